@@ -53,6 +53,7 @@ from foldyn.cases import (
     Rayleigh as Rayleigh,
     Spring as Spring,
     State as State,
+    StrainDamping as StrainDamping,
     Step as Step,
     Table as Table,
     Temperature as Temperature,

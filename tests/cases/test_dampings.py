@@ -50,6 +50,7 @@ def test_one_is_kept_as_given_and_several_add_up():
                 fd.Dashpot(0.5, between=[(3, 4), (0, 8)], direction=(1, 2, 0)),
             ],
         ),
+        ([fd.Rayleigh(0.1), fd.StrainDamping(1e-4)], []),
         ([fd.CreaseDamping(1e-3, [1, 2]), fd.CreaseDamping(2e-3, "valley")], []),
     ],
 )
@@ -75,6 +76,12 @@ def test_stored_and_read_back(damping, supports, tmp_path):
         (
             '[damping]\nmodal = { ratios = 0.02, count = 2, state = "start" }\n',
             fd.ModalDamping(0.02, 2, "start"),
+            (),
+        ),
+        ("[damping]\nstrain = 1e-4\n", fd.StrainDamping(1e-4), ()),
+        (
+            "[damping]\nstrain = { beta = 1e-4 }\nalpha = 0.1\n",
+            (fd.Rayleigh(0.1), fd.StrainDamping(1e-4)),
             (),
         ),
         ("[damping]\ncreases = 0.001\n", fd.CreaseDamping(0.001), ()),
@@ -108,6 +115,7 @@ def test_case_files(text, damping, supports, tmp_path):
         ("[damping]\nmodal = { ratio = 1 }\n", "damping.modal.ratio: .*did you mean 'ratios'"),
         ("[damping]\nmodal = { count = 1 }\n", "damping.modal.ratios: missing"),
         ("[damping]\nmodal = { ratios = [0.1], count = 1 }\n", "damping.modal.count = 1: .*leave"),
+        ("[damping]\nstrain = -1\n", "damping.strain = -1: must be at least 0"),
         ("[damping]\ncreases = [99]\n", r"damping.creases = \[99\]: must be a number"),
         ("[damping]\ncreases = { coefficient = 1, creases = [99] }\n", "crease 99 is out of range"),
         ("[damping]\ncreases = [{ coefficient = 1 }, {}]\n", r"creases\[1\].coefficient: missing"),

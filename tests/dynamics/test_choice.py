@@ -9,6 +9,7 @@ from oscillators import MASS, linear_law, oscillator, released
 import foldyn as fd
 from foldyn.dynamics import METHODS, prepare
 from foldyn.dynamics.method_choice import frequency, vibrating_share
+from foldyn.errors import FoldynWarning, MotionInterrupted
 from foldyn.studies import find_case
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
@@ -46,7 +47,72 @@ def test_an_impact_is_explicit():
     v = np.zeros(case.structure.nodes.shape)
     v[3, 0] = 5.0  # one node alone: its bars vibrate
     kicked = fd.Case(case.structure, supports, damping=fd.Rayleigh(1.0))
-    assert chosen(kicked, 0.1, initial=fd.State(velocity=v))[0] == "rk4"
+    assert chosen(kicked, 0.1, initial=fd.State(velocity=v))[0] == "dormand_prince"
+
+
+KICK = fd.State(velocity=np.outer(np.arange(13) == 7, [1.0, 0.0, 0.0]))
+DAMPED = fd.Rayleigh(0.1)
+
+
+def test_velocities_that_shake_the_bars_get_steps_that_resolve_them():
+    """RK4 takes the energy out of vibrations near its critical step, whatever damps the sheet."""
+    case = fd.Case(miura(), SUPPORTS, damping=DAMPED)
+    motion = fd.simulate(case, 0.2, "auto", initial=KICK, every=0.01)
+    assert motion.attrs["method"] == "dormand_prince"
+    assert motion.attrs["energy_error"] < 2e-3
+    assert "% of the initial kinetic energy is in vibrations" in motion.attrs["method_reason"]
+    with pytest.warns(FoldynWarning, match="the energy balance of the motion is off"):
+        damped = fd.simulate(case, 0.2, "rk4", initial=KICK, every=0.01)
+    assert damped.attrs["energy_error"] > 0.1
+    thick = fd.discretize(miura().pattern, SHEET, preset="plate")
+    slow = fd.modes(fd.Case(thick, SUPPORTS), 1).shape[0].values
+    smooth = fd.State(velocity=1e-3 * slow / np.abs(slow).max())
+    assert chosen(fd.Case(thick, SUPPORTS, damping=DAMPED), 0.2, initial=smooth)[0] == "rk4"
+
+
+def test_a_motion_whose_energies_do_not_balance_is_computed_anew(tmp_path):
+    """What the choice does not look at: a start with stretched bars."""
+    case, start = fd.Case(miura(), SUPPORTS, damping=DAMPED), fd.State(0.01 * KICK.velocity)
+    kept = {"store": tmp_path / "run.nc", "checkpoint": 1e-9}
+    why = 'anew with dormand_prince: with rk4.* is off by .* method = "dormand_prince" saves'
+    with pytest.warns(FoldynWarning, match=why):
+        motion = fd.simulate(case, 0.2, "auto", initial=start, every=0.01, **kept)
+    assert motion.attrs["method"] == "dormand_prince"
+    assert motion.attrs["energy_error"] < 0.01
+    assert "computed anew: with rk4 the energy" in motion.attrs["method_reason"]
+    alone = fd.simulate(case, 0.2, "dormand_prince", initial=start, every=0.01)
+    assert np.array_equal(motion.displacement, alone.displacement)
+    read = fd.simulate(case, 0.2, "auto", initial=start, every=0.01, **kept, resume=True)
+    assert read.attrs["wall_seconds"] == motion.attrs["wall_seconds"]  # not computed again
+
+
+def test_a_second_attempt_that_was_cut_off_goes_on(tmp_path):
+    case, start = fd.Case(miura(), SUPPORTS, damping=DAMPED), fd.State(0.01 * KICK.velocity)
+    given = {"initial": start, "every": 0.01, "store": tmp_path / "run.nc", "checkpoint": 1e-9}
+    reached = []
+
+    def stop(now):
+        reached.append(now.time)
+        if len(reached) > 3 and 0.05 < now.time < 0.2 and min(reached[-3:]) < max(reached):
+            raise KeyboardInterrupt
+
+    with pytest.warns(FoldynWarning, match="anew"), pytest.raises(MotionInterrupted):
+        fd.simulate(case, 0.2, "auto", progress=stop, **given)
+    motion = fd.simulate(case, 0.2, "auto", resume=True, **given)
+    assert motion.attrs["method"] == "dormand_prince"
+    alone = fd.simulate(case, 0.2, "dormand_prince", initial=start, every=0.01)
+    assert np.array_equal(motion.displacement, alone.displacement)
+
+
+def test_a_lasting_motion_is_computed_anew_with_shorter_steps():
+    """The errors of central differences do not grow; those of other explicit methods add up."""
+    case = fd.Case(miura(), SUPPORTS)
+    why = "anew with steps of .*: with steps of .*; dt = .* saves"
+    with pytest.warns(FoldynWarning, match=why):
+        motion = fd.simulate(case, 40.0, "auto", initial=KICK, every=0.1)
+    assert motion.attrs["method"] == "central_difference"
+    assert motion.attrs["energy_error"] < 0.01
+    assert motion.sizes["time"] == 401
 
 
 def test_stiff_damping_is_implicit():
@@ -75,7 +141,7 @@ def test_what_nothing_damps_gets_a_method_that_conserves():
     v = np.zeros((13, 3))
     v[[6, 7, 8], 0] = 0.01
     state = fd.State(velocity=v)
-    assert chosen(fd.Case(miura(), SUPPORTS), 0.01, initial=state)[0] == "rk4"
+    assert chosen(fd.Case(miura(), SUPPORTS), 0.01, initial=state)[0] == "dormand_prince"
     assert chosen(fd.Case(miura(), SUPPORTS), 100.0, initial=state)[0] == "central_difference"
     # a thin sheet, whose bars are far stiffer than its folds, let go from a slightly bent shape
     thin = fd.discretize(

@@ -24,6 +24,7 @@ from foldyn.cases.damping import (
     Damping,
     ModalDamping,
     Rayleigh,
+    StrainDamping,
     dampings,
     dampings_of,
 )
@@ -252,7 +253,7 @@ def _dampings(kind: Any) -> PlainValidator:
 
 
 class DampingSection(Section):
-    """[damping]: Rayleigh coefficients, or two damping ratios; modes and creases."""
+    """[damping]: Rayleigh coefficients, or two damping ratios; modes, creases, strain rates."""
 
     alpha: Annotated[float, Field(ge=0)] = 0.0
     beta: Annotated[float, Field(ge=0)] = 0.0
@@ -260,6 +261,7 @@ class DampingSection(Section):
     state: Annotated[str, one_of(STATES)] = "rest"
     modal: Annotated[Any, _dampings(ModalDamping)] = ()
     creases: Annotated[Any, _dampings(CreaseDamping)] = ()
+    strain: Annotated[Any, _dampings(StrainDamping)] = ()
 
     @model_validator(mode="after")
     def _either(self) -> Self:
@@ -272,7 +274,7 @@ class DampingSection(Section):
 
     def made(self) -> Damping | tuple[Damping, ...]:
         """The damping."""
-        others = [*self.modal, *self.creases]
+        others = [*self.modal, *self.creases, *self.strain]
         if others and not self.model_fields_set & {"alpha", "beta", "ratios"}:
             return dampings(others)
         return dampings([self._rayleigh(), *others])

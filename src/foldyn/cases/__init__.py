@@ -3,7 +3,7 @@
 from foldyn.cases import histories, loads
 from foldyn.cases.case import Case
 from foldyn.cases.contact import Contact, Plane
-from foldyn.cases.damping import CreaseDamping, ModalDamping, Rayleigh
+from foldyn.cases.damping import CreaseDamping, ModalDamping, Rayleigh, StrainDamping
 from foldyn.cases.dashpots import Dashpot
 from foldyn.cases.histories import *  # noqa: F403 - what it lists
 from foldyn.cases.history import Function, as_history
@@ -32,6 +32,7 @@ __all__ = [
     "Rayleigh",
     "Spring",
     "State",
+    "StrainDamping",
     "as_history",
     "resolve_nodes",
     "select",

@@ -47,7 +47,7 @@ class Case(Supported, Loaded, Damped):
         motions of the base; none by default (free motion is legal in dynamics).
     loads : sequence of Force, Gravity, Actuate and the other kinds of `LOADS`
         Forces, gravity, pressure, creases that fold by themselves; none by default.
-    damping : Rayleigh, ModalDamping, CreaseDamping, or a sequence of them
+    damping : Rayleigh, ModalDamping, CreaseDamping, StrainDamping, or a sequence of them
         Damping; none by default. Several add up.
     masses : sequence of PointMass
         What nodes carry beside the mass of the sheet; none by default.
@@ -171,10 +171,7 @@ class Case(Supported, Loaded, Damped):
         body = self.elastic_body
         if self.contact is None:
             return body
-        held = self.fixed & ~self.imposed
-        for vector, _ in self.base_terms:
-            held &= vector == 0.0
-        still = np.asarray(held.all(axis=1))
+        still = np.all(self.still, axis=1)
         return TouchingBody(body, self.contact.sheets(self.structure, still))
 
     @cached_property

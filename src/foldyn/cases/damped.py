@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.damping import CreaseDamping, Damping, ModalDamping, Rayleigh
+from foldyn.cases.damping import CreaseDamping, Damping, ModalDamping, Rayleigh, StrainDamping
 from foldyn.cases.dashpots import Dashpot
-from foldyn.errors import Faults
+from foldyn.errors import Faults, InputError
 from foldyn.structures.discretized import read_only
 
 
@@ -26,6 +26,8 @@ class Damped:
         Damping ratios of modes, if there are any.
     crease_damping : ndarray, shape (nf,)
         Damping of each fold, N m s/rad per m of crease.
+    strain_damping : float
+        Damping of strain rates, s.
     dashpots : tuple of (str, Dashpot)
         Those among the supports, with their places for messages.
     damped : bool
@@ -50,6 +52,12 @@ class Damped:
             if isinstance(part, CreaseDamping):
                 with faults.collected():
                     part.per_length(self.structure, "damping")
+        if self.strain_damping and self.structure.body.strains() is None:
+            with faults.collected():
+                raise InputError(
+                    "damping: StrainDamping takes bars and hinges, and the panels of this model "
+                    "bend as plates; take CreaseDamping, or Rayleigh for what hardly turns"
+                )
 
     @cached_property
     def rayleigh(self) -> Rayleigh:
@@ -68,6 +76,11 @@ class Damped:
         none = np.zeros(len(self.structure.folds))
         return read_only(sum((part.per_length(self.structure, "damping") for part in parts), none))
 
+    @property
+    def strain_damping(self) -> float:
+        """See the class."""
+        return next((part.beta for part in self.dampings if isinstance(part, StrainDamping)), 0.0)
+
     @cached_property
     def dashpots(self) -> tuple[tuple[str, Dashpot], ...]:
         """See the class."""
@@ -80,4 +93,5 @@ class Damped:
         rayleigh = self.rayleigh.alpha > 0.0 or self.rayleigh.beta > 0.0
         modal = self.modal_damping is not None and bool(np.any(self.modal_damping.ratios))
         dashpots = any(dashpot.coefficient > 0.0 for _, dashpot in self.dashpots)
-        return rayleigh or modal or dashpots or bool(self.crease_damping.any())
+        strain = self.strain_damping > 0.0
+        return rayleigh or modal or dashpots or strain or bool(self.crease_damping.any())

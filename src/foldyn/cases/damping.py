@@ -26,7 +26,8 @@ STATES = ("rest", "start")
 class Rayleigh:
     """Damping matrix C = alpha M + beta K0, K0 the tangent stiffness at a stated state.
 
-    A motion of angular frequency w is damped with the ratio alpha / (2 w) + beta w / 2.
+    A motion of angular frequency w is damped with the ratio alpha / (2 w) + beta w / 2. K0 is
+    constant, so beta resists rotations too: `StrainDamping` is for what turns far.
 
     Parameters
     ----------
@@ -210,8 +211,36 @@ class CreaseDamping(Part):
         return damped
 
 
-Damping = Rayleigh | ModalDamping | CreaseDamping
-DAMPINGS: tuple[type[Damping], ...] = (Rayleigh, ModalDamping, CreaseDamping)
+@brief
+@dataclass(frozen=True)
+class StrainDamping(Part):
+    """Damping of the rates at which bars stretch and hinges turn, each by beta times its stiffness.
+
+    That of a Kelvin-Voigt material: the force of each bar and hinge is that of its elongation or
+    turn plus beta times the rate of it, along its direction now. So it is right for motions of any
+    size, and takes nothing from rigid rotations. For small motions about rest it is beta K0 (see
+    `Rayleigh`): a vibration of angular frequency w is damped with the ratio beta w / 2. Hinges
+    count with the slope of their law at rest, and springs, which have dashpots, not at all.
+
+    Parameters
+    ----------
+    beta : float
+        Coefficient (s), at least 0.
+    """
+
+    beta: float
+
+    keys = {"beta": "beta"}
+    key: ClassVar[str] = "strain"
+    several: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        """Check the argument."""
+        object.__setattr__(self, "beta", number("beta", self.beta, least=0.0))
+
+
+Damping = Rayleigh | ModalDamping | CreaseDamping | StrainDamping
+DAMPINGS: tuple[type[Damping], ...] = (Rayleigh, ModalDamping, CreaseDamping, StrainDamping)
 """All kinds. In a table of damping each stands under its `key`, without one in the table itself."""
 
 

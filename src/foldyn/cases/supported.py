@@ -84,6 +84,14 @@ class Supported:
         """Numbers 3 * node + axis that are free, increasing; all others depend on them."""
         return self.constraints.free
 
+    @cached_property
+    def still(self) -> NDArray[np.bool_]:
+        """Whether supports keep each node where it stands along each axis, shape (n, 3)."""
+        held = self.fixed & ~self.imposed
+        for vector, _ in self.base_terms:
+            held &= vector == 0.0
+        return read_only(held)
+
     @property
     def imposed_slaves(self) -> NDArray[np.int64]:
         """Numbers of the dofs that `Impose` along a direction moves with others of their nodes."""

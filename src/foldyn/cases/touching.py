@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from foldyn.cases.case import Case
+from foldyn.cases.constraints import AGREES
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.mechanics.crossings import crossing_panels
+
+STRIDE = 5  # at every so manieth state panels that cross are looked for
 
 
 def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
@@ -41,7 +47,7 @@ def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
     for i, plane in enumerate(case.contact.planes):
         point, normal = np.array(plane.point) + moved[i], np.array(plane.normal)
         height = (x[surface] - point) @ normal / np.linalg.norm(normal)
-        free = ~case.fixed[surface].all(axis=1)
+        free = ~case.still[surface].all(axis=1)
         if free.any() and height[free].min() <= 0.0:
             behind = int(np.argmin(np.where(free, height, np.inf)))
             raise InputError(
@@ -64,6 +70,90 @@ def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
             FoldynWarning,
             stacklevel=4,
         )
+
+
+def check_driven(case: Case, states: Iterable[tuple[str, NDArray, NDArray]]) -> None:
+    """Refuse supports and planes that would go through each other, whatever the rest does.
+
+    Parameters
+    ----------
+    case : Case
+        With contact.
+    states : iterable of (str, ndarray of shape (n, 3), ndarray of shape (p, 3))
+        When, as "t = 0.1 s"; displacements (m) of the nodes, as far as supports decide them, and of
+        the planes. The first is the start.
+
+    Raises
+    ------
+    InputError
+        A node of which supports decide how far it is from a plane comes behind it; or panels of
+        which supports move all nodes cross.
+    """
+    contact, structure = case.contact, case.structure
+    assert contact is not None
+    panels, triangles = structure.triangle_panel, structure.triangles
+    decided = np.all([_decided(case, axis) for axis in np.eye(3)], axis=0)
+    centers, mean = _followers(case, decided)
+    decided[centers] = True
+    held = decided[triangles].all(axis=1)
+    look = contact.panels and bool(case.imposed_terms) and len(np.unique(panels[held])) > 1
+    planes, still = [], case.still.all(axis=1)  # planes leave these alone
+    for plane in contact.planes:
+        normal = np.array(plane.normal) / np.linalg.norm(plane.normal)
+        meeting = _decided(case, normal) & ~still
+        nodes = np.intersect1d(triangles, np.flatnonzero(meeting))
+        planes.append((np.array(plane.point), normal, nodes))
+    before, crossed = [], np.zeros((0, 2), np.int64)
+    for k, (when, u, moved) in enumerate(states):
+        x = structure.nodes + u
+        for i, (point, normal, nodes) in enumerate(planes):
+            height = (x[nodes] - point - moved[i]) @ normal
+            before += [height > 0.0] if k == 0 else []
+            behind = np.flatnonzero(before[i] & (height <= 0.0))
+            if behind.size:
+                raise InputError(
+                    f": at {when} it has reached node {nodes[behind[0]]}, whose distance from it "
+                    "supports decide: neither gives way. Stop the plane or the support before, or "
+                    "let the node move along the plane's normal",
+                    f"contact.planes[{i}]",
+                )
+        if look and k % STRIDE == 0:
+            x[centers] = structure.nodes[centers] + mean @ u
+            pairs = crossing_panels(x, triangles[held], panels[held])
+            crossed = pairs if k == 0 else crossed
+            new = [pair for pair in pairs.tolist() if pair not in crossed.tolist()]
+            if new:
+                raise InputError(
+                    f"supports: at {when} panels {new[0][0]} and {new[0][1]}, all of whose nodes "
+                    "supports hold or move, have passed through each other: neither gives way. "
+                    "Stop before, or free some of their nodes"
+                )
+
+
+def _decided(case: Case, direction: NDArray) -> NDArray:
+    """Whether supports alone decide how far each node (n,) moves along a unit vector."""
+    ties, nodes = case.constraints, len(case.structure.nodes)
+    along = sparse.csr_array(sparse.kron(sparse.eye_array(nodes), direction[None]))
+    if ties:
+        along = sparse.csr_array(along @ ties.basis)
+    return np.asarray(abs(along[:, ties.free]).sum(axis=1)).ravel() <= AGREES
+
+
+def _followers(case: Case, decided: NDArray) -> tuple[NDArray, sparse.csr_array]:
+    """Centers (c,) of panels whose corners supports decide; from motions (n, 3) what they follow.
+
+    decided : (n,) which nodes supports decide.
+    """
+    structure = case.structure
+    tri, size = structure.triangles, len(structure.nodes)
+    ends = np.concatenate([tri[:, [0, 1]], tri[:, [1, 2]], tri[:, [2, 0]]])
+    ends = np.unique(np.concatenate([ends, ends[:, ::-1]]), axis=0)
+    beside = sparse.csr_array((np.ones(len(ends)), ends.T), (size, size))
+    centers = np.asarray(getattr(structure, "centers", ()), np.int64)
+    centers = centers[centers >= 0]  # others have none
+    centers = centers[~decided[centers] & (beside[centers] @ ~decided == 0)]
+    mean = sparse.csr_array(beside[centers] / beside[centers].sum(axis=1)[:, None])
+    return centers, mean
 
 
 def _check_structure(case: Case) -> None:

@@ -73,15 +73,27 @@ def dampers(case: Case) -> Dampers:
 def _elements(
     case: Case, body: Body, nodes: NDArray, pairs: NDArray, strength: list[NDArray]
 ) -> Viscous:
-    """Axial dashpots between pairs (p, 2) of nodes, and the hinges of damped creases."""
+    """Axial dashpots between pairs (p, 2) of nodes, damped creases, and what strains a sheet."""
     damping = case.crease_damping
     hinges = body.fold_hinges() if damping.any() else no_fold_hinges()
     unknown = np.setdiff1d(np.flatnonzero(damping), hinges.fold)
     if unknown.size:
         raise InputError(f"damping: this structure cannot damp crease {unknown[0]}: leave it out")
     damped = damping[hinges.fold] > 0.0
-    return viscous(
-        pairs, nodes[pairs[:, 1]] - nodes[pairs[:, 0]], np.concatenate(strength),
-        hinges.nodes[damped], hinges.corners[damped], hinges.hidden[damped], hinges.per_hidden,
-        (damping[hinges.fold] * hinges.length)[damped],
-    )  # fmt: skip
+    axial, along = np.concatenate(strength), nodes[pairs[:, 1]] - nodes[pairs[:, 0]]
+    rows, corners, hidden = hinges.nodes[damped], hinges.corners[damped], hinges.hidden[damped]
+    turning = (damping[hinges.fold] * hinges.length)[damped]
+    if beta := case.strain_damping:
+        strains = body.strains()
+        assert strains is not None  # or the case would have refused it
+        stiff = strains.hinge_stiffness > 0.0
+        pairs, along = (
+            np.concatenate([pairs, strains.bars]),
+            np.concatenate([along, strains.vector]),
+        )
+        axial = np.concatenate([axial, beta * strains.bar_stiffness])
+        rows = np.concatenate([rows, strains.hinges[stiff]])
+        corners = np.concatenate([corners, strains.corners[stiff]])
+        hidden = np.concatenate([hidden, np.full((int(stiff.sum()), 2), -1)])
+        turning = np.concatenate([turning, beta * strains.hinge_stiffness[stiff]])
+    return viscous(pairs, along, axial, rows, corners, hidden, hinges.per_hidden, turning)

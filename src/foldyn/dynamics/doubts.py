@@ -8,6 +8,12 @@ from foldyn.dynamics.course import StepPlan
 INACCURATE = 1e-2  # relative energy error above which the user is warned
 
 
+def is_off(balance: Balance, rounding: Rounding) -> bool:
+    """Whether the energies of a motion do not balance, rounding apart."""
+    hidden = rounding.energy(balance.largest, balance.farthest)
+    return balance.relative > INACCURATE and balance.scale > hidden
+
+
 def doubts(balance: Balance, rounding: Rounding, plan: StepPlan, size: float, remedy: str) -> str:
     """Warning about a motion; empty if there is none.
 

@@ -7,6 +7,7 @@ import os
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from foldyn.dynamics.initial import (
     warn_of_unstable_damping,
 )
 from foldyn.dynamics.keeping import SECONDS, check_keeping
-from foldyn.dynamics.method_choice import AUTO, choose
+from foldyn.dynamics.method_choice import AUTO, Choice, choose
 from foldyn.dynamics.methods import METHODS, Integrator, method_of, suited, with_mass
 from foldyn.dynamics.modal_damping import modal_rows
 from foldyn.dynamics.motion import Motion
@@ -47,6 +48,7 @@ TOLERANCE = 1e-6  # relative error of a step that is chosen by it
 IMPLICIT_TOLERANCE = 1e-5  # the same of methods of order 2: 130 steps in a vibration's period
 LARGEST_STEP = 1e-3  # of the largest step: one that is short against loads that steps resolve
 FLOOR = 1e-8  # of the longest bar: the least displacement that errors are measured by
+FINER = 4  # times shorter steps where those of central differences were too long
 SPAN = 0.05  # of a step: distance of the points between which a user's history is differentiated
 
 
@@ -76,7 +78,8 @@ def simulate(
         Simulated time (s). The last step is the last that does not go beyond it.
     method : str, default "rk4"
         Integrator, a name of `foldyn.dynamics.METHODS`, or "auto" for the one that should be
-        quickest: the documentation has a page on them.
+        quickest, and another one where its energies do not balance: the documentation has a page on
+        them.
     dt : float, optional
         Time step (s). Explicit methods: without it half the critical step, shortened to divide
         `every`. Implicit methods and `dormand_prince`, which choose their steps by their error:
@@ -138,7 +141,8 @@ def simulate(
     Warns
     -----
     FoldynWarning
-        The energy balance is off by more than 1 % of the energies at play.
+        The energy balance is off by more than 1 % of the energies at play; or was, and "auto"
+        has computed the motion anew.
     CrossingWarning
         Panels pass through each other at a sample that was looked at.
 
@@ -191,16 +195,16 @@ def prepare(
         )
     start = number("start", start, unit="s")
     u, v = check_start(case, initial)
-    check_touching(case, u, float(start))
+    check_touching(case, u, float(start), float(start) + duration)
     remembered = check_state(case, initial.memory if initial else None)
     modal = modal_rows(case, u)
-    reason = ""
+    chosen = Choice(integrator.name, "")
     if method == AUTO:
         timing.counted_in_seconds(duration, every)
-        method, reason = choose(
+        chosen = choose(
             case, u, v, float(start), duration, dt, every, tolerance, IMPLICIT_TOLERANCE, modal
         )
-        integrator = method_of(method)
+        integrator = method_of(chosen.method)
     integrator = _with_radius(integrator, spectral_radius)
     if not integrator.implicit or not is_lumped(case.mass):
         check_mass(case.mass, case.constraints.determined)
@@ -243,7 +247,17 @@ def prepare(
         case, {} if sample is None else sample, u, v, plan.start, contact_quantities(case)
     )
     state = u, v, remembered, initial.continuation if initial else None
-    return Motion(case, integrator, plan, critical, force, state, packed, sampler, reason)
+    better = None
+    if chosen.better:
+        if chosen.better == chosen.method:
+            dt, every = plan.dt / FINER, plan.every * FINER
+        better = partial(
+            prepare, case, duration, chosen.better, dt, every, initial, force, tolerance, start,
+            None, sample, kept,
+        )  # fmt: skip
+    return Motion(
+        case, integrator, plan, critical, force, state, packed, sampler, chosen.reason, better
+    )
 
 
 def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrator:
@@ -290,6 +304,7 @@ def _warn_of_damping(case: Case, method: Integrator, u: NDArray, critical: float
     fast = [f"beta = {case.rayleigh.beta:g} s"] if case.rayleigh.beta > 0.0 else []
     fast += ["the dashpots"] if case.dashpots else []
     fast += ["the damping of the creases"] if case.crease_damping.any() else []
+    fast += ["the damping of strain rates"] if case.strain_damping else []
     if not fast:
         return
     supports = [support for support in case.supports if not isinstance(support, Dashpot)]
@@ -297,7 +312,7 @@ def _warn_of_damping(case: Case, method: Integrator, u: NDArray, critical: float
     without = method.critical_step(slow, u)
     if without > DAMPING_COST * critical:
         warnings.warn(
-            f"{' and '.join(fast)} make{'' if len(fast) > 1 or not case.rayleigh.beta else 's'} "
+            f"{' and '.join(fast)} make{'' if len(fast) > 1 or case.dashpots else 's'} "
             f"the critical step {without / critical:.0f} "
             f"times smaller ({critical:.3g} s instead of {without:.3g} s): an explicit method must "
             "resolve the damping of the fastest vibration; an implicit one need not: "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from foldyn.algebra.superlu import SingularTangentError
 from foldyn.cases import Case, Continuation, State
 from foldyn.cases.constraints import AGREES
 from foldyn.cases.ties import check_tied
-from foldyn.cases.touching import check_contact
+from foldyn.cases.touching import check_contact, check_driven
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import TALLY, Course, StepPlan
 from foldyn.dynamics.inertia import moving_energy
@@ -28,6 +29,7 @@ from foldyn.values import whole
 
 AXES = "xyz"
 FIRST = 0.15  # first step over the largest one, times the fifth root of the tolerance
+LOOKS = 501  # times at which supports and planes are looked at, beside the corners of histories
 ZERO = 1e-10  # of the largest stiffness: eigenvalues of less are none
 
 
@@ -91,24 +93,48 @@ def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
         if array.shape != shape:
             raise InputError(f"initial: {name} of shape {array.shape}: the case has {shape}")
         pair.append(np.ascontiguousarray(array))
-    held = case.fixed & ~case.imposed
-    for vector, _ in case.base_terms:
-        held &= vector == 0.0
-    if (pair[1][held] != 0.0).any():
-        node = int(np.argwhere((pair[1] != 0.0) & held)[0][0])
+    if (pair[1][case.still] != 0.0).any():
+        node = int(np.argwhere((pair[1] != 0.0) & case.still)[0][0])
         raise InputError(f"initial: velocity of node {node} is not zero along a supported axis")
     check_tied(case, pair[0], "initial")
     _check_tied_velocity(case, pair[1])
     return pair[0], pair[1]
 
 
-def check_touching(case: Case, u: NDArray, start: float) -> None:
-    """Refuse displacements (n, 3) with contact at the time `start` (s); see `check_contact`."""
+def check_touching(case: Case, u: NDArray, start: float, end: float) -> None:
+    """Refuse contact that cannot be, in a motion from displacements u (n, 3) at `start` (s)."""
     planes = () if case.contact is None else case.contact.planes
-    moved = np.zeros((len(planes), 3))
-    for plane, history in case.obstacle_terms:
-        moved[plane] = float(history(start)) * np.array(planes[plane].motion)
-    check_contact(case, u, moved)
+
+    def moved(factors: Iterable[float]) -> NDArray:
+        out = np.zeros((len(planes), 3))
+        for (plane, _), factor in zip(case.obstacle_terms, factors, strict=True):
+            out[plane] = factor * np.array(planes[plane].motion)
+        return out
+
+    obstacles = [history for _, history in case.obstacle_terms]
+    check_contact(case, u, moved(float(history(start)) for history in obstacles))
+    driven = (*case.imposed_terms, *case.base_terms)
+    if case.contact is None or not (driven or obstacles):
+        return
+    given = [*obstacles, *(history for _, history in driven)]
+    turns = [t for history in given for t in history.knots() or () if start < t < end]
+    times = np.union1d(np.linspace(start, end, LOOKS), turns)
+    try:
+        factors = np.array([np.broadcast_to(history(times), times.shape) for history in given])
+    except InputError:  # a function that fails: the motion will stop there, and say why
+        return
+    along, shapes = factors[len(obstacles) :], [shape for shape, _ in driven]
+    check_driven(
+        case,
+        (
+            (
+                f"t = {time:.6g} s",
+                sum((f * s for f, s in zip(along[:, k] - along[:, 0], shapes, strict=True)), u),
+                moved(factors[: len(obstacles), k]),
+            )
+            for k, time in enumerate(times)
+        ),
+    )
 
 
 def _check_tied_velocity(case: Case, velocity: NDArray) -> None:

@@ -128,6 +128,11 @@ class Keeping:
             result.close()
         return result if same else None
 
+    def keeps(self, about: Mapping[str, Any]) -> bool:
+        """Whether what is kept is this motion."""
+        kept, now = self._read(), json.loads(json.dumps(about))
+        return kept is not None and now.items() <= kept[_ABOUT]["motion"].items()
+
     def begin(
         self, about: Mapping[str, Any], rows: Mapping[str, tuple[int, ...]]
     ) -> dict[str, NDArray] | None:

@@ -9,6 +9,7 @@ samples.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from scipy import sparse
 from foldyn.algebra.solvers import factorized
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.cases import Case
+from foldyn.dynamics.doubts import INACCURATE
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.dynamics.methods import METHODS, suited
 from foldyn.dynamics.modal_damping import ModalRows
@@ -30,12 +32,26 @@ FEWEST = 50.0  # steps of an implicit run
 MOST_TIMES = 4000  # at which loads are looked at
 AT_REST = 1e-6  # of the loads: out-of-balance forces below that set nothing in motion
 SMOOTH = 1e-3  # of a vibration: the least share that is assumed
+RESOLVED = 0.2  # rad that a vibration may turn in a step: RK4 loses 1 % of its energy in 11,000
+ACCURATE = "dormand_prince"
+DEARER = 10.0  # times the cost of a motion: what another one may cost that is more accurate
+
+
+class Choice(NamedTuple):
+    """A method, why it was chosen, and one for where its energies turn out not to balance.
+
+    That one is the same method, with a shorter step, where its errors do not add up over time.
+    """
+
+    method: str
+    reason: str
+    better: str | None = None
 
 
 def choose(
     case: Case, u: NDArray, v: NDArray, start: float, duration: float, dt: float | None,
     every: int | float, tolerance: float | None, default: float, modal: ModalRows,
-) -> tuple[str, str]:  # fmt: skip
+) -> Choice:  # fmt: skip
     """The method that should be quicker for a motion from u and v (n, 3) at `start`, and why.
 
     dt, every and tolerance are those of `simulate`, default what implicit methods take without;
@@ -46,26 +62,33 @@ def choose(
     implicit = "energy_momentum" if conserved else "generalized_alpha"
     has_mass = not case.structure.massless or case.structure.condensed is not None
     if case.contact is not None and has_mass and case.remembering:
-        return suited("rk4", case).name, "explicit: contact, and laws with memory"
+        return Choice(suited("rk4", case).name, "explicit: contact, and laws with memory")
     if case.contact is not None and has_mass:
-        return suited("dormand_prince", case).name, "explicit: its error resolves impacts"
+        return Choice(suited(ACCURATE, case).name, "explicit: its error resolves impacts")
     if massless := case.structure.massless:
-        return "generalized_alpha", f"implicit: {massless} have no mass"
+        return Choice("generalized_alpha", f"implicit: {massless} have no mass")
     if (case.mass.diagonal() <= 0.0)[~case.constraints.determined.all(axis=1)].any():
-        return implicit, "implicit: nodes without mass have no acceleration"
+        return Choice(implicit, "implicit: nodes without mass have no acceleration")
     if case.remembering and tolerance is not None:
-        return implicit, "implicit: explicit steps that vary do not take laws with memory"
+        return Choice(implicit, "implicit: explicit steps that vary do not take laws with memory")
     omega = frequency(case, u, v, duration)
     lasting = conserved and duration * omega > 2.0 * math.pi * LONG
-    explicit = "central_difference" if lasting else "rk4"
-    if tolerance is not None:
-        explicit = "dormand_prince"
+    explicit, why = "central_difference" if lasting else "rk4", ""
     critical = METHODS[explicit].critical_step(case, u, modal)
+    accurate = None if case.remembering else explicit if lasting else ACCURATE
+    if dt is not None and tolerance is None and dt > critical:
+        return Choice(implicit, f"implicit: dt is above the critical step of {critical:.2g} s")
+    step = DEFAULT_FRACTION * critical if dt is None else float(dt)
+    if tolerance is not None:
+        explicit, accurate = ACCURATE, None
+    elif accurate == ACCURATE and (share := fast_share(case, u, v, RESOLVED / step)) > INACCURATE:
+        why = f"{share:.0%} of the initial kinetic energy is in vibrations that steps of "
+        why = f"; {why}{step:.2g} s do not resolve"
+        explicit, accurate = ACCURATE, None
     if dt is not None and tolerance is None:
-        fits = dt <= critical
-        word, name = ("within", explicit) if fits else ("above", implicit)
-        kind = "explicit" if fits else "implicit"
-        return name, f"{kind}: dt is {word} the critical step of {critical:.2g} s"
+        reason = f"explicit: dt is within the critical step of {critical:.2g} s{why}"
+        return Choice(explicit, reason, accurate)
+    critical = METHODS[explicit].critical_step(case, u, modal)
     many = duration / (DEFAULT_FRACTION * critical)
     share = vibrating_share(case, u, v, start, duration, omega)
     few = CONTENT * duration * omega * (share / (12.0 * (tolerance or default))) ** (1.0 / 3.0)
@@ -79,8 +102,9 @@ def choose(
         f"{_seconds(costs[0])}, {_round(few)} implicit ones {_seconds(costs[1])}, by estimate"
     )
     if costs[0] <= costs[1]:
-        return explicit, f"explicit: {estimate}"
-    return implicit, f"implicit: {estimate}"
+        return Choice(explicit, f"explicit: {estimate}{why}", accurate)
+    within_reach = not case.remembering and costs[0] <= DEARER * costs[1]
+    return Choice(implicit, f"implicit: {estimate}", ACCURATE if within_reach else None)
 
 
 def _explicit_cost(case: Case, evaluations: int) -> float:
@@ -133,6 +157,26 @@ def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
         if kinetic > 0.0:
             square = max(square, float(shape @ (k @ shape)) / kinetic)
     return math.sqrt(square)
+
+
+def fast_share(case: Case, u: NDArray, v: NDArray, omega: float) -> float:
+    """Share of the kinetic energy of velocities v (n, 3) in vibrations about u above omega (rad/s).
+
+    A vibration of w counts with (w^2 / (w^2 + omega^2))^2 of its energy; hinges have at least their
+    nominal stiffness.
+    """
+    free, m = np.asarray(case.free_dofs), case.free_mass
+    moving = v.ravel()[free]
+    momentum = m @ moving
+    energy = float(moving @ momentum)
+    if energy == 0.0 or not math.isfinite(omega):
+        return 0.0
+    k = case.constraints.matrix(case.elastic_body.tangent(u, 1.0))[free][:, free]
+    try:
+        slow = factorized(sparse.csc_array(k + omega**2 * m)).solve(omega**2 * momentum)
+    except SingularTangentError:
+        return 0.0
+    return float((moving - slow) @ (m @ (moving - slow))) / energy
 
 
 def vibrating_share(

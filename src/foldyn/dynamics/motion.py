@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, Continuation
 from foldyn.dynamics.audit import Rounding, audited
 from foldyn.dynamics.course import Outcome, Samples, StepPlan
-from foldyn.dynamics.doubts import doubts
+from foldyn.dynamics.doubts import doubts, is_off
 from foldyn.dynamics.failures import failure, smaller_step
 from foldyn.dynamics.identity import identity, key_of
 from foldyn.dynamics.initial import begin
@@ -22,6 +23,7 @@ from foldyn.dynamics.methods import Compiled, Engine, Implicit, Integrator
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
+from foldyn.dynamics.second_attempt import announced, reason_of
 from foldyn.dynamics.stability import (
     MARGIN,
     damper_rate,
@@ -31,7 +33,8 @@ from foldyn.dynamics.stability import (
     stability_limit,
 )
 from foldyn.dynamics.system import Packed, place, scratch
-from foldyn.dynamics.timing import check_room, check_samples, expected_samples
+from foldyn.dynamics.timing import check_room, check_samples, expected_samples, steps_taken
+from foldyn.dynamics.turned import resists_turns, turns_told
 from foldyn.errors import (
     ComputationError,
     CrossingWarning,
@@ -54,6 +57,7 @@ EXPLODED = 1.0  # relative energy error above which the motion is stopped
 # Panels that cross are looked for at samples so far apart that it takes a small share of the time
 PER_LOOK = 500  # force evaluations of an explicit method from one to the next, at least
 IMPLICIT_WORK = 25  # how many of them one of an implicit method, with its solution, stands for
+LOOKS = 100  # samples at which panels that turn are looked at
 FEW = 1000  # triangles looked at that take no time to speak of
 
 
@@ -63,11 +67,12 @@ class Motion:
     def __init__(
         self, case: Case, method: Integrator, plan: StepPlan, critical: float, force: bool,
         state: tuple[NDArray, NDArray, NDArray | str | None, Continuation | None], packed: Packed,
-        sampler: Sampler, reason: str = "",
+        sampler: Sampler, reason: str = "", better: Callable[[], Motion] | None = None,
     ) -> None:  # fmt: skip
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force, self.reason = critical, force, reason
         self._state, self.packed, self._sampler = state, packed, sampler
+        self._better = better
         self._rounding = Rounding(packed.body)
         self._engine: Engine | None = None
         self._ended = int(Outcome.DONE), -1
@@ -94,8 +99,11 @@ class Motion:
         What is kept on the disk meanwhile stays there, with the samples of the result where there
         are many, until the result is saved.
         """
+        again = keeping is not None and keeping.resume and self._other
+        if keeping and again and keeping.keeps(again._identity()):
+            return again.run(progress, keeping)
         self._integrated(progress, keeping)
-        return self.result()
+        return self.result(progress)
 
     def samples(self, progress: bool | Reporter | None = None) -> Samples:
         """Integrate the motion; its samples alone, which do not carry the case."""
@@ -103,8 +111,14 @@ class Motion:
         self._judge()
         return self._output.written(self.stored)
 
-    def result(self) -> xarray.Dataset:
-        """What was integrated, with the warnings that it deserves."""
+    def result(self, progress: bool | Reporter | None = None) -> xarray.Dataset:
+        """What was integrated, with the warnings that it deserves.
+
+        Where the energies do not balance and there is a better method, it is computed anew.
+        """
+        self.audit()
+        if self._better is not None and is_off(self._output.balance, self._rounding):
+            return self._anew(progress)
         self._judge()
         crossings = self._crossings()
         if len(crossings.first):
@@ -128,10 +142,31 @@ class Motion:
             f"{at:.6g} s: {REMEDY}"
         )
 
+    @cached_property
+    def _other(self) -> Motion | None:
+        """The same motion by the better method, if there is one."""
+        other = self._better() if self._better else None
+        if other is not None:
+            other.reason = reason_of(other, self)
+        return other
+
+    def _anew(self, progress: bool | Reporter | None) -> xarray.Dataset:
+        assert self._other is not None
+        text = announced(self._other, self, self._output.balance.relative)
+        warnings.warn(text, FoldynWarning, stacklevel=5)
+        self._start()  # gives its samples' memory back
+        if self._keeping is not None:
+            self._keeping.remove()
+        return self._other.run(progress, self._keeping)
+
     def _judge(self) -> None:
         self.audit()
         size, remedy = float(self.course.tally.farthest), smaller_step(self)
-        if text := doubts(self._output.balance, self._rounding, self.plan, size, remedy):
+        texts = [doubts(self._output.balance, self._rounding, self.plan, size, remedy)]
+        if resists_turns(self.case, self.packed):
+            seen, scale = self._output.looked_at(self.stored, LOOKS), self._output.balance.scale
+            texts.append(turns_told(self.case, self.packed, self._state[0], *seen, scale))
+        for text in filter(None, texts):
             warnings.warn(text, FoldynWarning, stacklevel=5)
 
     def _integrated(self, progress: bool | Reporter | None, keeping: Keeping | None = None) -> None:
@@ -262,7 +297,10 @@ class Motion:
 
     def finished(self, keeping: Keeping) -> xarray.Dataset | None:
         """Its result, if it is finished and to be gone on with."""
-        return keeping.finished(key_of(self._identity()))
+        found = keeping.finished(key_of(self._identity()))
+        if found is None and keeping.resume and self._other is not None:
+            return self._other.finished(keeping)
+        return found
 
     def _fits(self, length: int) -> int:
         """Steps, at most `length`, for whose samples there is room."""
@@ -362,14 +400,9 @@ class Motion:
 
     def _statistics(self) -> dict[str, Any]:
         plan, tally, engine = self.plan, self.course.tally, self._engine
-        steps = int(tally.steps)
         facts: dict[str, Any] = {
             "method": self.method.name,
-            "dt": plan.dt,
-            "steps": plan.steps,
-            "start": plan.start,
-            "duration": plan.end - plan.start,
-            "every": plan.every,
+            **steps_taken(plan, tally),
             "critical_step": self.critical,
             "wall_seconds": self.seconds,
             "threads": engine.threads if engine else 1,
@@ -378,15 +411,5 @@ class Motion:
         }
         if self.reason:
             facts["method_reason"] = self.reason
-        if not plan.steps:
-            facts |= {
-                "dt": float(tally.time - plan.start) / max(steps, 1),
-                "steps": steps,
-                "every": plan.every or plan.interval,
-                "tolerance": plan.tolerance,
-                "refused_steps": int(tally.refused),
-                "smallest_step": float(tally.shortest) if steps else 0.0,
-                "largest_step": float(tally.longest),
-            }
         facts["force_evaluations"] = int(tally.evaluations)
         return facts | (engine.facts() if engine else {})

@@ -166,6 +166,16 @@ class Output:
         columns = self._on_disk(stored)
         return self.written(stored).displacement if columns is None else columns["displacement"]
 
+    def looked_at(self, stored: int, most: int) -> tuple[NDArray, NDArray]:
+        """Displacement and velocity (k, n, 3) at up to `most` samples from first to last."""
+        picks = np.unique(np.linspace(0, stored - 1, min(most, stored)).astype(np.int64))
+        columns, out = self._on_disk(stored), self.written(stored)
+        pair: Any = (out.displacement, out.velocity)
+        if columns is not None:
+            pair = columns["displacement"], columns["velocity"]
+        moved, moving = (np.array([each[k] for k in picks.tolist()]) for each in pair)
+        return moved, moving
+
     def time(self, sample: int) -> float:
         """Time (s) of a sample."""
         if sample >= self.window.first:

@@ -112,8 +112,8 @@ def frequency_bound(case: Case, u: ArrayLike | None = None) -> float:
 
 
 def damper_rate(case: Case, u: ArrayLike | None = None) -> float:
-    """Largest rate (1/s) at which dashpots and creases damp a motion about u (n, 3)."""
-    if not case.dashpots and not case.crease_damping.any():
+    """Largest rate (1/s) at which dashpots, creases and strains damp a motion about u (n, 3)."""
+    if not case.dashpots and not case.crease_damping.any() and not case.strain_damping:
         return 0.0
     return _largest_quotient(case, dampers(case).matrix(case.body.dofs(_state(case, u))))
 

@@ -97,6 +97,23 @@ def expected_samples(plan: StepPlan) -> int:
     return math.floor((plan.end - plan.start) / plan.interval * (1.0 + 1e-12) + 1e-9) + 1
 
 
+def steps_taken(plan: StepPlan, tally: np.record) -> dict[str, float]:
+    """Steps and samples of a motion, for its result."""
+    facts = {"start": plan.start, "duration": plan.end - plan.start}
+    if plan.steps:
+        return facts | {"dt": plan.dt, "steps": plan.steps, "every": plan.every}
+    steps = int(tally.steps)
+    return facts | {
+        "dt": float(tally.time - plan.start) / max(steps, 1),
+        "steps": steps,
+        "every": plan.every or plan.interval,
+        "tolerance": plan.tolerance,
+        "refused_steps": int(tally.refused),
+        "smallest_step": float(tally.shortest) if steps else 0.0,
+        "largest_step": float(tally.longest),
+    }
+
+
 def counted_in_seconds(duration: float, every: int | float) -> bool:
     """Whether a sampling interval is in seconds; refuses one that fits no motion."""
     every = single(every)

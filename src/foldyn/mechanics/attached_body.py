@@ -34,6 +34,7 @@ from foldyn.mechanics.block_matrix import (
 from foldyn.mechanics.body import (
     Blocks,
     Body,
+    Strains,
     Unstrained,
     largest_turn,
     unit_rows,
@@ -174,6 +175,17 @@ class AttachedBody(WrappedBody):
         turns = clamp_angles(self.clamps, self.nodal(q))[1]
         clamps = unit_rows(self.clamps.nodes, turns, self.size)
         return sparse.csr_array(sparse.vstack([self.inner.holds(q), springs, clamps]))
+
+    def strains(self) -> Strains | None:
+        """See `Body`; the wing of a clamp, whose edge is held, goes with the first of its ends."""
+        own, clamps = self.inner.strains(), self.clamps
+        if own is None:
+            return None
+        return own._replace(
+            hinges=np.concatenate([own.hinges, clamps.nodes[:, [0, 1, 2, 0]]]),
+            corners=np.concatenate([own.corners, clamps.points]),
+            hinge_stiffness=np.concatenate([own.hinge_stiffness, clamps.stiffness]),
+        )
 
     def turning_moments(self) -> float:
         """See `Body`."""

@@ -47,6 +47,17 @@ class Unstrained(NamedTuple):
     stretch: Callable[[NDArray], float]  # of bars in a motion (m,), over what their ends could do
 
 
+class Strains(NamedTuple):
+    """Bars, p of them, and hinges, h, with their stiffness at rest."""
+
+    bars: NDArray  # (p, 2) nodes
+    vector: NDArray  # (p, 3) from the first to the second at rest, m
+    bar_stiffness: NDArray  # (p,) N/m
+    hinges: NDArray  # (h, 4) nodes: axis j, k, wings i, l
+    corners: NDArray  # (h, 4, 3) where they are at rest, m
+    hinge_stiffness: NDArray  # (h,) N m/rad
+
+
 class FoldHinges(NamedTuple):
     """Hinges of the folds, k of them: a fold may have several in a row, each of them a part of it.
 
@@ -234,6 +245,10 @@ class Body(ABC):
     def bend_hinges(self) -> FoldHinges:
         """Hinges within panels, for models that bend by hinges."""
         return no_fold_hinges()
+
+    def strains(self) -> Strains | None:
+        """Its bars and hinges; None where panels bend as plates."""
+        return None
 
     def folded(self, rest: NDArray) -> Body:
         """The body with other rest angles (nr,), rad."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.materials import HingeLaw
-from foldyn.mechanics.body import Body, FoldHinges, SoftHinges
+from foldyn.mechanics.body import Body, FoldHinges, SoftHinges, Strains
 
 
 class WrappedBody(Body):
@@ -89,6 +89,10 @@ class WrappedBody(Body):
     def bend_hinges(self) -> FoldHinges:
         """See `Body`."""
         return self.inner.bend_hinges()
+
+    def strains(self) -> Strains | None:
+        """See `Body`."""
+        return self.inner.strains()
 
     def folded(self, rest: NDArray) -> Self:
         """See `Body`."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence, Sized
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence, Sized
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Gravity, State
 from foldyn.cases.ties import check_tied
-from foldyn.cases.touching import check_contact
+from foldyn.cases.touching import check_contact, check_driven
 from foldyn.errors import InputError
 from foldyn.materials.memory_law import VARIABLES
 from foldyn.memory import check_memory
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     import xarray
 
 SHORTEST = 1e-3  # of a bar's length, that is left of it where a path starts
+LOOKS = 51  # load factors from one to the next at which supports and planes are looked at
 COPIES = 8  # of a point's dofs, while forces, work and the dataset are made of it
 
 
@@ -144,6 +146,7 @@ def trace(
     )  # fmt: skip
     begin = 0.0 if initial is None else plan.begin
     _check_start(problem, begin)
+    _check_driven(problem, begin, plan)
     _check_actuation(problem, plan)
     problem.begin(begin)
     refuse_mechanisms(problem, begin)
@@ -282,6 +285,22 @@ def _check_start(problem: OrigamiProblem, factor: float) -> None:
     if short.size:
         one, other = structure.bars[short[0]]
         raise InputError(f": the neighboring nodes {one} and {other} fall together", "initial")
+
+
+def _check_driven(problem: OrigamiProblem, begin: float, plan: PathPlan) -> None:
+    """Refuse load factors at which supports and planes have gone through each other."""
+    if problem.case.contact is None or not drives(problem.case, range(len(problem.case.loads))):
+        return
+    ends = [begin, *plan.factors, *([] if plan.end is None else [plan.end])]
+    between = [np.linspace(a, b, LOOKS) for a, b in itertools.pairwise(ends)]
+
+    def states() -> Iterator[tuple[str, NDArray, NDArray]]:
+        for factor in np.concatenate([ends[:1], *between]).tolist():
+            u = problem.start(factor).copy()
+            u[problem.held] = problem.prescribed(factor)
+            yield f"the load factor {factor:.6g}", problem.displacement(u), problem.planes(u)
+
+    check_driven(problem.case, states())
 
 
 def _check_actuation(problem: OrigamiProblem, plan: PathPlan) -> None:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn import mechanics
-from foldyn.materials import HingeLaw, Superlinear
-from foldyn.mechanics.body import Body, FoldHinges, SoftHinges, Unstrained, largest_turn
+from foldyn.materials import BarLaw, HingeLaw, Superlinear
+from foldyn.mechanics.body import Body, FoldHinges, SoftHinges, Strains, Unstrained, largest_turn
 from foldyn.mechanics.energy import gradients
 from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
 from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_tangent
@@ -179,6 +179,22 @@ class BarsHingesBody(Body):
         return FoldHinges(
             np.arange(len(rows)), nodes, model.rest[nodes], none, 0.0, model.hinge_rest[rows],
             model.hinge_stiffness[rows],
+        )  # fmt: skip
+
+    def strains(self) -> Strains:
+        """See `Body`."""
+        model, angle = self.model, self.angles(np.zeros(self.size))
+        bars, hinges = model.bars.astype(np.int64), model.hinges.astype(np.int64)
+        slope, turn = np.empty(len(bars)), np.empty(len(hinges))
+        for start, end, code, row in model.bar_runs.tolist():
+            slope[start:end] = BarLaw.compiled(code, np.zeros(1), model.addresses[row])[2]
+        for start, end, code, row in model.hinge_runs.tolist():
+            part, address = slice(start, end), model.addresses[row]
+            state = angle[part], model.hinge_rest[part], model.hinge_parameters[part]
+            turn[part] = HingeLaw.compiled(code, *state, address)[2]
+        return Strains(
+            bars, model.bar_vector, model.bar_stiffness * slope,
+            hinges, model.rest[hinges], model.hinge_stiffness * turn,
         )  # fmt: skip
 
     def folded(self, rest: NDArray) -> BarsHingesBody:

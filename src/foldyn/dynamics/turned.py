@@ -1,0 +1,120 @@
+"""What constant damping takes from panels that turn, though turning strains nothing.
+
+beta K0 and modal damping have the matrix C of a state in which panels stand as they did there. A
+panel that has turned by theta about an axis a, and turns on at the rate w, has in C the velocity
+w sin(theta) a x (a x x) of a strain beside that of a rotation, which takes w^2 sin^2(theta) kappa,
+
+    kappa = x' A C A x,    A = a a' - 1,
+
+and in all, up to theta, w kappa (theta / 2 - sin(2 theta) / 4). Of that each panel has the share of
+its area.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.dynamics.system import Packed
+
+SHARE = 0.01  # of the energies at play: what is said
+
+
+def resists_turns(case: Case, packed: Packed) -> bool:
+    """Whether a case has such damping, and panels."""
+    constant = case.rayleigh.beta > 0.0 or len(packed.system.damping.modal) > 0
+    return constant and len(case.structure.triangles) > 0
+
+
+def turns_told(
+    case: Case, packed: Packed, start: NDArray, displacement: NDArray, velocity: NDArray,
+    scale: float,
+) -> str:  # fmt: skip
+    """Warn of a motion in which panels turn far; empty where they do not.
+
+    start : (n, 3) displacement at the start, m.
+    displacement, velocity : (k, n, 3) at some samples, m and m/s.
+    scale : energy at play, J.
+    """
+    if scale == 0.0 or not (np.isfinite(displacement).all() and np.isfinite(velocity).all()):
+        return ""
+    farthest, energy = turned(case, packed, start, displacement, velocity)
+    if energy <= SHARE * scale:
+        return ""
+    kinds = ["beta"] if case.rayleigh.beta else []
+    kinds += ["modal damping"] if len(packed.system.damping.modal) else []
+    fits = case.structure.body.strains() is not None
+    remedy = "fd.StrainDamping (strain in a case file)" if fits else "fd.CreaseDamping"
+    return (
+        f"damping: {' and '.join(kinds)} resist{'s' if len(kinds) == 1 else ''} rotations: panels "
+        f"turn by up to {math.degrees(farthest):.3g} degrees, from which it takes about "
+        f"{min(energy / scale, 1.0):.0%} of the energies at play, although turning strains "
+        f"nothing; use {remedy}, which follows the motion"
+    )
+
+
+def turned(
+    case: Case, packed: Packed, start: NDArray, displacement: NDArray, velocity: NDArray
+) -> tuple[float, float]:
+    """Farthest turn (rad) of a panel, and what is taken from all that turn (J)."""
+    nodes, tri = case.structure.nodes, case.structure.triangles
+    modal = case.modal_damping
+    states = {case.rayleigh.state if case.rayleigh.beta else "", modal.state if modal else ""}
+    there = start if "start" in states else np.zeros_like(start)
+    before, area = _frames((nodes + there)[tri])
+    turn = _frames((nodes + displacement)[:, tri])[0] @ np.swapaxes(before, -1, -2)
+    angle = np.arccos(np.clip(0.5 * (np.trace(turn, axis1=-2, axis2=-1) - 1.0), -1.0, 1.0))
+    last = angle.argmax(axis=0)
+    panel = np.arange(len(tri))
+    own, theta = turn[last, panel], angle[last, panel]
+    axis = np.stack([own[:, 2, 1], own[:, 0, 2], own[:, 1, 0]], axis=1)
+    axis -= np.stack([own[:, 1, 2], own[:, 2, 0], own[:, 0, 1]], axis=1)
+    axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300)
+    rate = _rates((nodes + displacement)[:, tri], velocity[:, tri]).max(axis=0)
+    bent = (axis[:, :, None] * axis[:, None, :] - np.eye(3)).reshape(-1, 9)
+    kappa = np.einsum("ta,ab,tb->t", bent, _strained(case, packed, there), bent)
+    taken = kappa * rate * (0.5 * theta - 0.25 * np.sin(2.0 * theta))
+    return float(theta.max()), float(taken @ area) / float(area.sum())
+
+
+def _strained(case: Case, packed: Packed, there: NDArray) -> NDArray:
+    """F' C F (9, 9) of the displacements E x, E each unit matrix, x where C is from, `there`."""
+    x = case.structure.nodes + there
+    x -= x.mean(axis=0)
+    fields = np.zeros((x.size, 9))
+    for a in range(3):
+        for b in range(3):
+            fields[a::3, 3 * a + b] = x[:, b]
+    out, beta, body = np.zeros((9, 9)), case.rayleigh.beta, case.elastic_body
+    if beta:
+        k = body.tangent(body.dofs(there))
+        out += beta * (fields.T @ (k[: x.size, : x.size] @ fields))
+    if len(rows := packed.system.damping.modal):
+        by = packed.numbering
+        inward = [by.inward(field.reshape(-1, 3)).ravel() for field in fields.T]
+        seen = rows @ np.stack(inward, axis=1)
+        out += seen.T @ seen
+    return out
+
+
+def _frames(corners: NDArray) -> tuple[NDArray, NDArray]:
+    """Directions (..., 3, 3) of triangles (..., 3, 3), in columns, and their areas (...)."""
+    first, second = corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]
+    normal = np.cross(first, second)
+    double = np.linalg.norm(normal, axis=-1)
+    one = first / np.linalg.norm(first, axis=-1, keepdims=True)
+    up = normal / double[..., None]
+    return np.stack([one, np.cross(up, one), up], axis=-1), 0.5 * double
+
+
+def _rates(corners: NDArray, velocity: NDArray) -> NDArray:
+    """Angular velocities (...), rad/s, of triangles (..., 3, 3), in size."""
+    arm = corners - corners.mean(axis=-2, keepdims=True)
+    moving = velocity - velocity.mean(axis=-2, keepdims=True)
+    spin = np.cross(arm, moving).sum(axis=-2)
+    square = np.einsum("...ia,...ib->...ab", arm, arm)
+    inertia = np.trace(square, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - square
+    return np.linalg.norm(np.linalg.solve(inertia, spin[..., None])[..., 0], axis=-1)
