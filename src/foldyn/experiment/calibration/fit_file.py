@@ -93,8 +93,6 @@ def _known(kind: str) -> list[str]:
     keys = [one.name for one in reader if one.kind is not one.VAR_KEYWORD and one.name != "file"]
     if kind == Spectrum.kind:
         keys += _known(TimeHistory.kind)
-    if issubclass(CLASSES[kind], ModalParameters):
-        keys.append("modes")
     keys += [item.name for item in fields(CLASSES[kind]) if item.name not in MADE]
     return list(dict.fromkeys(keys))
 

@@ -41,34 +41,47 @@ PARTS = ("real", "imag", "magnitude", "sigma")
 """What columns of a response hold, as "node 8 x real"."""
 
 
-def frequencies(file: Path, **known: Any) -> NaturalFrequencies:
+def frequencies(
+    file: Path, modes: Any = None, shapes: Path | None = None, **known: Any
+) -> NaturalFrequencies:
     """Natural frequencies from a CSV file with the columns mode and frequency, or from a result.
-
-    A column frequency_sigma holds standard errors. Arguments as of `damping_ratios`.
-    """
-    return _of_modes(NaturalFrequencies, "frequency", file, **known)
-
-
-def damping_ratios(file: Path, **known: Any) -> DampingRatios:
-    """Damping ratios from a CSV file with the columns mode and damping_ratio, or from a result.
 
     Parameters
     ----------
     file : Path
-        CSV, where a column damping_ratio_sigma holds standard errors; or a result of `fd.modes`.
+        CSV, where a column frequency_sigma holds standard errors; or a result of `fd.modes`.
     modes : sequence of int, optional
         Numbers of the modes to take; all in the file by default.
     shapes : Path, optional
         File of the shapes of these modes, by which they are paired with the model's.
     **known
-        Other arguments of `DampingRatios`.
+        Other arguments of `NaturalFrequencies`.
     """
-    return _of_modes(DampingRatios, "damping_ratio", file, **known)
+    return _of_modes(NaturalFrequencies, file, known, _numbers(file, "frequency", modes, shapes))
 
 
-def _of_modes(
-    kind: Any, name: str, file: Path, modes: Any = None, shapes: Any = None, **known: Any
-) -> Any:
+def damping_ratios(
+    file: Path, modes: Any = None, shapes: Path | None = None, **known: Any
+) -> DampingRatios:
+    """Damping ratios, as `frequencies`: columns mode, damping_ratio and damping_ratio_sigma."""
+    return _of_modes(DampingRatios, file, known, _numbers(file, "damping_ratio", modes, shapes))
+
+
+def _of_modes(kind: Any, file: Path, known: dict[str, Any], given: dict[str, Any]) -> Any:
+    if "sigma" in given:
+        known = _with_sigma(file, known, given.pop("sigma"))
+    return made(kind, file, **known, **given)
+
+
+def _with_sigma(file: Path, known: dict[str, Any], errors: NDArray) -> dict[str, Any]:
+    """Other arguments with the standard errors that a file holds, which must be the only ones."""
+    if known.get("sigma") is not None:
+        raise InputError(f"{file}: sigma: leave it out, the file has a column of it")
+    return {**known, "sigma": errors}
+
+
+def _numbers(file: Path, name: str, modes: Any, shapes: Path | None) -> dict[str, Any]:
+    """Arguments that a file gives for numbers of modes."""
     if _is_result(file):
         found = _result(file, "modes")
         values = found[name].values[resisted(found)]
@@ -77,16 +90,13 @@ def _of_modes(
         wanted = {"mode": ("mode", "-"), name: (name, UNIT[name])}
         sigma = f"{name}_sigma"
         if sigma in dict(read_headings(file)):
-            if known.get("sigma") is not None:
-                raise InputError(f"{file}: sigma: leave it out, the file has a column {sigma}")
             wanted["sigma"] = sigma, UNIT[name]
         table = read_numbers(file, wanted)
     chosen = _chosen(file, table["mode"], modes)
-    numbers = {key: column[chosen] for key, column in table.items()}
+    given: dict[str, Any] = {key: column[chosen] for key, column in table.items()}
     if shapes is not None:
-        taken = [int(mode) for mode in numbers["mode"]]
-        numbers["shapes"] = mode_shapes(Path(shapes), modes=taken)
-    return made(kind, file, **{**known, **numbers})
+        given["shapes"] = mode_shapes(shapes, modes=given["mode"].astype(int).tolist())
+    return given
 
 
 def mode_shapes(
@@ -167,10 +177,6 @@ def frf(
         if quantity is not None:
             choice(f"{file}: quantity", quantity, RESPONSES)
         quantity, frequency, values, errors = _columns(file, chosen, axis, quantity)
-    if errors is not None:
-        if known.get("sigma") is not None:
-            raise InputError(f"{file}: sigma: leave it out, the file has columns of it")
-        known["sigma"] = errors
     if magnitude and np.iscomplexobj(values):
         values = np.abs(values)
     if band is not None:
@@ -182,8 +188,9 @@ def frf(
                 f"{frequency[0]:.6g} to {frequency[-1]:.6g} Hz"
             )
         frequency, values = frequency[within], values[within]
-        if errors is not None:
-            known["sigma"] = errors[within]
+        errors = None if errors is None else errors[within]
+    if errors is not None:
+        known = _with_sigma(file, known, errors)
     real = not np.iscomplexobj(values)
     return made(
         FrequencyResponse, file, nodes=chosen, frequency=frequency, values=values, axis=axis,
@@ -257,6 +264,9 @@ def _parts(names: Any) -> list[tuple[int, str, str]]:
 
 def _chosen(file: Path, numbers: NDArray, modes: Any) -> NDArray[np.int64]:
     """Places of the modes to take among those of a file, in the order of their numbers."""
+    broken = numbers[numbers != numbers.astype(int)]
+    if broken.size:
+        raise InputError(f"{file}: mode = {broken[0]:g}: must be a whole number")
     order = np.argsort(numbers, kind="stable")
     twice = numbers[order][1:][np.diff(numbers[order]) == 0.0]
     if twice.size:
