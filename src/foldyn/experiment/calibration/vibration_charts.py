@@ -23,8 +23,8 @@ def modes_table(one: ModalParameters, result: Any, case: Case) -> Table:
     places, measured = one.places(result, case), one.observed()
     model = result[one.quantity].values[places]
     errors = one.errors() if one.sigma is not None else np.full(len(measured), np.nan)
-    header = ["measured mode", "mode of the model", "measured", "standard error", "model",
-              "difference (%)", "difference (sigma)"]  # fmt: skip
+    header = ["mode", "model's mode", "measured", "sigma", "model", "model off by (%)",
+              "in sigma"]  # fmt: skip
     if one.unit:
         header[2:5] = [f"{title} ({one.unit})" for title in header[2:5]]
     names = result["mode"].values[places].tolist()
@@ -51,13 +51,7 @@ def shapes_table(one: ModeShapes, result: Any, case: Case) -> Table:
     for k, (mode, name, f) in enumerate(zip(one.mode.tolist(), names, hertz, strict=True)):
         others = np.delete(alike[k], place[k])
         rows.append([mode, name, f, float(alike[k, place[k]]), float(others.max(initial=0.0))])
-    header = [
-        "measured mode",
-        "mode of the model",
-        "frequency of that (Hz)",
-        "MAC",
-        "next best MAC",
-    ]
+    header = ["mode", "model's mode", "its frequency (Hz)", "MAC", "next best MAC"]
     return Table(header, rows, f"{one.name}: paired by their shapes")
 
 
@@ -76,13 +70,14 @@ def shape_charts(one: ModeShapes, result: Any, case: Case) -> list[Chart]:
 def response_charts(one: FrequencyResponse, result: Any, case: Case) -> list[Chart]:
     """Magnitude and, where it was measured, phase of responses, for each node."""
     model, nodes = one.curves(result, case), one.where(case).tolist()
-    level = f"{one.quantity}, {one.axis} (dB{f' re 1 {one.unit}' if one.unit else ''})"
+    level = f"{one.axis} (dB{f' re 1 {one.unit}' if one.unit else ''})"
     charts = []
     for k, node in enumerate(nodes[:MOST]):
         charts.append(_beside(one, level, k, node, _decibels(model), _decibels(one.values)))
         if not one.magnitude:
-            phases = np.degrees(np.angle(model)), np.degrees(np.angle(one.values))
-            charts.append(_beside(one, "phase (degrees)", k, node, *phases))
+            phase = np.degrees(np.angle(model))
+            near = phase + np.degrees(np.angle(one.values * model.conj()))  # no jumps by a turn
+            charts.append(_beside(one, "phase (degrees)", k, node, phase, near))
     return charts
 
 
@@ -93,7 +88,7 @@ def _beside(
         Curve("model", one.frequency, model[:, k]),
         Curve(one.label, one.frequency, seen[:, k], dots=True),
     ]
-    return Chart("frequency (Hz)", ylabel, curves, f"node {node}")
+    return Chart("frequency (Hz)", ylabel, curves, f"node {node}, {one.quantity}")
 
 
 def _decibels(values: NDArray) -> NDArray[np.float64]:
