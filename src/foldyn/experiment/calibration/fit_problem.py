@@ -219,6 +219,8 @@ def problem(
     InputError
         One cannot be used: a case file at the values to start from, a measurement that its case
         cannot predict, a parameter that the case file does not have.
+    ComputationError
+        Modes or a frequency response cannot be computed at the values to start from.
     """
     path = path_of(case, "case")
     document = read_document(path)

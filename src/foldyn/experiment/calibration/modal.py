@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.cases.directions import AXES
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import InputError
 from foldyn.experiment.calibration.measurement import (
     Measurement,
     NodeValues,
@@ -131,7 +131,7 @@ class ModeShapes(NodeValues):
 
         Raises
         ------
-        ComputationError
+        InputError
             The result has fewer modes.
         """
         shapes = self._of_model(result, case)
@@ -367,8 +367,8 @@ def _enough(name: str, found: int, needed: int, result: Any) -> None:
     modes, most = result.sizes["mode"], int(result.attrs["free_dofs"])
     what = f"mode {needed} was measured, but the model has only {found} that something resists"
     if modes >= most:
-        raise ComputationError(f"{name}: {what}; leave out what it cannot have, or refine it")
-    raise ComputationError(f"{name}: {what} among its lowest {modes}; raise analysis.count")
+        raise InputError(f"{name}: {what}; leave out what it cannot have, or refine it")
+    raise InputError(f"{name}: {what} among its lowest {modes}; raise analysis.count")
 
 
 def _numbered(name: str, given: Any, count: int) -> NDArray[np.int64]:
