@@ -7,6 +7,7 @@ import json
 import pytest
 
 import foldyn as fd
+from case_texts import MODES_TEXT
 
 CASE = """
 [pattern]
@@ -88,6 +89,21 @@ def test_the_same_from_the_command_line(fold) -> None:
     assert told["parameters"][0]["value"] == pytest.approx(1.0, rel=1e-3)
     assert told["ties"] == {"sheet.density": "sheet.length_scale_ratio"}
     assert "out/report.html" not in done.new
+
+
+def test_frequencies_from_the_command_line(workplace) -> None:
+    """The misfit stands beside the intervals."""
+    workplace.write(MODES_TEXT)
+    workplace.write("mode,frequency [Hz]\n1,0.724\n2,0.961\n3,2.214\n", "modes.csv")
+    done = workplace.call(
+        "fit", "case.toml", "modes.csv", "--vary", "sheet.youngs_modulus=1.1e6",
+        "--sigma", "0.002", "--no-figures",
+    )  # fmt: skip
+    assert done.status == 0, done.err
+    told = json.loads((workplace.folder / "case-fit/fit.json").read_text())
+    assert told["parameters"][0]["value"] == pytest.approx(1e6, rel=0.02)
+    assert f"  Misfit: {told['misfit']:.3g} sigma (reduced chi-square " in done.out
+    assert f"variation, {told['measurements'][0]['sigmas']:.3g} sigma" in done.out
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from case_texts import FOLD_TEXT
 
+SAME_STEPS = "ignore:.*time step is too coarse"
+"""For data that the model itself has made, with the same steps: they hide what these leave out."""
 FOLD = (
     FOLD_TEXT
     + """

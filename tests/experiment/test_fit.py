@@ -14,6 +14,8 @@ from foldyn.errors import ComputationError, InputError
 from foldyn.experiment import ForceDisplacement, Parameter, Shapes, TimeHistory
 from foldyn.experiment.calibration.fit_problem import problem
 
+pytestmark = pytest.mark.filterwarnings(fit_cases.SAME_STEPS)
+
 MOVED = -np.linspace(0.03, 0.3, 8)
 TIME = np.linspace(0.0, 2.0, 60)
 RATIO = Parameter("sheet.length_scale_ratio", 1.6, 0.2, 5.0)

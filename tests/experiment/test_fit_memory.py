@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fit_cases import PRESSED, SWUNG, write
+from fit_cases import PRESSED, SAME_STEPS, SWUNG, write
 
 import foldyn as fd
 from foldyn.errors import ComputationError
 from foldyn.experiment import ForceDisplacement, Parameter, TimeHistory
 from foldyn.experiment.calibration.fit_problem import problem
+
+pytestmark = pytest.mark.filterwarnings(SAME_STEPS)
 
 ELASTIC = 'fold_law = { kind = "enhanced", theta1 = 45, theta2 = 290 }'
 PRONY = 'fold_law = { kind = "prony", ratios = [0.6], times = [0.15] }'

@@ -17,6 +17,8 @@ from foldyn.experiment.calibration.fit_figures import plot_correlation, plot_his
 from foldyn.experiment.calibration.fit_page import write_fit
 from foldyn.experiment.calibration.fit_problem import problem
 
+pytestmark = pytest.mark.filterwarnings(fit_cases.SAME_STEPS)
+
 TIME = np.linspace(0.0, 2.0, 80)
 MOVED = -np.linspace(0.05, 0.3, 6)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fit_cases import SAME_STEPS
 from miura_film import DISTANCE, SCALE, SIZE, cv2
 
 import foldyn as fd
@@ -27,6 +28,8 @@ from foldyn.experiment import (
 )
 from foldyn.experiment.calibration.fit_file import read_fit
 from foldyn.experiment.calibration.measured_files import history, recognize, shapes
+
+pytestmark = pytest.mark.filterwarnings(SAME_STEPS)
 
 ALPHA, RATIO = 14.0, 2.7  # the truth: 1/s, and L*/L_F
 RATE, DROPPED = 240.0, 30  # frames/s, and the frame that repeats the one before

@@ -56,6 +56,7 @@ def test_folds_from_three_weights_alone(static_data) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*time step is too coarse")  # as coarse as the data's
 def test_damping_from_node_8_alone(released, release_data) -> None:
     """The issue asks for 10 %; all other front nodes are held out, and follow."""
     data = calibration.noisy(release_data, np.random.default_rng(7))

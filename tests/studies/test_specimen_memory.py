@@ -27,6 +27,7 @@ PARAMETERS = [
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*time step is too coarse")  # as coarse as the data's
 def test_drift_and_decay_are_fitted_together(tmp_path):
     """From histories with the noise of a film; 2 minutes once compiled."""
     duration = 0.8
@@ -54,6 +55,7 @@ def test_drift_and_decay_are_fitted_together(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*time step is too coarse")  # as coarse as the data's
 def test_a_film_tells_drift_and_decay(tmp_path):
     """From the film of a sheet that is the model but for its creases; 3 minutes once compiled.
 

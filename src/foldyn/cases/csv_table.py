@@ -31,11 +31,18 @@ UNITS: Mapping[str, Mapping[str, Fraction]] = {
     "force": {"N": Fraction(1), "mN": Fraction(1, 10**3), "kN": Fraction(10**3)},
     "length": {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 10**3)},
     "acceleration": {"m/s2": Fraction(1), "mm/s2": Fraction(1, 10**3)},
+    "frequency": {"Hz": Fraction(1), "kHz": Fraction(10**3)},
+    "receptance": {"m/N": Fraction(1), "mm/N": Fraction(1, 10**3)},
+    "mobility": {"m/(N s)": Fraction(1), "mm/(N s)": Fraction(1, 10**3)},
+    "accelerance": {"m/(N s2)": Fraction(1), "mm/(N s2)": Fraction(1, 10**3)},
 }
 """Units of the value column by quantity, each with its size in the SI unit."""
 
 _NUMBER = "number without unit"
-_SPELLINGS = {"µs": "us", "μs": "us", "m/s^2": "m/s2", "m/s²": "m/s2", "mm/s^2": "mm/s2"}
+_SPELLINGS = {
+    **{"µs": "us", "μs": "us", "m/s^2": "m/s2", "m/s²": "m/s2", "mm/s^2": "mm/s2"},
+    **{"m/s/N": "m/(N s)", "m/s2/N": "m/(N s2)", "m/s^2/N": "m/(N s2)", "m/s²/N": "m/(N s2)"},
+}
 _DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}  # the first in the header counts
 MOST = 64
 """Size of a file (MiB)."""

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 WRITTEN = ("fit.json", "fit.nc", "fitted.toml")
 KEPT = "evaluations"
+NOTED = 0.05
+"""Part of an interval that stands for the discretization, from which on it is told."""
 DRAWN = [
     "report.html",
     *(f"{n}.{form}" for n in ("correlation", "data-[0-9]", "data-[0-9][0-9]") for form in FIGURES),
@@ -41,7 +43,9 @@ def add_fit(commands: Any) -> None:
     )
     fit.add_argument("file", help="fit file, or case file (TOML) or the name of a shipped case")
     fit.add_argument(
-        "data", nargs="*", help="with a case file: measurements (CSV, or the tracks of a film)"
+        "data",
+        nargs="*",
+        help="with a case file: measurements (CSV, tracks of a film, or a result of kind modes)",
     )
     fit.add_argument(
         "--vary",
@@ -89,10 +93,13 @@ def run_fit(given: argparse.Namespace) -> Path:
         spent = clock.spent()
         for one in found.estimates:
             say(f"  {_line(one, found.confidence)}")
+        say(f"  {found.quality}")
         for score in found.scores:
             held_out = ", held out" if score.held_out else ""
-            say(f"  {score.name}{held_out}: rms misfit {score.rms:.3g} {score.unit}, "
-                f"{100.0 * score.relative:.2g} % of its variation")  # fmt: skip
+            sigmas = f", {score.sigmas:.3g} sigma" if math.isfinite(score.sigmas) else ""
+            misfit = f"rms misfit {score.rms:.3g} {score.unit}".rstrip()
+            say(f"  {score.name}{held_out}: {misfit}, {100.0 * score.relative:.2g} % of its "
+                f"variation{sigmas}")  # fmt: skip
         for name, write in zip(WRITTEN, (found.save, found.save, found.write_case), strict=True):
             results.keep(name, write)
         say(f"wrote {folder / WRITTEN[0]}")
@@ -132,9 +139,11 @@ def _fit(plan: FitFile, results: Results, quiet: bool) -> Fit:
 def _line(one: Estimate, confidence: float) -> str:
     if one.note:
         return f"{one.key} = {one.value:.6g} ({one.note})"
+    coarse = abs(one.discretization) / (one.upper - one.lower)
+    part = f" ({coarse:.0%} of that from discretization)" if coarse > NOTED else ""
     return (
         f"{one.key} = {one.value:.6g}, {100.0 * confidence:g} % from {one.lower:.6g} to "
-        f"{one.upper:.6g}"
+        f"{one.upper:.6g}{part}"
     )
 
 

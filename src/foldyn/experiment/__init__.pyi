@@ -3,7 +3,6 @@
 from foldyn.experiment.calibration.fit import Course as Course, fit as fit
 from foldyn.experiment.calibration.fitted import (
     Descent as Descent,
-    Estimate as Estimate,
     Fit as Fit,
     Score as Score,
 )
@@ -16,8 +15,15 @@ from foldyn.experiment.calibration.measured import (
     Shapes as Shapes,
 )
 from foldyn.experiment.calibration.measurement import Measurement as Measurement
+from foldyn.experiment.calibration.modal import (
+    DampingRatios as DampingRatios,
+    ModeShapes as ModeShapes,
+    NaturalFrequencies as NaturalFrequencies,
+)
 from foldyn.experiment.calibration.parameters import Parameter as Parameter
+from foldyn.experiment.calibration.responses import FrequencyResponse as FrequencyResponse
 from foldyn.experiment.calibration.sight import Sight as Sight
+from foldyn.experiment.calibration.uncertainty import Estimate as Estimate
 from foldyn.experiment.camera import (
     Camera as Camera,
     Scale as Scale,

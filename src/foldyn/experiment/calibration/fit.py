@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.experiment.calibration.fit_problem import Problem, problem
-from foldyn.experiment.calibration.fitted import Descent, Fit, Uncertainty, score, spread
+from foldyn.experiment.calibration.fitted import Descent, Fit, score
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter
+from foldyn.experiment.calibration.uncertainty import Uncertainty
 from foldyn.sweeps.evaluations import Evaluation, Evaluations
 from foldyn.sweeps.pool import Pool, pool_of
 from foldyn.values import number, whole
@@ -44,6 +46,8 @@ WHY = {
 MOST_PROCESSES = 1024
 """Processes at a time: more are a slip of the finger."""
 
+COUNTED = ("computed", "found")
+"""Counts of a `Course`."""
 PREDICTED = "predicted"
 """Name of what an evaluation holds."""
 Outcome = NDArray[np.float64] | str
@@ -91,9 +95,10 @@ def fit(
     Parameters
     ----------
     case : path
-        A case file of kind "statics" or "dynamics".
+        A case file of kind "statics", "dynamics", "modes" or "frf".
     data : sequence of Measurement
-        `ForceDisplacement`, `Shapes`, `TimeHistory`, `Spectrum`.
+        `ForceDisplacement`, `Shapes`, `TimeHistory`, `Spectrum`, `NaturalFrequencies`,
+        `DampingRatios`, `ModeShapes`, `FrequencyResponse`.
     parameters : sequence of Parameter
     ties : mapping of str to str, optional
         Keys that follow parameters, ``{"model.fold_law.theta2": "360 - model.fold_law.theta1"}``.
@@ -122,10 +127,18 @@ def fit(
     ComputationError
         No search converged.
 
+    Warns
+    -----
+    FoldynWarning
+        The time step of a motion, or the mesh of a shell, moves a parameter by more than its
+        standard error; it is not clear which mode of the model a measured one is; the search was
+        given up.
+
     Notes
     -----
     A motion is computed with fixed steps, `analysis.dt`, or for an implicit method without it the
-    interval of its output: steps chosen by their error would make the misfit jump.
+    interval of its output: steps chosen by their error would make the misfit jump. At the end it is
+    computed once more with half the step, and intervals are widened by what that changes.
     """
     confidence = number("confidence", confidence, above=0.0, below=1.0)
     whole("processes", processes, least=1, most=MOST_PROCESSES)
@@ -146,8 +159,16 @@ def fit(
         (best,) = search.at([values])
         ends = np.cumsum([len(one) for one in made.observed()])
         predicted = np.split(np.asarray(best), ends[:-1])
+        shifts = search.shifts(values, known)
+    if not lowest.converged:
+        _warn(
+            f"the search was {lowest.message}: the values are not those of the least misfit, and "
+            "their intervals mean nothing yet; start from these values, or nearer to the truth",
+            level=3,
+        )
+    _warn_of_pairing(made, values)
     return Fit(
-        known.estimates(made.space.keys, values), known.correlation, known.singular_values,
+        known.estimates(made.space.keys, values, shifts), known.correlation, known.singular_values,
         known.directions, confidence, known.freedom, known.misfit,
         tuple(map(score, made.measurements, predicted)), tuple(descents), made, tuple(predicted),
         search.count, time.perf_counter() - began,
@@ -175,28 +196,32 @@ class _Search:
         progress: Callable[[Course], None] | None,
     ) -> None:  # fmt: skip
         self.made, self.progress, self.cost = made, progress, math.inf
-        stamp = partial(_stamp, made.digest())
-        self.evaluations = Evaluations[Values](pool, stamp, folder, self._tell)
+        self.folder, self.all = folder, []
+        self.evaluations = self._evaluations(made, pool)
         space = made.space
         self.scale = space.column("scale")
         self.lower, self.upper = space.column("lower"), space.column("upper")
         observed = made.observed()
-        weights = [
-            np.full(len(seen), 0.0 if one.held_out else 1.0 / (one.sigma or spread(seen)))
-            for one, seen in zip(made.measurements, observed, strict=True)
-        ]
+        weights = [(not one.held_out) / one.errors() for one in made.measurements]
         self.weight = np.concatenate(weights)
+        self.absorbed = sum(one.absorbed for one in made.measurements if not one.held_out)
         self.chosen = self.weight > 0.0
         self.observed = np.concatenate(observed)
+
+    def _evaluations(self, made: Problem, pool: Pool) -> Evaluations[Values]:
+        self.all.append(
+            Evaluations[Values](pool, partial(_stamp, made.digest()), self.folder, self._tell)
+        )
+        return self.all[-1]
 
     @property
     def count(self) -> int:
         """Evaluations of the model."""
-        return self.evaluations.computed + self.evaluations.found
+        return sum(one.computed + one.found for one in self.all)
 
     def _tell(self, *_: object) -> None:
         if self.progress is not None:
-            computed, found = self.evaluations.computed, self.evaluations.found
+            computed, found = (sum(getattr(one, name) for one in self.all) for name in COUNTED)
             self.progress(Course(computed, found, self.cost))
 
     def at(self, points: Sequence[NDArray]) -> list[Outcome]:
@@ -230,7 +255,37 @@ class _Search:
         near = STEP * self.scale
         at_bound = (values - self.lower < near) | (self.upper - values < near)
         (residual,) = self._residual([values])
-        return Uncertainty.of(jacobian, residual, self.scale, at_bound, confidence)
+        return Uncertainty.of(jacobian, residual, self.scale, at_bound, confidence, self.absorbed)
+
+    def shifts(self, values: NDArray[np.float64], known: Uncertainty) -> list[NDArray[np.float64]]:
+        """How far ever smaller time steps, and elements, would move the estimates.
+
+        The misfit at the optimum is computed anew with half of each. What that changes moves the
+        optimum by its `influence`, and Richardson's extrapolation goes the rest of the way.
+        """
+        found = []
+        (coarse,) = self.at([values])
+        for finer in self.made.finer(values):
+            with pool_of(partial(_evaluate, finer.problem), 1) as pool:
+                (fine,) = self._evaluations(finer.problem, pool).at([tuple(values.tolist())])
+            if fine.failure:
+                _warn(
+                    f"at the values found, the model fails with a finer {finer.what} "
+                    f"({fine.failure}): the intervals do not include the error of the {finer.what}"
+                )
+                found.append(np.full(len(values), np.nan))
+                continue
+            change = ((fine.values[PREDICTED] - coarse) * self.weight)[self.chosen]
+            shift = known.influence @ change / (1.0 - 0.5**finer.order)
+            for k in np.flatnonzero(np.abs(shift) > known.standard_error):
+                _warn(
+                    f"{self.made.space.keys[k]}: the {finer.what} is too coarse: it shifts the "
+                    f"value by about {-shift[k]:.2g}, more than the standard error "
+                    f"({known.standard_error[k]:.2g}). The interval is wide enough for both; for a "
+                    f"better value set {finer.remedy}"
+                )
+            found.append(shift)
+        return found
 
     def _residual(self, points: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
         """Weighted residuals; infinite where the model fails, so that a search steps back."""
@@ -271,6 +326,20 @@ class _Search:
                 f"{self.made.space.keys[place]}: the model fails beside {values[place]:.6g}: {why}"
             )
         return np.stack(columns, axis=1)
+
+
+def _warn_of_pairing(made: Problem, values: NDArray[np.float64]) -> None:
+    """Say where it has become open, on the way, which mode is which."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FoldynWarning)
+            made.examine(values)
+    except InputError as error:
+        _warn(f"at the values found: {error}")
+
+
+def _warn(text: str, level: int = 4) -> None:
+    warnings.warn(text, FoldynWarning, stacklevel=level)
 
 
 def _stamp(digest: str, values: Values) -> list[Any]:

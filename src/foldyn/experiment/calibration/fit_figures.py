@@ -20,6 +20,8 @@ from foldyn.experiment.calibration.fitted import Fit
 from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
 from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes
 from foldyn.experiment.calibration.measurement import Measurement
+from foldyn.experiment.calibration.modal import ModeShapes
+from foldyn.experiment.calibration.responses import FrequencyResponse
 from foldyn.experiment.calibration.shown import MOST, dense, plane
 from foldyn.plots import style
 
@@ -37,6 +39,10 @@ def plot_measured(one: Measurement, result: Any, case: Case) -> Figure:
         return plot_histories(one, case, one.curves(result, case))
     if isinstance(one, Spectrum):
         return plot_spectra(one, case, one.spectra(result, case))
+    if isinstance(one, ModeShapes):
+        return plot_mode_shapes(one, one.shapes(result, case))
+    if isinstance(one, FrequencyResponse):
+        return plot_responses(one, case, one.curves(result, case))
     raise InputError(f"{one.name}: there is no figure of a {one.kind}")
 
 
@@ -133,6 +139,57 @@ def plot_spectra(one: Spectrum, case: Case, model: NDArray[np.float64]) -> Figur
     """Draw measured amplitude spectra beside those of the model; arguments as `plot_histories`."""
     labels = "frequency (Hz)", f"{one.axis} amplitude (mm)"
     return _beside(one, one.where(case), one.frequency, one.values, model, labels)
+
+
+def plot_mode_shapes(one: ModeShapes, model: NDArray[np.float64]) -> Figure:
+    """Draw components of measured shapes over those of the model, a frame for each mode.
+
+    Parameters
+    ----------
+    one : ModeShapes
+    model : ndarray, shape (k, m, a)
+        As `ModeShapes.shapes` gives it.
+    """
+    shown = one.mode[:MOST].tolist()
+    columns = min(len(shown), 4)
+    figure, frames = _frames(len(shown), columns, WIDTH / columns, 0.3)
+    for frame, mode, seen, said in zip(frames, shown, one.values, model, strict=False):
+        style.frame(frame, "component, model", f"component, {one.label}", f"mode {mode}")
+        frame.axline((0.0, 0.0), slope=1.0, color=style.GRAY, linewidth=0.8)
+        frame.errorbar(
+            said.ravel(), seen.ravel(), yerr=one.sigma, fmt="o", markersize=4, linestyle="none",
+            color=style.VERMILLION,
+        )  # fmt: skip
+    return style.finish(figure)
+
+
+def plot_responses(one: FrequencyResponse, case: Case, model: NDArray) -> Figure:
+    """Draw magnitudes of measured responses beside those of the model, a frame for each node.
+
+    Parameters
+    ----------
+    one : FrequencyResponse
+    case : Case
+    model : ndarray, shape (f, m)
+        As `FrequencyResponse.curves` gives it.
+    """
+    nodes = one.where(case)[:MOST].tolist()
+    columns = min(len(nodes), 2)
+    figure, frames = _frames(len(nodes), columns, 2.9, 0.8)
+    unit = f" ({one.unit})" if one.unit else ""
+    lines = []
+    for k, (frame, node) in enumerate(zip(frames, nodes, strict=True)):
+        title = f"node {node}" + (", held out" if one.held_out else "")
+        style.frame(frame, "frequency (Hz)", f"{one.axis} {one.quantity}{unit}", title)
+        mark = {"marker": ".", "markersize": 4.0, "linestyle": "none", "label": one.label}
+        lines = frame.semilogy(
+            one.frequency, np.abs(one.values[:, k]), color=style.VERMILLION, **mark
+        )
+        lines += frame.semilogy(
+            one.frequency, np.abs(model[:, k]), color=style.BLUE, lw=1.2, label="model"
+        )
+    style.legend_below(figure, lines, columns=2)
+    return style.finish(figure)
 
 
 def plot_correlation(fit: Fit) -> Figure:

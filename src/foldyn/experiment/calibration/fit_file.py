@@ -20,15 +20,30 @@ from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
 from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes
 from foldyn.experiment.calibration.measured_files import READERS
 from foldyn.experiment.calibration.measurement import Measurement
+from foldyn.experiment.calibration.modal import (
+    DampingRatios,
+    ModalParameters,
+    ModeShapes,
+    NaturalFrequencies,
+)
 from foldyn.experiment.calibration.parameters import Parameter
-from foldyn.values import MOST
+from foldyn.experiment.calibration.responses import FrequencyResponse
+from foldyn.values import MOST, show
 
-CLASSES = {one.kind: one for one in (ForceDisplacement, Shapes, TimeHistory, Spectrum)}
+CLASSES = {
+    one.kind: one
+    for one in (
+        ForceDisplacement, Shapes, TimeHistory, Spectrum, NaturalFrequencies, DampingRatios,
+        ModeShapes, FrequencyResponse,
+    )
+}  # fmt: skip
 MADE = (
     "kind", "case", "changes", "held_out", "displacement", "force", "values", "time", "frequency",
-    "axes",
+    "axes", "mode", "damping_ratio",
 )  # fmt: skip
 """Fields of measurements that come from their file, or have another name in a fit file."""
+NAMED = (TimeHistory.kind, Spectrum.kind, FrequencyResponse.kind)
+"""Kinds whose nodes a fit file must name."""
 
 
 def _case(name: str, info: ValidationInfo) -> Path:
@@ -55,11 +70,16 @@ class DataSection(Section):
 def _measurement(section: DataSection, info: ValidationInfo) -> Measurement:
     given = section.model_extra or {}
     check_keys(given, [*DataSection.model_fields, *_known(section.kind)])
-    if "nodes" not in given and section.kind in (TimeHistory.kind, Spectrum.kind):
+    if "nodes" not in given and section.kind in NAMED:
         raise InputError(": missing; name the nodes that were measured", ".nodes")
+    folder: Path = info.context["folder"]  # type: ignore[index]
+    if issubclass(CLASSES[section.kind], ModalParameters) and "shapes" in given:
+        if not isinstance(given["shapes"], str):
+            raise InputError(f" = {show(given['shapes'])}: must be the name of a file", ".shapes")
+        given = {**given, "shapes": folder / given["shapes"]}
     with within(": "):
         return READERS[section.kind](
-            info.context["folder"] / section.file,  # type: ignore[index]
+            folder / section.file,
             **{"name": Path(section.file).stem, **given},
             case=section.case,
             changes=section.set,

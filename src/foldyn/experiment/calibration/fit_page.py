@@ -19,7 +19,15 @@ from foldyn.experiment.calibration.fitted import Fit
 from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
 from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes
 from foldyn.experiment.calibration.measurement import Measurement
+from foldyn.experiment.calibration.modal import ModalParameters, ModeShapes
+from foldyn.experiment.calibration.responses import FrequencyResponse
 from foldyn.experiment.calibration.shown import MOST, dense, plane
+from foldyn.experiment.calibration.vibration_charts import (
+    modes_table,
+    response_charts,
+    shape_charts,
+    shapes_table,
+)
 from foldyn.report.album import Album
 from foldyn.report.charts import Chart, Charts, Curve
 from foldyn.report.page import write_report
@@ -77,6 +85,10 @@ def write_fit(
             shown = Charts(charts, _caption(one))
             draw = partial(_drawn, fit, (one, run), note)
             sections += album.figure(f"data-{i}", _caption(one), draw, shown)
+        if isinstance(one, ModalParameters):
+            sections.append(modes_table(one, run.result, run.case_file.case()))
+        elif isinstance(one, ModeShapes):
+            sections.append(shapes_table(one, run.result, run.case_file.case()))
     sections += [Heading("The search"), _searches(fit), *_provenance(fit, runs, call or Call())]
     return write_report(folder / "report.html", title, sections)
 
@@ -130,23 +142,26 @@ def _parameters(fit: Fit) -> Table:
     percent = f"{100.0 * fit.confidence:g} %"
     rows = [
         [one.key, one.value, *(cell(v) for v in (one.standard_error, one.lower, one.upper)),
-         one.note] for one in fit.estimates
+         cell(one.discretization or math.nan), one.note] for one in fit.estimates
     ]  # fmt: skip
     changes = fit.problem.space.changes([*fit.values.values()])
     for tie in fit.problem.space.ties:
-        rows.append([tie.key, changes[tie.key], None, None, None, f"= {tie.expression}"])
-    header = ["parameter", "value", "standard error", f"{percent} from", "to", ""]
-    return Table(header, rows, "Parameters in the units of the case file.", digits=5)
+        rows.append([tie.key, changes[tie.key], *4 * [None], f"= {tie.expression}"])
+    header = ["parameter", "value", "standard error", f"{percent} from", "to", "finer steps", ""]
+    return Table(header, rows, f"Parameters in the units of the case file. {fit.quality}", digits=5)
 
 
 def _quality(fit: Fit) -> str:
-    given = all(one.sigma is not None for one in fit.problem.measurements if not one.held_out)
-    text = f"The intervals are from the Jacobian at the optimum and Student's t with {fit.freedom} "
-    text += "degrees of freedom; they hold if the model is right and its errors are random."
-    if given and math.isfinite(fit.misfit):
-        text += f" The misfit is {fit.misfit:.3g} times what the data's standard errors explain"
-        wrong = ": the model is wrong somewhere, or they are too small"
-        text += f"{wrong if fit.misfit > 1.5 else ''}."
+    text = (
+        f"The intervals are from the Jacobian at the optimum and Student's t with {fit.freedom} "
+        "degrees of freedom; they hold if the model is right and its errors are random."
+    )
+    if any(one.discretization for one in fit.estimates):
+        text += (
+            " Finer steps: how far ever smaller time steps and, of a shell, elements would move "
+            "the value, estimated from one more computation with half of them; the interval "
+            "reaches that far beyond the noise."
+        )
     return text
 
 
@@ -167,8 +182,12 @@ def _blind(fit: Fit) -> str:
 
 
 def _scores(fit: Fit) -> Table:
-    rows = [[s.name, s.held_out, s.count, s.rms, s.unit, 100.0 * s.relative] for s in fit.scores]
-    header = ["measurement", "held out", "values", "rms misfit", "unit", "of its variation (%)"]
+    rows = [
+        [s.name, s.held_out, s.count, s.rms, s.unit, 100.0 * s.relative, cell(s.sigmas)]
+        for s in fit.scores
+    ]
+    header = ["measurement", "held out", "values", "rms misfit", "unit", "of its variation (%)",
+              "in sigma"]  # fmt: skip
     return Table(header, rows, digits=3)
 
 
@@ -188,7 +207,7 @@ def _searches(fit: Fit) -> Table:
 
 def _caption(one: Measurement) -> str:
     text = f"{one.name}: {one.label} and model."
-    if isinstance(one, TimeHistory | Spectrum) and one.values.shape[1] > MOST:
+    if isinstance(one, TimeHistory | Spectrum | FrequencyResponse) and one.values.shape[1] > MOST:
         text += f" The first {MOST} of {one.values.shape[1]} nodes."
     return f"{text} Held out: the fit did not use it." if one.held_out else text
 
@@ -203,6 +222,10 @@ def _charts(fit: Fit, number: int, one: Measurement, run: _Run) -> list[Chart]:
         return [Chart(f"{one.axis} displacement (m)", f"{one.axis} force (N)", [model, seen])]
     if isinstance(one, Shapes):
         return _shape_charts(one, run) if len(one.axes) > 1 else []
+    if isinstance(one, ModeShapes):
+        return shape_charts(one, result, case)
+    if isinstance(one, FrequencyResponse):
+        return response_charts(one, result, case)
     if isinstance(one, TimeHistory):
         curves, seen = one.curves(result, case), one.values - one.trend(one.values)
         curves, along = curves - one.trend(curves), one.time

@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,13 @@ from foldyn.analyses import CaseFile
 from foldyn.analyses.keys import files_of, replaced, value_at
 from foldyn.analyses.reading import case_of_document, read_document, validated
 from foldyn.cases import Case
+from foldyn.cases.models import SHELL
 from foldyn.dynamics.methods import method_of
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment.calibration.measurement import Measurement
+from foldyn.experiment.calibration.modal import ModalParameters, ModeShapes
 from foldyn.experiment.calibration.parameters import Parameter, Space, space
+from foldyn.experiment.calibration.responses import FrequencyResponse
 from foldyn.experiment.calibration.sight import Sight
 from foldyn.input_files import path_of
 from foldyn.program import program
@@ -30,6 +33,10 @@ STEADY = "generalized_alpha"
 """Integrator of a fit where the case file leaves the choice open."""
 ASIDE = ("name", "label", "sigma", "held_out", "case", "force")
 """Fields of measurements that do not change what is predicted."""
+VIBRATIONS = ("modes", "frf")
+"""Analyses whose results are looked at before a search."""
+MESH_ORDER = 2
+"""Order of a shell's elements."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +56,11 @@ class PredictedRun:
     path: Path
     document: dict[str, Any]
     members: tuple[int, ...]
+
+    @property
+    def kind(self) -> str:
+        """Kind of its analysis."""
+        return self.document["analysis"]["kind"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,16 +136,74 @@ class Problem:
                 there = run.path.parent / file
                 digest.update(there.read_bytes() if there.is_file() else b"")
         for one in self.measurements:
-            for item in fields(one):
-                if item.name in ASIDE:
-                    continue
-                value = getattr(one, item.name)
-                if item.name == "values" and not getattr(one, "align", 0.0):
-                    value = np.isfinite(value)
-                for part in value if isinstance(value, Sight) else (value,):
-                    array = isinstance(part, np.ndarray)
-                    digest.update(part.tobytes() if array else repr(part).encode())
+            for part in _parts(one):
+                array = isinstance(part, np.ndarray)
+                digest.update(part.tobytes() if array else repr(part).encode())
         return digest.hexdigest()
+
+    def examine(self, values: Sequence[float] | NDArray) -> None:
+        """Refuse values at which vibrations leave open what the measured ones are.
+
+        What an analysis warns of is told, as of a motion or path it is not.
+        """
+        for run in self.runs:
+            if run.kind in VIBRATIONS:
+                case_file = self.case_file(run, values)
+                members = [self.measurements[i] for i in run.members]
+                result = _computed(case_file, members)
+                for one in members:
+                    one.examine(result, case_file.case())
+
+    def finer(self, values: Sequence[float] | NDArray) -> list[Finer]:
+        """The same model with half the time step, and with half the size of a shell's elements."""
+        steps: dict[int, dict[str, float]] = {}
+        meshes: dict[int, dict[str, float]] = {}
+        orders = []
+        for k, run in enumerate(self.runs):
+            if run.kind == "dynamics":
+                motion = self._motion(run, values)
+                orders.append(motion.method.order)
+                steps[k] = {"analysis.dt": 0.5 * motion.plan.dt}
+                steps[k]["output.every"] = 0.5 * motion.plan.interval
+            if run.document.get("model", {}).get("kind") == SHELL:
+                divisions = self.case_file(run, values).case().structure.options.divisions
+                meshes[k] = {"model.divisions": 2 * divisions}
+        found = []
+        if steps:
+            longest = 2.0 * max(one["analysis.dt"] for one in steps.values())
+            remedy = f"analysis.dt below {longest:.3g} s"
+            found.append(Finer("time step", remedy, min(orders), self._changed(steps)))
+        if meshes:
+            most = max(one["model.divisions"] for one in meshes.values())
+            remedy = f"model.divisions = {most:g}"
+            found.append(Finer("mesh", remedy, MESH_ORDER, self._changed(meshes)))
+        return found
+
+    def _motion(self, run: PredictedRun, values: Sequence[float] | NDArray) -> Any:
+        """The motion that a run computes, before it begins."""
+        case_file = self.case_file(run, values)
+        return case_file.computation(**_steady(case_file)).compute.motion  # type: ignore[attr-defined]
+
+    def _changed(self, changes: Mapping[int, Mapping[str, float]]) -> Problem:
+        runs = [
+            replace(run, document=replaced(run.document, changes.get(k, {})))
+            for k, run in enumerate(self.runs)
+        ]
+        return replace(self, runs=tuple(runs))
+
+
+class Finer(NamedTuple):
+    """A problem that is discretized twice as finely as another.
+
+    what : "time step" or "mesh".
+    remedy : what a case file would say for it.
+    order : with which the error falls.
+    """
+
+    what: str
+    remedy: str
+    order: int
+    problem: Problem
 
 
 def problem(
@@ -149,6 +219,8 @@ def problem(
     InputError
         One cannot be used: a case file at the values to start from, a measurement that its case
         cannot predict, a parameter that the case file does not have.
+    ComputationError
+        Modes or a frequency response cannot be computed at the values to start from.
     """
     path = path_of(case, "case")
     document = read_document(path)
@@ -169,7 +241,8 @@ def problem(
         case_file = case_of_document(run.path, replaced(run.document, made.space.changes(start)))
         for i in run.members:
             _check(measurements[i], case_file)
-    fitted = sum(len(one.observed()) for one in measurements if not one.held_out)
+    made.examine(start)
+    fitted = sum(len(one.observed()) - one.absorbed for one in measurements if not one.held_out)
     if fitted < len(parameters):
         raise InputError(
             f"data: {fitted} values that are not held out cannot give {len(parameters)} "
@@ -226,17 +299,43 @@ def _check(one: Measurement, case_file: CaseFile) -> None:
 
 
 def _result(case_file: CaseFile, members: Sequence[Measurement]) -> Any:
-    """Path or motion that a case file asks for, at the load factors that are measured."""
+    """What a case file asks for, without its warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
-        if case_file.analysis.kind == "dynamics":
-            return case_file.computation(**_steady(case_file)).result()
-        case, given = case_file.case(), case_file.analysis.arguments
-        path = _path(case, members)
-        settings = replace(given["settings"], stability=False)
-        return case_file.computation(
-            method="newton", load_factors=path, first_step=None, until=None, settings=settings
-        ).result()
+        return _computed(case_file, members)
+
+
+def _computed(case_file: CaseFile, members: Sequence[Measurement]) -> Any:
+    """What a case file asks for, at the load factors, modes or frequencies that are measured."""
+    case, given = case_file.case(), case_file.analysis.arguments
+    if case_file.analysis.kind == "dynamics":
+        changes: dict[str, Any] = _steady(case_file)
+    elif case_file.analysis.kind == "modes":
+        counts = [one.count for one in members if isinstance(one, ModeShapes | ModalParameters)]
+        changes = {"count": min(max(given["count"], *counts), len(case.free_dofs))}
+    elif case_file.analysis.kind == "frf":
+        lines = [one.frequency for one in members if isinstance(one, FrequencyResponse)]
+        changes = {"frequencies": np.unique(np.concatenate(lines))}
+    else:
+        changes = {
+            "method": "newton", "load_factors": _path(case, members), "first_step": None,
+            "until": None, "settings": replace(given["settings"], stability=False),
+        }  # fmt: skip
+    return case_file.computation(**changes).result()
+
+
+def _parts(one: Measurement) -> Iterator[Any]:
+    """What predictions of a measurement depend on, but for the model."""
+    for item in fields(one):
+        value = getattr(one, item.name)
+        if item.name in ASIDE:
+            continue
+        if isinstance(value, Measurement):
+            yield from _parts(value)
+        elif isinstance(value, Sight):
+            yield from value
+        else:
+            yield np.isfinite(value) if item.name == "values" and not one.adapts else value
 
 
 def _path(case: Case, members: Sequence[Measurement]) -> list[float]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,55 +12,20 @@ import numpy as np
 import tomli_w
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.stats import chi2
 
 import foldyn
 from foldyn.analyses.keys import replaced
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.fit_problem import Problem
-from foldyn.experiment.calibration.measurement import Measurement
+from foldyn.experiment.calibration.measurement import Measurement, spread
+from foldyn.experiment.calibration.uncertainty import Estimate
 from foldyn.results import netcdf
 from foldyn.values import brief
 from foldyn.writing import write_text
 
-WEAK = 1e-5
-"""Singular value, relative to the largest, below which a direction is not seen at all."""
-PART = 0.1
-"""Part of a parameter in such a direction from which on it counts as not determined."""
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A parameter with its fitted value.
-
-    Attributes
-    ----------
-    key : str
-    value : float
-    standard_error : float
-        inf where the data do not determine the parameter, nan where a bound holds it.
-    lower, upper : float
-        Confidence interval.
-    determined : bool
-        Whether the data determine it.
-    at_bound : bool
-        Whether it ended at one of its bounds, which then decides its value.
-    """
-
-    key: str
-    value: float
-    standard_error: float
-    lower: float
-    upper: float
-    determined: bool
-    at_bound: bool
-
-    @property
-    def note(self) -> str:
-        """Remark beside its numbers, if any."""
-        if self.at_bound:
-            return "at its bound: the data pull it further"
-        return "" if self.determined else "the data do not determine it"
+RARE = 0.01
+"""Probability of a misfit by noise alone below which something else must have part in it."""
 
 
 @brief
@@ -105,6 +69,8 @@ class Score:
     unit : str
     relative : float
         `rms` over the root mean square of the measured values about their mean.
+    sigmas : float
+        Root mean square of the misfit in standard errors of the data; nan without `sigma`.
     """
 
     name: str
@@ -113,6 +79,7 @@ class Score:
     rms: float
     unit: str
     relative: float
+    sigmas: float
 
 
 @brief
@@ -132,10 +99,10 @@ class Fit:
     confidence : float
         Of the intervals.
     freedom : int
-        Fitted values minus free parameters.
+        Fitted values minus free parameters, and minus the scales, shifts and trends of the data.
     misfit : float
-        Root mean square of the weighted residuals per degree of freedom: about 1 where every
-        `sigma` is given and both they and the model are right.
+        Root mean square of the weighted residuals per degree of freedom, the root of the reduced
+        chi-square: about 1 where every `sigma` is given and both they and the model are right.
     scores : tuple of Score
         One a measurement.
     descents : tuple of Descent
@@ -181,6 +148,34 @@ class Fit:
         slack = 0.01 * costs.min() + 1e-9
         return int((costs <= costs.min() + slack).sum())
 
+    @property
+    def weighed(self) -> bool:
+        """Whether the misfit is in standard errors, as the data all have one."""
+        return all(one.sigma is not None for one in self.problem.measurements if not one.held_out)
+
+    @property
+    def unlikely(self) -> bool:
+        """Whether noise as large as the data's would hardly ever leave such a misfit."""
+        if not self.weighed or not np.isfinite(self.misfit):
+            return False
+        return bool(chi2.sf(self.freedom * self.misfit**2, self.freedom) < RARE)
+
+    @property
+    def quality(self) -> str:
+        """The misfit in words, and what it says of model and data."""
+        if not np.isfinite(self.misfit):
+            return "No degree of freedom is left to tell the misfit."
+        freedom = f"{self.freedom} degree{'s' if self.freedom != 1 else ''} of freedom"
+        if not self.weighed:
+            return (
+                f"Misfit: {self.misfit:.3g} of the spread of the data ({freedom}; give sigma to "
+                "compare it with noise)."
+            )
+        text = f"Misfit: {self.misfit:.3g} sigma (reduced chi-square {self.misfit**2:.3g}, "
+        text += f"{freedom})"
+        wrong = ", more than noise explains: the model is wrong somewhere, or sigma is too small"
+        return f"{text}{wrong if self.unlikely else ''}."
+
     def document(self) -> dict[str, Any]:
         """The case file with the values found."""
         return replaced(self.problem.document, self.problem.space.changes([*self.values.values()]))
@@ -205,6 +200,7 @@ class Fit:
             "directions": self.directions.tolist(),
             "degrees_of_freedom": self.freedom,
             "misfit": _plain(self.misfit),
+            "quality": self.quality,
             "measurements": [_plain(vars(one)) for one in self.scores],
             "starts": [_plain(vars(one)) for one in self.descents],
             "evaluations": self.evaluations,
@@ -216,19 +212,23 @@ class Fit:
         keys = list(self.values)
         data: dict[str, Any] = {
             name: ("parameter", np.array([getattr(one, name) for one in self.estimates]))
-            for name in ("value", "standard_error", "lower", "upper", "determined", "at_bound")
-        }
+            for name in (
+                "value", "standard_error", "lower", "upper", "determined", "at_bound",
+                "discretization",
+            )
+        }  # fmt: skip
         data["correlation"] = (("parameter", "other"), self.correlation)
         data["singular_value"] = ("direction", self.singular_values)
         data["direction_of"] = (("direction", "parameter"), self.directions)
-        both = zip(self.problem.measurements, self.predicted, strict=True)
-        for i, (one, predicted) in enumerate(both):
-            facts: dict[str, Any] = {"name": one.name, "kind": one.kind, "units": one.unit}
-            facts["held_out"] = int(one.held_out)
+        every = zip(self.problem.measurements, self.predicted, self.scores, strict=True)
+        for i, (one, predicted, score) in enumerate(every):
+            facts: dict[str, Any] = {"name": one.name, "kind": one.kind, "units": one.unit or "1"}
+            facts |= {"held_out": int(one.held_out), "misfit_in_sigmas": score.sigmas}
             data[f"measured_{i}"] = (f"value_{i}", one.observed(), facts)
             data[f"predicted_{i}"] = (f"value_{i}", predicted, facts)
         attrs = {"foldyn_version": foldyn.__version__, "confidence": self.confidence}
         attrs |= {"misfit": self.misfit, "degrees_of_freedom": self.freedom}
+        attrs |= {"misfit_in_sigmas": int(self.weighed), "quality": self.quality}
         return xr.Dataset(data, {"parameter": keys, "other": keys}, attrs)
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -251,117 +251,15 @@ class Fit:
             raise InputError(f"{path}: a fit is written as .json or .nc; choose one of them")
 
 
-@brief
-@dataclass(frozen=True, eq=False)
-class Uncertainty:
-    """Standard errors, intervals and correlation of p parameters.
-
-    Attributes
-    ----------
-    standard_error : ndarray, shape (p,)
-        inf of what is not determined, nan of what lies at a bound.
-    half_width : ndarray, shape (p,)
-        Of the confidence intervals.
-    correlation : ndarray, shape (p, p)
-        nan with what is not determined or at a bound.
-    singular_values : ndarray, shape (p,)
-        Of the weighted Jacobian by the parameters over their scales, decreasing; 0 for parameters
-        at a bound.
-    directions : ndarray, shape (p, p)
-        Row k: the change of the parameters (in their scales) that belongs to singular value k.
-    determined : ndarray of bool, shape (p,)
-    freedom : int
-        Values minus parameters that are free.
-    misfit : float
-        Root mean square of the weighted residuals per degree of freedom: 1 where the model is
-        right and the standard errors of the data are.
-    """
-
-    standard_error: NDArray[np.float64]
-    half_width: NDArray[np.float64]
-    correlation: NDArray[np.float64]
-    singular_values: NDArray[np.float64]
-    directions: NDArray[np.float64]
-    determined: NDArray[np.bool_]
-    freedom: int
-    misfit: float
-
-    @classmethod
-    def of(
-        cls,
-        jacobian: NDArray[np.float64],
-        residual: NDArray[np.float64],
-        scale: NDArray[np.float64],
-        at_bound: NDArray[np.bool_],
-        confidence: float,
-    ) -> Uncertainty:
-        """Linearized uncertainty of a fit at its optimum.
-
-        With the singular values s_k and directions v_k of the Jacobian J, cov = misfit^2 sum v_k
-        v_k^T / s_k^2, and the half width of an interval is the standard error times the quantile of
-        Student's t of the degrees of freedom.
-
-        The data do not see a direction whose singular value is below `WEAK` of the largest, and
-        hardly see one whose standard error exceeds the scales of the parameters. Both are left out
-        of the covariance, and parameters that take part in them are not determined.
-
-        Parameters
-        ----------
-        jacobian : ndarray, shape (n, p)
-            Weighted residuals by the parameters over their scales.
-        residual : ndarray, shape (n,)
-            Weighted residuals.
-        scale : ndarray, shape (p,)
-        at_bound : ndarray of bool, shape (p,)
-            Parameters that a bound holds: they count as known.
-        confidence : float
-            Of the intervals, 0.95 for 95 %.
-        """
-        n, p = jacobian.shape
-        free = np.flatnonzero(~at_bound)
-        freedom = n - len(free)
-        misfit = float(np.sqrt(residual @ residual / freedom)) if freedom > 0 else np.nan
-        singular, rows = np.zeros(p), np.zeros((p, p))
-        if len(free):
-            _, some, directions = np.linalg.svd(jacobian[:, free], full_matrices=False)
-            singular[: len(some)] = some
-            rows[np.ix_(np.arange(len(directions)), free)] = directions
-        own = np.arange(p) < len(free)
-        seen = own & (singular > WEAK * singular[0])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            seen &= ~(misfit / singular > 1.0)
-        weak = np.sqrt((rows[own & ~seen] ** 2).sum(axis=0))
-        determined = weak < PART
-        cov = (rows[seen].T / singular[seen] ** 2) @ rows[seen] * misfit**2
-        error = np.where(determined, np.sqrt(np.diag(cov)) * scale, np.inf)
-        error[at_bound] = np.nan
-        usable = determined & ~at_bound
-        correlation = np.full((p, p), np.nan)
-        some = np.flatnonzero(usable)
-        root = np.sqrt(np.diag(cov))[some]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            correlation[np.ix_(some, some)] = cov[np.ix_(some, some)] / np.outer(root, root)
-        width = float(student.ppf(0.5 + 0.5 * confidence, freedom)) if freedom > 0 else np.nan
-        return cls(error, error * width, correlation, singular, rows, determined, freedom, misfit)
-
-    def estimates(self, keys: Sequence[str], values: NDArray[np.float64]) -> tuple[Estimate, ...]:
-        """Estimates of the parameters."""
-        error, half = self.standard_error, self.half_width
-        numbers = values, error, values - half, values + half, self.determined, np.isnan(error)
-        rows = zip(keys, *(column.tolist() for column in numbers), strict=True)
-        return tuple(Estimate(*row) for row in rows)
-
-
 def score(one: Measurement, predicted: NDArray) -> Score:
     """Compare measured with predicted values."""
     observed = one.observed()
-    rms = float(np.sqrt(np.mean((predicted - observed) ** 2)))
-    return Score(one.name, one.held_out, len(observed), rms, one.unit, rms / spread(observed))
-
-
-def spread(observed: NDArray) -> float:
-    """Size of measured values, by which they are weighted where their error is not known."""
-    return float(np.std(observed)) or float(np.abs(observed).max()) or 1.0
+    misfit = predicted - observed
+    rms = float(np.sqrt(np.mean(misfit**2)))
+    sigmas = np.nan if one.sigma is None else float(np.sqrt(np.mean((misfit / one.errors()) ** 2)))
+    return Score(
+        one.name, one.held_out, len(observed), rms, one.unit, rms / spread(observed), sigmas
+    )
 
 
 def _plain(value: Any) -> Any:

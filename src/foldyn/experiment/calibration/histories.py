@@ -90,6 +90,16 @@ class TimeHistory(NodeValues):
                 "point was followed; leave it out"
             )
 
+    @property
+    def adapts(self) -> bool:
+        """See `Measurement`."""
+        return self.align > 0.0
+
+    @property
+    def absorbed(self) -> int:
+        """See `Measurement`."""
+        return (self.align > 0.0) + DETRENDS.index(self.detrend) * self.values.shape[1]
+
     def observed(self) -> NDArray[np.float64]:
         """See `Measurement`."""
         return self._reduced(self.values)

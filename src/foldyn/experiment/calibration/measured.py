@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
-from foldyn.experiment.calibration.measurement import Measurement, NodeValues, column
-from foldyn.values import choice, show
+from foldyn.experiment.calibration.measurement import AtNodes, NodeValues, check_axes, column
+from foldyn.values import choice
 
 IMPOSED = "imposed"
 """Selects all nodes that supports of the case move along the axis."""
@@ -21,7 +21,7 @@ QUANTITIES = ("displacement", "position")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class ForceDisplacement(Measurement):
+class ForceDisplacement(AtNodes):
     """Forces at displacements that supports of the case impose.
 
     Parameters
@@ -41,7 +41,6 @@ class ForceDisplacement(Measurement):
     axis: str = "x"
     kind: ClassVar[str] = "force_displacement"
     analysis: ClassVar[str] = "statics"
-    unit: ClassVar[str] = "N"
     word: ClassVar[str] = IMPOSED
 
     def __post_init__(self) -> None:
@@ -50,6 +49,11 @@ class ForceDisplacement(Measurement):
         choice(self._of("axis"), self.axis, AXES)
         moved = column(self._of("displacement"), self.displacement)
         self._set(displacement=moved, force=column(self._of("force"), self.force, len(moved)))
+
+    @property
+    def unit(self) -> str:
+        """See `Measurement`."""
+        return "N"
 
     def observed(self) -> NDArray[np.float64]:
         """See `Measurement`."""
@@ -121,8 +125,7 @@ class Shapes(NodeValues):
         """Check the arguments."""
         super().__post_init__()
         choice(self._of("quantity"), self.quantity, QUANTITIES)
-        if not self.axes or set(self.axes) - set(AXES) or len(set(self.axes)) < len(self.axes):
-            raise InputError(f'{self._of("axes")} = {show(self.axes)}: must be letters of "xyz"')
+        check_axes(self._of("axes"), self.axes)
         factors = column(self._of("load_factor"), self.load_factor)
         values = np.array(self.values, dtype=np.float64)
         if values.ndim != 3 or values.shape[::2] != (len(factors), len(self.axes)):

@@ -1,9 +1,9 @@
-"""Measurements from files: CSV with units, and the tracks of films and photographs (NetCDF)."""
+"""Measurements from files: CSV with units, tracks of films and photographs, results (NetCDF)."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence, Sized
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +13,23 @@ from numpy.typing import NDArray
 
 from foldyn.cases.csv_table import read_headings, read_numbers, some
 from foldyn.cases.directions import AXES
-from foldyn.cases.selection import check_nodes
-from foldyn.errors import InputError, within
+from foldyn.errors import InputError
 from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
 from foldyn.experiment.calibration.measured import IMPOSED, ForceDisplacement, Shapes
 from foldyn.experiment.calibration.measurement import Measurement
+from foldyn.experiment.calibration.modal import DampingRatios, ModeShapes, NaturalFrequencies
+from foldyn.experiment.calibration.modal_files import (
+    damping_ratios,
+    frequencies,
+    frf,
+    mode_shapes,
+    recognized,
+)
+from foldyn.experiment.calibration.responses import FrequencyResponse
 from foldyn.experiment.calibration.sight import Sight
+from foldyn.experiment.calibration.tables import by_node, limits, listed_nodes, made
 from foldyn.experiment.tracking.tracks_dataset import load_tracks
-from foldyn.values import choice, numbers, show
+from foldyn.values import choice, show
 
 
 def force_displacement(
@@ -45,7 +54,7 @@ def force_displacement(
             '{ displacement = "way", force = "load" }'
         )
     wanted = {name: (headings.get(name, name), unit) for name, unit in units.items()}
-    return _made(ForceDisplacement, file, **read_numbers(file, wanted), **known)
+    return made(ForceDisplacement, file, **read_numbers(file, wanted), **known)
 
 
 def shapes(
@@ -71,28 +80,8 @@ def shapes(
         return _shapes_of_tracks(file, moved, nodes, load_factor, **known)
     if load_factor is not None:
         raise InputError(f"{file}: load_factor: leave it out, the file has a column of that name")
-    axes = "".join(axis for axis in AXES if axis in names)
-    if not axes:
-        raise InputError(f'{file}: has no column "x", "y" or "z"; shapes need at least one')
-    wanted = {"load_factor": ("load_factor", "-"), "node": ("node", "-")}
-    table = read_numbers(file, wanted | {axis: (axis, "m") for axis in axes}, gaps=axes)
-    listed, steps = table["node"].astype(int), np.unique(table["load_factor"])
-    broken = np.flatnonzero(table["node"] != listed)
-    if broken.size:
-        raise InputError(f"{file}: node = {table['node'][broken[0]]:g}: must be a whole number")
-    lines, times = np.unique([listed, table["load_factor"]], axis=1, return_counts=True)
-    for node, factor in lines.T[times > 1]:
-        raise InputError(f"{file}: has two lines for node {node:g} at the load factor {factor:g}")
-    every = np.unique(listed)
-    values = np.full((len(steps), len(every), len(axes)), np.nan)
-    place = np.searchsorted(steps, table["load_factor"]), np.searchsorted(every, listed)
-    values[place] = np.stack([table[axis] for axis in axes], axis=1)
-    chosen = every.tolist() if nodes is None else _listed(file, nodes)
-    missing = sorted(set(chosen) - set(every.tolist()))
-    if missing:
-        raise InputError(f"{file}: has no line for node {missing[0]}")
-    values = values[:, np.searchsorted(every, chosen)]
-    return _made(Shapes, file, nodes=chosen, load_factor=steps, values=values, axes=axes, **known)
+    steps, chosen, axes, values = by_node(file, "load_factor", nodes, "m")
+    return made(Shapes, file, nodes=chosen, load_factor=steps, values=values, axes=axes, **known)
 
 
 def history(
@@ -119,13 +108,13 @@ def history(
     **known
         Other arguments of `TimeHistory`.
     """
-    chosen = _listed(file, nodes)
+    chosen = listed_nodes(file, nodes)
     tracks, names = _opened(file)
     time, values = _motions(file, tracks, names, chosen, axis, columns)
     if tracks is not None:
         known["sight"] = Sight.of(tracks)
     if window is not None:
-        first, last = _range("window", window, "times (s)")
+        first, last = limits("window", window, "times (s)")
         within = (time >= first) & (time <= last)
         if within.sum() < 2:
             raise InputError(
@@ -133,14 +122,14 @@ def history(
                 f"{time[0]:.6g} to {time[-1]:.6g} s"
             )
         time, values = time[within], values[within]
-    return _made(TimeHistory, file, nodes=chosen, time=time, values=values, axis=axis, **known)
+    return made(TimeHistory, file, nodes=chosen, time=time, values=values, axis=axis, **known)
 
 
 def spectrum(
     file: Path, band: Sequence[float] | None = None, taper: str | None = None, **known: Any
 ) -> Spectrum:
     """Spectra of histories within a band (Hz), which must be given; the rest as for `history`."""
-    chosen = _range("band", band, "frequencies (Hz)")
+    chosen = limits("band", band, "frequencies (Hz)")
     detrend = known.pop("detrend", "constant")
     return Spectrum.of(history(file, **known), chosen, detrend, taper)
 
@@ -151,15 +140,21 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
     Columns displacement and force: forces on all nodes that supports move along the axis. A column
     load_factor: shapes. A first column of times and others such as "node 8 x": histories of the
     nodes along the axis. Tracks of a film: histories of all nodes that were seen; one that was seen
-    only once shows no motion and is left out.
+    only once shows no motion and is left out. A column mode: mode shapes where there is a column
+    node, else natural frequencies. A column frequency and others such as "node 8 x real": frequency
+    responses of the nodes along the axis. Results of Foldyn: natural frequencies, or frequency
+    responses.
     """
+    choice(f"{file}: axis", axis, AXES)
+    modal = recognized(file, axis, **known)
+    if modal is not None:
+        return modal
     tracks, names = _opened(file)
     if "photo" in names:
         raise InputError(
             f"{file}: holds tracks of photographs, whose load factors only a fit file can name: "
             'kind = "shapes", load_factor = [...]'
         )
-    choice(f"{file}: axis", axis, AXES)
     if tracks is not None:
         moved = _moved(file, tracks, "time").sel(axis=axis)
         nodes = moved["node"].values[np.isfinite(moved.values).any(axis=0)].tolist()
@@ -174,7 +169,9 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
         if not nodes:
             raise InputError(
                 f'{file}: the columns are {some(names)}; needed are "displacement" and '
-                f'"force", or "load_factor", "node", "x", ..., or "time", "node 8 {axis}", ...'
+                f'"force", or "load_factor", "node", "x", ..., or "time", "node 8 {axis}", ..., or '
+                f'"mode", "frequency", or "mode", "node", "x", ..., or "frequency", '
+                f'"node 8 {axis} real", "node 8 {axis} imag", ...'
             )
     time, values = _motions(file, tracks, names, nodes, axis)
     shown = np.isfinite(values).sum(axis=0) != 1
@@ -182,7 +179,7 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
     known |= {"nodes": np.array(nodes)[kept].tolist(), "values": values[:, kept]}
     if tracks is not None:
         known["sight"] = Sight.of(tracks)
-    return _made(TimeHistory, file, time=time, axis=axis, **known)
+    return made(TimeHistory, file, time=time, axis=axis, **known)
 
 
 def _opened(file: Path) -> tuple[xr.Dataset | None, list[str]]:
@@ -249,9 +246,9 @@ def _shapes_of_tracks(
     if not moved.size:
         raise InputError(f"{file}: no node was measured in any photograph")
     if nodes is not None:
-        moved = _of_nodes(file, moved, _listed(file, nodes))
+        moved = _of_nodes(file, moved, listed_nodes(file, nodes))
     moved = moved.dropna("axis", how="all")
-    return _made(
+    return made(
         Shapes, file, nodes=moved["node"].values.tolist(), load_factor=load_factor,
         values=moved.values, axes="".join(moved["axis"].values), **known,
     )  # fmt: skip
@@ -280,32 +277,9 @@ def _of_nodes(file: Path, moved: xr.DataArray, nodes: Sequence[int]) -> xr.DataA
     return moved.sel(node=list(nodes))
 
 
-def _listed(file: Path, nodes: Any) -> list[int]:
-    """Numbers of nodes: expressions over a pattern mean nothing to a file."""
-    empty = isinstance(nodes, Sized) and not len(nodes)
-    chosen = "" if empty else check_nodes(nodes)
-    if isinstance(chosen, str):
-        raise InputError(f"nodes = {show(nodes)}: give the numbers of the nodes in {file.name}")
-    return list(chosen)
-
-
 def _texts(given: Any) -> bool:
     """Whether this is a list of texts."""
     return isinstance(given, list | tuple) and all(isinstance(one, str) for one in given)
-
-
-def _range(name: str, given: Any, what: str) -> tuple[float, float]:
-    """Two increasing numbers."""
-    pair = numbers(name, given) if isinstance(given, list | tuple) else np.zeros(0)
-    if pair.shape != (2,) or not pair[0] < pair[1]:
-        raise InputError(f"{name} = {show(given)}: give two {what}, as in [2, 30]")
-    return float(pair[0]), float(pair[1])
-
-
-def _made(kind: Any, file: Path, **known: Any) -> Any:
-    """A measurement; messages on what is wrong with it name the file."""
-    with within("", file):
-        return kind(**known)
 
 
 READERS: Mapping[str, Any] = {
@@ -313,5 +287,9 @@ READERS: Mapping[str, Any] = {
     Shapes.kind: shapes,
     TimeHistory.kind: history,
     Spectrum.kind: spectrum,
+    NaturalFrequencies.kind: frequencies,
+    DampingRatios.kind: damping_ratios,
+    ModeShapes.kind: mode_shapes,
+    FrequencyResponse.kind: frf,
 }
 """Function that reads each kind of measurement: ``reader(file, **arguments)`` returns it."""

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from foldyn.analyses.keys import parts
 from foldyn.cases import Case
+from foldyn.cases.directions import AXES
 from foldyn.cases.selection import check_nodes, resolve_nodes
 from foldyn.errors import InputError
-from foldyn.values import number, numbers
+from foldyn.values import number, numbers, show
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -24,15 +25,13 @@ class Measurement(ABC):
 
     Parameters
     ----------
-    nodes : sequence of int, or str
-        Nodes of the structure, or an expression over the pattern's vertices.
     name : str
         Its name in messages and figures; the kind by default.
     label : str
         What figures call the data: "measured"; "synthetic" where a model made them.
     sigma : float, optional
         Standard error of one value, in the unit of the values. A fit to several measurements needs
-        it for each, to weight them.
+        it for each, to weight them. Some kinds take a list, one for each value.
     held_out : bool
         Not fitted, only compared with the result of the fit to the others.
     case : path, optional
@@ -42,24 +41,21 @@ class Measurement(ABC):
         ``{"supports[3].displacement": 0.04}``.
     """
 
-    nodes: int | str | Sequence[int] = ()
     name: str = ""
     label: str = "measured"
-    sigma: float | None = None
+    sigma: Any = None
     held_out: bool = False
     case: str | Path | None = None
     changes: Mapping[str, Any] = field(default_factory=dict)
     kind: ClassVar[str] = ""
     analysis: ClassVar[str] = ""
-    unit: ClassVar[str] = "m"
-    word: ClassVar[str] = ""  # for `nodes`, which only this kind understands
+    each: ClassVar[bool] = False  # whether sigma may be a list
 
     def __post_init__(self) -> None:
         """Check what all have."""
         self._set(name=self.name or self.kind)
-        if not (isinstance(self.nodes, str) and self.nodes == self.word):
-            self._set(nodes=check_nodes(self.nodes, self._of("nodes")))
-        if self.sigma is not None:
+        listed = self.each and isinstance(self.sigma, Sequence | np.ndarray)
+        if self.sigma is not None and not listed:
             number(self._of("sigma"), self.sigma, above=0.0)
         for key in self.changes:
             parts(key)
@@ -72,13 +68,29 @@ class Measurement(ABC):
         """Name of a field in messages."""
         return f"{self.name or self.kind}: {name}"
 
-    def where(self, case: Case) -> NDArray[np.int64]:
-        """Numbers of the nodes."""
-        return resolve_nodes(case.structure, self.nodes, self._of("nodes"))
+    @property
+    def unit(self) -> str:
+        """Unit of the values; empty where they have none."""
+        return "m"
+
+    @property
+    def adapts(self) -> bool:
+        """Whether predictions depend on the measured values."""
+        return False
+
+    @property
+    def absorbed(self) -> int:
+        """Degrees of freedom that predictions take from the data: scales, shifts and trends."""
+        return 0
 
     @abstractmethod
     def observed(self) -> NDArray[np.float64]:
         """Measured values, flat."""
+
+    def errors(self) -> NDArray[np.float64]:
+        """Standard error of each measured value; the spread of all where none is known."""
+        observed = self.observed()
+        return np.full(len(observed), self.sigma or spread(observed))
 
     @abstractmethod
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
@@ -88,13 +100,40 @@ class Measurement(ABC):
     def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
         """Values that a result gives for the measured ones, flat and in their order."""
 
+    def examine(self, result: Any, case: Case) -> None:  # noqa: B027
+        """Refuse a result that leaves open which of its values are the measured ones."""
+
     def factors(self, case: Case) -> NDArray[np.float64]:
-        """Load factors at which a path is needed; none for a motion."""
+        """Load factors at which a path is needed; none for what is no path."""
         return np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class NodeValues(Measurement):
+class AtNodes(Measurement):
+    """Values at nodes.
+
+    Parameters
+    ----------
+    nodes : sequence of int, or str
+        Nodes of the structure, or an expression over the pattern's vertices.
+    """
+
+    nodes: int | str | Sequence[int] = ()
+    word: ClassVar[str] = ""  # for `nodes`, which only this kind understands
+
+    def __post_init__(self) -> None:
+        """Check the nodes."""
+        super().__post_init__()
+        if not (isinstance(self.nodes, str) and self.nodes == self.word):
+            self._set(nodes=check_nodes(self.nodes, self._of("nodes")))
+
+    def where(self, case: Case) -> NDArray[np.int64]:
+        """Numbers of the nodes."""
+        return resolve_nodes(case.structure, self.nodes, self._of("nodes"))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NodeValues(AtNodes):
     """Values of each of the nodes: `values`, its second axis along the nodes."""
 
     values: Any = ()
@@ -105,12 +144,12 @@ class NodeValues(Measurement):
         if named != known:
             raise InputError(f"{self._of('values')}: are of {known} nodes, {named} are named")
 
-    def _per_node(self, values: NDArray[np.float64], rows: int, what: str) -> NDArray[np.float64]:
+    def _per_node(self, values: NDArray, rows: int, what: str, field: str = "values") -> NDArray:
         """The values of as many rows, a column for each node."""
         values = values[:, None] if values.ndim == 1 else values
         if values.ndim != 2 or len(values) != rows:
             raise InputError(
-                f"{self._of('values')}: shape {values.shape}: must be ({rows} {what}, nodes)"
+                f"{self._of(field)}: shape {values.shape}: must be ({rows} {what}, nodes)"
             )
         return values
 
@@ -122,3 +161,23 @@ def column(name: str, values: Any, length: int | None = None) -> NDArray[np.floa
         wanted = "a list of numbers" if length is None else f"a list of {length} numbers"
         raise InputError(f"{name}: shape {array.shape}: must be {wanted}")
     return array
+
+
+def plain_array(name: str, values: Any) -> NDArray:
+    """Array of values of any kind, NaN among them."""
+    try:
+        return np.array(values)
+    except ValueError:
+        raise InputError(f"{name}: rows have different lengths") from None
+
+
+def spread(observed: NDArray) -> float:
+    """Size of measured values, by which they are weighted where their error is not known."""
+    return float(np.std(observed)) or float(np.abs(observed).max()) or 1.0
+
+
+def check_axes(name: str, axes: Any) -> None:
+    """Refuse what is not letters of "xyz", each once."""
+    sound = isinstance(axes, str) and axes and len(set(axes)) == len(axes) and {*axes} <= {*AXES}
+    if not sound:
+        raise InputError(f'{name} = {show(axes)}: must be letters of "xyz"')

@@ -28,24 +28,29 @@ SEED = 20_000
 def summary(
     fitted: Callable[[np.random.Generator], Fit], draws: int, truth: Mapping[str, float]
 ) -> dict[str, Any]:
-    """How many intervals contain the truth, and how far off the estimates are."""
+    """How many intervals contain the truth, and how far off the estimates are.
+
+    The data have the time step of the fit, whose error is therefore in both: what it adds to an
+    interval is left out here.
+    """
     fits = [fitted(np.random.default_rng(SEED + number)) for number in range(draws)]
     found = {}
     for key in truth:
         some = [one[key] for one in fits]
         values = np.array([one.value for one in some])
-        width = np.mean([0.5 * (one.upper - one.lower) for one in some])
+        lower = [one.lower - min(one.discretization, 0.0) for one in some]
+        upper = [one.upper - max(one.discretization, 0.0) for one in some]
         found[key] = {
             "truth": truth[key],
             "draws": len(some),
-            "contained": sum(one.lower <= truth[key] <= one.upper for one in some),
+            "contained": sum(a <= truth[key] <= b for a, b in zip(lower, upper, strict=True)),
             "mean": float(values.mean()),
             "standard_deviation": float(values.std(ddof=1)) if len(some) > 1 else None,
             "largest_error": float(np.abs(values - truth[key]).max()),
-            "mean_half_width": float(width),
+            "mean_half_width": float(0.5 * np.mean(np.subtract(upper, lower))),
             "values": values.tolist(),
-            "lower": [one.lower for one in some],
-            "upper": [one.upper for one in some],
+            "lower": lower,
+            "upper": upper,
         }
     return found
 

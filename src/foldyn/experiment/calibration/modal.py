@@ -1,0 +1,385 @@
+"""What a fit compares of modes: natural frequencies, damping ratios and mode shapes."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.cases.directions import AXES
+from foldyn.errors import InputError
+from foldyn.experiment.calibration.measurement import (
+    Measurement,
+    NodeValues,
+    check_axes,
+    column,
+    plain_array,
+)
+from foldyn.linear import mac, pair_modes
+from foldyn.values import numbers, show
+
+LEAST = 0.5
+"""MAC of a partner."""
+CLOSE = 0.1
+"""Difference of the MAC with two modes of the model from which on they can be told apart."""
+FEWEST = 2
+"""Components of a shape: a single one is like that of any other."""
+
+
+class Pairing(NamedTuple):
+    """Which mode of the model each measured one is.
+
+    place : places (k,) of the partners among the modes of the model that something resists.
+    mac : (k, K), of the measured modes with all of these.
+    """
+
+    place: NDArray[np.int64]
+    mac: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ModeShapes(NodeValues):
+    """Mode shapes at nodes: what counts is their form, not their sign or size.
+
+    Each measured shape is compared with that mode of the model, among those that its case asks for,
+    whose shape is most like it (MAC), scaled so that it fits best. The sum of the squared
+    differences is then 1 - MAC for a shape of length 1.
+
+    Parameters
+    ----------
+    values : array_like, shape (k, m, a)
+        Of each mode, the component of each node along each axis, in any unit; NaN where it was not
+        measured. They are kept divided by the largest of each mode.
+    axes : str
+        The axes measured, "z" for a sensor that looks along z.
+    mode : sequence of int, optional
+        Numbers of the modes, for messages and figures; 1, 2, ... by default.
+    sigma : float, optional
+        Standard error of a component, as a fraction of the largest one of its mode.
+    """
+
+    axes: str = "xyz"
+    mode: Any = None
+    kind: ClassVar[str] = "mode_shapes"
+    analysis: ClassVar[str] = "modes"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        super().__post_init__()
+        check_axes(self._of("axes"), self.axes)
+        values = plain_array(self._of("values"), self.values)
+        if values.ndim != 3 or values.shape[2] != len(self.axes) or values.dtype.kind not in "fiu":
+            raise InputError(
+                f"{self._of('values')}: shape {values.shape}, {values.dtype}: must be real numbers "
+                f"(modes, nodes, axes), here (modes, nodes, {len(self.axes)})"
+            )
+        values = values.astype(np.float64)
+        if np.isinf(values).any():
+            raise InputError(f"{self._of('values')}: infinite; give NaN where nothing was measured")
+        self._set(mode=_numbered(self._of("mode"), self.mode, len(values)))
+        for number, one in zip(self.mode, values, strict=True):
+            known = one[np.isfinite(one)]
+            if len(known) < FEWEST or not known.any():
+                raise InputError(
+                    f"{self._of('values')}: mode {number} has {len(known)} components that are "
+                    f"numbers; a shape needs at least {FEWEST}, not all of them 0"
+                )
+        largest = np.nanmax(np.abs(values), axis=(1, 2))
+        self._set(values=values / largest[:, None, None])
+
+    @property
+    def unit(self) -> str:
+        """See `Measurement`."""
+        return ""
+
+    @property
+    def adapts(self) -> bool:
+        """See `Measurement`: they are paired, and scaled."""
+        return True
+
+    @property
+    def absorbed(self) -> int:
+        """See `Measurement`: the scale of each shape."""
+        return len(self.values)
+
+    @property
+    def count(self) -> int:
+        """How many modes of the model are needed, those without stiffness not counted."""
+        return len(self.values)
+
+    def observed(self) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self.values[np.isfinite(self.values)]
+
+    def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
+        """See `Measurement`."""
+        super().check(case, arguments)
+        nodes, axes = self.where(case), [AXES.index(axis) for axis in self.axes]
+        if case.fixed[nodes][:, axes].all():
+            raise InputError(
+                f"{self._of('nodes')}: supports hold all of them along {', '.join(self.axes)}; "
+                "name nodes and axes that move"
+            )
+
+    def pairing(self, result: Any, case: Case) -> Pairing:
+        """Which modes of a result are the measured ones, so that the sum of their MAC is largest.
+
+        Raises
+        ------
+        InputError
+            The result has fewer modes.
+        """
+        shapes = self._of_model(result, case)
+        _enough(self.name, len(shapes), self.count, result)
+        alike = np.zeros((len(self.values), len(shapes)))
+        for row, one in zip(alike, self.values, strict=True):
+            seen = np.isfinite(one)
+            row[:] = np.nan_to_num(mac(one[seen][None], shapes[:, seen])[0])
+        return Pairing(pair_modes(alike).second, alike)
+
+    def examine(self, result: Any, case: Case) -> None:
+        """See `Measurement`: each measured mode must be like one of the model, and one alone."""
+        place, alike = self.pairing(result, case)
+        kept = resisted(result)
+        names, hertz = result["mode"].values[kept], result["frequency"].values[kept]
+        for number, own, row in zip(self.mode, place, alike, strict=True):
+            others = np.where(np.arange(len(row)) == own, 0.0, row)
+            rival = int(others.argmax())
+            if row[own] < LEAST:
+                best = int(row.argmax())
+                raise InputError(
+                    f"{self.name}: mode {number} is like no mode of the model: the largest MAC is "
+                    f"{row[best]:.2f}, with mode {names[best]} ({hertz[best]:.4g} Hz); check "
+                    "nodes, axes and supports, start nearer to the truth, or raise analysis.count"
+                )
+            if others[rival] > row[own] - CLOSE:
+                raise InputError(
+                    f"{self.name}: mode {number} may be mode {names[own]} of the model "
+                    f"({hertz[own]:.4g} Hz, MAC {row[own]:.2f}) or mode {names[rival]} "
+                    f"({hertz[rival]:.4g} Hz, MAC {others[rival]:.2f}): the measured components do "
+                    "not tell them apart; measure at more nodes or axes, leave this mode out, or "
+                    "lower analysis.count if one of them is too high"
+                )
+
+    def shapes(self, result: Any, case: Case) -> NDArray[np.float64]:
+        """Shapes of the partners, scaled to fit best where measured, shape (k, m, a)."""
+        shapes = self._of_model(result, case)[self.pairing(result, case).place]
+        seen = np.isfinite(self.values)
+        own, other = np.where(seen, shapes, 0.0), np.where(seen, self.values, 0.0)
+        size = (own**2).sum(axis=(1, 2))
+        scale = (own * other).sum(axis=(1, 2)) / np.where(size > 0.0, size, 1.0)
+        return shapes * scale[:, None, None]
+
+    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self.shapes(result, case)[np.isfinite(self.values)]
+
+    def _of_model(self, result: Any, case: Case) -> NDArray[np.float64]:
+        """Shapes (K, m, a) of the model where it was measured, of modes that something resists."""
+        shapes = result["shape"].transpose("mode", "node", "axis").values[resisted(result)]
+        return shapes[:, self.where(case)][..., [AXES.index(axis) for axis in self.axes]]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ModalParameters(Measurement):
+    """A number of each of several modes.
+
+    Parameters
+    ----------
+    mode : sequence of int, optional
+        Which mode of the model each is, counted from 1 by frequency, those that nothing resists
+        left out; the lowest ones by default. With `shapes`, numbers for messages and figures.
+    shapes : ModeShapes, optional
+        The shapes of the same modes, in the same order: then each is the mode of the model whose
+        shape is most like it, whatever its place among the others. They are not fitted.
+    sigma : float or array_like, shape (k,), optional
+        Standard error of each.
+    """
+
+    mode: Any = None
+    shapes: ModeShapes | None = None
+    analysis: ClassVar[str] = "modes"
+    each: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        super().__post_init__()
+        values = column(self._of(self.quantity), getattr(self, self.quantity))
+        self._check_values(values)
+        self._set(**{self.quantity: values, "mode": self._modes(len(values))})
+        if isinstance(self.sigma, np.ndarray | list | tuple):
+            sigma = column(self._of("sigma"), self.sigma, len(values))
+            if (sigma <= 0.0).any():
+                raise InputError(f"{self._of('sigma')}: must be greater than 0 for each mode")
+            self._set(sigma=sigma)
+
+    def _modes(self, count: int) -> NDArray[np.int64]:
+        numbered = _numbered(self._of("mode"), self.mode, count)
+        if self.shapes is None:
+            return numbered
+        if not isinstance(self.shapes, ModeShapes):
+            raise InputError(f"{self._of('shapes')}: got {show(self.shapes)}, give ModeShapes")
+        if self.mode is None and len(self.shapes.mode) == count:
+            return self.shapes.mode
+        if not np.array_equal(self.shapes.mode, numbered):
+            raise InputError(
+                f"{self._of('shapes')}: are of the modes {show(self.shapes.mode.tolist())}, the "
+                f"values of {show(numbered.tolist())}; give both of the same modes"
+            )
+        return numbered
+
+    @abstractmethod
+    def _check_values(self, values: NDArray[np.float64]) -> None:
+        """Refuse values that no mode has."""
+
+    @property
+    @abstractmethod
+    def quantity(self) -> str:
+        """Variable of modes that is compared, and the field that holds what was measured."""
+
+    @property
+    def adapts(self) -> bool:
+        """See `Measurement`."""
+        return self.shapes is not None
+
+    @property
+    def count(self) -> int:
+        """How many modes of the model are needed, those without stiffness not counted."""
+        return int(self.mode.max()) if self.shapes is None else self.shapes.count
+
+    def observed(self) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return getattr(self, self.quantity)
+
+    def errors(self) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        if isinstance(self.sigma, np.ndarray):
+            return self.sigma
+        return super().errors()
+
+    def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
+        """See `Measurement`."""
+        if self.shapes is not None:
+            self.shapes.check(case, arguments)
+
+    def examine(self, result: Any, case: Case) -> None:
+        """See `Measurement`."""
+        if self.shapes is not None:
+            self.shapes.examine(result, case)
+        self.predicted(result, case)
+
+    def places(self, result: Any, case: Case) -> NDArray[np.int64]:
+        """Places (k,) in a result of the modes that were measured."""
+        kept = resisted(result)
+        if self.shapes is not None:
+            return kept[self.shapes.pairing(result, case).place]
+        _enough(self.name, len(kept), self.count, result)
+        return kept[self.mode - 1]
+
+    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return result[self.quantity].values[self.places(result, case)]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NaturalFrequencies(ModalParameters):
+    """Natural frequencies.
+
+    Parameters
+    ----------
+    frequency : array_like, shape (k,)
+        Natural frequencies (Hz), increasing.
+    """
+
+    frequency: Any = ()
+    kind: ClassVar[str] = "frequencies"
+
+    @property
+    def quantity(self) -> str:
+        """See `ModalParameters`."""
+        return "frequency"
+
+    @property
+    def unit(self) -> str:
+        """See `Measurement`."""
+        return "Hz"
+
+    def _check_values(self, values: NDArray[np.float64]) -> None:
+        if (values <= 0.0).any():
+            raise InputError(
+                f"{self._of('frequency')} = {values.min():g}: must be greater than 0 Hz; leave out "
+                "rigid motions"
+            )
+        back = np.flatnonzero(np.diff(values) < 0.0)
+        if back.size:
+            raise InputError(
+                f"{self._of('frequency')}: {values[back[0] + 1]:g} Hz comes after "
+                f"{values[back[0]]:g} Hz; sort the modes by frequency"
+            )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DampingRatios(ModalParameters):
+    """Modal damping ratios.
+
+    Parameters
+    ----------
+    damping_ratio : array_like, shape (k,)
+        Fractions of the critical damping: 0.02 is 2 %.
+    """
+
+    damping_ratio: Any = ()
+    kind: ClassVar[str] = "damping_ratios"
+
+    @property
+    def quantity(self) -> str:
+        """See `ModalParameters`."""
+        return "damping_ratio"
+
+    @property
+    def unit(self) -> str:
+        """See `Measurement`."""
+        return ""
+
+    def _check_values(self, values: NDArray[np.float64]) -> None:
+        wrong = values[(values < 0.0) | (values >= 1.0)]
+        if wrong.size:
+            raise InputError(
+                f"{self._of('damping_ratio')} = {wrong[0]:g}: must be from 0 to below 1 (2 % is "
+                "0.02)"
+            )
+
+
+def resisted(result: Any) -> NDArray[np.int64]:
+    """Places of the modes that something resists: neither rigid nor mechanisms, nor unstable."""
+    return np.flatnonzero(result["eigenvalue"].values > 0.0)
+
+
+def _enough(name: str, found: int, needed: int, result: Any) -> None:
+    """Refuse a result with fewer modes than were measured."""
+    if found >= needed:
+        return
+    modes, most = result.sizes["mode"], int(result.attrs["free_dofs"])
+    what = f"mode {needed} was measured, but the model has only {found} that something resists"
+    if modes >= most:
+        raise InputError(f"{name}: {what}; leave out what it cannot have, or refine it")
+    raise InputError(f"{name}: {what} among its lowest {modes}; raise analysis.count")
+
+
+def _numbered(name: str, given: Any, count: int) -> NDArray[np.int64]:
+    """Numbers of modes from 1, increasing; 1, 2, ... where none are given."""
+    if given is None:
+        return np.arange(1, count + 1)
+    array = numbers(name, given)
+    modes = array.astype(np.int64)
+    if array.shape != (count,) or (modes != array).any() or (np.diff(modes, prepend=0) <= 0).any():
+        raise InputError(
+            f"{name} = {show(np.ravel(array).tolist())}: must be the increasing numbers, from 1, "
+            f"of the {count} modes"
+        )
+    return modes
