@@ -43,8 +43,12 @@ def placed(dofs: NDArray, by: Numbering) -> NDArray:
     return np.where(dofs < nodal, by.dofs(np.minimum(dofs, nodal - 1)), dofs)
 
 
-def dampers(case: Case) -> Dampers:
+def dampers(case: Case, quasi_static: bool = False) -> Dampers:
     """Dampers of a case.
+
+    Those of creases between panels that give way are left out: the hinge remembers what they do
+    (`Case.remembering`). In slow motions it has the damping of its crease times the square of the
+    crease's share in its turn; `quasi_static` counts them so.
 
     Raises
     ------
@@ -67,21 +71,26 @@ def dampers(case: Case) -> Dampers:
         blocks = blocks_of_ends(ends, np.tile(block, (len(ends), 1, 1)))
         constant = constant + assembled(pairs_of_ends(ends), blocks, body.size)
     ends = np.concatenate(pairs)
-    return Dampers(sparse.csr_array(constant), _elements(case, body, nodes, ends, strength))
+    elements = _elements(case, body, nodes, ends, strength, quasi_static)
+    return Dampers(sparse.csr_array(constant), elements)
 
 
 def _elements(
-    case: Case, body: Body, nodes: NDArray, pairs: NDArray, strength: list[NDArray]
-) -> Viscous:
+    case: Case, body: Body, nodes: NDArray, pairs: NDArray, strength: list[NDArray],
+    quasi_static: bool,
+) -> Viscous:  # fmt: skip
     """Axial dashpots between pairs (p, 2) of nodes, and the hinges of damped creases."""
     damping = case.crease_damping
     hinges = body.fold_hinges() if damping.any() else no_fold_hinges()
     unknown = np.setdiff1d(np.flatnonzero(damping), hinges.fold)
     if unknown.size:
         raise InputError(f"damping: this structure cannot damp crease {unknown[0]}: leave it out")
-    damped = damping[hinges.fold] > 0.0
+    coefficient = damping[hinges.fold] * hinges.length
+    share = 1.0 - hinges.softness * hinges.stiffness
+    coefficient = coefficient * np.where(hinges.softness > 0.0, share**2 * quasi_static, 1.0)
+    damped = coefficient > 0.0
     return viscous(
         pairs, nodes[pairs[:, 1]] - nodes[pairs[:, 0]], np.concatenate(strength),
-        hinges.nodes[damped], hinges.corners[damped], hinges.hidden[damped], hinges.per_hidden,
-        (damping[hinges.fold] * hinges.length)[damped],
+        hinges.nodes[damped], hinges.corners[damped], hinges.hidden[damped],
+        hinges.hidden_turn[damped], coefficient[damped],
     )  # fmt: skip
