@@ -123,6 +123,12 @@ def power_of_part(model, actuators, factor, angle, first, last):
     return power
 
 
+@kernel
+def jolt(model, actuators, angle):
+    """Work (J) of offsets that jump between two steps, at dihedrals `angle` (nh,)."""
+    return offset_work(model, actuators, angle, 0, actuators.hinge.size, True)
+
+
 @inner
 def offset_work(model, actuators, angle, first, last, accepted):
     """Work (J) of offsets since the last accepted step, of a part of what turns.
