@@ -132,7 +132,7 @@ def test_work_of_moments_on_damped_creases(law, history):
 
 
 def test_a_crease_that_is_damped_far_beyond_swinging_creeps_back():
-    """With c the damping and k the stiffness of the crease, as exp(-k t / c) after a ramp of 1 s."""
+    """With c the damping and k the stiffness of the crease, as exp(-k t / c) after a ramp."""
     case = fd.Case(
         model("plate", k=2.0, sheet=replace(SHEET, density=1e-4)),
         supports=[fd.Fix([0, 1, 2, 3], "xyz")],

@@ -16,8 +16,12 @@ from __future__ import annotations
 
 import math
 
-from foldyn.jit.compiled import inner, inner_scalar
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
+from foldyn.materials.law import HingeLaw
 from foldyn.materials.linear import CODE as LINEAR
 from foldyn.materials.switch import hinge_energy, hinge_moment, hinge_rest_slope, hinge_slope
 
@@ -95,3 +99,28 @@ def series_rest_slope(code, theta, rest, a, b, c, d, share, address):
         return hinge_rest_slope(code, theta, rest, a, b, address[0])
     phi = crease_angle(code, theta, rest, a, b, c, d, share, address)
     return hinge_rest_slope(code, phi, rest, a, b, address[0]) / share
+
+
+@kernel
+def _table(code, theta, rest, p, share, address):
+    out = np.empty((2, theta.size))
+    for i in range(theta.size):
+        t, r, a, b, c, d = theta[i], rest[i], p[i, 0], p[i, 1], p[i, 2], p[i, 3]
+        out[0, i] = series_energy(code, t, r, a, b, c, d, share[i], address)
+        out[1, i] = series_moment(code, t, r, a, b, c, d, share[i], address)
+    return out
+
+
+def in_series(
+    law: HingeLaw, theta: ArrayLike, rest: ArrayLike, share: ArrayLike
+) -> tuple[NDArray, NDArray]:
+    """Energy / k (rad^2) and moment / k (rad) of hinges whose crease has a share in small turns.
+
+    theta, rest : dihedrals (rad); arrays that go together with the shares.
+    """
+    arrays = np.broadcast_arrays(*(np.asarray(each, float) for each in (theta, rest, share)))
+    flat, at_rest, part = (np.ascontiguousarray(each.ravel()) for each in arrays)
+    parameters = np.ascontiguousarray(law.parameters(at_rest))
+    address = np.array(law.addresses or (0, 0, 0), np.int64)
+    energy, moment = _table(law.code, flat, at_rest, parameters, part, address)
+    return energy.reshape(arrays[0].shape), moment.reshape(arrays[0].shape)

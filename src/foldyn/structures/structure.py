@@ -175,7 +175,7 @@ class Structure(Discretized):
                     h.rest,
                     h.law,
                     None if h.onset is None else onset_parameters(h.onset),
-                    1.0 - self._softness * h.stiffness if h.name == "fold" else None,
+                    h.share,
                 )
                 for h in self.hinge_kinds
             ),
@@ -240,7 +240,15 @@ class Structure(Discretized):
         own = isinstance(law, PlateSuperlinear) and law.onset is None
         onset = self.bend_onset if own else None
         return (
-            HingeKind("fold", self.fold_law, self.folds, self.fold_stiffness, self.fold_rest),
+            HingeKind(
+                "fold",
+                self.fold_law,
+                self.folds,
+                self.fold_stiffness,
+                self.fold_rest,
+                None,
+                self._softness,
+            ),
             HingeKind(
                 "bend", self.bend_law, self.bends, self.bend_stiffness, self.bend_rest, onset
             ),
