@@ -182,13 +182,14 @@ class Case(Supported, Loaded, Damped):
 
     @cached_property
     def remembering(self) -> tuple[Remembering, ...]:
-        """Its hinges whose laws have memory, by kinds; `body` has the elastic parts alone."""
-        return remembering(self.structure, self.body)
+        """Its hinges that remember, by kinds; `body` has the elastic parts of their laws alone."""
+        return remembering(self.structure, self.body, self.crease_damping)
 
     def check_flow(self) -> None:
         """Refuse changes of rest angles from which laws measure what has flowed."""
         for change, _ in self.rest_terms:
-            for number in np.flatnonzero(change).tolist():
+            rest = len(change) - self.body.offsets
+            for number in np.flatnonzero(change[:rest]).tolist():
                 law = self.body.rest_law(number)
                 if any(part.law is law and not part.law.relaxes for part in self.remembering):
                     raise InputError(

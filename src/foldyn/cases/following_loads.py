@@ -14,6 +14,7 @@ from foldyn.cases.load import Load
 from foldyn.cases.regions import check_panels, resolve_panels
 from foldyn.cases.selection import check_creases, resolve_creases
 from foldyn.errors import InputError
+from foldyn.mechanics.body import NO_DOF
 from foldyn.mechanics.following import Following, joined, moments, pressures, pushes
 from foldyn.values import brief, number, number_or_list, show
 
@@ -119,15 +120,25 @@ class CreaseMoment(Load):
         chosen = np.isin(pieces.fold, creases)
         part = (each[pieces.fold] * pieces.share)[chosen]
         turning = moments(pieces.corners[chosen], pieces.nodes[chosen], part)
-        hidden = pieces.hidden[chosen]
-        back = -part[:, None] * pieces.per_hidden * np.ones(2)
-        return joined([(turning, 0), (pushes(hidden[hidden >= 0], back[hidden >= 0]), 0)])
+        hidden, back = pieces.hidden[chosen], -part[:, None] * pieces.hidden_turn[chosen]
+        there = hidden != NO_DOF
+        return joined([(turning, 0), (pushes(hidden[there], back[there]), 0)])
+
+    def turns(self, structure: Any, place: str) -> NDArray | None:
+        """See `Load`: the panels beside a crease give way to all of its moment."""
+        body = structure.body
+        if not body.offsets:
+            return None
+        creases, moment = self.of_creases(structure, place)
+        out = np.zeros(len(body.rest_angles))
+        out[len(out) - body.offsets + creases] = moment * body.fold_hinges().softness[creases]
+        return out
 
     def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse moments of creases between panels that are held."""
         creases, _ = self.of_creases(structure, place)
         pieces = structure.body.fold_hinges()
-        held = fixed[pieces.nodes].all(axis=(1, 2)) & (pieces.hidden < 0).all(axis=1)
+        held = fixed[pieces.nodes].all(axis=(1, 2)) & (pieces.hidden == NO_DOF).all(axis=1)
         still = np.intersect1d(creases, pieces.fold[held])
         if still.size:
             raise InputError(

@@ -49,7 +49,10 @@ class Load(Part):
         return None
 
     def turns(self, structure: Any, place: str) -> NDArray[np.float64] | None:
-        """Changes (nr,), rad, of `Body.rest_angles` beside those of creases; None if none."""
+        """Changes, rad, of `Body.rest_angles`, or of the first of them; None if none.
+
+        Those of creases by `rest_changes` are apart.
+        """
         return None
 
     def following(self, structure: Any, place: str) -> Following | None:

@@ -35,12 +35,13 @@ class Loaded:
         return summed(self._turned())
 
     def _turned(self) -> Summands:
+        count = len(self.structure.body.rest_angles)
         for change, history in self.actuation_terms:
-            yield np.pad(change, (0, len(self.structure.body.rest_angles) - len(change))), history
+            yield np.pad(change, (0, count - len(change))), history
         for place, load in self._loads():
             turns = load.turns(self.structure, place)
             if turns is not None and turns.any():
-                yield turns, load.history
+                yield np.pad(turns, (0, count - len(turns))), load.history
 
     def _actuated(self) -> Summands:
         first: dict[int, str] = {}  # the load that actuates a crease

@@ -1,7 +1,9 @@
 """Hinges whose rest angle moves in time: they do work as they turn, though no force acts.
 
-The power of one is k (dW/d rest) d rest/dt, W the energy of its law per unit
-stiffness: what the energy audit needs.
+What turns one is the sum of all that acts on it, each with its own history. The power of one is
+k (dW/d rest) d rest/dt, W the energy of its law per unit stiffness: what the energy audit needs.
+Offsets, by which moments of creases alone turn the panels beside them (`materials.series`), may
+jump as the moments do: their work is the mean moment of a step times the change of the offset.
 """
 
 from __future__ import annotations
@@ -11,41 +13,73 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import inner, kernel
-from foldyn.materials.switch import hinge_rest_slope, move_rest
+from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.materials.series import series_moment, series_rest_slope
+from foldyn.materials.switch import move_rest
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.kernels import folds_of
 
 
 class Actuators(NamedTuple):
-    """Rest angle of hinge[k]: start[k] + span[k] times the factor of history row[k], rad."""
+    """What turns: the rest angle of a hinge, or its offset.
+
+    Its value is start[k] plus the sum over its parts, from part[k, 0] to part[k, 1], of span times
+    the factor of history row, rad.
+    """
 
     hinge: NDArray  # (a,) row of what `folds_of` gives
-    start: NDArray  # (a,)
-    span: NDArray  # (a,)
-    row: NDArray  # (a,) of the waveforms
-    code: NDArray  # (a,) of its law
-    address: NDArray  # (a,) of the law's energy, if it is the user's own
     lowest: NDArray  # (a,) lowest node of the hinge, in increasing order
+    is_offset: NDArray  # (a,) bool
+    start: NDArray  # (a,)
+    part: NDArray  # (a, 2)
+    code: NDArray  # (a,) of its law
+    address: NDArray  # (a, 3) of the law's functions, if it is the user's own
+    span: NDArray  # (p,)
+    row: NDArray  # (p,) of the waveforms
+    share: NDArray  # see `Body.series`
+    offset: NDArray
 
 
 def actuators(body: Body, numbers: NDArray, span: NDArray, row: NDArray) -> tuple[Body, Actuators]:
     """A body whose rest angles can be changed, and what turns.
 
-    numbers, span, row : (f,) of its rest angles, how far each turns (rad), and its waveform.
+    numbers, span, row : (p,) of its rest angles, how far each turns (rad), and its waveform.
     """
-    hinge, place = np.zeros(0, np.int64), np.zeros(0, np.int64)
-    laws = [body.rest_law(number) for number in numbers.tolist()]
-    if len(numbers):
-        body, hinge, place = body.actuated(numbers)
+    order = np.argsort(numbers, kind="stable")
+    turned, first, count = np.unique(numbers[order], return_index=True, return_counts=True)
+    hinge, which = np.zeros(0, np.int64), np.zeros(0, np.int64)
+    if len(turned):
+        body, hinge, which = body.actuated(turned)
     lowest = body.lowest_nodes(hinge).astype(np.int64)
     along = np.argsort(lowest, kind="stable")
-    hinge, place = hinge[along], place[along]
+    hinge, which, lowest = hinge[along], which[along], lowest[along]
+    laws = [body.rest_law(number) for number in turned.tolist()]
     code = np.array([law.code for law in laws], np.int64)
-    address = np.array([law.addresses[0] if law.addresses else 0 for law in laws], np.int64)
-    start = body.turned()[0][hinge]
-    where = code[place], address[place], lowest[along]
-    return body, Actuators(hinge, start, span[place], row[place], *where)
+    address = np.array([law.addresses or (0, 0, 0) for law in laws], np.int64).reshape(-1, 3)
+    share, offset = body.series()
+    is_offset = (turned >= len(body.rest_angles) - body.offsets)[which]
+    return body, Actuators(
+        hinge=hinge,
+        lowest=lowest,
+        is_offset=is_offset,
+        start=np.where(is_offset, offset[hinge, 0], body.turned()[0][hinge]),
+        part=np.stack([first, first + count], axis=1)[which].astype(np.int64),
+        code=code[which],
+        address=address[which],
+        span=span[order],
+        row=row[order],
+        share=share,
+        offset=offset,
+    )
+
+
+@inner_scalar
+def turned_by(actuators, factor, k, derivative):
+    """Sum of what turns one, from its start on, or a derivative of it."""
+    total = 0.0
+    for i in range(actuators.part[k, 0], actuators.part[k, 1]):
+        total += actuators.span[i] * factor[actuators.row[i], derivative]
+    return total
 
 
 @kernel
@@ -59,12 +93,12 @@ def turn_part(model, actuators, factor, first, last):
     """The same for a part of what turns."""
     rest_angle, p, _ = folds_of(model)
     for k in range(first, last):
-        e = actuators.hinge[k]
-        rest = actuators.start[k] + actuators.span[k] * factor[actuators.row[k], 0]
-        if not 0.0 <= rest <= 2.0 * np.pi:
-            rest = np.nan
-        rest_angle[e] = rest
-        move_rest(actuators.code[k], rest, p[e])
+        e, value = actuators.hinge[k], actuators.start[k] + turned_by(actuators, factor, k, 0)
+        if actuators.is_offset[k]:
+            actuators.offset[e, 0] = value
+            continue
+        rest_angle[e] = value if 0.0 <= value <= 2.0 * np.pi else np.nan
+        move_rest(actuators.code[k], rest_angle[e], p[e])
 
 
 @inner
@@ -75,13 +109,43 @@ def actuator_power(model, actuators, factor, angle):
 
 @inner
 def power_of_part(model, actuators, factor, angle, first, last):
-    """The same of a part of what turns; `angle` (nh,) are those of all."""
+    """The same of a part of what turns, but for offsets; `angle` (nh,) are those of all."""
     (rest_angle, p, stiffness), power = folds_of(model), 0.0
     for k in range(first, last):
+        if actuators.is_offset[k]:
+            continue
         e = actuators.hinge[k]
-        slope = hinge_rest_slope(
-            actuators.code[k], angle[e], rest_angle[e], p[e, 0], p[e, 1], actuators.address[k]
+        slope = series_rest_slope(
+            actuators.code[k], angle[e] + actuators.offset[e, 0], rest_angle[e],
+            p[e, 0], p[e, 1], p[e, 2], p[e, 3], actuators.share[e], actuators.address[k],
         )  # fmt: skip
-        rate = actuators.span[k] * factor[actuators.row[k], 1]
-        power += stiffness[e] * slope * rate
+        power += stiffness[e] * slope * turned_by(actuators, factor, k, 1)
     return power
+
+
+@kernel
+def jolt(model, actuators, angle):
+    """Work (J) of offsets that jump between two steps, at dihedrals `angle` (nh,)."""
+    return offset_work(model, actuators, angle, 0, actuators.hinge.size, True)
+
+
+@inner
+def offset_work(model, actuators, angle, first, last, accepted):
+    """Work (J) of offsets since the last accepted step, of a part of what turns.
+
+    accepted : whether the present state is that of one.
+    """
+    (rest_angle, p, stiffness), work, offset = folds_of(model), 0.0, actuators.offset
+    for k in range(first, last):
+        if not actuators.is_offset[k]:
+            continue
+        e = actuators.hinge[k]
+        moment = offset[e, 1] + stiffness[e] * series_moment(
+            actuators.code[k], angle[e] + offset[e, 0], rest_angle[e],
+            p[e, 0], p[e, 1], p[e, 2], p[e, 3], actuators.share[e], actuators.address[k],
+        )  # fmt: skip
+        before = moment if np.isnan(offset[e, 3]) else offset[e, 3]
+        work += 0.5 * (before + moment) * (offset[e, 0] - offset[e, 2])
+        if accepted:
+            offset[e, 2], offset[e, 3] = offset[e, 0], moment
+    return work

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.dynamics.actuation import offset_work
 from foldyn.dynamics.record import record
 from foldyn.jit.compiled import inner, inner_scalar, scalar
 from foldyn.materials.memory_law import VARIABLES
@@ -169,6 +170,11 @@ def observe(model, system, mass, course, a, step, plan, out, work, s):
     team, tally = work.team, course.tally
     wait(team)  # for the others' accelerations, dihedrals and notes
     t = plan.start + step * plan.dt
+    if system.turns:
+        team.note[team.number, WORK] += offset_work(
+            model, system.actuators, work.fold_angle, s.turned[0], s.turned[1], True
+        )
+        wait(team)
     wrong = total(team, WRONG)
     first, last = part(team, work.angle.size)
     hinge = passed_through(work.angle, course.angle, first, last)

@@ -15,7 +15,7 @@ from scipy import sparse
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.mechanics.block_matrix import assembled, blocks_of_ends, pairs_of_ends
-from foldyn.mechanics.body import Body, Numbering, no_fold_hinges
+from foldyn.mechanics.body import NO_DOF, Body, Numbering, no_fold_hinges
 from foldyn.mechanics.viscous import Viscous, viscous, viscous_matrix
 
 
@@ -43,8 +43,12 @@ def placed(dofs: NDArray, by: Numbering) -> NDArray:
     return np.where(dofs < nodal, by.dofs(np.minimum(dofs, nodal - 1)), dofs)
 
 
-def dampers(case: Case) -> Dampers:
+def dampers(case: Case, quasi_static: bool = False) -> Dampers:
     """Dampers of a case.
+
+    Those of creases between panels that give way are left out: the hinge remembers what they do
+    (`Case.remembering`). In slow motions it has the damping of its crease times the square of the
+    crease's share in its turn; `quasi_static` counts them so.
 
     Raises
     ------
@@ -67,33 +71,38 @@ def dampers(case: Case) -> Dampers:
         blocks = blocks_of_ends(ends, np.tile(block, (len(ends), 1, 1)))
         constant = constant + assembled(pairs_of_ends(ends), blocks, body.size)
     ends = np.concatenate(pairs)
-    return Dampers(sparse.csr_array(constant), _elements(case, body, nodes, ends, strength))
+    elements = _elements(case, body, nodes, ends, strength, quasi_static)
+    return Dampers(sparse.csr_array(constant), elements)
 
 
 def _elements(
-    case: Case, body: Body, nodes: NDArray, pairs: NDArray, strength: list[NDArray]
-) -> Viscous:
+    case: Case, body: Body, nodes: NDArray, pairs: NDArray, strength: list[NDArray],
+    quasi_static: bool,
+) -> Viscous:  # fmt: skip
     """Axial dashpots between pairs (p, 2) of nodes, damped creases, and what strains a sheet."""
     damping = case.crease_damping
     hinges = body.fold_hinges() if damping.any() else no_fold_hinges()
     unknown = np.setdiff1d(np.flatnonzero(damping), hinges.fold)
     if unknown.size:
         raise InputError(f"damping: this structure cannot damp crease {unknown[0]}: leave it out")
-    damped = damping[hinges.fold] > 0.0
+    coefficient = damping[hinges.fold] * hinges.length
+    share = 1.0 - hinges.softness * hinges.stiffness
+    coefficient = coefficient * np.where(hinges.softness > 0.0, share**2 * quasi_static, 1.0)
+    damped = coefficient > 0.0
     axial, along = np.concatenate(strength), nodes[pairs[:, 1]] - nodes[pairs[:, 0]]
     rows, corners, hidden = hinges.nodes[damped], hinges.corners[damped], hinges.hidden[damped]
-    turning = (damping[hinges.fold] * hinges.length)[damped]
+    hidden_turn, turning = hinges.hidden_turn[damped], coefficient[damped]
     if beta := case.strain_damping:
         strains = body.strains()
         assert strains is not None  # or the case would have refused it
         stiff = strains.hinge_stiffness > 0.0
-        pairs, along = (
-            np.concatenate([pairs, strains.bars]),
-            np.concatenate([along, strains.vector]),
-        )
+        none = np.full((int(stiff.sum()), 2), NO_DOF)
+        pairs = np.concatenate([pairs, strains.bars])
+        along = np.concatenate([along, strains.vector])
         axial = np.concatenate([axial, beta * strains.bar_stiffness])
         rows = np.concatenate([rows, strains.hinges[stiff]])
         corners = np.concatenate([corners, strains.corners[stiff]])
-        hidden = np.concatenate([hidden, np.full((int(stiff.sum()), 2), -1)])
+        hidden = np.concatenate([hidden, none])
+        hidden_turn = np.concatenate([hidden_turn, np.zeros(none.shape)])
         turning = np.concatenate([turning, beta * strains.hinge_stiffness[stiff]])
-    return viscous(pairs, along, axial, rows, corners, hidden, hinges.per_hidden, turning)
+    return viscous(pairs, along, axial, rows, corners, hidden, hidden_turn, turning)

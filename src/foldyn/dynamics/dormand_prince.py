@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from foldyn.dynamics.actuation import offset_work
 from foldyn.dynamics.course import Outcome, passed_through, sample
 from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration, longest_step
@@ -112,6 +113,15 @@ def _accelerate(model, system, mass, q, w, t, out, work, s):
 
 
 @inner
+def _offset_work(model, system, work, accepted):
+    """Work of offsets since the last step (see `actuation.offset_work`)."""
+    if not system.turns:
+        return 0.0
+    last = system.actuators.hinge.size
+    return offset_work(model, system.actuators, work.fold_angle, 0, last, accepted)
+
+
+@inner
 def _longest(model, system, q, w, dt, work, s):
     return longest_step(model, system, q, w, dt, work, s)
 
@@ -201,7 +211,8 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         tally.steps += 1
         tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
         due = plan.start + tally.samples * plan.interval
-        begun = tally.work, tally.dissipated
+        done = _offset_work(model, system, work, True)
+        begun = tally.work + done, tally.dissipated
         while plan.every == 0 and tally.samples < room and due <= after + ROUNDING * h:
             _weights(min(1.0, (due - t) / h), weights)
             _combine(u, speeds, weights, h, 7, fut)
@@ -210,6 +221,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             tally.dissipated = _integral(begun[1], powers[1], h, weights, 7)
             _accelerate(model, system, mass, ut, vt, due, a, work, s)
             tally.evaluations += 1
+            tally.work += _offset_work(model, system, work, False)
             outcome = sample(model, system, mass, ut, vt, a, due, course, out, work, s)
             if outcome != Outcome.DONE:
                 return outcome, -1
@@ -231,6 +243,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
                 model, system, mass, course.u, course.v, after, a, work, s
             )
             tally.evaluations += 1
+            tally.work += _offset_work(model, system, work, True)
             for i in range(n):
                 accelerations[0, i] = fa[i]
         tally.wanted = min(tally.wanted, longest)

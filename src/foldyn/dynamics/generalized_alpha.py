@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.algebra.banded import substitute
-from foldyn.dynamics.actuation import actuator_power, turn
+from foldyn.dynamics.actuation import actuator_power, offset_work, turn
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.damping import dampers_work, drag, drag_works, viscous_work
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
@@ -252,4 +252,5 @@ def _actuation(model, system, old, new, angle0, angle1):
     turn(model, system.actuators, old.factor)
     done = actuator_power(model, system.actuators, change, angle0)
     turn(model, system.actuators, new.factor)
-    return done + actuator_power(model, system.actuators, change, angle1)
+    done += actuator_power(model, system.actuators, change, angle1)
+    return done + offset_work(model, system.actuators, angle1, 0, system.actuators.hinge.size, True)

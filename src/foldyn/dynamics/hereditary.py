@@ -31,7 +31,9 @@ def with_memory(case: Case, body: Body, by: Numbering) -> Body:
         return body
     case.check_flow()
     state = memory_of_case(case)
-    own = state.own._replace(dofs=placed(state.own.dofs, by))
+    hinges = {"fold": body.fold_hinges, "bend": body.bend_hinges}
+    row = np.concatenate([hinges[part.kind]().row for part in parts])
+    own = state.own._replace(dofs=placed(state.own.dofs, by), row=row)
     return InelasticBody(body, Memory(own, state.settles))
 
 
@@ -69,7 +71,7 @@ def instant_stiffness(case: Case, u: NDArray) -> sparse.csr_array | None:
     q = body.dofs(u)
     gradient = memory_of_case(case).gradients(q, body.size)
     added = [
-        part.hinges.stiffness * sum(branch.relaxed + branch.share for branch in part.branches)
+        part.stiffness * sum(branch.relaxed + branch.share for branch in part.branches)
         for part in parts
     ]
     return sparse.csr_array(gradient.T @ sparse.diags_array(np.concatenate(added)) @ gradient)

@@ -226,9 +226,11 @@ def begin(
     first = min(1.0, FIRST * plan.tolerance**0.2) * plan.dt
     tally.time, tally.wanted, tally.error, tally.shortest = plan.start, first, 1e-4, np.inf
     inward = by.inward(q)
+    if system.turns:
+        turn(body.model, system.actuators, s.factor)
+        system.actuators.offset[:, 2] = system.actuators.offset[:, 0]
+        system.actuators.offset[:, 3] = np.nan  # no moment known yet
     if len(body.hidden):  # they stand where they are in balance
-        if system.turns:
-            turn(body.model, system.actuators, s.factor)
         push = following_force(system.following, inward.ravel(), s.factor)
         inward.ravel()[body.hidden] = body.dofs(by.inward(u)[: len(u)], push)[body.hidden]
         if continued is not None and len(continued.values) > inward.size:
@@ -236,7 +238,7 @@ def begin(
     if body.memory is not None:
         there = by.inward(u)
         there.ravel()[body.hidden] = inward.ravel()[body.hidden]
-        body.memory.start(there, remembered)
+        body.memory.start(body.series()[1], there, remembered)
     return Course(
         u=inward,
         v=by.inward(w),

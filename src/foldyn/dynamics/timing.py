@@ -167,11 +167,12 @@ def check_room(samples: int, nodes: int, supported: int, room: float) -> None:
 
 def histories(case: Case) -> Iterator[tuple[str, History]]:
     """Histories of a case that vary, each with what it drives."""
+    rest = len(case.body.rest_angles) - case.body.offsets  # moments of creases are loads
     driven = {
         "a load": (*case.load_terms, *case.following_terms),
         "an imposed displacement": case.imposed_terms,
         "a base motion": case.base_terms,
-        "an actuation": case.rest_terms,
+        "an actuation": [(turn, history) for turn, history in case.rest_terms if turn[:rest].any()],
     }
     for what, terms in driven.items():
         yield from ((what, history) for _, history in terms if history.kind != "constant")

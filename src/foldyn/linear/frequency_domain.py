@@ -60,8 +60,8 @@ def direct(
 def dynamic_stiffness(system: Linearized, omega: float) -> sparse.csc_array:
     """K - w^2 M + i w C at an angular frequency (rad/s), with the complex stiffness of memories."""
     undamped = system.stiffness - omega**2 * system.mass
-    if system.branches is not None:
-        undamped = undamped + system.branches.stiffness(1j * omega)
+    if system.responding is not None:
+        undamped = undamped + system.responding.stiffness(1j * omega)
     return sparse.csc_array(undamped + 1j * omega * system.damping)
 
 
@@ -123,8 +123,8 @@ def modal(
     response = np.zeros((len(frequency), pencil.size), np.complex128)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
-        if system.branches is not None:
-            memory = system.branches.between(modes.shapes, 1j * omega)
+        if system.responding is not None:
+            memory = system.responding.between(modes.shapes, 1j * omega)
         for load, left, factor in parts:
             q = _amplitudes(modes.values, noise, damping, omega, load, memory)
             response[k] += (modes.shapes @ q + left) * factor(omega)

@@ -20,8 +20,8 @@ from scipy import sparse
 
 from foldyn.algebra.superlu import SingularTangentError, factorize
 from foldyn.cases import Case
-from foldyn.dynamics.hereditary import memory_of_case
 from foldyn.errors import ComputationError
+from foldyn.structures.remembering import memory, remembering
 
 MOST = 40  # iterations for a mode
 SETTLED = 1e-11  # relative change of s
@@ -41,20 +41,24 @@ class Branches:
         Stiffness without memory that they add to K, N m/rad.
     share, rate : (h, b)
         Stiffness (N m/rad) and rate (1/s) of each branch; of none 0 and 1.
+    viscous : (h,)
+        What of their damping is counted elsewhere, N m s/rad.
     """
 
     gradient: sparse.csr_array
     relaxed: NDArray
     share: NDArray
     rate: NDArray
+    viscous: NDArray
 
     def weights(self, s: complex) -> NDArray:
         """Complex stiffness (h,), N m/rad, at a complex angular frequency, rad/s."""
-        return self.relaxed + (self.share * (s / (s + self.rate))).sum(axis=1)
+        relaxing = (self.share * (s / (s + self.rate))).sum(axis=1)
+        return self.relaxed + relaxing - s * self.viscous
 
     def slopes(self, s: complex) -> NDArray:
         """Their derivative with respect to s."""
-        return (self.share * (self.rate / (s + self.rate) ** 2)).sum(axis=1)
+        return (self.share * (self.rate / (s + self.rate) ** 2)).sum(axis=1) - self.viscous
 
     def stiffness(self, s: complex) -> sparse.csc_array:
         """Their stiffness (nf, nf), N/m."""
@@ -69,20 +73,30 @@ class Branches:
         return turns.T @ (self.weights(s)[:, None] * turns)
 
 
-def branches_of(case: Case, q: NDArray, free: NDArray, size: int) -> Branches | None:
-    """Branches of a case about the dofs q (m,), on the free ones of so many unknowns."""
+def branches_of(
+    case: Case, q: NDArray, free: NDArray, size: int, dampers: bool = False
+) -> Branches | None:
+    """Branches of a case about the dofs q (m,), on the free ones of so many unknowns.
+
+    dampers : whether those of damped creases are among them, less what `dynamics.dampers` counts
+        of these as quasi-static.
+    """
     parts = case.remembering
+    if not dampers:
+        parts = remembering(case.structure, case.body)
     if not parts:
         return None
-    gradient = memory_of_case(case).gradients(q, case.body.size)
+    gradient = memory(parts, case.body).gradients(q, case.body.size)
     gradient = sparse.csr_array((gradient.data, gradient.indices, gradient.indptr))
     gradient.resize((gradient.shape[0], size))
     if ties := case.constraints:
         gradient = sparse.csr_array(gradient @ ties.extended(size))
     most = max(len(part.branches) for part in parts)
-    relaxed, share, rate = [], [], []
+    relaxed, share, rate, viscous = [], [], [], []
     for part in parts:
-        stiffness, branches = part.hinges.stiffness, part.branches
+        stiffness, branches = part.stiffness, part.branches
+        own = 1.0 - part.hinges.softness * part.hinges.stiffness
+        viscous.append(part.damping * own**2)
         relaxed.append(stiffness * sum(branch.relaxed for branch in branches))
         missing = most - len(branches)
         rows = [branch.share * stiffness for branch in branches]
@@ -91,7 +105,7 @@ def branches_of(case: Case, q: NDArray, free: NDArray, size: int) -> Branches | 
         rate.append(np.stack([*rows, *[np.ones(len(stiffness))] * missing], axis=1))
     return Branches(
         sparse.csr_array(gradient[:, free]), np.concatenate(relaxed), np.concatenate(share),
-        np.concatenate(rate),
+        np.concatenate(rate), np.concatenate(viscous),
     )  # fmt: skip
 
 

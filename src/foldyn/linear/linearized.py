@@ -90,6 +90,9 @@ class Linearized:
         All of them.
     branches : Branches or None
         Those of laws with memory, whose stiffness depends on the frequency; `stiffness` is without.
+    responding : Branches or None
+        The same with what damped creases between panels that give way are beyond `damping`: what
+        responses at given frequencies take.
     """
 
     case: Case
@@ -108,6 +111,7 @@ class Linearized:
     internal: int
     inner: Amplitudes = field(repr=False)
     branches: Branches | None = field(default=None, repr=False)
+    responding: Branches | None = field(default=None, repr=False)
 
     def expanded(self, motions: NDArray) -> NDArray:
         """Displacements (3n, k) of all nodes in motions (nf, k) of the free dofs."""
@@ -198,7 +202,7 @@ def linearize(
     if loads is not None:
         stiffness = sparse.csr_array(stiffness + _symmetric(loads, free))
     stiffness, mass = inner.stiffened(stiffness), inner.massed(mass_of(case))
-    ties, more = case.constraints, inner.behind(dampers(case).matrix(point.dofs))
+    ties, more = case.constraints, inner.behind(dampers(case, True).matrix(point.dofs))
     damping = case.rayleigh.matrix(mass, inner.stiffened(_reference(case, exact)))
     whole = np.zeros((len(inner.dofs) + body.size, 3))
     whole[: point.displacement.size] = np.tile(np.eye(3), (len(point.displacement), 1))
@@ -220,6 +224,7 @@ def linearize(
         internal=internal,
         inner=inner,
         branches=branches_of(case, point.dofs, free, stiffness.shape[0]),
+        responding=branches_of(case, point.dofs, free, stiffness.shape[0], dampers=True),
     )
 
 

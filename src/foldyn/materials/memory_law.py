@@ -32,7 +32,7 @@ class Branch(NamedTuple):
     code: int  # of the switch
     parameters: NDArray  # (n, 4)
     relaxed: float
-    share: float
+    share: float | NDArray  # (n,)
     rate: NDArray  # (n,) 1/s
 
 

@@ -15,6 +15,9 @@ Simo and T. J. R. Hughes, Computational Inelasticity, 1998, section 10.3):
     e' = exp(-x) e + D (1 - exp(-x)) / x,
 
 and so is what the dashpot takes, g int e^2 dt / tau.
+
+A crease in series with panels (`series`), with a damper beside it or not, is such a law again: the
+poles of its stiffness are its rates (`in_series`).
 """
 
 from __future__ import annotations
@@ -110,8 +113,86 @@ class Prony(MemoryLaw):
 
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
         """See `MemoryLaw`."""
-        n = len(stiffness)
-        return tuple(
-            Branch(CODE, columns(n, g, 1.0 / tau), 0.0, g, np.full(n, 1.0 / tau))
-            for g, tau in zip(*self.series, strict=True)
-        )
+        ratio, tau = (np.tile(each, (len(stiffness), 1)) for each in self.series)
+        return maxwell(ratio, 1.0 / tau)
+
+
+@dataclass(frozen=True)
+class CreaseDampers(MemoryLaw):
+    """Dampers of creases between panels that give way, as a law without branches of its own.
+
+    They resist the turn of their creases, which is not that of the hinges.
+    """
+
+    law: str | HingeLaw = "linear"
+    name: str = "damping of creases"
+
+    rate_dependent = True
+    relaxes = True
+
+    def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
+        """See `MemoryLaw`."""
+        return ()
+
+
+def maxwell(ratio: NDArray, rate: NDArray) -> tuple[Branch, ...]:
+    """Branches of n hinges with stiffness ratios (n, b) and rates (n, b), 1/s."""
+    return tuple(
+        Branch(CODE, columns(len(g), g, each), 0.0, g, each)
+        for g, each in zip(ratio.T, rate.T, strict=True)
+    )
+
+
+def in_series(
+    share: NDArray, ratio: NDArray, rate: NDArray, time: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Branches of n hinges whose creases are in series with panels.
+
+    With phi the turn of the crease, theta that of the hinge and a_j the turns of the dashpots, per
+    unit stiffness of the crease,
+
+        time dphi/dt = k (theta - phi) - phi - sum g_j (phi - a_j),   da_j/dt = rate_j (phi - a_j),
+
+    k = share / (1 - share) the stiffness of the panels. The moment k (theta - phi) is that of a
+    generalized Maxwell law, whose rates are the eigenvalues of this symmetric system.
+
+    Parameters
+    ----------
+    share : (n,)
+        Of the crease in a small turn, at most 1.
+    ratio, rate : (n, b)
+        Of the crease's own branches, per unit of its stiffness; 1/s.
+    time : (n,)
+        Damping of the crease over its stiffness, s.
+
+    Returns
+    -------
+    ratio, rate : (n, b + 1)
+        Per unit of the stiffness of the hinge; ratios of branches that are missing are 0.
+    """
+    n, b = ratio.shape
+    ratios, rates = np.zeros((n, b + 1)), np.ones((n, b + 1))
+    alone = share == 1.0
+    ratios[alone, :b], rates[alone, :b] = ratio[alone], rate[alone]
+    for damped in (False, True):
+        rows = np.flatnonzero(~alone & ((time > 0.0) == damped))
+        g, part = ratio[rows], share[rows]
+        panels = part / (1.0 - part)
+        matrix = np.zeros((len(rows), b + 1, b + 1))
+        matrix[:, 0, 0] = panels + 1.0 + g.sum(axis=1)
+        matrix[:, 0, 1:] = matrix[:, 1:, 0] = -g
+        matrix[:, np.arange(1, b + 1), np.arange(1, b + 1)] = g
+        weight = np.column_stack([time[rows], g / rate[rows]])
+        push = np.zeros((len(rows), b + 1))
+        push[:, 0] = panels
+        if not damped:  # the crease is in balance with its branches
+            first, across = matrix[:, :1, 0], matrix[:, 1:, 0]
+            push, weight = -across * (panels[:, None] / first), weight[:, 1:]
+            matrix = matrix[:, 1:, 1:] - across[:, :, None] * (across / first)[:, None, :]
+        root = np.sqrt(weight)
+        found, shapes = np.linalg.eigh(matrix / (root[:, :, None] * root[:, None, :]))
+        pushed = ((push / root)[:, None, :] @ shapes)[:, 0]
+        columns_ = slice(1 - damped, b + 1)
+        ratios[rows, columns_] = pushed**2 / (found * part[:, None])
+        rates[rows, columns_] = found
+    return ratios, rates

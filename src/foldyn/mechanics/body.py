@@ -29,6 +29,7 @@ from foldyn.mechanics.tangent import Sparsity
 ITERATIONS = 50
 BALANCED = 1e-13  # rad, of the last step of Newton's method for hidden dofs
 LEAST_SLOPE = 1e-3  # of a fold's stiffness, in these steps
+NO_DOF = np.iinfo(np.int64).max  # where there is none: no array has it as an index
 
 
 class SoftHinges(NamedTuple):
@@ -63,16 +64,20 @@ class FoldHinges(NamedTuple):
 
     The bends of a model of hinges are described likewise, each as a fold of one hinge.
 
-    The angle by which a hinge folds is its dihedral, less `per_hidden` times its hidden dofs.
+    The angle by which a hinge folds is its dihedral, less `per_hidden` times its hidden dofs. Where
+    panels give way without such dofs, a moment of the crease alone turns the dihedral by `softness`
+    times it before the hinge resists (`materials.series`).
     """
 
     fold: NDArray  # (k,) number of the fold
     nodes: NDArray  # (k, 4) axis j, k, wings i, l
     corners: NDArray  # (k, 4, 3) where they are at rest, m
-    hidden: NDArray  # (k, 2) dofs; -1 without them
+    hidden: NDArray  # (k, 2) dofs, or NO_DOF
     per_hidden: float  # rad/m
     rest: NDArray  # (k,) rad
     stiffness: NDArray  # (k,) N m/rad
+    softness: NDArray  # (k,) rad/(N m), of the panels beside
+    row: NDArray  # (k,) of each in `Body.series`
 
     @property
     def length(self) -> NDArray:
@@ -85,12 +90,17 @@ class FoldHinges(NamedTuple):
         length = self.length
         return length / np.bincount(self.fold, length)[self.fold]
 
+    @property
+    def hidden_turn(self) -> NDArray:
+        """Turn (k, 2) of each per unit of its hidden dofs, rad/m: 0 where it has none."""
+        return np.where(self.hidden == NO_DOF, 0.0, self.per_hidden)
+
 
 def no_fold_hinges() -> FoldHinges:
     """None."""
     nodes, hidden = np.zeros((0, 4), np.int64), np.zeros((0, 2), np.int64)
-    empty = np.zeros(0)
-    return FoldHinges(nodes[:, 0], nodes, np.zeros((0, 4, 3)), hidden, 0.0, empty, empty)
+    empty, none = np.zeros(0), nodes[:, 0]
+    return FoldHinges(none, nodes, np.zeros((0, 4, 3)), hidden, 0.0, empty, empty, empty, none)
 
 
 class Blocks(Protocol):
@@ -140,6 +150,8 @@ class Body(ABC):
         Dofs beside the displacements of the nodes: they have no mass.
     energy_groups : tuple of str
         Names of the parts of the energy.
+    offsets : int
+        Folds whose panels give way to moments of the crease alone: nf, or none.
     has_discrete_gradient : bool
         Whether the kernels of `dynamics.energy_momentum` take its model.
     memory : Memory or None
@@ -151,6 +163,7 @@ class Body(ABC):
     rows: int
     hidden: NDArray = np.zeros(0, np.int64)
     energy_groups: tuple[str, ...]
+    offsets: int = 0
     has_discrete_gradient: ClassVar[bool] = False
     memory: Any = None
 
@@ -231,7 +244,10 @@ class Body(ABC):
     # ------------------------------------------------------------------ rest angles
     @property
     def rest_angles(self) -> NDArray:
-        """Rest angles (nr,), rad, that loads may change: of the folds first."""
+        """Rest angles (nr,), rad, that loads may change: of the folds first.
+
+        The last `offsets` are no rest angles, but what the laws of folds see beside the dihedral.
+        """
         return np.zeros(0)
 
     def rest_law(self, number: int) -> HingeLaw:
@@ -264,6 +280,16 @@ class Body(ABC):
     def turned(self) -> tuple[NDArray, NDArray]:
         """Rest angles (rad) of what actuators turn, and the rows of `model.hinges` there."""
         return np.zeros(0), np.zeros(0, np.int64)
+
+    def series(self) -> tuple[NDArray, NDArray]:
+        """Of all that actuators turn: the share of the crease in a small turn, and offsets.
+
+        Offsets (., 4) are what the laws see beside the dihedrals (rad), the moment of branches of
+        laws with memory (N m), and both offset and whole moment at the last accepted step. In a
+        body from `actuated` they are changed in place.
+        """
+        count = len(self.turned()[0])
+        return np.ones(count), np.zeros((count, 4))
 
     def lowest_nodes(self, turned: NDArray) -> NDArray:
         """Lowest node of what turns in these rows (k,): whose thread it is, where there are any."""

@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from foldyn.jit.compiled import inner_scalar, kernel
-from foldyn.materials.switch import bar_energy, hinge_energy
+from foldyn.materials.series import series_energy
+from foldyn.materials.switch import bar_energy
 from foldyn.mechanics.dihedral import dihedral_gradient
 
 
@@ -73,10 +74,11 @@ def strain_energies(model, u, out):
     p = model.hinge_parameters
     for run in range(model.hinge_runs.shape[0]):
         code = model.hinge_runs[run, 2]
-        address = model.addresses[model.hinge_runs[run, 3], 0]
+        address = model.addresses[model.hinge_runs[run, 3]]
         for e in range(model.hinge_runs[run, 0], model.hinge_runs[run, 1]):
-            theta = hinge_dihedral(model, u, e)[0]
-            w = hinge_energy(
-                code, theta, model.hinge_rest[e], p[e, 0], p[e, 1], p[e, 2], p[e, 3], address
-            )
+            theta = hinge_dihedral(model, u, e)[0] + model.hinge_offset[e, 0]
+            w = series_energy(
+                code, theta, model.hinge_rest[e], p[e, 0], p[e, 1], p[e, 2], p[e, 3],
+                model.hinge_share[e], address,
+            )  # fmt: skip
             out[1 + model.hinge_group[e]] += model.hinge_stiffness[e] * w

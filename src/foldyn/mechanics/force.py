@@ -19,9 +19,11 @@ from numpy.typing import NDArray
 from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
 from foldyn.jit.intrinsics import flat, prefetch_range
 from foldyn.jit.rows import LANES, add_rows, load_rows
-from foldyn.materials import enhanced_linear, ogden, superlinear
+from foldyn.materials import ogden, superlinear
 from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
-from foldyn.materials.switch import bar_stress, hinge_moment
+from foldyn.materials.linear import CODE as LINEAR
+from foldyn.materials.series import series_moment
+from foldyn.materials.switch import bar_stress
 from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.model import BLOCK, BarsHinges
 from foldyn.mechanics.strips import Strips, strips
@@ -187,37 +189,63 @@ def add_bar_forces(model, low, high, work):
 
 
 @inner_scalar
-def enhanced_moments(stiffness, rest, p, low, high, first, m, angle, value):
-    """Moments of hinges of the enhanced linear law: those between low and high at once."""
+def linear_moments(stiffness, rest, offset, first, m, angle, value):
+    """Moments of hinges of the linear law."""
+    for q in range(m):
+        e = first + q
+        value[q] = stiffness[e] * (angle[q] + offset[4 * e] - rest[e])
+
+
+@inner_scalar
+def gives_way(share, first, m):
+    """Whether panels give way beside one of the creases of a block."""
+    soft = 0
+    for q in range(m):
+        soft += share[first + q] < 1.0
+    return soft > 0
+
+
+@inner_scalar
+def enhanced_moments(
+    code, address, stiffness, rest, p, share, offset, low, high, first, m, angle, value
+):
+    """Moments of hinges of the enhanced linear law: of creases between low and high at once."""
     beyond = 0
     for q in range(m):
         e = first + q
-        beyond += (angle[q] < low) | (angle[q] > high)
-        value[q] = stiffness[e] * (angle[q] - rest[e] - p[4 * e + 2])
+        turn, middle = angle[q] + offset[4 * e], rest[e] + p[4 * e + 2]
+        crease = share[e] * turn + (1.0 - share[e]) * middle
+        beyond += (crease < low) | (crease > high)
+        value[q] = stiffness[e] * (turn - rest[e] - p[4 * e + 2])
     if beyond > 0:
         for q in range(m):
             e = first + q
-            if (angle[q] < low) | (angle[q] > high):
-                at = enhanced_linear.moment(angle[q], rest[e], low, high) - p[4 * e + 2]
+            turn, middle = angle[q] + offset[4 * e], rest[e] + p[4 * e + 2]
+            crease = share[e] * turn + (1.0 - share[e]) * middle
+            if (crease < low) | (crease > high):
+                at = series_moment(
+                    code, turn, rest[e], low, high, p[4 * e + 2], 0.0, share[e], address
+                )
                 value[q] = stiffness[e] * at
 
 
 @inner_scalar
 def superlinear_moments(stiffness, rest, first, m, angle, value):
-    """Moments of hinges of the superlinear law."""
+    """Moments of hinges of the superlinear law whose panels do not give way."""
     for q in range(m):
         e = first + q
         value[q] = stiffness[e] * superlinear.moment(angle[q], rest[e])
 
 
 @inner
-def hinge_moments(code, address, stiffness, rest, p, first, m, angle, value):
+def hinge_moments(code, address, stiffness, rest, p, share, offset, first, m, angle, value):
     """Moment (N m) of the m hinges of a block with dihedrals `angle`, all of one law."""
     for q in range(m):
         e = first + q
-        value[q] = stiffness[e] * hinge_moment(
-            code, angle[q], rest[e], p[4 * e], p[4 * e + 1], p[4 * e + 2], p[4 * e + 3], address
-        )
+        value[q] = stiffness[e] * series_moment(
+            code, angle[q] + offset[4 * e], rest[e],
+            p[4 * e], p[4 * e + 1], p[4 * e + 2], p[4 * e + 3], share[e], address,
+        )  # fmt: skip
 
 
 @kernel
@@ -230,10 +258,11 @@ def add_hinge_forces(model, low, high, work, keep):
     position, sums, hinges = flat(work.position), flat(work.sums), flat(model.hinges)
     stiffness, rest, kept = model.hinge_stiffness, model.hinge_rest, work.angle
     p, angle = flat(model.hinge_parameters), g[12 * BLOCK :]
+    share, offset = model.hinge_share, flat(model.hinge_offset)
     far = work.strips.lowest.shape[0] > 1
     for run in range(model.hinge_runs.shape[0]):
         code = model.hinge_runs[run, 2]
-        address = model.addresses[model.hinge_runs[run, 3], 1]
+        address = model.addresses[model.hinge_runs[run, 3]]
         start, end = elements_of(hinges, 4, model.hinge_runs[run], low, high, model.rest.shape[0])
         for first in range(start, end, BLOCK):
             m = min(BLOCK, end - first)
@@ -260,14 +289,19 @@ def add_hinge_forces(model, low, high, work, keep):
             if keep:
                 for q in range(m):
                     kept[first + q] = angle[q]
-            if code == superlinear.CODE:
+            if code == LINEAR:
+                linear_moments(stiffness, rest, offset, first, m, angle, value)
+            elif (code == superlinear.CODE) and not gives_way(share, first, m):
                 superlinear_moments(stiffness, rest, first, m, angle, value)
             elif (code == STRESS_FREE) | (code == AS_PUBLISHED):  # theta1 and theta2 are the run's
                 enhanced_moments(
-                    stiffness, rest, p, p[4 * start], p[4 * start + 1], first, m, angle, value
-                )
+                    code, address, stiffness, rest, p, share, offset,
+                    p[4 * start], p[4 * start + 1], first, m, angle, value,
+                )  # fmt: skip
             else:
-                hinge_moments(code, address, stiffness, rest, p, first, m, angle, value)
+                hinge_moments(
+                    code, address, stiffness, rest, p, share, offset, first, m, angle, value
+                )
             for v in range(4):
                 scatter(sums, mask, hinges, 4, v, first, m, g, 3 * v * BLOCK, value, 0)
 

@@ -35,13 +35,15 @@ from foldyn.mechanics.viscous import hinge_gradient
 class MemoryHinges(NamedTuple):
     """Arrays of h hinges with b branches in all; dofs are 3 row + column of arrays (rows, 3).
 
-    Those from `angle` on change in place. The angles in them are turns from the rest angle.
+    Those from `angle` on change in place. The angles in them are turns from the rest angle, with
+    the offset that the laws of the body see (`Body.series`).
     """
 
     dofs: NDArray  # (h, 14), see `viscous.hinge_gradient`
     corners: NDArray  # (h, 4, 3) m
-    per_hidden: NDArray  # (h,) rad/m
+    hidden_turn: NDArray  # (h, 2) rad/m
     rest: NDArray  # (h,) rad
+    row: NDArray  # (h,) int64: of the offsets
     stiffness: NDArray  # (h,) N m/rad
     group: NDArray  # (h,) int64: of the model's energies
     first: NDArray  # (h + 1,) int64: a hinge has the branches first[e] to first[e + 1]
@@ -64,6 +66,7 @@ class Inelastic(NamedTuple):
 
     inner: Any
     hinges_with_memory: MemoryHinges
+    offset: NDArray  # (., 4) see `Body.series`
 
     @property
     def hinges(self) -> NDArray:
@@ -72,9 +75,10 @@ class Inelastic(NamedTuple):
 
 
 @scalar
-def evaluate_branches(own, e, turn):
+def evaluate_branches(own, offset, e, turn):
     """Note what the branches of a hinge do at a turn (rad); returns the energy dissipated, J."""
     moment, slope, stored, lost = 0.0, 0.0, 0.0, 0.0
+    turn += offset[own.row[e], 0]
     for k in range(own.first[e], own.first[e + 1]):
         found = update(
             own.code[k], own.parameters[k], own.angle[e], turn, own.elapsed[0], own.state[k, 0],
@@ -86,31 +90,32 @@ def evaluate_branches(own, e, turn):
         stored += found[4]
         lost += found[5]
     own.turned[e] = turn
+    offset[own.row[e], 1] += own.stiffness[e] * moment - own.moment[e]  # beside other laws' there
     own.moment[e], own.slope[e] = own.stiffness[e] * moment, own.stiffness[e] * slope
     own.stored[e] = own.stiffness[e] * stored
     return own.stiffness[e] * lost
 
 
 @kernel
-def add_memory_forces(own, u, force):
+def add_memory_forces(own, offset, u, force):
     """Add the forces of the branches at u to `force`, both (rows, 3)."""
     moved, out, g, lost = flat(u), flat(force), own.gradient, 0.0
     for e in range(own.rest.size):
-        angle = hinge_gradient(own.corners[e], own.dofs[e], own.per_hidden[e], moved, g)
-        lost += evaluate_branches(own, e, angle - own.rest[e])
+        angle = hinge_gradient(own.corners[e], own.dofs[e], own.hidden_turn[e], moved, g)
+        lost += evaluate_branches(own, offset, e, angle - own.rest[e])
         for c in range(14):
             out[own.dofs[e, c]] += own.moment[e] * g[c]
     own.lost[1] = lost
 
 
 @kernel
-def evaluate_at(own, u):
+def evaluate_at(own, offset, u):
     """Evaluate the branches at u (rows, 3)."""
     moved, lost = flat(u), 0.0
     for e in range(own.rest.size):
         x, dofs = own.corners[e], own.dofs[e]
-        angle = hinge_gradient(x, dofs, own.per_hidden[e], moved, own.gradient)
-        lost += evaluate_branches(own, e, angle - own.rest[e])
+        angle = hinge_gradient(x, dofs, own.hidden_turn[e], moved, own.gradient)
+        lost += evaluate_branches(own, offset, e, angle - own.rest[e])
     own.lost[1] = lost
 
 
@@ -130,7 +135,7 @@ def memory_tangents(own, u, out):
     points, gradient, block = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3, 4, 3))
     moved, g = flat(u), own.gradient
     for e in range(own.rest.size):
-        hinge_gradient(own.corners[e], own.dofs[e], own.per_hidden[e], moved, g)
+        hinge_gradient(own.corners[e], own.dofs[e], own.hidden_turn[e], moved, g)
         for v in range(4):
             for c in range(3):
                 points[v, c] = own.corners[e, v, c] + moved[own.dofs[e, 3 * v + c]]
@@ -149,7 +154,7 @@ def memory_gradients(own, u, out):
     """Gradients (h, 14) of the angles at u."""
     moved = flat(u)
     for e in range(own.rest.size):
-        hinge_gradient(own.corners[e], own.dofs[e], own.per_hidden[e], moved, out[e])
+        hinge_gradient(own.corners[e], own.dofs[e], own.hidden_turn[e], moved, out[e])
 
 
 @overload(force_of, inline="always")
@@ -159,7 +164,7 @@ def _force(model, u, force, work):
 
     def inelastic(model, u, force, work):
         force_of(model.inner, u, force, work)
-        add_memory_forces(model.hinges_with_memory, u, force)
+        add_memory_forces(model.hinges_with_memory, model.offset, u, force)
 
     return inelastic
 

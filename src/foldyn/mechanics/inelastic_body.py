@@ -38,19 +38,22 @@ class Memory:
     def __init__(self, own: MemoryHinges, settles: NDArray) -> None:
         self.own, self.settles = own, settles
 
-    def start(self, q: NDArray, state: NDArray | str | None = None) -> None:
-        """Begin at the dofs q (rows, 3) in a state (b, 2), "fresh", or the default."""
+    def start(self, offset: NDArray, q: NDArray, state: NDArray | str | None = None) -> None:
+        """Begin at the dofs q (rows, 3) in a state (b, 2), "fresh", or the default.
+
+        offset : see `Inelastic`.
+        """
         own = self.own
         for array in (own.angle, own.state, own.elapsed, own.lost):
             array[:] = 0.0
-        evaluate_at(own, q)  # turned from rest in no time
+        evaluate_at(own, offset, q)  # turned from rest in no time
         make_last(own)
         own.lost[:] = 0.0
         if isinstance(state, np.ndarray):
             own.state[:] = state
         elif state is None:
             own.state[self.settles] = 0.0
-        evaluate_at(own, q)
+        evaluate_at(own, offset, q)
 
     def commit(self) -> None:
         """Accept the step that ends where the body was evaluated last."""
@@ -99,7 +102,8 @@ class InelasticBody(WrappedBody):
         super().__init__(inner)
         self.memory = memory
         self.energy_groups = inner.energy_groups
-        self.model = Inelastic(inner.model, memory.own)
+        self._offset = inner.series()[1]
+        self.model = Inelastic(inner.model, memory.own, self._offset)
 
     def _rows(self, q: NDArray) -> NDArray:
         """Dofs (m,) or (rows, 3) as (rows, 3)."""
@@ -113,13 +117,13 @@ class InelasticBody(WrappedBody):
     def energies(self, q: NDArray) -> NDArray:
         """See `Body`; with what the branches store."""
         own = self.memory.own
-        evaluate_at(own, self._rows(q))
+        evaluate_at(own, self._offset, self._rows(q))
         return self.inner.energies(q) + np.bincount(own.group, own.stored, len(self.energy_groups))
 
     def internal(self, q: NDArray, work: Any = None) -> NDArray:
         """See `Body`."""
         force = np.zeros((self.rows, 3))
-        add_memory_forces(self.memory.own, self._rows(q), force)
+        add_memory_forces(self.memory.own, self._offset, self._rows(q), force)
         return self.inner.internal(q, work) + force.ravel()[: self.size]
 
     def hinge_forces(self, q: NDArray, work: Any = None) -> NDArray:
@@ -141,7 +145,7 @@ class InelasticBody(WrappedBody):
         """
         own, u = self.memory.own, self._rows(q)
         out = np.empty((len(own.rest), WIDTH, WIDTH))
-        evaluate_at(own, u)
+        evaluate_at(own, self._offset, u)
         np.maximum(own.slope, (floor - 1.0) * own.stiffness, out=own.slope)
         memory_tangents(own, u, out)
         return out
@@ -179,7 +183,7 @@ class InelasticBlocks:
     def __init__(self, inner: Blocks, own: MemoryHinges, rows: int) -> None:
         self._inner = inner
         mine = np.ones(own.dofs.shape, bool)  # dofs that a hinge has
-        mine[:, 12:] = (own.per_hidden > 0.0)[:, None]
+        mine[:, 12:] = own.hidden_turn > 0.0
         self._pairs = mine[:, :, None] & mine[:, None, :]
         self._row = np.broadcast_to(own.dofs[:, :, None], self._pairs.shape)[self._pairs]
         self._column = np.broadcast_to(own.dofs[:, None, :], self._pairs.shape)[self._pairs]

@@ -20,7 +20,8 @@ from foldyn.jit.intrinsics import LINE
 from foldyn.materials import ogden, superlinear
 from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
 from foldyn.materials.linear import CODE as LINEAR
-from foldyn.materials.switch import bar_energy, bar_stress, hinge_energy, hinge_moment
+from foldyn.materials.series import series_energy, series_moment
+from foldyn.materials.switch import bar_energy, bar_stress
 from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.model import BarsHinges
 
@@ -35,6 +36,7 @@ class Topology(NamedTuple):
     hinges: NDArray  # (4 nh,) uint32
     hinge_runs: NDArray  # (rh, 4)
     hinge_group: NDArray  # (nh,)
+    addresses: NDArray  # (na, 3) zero: users' laws are computed one by one
 
 
 class Lanes(NamedTuple):
@@ -46,6 +48,7 @@ class Lanes(NamedTuple):
     bar_stiffness: NDArray  # N/m
     hinge_stiffness: NDArray  # (nh WIDTH,) N m/rad
     hinge_rest: NDArray  # rad
+    hinge_share: NDArray
     hinge_parameters: NDArray  # (4, nh WIDTH)
 
 
@@ -53,7 +56,7 @@ def topology(model: BarsHinges) -> Topology:
     """What a model shares with those beside it."""
     return Topology(
         model.bars.ravel(), model.bar_runs, model.hinges.ravel(), model.hinge_runs,
-        model.hinge_group,
+        model.hinge_group, model.addresses,
     )  # fmt: skip
 
 
@@ -69,6 +72,7 @@ def lanes(models: Sequence[BarsHinges]) -> Lanes:
     """The numbers of WIDTH models."""
     columns = (
         "rest", "bar_vector", "bar_per_length2", "bar_stiffness", "hinge_stiffness", "hinge_rest",
+        "hinge_share",
     )  # fmt: skip
     parameters = side_by_side([model.hinge_parameters.T for model in models])
     numbers = [side_by_side([getattr(model, name) for model in models]) for name in columns]
@@ -130,7 +134,7 @@ def add_hinge_lanes(topology, own, position, force, value, angles, before, hinge
     """
     hinges, p, passed = topology.hinges, own.hinge_parameters, False
     for run in range(topology.hinge_runs.shape[0]):
-        code = topology.hinge_runs[run, 2]
+        code, address = topology.hinge_runs[run, 2], topology.addresses[topology.hinge_runs[run, 3]]
         for e in range(topology.hinge_runs[run, 0], topology.hinge_runs[run, 1]):
             j, k, i, l = hinges[4 * e], hinges[4 * e + 1], hinges[4 * e + 2], hinges[4 * e + 3]  # noqa: E741
             jx, jy, jz = take(position, j)
@@ -148,20 +152,24 @@ def add_hinge_lanes(topology, own, position, force, value, angles, before, hinge
                     if abs(value[q] - angles[at + q]) > math.pi and hinge[q] < 0:
                         hinge[q], before[q] = e, angles[at + q]
             put(angles, at, angle)
-            rest = eight(own.hinge_rest, at)
-            if code == superlinear.CODE:
+            rest, share = eight(own.hinge_rest, at), eight(own.hinge_share, at)
+            if (code == superlinear.CODE) and not any_of(share < 1.0):
                 moment = superlinear.moment(angle, rest)
             elif code == LINEAR:
                 moment = angle - rest
             else:
+                middle = rest + eight(p[2], at)
                 moment = angle - rest - eight(p[2], at)
+                crease = share * angle + (1.0 - share) * middle
                 plain = (code == STRESS_FREE) | (code == AS_PUBLISHED)
-                if not plain or any_of(angle < eight(p[0], at)) or any_of(angle > eight(p[1], at)):
+                low, high = eight(p[0], at), eight(p[1], at)
+                if not plain or any_of(crease < low) or any_of(crease > high):
                     for q in range(WIDTH):
                         n, r = at + q, own.hinge_rest[at + q]
-                        value[q] = hinge_moment(
-                            code, angles[n], r, p[0, n], p[1, n], p[2, n], p[3, n], 0
-                        )
+                        value[q] = series_moment(
+                            code, angles[n], r, p[0, n], p[1, n], p[2, n], p[3, n],
+                            own.hinge_share[n], address,
+                        )  # fmt: skip
                     moment = eight(value, 0)
             m = eight(own.hinge_stiffness, at) * moment
             add(force, j, m * jx, m * jy, m * jz)
@@ -193,11 +201,12 @@ def energies_of_lanes(topology, own, u, angle, out):
                 out[0, q] += own.bar_stiffness[i] / own.bar_per_length2[i] * w
     p = own.hinge_parameters
     for run in range(topology.hinge_runs.shape[0]):
-        code = topology.hinge_runs[run, 2]
+        code, address = topology.hinge_runs[run, 2], topology.addresses[topology.hinge_runs[run, 3]]
         for e in range(topology.hinge_runs[run, 0], topology.hinge_runs[run, 1]):
             for q in range(WIDTH):
                 i = e * WIDTH + q
-                w = hinge_energy(
-                    code, angle[i], own.hinge_rest[i], p[0, i], p[1, i], p[2, i], p[3, i], 0
-                )
+                w = series_energy(
+                    code, angle[i], own.hinge_rest[i], p[0, i], p[1, i], p[2, i], p[3, i],
+                    own.hinge_share[i], address,
+                )  # fmt: skip
                 out[1 + topology.hinge_group[e], q] += own.hinge_stiffness[i] * w

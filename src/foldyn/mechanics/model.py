@@ -40,6 +40,8 @@ class BarsHinges(NamedTuple):
     hinge_stiffness: NDArray  # (nh,) N m/rad, whole hinge
     hinge_rest: NDArray  # (nh,) rad
     hinge_parameters: NDArray  # (nh, 4)
+    hinge_share: NDArray  # (nh,) of its crease in small turns; the rest is its panels'
+    hinge_offset: NDArray  # (nh, 4) beside the dihedral, see `Body.series`
     hinge_group: NDArray  # (nh,) int64: energies are summed per group
     hinge_runs: NDArray  # (rh, 4) int64
     addresses: NDArray  # (na, 3) int64: compiled user laws (energy, response, slope)
@@ -49,6 +51,7 @@ class Hinges(NamedTuple):
     """Hinges of one group: rows (axis j, k, wings i, l), stiffness, rest angle and their law.
 
     parameters : (nh, 4) of each hinge, where they are not those that the law gives.
+    share : (nh,) of its crease in a turn (`materials.series`), where panels give way beside it.
     """
 
     nodes: NDArray
@@ -56,6 +59,7 @@ class Hinges(NamedTuple):
     rest: NDArray
     law: HingeLaw
     parameters: NDArray | None = None
+    share: NDArray | None = None
 
 
 def element_order(nodes: NDArray) -> NDArray:
@@ -119,6 +123,8 @@ def build(
         hinge_parameters=gather(
             lambda k, g: g.law.parameters(g.rest) if g.parameters is None else g.parameters, (-1, 4)
         ),
+        hinge_share=gather(lambda k, g: np.ones(len(g.rest)) if g.share is None else g.share, -1),
+        hinge_offset=np.zeros((start, 4)),
         hinge_group=gather(lambda k, g: np.full(len(g.rest), k), -1, np.int64),
         hinge_runs=np.array(hinge_runs, np.int64).reshape(-1, 4),
         addresses=np.array(addresses or [(0, 0, 0)], np.int64),
@@ -157,6 +163,8 @@ def renumber(model: BarsHinges, order: NDArray) -> tuple[BarsHinges, NDArray]:
         hinge_stiffness=model.hinge_stiffness[hinge],
         hinge_rest=model.hinge_rest[hinge],
         hinge_parameters=model.hinge_parameters[hinge],
+        hinge_share=model.hinge_share[hinge],
+        hinge_offset=model.hinge_offset[hinge],
         hinge_group=model.hinge_group[hinge],
     )
     return moved, hinge

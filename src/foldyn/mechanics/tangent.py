@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.compiled import inner_scalar, kernel
-from foldyn.materials.switch import bar_slope, bar_stress, hinge_moment, hinge_slope
+from foldyn.materials.series import series_moment, series_slope
+from foldyn.materials.switch import bar_slope, bar_stress
 from foldyn.mechanics.dihedral import add_hessian
 from foldyn.mechanics.energy import bar_extension, hinge_dihedral
 from foldyn.mechanics.model import BarsHinges
@@ -111,8 +112,7 @@ def _add_hinges(model, u, slots, data, floor):
     p = model.hinge_parameters
     for run in range(model.hinge_runs.shape[0]):
         code = model.hinge_runs[run, 2]
-        moment_at = model.addresses[model.hinge_runs[run, 3], 1]
-        slope_at = model.addresses[model.hinge_runs[run, 3], 2]
+        address = model.addresses[model.hinge_runs[run, 3]]
         for e in range(model.hinge_runs[run, 0], model.hinge_runs[run, 1]):
             for v in range(4):
                 for c in range(3):
@@ -120,11 +120,11 @@ def _add_hinges(model, u, slots, data, floor):
             dihedral = hinge_dihedral(model, u, e)
             for c in range(12):
                 flat[c] = dihedral[1 + c]
-            theta, rest, k = dihedral[0], model.hinge_rest[e], model.hinge_stiffness[e]
-            moment = k * hinge_moment(
-                code, theta, rest, p[e, 0], p[e, 1], p[e, 2], p[e, 3], moment_at
-            )
-            slope = hinge_slope(code, theta, rest, p[e, 0], p[e, 1], slope_at)
+            theta, rest = dihedral[0] + model.hinge_offset[e, 0], model.hinge_rest[e]
+            a, b, c, d, share = p[e, 0], p[e, 1], p[e, 2], p[e, 3], model.hinge_share[e]
+            k = model.hinge_stiffness[e]
+            moment = k * series_moment(code, theta, rest, a, b, c, d, share, address)
+            slope = series_slope(code, theta, rest, a, b, c, d, share, address)
             slope = k * max(slope, floor)
             block[:] = 0.0
             add_hessian(points, gradient, moment, block)

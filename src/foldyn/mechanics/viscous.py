@@ -19,6 +19,7 @@ from scipy import sparse
 
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.body import NO_DOF
 from foldyn.mechanics.dihedral import dihedral_gradient
 
 WIDTH = 14  # dofs of an element at most: four nodes, and two beside displacements
@@ -30,7 +31,7 @@ class Viscous(NamedTuple):
     dofs: NDArray  # (p + h, 14) of each element; the dof 0 with a gradient of 0 where it has fewer
     axial: NDArray  # (p, 3) rest vector from the first node to the second, m
     corners: NDArray  # (h, 4, 3) rest positions of the nodes j, k, i, l, m
-    per_hidden: NDArray  # (h,) what a unit of the last two dofs takes from the dihedral, rad/m
+    hidden_turn: NDArray  # (h, 2) what a unit of the last two dofs takes from the dihedral, rad/m
     coefficient: NDArray  # (p + h,) N s/m, N m s/rad
     gradient: NDArray  # (14,) memory of one element
 
@@ -42,7 +43,7 @@ def viscous(
     hinges: NDArray,
     corners: NDArray,
     hidden: NDArray,
-    per_hidden: float,
+    hidden_turn: NDArray,
     hinge_coefficient: NDArray,
 ) -> Viscous:
     """Pack elements.
@@ -55,10 +56,8 @@ def viscous(
         N s/m.
     hinges, corners : (h, 4), (h, 4, 3)
         Rows of the nodes: axis j, k, wings i, l; where they are at rest, m.
-    hidden : (h, 2)
-        Dofs beside displacements; -1 without them.
-    per_hidden : float
-        rad/m.
+    hidden, hidden_turn : (h, 2)
+        Dofs beside displacements, or NO_DOF, and what a unit of each turns, rad/m.
     hinge_coefficient : (h,)
         N m s/rad.
     """
@@ -70,25 +69,28 @@ def viscous(
         dofs=dofs,
         axial=np.array(axial, float).reshape(p, 3),
         corners=np.array(corners, float).reshape(h, 4, 3),
-        per_hidden=np.where(hidden[:, 0] >= 0, per_hidden, 0.0),
+        hidden_turn=np.array(hidden_turn, float).reshape(h, 2),
         coefficient=np.concatenate([axial_coefficient, hinge_coefficient]).astype(float),
         gradient=np.zeros(WIDTH),
     )
 
 
 def hinge_dofs(hinges: NDArray, hidden: NDArray) -> NDArray:
-    """Dofs (h, 14) of hinges, rows of nodes (h, 4), with two hidden dofs (h, 2) or -1."""
+    """Dofs (h, 14) of hinges, rows of nodes (h, 4), with two hidden dofs (h, 2).
+
+    In the place of NO_DOF stands the dof 0, whose part is 0 (`FoldHinges.hidden_turn`).
+    """
     dofs = np.zeros((len(hinges), WIDTH), np.int64)
     dofs[:, :12] = (3 * hinges[:, :, None] + np.arange(3)).reshape(-1, 12)
-    dofs[:, 12:] = np.maximum(hidden, 0)
+    dofs[:, 12:] = np.where(hidden == NO_DOF, 0, hidden)
     return dofs
 
 
 @scalar
-def hinge_gradient(x, dofs, per_hidden, moved, out):
+def hinge_gradient(x, dofs, hidden_turn, moved, out):
     """Angle (rad) of a hinge at flat displacements, and its gradient to `out` (14,).
 
-    x : (4, 3) rest positions of its nodes, m; dofs, per_hidden : see `Viscous`.
+    x : (4, 3) rest positions of its nodes, m; dofs, hidden_turn : see `Viscous`.
     """
     found = dihedral_gradient(
         x[0, 0] + moved[dofs[0]], x[0, 1] + moved[dofs[1]], x[0, 2] + moved[dofs[2]],
@@ -98,8 +100,8 @@ def hinge_gradient(x, dofs, per_hidden, moved, out):
     )  # fmt: skip
     for c in range(12):
         out[c] = found[1 + c]
-    out[12] = out[13] = -per_hidden
-    return found[0] - per_hidden * (moved[dofs[12]] + moved[dofs[13]])
+    out[12], out[13] = -hidden_turn[0], -hidden_turn[1]
+    return found[0] - hidden_turn[0] * moved[dofs[12]] - hidden_turn[1] * moved[dofs[13]]
 
 
 @kernel
@@ -118,7 +120,7 @@ def _gradient(elements, moved, e, out):
             out[3 + c] /= length
             out[c] = -out[3 + c]
         return
-    hinge_gradient(elements.corners[e - p], dofs, elements.per_hidden[e - p], moved, out)
+    hinge_gradient(elements.corners[e - p], dofs, elements.hidden_turn[e - p], moved, out)
 
 
 @kernel

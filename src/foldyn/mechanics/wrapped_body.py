@@ -23,6 +23,7 @@ class WrappedBody(Body):
     def __init__(self, inner: Body) -> None:
         self.inner = inner
         self.size, self.rows, self.hidden = inner.size, inner.rows, inner.hidden
+        self.offsets = inner.offsets
 
     def around(self, inner: Body) -> Self:
         """The same around another body with the same nodes."""
@@ -102,6 +103,10 @@ class WrappedBody(Body):
         """See `Body`."""
         inner, rows, place = self.inner.actuated(numbers)
         return self.around(inner), rows, place
+
+    def series(self) -> tuple[NDArray, NDArray]:
+        """See `Body`."""
+        return self.inner.series()
 
     def turned(self) -> tuple[NDArray, NDArray]:
         """See `Body`."""

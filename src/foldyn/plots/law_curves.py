@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.materials.memory_law import memory_of
+from foldyn.materials.series import in_series
 from foldyn.shells import Shell
 from foldyn.structures import Structure
 from foldyn.structures.discretized import HingeKind
@@ -70,13 +71,14 @@ def _hinges(hinges: HingeKind) -> LawFrame:
     groups, curves, reach = _distinct(stiffness, rest), [], 0.0
     for first, count in groups[:MOST_CURVES]:
         k, theta0, law = float(stiffness[first]), float(rest[first]), hinges.law_of(first)
-        moment = k * np.asarray(law.moment(np.radians(degrees), theta0))
+        share = hinges.share[first]
+        moment = k * in_series(law, np.radians(degrees), theta0, share)[1]
         j, m = hinges.nodes[first][:2]
         label = f"{kind} {j}-{m}"
         label += f" and {count - 1} more" if count > 1 else ""
         angle = float(np.degrees(theta0))
         label += f": k {k:.4g} N m/rad, rest {angle:.4g}°"
-        at_rest = k * float(law.moment(theta0, theta0))
+        at_rest = k * float(in_series(law, theta0, theta0, share)[1])
         curves.append(LawCurve(label, degrees, moment, (angle, at_rest)))
         reach = max(reach, float(np.abs(moment[framed]).max()))
     hidden = len(groups) - MOST_CURVES

@@ -13,6 +13,7 @@ from foldyn import mechanics
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, Superlinear
 from foldyn.mechanics.body import (
+    NO_DOF,
     Body,
     FoldHinges,
     SoftHinges,
@@ -198,10 +199,11 @@ class ShellBody(Body):
         """See `Body`: the pieces of the creases."""
         model = self.model
         nodes = model.hinges[model.piece_hinge]
-        hidden = self._nodal + model.piece_rotations
+        turns = model.piece_rotations
+        hidden = np.where(turns >= 0, self._nodal + turns, NO_DOF)
         return FoldHinges(
             self._crease, nodes, model.rest[nodes], hidden, model.per_reach, model.piece_rest,
-            model.piece_stiffness,
+            model.piece_stiffness, np.zeros(len(nodes)), np.arange(len(nodes)),
         )  # fmt: skip
 
     def folded(self, rest: NDArray) -> ShellBody:

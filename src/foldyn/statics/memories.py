@@ -69,7 +69,7 @@ class Memories:
     def start(self, q: NDArray, state: NDArray | str | None) -> None:
         """Begin at the body's dofs q (m,), with creases in a state (b, 2); see `cases.State`."""
         if self._creases is not None:
-            self._creases.start(q, state)
+            self._creases.start(self.body.series()[1], q, state)
 
     def tie(self) -> None:
         """Begin with springs of friction at rest where the body was evaluated last."""

@@ -40,7 +40,9 @@ class Actuation:
     def rest(self, factor: float) -> NDArray:
         """Rest angles (nr,), rad."""
         angle = self._body.rest_angles + self._constant + factor * self._change
-        return np.where((angle >= 0.0) & (angle <= 2.0 * math.pi), angle, np.nan)
+        possible = (angle >= 0.0) & (angle <= 2.0 * math.pi)
+        possible[len(angle) - self._body.offsets :] = True
+        return np.where(possible, angle, np.nan)
 
     def _folded(self, factor: float) -> Body:
         return self._body.folded(self.rest(factor)) if self.acts else self._body
@@ -248,14 +250,14 @@ class OrigamiProblem:
 
     def begin(self, factor: float) -> None:
         """Begin at a factor, with friction at rest."""
-        self._evaluate(self.start(factor))
+        self._evaluate(self.start(factor), factor)
         self.memories.tie()
 
-    def keep(self, u: NDArray) -> Any:
+    def keep(self, u: NDArray, factor: float) -> Any:
         """Accept a state (m,), where creases have yielded and nodes slipped; see `recall`."""
         if not self.memories:
             return None
-        self._evaluate(u)
+        self._evaluate(u, factor)
         return self.memories.commit()
 
     def recall(self, kept: Any) -> None:
@@ -266,11 +268,11 @@ class OrigamiProblem:
         """Whether anything slips in a state (m,)."""
         if not self.memories.rubs:
             return False
-        self._evaluate(u)
+        self._evaluate(u, 0.0)
         return self.memories.slips()
 
-    def _evaluate(self, u: NDArray) -> None:
-        self.body(u, 0.0).energies(self.dofs(u))
+    def _evaluate(self, u: NDArray, factor: float) -> None:
+        self.body(u, factor).energies(self.dofs(u))
 
     def turn(self, u: NDArray, v: NDArray) -> float:
         """Largest turn (rad) of a part of the structure from u to v; inf on penetration."""

@@ -102,7 +102,7 @@ def arrive(solver: Solver, attempt: Attempt) -> Station:
 def kept(problem: Problem, station: Station) -> Station:
     """The station with what has yielded or slipped on the way; the problem goes on from there."""
     keep = getattr(problem, "keep", None)  # problems that forget have none
-    memory = keep(station.point.u) if keep else None
+    memory = keep(station.point.u, station.point.factor) if keep else None
     if memory is None:
         return station
     return station._replace(point=replace(station.point, memory=memory))
@@ -215,10 +215,10 @@ class Released:
         """Forces at play in the problem."""
         return self.problem.reference(u, self.factor)
 
-    def keep(self, u: NDArray) -> Any:
+    def keep(self, u: NDArray, factor: float) -> Any:
         """Accept a state in the problem."""
         keep = getattr(self.problem, "keep", None)
-        return keep(u) if keep else None
+        return keep(u, self.factor) if keep else None
 
     def turn(self, u: NDArray, v: NDArray) -> float:
         """Turn in the problem."""

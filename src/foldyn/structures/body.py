@@ -11,7 +11,15 @@ from scipy import sparse
 
 from foldyn import mechanics
 from foldyn.materials import BarLaw, HingeLaw, Superlinear
-from foldyn.mechanics.body import Body, FoldHinges, SoftHinges, Strains, Unstrained, largest_turn
+from foldyn.mechanics.body import (
+    NO_DOF,
+    Body,
+    FoldHinges,
+    SoftHinges,
+    Strains,
+    Unstrained,
+    largest_turn,
+)
 from foldyn.mechanics.energy import gradients
 from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
 from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_tangent
@@ -34,6 +42,8 @@ class BarsHingesBody(Body):
         Rows in `model.hinges` of the folds, then of the bends.
     laws : tuple of (HingeLaw, int)
         Laws of the folds and of the bends, and how many there are of each.
+    softness : ndarray, shape (nf,)
+        Of the panels beside the folds, rad/(N m).
     like : BarsHingesBody, optional
         One whose elements have the same nodes.
     """
@@ -43,14 +53,15 @@ class BarsHingesBody(Body):
 
     def __init__(
         self, model: BarsHinges, turning: NDArray, laws: tuple[tuple[HingeLaw, int], ...],
-        like: BarsHingesBody | None = None,
+        softness: NDArray, like: BarsHingesBody | None = None,
     ) -> None:  # fmt: skip
         self.model, self._turning, self._laws, self._like = model, turning, laws, like
+        self._softness, self.offsets = softness, len(softness) if softness.any() else 0
         self.size, self.rows = model.rest.size, len(model.rest)
 
     def _with(self, model: BarsHinges) -> BarsHingesBody:
         """Another body whose elements have the same nodes."""
-        return BarsHingesBody(model, self._turning, self._laws, self)
+        return BarsHingesBody(model, self._turning, self._laws, self._softness, self)
 
     def _nodal(self, q: NDArray) -> NDArray:
         return np.ascontiguousarray(q, float).reshape(self.model.rest.shape)
@@ -157,28 +168,30 @@ class BarsHingesBody(Body):
 
     @property
     def rest_angles(self) -> NDArray:
-        """See `Body`: of the folds, then of the bends."""
-        return self.model.hinge_rest[self._turning]
+        """See `Body`: of the folds, of the bends, and offsets."""
+        offsets = self.model.hinge_offset[self._turning[: self.offsets], 0]
+        return np.append(self.model.hinge_rest[self._turning], offsets)
 
     def rest_law(self, number: int) -> HingeLaw:
         """See `Body`."""
         (folds, count), (bends, _) = self._laws
-        return folds if number < count else bends
+        return bends if count <= number < len(self._turning) else folds
 
     def fold_hinges(self) -> FoldHinges:
         """See `Body`: one of each."""
-        return self._hinges_at(self._turning[: self._laws[0][1]])
+        return self._hinges_at(self._turning[: self._laws[0][1]], self._softness)
 
     def bend_hinges(self) -> FoldHinges:
         """See `Body`."""
-        return self._hinges_at(self._turning[self._laws[0][1] :])
+        rows = self._turning[self._laws[0][1] :]
+        return self._hinges_at(rows, np.zeros(len(rows)))
 
-    def _hinges_at(self, rows: NDArray) -> FoldHinges:
+    def _hinges_at(self, rows: NDArray, softness: NDArray) -> FoldHinges:
         model = self.model
-        nodes, none = model.hinges[rows].astype(np.int64), np.full((len(rows), 2), -1)
+        nodes, none = model.hinges[rows].astype(np.int64), np.full((len(rows), 2), NO_DOF)
         return FoldHinges(
             np.arange(len(rows)), nodes, model.rest[nodes], none, 0.0, model.hinge_rest[rows],
-            model.hinge_stiffness[rows],
+            model.hinge_stiffness[rows], softness, rows,
         )  # fmt: skip
 
     def strains(self) -> Strains:
@@ -191,7 +204,8 @@ class BarsHingesBody(Body):
         for start, end, code, row in model.hinge_runs.tolist():
             part, address = slice(start, end), model.addresses[row]
             state = angle[part], model.hinge_rest[part], model.hinge_parameters[part]
-            turn[part] = HingeLaw.compiled(code, *state, address)[2]
+            own, share = HingeLaw.compiled(code, *state, address)[2], model.hinge_share[part]
+            turn[part] = own / (share + (1.0 - share) * own)  # in series with panels
         return Strains(
             bars, model.bar_vector, model.bar_stiffness * slope,
             hinges, model.rest[hinges], model.hinge_stiffness * turn,
@@ -200,25 +214,36 @@ class BarsHingesBody(Body):
     def folded(self, rest: NDArray) -> BarsHingesBody:
         """See `Body`."""
         angle, parameters = self.model.hinge_rest.copy(), self.model.hinge_parameters.copy()
-        angle[self._turning], start = rest, 0
+        offset, count = self.model.hinge_offset.copy(), len(self._turning)
+        angle[self._turning], start = rest[:count], 0
+        offset[self._turning[: self.offsets], 0] = rest[count:]
         for law, count in self._laws:
             part = slice(start, start + count)
             if law.follows_rest:
                 parameters[self._turning[part]] = law.parameters(rest[part])
             start += count
-        return self._with(self.model._replace(hinge_rest=angle, hinge_parameters=parameters))
+        model = self.model._replace(
+            hinge_rest=angle, hinge_parameters=parameters, hinge_offset=offset
+        )
+        return self._with(model)
 
     def actuated(self, numbers: NDArray) -> tuple[BarsHingesBody, NDArray, NDArray]:
         """See `Body`."""
         model = self.model
         own = model._replace(
-            hinge_rest=model.hinge_rest.copy(), hinge_parameters=model.hinge_parameters.copy()
-        )
-        return self._with(own), self._turning[numbers], np.arange(len(numbers))
+            hinge_rest=model.hinge_rest.copy(), hinge_parameters=model.hinge_parameters.copy(),
+            hinge_offset=model.hinge_offset.copy(),
+        )  # fmt: skip
+        rows = np.append(self._turning, self._turning[: self.offsets])
+        return self._with(own), rows[numbers], np.arange(len(numbers))
 
     def turned(self) -> tuple[NDArray, NDArray]:
         """See `Body`."""
         return self.model.hinge_rest, np.arange(len(self.model.hinge_rest))
+
+    def series(self) -> tuple[NDArray, NDArray]:
+        """See `Body`."""
+        return self.model.hinge_share, self.model.hinge_offset
 
     def lowest_nodes(self, turned: NDArray) -> NDArray:
         """See `Body`."""
@@ -230,7 +255,8 @@ class BarsHingesBody(Body):
             return self, np.arange(self.rows)
         order = node_order(self.model)
         model, rows = renumber(self.model, order)
-        return BarsHingesBody(model, ranks(rows)[self._turning], self._laws), order
+        turning = ranks(rows)[self._turning]
+        return BarsHingesBody(model, turning, self._laws, self._softness), order
 
     def _hinges_alone(self) -> BarsHingesBody:
         """The body without its bars."""
@@ -240,7 +266,10 @@ class BarsHingesBody(Body):
         """See `Body`."""
         runs = self.model.hinge_runs.copy()
         runs[:, 2] = 0  # the linear law
-        return self._with(self.model._replace(hinge_rest=self.angles(q), hinge_runs=runs))
+        model, offset = self.model, np.zeros_like(self.model.hinge_offset)
+        return self._with(
+            model._replace(hinge_rest=self.angles(q), hinge_runs=runs, hinge_offset=offset)
+        )
 
     def unstrained(self, q: NDArray) -> Unstrained:
         """See `Body`."""

@@ -151,14 +151,14 @@ def discretize(
     folds = fold_stiffness(options.crease_stiffness, pattern, sheet)
     welds, onset = weld_stiffness(pattern, sheet), np.zeros(0)
     bends = np.concatenate([calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), welds])
-    plates = None
+    plates, softness = None, np.zeros(len(folds))
     if options.scheme == "n5b8e":
         stiff = rigid_panels(options.rigid, len(pattern.faces))
         plates = edge_plates(mesh, pattern, sheet, options.straight, stiff)
         bends = spoke_stiffness(plates, len(mesh.folds), len(bends))
     elif options.calibration == "plate":
         plated = panel_plates(mesh, pattern, sheet, options.rigid)
-        folds, large = plated.folds(folds), bends
+        folds, softness, large = plated.folds(folds), plated.creases, bends
         bends = np.concatenate([plated.bends, welds])
         onset = plate_onset(bends, large)
 
@@ -175,6 +175,7 @@ def discretize(
         pattern=pattern,
         folds=mesh.folds,
         fold_stiffness=folds,
+        panel_softness=softness,
         fold_rest=fold_rest(options.crease_rest, mesh.folds, x, pattern),
         bends=hinges,
         bend_stiffness=bends,

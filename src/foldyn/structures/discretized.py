@@ -14,6 +14,7 @@ from scipy import sparse
 from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, PlateSuperlinear, hinge_law
+from foldyn.materials.series import in_series
 from foldyn.mechanics.body import Body
 from foldyn.patterns.picture import picture
 from foldyn.structures.mass import Surface, center_of_mass, inertia_tensor, row_sums
@@ -27,6 +28,7 @@ class HingeKind(NamedTuple):
     """Hinges of one kind and law: rows (k, 2 or more) of their ends, stiffness and rest angle.
 
     onset : of each hinge (k,), rad, where the law leaves it to them.
+    softness : of the panels beside each (k,), rad/(N m), where they give way.
     """
 
     name: str
@@ -35,6 +37,13 @@ class HingeKind(NamedTuple):
     stiffness: NDArray
     rest: NDArray
     onset: NDArray | None = None
+    softness: NDArray | None = None
+
+    @property
+    def share(self) -> NDArray:
+        """Share (k,) of the crease, or of the hinge itself, in a small turn."""
+        soft = np.zeros(len(self.stiffness)) if self.softness is None else self.softness
+        return 1.0 - soft * self.stiffness
 
     def law_of(self, row: int) -> HingeLaw:
         """Law of one hinge."""
@@ -45,7 +54,7 @@ class HingeKind(NamedTuple):
     def energy(self, theta: NDArray, rest: NDArray) -> NDArray:
         """Energies / k (rad^2) of the hinges at dihedrals and rest angles (..., k), rad."""
         if self.onset is None:
-            return self.law.energy(theta, rest)
+            return in_series(self.law, theta, rest, self.share)[0]
         unit = PlateSuperlinear(float(np.degrees(1.0)))
         return self.onset**2 * unit.energy((theta - rest) / self.onset, 0.0)
 

@@ -12,6 +12,7 @@ from foldyn import mechanics
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, LinearHinge, Superlinear
 from foldyn.mechanics.body import (
+    NO_DOF,
     Body,
     FoldHinges,
     SoftHinges,
@@ -54,7 +55,7 @@ class BarsPlatesBody(Body):
         self.size, self.rows = self._nodal + model.rotations, model.rows
         self.hidden = np.arange(self._nodal, self.size)
         self._bars = BarsHingesBody(
-            model.bars, np.zeros(0, np.int64), (), like._bars if like else None
+            model.bars, np.zeros(0, np.int64), (), np.zeros(0), like._bars if like else None
         )
 
     def _with(self, model: BarsPlates) -> BarsPlatesBody:
@@ -179,13 +180,13 @@ class BarsPlatesBody(Body):
     def fold_hinges(self) -> FoldHinges:
         """See `Body`: one of each."""
         nodes = self.model.hinges[: len(self.model.fold_rest)]
-        hidden = np.where(
-            self.model.fold_rotations >= 0, self._nodal + self.model.fold_rotations, -1
-        )
+        turns = self.model.fold_rotations
+        hidden = np.where(turns >= 0, self._nodal + turns, NO_DOF)
         corners = self.model.bars.rest[nodes]
         return FoldHinges(
             np.arange(len(nodes)), nodes, corners, hidden, self.model.per_reach,
-            self.model.fold_rest, self.model.fold_stiffness,
+            self.model.fold_rest, self.model.fold_stiffness, np.zeros(len(nodes)),
+            np.arange(len(nodes)),
         )  # fmt: skip
 
     def folded(self, rest: NDArray) -> BarsPlatesBody:

@@ -1,4 +1,4 @@
-"""The hinges of a structure whose laws have memory."""
+"""The hinges of a structure that remember: by their laws, or by dampers of their creases."""
 
 from __future__ import annotations
 
@@ -9,18 +9,26 @@ from numpy.typing import NDArray
 
 from foldyn.materials.law import PARAMETERS
 from foldyn.materials.memory_law import VARIABLES, Branch, MemoryLaw, memory_of
+from foldyn.materials.prony import CODE as MAXWELL
+from foldyn.materials.prony import CreaseDampers, in_series, maxwell
 from foldyn.mechanics.body import Body, FoldHinges
 from foldyn.mechanics.inelastic import MemoryHinges
 from foldyn.mechanics.inelastic_body import Memory
 from foldyn.mechanics.viscous import WIDTH, hinge_dofs
 
+LEAST = 1e-9  # stiffness of a crease over that of its panels: one without has so much
+
 
 class Remembering(NamedTuple):
-    """Hinges of one kind whose law has memory."""
+    """Hinges of one kind whose law has memory.
+
+    damping : (k,) of their creases, N m s/rad, where panels give way beside them.
+    """
 
     kind: str  # "fold" or "bend"
     law: MemoryLaw
     hinges: FoldHinges
+    damping: NDArray
 
     @property
     def count(self) -> int:
@@ -28,25 +36,55 @@ class Remembering(NamedTuple):
         return len(self.hinges.rest) * len(self.branches)
 
     @property
+    def stiffness(self) -> NDArray:
+        """Stiffness (k,), N m/rad, that parameters of the branches refer to."""
+        stiffness, softness = self.hinges.stiffness, self.hinges.softness
+        least = np.divide(LEAST, softness, out=np.zeros_like(softness), where=softness > 0.0)
+        return np.maximum(stiffness, least)
+
+    @property
     def branches(self) -> tuple[Branch, ...]:
-        """Branches of the law, of all hinges."""
-        return self.law.branches(self.hinges.stiffness, self.hinges.length)
+        """Branches of the law, of all hinges.
+
+        What yields or creeps is in series with its crease, and so with the panels. What relaxes is
+        beside the crease: of the panels it knows a part.
+        """
+        stiffness = self.stiffness
+        own = self.law.branches(stiffness, self.hinges.length)
+        share = 1.0 - self.hinges.softness * stiffness
+        if (share == 1.0).all() or any(branch.code != MAXWELL for branch in own):
+            return own
+        none = np.zeros((len(share), 0))
+        ratio = np.column_stack([none, *[branch.share for branch in own]])
+        rate = np.column_stack([none, *[branch.rate for branch in own]])
+        ratio, rate = in_series(share, ratio, rate, self.damping * share / stiffness)
+        there = ratio.any(axis=0)
+        return maxwell(ratio[:, there], rate[:, there])
 
 
-def remembering(structure: Any, body: Body | None = None) -> tuple[Remembering, ...]:
+def remembering(
+    structure: Any, body: Body | None = None, damping: NDArray | None = None
+) -> tuple[Remembering, ...]:
     """What of a structure remembers: its folds, its bends, both or nothing.
 
     body : the structure's, or one that has it within.
+    damping : (nf,) of its creases, N m s/rad per m; none by default.
     """
     laws = {"fold": structure.fold_law, "bend": getattr(structure, "bend_law", None)}
-    out = []
+    out, whole = [], structure.body if body is None else body
+    damped = damping is not None and damping.any() and bool(whole.offsets)
     for kind, given in laws.items():
         law = memory_of(given)
-        if law is None:
+        if law is None and not (damped and kind == "fold"):
             continue
-        whole = structure.body if body is None else body
         hinges = whole.fold_hinges() if kind == "fold" else whole.bend_hinges()
-        out.append(Remembering(kind, law, hinges))
+        dampers = np.zeros(len(hinges.rest))
+        if damping is not None and kind == "fold":
+            dampers = np.where(hinges.softness > 0.0, damping[hinges.fold] * hinges.length, 0.0)
+        if law is not None:
+            out.append(Remembering(kind, law, hinges, dampers if law.relaxes else 0.0 * dampers))
+        if dampers.any() and (law is None or not law.relaxes):
+            out.append(Remembering(kind, CreaseDampers(), hinges, dampers))
     return tuple(out)
 
 
@@ -61,9 +99,10 @@ def memory(parts: tuple[Remembering, ...], body: Body) -> Memory:
         own = {
             "dofs": hinge_dofs(hinges.nodes, hinges.hidden),
             "corners": hinges.corners,
-            "per_hidden": np.where(hinges.hidden[:, 0] >= 0, hinges.per_hidden, 0.0),
+            "hidden_turn": hinges.hidden_turn,
             "rest": hinges.rest,
-            "stiffness": hinges.stiffness,
+            "row": hinges.row,
+            "stiffness": part.stiffness,
             "group": np.full(n, group),
             "first": count + b * np.arange(n),
             "code": np.tile([branch.code for branch in branches], n),
@@ -82,7 +121,7 @@ def memory(parts: tuple[Remembering, ...], body: Body) -> Memory:
     columns["lost"], columns["elapsed"] = [np.zeros(2)], [np.zeros(1)]
     columns["gradient"] = [np.zeros(WIDTH)]
     shapes = {"corners": (-1, 4, 3), "parameters": (-1, PARAMETERS)}
-    whole = ("dofs", "group", "first", "code")
+    whole = ("dofs", "row", "group", "first", "code")
     arrays = {
         name: np.ascontiguousarray(
             np.concatenate([part.reshape(shapes.get(name, part.shape)) for part in parts]),

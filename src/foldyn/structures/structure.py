@@ -89,6 +89,9 @@ class Structure(Discretized):
     folds, fold_stiffness, fold_rest : (nf, 4), (nf,), (nf,)
         Hinge rows (axis j, k, wings i, l) in the order of `pattern.creases`; stiffness of the
         whole crease (N m/rad); rest dihedral (rad).
+    panel_softness : (nf,)
+        Turn (rad/(N m)) by which the panels beside each crease give way to its moment, a part of
+        the turn of its fold (`foldyn.materials.series`).
     bends, bend_stiffness, bend_rest : (nh, 4), (nh,), (nh,)
         The same for the hinges inside panels.
     bend_onset : (nh,)
@@ -117,6 +120,7 @@ class Structure(Discretized):
     folds: NDArray = field(default_factory=lambda: _none(4))
     fold_stiffness: NDArray = field(default_factory=lambda: _none(1, float))
     fold_rest: NDArray = field(default_factory=lambda: _none(1, float))
+    panel_softness: NDArray = field(default_factory=lambda: _none(1, float))
     bends: NDArray = field(default_factory=lambda: _none(4))
     bend_stiffness: NDArray = field(default_factory=lambda: _none(1, float))
     bend_rest: NDArray = field(default_factory=lambda: _none(1, float))
@@ -140,6 +144,11 @@ class Structure(Discretized):
     kind: ClassVar[str] = "bars_and_hinges"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
     fill: ClassVar[Fill] = FILL
+
+    @property
+    def _softness(self) -> NDArray:
+        """`panel_softness`, or zeros."""
+        return self.panel_softness if len(self.panel_softness) else np.zeros(len(self.folds))
 
     @cached_property
     def bar_law(self) -> BarLaw:
@@ -166,6 +175,7 @@ class Structure(Discretized):
                     h.rest,
                     h.law,
                     None if h.onset is None else onset_parameters(h.onset),
+                    h.share,
                 )
                 for h in self.hinge_kinds
             ),
@@ -178,7 +188,7 @@ class Structure(Discretized):
             return self._plates_body(self.edge_plates)
         rows = [self._rows(group, kind.nodes) for group, kind in enumerate(self.hinge_kinds)]
         laws = tuple((kind.law, len(kind.nodes)) for kind in self.hinge_kinds)
-        body = BarsHingesBody(self.model, np.concatenate(rows), laws)
+        body = BarsHingesBody(self.model, np.concatenate(rows), laws, self._softness)
         if not len(self.clamps):
             return body
         bends = tuple(GROUPS).index("strain_bends")
@@ -230,7 +240,15 @@ class Structure(Discretized):
         own = isinstance(law, PlateSuperlinear) and law.onset is None
         onset = self.bend_onset if own else None
         return (
-            HingeKind("fold", self.fold_law, self.folds, self.fold_stiffness, self.fold_rest),
+            HingeKind(
+                "fold",
+                self.fold_law,
+                self.folds,
+                self.fold_stiffness,
+                self.fold_rest,
+                None,
+                self._softness,
+            ),
             HingeKind(
                 "bend", self.bend_law, self.bends, self.bend_stiffness, self.bend_rest, onset
             ),

@@ -11,6 +11,7 @@ from scipy import sparse
 from foldyn.cases import Case
 from foldyn.cases.loaded import SomeLoads
 from foldyn.dynamics.touch import CONTACT_FORCE
+from foldyn.materials.series import in_series
 from foldyn.mechanics import angles
 from foldyn.structures import Structure
 from foldyn.structures.mesh import double_areas
@@ -51,10 +52,11 @@ def fields(case: Case, result: Any, displacement: NDArray) -> dict[str, Field]:
         structure.edge_plates is None and not case.remembering
     ):  # whose folds turn less than the panels beside them
         angles = np.hstack([folds, hinge_angles(structure, structure.bends, displacement)])
-        rest = rest_angles(case, result, len(displacement))
-        own = slice(len(structure.folds))
-        law = structure.fold_law
-        moment = structure.fold_stiffness * law.moment(angles[:, own], rest[:, own])
+        rest, offset = rest_angles(case, result, len(displacement))
+        own, folds = slice(len(structure.folds)), structure.hinge_kinds[0]
+        angles[:, own] += offset
+        turned = in_series(folds.law, angles[:, own], rest[:, own], folds.share)
+        moment = structure.fold_stiffness * turned[1]
         out["fold_moment"] = Field("moment of creases", "N m", "crease", moment, True)
         density = energy_density(structure, strain, angles, rest)
         out["energy"] = Field("strain energy per area", "J/m²", "panel", density, False)
@@ -89,20 +91,24 @@ def hinge_angles(structure: Structure, hinges: NDArray, displacement: NDArray) -
     )
 
 
-def rest_angles(case: Case, result: Any, samples: int) -> NDArray:
-    """Rest angles (samples, k) of folds and bends, rad, as loads turn them."""
-    rest = np.hstack([case.structure.fold_rest, case.structure.bend_rest])
-    turned = np.tile(rest, (samples, 1))
+def rest_angles(case: Case, result: Any, samples: int) -> tuple[NDArray, NDArray]:
+    """Rest angles (samples, k) of folds and bends, rad, as loads turn them, and offsets of folds.
+
+    Offsets are what the laws of folds see beside the dihedrals (`Body.series`).
+    """
+    body, structure = case.body, case.structure
+    turned = np.tile(body.rest_angles, (samples, 1))
     if "time" in result.sizes:
         for change, history in case.rest_terms:
-            turned += np.outer(history(result["time"].values), change[: len(rest)])
-        return turned
-    constant = set(np.atleast_1d(result.attrs.get("constant", [])).astype(int).tolist())
-    for k in range(len(case.loads)):
-        factor = np.ones(samples) if k in constant else result["load_factor"].values
-        for change, _ in SomeLoads(case, [k]).rest_terms:
-            turned += np.outer(factor, change[: len(rest)])
-    return turned
+            turned += np.outer(history(result["time"].values), change)
+    else:
+        constant = set(np.atleast_1d(result.attrs.get("constant", [])).astype(int).tolist())
+        for k in range(len(case.loads)):
+            factor = np.ones(samples) if k in constant else result["load_factor"].values
+            for change, _ in SomeLoads(case, [k]).rest_terms:
+                turned += np.outer(factor, change)
+    count = len(structure.fold_rest) + len(structure.bend_rest)
+    return turned[:, :count], turned[:, count:] if body.offsets else np.zeros((samples, 1))
 
 
 def energy_density(

@@ -40,7 +40,7 @@ class ElementBlocks:
         self._gradient = np.zeros((len(elements.coefficient), WIDTH))
         self._own = np.ones_like(self._gradient, bool)  # the dofs that an element has
         self._own[: len(elements.axial), 6:] = False
-        self._own[len(elements.axial) :, 12:] = (elements.per_hidden > 0.0)[:, None]
+        self._own[len(elements.axial) :, 12:] = elements.hidden_turn > 0.0
         pairs = self._own[:, :, None] & self._own[:, None, :]
         shape = (*self._own.shape, WIDTH)
         self._row = np.broadcast_to(elements.dofs[:, :, None], shape)[pairs]

@@ -24,7 +24,7 @@ import math
 import numpy as np
 
 from foldyn.jit.compiled import inner_scalar, kernel, scalar
-from foldyn.materials import switch
+from foldyn.materials import series, switch
 from foldyn.mechanics.dihedral import add_hessian, dihedral_gradient
 from foldyn.mechanics.energy import hinge_dihedral
 from foldyn.mechanics.tangent import add_to_bar, add_to_hinge
@@ -62,15 +62,15 @@ def mean_stress(code, address, x, change):
 
 
 @kernel
-def mean_moment(code, address, p, rest, theta, change):
+def mean_moment(code, address, p, share, rest, theta, change):
     """Mean moment / k of a hinge that turns by `change` from theta, and its slope; see bars."""
-    moment, slope = 0.0, 0.0
+    moment, slope, a, b, c, d = 0.0, 0.0, p[0], p[1], p[2], p[3]
     for point in (GAUSS, 1.0 - GAUSS):
         t = theta + point * change
-        moment += 0.5 * switch.hinge_moment(code, t, rest, p[0], p[1], p[2], p[3], address[1])
-        slope += 0.5 * point * switch.hinge_slope(code, t, rest, p[0], p[1], address[2])
-    before = switch.hinge_energy(code, theta, rest, p[0], p[1], p[2], p[3], address[0])
-    after = switch.hinge_energy(code, theta + change, rest, p[0], p[1], p[2], p[3], address[0])
+        moment += 0.5 * series.series_moment(code, t, rest, a, b, c, d, share, address)
+        slope += 0.5 * point * series.series_slope(code, t, rest, a, b, c, d, share, address)
+    before = series.series_energy(code, theta, rest, a, b, c, d, share, address)
+    after = series.series_energy(code, theta + change, rest, a, b, c, d, share, address)
     missed = after - before - moment * change
     size = max(abs(before), abs(after))
     if p[2] != 0.0 or p[3] != 0.0:  # what stress-free laws subtract cancels digits
@@ -78,6 +78,13 @@ def mean_moment(code, address, p, rest, theta, change):
     if abs(change) > LEAST and abs(missed) > NOISE * size:
         moment += missed / change
     return moment, slope
+
+
+@inner_scalar
+def _mean_moment(model, e, code, address, theta, change):
+    """The same of hinge e of a model."""
+    p, share, rest = model.hinge_parameters[e], model.hinge_share[e], model.hinge_rest[e]
+    return mean_moment(code, address, p, share, rest, theta + model.hinge_offset[e, 0], change)
 
 
 @kernel
@@ -199,8 +206,7 @@ def add_hinge_forces(model, u0, u1, angle0, angle1, force):
             turn = angle1[e] - angle0[e]
             _gather(model, e, u0, u1, x, dx)
             discrete_gradient(x, dx, turn, points, plain, gradient)
-            parameters = model.hinge_parameters[e]
-            moment = mean_moment(code, address, parameters, model.hinge_rest[e], angle0[e], turn)[0]
+            moment = _mean_moment(model, e, code, address, angle0[e], turn)[0]
             moment *= model.hinge_stiffness[e]
             for v in range(4):
                 for c in range(3):
@@ -254,8 +260,7 @@ def add_hinge_tangent(model, u0, u1, angle0, floor, slots, data):
             turn = dihedral[0] - angle0[e]
             _gather(model, e, u0, u1, x, dx)
             discrete_gradient(x, dx, turn, points, plain, gradient)
-            parameters, rest = model.hinge_parameters[e], model.hinge_rest[e]
-            moment, slope = mean_moment(code, address, parameters, rest, angle0[e], turn)
+            moment, slope = _mean_moment(model, e, code, address, angle0[e], turn)
             if code >= 0:
                 slope = max(slope, 0.5 * floor)
             block[:] = 0.0

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.algebra.banded import one_thread
+from foldyn.dynamics.actuation import jolt
 from foldyn.dynamics.course import Course, Outcome, Samples, StepPlan, sample
 from foldyn.dynamics.implicit.impulse import impulse_lasts
 from foldyn.dynamics.implicit.matrix import StepMatrix
@@ -334,6 +335,11 @@ class Implicit:
             self._packed.body.memory.commit()
         if jump is not None:
             scheme.begin(max(end, jump))
+            system = self._packed.system
+            if system.turns:
+                course.tally.work += jolt(
+                    self._packed.model, system.actuators, scheme.work.fold_angle
+                )
             if self._touching is not None:
                 self._touching.begin()
 

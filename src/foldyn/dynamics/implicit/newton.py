@@ -41,10 +41,13 @@ class Newton:
     def prepare(self, h: float, t: float) -> None:
         """Have everything compiled that a step needs."""
         scheme = self.scheme
+        offset = scheme.packed.system.actuators.offset
+        before = offset.copy()
         scheme.shift[:] = 0.0
         scheme.residual(h, t)
         scheme.tangent(self.matrix, scheme.displacement(), False)
         scheme.works(h)
+        offset[:] = before
 
     def renew(self, h: float) -> bool:
         """Make the matrix of a step h (s) from its start; tells whether it could be factorized."""

@@ -1,0 +1,126 @@
+"""A crease in series with the panels beside it: hinges whose dihedral is not that of their crease.
+
+Panels that bend as plates give way at their creases. The dihedral theta of such a hinge is that of
+the crease, phi, and what a linear spring of compliance c adds, which the panels are. The law m of
+the crease (per unit of its stiffness K) and the spring transmit one moment,
+
+    M = K m(phi) = (theta - phi) / c.
+
+Per unit of the stiffness k = K s of the whole hinge, s = 1/(1 + c K) the share of the crease in
+small turns, M / k = m(phi) / s = (theta - phi) / (1 - s). Where m is linear that is the law itself
+at theta; elsewhere phi is found by Newton's method. A moment Q of the crease alone, which turns phi
+but not the panels, acts as Q on the whole hinge whose law sees theta + c Q.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
+from foldyn.materials.law import HingeLaw
+from foldyn.materials.linear import CODE as LINEAR
+from foldyn.materials.switch import hinge_energy, hinge_moment, hinge_rest_slope, hinge_slope
+
+ITERATIONS = 100
+ACCURACY = 4e-15  # rad, relative to angles above 1
+TWO_PI = 2.0 * math.pi
+
+
+@inner
+def crease_angle(code, theta, rest, a, b, c, d, share, address):
+    """Dihedral phi (rad) of the crease of a hinge at theta; nan where Newton's method fails.
+
+    address : (3,) of the law's energy, moment and slope.
+    """
+    if share == 1.0:
+        return theta
+    if code == LINEAR:
+        return rest + share * (theta - rest)
+    locks = (code == STRESS_FREE) | (code == AS_PUBLISHED)  # between 0 and 2 pi
+    soft = (1.0 - share) / share
+    phi = share * theta + (1.0 - share) * (rest + c * locks)
+    if locks:
+        phi = min(max(phi, 1e-3), TWO_PI - 1e-3)
+    for _ in range(ITERATIONS):
+        beyond = phi - theta + soft * hinge_moment(code, phi, rest, a, b, c, d, address[1])
+        slope = 1.0 + soft * hinge_slope(code, phi, rest, a, b, address[2])
+        step = beyond / slope
+        if locks:
+            step = min(max(step, 0.5 * (phi - TWO_PI)), 0.5 * phi)
+        phi -= step
+        if abs(step) <= ACCURACY * max(1.0, abs(phi)):
+            return phi
+    return math.nan
+
+
+@inner_scalar
+def straight(code, share):
+    """Whether the law of a hinge is that of its crease: no panels give way, or all is linear."""
+    return (share == 1.0) | (code == LINEAR)
+
+
+@inner
+def series_energy(code, theta, rest, a, b, c, d, share, address):
+    """Energy / k of a hinge at theta, that in the panels among it."""
+    if straight(code, share):
+        return hinge_energy(code, theta, rest, a, b, c, d, address[0])
+    phi = crease_angle(code, theta, rest, a, b, c, d, share, address)
+    own = hinge_energy(code, phi, rest, a, b, c, d, address[0])
+    return own / share + 0.5 * (theta - phi) ** 2 / (1.0 - share)
+
+
+@inner
+def series_moment(code, theta, rest, a, b, c, d, share, address):
+    """Moment / k of a hinge at theta."""
+    if straight(code, share):
+        return hinge_moment(code, theta, rest, a, b, c, d, address[1])
+    phi = crease_angle(code, theta, rest, a, b, c, d, share, address)
+    return hinge_moment(code, phi, rest, a, b, c, d, address[1]) / share
+
+
+@inner
+def series_slope(code, theta, rest, a, b, c, d, share, address):
+    """Slope of the moment / k of a hinge at theta."""
+    if straight(code, share):
+        return hinge_slope(code, theta, rest, a, b, address[2])
+    phi = crease_angle(code, theta, rest, a, b, c, d, share, address)
+    own = hinge_slope(code, phi, rest, a, b, address[2])
+    return own / (share + (1.0 - share) * own)
+
+
+@inner
+def series_rest_slope(code, theta, rest, a, b, c, d, share, address):
+    """Derivative of energy / k of a hinge with respect to its rest angle."""
+    if straight(code, share):
+        return hinge_rest_slope(code, theta, rest, a, b, address[0])
+    phi = crease_angle(code, theta, rest, a, b, c, d, share, address)
+    return hinge_rest_slope(code, phi, rest, a, b, address[0]) / share
+
+
+@kernel
+def _table(code, theta, rest, p, share, address):
+    out = np.empty((2, theta.size))
+    for i in range(theta.size):
+        t, r, a, b, c, d = theta[i], rest[i], p[i, 0], p[i, 1], p[i, 2], p[i, 3]
+        out[0, i] = series_energy(code, t, r, a, b, c, d, share[i], address)
+        out[1, i] = series_moment(code, t, r, a, b, c, d, share[i], address)
+    return out
+
+
+def in_series(
+    law: HingeLaw, theta: ArrayLike, rest: ArrayLike, share: ArrayLike
+) -> tuple[NDArray, NDArray]:
+    """Energy / k (rad^2) and moment / k (rad) of hinges whose crease has a share in small turns.
+
+    theta, rest : dihedrals (rad); arrays that go together with the shares.
+    """
+    arrays = np.broadcast_arrays(*(np.asarray(each, float) for each in (theta, rest, share)))
+    flat, at_rest, part = (np.ascontiguousarray(each.ravel()) for each in arrays)
+    parameters = np.ascontiguousarray(law.parameters(at_rest))
+    address = np.array(law.addresses or (0, 0, 0), np.int64)
+    energy, moment = _table(law.code, flat, at_rest, parameters, part, address)
+    return energy.reshape(arrays[0].shape), moment.reshape(arrays[0].shape)
