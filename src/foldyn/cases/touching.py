@@ -62,7 +62,7 @@ def _check_planes(case: Case, u: NDArray, moved: NDArray) -> None:
         if (height > NEAREST * half).all():
             continue
         worst = int(np.argmin(height / half))
-        behind = f"{-height[worst]:.3g} m behind it"
+        behind = f"{abs(height[worst]):.3g} m behind it"
         if height[worst] > 0.0:
             behind = f"{height[worst]:.3g} m from it, with {half[worst]:.3g} m of the sheet between"
         raise InputError(
