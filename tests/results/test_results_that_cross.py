@@ -9,7 +9,8 @@ import pytest
 
 import foldyn as fd
 from foldyn.errors import ComputationError, CrossingWarning, PenetrationError
-from foldyn.results.crossings import crossings_of, pairs_text
+from foldyn.mechanics.crossings import pairs_text
+from foldyn.results.crossings import crossings_of
 
 PAPER = fd.Sheet(1.219e9, 0.2, 0.24e-3, 667.0)
 

@@ -13,9 +13,13 @@ from scipy import sparse
 from foldyn.cases.case import Case
 from foldyn.cases.constraints import AGREES
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.mechanics.crossings import crossing_panels
+from foldyn.mechanics.crossings import crossing_panels, pairs_text
 
 STRIDE = 5  # at every so manieth state panels that cross are looked for
+NEAREST = 0.01  # of the distance at which contact begins: no motion brings anything nearer
+APART = (
+    "start from a state in which they are apart, as with crease_rest above 0 and below 360 degrees"
+)
 
 
 def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
@@ -32,7 +36,7 @@ def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
     Raises
     ------
     InputError
-        The structure takes no contact; a node is behind a plane; panels meet.
+        The structure takes no contact; a node is behind a plane, or in it; panels cross or meet.
 
     Warns
     -----
@@ -42,33 +46,59 @@ def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
     if case.contact is None:
         return
     _check_structure(case)
-    x = case.structure.nodes + u
+    _check_planes(case, u, moved)
+    if case.contact.panels:
+        _check_panels(case, u)
+
+
+def _check_planes(case: Case, u: NDArray, moved: NDArray) -> None:
+    """Refuse nodes that are behind a plane, or in it."""
+    assert case.contact is not None
     surface = np.unique(case.structure.triangles)
+    surface = surface[~case.still[surface].all(axis=1)]  # what stays where it is is left alone
+    if not len(surface):
+        return
+    body: Any = case.body
+    x, half = case.structure.nodes[surface] + u[surface], 0.5 * body.tables.node_thickness[surface]
     for i, plane in enumerate(case.contact.planes):
         point, normal = np.array(plane.point) + moved[i], np.array(plane.normal)
-        height = (x[surface] - point) @ normal / np.linalg.norm(normal)
-        free = ~case.still[surface].all(axis=1)
-        if free.any() and height[free].min() <= 0.0:
-            behind = int(np.argmin(np.where(free, height, np.inf)))
-            raise InputError(
-                f": node {surface[behind]} is {-height[behind]:.3g} m behind it at the start: move "
-                "the plane, or turn its normal to the side of the sheet",
-                f"contact.planes[{i}]",
-            )
-    body: Any = case.body
-    energy = body.contact(body.dofs(u))[0]
-    if not np.isfinite(energy):
+        height = (x - point) @ normal / np.linalg.norm(normal)
+        if (height > NEAREST * half).all():
+            continue
+        worst = int(np.argmin(height / half))
+        behind = f"{abs(height[worst]):.3g} m behind it"
+        if height[worst] > 0.0:
+            behind = f"{height[worst]:.3g} m from it, with {half[worst]:.3g} m of the sheet between"
         raise InputError(
-            ": at the start panels meet, or fold onto themselves: start from a state in which "
-            "they are apart, as with crease_rest above 0 and below 360 degrees",
+            f": node {surface[worst]} is {behind} at the start: move the plane, or turn its normal "
+            "to the side of the sheet",
+            f"contact.planes[{i}]",
+        )
+
+
+def _check_panels(case: Case, u: NDArray) -> None:
+    """Refuse panels that cross or meet; warn where they overlap at rest."""
+    structure = case.structure
+    pairs = crossing_panels(structure.nodes + u, structure.triangles, structure.triangle_panel)
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]  # what a panel does to itself is no contact
+    if len(pairs):
+        raise InputError(
+            f": at the start panels pass through each other: {pairs_text(pairs)}; {APART}",
             "contact",
         )
-    if not u.any() and energy > 0.0 and not case.contact.planes:
+    body: Any = case.body
+    energy, share, panels = body.nearest(body.dofs(u))
+    most = f" ({pairs_text(panels)})" if len(panels) else ""
+    if not (np.isfinite(energy) and share > NEAREST):
+        raise InputError(
+            f": at the start panels meet, or fold onto themselves{most}; {APART}", "contact"
+        )
+    if not u.any() and energy > 0.0:
         warnings.warn(
-            "contact: at rest panels are nearer to each other than the sheet is thick; they will "
-            f"be pushed apart with an energy of {energy:.3g} J",
+            f"contact: at rest panels are nearer to each other than the sheet is thick{most}; "
+            f"they will be pushed apart with an energy of {energy:.3g} J",
             FoldynWarning,
-            stacklevel=4,
+            stacklevel=5,
         )
 
 

@@ -31,6 +31,7 @@ BOTH = 3
 FEWEST, SPREAD = 64, 2  # the grid has at most this many cells, and this many per triangle more
 LARGEST = 0.0625  # of the largest box: the least size of a cell
 ROOM = 64  # pairs at first
+MOST_SHOWN = 8  # pairs of panels that a text names
 
 
 def crossing_panels(points: NDArray, triangles: NDArray, panels: NDArray) -> NDArray[np.int64]:
@@ -56,6 +57,13 @@ def crossing_panels(points: NDArray, triangles: NDArray, panels: NDArray) -> NDA
     sides = np.zeros((len(pairs), 2), np.int64)
     np.bitwise_or.at(sides, which.ravel(), found[:count, 2:])
     return pairs[(sides == BOTH).all(axis=1)]
+
+
+def pairs_text(panels: NDArray) -> str:
+    """Pairs of panels (k, 2) in words: "0 and 2, 5 itself and 3 more pairs"."""
+    named = [f"{a} and {b}" if a != b else f"{a} itself" for a, b in panels[:MOST_SHOWN].tolist()]
+    more = len(panels) - len(named)
+    return ", ".join(named) + (f" and {more} more pair{'s' if more > 1 else ''}" if more else "")
 
 
 @kernel

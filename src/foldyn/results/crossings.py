@@ -13,11 +13,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.mechanics.crossings import crossing_panels
+from foldyn.mechanics.crossings import crossing_panels, pairs_text
 from foldyn.results.columns import Column
 from foldyn.results.quantities import CROSSINGS, variable
-
-MOST_SHOWN = 8  # pairs of panels that a text names
 
 
 class Crossings(NamedTuple):
@@ -115,10 +113,3 @@ def _found(seen: dict[int, NDArray[np.int64]], many: int) -> Crossings:
         np.stack(np.divmod(keys[first], many), axis=1),
         samples[first],
     )
-
-
-def pairs_text(panels: NDArray) -> str:
-    """Pairs of panels (k, 2) in words: "0 and 2, 5 itself and 3 more pairs"."""
-    named = [f"{a} and {b}" if a != b else f"{a} itself" for a, b in panels[:MOST_SHOWN].tolist()]
-    more = len(panels) - len(named)
-    return ", ".join(named) + (f" and {more} more pair{'s' if more > 1 else ''}" if more else "")

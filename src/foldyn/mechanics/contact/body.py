@@ -19,6 +19,7 @@ from foldyn.mechanics.contact.friction import Friction, stored
 from foldyn.mechanics.contact.holding import held_by_panels, held_by_planes
 from foldyn.mechanics.contact.memory import Memory, memories, memory
 from foldyn.mechanics.contact.model import Touching, TouchingWork
+from foldyn.mechanics.contact.pairs import VERTEX
 from foldyn.mechanics.contact.rubbing import add_rubs
 from foldyn.mechanics.contact.tables import HISTORY, NORMAL, Sheets, Tables, tables
 from foldyn.mechanics.contact.tangent import (
@@ -110,6 +111,30 @@ class TouchingBody(WrappedBody):
         force = np.zeros_like(u)
         add_contact(self.tables, u, self.inner.angles(q), force, self._placed())
         return float(self._memory.facts.energy), force
+
+    def nearest(self, q: NDArray) -> tuple[float, float, NDArray]:
+        """Energy (J) of contact between panels, and which of them are nearest to each other.
+
+        That is the least distance over the one at which they begin to touch, and the panels
+        (1, 2), the lower first; inf and none, (0, 2), where no panels are near.
+        """
+        body = self.around(self.inner)
+        own = body.tables = self.tables._replace(planes=self.tables.planes[:0])
+        kept = body._memory = memory(own, self.sheets.panels)  # pairs are listed here
+        body._moved, energy = np.zeros((0, 3)), body.contact(q)[0]
+        counts = int(kept.counts.listed_first), int(kept.counts.listed_second)
+        share = np.concatenate(
+            [1.0 + kept.gap[k, :n] / kept.d0[k, :n] for k, n in enumerate(counts)]
+        )
+        if not share.size:
+            return energy, np.inf, np.zeros((0, 2), np.int64)
+        worst = int(share.argmin())
+        kind, row = (0, worst) if worst < counts[0] else (1, worst - counts[0])
+        one, other = kept.pairs[kind, row]
+        panels = own.edge_panels[[one, other], 0]
+        if kind == VERTEX:
+            panels = np.array([own.ranges.own[own.ranges.own_start[one]], own.panel[other]])
+        return energy, float(share[worst]), np.sort(panels)[None]
 
     def _placed(self) -> Memory:
         """The memory with the planes where they are."""

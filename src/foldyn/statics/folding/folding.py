@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import CrossingWarning, FoldynWarning, InputError
-from foldyn.mechanics.crossings import crossing_panels
+from foldyn.mechanics.crossings import crossing_panels, pairs_text
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import pattern_of
 from foldyn.patterns.picture import picture
 from foldyn.patterns.transforms import FACE_ORDERS
-from foldyn.results.crossings import pairs_text
 from foldyn.statics.folding.energy import FoldEnergy
 from foldyn.statics.folding.record import folded_pattern, path_of
 from foldyn.statics.folding.subdivision import subdivided
