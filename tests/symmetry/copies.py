@@ -246,8 +246,8 @@ FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     **dict.fromkeys(("law", "fold_law", "bend_law"), Copy.law),
     **dict.fromkeys(("Sheet.panels", "planes"), Copy.parts),
     # what no symmetry changes
-    **dict.fromkeys(("history", "value", "axes", "axis", "name", "rest", "state", "count"), Copy.same),
-    **dict.fromkeys(("scheme", "mass", "bar_law", "calibration", "divisions"), Copy.same),
+    **dict.fromkeys(("history", "value", "axes", "axis", "name", "rest", "state"), Copy.same),
+    **dict.fromkeys(("count", "scheme", "mass", "bar_law", "calibration", "divisions"), Copy.same),
     **dict.fromkeys(("youngs_modulus", "poissons_ratio", "thickness", "density"), Copy.same),
     **dict.fromkeys(("length_scale_ratio", "fraction", "change", "expansion"), Copy.same),
     **dict.fromkeys(("stiffness", "rest_length", "coefficient", "alpha", "beta"), Copy.same),
