@@ -18,7 +18,7 @@ OLDEST_TESTS := tests/jit tests/materials tests/mechanics tests/results --ignore
 # the tests of a file on one worker, so that two seldom compile the same
 WORKERS ?= -n auto --maxprocesses 4 --dist loadfile
 
-.PHONY: help demo test test-oldest lint format docs wheel-check clean setup
+.PHONY: help demo test test-all test-oldest lint format docs wheel-check clean setup
 .DEFAULT_GOAL := help
 
 help:  ## list what can be made
@@ -60,8 +60,11 @@ demo: $(STAMP)  ## run the four shipped case studies; pages and figures in demo-
 	@echo; echo 'The figures, and a page with all of each case:'
 	@find $(DEMO_OUT) -name '*.png' -o -name 'report.html' | sort | sed 's/^/  /'
 
-test: $(STAMP)  ## run the tests
+test: $(STAMP)  ## run the tests that a change can plausibly break
 	@$(BIN)/python -m pytest $(WORKERS) $(PYTEST_FLAGS)
+
+test-all: test  ## run these, and then those that are long or one of many of a kind
+	@$(BIN)/python -m pytest $(WORKERS) $(PYTEST_FLAGS) -m thorough
 
 test-oldest: $(BIN)/python  ## run the tests of compiling, laws and results with the oldest versions that pyproject.toml allows
 	@rm -rf $(OLDEST) && $(BIN)/python -m venv $(OLDEST)

@@ -155,3 +155,10 @@ def test_contradictions(supports, text) -> None:
 def test_wrong_input(make, text) -> None:
     with pytest.raises(InputError, match=text):
         make()
+
+
+def test_values_for_each_node_stand_beside_links() -> None:
+    """What is imposed along an axis is no equation between displacements, as a link is."""
+    case = Case(STRUCTURE, [fd.Link([0, 1], "y"), Impose([2, 3, 0], "x", [0.1, 0.2, 0.3])])
+    ((moved, _),) = case.imposed_terms
+    np.testing.assert_array_equal(moved, [[0.3, 0, 0], [0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]])

@@ -35,7 +35,7 @@ def test_the_page_has_commands_for_each_pattern_of_its_table():
         "square-twist",
         "bird-base",
         *(
-            pytest.param(name, marks=pytest.mark.slow)
+            pytest.param(name, marks=pytest.mark.thorough)
             for name in ("miura", "waterbomb", "resch", "crane")
         ),
     ],

@@ -116,7 +116,7 @@ def test_no_step_is_too_long_to_see_what_is_in_its_way(monkeypatch):
     assert speed == 0.0 and facts["energy_error"] < 1e-9  # through it, without a trace
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_an_impact_too_violent_for_the_step_is_told():
     """A snap at some m/s, with a step that is far too long for it."""
     with pytest.raises(ComputationError, match=r"use a step below|no equilibrium was found"):

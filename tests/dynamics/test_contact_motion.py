@@ -185,7 +185,7 @@ def test_others_refuse_contact():
         fd.modes(case)
 
 
-@pytest.mark.slow  # compiles the loop with contact around laws with memory
+@pytest.mark.thorough  # compiles the loop with contact around laws with memory
 def test_a_relaxing_fold_falls_on_a_plane_and_its_energies_balance():
     """Contact and memory together; `auto` takes a method that both allow."""
     pattern = fd.patterns.simple_fold(a=0.05, b=0.05, dihedral=90)

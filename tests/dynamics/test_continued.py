@@ -82,7 +82,7 @@ def driven(**options):
     return fd.Case(structure, supports, loads, fd.Rayleigh(0.1, 1e-3))
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("ignore:the energy balance")
 @pytest.mark.parametrize("method", ["generalized_alpha", "energy_momentum"])
 def test_supports_loads_and_folds_that_move(method, tmp_path):
@@ -93,7 +93,7 @@ def test_supports_loads_and_folds_that_move(method, tmp_path):
     assert "continued_from" in again and "continued_from" not in part
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_rotations_of_a_shell(tmp_path):
     """They have no mass, and where they are is no part of a displacement; 2 minutes, compiling."""
     shell = fd.shell(fd.patterns.simple_fold(1.0, 1.0, dihedral=60), SHEET, 2)

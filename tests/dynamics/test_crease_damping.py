@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oscillators import equal_steps
-from scipy.spatial.transform import Rotation
 
 import foldyn as fd
 from foldyn.dynamics import METHODS
@@ -93,28 +92,6 @@ def test_a_folded_sheet_that_spins_loses_nothing(method):
     motion = fd.simulate(case, 1.0, method, initial=fd.State(0 * v, v), every=0.1, **numeric)
     # what the centrifugal forces stretch and fold is of the order of the spin to the fourth power
     assert float(motion.dissipated[-1]) < 1e-4 * float(motion.kinetic[0])
-
-
-def test_rotation_of_the_whole_changes_nothing():
-    """The same fold with its supports turned in space: the same energies."""
-    found = []
-    for turn in (Rotation.identity(), Rotation.from_rotvec([0.4, -1.0, 2.0])):
-        pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=120)
-        turned = fd.Pattern(
-            turn.apply(np.array(pattern.vertices)), pattern.faces, pattern.assignments
-        )
-        sheet = fd.Sheet(1e6, 0.25, 0.01, 1.0)
-        s = fd.discretize(
-            turned, sheet, fold_law="linear", bend_law="linear", crease_stiffness=K,
-            mass="circumcenter", preset="herkal")  # fmt: skip
-        held = [node for node in range(len(s.nodes)) if node not in (4, 5, 7)]
-        force = turn.apply([0.0, 0.0, -2e-3])
-        load = fd.Force([4, 5], force, fd.HalfSine(0.5))
-        case = fd.Case(s, [fd.Fix(held)], [load], fd.CreaseDamping(5e-3))
-        found.append(fd.simulate(case, 1.0, "newmark", dt=2e-3, every=10))
-    assert float(found[0].dissipated[-1]) > 0.05 * float(found[0].work[-1])
-    for name in ("dissipated", "work", "kinetic"):
-        assert found[0][name].values == pytest.approx(found[1][name].values, rel=1e-5, abs=1e-9)
 
 
 def large_folding(model: str, method: str, modulus: float, **numeric):

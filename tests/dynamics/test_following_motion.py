@@ -141,6 +141,20 @@ def test_a_motion_starts_with_a_shells_rotations_in_balance_with_the_moment() ->
     assert moved < 1e-8
 
 
+def test_rotations_of_a_shell_follow_a_moment_that_jumps() -> None:
+    """They have no mass: gone within a nanosecond, or at once, the moment is the same."""
+    fold = shell(fd.patterns.simple_fold(1.0, 1.0, 100), SHEET)
+    whole, half = ([fd.CreaseMoment([0], 0.1 * part, fd.Pulse(0.1))] for part in (1.0, 0.5))
+    half.append(fd.CreaseMoment([0], 0.05, fd.Pulse(0.1 - 1e-9)))
+    one, other = (
+        fd.simulate(fd.Case(fold, loads=loads), 0.2, "newmark", dt=0.004, every=10)
+        for loads in (whole, half)
+    )
+    size = np.abs(one.displacement).max()
+    np.testing.assert_allclose(one.displacement, other.displacement, rtol=0, atol=1e-7 * size)
+    assert one.energy_error < 1e-3
+
+
 @pytest.mark.parametrize("make", [bars, shell])
 def test_work_of_pressure_on_a_closed_body_is_pressure_times_volume(make) -> None:
     s, p = make(BOX, fd.Sheet(1e5, 0.25, 0.01, 1.0)), 20.0

@@ -260,3 +260,17 @@ def test_progress_is_told():
     times = [state.time for state in seen]
     assert times == sorted(times)
     assert times[-1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_two_jumps_within_a_nanosecond_are_one(method):
+    """A step between them ends where rounding of the inertia lets it, and changes nothing."""
+    jump = 0.0317
+    one = case2(fd.Step(jump))
+    half = fd.Force([7], (0.005, 0.0, 0.0), fd.Step(jump))
+    two = one.altered(loads=[half, fd.Force([7], half.vector, fd.Step(jump - 1e-9))])
+    found = [
+        fd.simulate(case, 0.1, method, dt=0.01, every=10).displacement.values[-1]
+        for case in (one, two)
+    ]
+    np.testing.assert_allclose(*found, rtol=0, atol=1e-7 * np.abs(found[0]).max())

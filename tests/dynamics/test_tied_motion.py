@@ -99,32 +99,6 @@ def fold_on_rollers(mass, turn=None, moved=False, damping=None):
     return fd.Case(s, supports, [force], damping or fd.Rayleigh(0.1, 1e-4))
 
 
-@pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("moved", [False, True])
-def test_a_turned_structure_moves_as_before(mass, method, moved) -> None:
-    turn = turned()
-    plain, oblique = (
-        fd.simulate(fold_on_rollers(mass, at, moved), 1.0, method, every=0.1, **fixed_step(method))
-        for at in (None, turn)
-    )
-    size = np.abs(plain.displacement.values).max()
-    np.testing.assert_allclose(
-        plain.displacement.values @ turn.T, oblique.displacement.values, atol=2e-9 * size
-    )
-    forces = reactions(plain, 8) @ turn.T
-    largest = np.abs(forces).max()
-    close = 1e-3 if method == "dormand_prince" else 1e-5  # steps that rounding chose
-    np.testing.assert_allclose(forces, reactions(oblique, 8), atol=close * largest)
-    for name in ("work", "kinetic", "dissipated"):
-        energy = plain[name].values
-        np.testing.assert_allclose(oblique[name], energy, atol=1e-5 * np.abs(energy).max())
-    if not METHODS[method].implicit:
-        assert oblique.critical_step == pytest.approx(plain.critical_step, rel=1e-9)
-    assert oblique.energy_error == pytest.approx(plain.energy_error, rel=1e-2, abs=1e-7)
-    assert oblique.energy_error < 2e-3
-
-
 @pytest.mark.parametrize("method", ["rk4", "generalized_alpha"])
 def test_a_base_carries_rollers_along(method) -> None:
     """Along the normal of their plane by what the base moves that way, in any frame."""

@@ -64,24 +64,6 @@ def test_force_and_tangent_turn_with_the_structure(name, seed):
     assert relative(s.tangent(turned).toarray(), big @ s.tangent(u).toarray() @ big.T) < 1e-12
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_turned_pattern_is_the_same_structure(name):
-    """Discretized anew after a rotation: same stiffness, force turned."""
-    import foldyn as fd
-
-    s, q = structure(name), rotation(5)
-    make, options = MODELS[name]
-    pattern = make()
-    other = fd.discretize(fd.Pattern(pattern.vertices @ q.T, pattern.faces), s.sheet, **options)
-    np.testing.assert_array_equal(other.bars, s.bars)
-    np.testing.assert_array_equal(other.folds, s.folds)
-    np.testing.assert_allclose(other.bar_area, s.bar_area, rtol=1e-12)
-    np.testing.assert_allclose(other.bend_stiffness, s.bend_stiffness, rtol=1e-12)
-    np.testing.assert_allclose(other.fold_rest, s.fold_rest, rtol=1e-12)
-    u = state(s, 2)
-    assert relative(other.internal_force(u @ q.T), s.internal_force(u) @ q.T) < 1e-11
-
-
 @settings(max_examples=40)
 @given(name=st.sampled_from(NAMES), seed=st.integers(0, 10**6), amplitude=st.floats(1e-6, 0.15))
 def test_forces_and_moments_balance(name, seed, amplitude):

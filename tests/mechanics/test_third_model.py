@@ -50,7 +50,7 @@ def test_statics(method):
 
 
 @pytest.mark.parametrize(
-    "method", [pytest.param("rk4", marks=pytest.mark.slow), "generalized_alpha"]
+    "method", [pytest.param("rk4", marks=pytest.mark.thorough), "generalized_alpha"]
 )
 def test_motions(method):
     """A small vibration of known frequency, lightly damped by the mass."""

@@ -92,7 +92,7 @@ def test_the_order_is_found_in_white_noise(n, noise):
     assert set(orders) == {6}
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_scatter_over_seeds_is_near_the_least_possible():
     """Noise of 1 % of the largest amplitude, 240 samples, 100 seeds.
 

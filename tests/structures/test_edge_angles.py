@@ -189,7 +189,7 @@ def test_statics_and_actuation():
 
 
 @pytest.mark.parametrize(
-    "method", ["generalized_alpha", "newmark", pytest.param("rk4", marks=pytest.mark.slow)]
+    "method", ["generalized_alpha", "newmark", pytest.param("rk4", marks=pytest.mark.thorough)]
 )
 def test_motions_close_their_energy_audit(method):
     load = fd.Force([6, 7, 8], (0, 0, 1e-3), fd.HalfSine(0.5))
@@ -252,8 +252,8 @@ def test_what_it_does_not_go_with(options, message):
     [
         ("linear", "rk4"),
         ("enhanced", "rk4"),
-        pytest.param("linear", "dormand_prince", marks=pytest.mark.slow),
-        pytest.param("enhanced", "dormand_prince", marks=pytest.mark.slow),
+        pytest.param("linear", "dormand_prince", marks=pytest.mark.thorough),
+        pytest.param("enhanced", "dormand_prince", marks=pytest.mark.thorough),
     ],
 )
 def test_explicit_methods_balance_the_edges(law, method):
@@ -288,3 +288,15 @@ def test_moments_on_creases_need_edge_angles():
 def test_panels_that_curl_are_refused():
     with pytest.raises(InputError, match=r'scheme = "n5b8e": panels that curl.*"n5b8"'):
         fd.Case(miura(), [fd.Fix([0, 1, 2])], [fd.Temperature(10.0, curvature=1e-3)])
+
+
+def test_rigid_panels_have_no_edge_angles():
+    """Without any, the body of explicit methods is the one of all others."""
+    s = edged(fd.patterns.simple_fold(dihedral=100), rigid="all")
+    u = np.zeros((8, 3))
+    u[[4, 5], 2] = 0.1
+    force = s.body.internal(u)
+    np.testing.assert_allclose(
+        s.condensed.body.internal(u), force, rtol=0, atol=1e-12 * np.abs(force).max()
+    )
+    assert np.isfinite(fd.dynamics.critical_step(fd.Case(s), "rk4"))

@@ -153,7 +153,7 @@ def test_what_was_computed_is_kept_point_by_point(case, tmp_path):
     np.testing.assert_array_equal(once_more["side_by_side"], sides)  # what is kept says how
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_processes_compute_batches(case):
     vary = {"sheet.youngs_modulus": "1e6:1.2e6:24"}
     found = of(case, vary, processes=2)

@@ -121,7 +121,7 @@ def test_what_a_path_carries(results):
     assert take(results, "statics", "strain") == pytest.approx(np.abs(strain).max(), rel=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_barriers_of_a_tower_that_snaps(tmp_path):
     case = fd.studies.find_case("gallery/kresling-displacement")
     names = ["stable_states", "barrier", "barrier_back", "state_strokes", "state_energies"]

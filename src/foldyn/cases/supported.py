@@ -114,11 +114,11 @@ class Supported:
 
     def _imposed(self) -> Summands:
         for place, support in self._supports(Impose):
-            vector = np.zeros((len(self.structure.nodes), 3))
+            vector, along = np.zeros((len(self.structure.nodes), 3)), {place: support.value}
             if support.axis is not None:
                 vector[self._nodes_of(place, support), AXES.index(support.axis)] = support.value
-            moved = self._straight.carried(vector)
-            yield self._tied(moved, place, {place: support.value}), support.history
+                along = {}
+            yield self._tied(self._straight.carried(vector), place, along), support.history
 
     @cached_property
     def prescribed_terms(self) -> Terms:

@@ -86,7 +86,7 @@ def condensed_plates(model: BarsPlates, constant: bool) -> CondensedPlates:
         turned = model.angle[model.start[p] : model.start[p + 1]]
         own = np.flatnonzero(turned < 0)
         matrix = model.stiffness[model.entry[p] : model.entry[p + 1]]
-        part = matrix.reshape(len(turned), -1)[np.ix_(own, own)]
+        part = matrix.reshape(len(turned), len(turned))[np.ix_(own, own)]
         number = -1 - turned[own]
         rows.append(np.repeat(number, len(own)))
         columns.append(np.tile(number, len(own)))
@@ -98,7 +98,9 @@ def condensed_plates(model: BarsPlates, constant: bool) -> CondensedPlates:
     joined = sparse.csr_array(
         abs(stiffness) + sparse.coo_array((np.ones(len(one)), (one, other)), shape=(r, r))
     )
-    order = reverse_cuthill_mckee(sparse.csr_array(joined + joined.T), symmetric_mode=True)
+    order = np.zeros(0)  # where all panels are rigid
+    if r:
+        order = reverse_cuthill_mckee(sparse.csr_array(joined + joined.T), symmetric_mode=True)
     rank = ranks(order.astype(np.int64))
     found = sparse.coo_array(joined)
     width = int(np.abs(rank[found.coords[0]] - rank[found.coords[1]]).max(initial=0))

@@ -334,6 +334,7 @@ class Implicit:
         if self._packed.body.memory is not None:
             self._packed.body.memory.commit()
         if jump is not None:
+            course.tally.work += scheme.settle(max(end, jump))
             scheme.begin(max(end, jump))
             system = self._packed.system
             if system.turns:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.implicit.matrix import StepMatrix
-from foldyn.dynamics.implicit.scheme import NEW_MATRIX, NOT_CONVERGED, SOLVED, Goal, Scheme
+from foldyn.dynamics.implicit.scheme import NEW_MATRIX, NOT_CONVERGED, SOLVED, Scheme
 
 MOST = 25  # iterations
 SAME_STEP = 1e-3  # relative difference of steps that may share a matrix
@@ -89,7 +89,7 @@ class Newton:
         Returns `SOLVED`, or why not.
         """
         scheme, matrix = self.scheme, self.matrix
-        goal = Goal(scheme.tolerance, scheme.hinge_forces(), scheme.rounding)
+        goal = scheme.goal(h)
         kept = self._lasting and abs(h - self._h) < SAME_STEP * h
         last, lowest, left, made = np.inf if kept else 0.0, np.inf, MOST, matrix.factorizations
         before, again = scheme.displacement().copy(), False

@@ -13,20 +13,21 @@ from scipy import sparse
 from foldyn.cases.waveforms import unseen
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.system import Packed, Scratch, accelerate, scratch
+from foldyn.dynamics.system import Packed, Scratch, accelerate, place, scratch
 from foldyn.dynamics.ties import hand_over
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.contact.body import contact_tangent
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.tables import Tables
+from foldyn.mechanics.following import following_force
 
 EPS = float(np.finfo(float).eps)
 FAST = 0.3  # share of the residual that an iteration leaves, below which its matrix is kept
 GROWTH = 1e8  # of the residual, at which the iteration has lost its way
 # what is left where the residual no longer falls: rounding, if it is below one of these
 ENOUGH = 1e-8  # of the forces at play
-ROUNDING = 8.0  # times the rounding of the bars' forces
+ROUNDING = 8.0  # times the rounding of forces
 STALL = 0.5  # share of the residual that an iteration leaves, above which it does not fall
 
 SOLVED, GO_ON, NEW_MATRIX, NOT_CONVERGED, NOT_FINITE = range(5)
@@ -37,7 +38,7 @@ class Goal(NamedTuple):
 
     tolerance: float  # relative to the forces at play
     least: float  # forces at play at least
-    rounding: float  # of the bars' forces
+    rounding: float  # of the bars' forces and, in a very short step, of the inertia
 
 
 @kernel
@@ -181,6 +182,31 @@ class Scheme(ABC):
         self._growth[:] = 0.0
         old.force[:], old.factor[:], old.pushed[:] = s.force, s.factor, s.pushed
         self.folds[:] = self.work.fold_angle
+
+    def settle(self, t: float) -> float:
+        """Have dofs without mass follow loads that jump at t (s); returns the work done on them, J.
+
+        Where nothing damps them they do so at once.
+        """
+        body, system, s = self.packed.body, self.packed.system, self.scratch
+        damping, hidden = system.damping, body.hidden
+        damped = damping.elements.coefficient.size or body.memory is not None
+        if damping.data.size:
+            damped = damped or np.diff(damping.indptr)[hidden].any()
+        if not len(hidden) or damped:
+            return 0.0
+        place(system, self.old.q, self.old.w, t, s)
+        start = np.ravel(s.displacement)
+        push = following_force(system.following, start, s.factor)
+        settled = body.dofs(s.displacement[: len(system.order)], push)
+        self.old.q.ravel()[hidden] = settled[hidden]
+        return float((body.energies(settled) - body.energies(start[: body.size])).sum())
+
+    def goal(self, h: float) -> Goal:
+        """What the residual of a step h (s) is judged by."""
+        inertia = self.weights(h).mass * self.packed.mass.diagonal[:, None] * self.shift
+        rounding = self.rounding + EPS * float(np.linalg.norm(inertia))
+        return Goal(self.tolerance, self.hinge_forces(), rounding)
 
     def hinge_forces(self) -> float:
         """Norm of the hinges' forces at old.q, N: forces at play even where all is at rest."""

@@ -115,7 +115,7 @@ class TouchingNewton(Newton):
         if not self._touched and self._passes_by(h, t):
             return SOLVED
         self._lasting = False
-        goal = Goal(scheme.tolerance, scheme.hinge_forces(), scheme.rounding)
+        goal = scheme.goal(h)
         before, again, last = scheme.displacement().copy(), False, 0.0
         norm, reference = self._residual(h, t)
         for _ in range(MOST):

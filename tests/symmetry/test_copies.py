@@ -1,0 +1,101 @@
+"""A case moves as its copies do: turned, mirrored, renumbered, and with its loads in halves.
+
+Drawn at random from the registries of loads, histories, supports, dampings and laws, for every
+method, for paths of equilibria, and for every model; see `draws` and `copies`. What fails is found
+again by its seed: draw(seed, combinations).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from copies import copied, split, symmetries
+from draws import ANALYSES, EXTRAS, MODELS, SHELL, STATIC, Combination, Draw, draw
+
+import foldyn as fd
+from foldyn.dynamics import METHODS
+from foldyn.dynamics.generalized_alpha import Alpha
+
+# forces on held nodes, coarse steps: not what this is about
+pytestmark = pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
+
+CLOSE = 1e-7  # of the largest displacement
+STIFF = 1e3
+IMPLICIT = ("newmark", "generalized_alpha")
+# which kernels serve other tests, too
+QUICK = [
+    *(Combination(one, model) for model in ("plate", "herkal", "merlin2") for one in ANALYSES),
+    *(Combination(one, model) for model in ("n5b8e", SHELL) for one in (*IMPLICIT, STATIC)),
+    *(Combination("generalized_alpha", "plate", extra) for extra in EXTRAS),
+]
+ALL = [
+    Combination(analysis, model, extra)
+    for extra in ("", *EXTRAS)
+    for model in MODELS
+    for analysis in ANALYSES
+]
+
+
+@pytest.fixture(autouse=True)
+def to_rounding(monkeypatch):
+    """Equations solved to rounding: where the iteration stops depends on the numbering."""
+    monkeypatch.setattr(Alpha, "tolerance", 1e-12)
+
+
+def jumps_late(case: fd.Case) -> bool:
+    """Whether what follows a jump of a load depends on the step before it, to the first order.
+
+    So it does where dofs without mass are damped: their velocities there are those of that step.
+    """
+    damped = case.crease_damping.any() or case.rayleigh.beta > 0.0 or case.remembering
+    return bool(
+        len(case.body.hidden) and damped and any(load.history.jumps() for load in case.loads)
+    )
+
+
+def check(seed: int, drawn: Draw) -> None:
+    case, initial = drawn.case, drawn.initial
+    rng, apart = np.random.default_rng(seed), {}
+    for symmetry in symmetries(case):
+        other, copy = copied(case, symmetry(case, rng))
+        start = initial and fd.State(*map(copy.field, (initial.displacement, initial.velocity)))
+        apart[symmetry.__name__] = furthest(drawn.found, drawn.run(other, start), copy.field)
+    if not (drawn.analysis in METHODS and jumps_late(case)):
+        apart["split"] = furthest(drawn.found, drawn.run(split(case), initial), np.array)
+    assert np.abs(drawn.found.displacement).max() > 1e-6 * case.structure.pattern.size
+    assert max(apart.values()) < CLOSE, f"{drawn.analysis}: {apart}, {case}"
+
+
+def furthest(one, other, field) -> float:
+    """Largest difference of the displacements of two results over their size.
+
+    field : what becomes of vectors (..., n, 3) from the one to the other. Energies and the sum of
+    the reactions, in which stiff bars multiply differences, must be as near but for `STIFF`.
+    """
+    pairs = [(field(one.displacement.values), other.displacement.values, 1.0)]
+    pairs.append((field(reactions(one)).sum(axis=1), reactions(other).sum(axis=1), STIFF))
+    energies = [name for name in ("work", "kinetic", "dissipated") if name in one]
+    pairs.append((one[energies].to_array(), other[energies].to_array(), STIFF))
+    return max(
+        float(np.abs(a - b).max(initial=0.0)) / (float(np.abs(a).max(initial=0.0)) or 1.0) / factor
+        for a, b, factor in pairs
+    )
+
+
+def reactions(result) -> np.ndarray:
+    """Forces of the supports (samples, n, 3), N."""
+    out = np.zeros(result.displacement.shape)
+    axis = ["xyz".index(name) for name in result.support_axis.values]
+    out[:, result.support_node.values, axis] = result.reaction.values
+    return out
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_copies_move_alike(seed):
+    check(seed, draw(seed, QUICK))
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", range(1000, 1500))
+def test_500_copies_move_alike(seed):
+    check(seed, draw(seed, ALL))
