@@ -75,7 +75,7 @@ def furthest(one, other, field) -> float:
     pairs = [(field(one.displacement.values), other.displacement.values, 1.0)]
     pairs.append((field(reactions(one)).sum(axis=1), reactions(other).sum(axis=1), STIFF))
     energies = [name for name in ("work", "kinetic", "dissipated") if name in one]
-    pairs.append((one[energies].to_array(), other[energies].to_array(), STIFF))
+    pairs.append((*(found[energies].to_array().values for found in (one, other)), STIFF))
     return max(
         float(np.abs(a - b).max(initial=0.0)) / (float(np.abs(a).max(initial=0.0)) or 1.0) / factor
         for a, b, factor in pairs
