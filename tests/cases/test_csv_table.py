@@ -188,7 +188,7 @@ def test_files_that_cannot_be_read(tmp_path) -> None:
         Table.from_csv(tmp_path / "none.csv")
     with pytest.raises(InputError, match="is a folder; give a CSV file"):
         Table.from_csv(tmp_path)
-    with pytest.raises(InputError, match="path = 3: must be the path of a CSV file"):
+    with pytest.raises(InputError, match="path = 3: give the path of a file"):
         Table.from_csv(3)  # type: ignore
     with pytest.raises(InputError, match="cannot be read"):
         Table.from_csv("a\0b.csv")

@@ -63,7 +63,7 @@ def test_write_into_missing_directory(tmp_path):
 
 
 def test_write_needs_a_pattern(tmp_path):
-    with pytest.raises(InputError, match="pattern = 5: give a Pattern"):
+    with pytest.raises(InputError, match="pattern: got int, give a Pattern"):
         write_pattern(tmp_path / "x.fold", 5)
     assert not list(tmp_path.iterdir())
 

@@ -75,7 +75,7 @@ def test_the_mapping_is_copied():
         ({"crease_stiffness": {"valley": -1}}, "crease_stiffness: must not be negative"),
         ({"crease_stiffness": {"valley": "1"}}, "crease_stiffness.valley = .*must be a number"),
         ({"crease_stiffness": {}}, "crease_stiffness: give a value by assignment or family"),
-        ({"crease_stiffness": True}, "crease_stiffness = True"),
+        ({"crease_stiffness": True}, "crease_stiffness = true"),
         ({"crease_rest": {"valley": 360}}, "crease_rest = 360: must lie between 0 and 360"),
     ],
 )

@@ -27,7 +27,7 @@ from foldyn.mechanics.body import Body
 from foldyn.mechanics.contact.body import GROUP as CONTACT
 from foldyn.mechanics.contact.body import TouchingBody
 from foldyn.patterns.picture import picture
-from foldyn.structures.discretized import Discretized, read_only
+from foldyn.structures.discretized import read_only
 from foldyn.structures.mass import center_of_mass, inertia_tensor, row_sums
 from foldyn.structures.remembering import Remembering, remembering
 from foldyn.values import brief, show
@@ -119,7 +119,7 @@ class Case(Supported, Loaded, Damped):
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        if not isinstance(self.structure, Discretized):
+        if not hasattr(self.structure, "nodes"):
             raise InputError(
                 f": got {type(self.structure).__name__}, give a structure, as fd.discretize and "
                 "fd.shell make it",

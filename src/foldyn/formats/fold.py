@@ -20,7 +20,7 @@ from foldyn.formats.notes import count
 from foldyn.formats.units import METERS
 from foldyn.input_files import from_json
 from foldyn.patterns.transforms import FACE_ORDERS
-from foldyn.values import choice, show, whole
+from foldyn.values import choice, show, single
 
 ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
 FAMILIES = "foldyn:families"
@@ -147,14 +147,15 @@ def _number(frames: Sequence[dict[str, Any]], chosen: int | str | None) -> int:
         raise InputError(
             f": the file has {has} of the title {show(chosen)}: titles are {known}", "frame"
         )
-    number = whole("frame", chosen, what="or a title")
-    if not 0 <= number < len(frames):
+    number = single(chosen)
+    counts = isinstance(number, int | np.integer) and not isinstance(number, bool)
+    if not counts or not 0 <= number < len(frames):
         raise InputError(
-            f" = {number}: the file has the frames 0 to {len(frames) - 1}; give one of these "
+            f" = {show(chosen)}: the file has the frames 0 to {len(frames) - 1}; give one of these "
             "numbers or a title",
             "frame",
         )
-    return number
+    return int(number)
 
 
 def _with_field(document: dict[str, Any], field: str, what: str) -> str:

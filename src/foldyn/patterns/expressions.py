@@ -9,7 +9,7 @@ import warnings
 from foldyn.errors import InputError
 from foldyn.values import shortened
 
-_UNDERSCORED = re.compile(r"(?<![\w.])[\d.]+_")
+_UNDERSCORED = re.compile(r"(?<![\w.])\d[\d.]*_")
 LONGEST = 1000
 """Characters of an expression."""
 DEEPEST = 50

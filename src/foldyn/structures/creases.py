@@ -14,7 +14,7 @@ from foldyn.patterns.crease_data import crease_values
 from foldyn.structures import calibration
 from foldyn.structures.mesh import hinge_angles, lengths
 from foldyn.structures.sheet import Sheet
-from foldyn.values import doubt_degrees, number, number_or_list, numbers, show
+from foldyn.values import doubt_degrees, number, numbers, show, single
 
 PerCrease = float | Sequence[float] | Mapping[str, float] | None
 
@@ -31,7 +31,10 @@ def per_crease(name: str, value: Any) -> Any:
         if strange:
             raise InputError(f": {show(strange[0])} is no assignment or family of creases", name)
         return {word: number(f"{name}.{word}", value[word]) for word in value}
-    return None if value is None else number_or_list(name, value, "crease")
+    value = single(value)
+    if isinstance(value, list | tuple | np.ndarray):
+        return tuple(numbers(name, value).tolist())
+    return None if value is None else number(name, value)
 
 
 def fold_stiffness(given: PerCrease, pattern: Pattern, sheet: Sheet) -> NDArray:
