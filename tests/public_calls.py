@@ -68,6 +68,7 @@ DATA: Calls = {
     }),
     "Rayleigh": (fd.Rayleigh, {"alpha": 0.5, "beta": 0.25, "state": "start"}),
     "ModalDamping": (fd.ModalDamping, {"ratios": 0.5, "count": 3, "state": "start"}),
+    "StrainDamping": (fd.StrainDamping, {"beta": 1e-4}),
     "CreaseDamping": (fd.CreaseDamping, {"coefficient": 0.5, "creases": [0]}),
     "PointMass": (fd.PointMass, {"nodes": [0], "mass": 0.5}),
     "Contact": (fd.Contact, {

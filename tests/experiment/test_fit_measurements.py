@@ -93,7 +93,7 @@ def test_data_that_do_not_fit_the_case(swung, data, message) -> None:
 
 
 def test_a_case_that_is_no_file(swung) -> None:
-    with pytest.raises(InputError, match="case: got CaseFile, give the path of a case file"):
+    with pytest.raises(InputError, match=r"case = <CaseFile .*: give the path of a file"):
         problem(fd.read_case(swung), [history()], ALPHA, {})
 
 

@@ -10,11 +10,11 @@ from decks_run import HAS_CALCULIX, HAS_OPENSEES, by_calculix, by_opensees
 from scipy.sparse.linalg import spsolve
 
 import foldyn as fd
+from foldyn.algebra.extrapolation import extrapolated
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.exports import opensees
 from foldyn.exports.creased_shell import creased_shell
 from foldyn.linear.linearized import linearize
-from foldyn.linear.refinement import extrapolated
 from foldyn.linear.shell_of import shell_of
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)

@@ -142,7 +142,7 @@ def test_more_modes_than_dofs():
 
 
 def test_an_unknown_solver():
-    with pytest.raises(InputError, match="solver = 'mumps'"):
+    with pytest.raises(InputError, match='solver = "mumps"'):
         modes(fd.Case(miura()), solver="mumps", secant=1.0)
 
 

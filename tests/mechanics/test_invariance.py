@@ -136,6 +136,7 @@ def test_numbering_does_not_matter(name):
         pattern=None,
         bars=new[s.bars][rows["bars"]],
         bar_area=s.bar_area[rows["bars"]],
+        panel_softness=s.panel_softness[rows["folds"]] if len(s.panel_softness) else np.zeros(0),
         **{
             f"{kind}{part}": (new[value] if part == "s" else value)[rows[kind + "s"]]
             for kind in ("fold", "bend")

@@ -188,6 +188,7 @@ def test_statics_and_actuation():
     assert float(path.strain_bends[-1]) < 1e-12
 
 
+@pytest.mark.filterwarnings("ignore:damping. beta resists rotations")
 @pytest.mark.parametrize(
     "method", ["generalized_alpha", "newmark", pytest.param("rk4", marks=pytest.mark.thorough)]
 )

@@ -22,7 +22,10 @@ from foldyn.studies.herkal.specimen import evaluation, measured, page, prepared,
 from foldyn.studies.herkal.specimen.evaluation import vibration_of
 from foldyn.studies.herkal.specimen.measured import Data, data_of
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*time step is too coarse")  # as the data's
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:.*time step is too coarse"),  # as the data's
+    pytest.mark.filterwarnings("ignore:damping. beta resists rotations"),  # as the paper's model
+]
 
 STEP = 1.0 / calibration.RATE
 COARSER = 0.002  # s, step of the motions: half as many as in the study
