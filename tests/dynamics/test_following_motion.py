@@ -100,6 +100,7 @@ def test_reactions_carry_the_pressure() -> None:
         assert error < 1e-2 * P
 
 
+@pytest.mark.filterwarnings("ignore:damping. beta resists rotations")
 @pytest.mark.parametrize("method", METHODS)
 def test_the_energy_balance_closes(method) -> None:
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)

@@ -130,7 +130,7 @@ def test_tangents_of_bodies_with_memory_are_exact(law, model):
     whole = InelasticBody(body, memory(case.remembering, body))
     random = np.random.default_rng(3)
     q0, q1 = (3e-3 * random.normal(size=body.size) for _ in range(2))
-    whole.memory.start(whole._rows(q0))
+    whole.memory.start(body.series()[1], whole._rows(q0))
     own = whole.memory.own
     own.elapsed[0] = 0.1
     assert checks.tangent_error(whole.internal, whole.tangent, q1, size=1e-3) < 1e-7

@@ -14,6 +14,7 @@ from scipy import sparse
 from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, PlateSuperlinear, hinge_law
+from foldyn.materials.memory_law import memory_of
 from foldyn.materials.series import in_series
 from foldyn.mechanics.body import Body
 from foldyn.patterns.picture import picture
@@ -41,9 +42,15 @@ class HingeKind(NamedTuple):
 
     @property
     def share(self) -> NDArray:
-        """Share (k,) of the crease, or of the hinge itself, in a small turn."""
-        soft = np.zeros(len(self.stiffness)) if self.softness is None else self.softness
-        return 1.0 - soft * self.stiffness
+        """Share (k,) of the crease, or of the hinge itself, in a small turn.
+
+        All where creases yield or creep: their turn is nearly that of the hinge, as little moment
+        is left for the panels.
+        """
+        law = memory_of(self.law)
+        if self.softness is None or (law is not None and not law.relaxes):
+            return np.ones(len(self.stiffness))
+        return 1.0 - self.softness * self.stiffness
 
     def law_of(self, row: int) -> HingeLaw:
         """Law of one hinge."""

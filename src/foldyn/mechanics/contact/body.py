@@ -121,7 +121,8 @@ class TouchingBody(WrappedBody):
         body = self.around(self.inner)
         own = body.tables = self.tables._replace(planes=self.tables.planes[:0])
         kept = body._memory = memory(own, self.sheets.panels)  # pairs are listed here
-        body._moved, energy = np.zeros((0, 3)), body.contact(q)[0]
+        body._moved = np.zeros((0, 3))
+        energy = body.contact(q)[0]
         counts = int(kept.counts.listed_first), int(kept.counts.listed_second)
         share = np.concatenate(
             [1.0 + kept.gap[k, :n] / kept.d0[k, :n] for k, n in enumerate(counts)]
