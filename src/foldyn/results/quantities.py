@@ -163,6 +163,8 @@ REASONS: Mapping[str, str] = {
     "transmissibility": "a resonance without damping, or no convergence",
     "coherence": "what does not respond (held axes, nodes at rest) is coherent with nothing",
     "swing": "the harmonic balance does not converge at the frequency",
+    "mesh_error": "the meshes of the shell have not converged",
+    "deflection_mesh_error": "the meshes of the shell have not converged",
 }
 """Variables that may lack values, and why."""
 UNEXPECTED = "the computation was no longer finite"
