@@ -65,18 +65,6 @@ def test_a_moment_and_a_rest_angle_that_balance_it_hold_still(kind):
     assert abs(opened(structure, fd.trace(case, steps=1))).max() < 1e-9
 
 
-def test_a_moment_presses_a_crease_into_its_lock():
-    """Nothing resists but the crease: it turns as its law says, far beyond where that is linear."""
-    law = fd.EnhancedLinear(theta1=110, theta2=250)
-    structure = model("plate", 0.05, law)
-    rest = float(structure.fold_rest[0])  # 240 degrees: a mountain, which locks beyond 250
-    load = fd.CreaseMoment("all", 0.05 * float(law.moment(np.radians(280), rest)))
-    case = fd.Case(structure, supports=[fd.Fix([0, 1, 2], "xyz")], loads=[load])
-    path = fd.trace(case, load_factors=np.linspace(0.1, 1.0, 10))
-    found = np.degrees(rest + abs(opened(structure, path)[-1]))
-    assert found == pytest.approx(280.0, abs=1e-6)
-
-
 @pytest.mark.parametrize("rigid", [None, "all"])
 @pytest.mark.parametrize("k", [0.02, 0.2, 2.0])
 def test_creases_are_damped_as_those_of_a_shell(k, rigid):

@@ -231,5 +231,5 @@ def test_why_panels_harden():
 
     shell, hard, weak = (growth(s) for s in (made[SHELL], plate, soft))
     assert shell == pytest.approx(1.0, abs=0.02)
-    assert hard > 1.06  # the crease alone begins to lock, later than its hinge
+    assert hard > 1.08
     assert weak == pytest.approx(1.0, abs=0.04)

@@ -13,7 +13,7 @@ from scipy import sparse
 
 from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
-from foldyn.materials import HingeLaw, PlateSuperlinear, hinge_law
+from foldyn.materials import EnhancedLinear, HingeLaw, PlateSuperlinear, hinge_law
 from foldyn.materials.memory_law import memory_of
 from foldyn.materials.series import in_series
 from foldyn.mechanics.body import Body
@@ -44,11 +44,14 @@ class HingeKind(NamedTuple):
     def share(self) -> NDArray:
         """Share (k,) of the crease, or of the hinge itself, in a small turn.
 
-        All where creases yield or creep: their turn is nearly that of the hinge, as little moment
-        is left for the panels.
+        All where a law locks, since it is the panels that meet, and where creases yield or creep:
+        their turn is nearly that of the hinge, as little moment is left for the panels.
         """
-        law = memory_of(self.law)
-        if self.softness is None or (law is not None and not law.relaxes):
+        memory = memory_of(self.law)
+        elastic, flows = self.law, False
+        if memory is not None:
+            elastic, flows = memory.elastic, not memory.relaxes
+        if self.softness is None or flows or isinstance(elastic, EnhancedLinear):
             return np.ones(len(self.stiffness))
         return 1.0 - self.softness * self.stiffness
 
