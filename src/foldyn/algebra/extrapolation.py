@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 ORDER = 2.0  # of the elements
 LEAST, MOST = 1.0, 3.0  # observed orders that are near it
@@ -68,4 +67,6 @@ def _observed(early: float, late: float, divisions: Sequence[int]) -> float:
 
     if not miss(LEAST) * miss(MOST) < 0.0:
         return np.nan
+    from scipy.optimize import brentq  # takes a tenth of a second that most runs do not need
+
     return float(brentq(miss, LEAST, MOST))
