@@ -9,6 +9,7 @@ import pytest
 from attached_cases import FOLD, MODELS, SHEET, SQUARE, derivative_errors, moved, structure
 
 import foldyn as fd
+from foldyn.dynamics.driver import prepare
 from foldyn.errors import InputError, PenetrationError
 
 pytestmark = pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
@@ -151,6 +152,20 @@ def test_a_clamp_rides_on_a_moving_base(model, method):
     size = np.abs(relative).max()
     assert np.abs(relative - still.displacement.values).max() < 1e-3 * size
     assert moving.attrs["energy_error"] < 1e-3
+
+
+@pytest.mark.parametrize("preset", ["plate", "n5b8e"])
+@pytest.mark.parametrize("clamped", [(), [(0, 1)]], ids=["spring", "clamp and spring"])
+def test_explicit_steps_watch_the_dihedrals_of_all_hinges(preset, clamped):
+    """Else panels that pass through each other are not seen, or are where none do."""
+    s = fd.discretize(FOLD, HEAVY, preset=preset, fold_law="linear", clamped=clamped)
+    case = fd.Case(s, [fd.Fix([0, 1]), fd.Spring(1.0, nodes=[3])], [fd.Force([2], (0, 0, 1.0))])
+    motion = prepare(case, 0.1, method="rk4", every=0.01)
+    motion.run()
+    body, u = motion.packed.body, motion.course.u
+    found = body.angles(u.ravel())
+    np.testing.assert_allclose(motion.course.angle, found, rtol=0, atol=1e-12)
+    assert np.abs(found - body.angles(0.0 * u.ravel())).max() > 1e-3
 
 
 def test_an_edge_may_be_brought_elsewhere_in_statics(model):

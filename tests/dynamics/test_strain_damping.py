@@ -39,9 +39,10 @@ def test_about_rest_it_is_beta_times_the_stiffness(options):
     assert (ratios[3] < ratios[1]).any()  # springs are not part of it
 
 
-def test_clamped_edges_are_damped():
+@pytest.mark.parametrize("nodes", [[0, 1, 2], [3, 4, 6]], ids=["held", "free"])
+def test_clamped_edges_are_damped(nodes):
     s = miura(preset="herkal", bend_law="linear", clamped=[(0, 1), (1, 2)])
-    held = [fd.Fix([0, 1, 2])]
+    held = [fd.Fix(nodes)]
     beta, strain = (
         fd.modes(fd.Case(s, held, damping=damping), 8).damping_ratio.values
         for damping in (fd.Rayleigh(beta=BETA), fd.StrainDamping(BETA))

@@ -33,6 +33,7 @@ ANALYSES = (*METHODS, STATIC)
 EXTRAS = ("springs", "memory", "contact")
 TRIES = 12  # of a part, until the library takes it
 SMALL = 0.02  # of the pattern's size: displacements
+ALWAYS = {"BaseMotion.value"}  # drawn: the default, a meter, is as large as the sheet
 LEAST = 1e-6  # of that size: the largest displacement, or there is nothing to compare
 STEPS, SAMPLES = 40, 5  # of implicit methods
 
@@ -162,10 +163,12 @@ def drawn(scene: Scene, kinds: Any) -> Any:
     for _ in range(20 * TRIES):
         given: dict[str, Any] = {}
         for item in fields(kind):
+            full = f"{kind.__name__}.{item.name}"
             needed = item.default is MISSING and item.default_factory is MISSING
+            needed = needed or full in ALWAYS
             if item.name == "name" or not (needed or scene.rng.random() < 0.5):
                 continue
-            draw = FIELDS.get(f"{kind.__name__}.{item.name}", FIELDS.get(item.name))
+            draw = FIELDS.get(full, FIELDS.get(item.name))
             assert draw is not None, f"say in FIELDS how to draw {kind.__name__}.{item.name}"
             try:
                 given[item.name] = draw(scene, given)
@@ -274,7 +277,8 @@ def scene_of(structure: Any, rng, implicit: bool) -> Scene:
     sheet, pattern = structure.sheet, structure.pattern
     shortest = np.linalg.norm(np.diff(pattern.vertices[pattern.edges], axis=1), axis=2).min()
     sound = float(shortest) / np.sqrt(sheet.youngs_modulus / sheet.density)
-    time, size = (300.0 if implicit else 20.0) * sound, pattern.size
+    shell = isinstance(structure, fd.Shell)  # so stiff that rounded forces add up in long motions
+    time, size = (20.0 if not implicit else 100.0 if shell else 300.0) * sound, pattern.size
     mass = structure.total_mass / len(pattern.vertices)
     return Scene(rng, structure, time, mass * SMALL * size / time**2, mass, size)
 

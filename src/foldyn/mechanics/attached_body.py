@@ -46,6 +46,14 @@ from foldyn.mechanics.wrapped_body import WrappedBody
 GROUP = "strain_springs"
 
 
+def _measuring(work: Any, angle: NDArray, fold_angle: NDArray) -> Any:
+    """The memory of a model, and of that within it, whose dihedrals go to other arrays."""
+    within = {}
+    if hasattr(work, "plates"):
+        within["plates"] = _measuring(work.plates, angle, fold_angle)
+    return work._replace(angle=angle, fold_angle=fold_angle, **within)
+
+
 def attached(body: Body, clamps: Clamps | None = None, springs: Springs | None = None) -> Body:
     """A body with clamps or springs in addition to its own clamps."""
     inner = body
@@ -146,7 +154,7 @@ class AttachedBody(WrappedBody):
         count = len(inner.angle)
         angle = np.empty(count + len(self.clamps.rest))
         fold_angle = angle[:count] if inner.fold_angle is inner.angle else inner.fold_angle
-        inner = inner._replace(angle=angle[:count], fold_angle=fold_angle)
+        inner = _measuring(inner, angle[:count], fold_angle)
         return [AttachedWork(inner, angle, fold_angle, inner.strips, inner.team)]
 
     # ------------------------------------------------------------------ measures
@@ -177,7 +185,7 @@ class AttachedBody(WrappedBody):
         return sparse.csr_array(sparse.vstack([self.inner.holds(q), springs, clamps]))
 
     def strains(self) -> Strains | None:
-        """See `Body`; the wing of a clamp, whose edge is held, goes with the first of its ends."""
+        """See `Body`; a clamp's wing has the node of its first end (`viscous.hinge_gradient`)."""
         own, clamps = self.inner.strains(), self.clamps
         if own is None:
             return None

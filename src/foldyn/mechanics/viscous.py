@@ -90,16 +90,25 @@ def hinge_dofs(hinges: NDArray, hidden: NDArray) -> NDArray:
 def hinge_gradient(x, dofs, hidden_turn, moved, out):
     """Angle (rad) of a hinge at flat displacements, and its gradient to `out` (14,).
 
+    A wing with the node of the axis' first end is that of a clamp: it rides on the mean of both.
+
     x : (4, 3) rest positions of its nodes, m; dofs, hidden_turn : see `Viscous`.
     """
+    ride = 3 if dofs[9] == dofs[0] else 9
     found = dihedral_gradient(
         x[0, 0] + moved[dofs[0]], x[0, 1] + moved[dofs[1]], x[0, 2] + moved[dofs[2]],
         x[1, 0] + moved[dofs[3]], x[1, 1] + moved[dofs[4]], x[1, 2] + moved[dofs[5]],
         x[2, 0] + moved[dofs[6]], x[2, 1] + moved[dofs[7]], x[2, 2] + moved[dofs[8]],
-        x[3, 0] + moved[dofs[9]], x[3, 1] + moved[dofs[10]], x[3, 2] + moved[dofs[11]],
+        x[3, 0] + 0.5 * (moved[dofs[9]] + moved[dofs[ride]]),
+        x[3, 1] + 0.5 * (moved[dofs[10]] + moved[dofs[ride + 1]]),
+        x[3, 2] + 0.5 * (moved[dofs[11]] + moved[dofs[ride + 2]]),
     )  # fmt: skip
     for c in range(12):
         out[c] = found[1 + c]
+    if ride == 3:
+        for c in range(3):
+            out[9 + c] *= 0.5
+            out[3 + c] += out[9 + c]
     out[12], out[13] = -hidden_turn[0], -hidden_turn[1]
     return found[0] - hidden_turn[0] * moved[dofs[12]] - hidden_turn[1] * moved[dofs[13]]
 
