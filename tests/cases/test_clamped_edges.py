@@ -154,8 +154,7 @@ def test_a_clamp_rides_on_a_moving_base(model, method):
     assert moving.attrs["energy_error"] < 1e-3
 
 
-@pytest.mark.parametrize("preset", ["plate", "n5b8e"])
-@pytest.mark.parametrize("clamped", [(), [(0, 1)]], ids=["spring", "clamp and spring"])
+@pytest.mark.parametrize(("preset", "clamped"), [("plate", ()), ("plate", [(0, 1)]), ("n5b8e", ())])
 def test_explicit_steps_watch_the_dihedrals_of_all_hinges(preset, clamped):
     """Else panels that pass through each other are not seen, or are where none do."""
     s = fd.discretize(FOLD, HEAVY, preset=preset, fold_law="linear", clamped=clamped)

@@ -46,14 +46,6 @@ from foldyn.mechanics.wrapped_body import WrappedBody
 GROUP = "strain_springs"
 
 
-def _measuring(work: Any, angle: NDArray, fold_angle: NDArray) -> Any:
-    """The memory of a model, and of that within it, whose dihedrals go to other arrays."""
-    within = {}
-    if hasattr(work, "plates"):
-        within["plates"] = _measuring(work.plates, angle, fold_angle)
-    return work._replace(angle=angle, fold_angle=fold_angle, **within)
-
-
 def attached(body: Body, clamps: Clamps | None = None, springs: Springs | None = None) -> Body:
     """A body with clamps or springs in addition to its own clamps."""
     inner = body
@@ -151,11 +143,11 @@ class AttachedBody(WrappedBody):
     def workspaces(self, threads: int) -> Sequence[AttachedWork]:
         """See `Body`: one thread."""
         inner = self.inner.workspaces(1)[0]
-        count = len(inner.angle)
-        angle = np.empty(count + len(self.clamps.rest))
-        fold_angle = angle[:count] if inner.fold_angle is inner.angle else inner.fold_angle
-        inner = _measuring(inner, angle[:count], fold_angle)
-        return [AttachedWork(inner, angle, fold_angle, inner.strips, inner.team)]
+        angle, count = inner.angle, len(inner.angle)
+        if len(self.clamps.rest):  # whose dihedrals follow, as bars and hinges alone have them
+            angle = np.empty(count + len(self.clamps.rest))
+            inner = inner._replace(angle=angle[:count], fold_angle=angle[:count])
+        return [AttachedWork(inner, angle, inner.fold_angle, inner.strips, inner.team)]
 
     # ------------------------------------------------------------------ measures
     def angles(self, q: NDArray) -> NDArray:
