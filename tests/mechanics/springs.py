@@ -1,7 +1,7 @@
 """A third model, as anyone may add one: points joined by linear springs.
 
-It needs what is here and nothing in the package: a named tuple of arrays, kernels that stand for
-`force_of`, `energies_of` and `folds_of`, a `Body`, and a structure that gives it.
+It needs what is here and nothing in the package: a named tuple of arrays, a term with kernels for
+its forces and energies, a `Body`, and a structure that gives it.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 from scipy import sparse
 
 import foldyn as fd
 from foldyn.algebra.solvers import Fill
 from foldyn.jit.compiled import kernel
+from foldyn.jit.context import Context, contents, numbers_at, rows_at
 from foldyn.materials import hinge_law
 from foldyn.mechanics.body import Body
-from foldyn.mechanics.kernels import Whole, energies_of, folds_of, force_of
 from foldyn.mechanics.step_tangent import SparseBlocks
+from foldyn.mechanics.term import ENERGIES, FORCES, Folds, Term, Whole, energies, forces
 from foldyn.mechanics.threads import Team, team
 from foldyn.structures.discretized import Discretized
 
@@ -61,29 +61,25 @@ def spring_force(model, u, force):
     return energy
 
 
-@overload(force_of)
-def _force(model, u, force, work):
-    if model.instance_class is Springs:
-        return lambda model, u, force, work: spring_force(model, u, force)
-    return None
+class SpringsTerm(NamedTuple):
+    """What the kernels of the term work with."""
+
+    model: Springs
+    unused: NDArray  # (n, 3)
 
 
-@overload(energies_of)
-def _energies(model, u, work, out):
-    if model.instance_class is not Springs:
-        return None
-
-    def energies(model, u, work, out):
-        out[0] = spring_force(model, u, np.empty_like(u))
-
-    return energies
+@forces
+def _forces(context, u, v, t, force, powers):
+    own = contents(context)
+    rows = own.unused.shape[0]
+    spring_force(own.model, rows_at(u, rows), rows_at(force, rows))
 
 
-@overload(folds_of)
-def _folds(model):
-    if model.instance_class is Springs:
-        return lambda model: (np.empty(0), np.empty((0, 4)), np.empty(0))
-    return None
+@energies
+def _energies(context, u, out):
+    own = contents(context)
+    moved = rows_at(u, own.unused.shape[0])
+    numbers_at(out, 1)[0] = spring_force(own.model, moved, own.unused)
 
 
 class SpringsBody(Body):
@@ -121,6 +117,14 @@ class SpringsBody(Body):
     def workspaces(self, threads: int) -> list[SpringsWork]:
         own = Whole(np.array([0, self.rows]))
         return [SpringsWork(np.zeros(0), np.zeros(0), own, team(1)[0])]
+
+    def terms(self, work: SpringsWork) -> list[Term]:
+        own = Context(SpringsTerm(self.model, np.zeros((self.rows, 3))))
+        return [Term(own, {FORCES: _forces, ENERGIES: _energies})]
+
+    @property
+    def folds(self) -> Folds:
+        return Folds(np.zeros(0), np.zeros((0, 4)), np.zeros(0))
 
     def turn(self, q: NDArray, other: NDArray) -> float:
         a, b = self.model.ends.T

@@ -17,7 +17,6 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.materials.series import series_moment, series_rest_slope
 from foldyn.materials.switch import move_rest
 from foldyn.mechanics.body import Body
-from foldyn.mechanics.kernels import folds_of
 
 
 class Actuators(NamedTuple):
@@ -27,7 +26,7 @@ class Actuators(NamedTuple):
     the factor of history row, rad.
     """
 
-    hinge: NDArray  # (a,) row of what `folds_of` gives
+    hinge: NDArray  # (a,) row of `Folds`
     lowest: NDArray  # (a,) lowest node of the hinge, in increasing order
     is_offset: NDArray  # (a,) bool
     start: NDArray  # (a,)
@@ -83,15 +82,15 @@ def turned_by(actuators, factor, k, derivative):
 
 
 @kernel
-def turn(model, actuators, factor):
+def turn(folds, actuators, factor):
     """Set the rest angles for the factors (h, 3); one that leaves 0..2 pi becomes nan."""
-    turn_part(model, actuators, factor, 0, actuators.hinge.size)
+    turn_part(folds, actuators, factor, 0, actuators.hinge.size)
 
 
 @inner
-def turn_part(model, actuators, factor, first, last):
+def turn_part(folds, actuators, factor, first, last):
     """The same for a part of what turns."""
-    rest_angle, p, _ = folds_of(model)
+    rest_angle, p = folds.rest, folds.parameters
     for k in range(first, last):
         e, value = actuators.hinge[k], actuators.start[k] + turned_by(actuators, factor, k, 0)
         if actuators.is_offset[k]:
@@ -102,15 +101,16 @@ def turn_part(model, actuators, factor, first, last):
 
 
 @inner
-def actuator_power(model, actuators, factor, angle):
+def actuator_power(folds, actuators, factor, angle):
     """Power (W) that turning folds with dihedrals `angle` (nh,) put into the structure."""
-    return power_of_part(model, actuators, factor, angle, 0, actuators.hinge.size)
+    return power_of_part(folds, actuators, factor, angle, 0, actuators.hinge.size)
 
 
 @inner
-def power_of_part(model, actuators, factor, angle, first, last):
+def power_of_part(folds, actuators, factor, angle, first, last):
     """The same of a part of what turns, but for offsets; `angle` (nh,) are those of all."""
-    (rest_angle, p, stiffness), power = folds_of(model), 0.0
+    rest_angle, p, stiffness = folds.rest, folds.parameters, folds.stiffness
+    power = 0.0
     for k in range(first, last):
         if actuators.is_offset[k]:
             continue
@@ -124,18 +124,19 @@ def power_of_part(model, actuators, factor, angle, first, last):
 
 
 @kernel
-def jolt(model, actuators, angle):
+def jolt(folds, actuators, angle):
     """Work (J) of offsets that jump between two steps, at dihedrals `angle` (nh,)."""
-    return offset_work(model, actuators, angle, 0, actuators.hinge.size, True)
+    return offset_work(folds, actuators, angle, 0, actuators.hinge.size, True)
 
 
 @inner
-def offset_work(model, actuators, angle, first, last, accepted):
+def offset_work(folds, actuators, angle, first, last, accepted):
     """Work (J) of offsets since the last accepted step, of a part of what turns.
 
     accepted : whether the present state is that of one.
     """
-    (rest_angle, p, stiffness), work, offset = folds_of(model), 0.0, actuators.offset
+    rest_angle, p, stiffness = folds.rest, folds.parameters, folds.stiffness
+    work, offset = 0.0, actuators.offset
     for k in range(first, last):
         if not actuators.is_offset[k]:
             continue

@@ -13,7 +13,7 @@ from foldyn.dynamics.course import Outcome, observe, share, tell
 from foldyn.dynamics.system import acceleration, longest_step
 from foldyn.jit.compiled import shared
 from foldyn.jit.intrinsics import borrowed, flat
-from foldyn.mechanics.kernels import elapse
+from foldyn.mechanics.term import clock_to
 
 ORDER = 2
 NEWTON = 4  # iterations: few, where c is small
@@ -72,14 +72,14 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         while True:  # once, unless contact asks for shorter steps
             dt = 0.0
             if step > 0:
-                dt = share(longest_step(model, system, course.u, course.v, left, work, s), left)
+                dt = share(longest_step(model, system, course.u, course.v, left, s), left)
             for i in range(u.size):
                 v[i] += 0.5 * dt * fa[i]
                 u[i] += dt * v[i]
                 ahead[i] = v[i] + 0.5 * dt * fa[i]
             left = 0.0 if dt == left else left - dt
             now = plan.start + step * plan.dt - left
-            elapse(model, span - left)
+            clock_to(model, span - left)
             power_in, power_out = acceleration(
                 model, system, mass, course.u, s.stage[0], now, a, work, s
             )

@@ -13,7 +13,7 @@ from foldyn.dynamics.actuation import offset_work
 from foldyn.dynamics.record import record
 from foldyn.jit.compiled import inner, inner_scalar, scalar
 from foldyn.materials.memory_law import VARIABLES
-from foldyn.mechanics.kernels import commit, recall
+from foldyn.mechanics.term import commit_all, states_of
 from foldyn.mechanics.threads import largest, part, total, wait
 
 
@@ -129,15 +129,15 @@ def passed_through(now, before, first, last):
 
 
 @inner
-def sample(model, system, mass, u, v, a, t, course, out, work, s):
+def sample(model, system, mass, u, v, a, t, course, out, s):
     """Write the next sample, after `acceleration` at u, v and t; returns an outcome."""
     k = course.tally.samples - out.first
     out.time[k] = t
     record(
-        model, system, mass, u, v, a, course.tally, work, s,
+        model, system, mass, u, v, a, course.tally, s,
         out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
     )  # fmt: skip
-    recall(model, out.memory[k])
+    states_of(model, out.memory[k])
     if not np.isfinite(out.energy[k].sum()):
         return Outcome.NOT_FINITE
     course.tally.samples += 1
@@ -172,7 +172,7 @@ def observe(model, system, mass, course, a, step, plan, out, work, s):
     t = plan.start + step * plan.dt
     if system.turns:
         team.note[team.number, WORK] += offset_work(
-            model, system.actuators, work.fold_angle, s.turned[0], s.turned[1], True
+            model.folds, system.actuators, work.fold_angle, s.turned[0], s.turned[1], True
         )
         wait(team)
     wrong = total(team, WRONG)
@@ -188,9 +188,9 @@ def observe(model, system, mass, course, a, step, plan, out, work, s):
         tally.steps = step
         outcome = Outcome.DONE
         if wrong == 0.0 and hinge < 0:
-            commit(model)
+            commit_all(model)
         if wrong == 0.0 and hinge < 0 and step == tally.samples * plan.every:
-            outcome = sample(model, system, mass, course.u, course.v, a, t, course, out, work, s)
+            outcome = sample(model, system, mass, course.u, course.v, a, t, course, out, s)
         team.note[0, OUTCOME] = outcome + 0  # as a number
     wait(team)
     if wrong > 0.0:

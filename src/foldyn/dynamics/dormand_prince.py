@@ -118,12 +118,12 @@ def _offset_work(model, system, work, accepted):
     if not system.turns:
         return 0.0
     last = system.actuators.hinge.size
-    return offset_work(model, system.actuators, work.fold_angle, 0, last, accepted)
+    return offset_work(model.folds, system.actuators, work.fold_angle, 0, last, accepted)
 
 
 @inner
-def _longest(model, system, q, w, dt, work, s):
-    return longest_step(model, system, q, w, dt, work, s)
+def _longest(model, system, q, w, dt, s):
+    return longest_step(model, system, q, w, dt, s)
 
 
 @kernel
@@ -146,12 +146,10 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         powers[0, 0], powers[1, 0] = _accelerate(
             model, system, mass, course.u, course.v, plan.start, a, work, s
         )
-        tally.wanted = _longest(model, system, course.u, course.v, tally.wanted, work, s)
+        tally.wanted = _longest(model, system, course.u, course.v, tally.wanted, s)
         if tally.samples == 0:
             tally.farthest, tally.fastest = _largest(u), _largest(v)
-            outcome = sample(
-                model, system, mass, course.u, course.v, a, plan.start, course, out, work, s
-            )
+            outcome = sample(model, system, mass, course.u, course.v, a, plan.start, course, out, s)
             if outcome != Outcome.DONE:
                 return outcome, -1
     else:
@@ -206,7 +204,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         hinge = passed_through(work.angle, course.angle, 0, work.angle.size)
         if hinge >= 0:
             return Outcome.PENETRATION, hinge
-        longest = _longest(model, system, ut, vt, plan.dt, work, s)
+        longest = _longest(model, system, ut, vt, plan.dt, s)
         after = goal if h == goal - t else t + h
         tally.steps += 1
         tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
@@ -222,7 +220,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             _accelerate(model, system, mass, ut, vt, due, a, work, s)
             tally.evaluations += 1
             tally.work += _offset_work(model, system, work, False)
-            outcome = sample(model, system, mass, ut, vt, a, due, course, out, work, s)
+            outcome = sample(model, system, mass, ut, vt, a, due, course, out, s)
             if outcome != Outcome.DONE:
                 return outcome, -1
             due = plan.start + tally.samples * plan.interval
@@ -250,9 +248,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         if plan.every > 0 and tally.steps % plan.every == 0:
             _accelerate(model, system, mass, course.u, course.v, after, a, work, s)
             tally.evaluations += 1
-            outcome = sample(
-                model, system, mass, course.u, course.v, a, after, course, out, work, s
-            )
+            outcome = sample(model, system, mass, course.u, course.v, a, after, course, out, s)
             if outcome != Outcome.DONE:
                 return outcome, -1
     tally.power_in, tally.power_out = powers[0, 0], powers[1, 0]

@@ -40,13 +40,14 @@ from foldyn.dynamics.implicit.scheme import Scheme, add_load_work, norms
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.system import Packed, carry, place
 from foldyn.dynamics.ties import follow_masters
-from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics import strain_energies
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.tables import Tables
 from foldyn.mechanics.following import add_following
 from foldyn.mechanics.step_tangent import FLOOR, expected_stress
+from foldyn.mechanics.term import Folds
 
 ORDER = 2
 
@@ -59,11 +60,12 @@ class EnergyMomentum(Scheme):
 
     def __init__(self, packed: Packed, course: Course) -> None:
         super().__init__(packed, course)
-        model: Any = packed.model
+        body: Any = packed.body
         self._contact: StepContact | None = None
         if packed.system.touches:
-            self._contact = StepContact(model.contact, self.work.memory, packed.system.rows)
-            model = model.inner
+            self._contact = StepContact(body.tables, self.work.memory, packed.system.rows)
+            body = body.inner
+        model = body.model
         self._arrays = model, packed.system, packed.mass
         self._touch = np.zeros((0, 3)) if self._contact is None else self._contact.force
         self._stress, self._start = np.zeros((2, len(model.bars)))
@@ -176,7 +178,7 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, to
     new.factor[:] = s.factor
     mean = 0.5 * (old.factor + new.factor)
     if system.turns:
-        turn(model, system.actuators, mean)
+        turn(_folds(model), system.actuators, mean)
     carry(system.moved, old.factor, 0, old.q, s.displacement)
     carry(system.moved, new.factor, 0, new.q, s.velocity)
     new.force[:] = 0.0
@@ -208,6 +210,11 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, to
         inertia += left[i] * left[i]
         left[i] += bracket[i]
     return norms(system, out, inertia, mean, new.pushed)
+
+
+@inner_scalar
+def _folds(model):
+    return Folds(model.hinge_rest, model.hinge_parameters, model.hinge_stiffness)
 
 
 @inner
@@ -256,14 +263,14 @@ def _works(system, mass, h, old, new, shift, s):
 def _actuation(model, system, old, new, u0, u1, s):
     """Work of the actuators in a step: what turning the rest angles at either end changes."""
     done, mean = 0.0, 0.5 * (old.factor + new.factor)
-    turn(model, system.actuators, old.factor)
+    turn(_folds(model), system.actuators, old.factor)
     strain_energies(model, u0, s.energy)
     done -= s.energy.sum()
-    turn(model, system.actuators, mean)
+    turn(_folds(model), system.actuators, mean)
     strain_energies(model, u0, s.energy)
     done += s.energy.sum()
     strain_energies(model, u1, s.energy)
     done -= s.energy.sum()
-    turn(model, system.actuators, new.factor)
+    turn(_folds(model), system.actuators, new.factor)
     strain_energies(model, u1, s.energy)
     return done + s.energy.sum()

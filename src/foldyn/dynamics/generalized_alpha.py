@@ -45,7 +45,7 @@ from foldyn.dynamics.system import Packed, acceleration, carry
 from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import borrowed, flat
-from foldyn.mechanics.kernels import elapse
+from foldyn.mechanics.term import clock_to
 
 ORDER = 2
 SPECTRAL_RADIUS = 0.8
@@ -89,7 +89,7 @@ class Alpha(Scheme):
     def residual(self, h: float, t: float) -> tuple[float, float]:
         """See `Scheme`."""
         return residual(
-            *self.packed.arrays, self._p, h, t, self.old, self.new, self.shift, self.out, self.work,
+            *self.arrays, self._p, h, t, self.old, self.new, self.shift, self.out, self.share,
             self.scratch,
         )  # fmt: skip
 
@@ -101,7 +101,7 @@ class Alpha(Scheme):
         if matrix.band is None:
             return super().iterate(matrix, goal, h, t, last, lowest, most)
         return _iterate(
-            *self.packed.arrays, self._p, h, t, self.old, self.new, self.shift, self.out, self.work,
+            *self.arrays, self._p, h, t, self.old, self.new, self.shift, self.out, self.share,
             self.scratch, self.earlier, matrix.band, matrix.free, goal, last, lowest, most,
         )  # fmt: skip
 
@@ -114,12 +114,14 @@ class Alpha(Scheme):
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""
-        model, system, mass = self.packed.arrays
+        terms, system, mass = self.arrays
         done, lost = _works(system, mass, h, self.old, self.new, self.shift, self.scratch)
         if system.damping.follows:
             lost += _taken(system, self.old, self.new, self.scratch)
         if system.turns:
-            done += _actuation(model, system, self.old, self.new, self.folds, self.work.fold_angle)
+            done += _actuation(
+                terms.folds, system, self.old, self.new, self.folds, self.work.fold_angle
+            )
         return done, lost
 
     def change(self, h: float) -> NDArray:
@@ -168,7 +170,7 @@ def residual(model, system, mass, p, h, t, old, new, shift, out, work, s):
     if system.ties.slave.size > 0:  # of which the masters may be such nodes
         follow_masters(system.ties, a1)
         follow_masters(system.ties, w1)
-    elapse(model, h)
+    clock_to(model, h)
     acceleration(model, system, mass, new.q, new.w, t, out, work, s)
     for i in range(q0.size):
         b1[i] = flat(s.force)[i]
@@ -245,12 +247,12 @@ def _taken(system, old, new, s):
 
 
 @kernel
-def _actuation(model, system, old, new, angle0, angle1):
+def _actuation(folds, system, old, new, angle0, angle1):
     """Work of the actuators in a step, from angles angle0 to angle1 of the folds."""
     change = np.zeros_like(new.factor)
     change[:, 1] = 0.5 * (new.factor[:, 0] - old.factor[:, 0])
-    turn(model, system.actuators, old.factor)
-    done = actuator_power(model, system.actuators, change, angle0)
-    turn(model, system.actuators, new.factor)
-    done += actuator_power(model, system.actuators, change, angle1)
-    return done + offset_work(model, system.actuators, angle1, 0, system.actuators.hinge.size, True)
+    turn(folds, system.actuators, old.factor)
+    done = actuator_power(folds, system.actuators, change, angle0)
+    turn(folds, system.actuators, new.factor)
+    done += actuator_power(folds, system.actuators, change, angle1)
+    return done + offset_work(folds, system.actuators, angle1, 0, system.actuators.hinge.size, True)

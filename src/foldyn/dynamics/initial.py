@@ -227,7 +227,7 @@ def begin(
     tally.time, tally.wanted, tally.error, tally.shortest = plan.start, first, 1e-4, np.inf
     inward = by.inward(q)
     if system.turns:
-        turn(body.model, system.actuators, s.factor)
+        turn(body.folds, system.actuators, s.factor)
         system.actuators.offset[:, 2] = system.actuators.offset[:, 0]
         system.actuators.offset[:, 3] = np.nan  # no moment known yet
     if len(body.hidden):  # they stand where they are in balance

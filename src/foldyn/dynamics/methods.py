@@ -33,6 +33,7 @@ from foldyn.dynamics.system import Packed, scratches
 from foldyn.dynamics.timing import jumps
 from foldyn.errors import InputError
 from foldyn.jit.compiled import ready
+from foldyn.mechanics.term import Model
 from foldyn.mechanics.threads import run_together
 from foldyn.values import of_kind
 
@@ -66,17 +67,18 @@ class Compiled:
         self, loop: Callable[..., tuple[int, int]], packed: Packed, course: Course, plan: StepPlan,
         threads: int,
     ) -> None:  # fmt: skip
-        self._loop, self._arguments = loop, (*packed.arrays, course, plan)
-        self._packed, self._course = packed, course
+        self._loop, self._packed, self._course, self._plan = loop, packed, course, plan
         self._works = packed.body.workspaces(threads)
+        self._models = [Model(packed.body, work) for work in self._works]
         self._memories = scratches(packed.system, self._works)
         self.threads = len(self._works)
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
+        case = self._packed.system, self._packed.mass, self._course, self._plan, out
         arguments = [
-            (*self._arguments, out, work, memory, stretch)
-            for work, memory in zip(self._works, self._memories, strict=True)
+            (model.terms, *case, model.share, memory, stretch)
+            for model, memory in zip(self._models, self._memories, strict=True)
         ]
         return run_together(self._loop, [work.team for work in self._works], arguments)[0]
 

@@ -8,11 +8,11 @@ from foldyn.dynamics.system import carry
 from foldyn.dynamics.ties import add_reactions
 from foldyn.jit.compiled import inner
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.kernels import energies_of, lost_of
+from foldyn.mechanics.term import dissipated_by, energies_of
 
 
 @inner
-def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity, reaction, energy):
+def record(model, system, mass, q, w, a, tally, s, displacement, velocity, reaction, energy):
     """Write one sample after `acceleration`.
 
     The reaction is what the supports exert: M (a + alpha v) + F_int + beta K0 v - p there. energy
@@ -43,9 +43,9 @@ def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity,
     else:
         for k in range(system.supported.size):
             reaction[k] += drag(system.damping, product[system.supported[k]])
-    energies_of(model, s.displacement, work, s.energy)
+    energies_of(model, s.displacement, s.energy)
     for k in range(groups):
         energy[k] = s.energy[k]
-    energy[groups + 1] = tally.dissipated + lost_of(model)
+    energy[groups + 1] = tally.dissipated + dissipated_by(model)
     # what brought the moving supports to their speed belongs to the work: it may come in jolts
     energy[groups + 2] = tally.work + moving_energy(system.moved_mass, s.factor)

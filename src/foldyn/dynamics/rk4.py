@@ -9,7 +9,7 @@ from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration, longest_step
 from foldyn.jit.compiled import shared
 from foldyn.jit.intrinsics import borrowed, flat
-from foldyn.mechanics.kernels import elapse
+from foldyn.mechanics.term import clock_to
 
 ORDER = 4
 
@@ -54,7 +54,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
                 since = 0.5 * ((stage + 1) // 2) * dt
                 t = now + since
                 if stage > 0:
-                    elapse(model, plan.dt - left + since)
+                    clock_to(model, plan.dt - left + since)
                 power_in, power_out = acceleration(
                     model, system, mass, stage_u, stage_v, t, a, work, s
                 )
@@ -68,7 +68,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
                         )
                         if outcome != Outcome.DONE or step == end:
                             return outcome, hinge
-                    dt = share(longest_step(model, system, course.u, course.v, left, work, s), left)
+                    dt = share(longest_step(model, system, course.u, course.v, left, s), left)
                 ahead = 0.5 * dt if stage < 2 else dt
                 if stage == 0:
                     for i in range(u.size):

@@ -46,12 +46,7 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.body import Body, Numbering, renumbered
 from foldyn.mechanics.following import Following, joined, push_following
-from foldyn.mechanics.kernels import (
-    contact_limit,
-    contact_powers,
-    force_of,
-    place_obstacles,
-)
+from foldyn.mechanics.term import forces_of, limit_of, obstacles_to
 from foldyn.mechanics.threads import wait
 
 
@@ -121,13 +116,8 @@ class Packed(NamedTuple):
 
     @property
     def model(self) -> Any:
-        """The arrays of the body's kernels."""
+        """The arrays of the body."""
         return self.body.model
-
-    @property
-    def arrays(self) -> tuple[Any, System, Inertia]:
-        """What compiled loops take first."""
-        return self.model, self.system, self.mass
 
 
 def pack(
@@ -314,20 +304,19 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
         evaluate(system.waves, t, derive, s.factor)
         s.time[0] = t
     if system.turns:
-        turn_part(model, system.actuators, s.factor, s.turned[0], s.turned[1])
+        turn_part(model.folds, system.actuators, s.factor, s.turned[0], s.turned[1])
     if system.moves:
         own, supports = (first, last), (s.moved[0], s.moved[1])
         here, there = flat(s.displacement), flat(s.velocity)
         _carry_part(system.moved, s.factor, 0, flat(q), here, own, supports)
         _carry_part(system.moved, s.factor, 1, flat(w), there, own, supports)
     if system.presses:
-        place_obstacles(model, s.factor, work)
+        obstacles_to(model, s.factor)
     u = s.displacement if system.moves else q
     v = s.velocity if system.moves else w
     wait(work.team)  # for q and w of the others
-    force_of(model, u, s.force, work)
+    power_in, power_out = forces_of(model, u, v, t, s.force)
     force, speed = flat(s.force), flat(v)
-    power_in, power_out = contact_powers(model, v, work)
     loads, damping = system.loads, system.damping
     for k in range(s.loads[0], s.loads[1]):
         dof = loads.dof[k]
@@ -365,13 +354,13 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
             power_in += drag_power(damping, moving_energy(system.moved_mass, s.factor))
     if system.turns:
         power_in += power_of_part(
-            model, system.actuators, s.factor, work.fold_angle, s.turned[0], s.turned[1]
+            model.folds, system.actuators, s.factor, work.fold_angle, s.turned[0], s.turned[1]
         )
     return power_in, power_out
 
 
 @inner_scalar
-def longest_step(model, system, q, w, dt, work, s):
+def longest_step(model, system, q, w, dt, s):
     """The longest step (s), at most dt, that contact allows: after `acceleration` at q and w.
 
     Once before each step, where the last one has ended.
@@ -380,7 +369,7 @@ def longest_step(model, system, q, w, dt, work, s):
         return dt
     u = s.displacement if system.moves else q
     v = s.velocity if system.moves else w
-    return contact_limit(model, u, v, dt, system.lightness, work)
+    return limit_of(model, u, v, dt, system.lightness)
 
 
 @kernel

@@ -56,7 +56,8 @@ class Alone(Compiler):
         """Compile a Python function."""
         self.state.library = AloneLibrary(self.state.targetctx.codegen(), func.__qualname__)
         self.state.library.enable_object_caching()
-        self.state.library.called_alone = self.state.flags.no_cpython_wrapper
+        flags = self.state.flags
+        self.state.library.called_alone = flags.no_cpython_wrapper and flags.no_cfunc_wrapper
         return super().compile_extra(func)
 
 
@@ -108,6 +109,43 @@ shared = _decorator(fastmath=_FUSED, nogil=True)
 # the arithmetic as it is written: pictures
 strict = _decorator()
 strict_inlined = _decorator(inline="always")
+
+
+class Addressed:
+    """A function of one signature that compiled code calls by its address, kept on disk.
+
+    Its first argument is the address of a context, whose type decides what is compiled. Addresses
+    reach their callers as data, and differ in every process. No exception leaves such a function,
+    and it allocates nothing: where something is wrong it returns nan.
+
+    Parameters
+    ----------
+    function : callable
+    signature : Numba types of the arguments after the context
+    """
+
+    def __init__(self, function: Callable[..., Any], signature: tuple[Any, ...]) -> None:
+        self._signature = signature
+        compiled = njit(
+            error_model="numpy", pipeline_class=Alone, fastmath=_FUSED, no_cpython_wrapper=True,
+            no_cfunc_wrapper=False,
+        )  # fmt: skip
+        self._dispatcher: Any = compiled(function)
+        self._dispatcher._cache = self._cache = Kept(function)
+        _shut(self._dispatcher)
+
+    def at(self, context: Any) -> int:
+        """The address in this process for the type of a `Context`."""
+        kinds = (context.kind, *self._signature)
+        if kinds not in self._dispatcher.overloads:
+            self._dispatcher.compile(kinds)
+        made = self._dispatcher.overloads[kinds]
+        return made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name)
+
+
+def addressed(*signature: Any) -> Callable[[Callable[..., Any]], Addressed]:
+    """Decorator of functions that are called by their address; see `Addressed`."""
+    return lambda function: Addressed(function, signature)
 
 
 def callback(signature: str, function: Callable[..., Any]) -> Any:

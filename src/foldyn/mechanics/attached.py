@@ -15,12 +15,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner_scalar, kernel
+from foldyn.jit.context import Context, contents, numbers_at, rows_at
 from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient
-from foldyn.mechanics.kernels import energies_of, folds_of, force_of
+from foldyn.mechanics.term import ENERGIES, FORCES, Term, energies, forces
 from foldyn.mechanics.threads import Team
 
 GROUND = -1  # row of a foot that stands still
@@ -251,36 +251,50 @@ def axial_blocks(springs, u, loose):
     return out
 
 
-@overload(force_of, inline="always")
-def _force(model, u, force, work):
-    if model.instance_class is not Attached:
-        return None
-
-    def attached(model, u, force, work):
-        force_of(model.inner, u, force, work.inner)
-        add_clamp_forces(model.clamps, u, force, work.angle)
-        add_spring_forces(model.springs, u, force)
-
-    return attached
+class _ClampsTerm(NamedTuple):
+    clamps: Clamps
+    angle: NDArray  # (nh + c,) dihedrals of all hinges, theirs at the end
+    rows: int
 
 
-@overload(energies_of, inline="always")
-def _energies(model, u, work, out):
-    if model.instance_class is not Attached:
-        return None
-
-    def attached(model, u, work, out):
-        energies_of(model.inner, u, work.inner, out[: model.groups])
-        if model.clamps.rest.size > 0:
-            out[model.clamps.group] += clamp_energy(model.clamps, u)
-        if out.size > model.groups:
-            out[model.groups] = spring_energy(model.springs, u)
-
-    return attached
+@forces
+def _clamp_forces(context, u, v, t, force, powers):
+    own = contents(context)
+    add_clamp_forces(own.clamps, rows_at(u, own.rows), rows_at(force, own.rows), own.angle)
 
 
-@overload(folds_of, inline="always")
-def _folds(model):
-    if model.instance_class is not Attached:
-        return None
-    return lambda model: folds_of(model.inner)
+@energies
+def _clamp_energies(context, u, out):
+    own = contents(context)
+    group = own.clamps.group
+    numbers_at(out, group + 1)[group] += clamp_energy(own.clamps, rows_at(u, own.rows))
+
+
+def clamps_term(clamps: Clamps, angle: NDArray, rows: int) -> Term:
+    """Clamped edges; their dihedrals end `angle`."""
+    own = Context(_ClampsTerm(clamps, angle, rows))
+    return Term(own, {FORCES: _clamp_forces, ENERGIES: _clamp_energies})
+
+
+class _SpringsTerm(NamedTuple):
+    springs: Springs
+    group: int  # of the energies
+    rows: int
+
+
+@forces
+def _spring_forces(context, u, v, t, force, powers):
+    own = contents(context)
+    add_spring_forces(own.springs, rows_at(u, own.rows), rows_at(force, own.rows))
+
+
+@energies
+def _spring_energies(context, u, out):
+    own = contents(context)
+    numbers_at(out, own.group + 1)[own.group] = spring_energy(own.springs, rows_at(u, own.rows))
+
+
+def springs_term(springs: Springs, group: int, rows: int) -> Term:
+    """Springs, with the group of their energy."""
+    own = Context(_SpringsTerm(springs, group, rows))
+    return Term(own, {FORCES: _spring_forces, ENERGIES: _spring_energies})

@@ -21,9 +21,11 @@ from foldyn.mechanics.attached import (
     clamp_angles,
     clamp_blocks,
     clamp_energy,
+    clamps_term,
     no_clamps,
     no_springs,
     spring_energy,
+    springs_term,
 )
 from foldyn.mechanics.block_matrix import (
     assembled,
@@ -41,6 +43,7 @@ from foldyn.mechanics.body import (
 )
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.tangent import Sparsity, block_keys, joined
+from foldyn.mechanics.term import Term
 from foldyn.mechanics.wrapped_body import WrappedBody
 
 GROUP = "strain_springs"
@@ -148,6 +151,15 @@ class AttachedBody(WrappedBody):
             angle = np.empty(count + len(self.clamps.rest))
             inner = inner._replace(angle=angle[:count], fold_angle=angle[:count])
         return [AttachedWork(inner, angle, inner.fold_angle, inner.strips, inner.team)]
+
+    def terms(self, work: AttachedWork) -> list[Term]:
+        """See `Body`."""
+        terms = self.inner.terms(work.inner)
+        if len(self.clamps.rest):
+            terms.append(clamps_term(self.clamps, work.angle, self.rows))
+        if GROUP in self.energy_groups:
+            terms.append(springs_term(self.springs, len(self.inner.energy_groups), self.rows))
+        return terms
 
     # ------------------------------------------------------------------ measures
     def angles(self, q: NDArray) -> NDArray:

@@ -4,9 +4,9 @@ The m dofs are 3 node + axis, then the hidden ones: those without mass that a mo
 the displacements of its nodes. Compiled loops hold them in arrays with a row of three per node,
 (rows, 3); hidden dofs follow in further rows, the last one filled up. Either form is taken.
 
-A model is a named tuple of arrays, its kernels (`mechanics.kernels`), a `Body` and a structure that
-gives it. A body changes nothing in place; what makes another one of it (`folded`, `nominal`, ...)
-leaves it as it was.
+A model is a named tuple of arrays, its kernels, a `Body` that tells its terms (`mechanics.term`),
+and a structure that gives it. A body changes nothing in place; what makes another one of it
+(`folded`, `nominal`, ...) leaves it as it was.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from foldyn.errors import ComputationError
 from foldyn.materials import HingeLaw
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.tangent import Sparsity
+from foldyn.mechanics.term import Folds, Term
 
 ITERATIONS = 50
 BALANCED = 1e-13  # rad, of the last step of Newton's method for hidden dofs
@@ -202,6 +203,15 @@ class Body(ABC):
     @abstractmethod
     def workspaces(self, threads: int) -> Sequence[Any]:
         """Memory of the kernels on each thread, on fewer than asked for if need be."""
+
+    @abstractmethod
+    def terms(self, work: Any) -> list[Term]:
+        """What adds to its forces, for a thread with this memory; see `mechanics.term`."""
+
+    @property
+    @abstractmethod
+    def folds(self) -> Folds:
+        """What actuators turn, as arrays that change in place."""
 
     @property
     def threads(self) -> int:

@@ -10,24 +10,27 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.context import Context, contents, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.branch_switch import update
 from foldyn.mechanics.dihedral import add_hessian
-from foldyn.mechanics.kernels import (
+from foldyn.mechanics.term import (
+    ADVANCE_CLOCK,
+    BRANCH_STATES,
+    COMMIT,
+    DISSIPATED,
+    ENERGIES,
+    FORCES,
+    Term,
+    advance_clock,
+    branch_states,
     commit,
-    contact_limit,
-    contact_powers,
-    elapse,
-    energies_of,
-    folds_of,
-    force_of,
-    lost_of,
-    place_obstacles,
-    recall,
+    dissipated,
+    energies,
+    forces,
 )
 from foldyn.mechanics.viscous import hinge_gradient
 
@@ -157,93 +160,58 @@ def memory_gradients(own, u, out):
         hinge_gradient(own.corners[e], own.dofs[e], own.hidden_turn[e], moved, out[e])
 
 
-@overload(force_of, inline="always")
-def _force(model, u, force, work):
-    if model.instance_class is not Inelastic:
-        return None
-
-    def inelastic(model, u, force, work):
-        force_of(model.inner, u, force, work)
-        add_memory_forces(model.hinges_with_memory, model.offset, u, force)
-
-    return inelastic
+class _MemoryTerm(NamedTuple):
+    own: MemoryHinges
+    offset: NDArray
+    rows: int
+    groups: int  # of the energies
 
 
-@overload(energies_of, inline="always")
-def _energies(model, u, work, out):
-    if model.instance_class is not Inelastic:
-        return None
-
-    def inelastic(model, u, work, out):
-        energies_of(model.inner, u, work, out)
-        own = model.hinges_with_memory
-        for e in range(own.rest.size):  # as at the last evaluation, which was at u
-            out[own.group[e]] += own.stored[e]
-
-    return inelastic
+@forces
+def _forces(context, u, v, t, force, powers):
+    term = contents(context)
+    add_memory_forces(term.own, term.offset, rows_at(u, term.rows), rows_at(force, term.rows))
 
 
-@overload(folds_of, inline="always")
-def _folds(model):
-    if model.instance_class is not Inelastic:
-        return None
-    return lambda model: folds_of(model.inner)
+@energies
+def _energies(context, u, out):
+    term = contents(context)
+    own, energy = term.own, numbers_at(out, term.groups)
+    for e in range(own.rest.size):  # as at the last evaluation, which was at u
+        energy[own.group[e]] += own.stored[e]
 
 
-@overload(place_obstacles, inline="always")
-def _obstacles(model, factor, work):
-    if model.instance_class is not Inelastic:
-        return None
-    return lambda model, factor, work: place_obstacles(model.inner, factor, work)
+@advance_clock
+def _advance_clock(context, since):
+    contents(context).own.elapsed[0] = since
 
 
-@overload(contact_powers, inline="always")
-def _powers(model, v, work):
-    if model.instance_class is not Inelastic:
-        return None
-    return lambda model, v, work: contact_powers(model.inner, v, work)
+@commit
+def _commit(context):
+    make_last(contents(context).own)
 
 
-@overload(contact_limit, inline="always")
-def _limit(model, u, v, dt, lightness, work):
-    if model.instance_class is not Inelastic:
-        return None
-    return lambda model, u, v, dt, lightness, work: contact_limit(
-        model.inner, u, v, dt, lightness, work
-    )
+@dissipated
+def _dissipated(context):
+    own = contents(context).own
+    return own.lost[0] + own.lost[1]
 
 
-@overload(elapse, inline="always")
-def _elapse(model, time):
-    if model.instance_class is not Inelastic:
-        return None
-
-    def inelastic(model, time):
-        model.hinges_with_memory.elapsed[0] = time
-
-    return inelastic
+@branch_states
+def _branch_states(context, out):
+    reached = flat(contents(context).own.reached)
+    to = numbers_at(out, reached.size)
+    for k in range(reached.size):
+        to[k] = reached[k]
 
 
-@overload(commit, inline="always")
-def _commit(model):
-    if model.instance_class is not Inelastic:
-        return None
-    return lambda model: make_last(model.hinges_with_memory)
-
-
-@overload(lost_of, inline="always")
-def _lost(model):
-    if model.instance_class is not Inelastic:
-        return None
-    return lambda model: model.hinges_with_memory.lost[0] + model.hinges_with_memory.lost[1]
-
-
-@overload(recall, inline="always")
-def _recall(model, out):
-    if model.instance_class is not Inelastic:
-        return None
-
-    def inelastic(model, out):
-        out[:] = model.hinges_with_memory.reached
-
-    return inelastic
+def memory_term(own: MemoryHinges, offset: NDArray, rows: int, groups: int) -> Term:
+    """What the branches of hinges with memory add, with so many groups of energies."""
+    context = Context(_MemoryTerm(own, offset, rows, groups))
+    return Term(
+        context,
+        {
+            FORCES: _forces, ENERGIES: _energies, ADVANCE_CLOCK: _advance_clock, COMMIT: _commit,
+            DISSIPATED: _dissipated, BRANCH_STATES: _branch_states,
+        },
+    )  # fmt: skip

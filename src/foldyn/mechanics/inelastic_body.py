@@ -18,9 +18,11 @@ from foldyn.mechanics.inelastic import (
     make_last,
     memory_gradients,
     memory_tangents,
+    memory_term,
 )
 from foldyn.mechanics.step_tangent import FLOOR
 from foldyn.mechanics.tangent import Sparsity, block_keys, joined
+from foldyn.mechanics.term import Term
 from foldyn.mechanics.viscous import WIDTH
 from foldyn.mechanics.wrapped_body import WrappedBody
 
@@ -167,6 +169,11 @@ class InelasticBody(WrappedBody):
     def workspaces(self, threads: int) -> Sequence[Any]:
         """See `Body`: one thread."""
         return self.inner.workspaces(1)
+
+    def terms(self, work: Any) -> list[Term]:
+        """See `Body`."""
+        own = memory_term(self.memory.own, self._offset, self.rows, len(self.energy_groups))
+        return [*self.inner.terms(work), own]
 
     def nominal(self, q: NDArray) -> Body:
         """See `Body`: of the elastic parts, with the slopes of the branches."""

@@ -14,17 +14,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.context import Context, contents, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.energy import strain_energies
 from foldyn.mechanics.force import Workspace, internal_force, workspace
-from foldyn.mechanics.kernels import Whole, energies_of, folds_of, force_of
 from foldyn.mechanics.model import BarsHinges
+from foldyn.mechanics.term import ENERGIES, FORCES, Term, Whole, energies, forces
 from foldyn.mechanics.threads import Team, team
 
 
@@ -193,35 +193,33 @@ def turn_moments(model, x, couple, work):
                 couple[-1 - h] += model.per_reach * moment
 
 
-@overload(force_of, inline="always")
-def _force(model, u, force, work):
-    if model.instance_class is not BarsPlates:
-        return None
-
-    def plates(model, u, force, work):
-        n, r = model.bars.rest.shape[0], model.rotations
-        moved, out = flat(u), flat(force)
-        out[3 * n + r :] = 0.0
-        x, couple = moved[3 * n : 3 * n + r], out[3 * n : 3 * n + r]
-        plates_force(model, u[:n], x, force[:n], couple, work)
-
-    return plates
+class _PlatesTerm(NamedTuple):
+    model: BarsPlates
+    work: PlatesWork
+    rows: int
 
 
-@overload(energies_of, inline="always")
-def _energies(model, u, work, out):
-    if model.instance_class is not BarsPlates:
-        return None
+@forces
+def _forces(context, u, v, t, force, powers):
+    own = contents(context)
+    model, moved, out = own.model, rows_at(u, own.rows), rows_at(force, own.rows)
+    n, r = model.bars.rest.shape[0], model.rotations
+    for k in range(3 * n + r, out.size):
+        flat(out)[k] = 0.0
+    x, couple = flat(moved)[3 * n : 3 * n + r], flat(out)[3 * n : 3 * n + r]
+    plates_force(model, moved[:n], x, out[:n], couple, own.work)
 
-    def plates(model, u, work, out):
-        n, r = model.bars.rest.shape[0], model.rotations
-        plates_energy(model, u[:n], flat(u)[3 * n : 3 * n + r], work, out)
 
-    return plates
+@energies
+def _energies(context, u, out):
+    own = contents(context)
+    model, moved = own.model, rows_at(u, own.rows)
+    n, r = model.bars.rest.shape[0], model.rotations
+    x = flat(moved)[3 * n : 3 * n + r]
+    plates_energy(model, moved[:n], x, own.work, numbers_at(out, 3))
 
 
-@overload(folds_of, inline="always")
-def _folds(model):
-    if model.instance_class is not BarsPlates:
-        return None
-    return lambda model: (model.fold_rest, model.fold_parameters, model.fold_stiffness)
+def plates_term(model: BarsPlates, work: PlatesWork, rows: int) -> Term:
+    """Bars, folds and plates, whose dofs fill so many rows."""
+    own = Context(_PlatesTerm(model, work, rows))
+    return Term(own, {FORCES: _forces, ENERGIES: _energies})

@@ -12,15 +12,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.context import Context, contents, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_slope
-from foldyn.mechanics.kernels import Whole, energies_of, folds_of, force_of
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.plates import (
     BarsPlates,
@@ -31,6 +30,7 @@ from foldyn.mechanics.plates import (
     turn_hinges,
     turn_moments,
 )
+from foldyn.mechanics.term import ENERGIES, FORCES, Term, Whole, energies, forces
 from foldyn.mechanics.threads import Team
 
 STEPS = 50  # of Newton's method, at most
@@ -215,22 +215,26 @@ def condensed_energy(model, u, work, out):
     plates_energy(model.plates, u, work.x, work.plates, out)
 
 
-@overload(force_of, inline="always")
-def _force(model, u, force, work):
-    if model.instance_class is not CondensedPlates:
-        return None
-    return lambda model, u, force, work: condensed_force(model, u, force, work)
+class _CondensedTerm(NamedTuple):
+    model: CondensedPlates
+    work: CondensedWork
 
 
-@overload(energies_of, inline="always")
-def _energies(model, u, work, out):
-    if model.instance_class is not CondensedPlates:
-        return None
-    return lambda model, u, work, out: condensed_energy(model, u, work, out)
+@forces
+def _forces(context, u, v, t, force, powers):
+    own = contents(context)
+    rows = own.model.plates.nodes
+    condensed_force(own.model, rows_at(u, rows), rows_at(force, rows), own.work)
 
 
-@overload(folds_of, inline="always")
-def _folds(model):
-    if model.instance_class is not CondensedPlates:
-        return None
-    return lambda model: folds_of(model.plates)
+@energies
+def _energies(context, u, out):
+    own = contents(context)
+    moved = rows_at(u, own.model.plates.nodes)
+    condensed_energy(own.model, moved, own.work, numbers_at(out, 3))
+
+
+def condensed_term(model: CondensedPlates, work: CondensedWork) -> Term:
+    """Bars, folds and plates with their rotations in balance."""
+    own = Context(_CondensedTerm(model, work))
+    return Term(own, {FORCES: _forces, ENERGIES: _energies})

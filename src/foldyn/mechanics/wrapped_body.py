@@ -10,6 +10,7 @@ from scipy import sparse
 
 from foldyn.materials import HingeLaw
 from foldyn.mechanics.body import Body, FoldHinges, SoftHinges, Strains
+from foldyn.mechanics.term import Folds
 
 
 class WrappedBody(Body):
@@ -103,6 +104,11 @@ class WrappedBody(Body):
         """See `Body`."""
         inner, rows, place = self.inner.actuated(numbers)
         return self.around(inner), rows, place
+
+    @property
+    def folds(self) -> Folds:
+        """See `Body`."""
+        return self.inner.folds
 
     def series(self) -> tuple[NDArray, NDArray]:
         """See `Body`."""

@@ -23,6 +23,7 @@ from foldyn.mechanics.body import (
 )
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
+from foldyn.mechanics.term import Folds, Term
 from foldyn.shells.kernels import (
     ShellModel,
     ShellWork,
@@ -30,6 +31,7 @@ from foldyn.shells.kernels import (
     ride,
     shell_energy,
     shell_force,
+    shell_term,
     shell_work,
 )
 from foldyn.shells.tangent import (
@@ -129,6 +131,16 @@ class ShellBody(Body):
     def workspaces(self, threads: int) -> list[ShellWork]:
         """See `Body`."""
         return [shell_work(self.model)]
+
+    def terms(self, work: ShellWork) -> list[Term]:
+        """See `Body`."""
+        return [shell_term(self.model, work)]
+
+    @property
+    def folds(self) -> Folds:
+        """See `Body`."""
+        model = self.model
+        return Folds(model.piece_rest, model.piece_parameters, model.piece_stiffness)
 
     def angles(self, q: NDArray) -> NDArray:
         """See `Body`."""

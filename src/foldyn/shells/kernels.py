@@ -10,14 +10,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.jit.context import Context, contents, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
-from foldyn.mechanics.kernels import Whole, energies_of, folds_of, force_of
+from foldyn.mechanics.term import ENERGIES, FORCES, Term, Whole, energies, forces
 from foldyn.mechanics.threads import Team, team
 
 
@@ -229,34 +229,33 @@ def carry(model, force, work):
                 force[model.hinges[h, end], c] += carried
 
 
-@overload(force_of, inline="always")
-def _force(model, u, force, work):
-    if model.instance_class is not ShellModel:
-        return None
-
-    def shell(model, u, force, work):
-        n, r = model.nodes, model.rotations
-        moved, out = flat(u), flat(force)
-        out[3 * n + r :] = 0.0
-        shell_force(model, u[:n], moved[3 * n : 3 * n + r], force[:n], out[3 * n : 3 * n + r], work)
-
-    return shell
+class _ShellTerm(NamedTuple):
+    model: ShellModel
+    work: ShellWork
+    rows: int
 
 
-@overload(energies_of, inline="always")
-def _energies(model, u, work, out):
-    if model.instance_class is not ShellModel:
-        return None
+@forces
+def _forces(context, u, v, t, force, powers):
+    own = contents(context)
+    model, moved, out = own.model, rows_at(u, own.rows), rows_at(force, own.rows)
+    n, r = model.nodes, model.rotations
+    for k in range(3 * n + r, out.size):
+        flat(out)[k] = 0.0
+    x, couple = flat(moved)[3 * n : 3 * n + r], flat(out)[3 * n : 3 * n + r]
+    shell_force(model, moved[:n], x, out[:n], couple, own.work)
 
-    def shell(model, u, work, out):
-        n, r = model.nodes, model.rotations
-        shell_energy(model, u[:n], flat(u)[3 * n : 3 * n + r], work, out)
 
-    return shell
+@energies
+def _energies(context, u, out):
+    own = contents(context)
+    model, moved = own.model, rows_at(u, own.rows)
+    n, r = model.nodes, model.rotations
+    x = flat(moved)[3 * n : 3 * n + r]
+    shell_energy(model, moved[:n], x, own.work, numbers_at(out, 3))
 
 
-@overload(folds_of, inline="always")
-def _folds(model):
-    if model.instance_class is not ShellModel:
-        return None
-    return lambda model: (model.piece_rest, model.piece_parameters, model.piece_stiffness)
+def shell_term(model: ShellModel, work: ShellWork) -> Term:
+    """A shell."""
+    own = Context(_ShellTerm(model, work, model.rows))
+    return Term(own, {FORCES: _forces, ENERGIES: _energies})

@@ -11,6 +11,7 @@ from scipy import sparse
 
 from foldyn import mechanics
 from foldyn.materials import BarLaw, HingeLaw, Superlinear
+from foldyn.mechanics.bars_hinges import bars_hinges_term
 from foldyn.mechanics.body import (
     NO_DOF,
     Body,
@@ -23,6 +24,7 @@ from foldyn.mechanics.body import (
 from foldyn.mechanics.energy import gradients
 from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
 from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_tangent
+from foldyn.mechanics.term import Folds, Term
 
 GROUPS: Mapping[str, str] = {
     "strain_bars": "strain energy of the bars",
@@ -112,6 +114,16 @@ class BarsHingesBody(Body):
     def workspaces(self, threads: int) -> list[mechanics.Workspace]:
         """See `Body`."""
         return mechanics.workspaces(self.model, threads)
+
+    def terms(self, work: mechanics.Workspace) -> list[Term]:
+        """See `Body`."""
+        return [bars_hinges_term(self.model, work, len(GROUPS))]
+
+    @property
+    def folds(self) -> Folds:
+        """See `Body`."""
+        model = self.model
+        return Folds(model.hinge_rest, model.hinge_parameters, model.hinge_stiffness)
 
     def angles(self, q: NDArray) -> NDArray:
         """See `Body`."""

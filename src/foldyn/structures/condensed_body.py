@@ -10,8 +10,14 @@ from scipy.sparse.linalg import splu
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw
 from foldyn.mechanics.body import Body, FoldHinges, Unstrained
-from foldyn.mechanics.plates_condensed import CondensedWork, condensed_plates, condensed_work
+from foldyn.mechanics.plates_condensed import (
+    CondensedWork,
+    condensed_plates,
+    condensed_term,
+    condensed_work,
+)
 from foldyn.mechanics.step_tangent import SparseBlocks
+from foldyn.mechanics.term import Folds, Term
 from foldyn.structures.plates_body import BarsPlatesBody
 
 
@@ -57,6 +63,15 @@ class CondensedBody(Body):
     def workspaces(self, threads: int) -> list[CondensedWork]:
         """See `Body`."""
         return [condensed_work(self.model)]
+
+    def terms(self, work: CondensedWork) -> list[Term]:
+        """See `Body`."""
+        return [condensed_term(self.model, work)]
+
+    @property
+    def folds(self) -> Folds:
+        """See `Body`."""
+        return self.inner.folds
 
     def angles(self, q: NDArray) -> NDArray:
         """See `Body`."""

@@ -25,11 +25,13 @@ from foldyn.mechanics.plates import (
     PlatesWork,
     plates_energy,
     plates_force,
+    plates_term,
     plates_work,
 )
 from foldyn.mechanics.plates_tangent import PlatesPattern, add_plates_tangent, plates_pattern
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
+from foldyn.mechanics.term import Folds, Term
 from foldyn.structures.body import GROUPS, BarsHingesBody, stretch
 
 
@@ -132,6 +134,15 @@ class BarsPlatesBody(Body):
     def workspaces(self, threads: int) -> list[PlatesWork]:
         """See `Body`."""
         return [plates_work(self.model)]
+
+    def terms(self, work: PlatesWork) -> list[Term]:
+        """See `Body`."""
+        return [plates_term(self.model, work, self.rows)]
+
+    @property
+    def folds(self) -> Folds:
+        """See `Body`."""
+        return Folds(self.model.fold_rest, self.model.fold_parameters, self.model.fold_stiffness)
 
     # ------------------------------------------------------------------ measures
     def angles(self, q: NDArray) -> NDArray:

@@ -142,9 +142,9 @@ class Implicit:
         if memory is not None:
             memory.still()
         old, t = self._scheme.old, float(self._course.tally.time)
-        work, scratch = self._scheme.work, self._scheme.scratch
-        accelerate(*self._packed.arrays, old.q, old.w, t, out, work, scratch)
-        out[self._scheme.massless] = 0.0
+        scheme = self._scheme
+        accelerate(*scheme.arrays, old.q, old.w, t, out, scheme.share, scheme.scratch)
+        out[scheme.massless] = 0.0
         return out
 
     def _state(self) -> list[NDArray]:
@@ -220,7 +220,7 @@ class Implicit:
         """Write a sample."""
         scheme = self._scheme
         return _write(
-            *self._packed.arrays, self._course, t, out, scheme.work, scheme.scratch, scheme.out
+            *scheme.arrays, self._course, t, out, scheme.share, scheme.scratch, scheme.out
         )
 
     def _fixed(self, out: Samples) -> tuple[int, int]:
@@ -339,7 +339,7 @@ class Implicit:
             system = self._packed.system
             if system.turns:
                 course.tally.work += jolt(
-                    self._packed.model, system.actuators, scheme.work.fold_angle
+                    self._packed.body.folds, system.actuators, scheme.work.fold_angle
                 )
             if self._touching is not None:
                 self._touching.begin()
@@ -384,4 +384,4 @@ def _largest(values: NDArray) -> float:
 def _write(model, system, mass, course, t, out, work, s, a):
     """Write the next sample at time t."""
     acceleration(model, system, mass, course.u, course.v, t, a, work, s)
-    return sample(model, system, mass, course.u, course.v, a, t, course, out, work, s)
+    return sample(model, system, mass, course.u, course.v, a, t, course, out, s)

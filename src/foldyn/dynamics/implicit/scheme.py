@@ -21,6 +21,7 @@ from foldyn.mechanics.contact.body import contact_tangent
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.tables import Tables
 from foldyn.mechanics.following import following_force
+from foldyn.mechanics.term import Model
 
 EPS = float(np.finfo(float).eps)
 FAST = 0.3  # share of the residual that an iteration leaves, below which its matrix is kept
@@ -98,6 +99,9 @@ class Scheme(ABC):
     def __init__(self, packed: Packed, course: Course) -> None:
         self.packed, self.course = packed, course
         self.work: Any = packed.body.workspaces(1)[0]
+        self.model = Model(packed.body, self.work)
+        self.share = self.model.share
+        self.arrays = self.model.terms, packed.system, packed.mass
         self.scratch: Scratch = scratch(packed.system)
         shape, histories = course.u.shape, self.scratch.factor.shape
         self.out, self.step = np.zeros(shape), np.zeros(shape)
@@ -176,7 +180,7 @@ class Scheme(ABC):
     def begin(self, t: float) -> None:
         """Make `old` the beginning of a motion, or of its part after a jump, at t (s)."""
         old, s = self.old, self.scratch
-        accelerate(*self.packed.arrays, old.q, old.w, t, old.a, self.work, s)
+        accelerate(*self.arrays, old.q, old.w, t, old.a, self.share, s)
         old.a[self.massless] = 0.0
         self._speed[:], self._last = old.w, 0.0
         self._growth[:] = 0.0
@@ -248,7 +252,7 @@ class Scheme(ABC):
         for moved, force in ((change, self._pushed), (np.zeros_like(change), self.out)):
             s.factor[:], s.time[0] = phase.factor, 0.0  # evaluated as if for this time
             s.factor[:, 0] += moved
-            accelerate(*self.packed.arrays, phase.q, phase.w, 0.0, self.earlier, self.work, s)
+            accelerate(*self.arrays, phase.q, phase.w, 0.0, self.earlier, self.share, s)
             force[:] = s.force
         s.time[0] = np.nan
         self._pushed -= self.out

@@ -18,7 +18,7 @@ from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.friction import Friction, stored
 from foldyn.mechanics.contact.holding import held_by_panels, held_by_planes
 from foldyn.mechanics.contact.memory import Memory, memories, memory
-from foldyn.mechanics.contact.model import Touching, TouchingWork
+from foldyn.mechanics.contact.model import Touching, TouchingWork, contact_term
 from foldyn.mechanics.contact.pairs import VERTEX
 from foldyn.mechanics.contact.rubbing import add_rubs
 from foldyn.mechanics.contact.tables import HISTORY, NORMAL, Sheets, Tables, tables
@@ -29,6 +29,7 @@ from foldyn.mechanics.contact.tangent import (
     touching_pairs,
 )
 from foldyn.mechanics.tangent import Sparsity
+from foldyn.mechanics.term import Term
 from foldyn.mechanics.wrapped_body import WrappedBody
 
 GROUP = "contact"
@@ -214,6 +215,12 @@ class TouchingBody(WrappedBody):
             TouchingWork(work, work.angle, work.fold_angle, work.strips, work.team, own)
             for work, own in zip(works, kept, strict=True)
         ]
+
+    def terms(self, work: TouchingWork) -> list[Term]:
+        """See `Body`."""
+        group = len(self.inner.energy_groups)
+        own = contact_term(self.tables, work.memory, work.angle, group, self.rows)
+        return [*self.inner.terms(work.inner), own]
 
     @property
     def threads(self) -> int:

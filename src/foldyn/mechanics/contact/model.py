@@ -4,22 +4,25 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from numba.extending import overload
 from numpy.typing import NDArray
 
+from foldyn.jit.context import Context, contents, numbers_at, rows_at
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import move_planes, plane_powers
 from foldyn.mechanics.contact.rubbing import rub_power
 from foldyn.mechanics.contact.share import energy_of_all
 from foldyn.mechanics.contact.step_limit import limited
-from foldyn.mechanics.contact.tables import Tables
-from foldyn.mechanics.kernels import (
-    contact_limit,
-    contact_powers,
-    energies_of,
-    folds_of,
-    force_of,
+from foldyn.mechanics.contact.tables import HISTORY, Tables
+from foldyn.mechanics.term import (
+    ENERGIES,
+    FORCES,
+    LIMIT,
+    PLACE_OBSTACLES,
+    Term,
+    energies,
+    forces,
+    limit,
     place_obstacles,
 )
 from foldyn.mechanics.threads import Team
@@ -49,68 +52,53 @@ class TouchingWork(NamedTuple):
     memory: Memory
 
 
-@overload(force_of, inline="always")
-def _force(model, u, force, work):
-    if model.instance_class is not Touching:
-        return None
-
-    def touching(model, u, force, work):
-        force_of(model.inner, u, force, work.inner)
-        add_contact(model.contact, u, work.angle, force, work.memory)
-
-    return touching
+class _ContactTerm(NamedTuple):
+    tables: Tables
+    memory: Memory
+    angle: NDArray
+    group: int  # of the energies
+    rows: int
+    histories: int  # as far as planes move with them
 
 
-@overload(energies_of, inline="always")
-def _energies(model, u, work, out):
-    """The energy of contact is that of the last force, which samples are taken after.
+@forces
+def _forces(context, u, v, t, force, powers):
+    own = contents(context)
+    speed, both = rows_at(v, own.rows), numbers_at(powers, 2)
+    add_contact(own.tables, rows_at(u, own.rows), own.angle, rows_at(force, own.rows), own.memory)
+    given, taken = plane_powers(own.tables, speed, own.memory)
+    if own.tables.friction > 0.0:
+        taken += rub_power(own.tables, speed, own.memory)
+    both[0] += given
+    both[1] += taken
 
-    All members of a team have waited for each other then.
+
+@energies
+def _energies(context, u, out):
+    own = contents(context)
+    numbers_at(out, own.group + 1)[own.group] = energy_of_all(own.memory)
+
+
+@place_obstacles
+def _place(context, factors):
+    own = contents(context)
+    move_planes(own.tables, rows_at(factors, own.histories), own.memory)
+
+
+@limit
+def _limit(context, u, v, dt, lightness):
+    own = contents(context)
+    light = numbers_at(lightness, own.rows)
+    moved, speed = rows_at(u, own.rows), rows_at(v, own.rows)
+    return limited(own.tables, moved, speed, own.angle, dt, light, own.memory)
+
+
+def contact_term(tables: Tables, memory: Memory, angle: NDArray, group: int, rows: int) -> Term:
+    """Contact of what the tables hold, with the group of its energy.
+
+    That is the energy at the last force; all members of a team have waited for each other then.
     """
-    if model.instance_class is not Touching:
-        return None
-
-    def touching(model, u, work, out):
-        energies_of(model.inner, u, work.inner, out[: model.groups])
-        out[model.groups] = energy_of_all(work.memory)
-
-    return touching
-
-
-@overload(folds_of, inline="always")
-def _folds(model):
-    if model.instance_class is not Touching:
-        return None
-    return lambda model: folds_of(model.inner)
-
-
-@overload(place_obstacles, inline="always")
-def _obstacles(model, factor, work):
-    if model.instance_class is not Touching:
-        return None
-    return lambda model, factor, work: move_planes(model.contact, factor, work.memory)
-
-
-@overload(contact_powers, inline="always")
-def _powers(model, v, work):
-    if model.instance_class is not Touching:
-        return None
-
-    def powers(model, v, work):
-        given, taken = plane_powers(model.contact, v, work.memory)
-        if model.contact.friction > 0.0:
-            taken += rub_power(model.contact, v, work.memory)
-        return given, taken
-
-    return powers
-
-
-@overload(contact_limit, inline="always")
-def _limit(model, u, v, dt, lightness, work):
-    if model.instance_class is not Touching:
-        return None
-
-    def touching(model, u, v, dt, lightness, work):
-        return limited(model.contact, u, v, work.angle, dt, lightness, work.memory)
-
-    return touching
+    histories = 1 + int(tables.planes[:, HISTORY].max(initial=-1.0))
+    own = Context(_ContactTerm(tables, memory, angle, group, rows, histories))
+    kernels = {FORCES: _forces, ENERGIES: _energies, LIMIT: _limit}
+    return Term(own, kernels | ({PLACE_OBSTACLES: _place} if histories else {}))

@@ -1,0 +1,177 @@
+"""Tuples of arrays that reach compiled functions as one address.
+
+A context is an array of slots of eight bytes, one for each number, address, length and stride of a
+(nested) named tuple. Python fills it, so nothing is compiled for that; inside a kernel, `contents`
+makes the tuple again. There it owns no memory: no references are counted, and what is not used is
+not even loaded. Whoever holds the `Context` keeps all arrays alive.
+
+The layout is known to the type of a context alone, `ContextType`, whose `types` tell the store of
+kernels (`jit.kept`) all fields of the tuple.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import count
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import typeof, types
+from numba.core.imputils import impl_ret_untracked
+from numba.extending import models, register_model
+from numba.np.arrayobj import make_array, populate_array
+
+from foldyn.jit.intrinsics import DOUBLE, INT64, data_of, intrinsic
+
+WORD = 2**64 - 1
+
+
+class ContextType(types.Type):
+    """Type of the address of a tuple."""
+
+    def __init__(self, kind: types.Type) -> None:
+        self.types = (kind,)
+        super().__init__(f"Context({kind})")
+
+
+@register_model(ContextType)
+class _Address(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, INT64)
+
+
+class Context:
+    """A tuple at an address; it holds the arrays.
+
+    Numbers in the tuple are those of now. Arrays and records are shared, and may change in place.
+
+    Parameters
+    ----------
+    value : tuple
+        Named tuples within named tuples, arrays, records, numbers.
+
+    Attributes
+    ----------
+    kind : ContextType
+    address : int
+    """
+
+    def __init__(self, value: tuple) -> None:
+        kind = typeof(value)
+        self._value, self._slots = value, np.array(list(_slots(kind, value)), np.uint64)
+        self.kind, self.address = ContextType(kind), int(self._slots.ctypes.data)
+
+
+def _slots(kind: Any, value: Any) -> Iterator[int]:
+    if isinstance(kind, types.BaseTuple):
+        for inside, item in zip(kind.types, value, strict=True):  # type: ignore[attr-defined]
+            yield from _slots(inside, item)
+    elif isinstance(kind, types.Array):
+        yield value.ctypes.data
+        yield from value.shape
+        yield from (stride & WORD for stride in value.strides)
+    elif isinstance(kind, types.Record):
+        yield np.frombuffer(value.data, np.uint8).ctypes.data
+    elif isinstance(kind, types.Float):
+        yield int(np.float64(value).view(np.uint64))
+    elif isinstance(kind, types.Boolean | types.Integer):
+        yield int(value) & WORD
+    else:
+        raise TypeError(f"{kind} has no place in a context")
+
+
+def _array(context: Any, builder: Any, kind: Any, numbers: Sequence[Any]) -> Any:
+    """Array without an owner from its address, lengths and strides."""
+    out = make_array(kind)(context, builder)
+    size = context.get_abi_sizeof(context.get_data_type(kind.dtype))
+    populate_array(
+        out,
+        data=builder.inttoptr(numbers[0], out.data.type),
+        shape=numbers[1 : 1 + kind.ndim],
+        strides=numbers[1 + kind.ndim :],
+        itemsize=INT64(size),
+        meminfo=None,
+    )
+    return out._getvalue()
+
+
+def _made(context: Any, builder: Any, kind: Any, slot: Callable[[], Any]) -> Any:
+    """Value of a kind from the next slots."""
+    if isinstance(kind, types.BaseTuple):
+        items = [_made(context, builder, one, slot) for one in kind.types]  # type: ignore[attr-defined]
+        return context.make_tuple(builder, kind, items)
+    if isinstance(kind, types.Array):
+        return _array(context, builder, kind, [slot() for _ in range(1 + 2 * kind.ndim)])
+    found, wanted = slot(), context.get_value_type(kind)
+    if isinstance(kind, types.Record):
+        return builder.inttoptr(found, wanted)
+    if isinstance(kind, types.Float):
+        return builder.bitcast(found, DOUBLE)
+    return found if wanted == INT64 else builder.trunc(found, wanted)
+
+
+@intrinsic
+def contents(typing_context, context):
+    """Return the tuple that a context holds."""
+    (kind,) = context.types
+
+    def codegen(target, builder, signature, arguments):
+        base, place = builder.inttoptr(arguments[0], INT64.as_pointer()), count()
+        out = _made(
+            target, builder, kind, lambda: builder.load(builder.gep(base, [INT64(next(place))]))
+        )
+        return impl_ret_untracked(target, builder, kind, out)
+
+    return kind(context), codegen
+
+
+# ------------------------------------------------------------------ arrays by address
+def _at(kind: types.Array) -> Callable[..., Any]:
+    def codegen(context, builder, signature, arguments):
+        numbers = [arguments[0], arguments[1], INT64(8)]
+        if kind.ndim == 2:
+            numbers = [*arguments, INT64(3), INT64(24), INT64(8)]
+        return _array(context, builder, kind, numbers)
+
+    return codegen
+
+
+@intrinsic
+def rows_at(typing_context, address, count):
+    """Array (count, 3) at an address."""
+    kind = types.Array(types.float64, 2, "C")
+    return kind(types.int64, types.int64), _at(kind)
+
+
+@intrinsic
+def numbers_at(typing_context, address, count):
+    """Array (count,) at an address."""
+    kind = types.Array(types.float64, 1, "C")
+    return kind(types.int64, types.int64), _at(kind)
+
+
+# ------------------------------------------------------------------ calls by address
+def _call(result: Any, kinds: Any) -> Callable[..., Any]:
+    def codegen(context, builder, signature, arguments):
+        passed = [builder.extract_value(arguments[1], k) for k in range(len(kinds))]
+        for k, kind in enumerate(kinds):
+            if isinstance(kind, types.Array):
+                passed[k] = builder.ptrtoint(data_of(context, builder, kind, passed[k]), INT64)
+        kind = ir.FunctionType(result, [value.type for value in passed])
+        found = builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), passed)
+        return context.get_dummy_value() if isinstance(result, ir.VoidType) else found
+
+    return codegen
+
+
+@intrinsic
+def run_at(typing_context, address, arguments):
+    """Call the function at an address with a tuple of numbers, and arrays by their addresses."""
+    return types.void(types.int64, arguments), _call(ir.VoidType(), arguments.types)
+
+
+@intrinsic
+def value_at(typing_context, address, arguments):
+    """Value (float64) of the function at an address, called likewise."""
+    return types.float64(types.int64, arguments), _call(DOUBLE, arguments.types)

@@ -1,0 +1,37 @@
+"""Bars and hinges as a term of a model; see `mechanics.term`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from foldyn.jit.context import Context, contents, numbers_at, rows_at
+from foldyn.mechanics.energy import strain_energies
+from foldyn.mechanics.force import Workspace, internal_force
+from foldyn.mechanics.model import BarsHinges
+from foldyn.mechanics.term import ENERGIES, FORCES, Term, energies, forces
+
+
+class _BarsHingesTerm(NamedTuple):
+    model: BarsHinges
+    work: Workspace
+    groups: int
+
+
+@forces
+def _forces(context, u, v, t, force, powers):
+    own = contents(context)
+    rows = own.model.rest.shape[0]
+    internal_force(own.model, rows_at(u, rows), rows_at(force, rows), own.work)
+
+
+@energies
+def _energies(context, u, out):
+    own = contents(context)
+    moved = rows_at(u, own.model.rest.shape[0])
+    strain_energies(own.model, moved, numbers_at(out, own.groups))
+
+
+def bars_hinges_term(model: BarsHinges, work: Workspace, groups: int) -> Term:
+    """Bars and hinges, whose energies have so many groups."""
+    own = Context(_BarsHingesTerm(model, work, groups))
+    return Term(own, {FORCES: _forces, ENERGIES: _energies})

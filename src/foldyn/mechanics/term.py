@@ -1,0 +1,185 @@
+"""Terms of a model: what adds to its energy and forces, called by address.
+
+A model is a flat list of terms. Each is a context, a named tuple of all that the term works with
+(`jit.context`), and kernels of fixed signatures, each compiled once for a kind of term. They reach
+the loops of integrators as data, by their addresses, so that a loop is compiled once, not once for
+every combination of terms. A kernel that a term lacks has the address 0.
+
+Arrays reach a kernel by their addresses, as `rows_at` and `numbers_at` find them: u, v and force
+are (rows, 3), as in `mechanics.body`. The signatures, after the address of the context:
+
+    forces(u, v, t, force, powers)   adds its forces at u, v and the time t to `force`, N, and to
+                                     `powers` the power that it puts in and the one that it
+                                     dissipates, W; that of the body comes first, and writes
+    energies(u, out)                 adds its energies to their groups; the body's are written, too
+    limit(u, v, h, lightness) -> h   the longest step (s), at most h, in which nothing is overrun:
+                                     before each step, after the forces where the last one ended;
+                                     lightness (n,) is 1 / mass of the nodes, 1/kg
+    place_obstacles(factors)         puts what moves with histories where their factors (h, 3) say
+    advance_clock(since)             it is evaluated next so long (s) after the last accepted step
+    commit()                         the step is accepted that ends where it was evaluated last
+    dissipated() -> J                what its laws have dissipated up to there
+    branch_states(out)               writes the states (b, 2) of its branches there
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from foldyn.jit.compiled import Addressed, addressed, inner_scalar
+from foldyn.jit.context import Context, run_at, value_at
+from foldyn.mechanics.threads import Team
+
+(
+    FORCES, ENERGIES, LIMIT, PLACE_OBSTACLES, ADVANCE_CLOCK, COMMIT, DISSIPATED, BRANCH_STATES
+) = range(8)  # fmt: skip
+ADDRESS, NUMBER = types.int64, types.float64
+
+forces = addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS)
+energies = addressed(ADDRESS, ADDRESS)
+limit = addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS)
+place_obstacles = addressed(ADDRESS)
+advance_clock = addressed(NUMBER)
+commit = dissipated = addressed()
+branch_states = addressed(ADDRESS)
+
+
+class Term(NamedTuple):
+    """A term: its context, and its kernels by what they do."""
+
+    context: Context
+    kernels: Mapping[int, Addressed]
+
+
+class Whole(NamedTuple):
+    """The share of a thread that works alone, in place of `Strips`: everything."""
+
+    own: NDArray  # (2,) first and last + 1 of the rows
+
+
+class Folds(NamedTuple):
+    """What actuators turn: k hinges."""
+
+    rest: NDArray  # (k,) rest angles, rad
+    parameters: NDArray  # (k, 4)
+    stiffness: NDArray  # (k,) N m/rad
+
+
+class Terms(NamedTuple):
+    """A model as compiled loops see it: of one type, whatever its terms."""
+
+    context: NDArray  # (k,) addresses
+    kernel: NDArray  # (k, 8) addresses, or 0
+    folds: Folds
+    powers: NDArray  # (2,) memory
+
+
+class Share(NamedTuple):
+    """What a thread's loop needs of the memory of a model."""
+
+    angle: NDArray  # (nh,) dihedrals at the last force, rad
+    fold_angle: NDArray  # (k,) those of `Folds`, rad
+    strips: Whole
+    team: Team
+
+
+class Model:
+    """The terms of a body on one thread; the arrays and contexts live as long as it does.
+
+    Parameters
+    ----------
+    body : Body
+    work : memory of the thread, one of `Body.workspaces`
+
+    Attributes
+    ----------
+    terms : Terms
+    share : Share
+    """
+
+    def __init__(self, body: Any, work: Any) -> None:
+        self._held = terms = body.terms(work)
+        kernel = np.zeros((len(terms), 8), np.int64)
+        for row, term in zip(kernel, terms, strict=True):
+            for place, function in term.kernels.items():
+                row[place] = function.at(term.context)
+        context = np.array([term.context.address for term in terms], np.int64)
+        self.terms = Terms(context, kernel, body.folds, np.zeros(2))
+        own = Whole(np.asarray(work.strips.own))
+        self.share = Share(work.angle, work.fold_angle, own, work.team)
+
+
+@inner_scalar
+def forces_of(terms, u, v, t, force):
+    """Internal forces (rows, 3) at u, v and t; returns the powers in and out, W.
+
+    Keeps all dihedrals in the angle, and in the fold_angle, of the thread's `Share`.
+    """
+    terms.powers[0], terms.powers[1] = 0.0, 0.0
+    for k in range(terms.context.size):
+        run_at(terms.kernel[k, FORCES], (terms.context[k], u, v, t, force, terms.powers))
+    return terms.powers[0], terms.powers[1]
+
+
+@inner_scalar
+def energies_of(terms, u, out):
+    """Strain energies (J) by group, to `out`; of what keeps that of its last force, that."""
+    for k in range(terms.context.size):
+        if terms.kernel[k, ENERGIES] != 0:
+            run_at(terms.kernel[k, ENERGIES], (terms.context[k], u, out))
+
+
+@inner_scalar
+def limit_of(terms, u, v, dt, lightness):
+    """The longest step (s), at most dt, of all terms."""
+    for k in range(terms.context.size):
+        if terms.kernel[k, LIMIT] != 0:
+            dt = value_at(terms.kernel[k, LIMIT], (terms.context[k], u, v, dt, lightness))
+    return dt
+
+
+@inner_scalar
+def obstacles_to(terms, factor):
+    """Put moving obstacles where the factors (h, 3) of histories and their derivatives say."""
+    for k in range(terms.context.size):
+        if terms.kernel[k, PLACE_OBSTACLES] != 0:
+            run_at(terms.kernel[k, PLACE_OBSTACLES], (terms.context[k], factor))
+
+
+@inner_scalar
+def clock_to(terms, since):
+    """Tell terms with memory how long (s) after the last accepted step they are evaluated next."""
+    for k in range(terms.context.size):
+        if terms.kernel[k, ADVANCE_CLOCK] != 0:
+            run_at(terms.kernel[k, ADVANCE_CLOCK], (terms.context[k], since))
+
+
+@inner_scalar
+def commit_all(terms):
+    """Tell them that the step has been accepted that ends where they were evaluated last."""
+    for k in range(terms.context.size):
+        if terms.kernel[k, COMMIT] != 0:
+            run_at(terms.kernel[k, COMMIT], (terms.context[k],))
+
+
+@inner_scalar
+def dissipated_by(terms):
+    """Energy (J) that they have dissipated up to where they were evaluated last."""
+    lost = 0.0
+    for k in range(terms.context.size):
+        if terms.kernel[k, DISSIPATED] != 0:
+            lost += value_at(terms.kernel[k, DISSIPATED], (terms.context[k],))
+    return lost
+
+
+@inner_scalar
+def states_of(terms, out):
+    """Write the states of their branches (b, 2) there to `out`."""
+    for k in range(terms.context.size):
+        if terms.kernel[k, BRANCH_STATES] != 0:
+            run_at(terms.kernel[k, BRANCH_STATES], (terms.context[k], out))
