@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import Outcome, observe, share, tell
-from foldyn.dynamics.system import acceleration, longest_step
+from foldyn.dynamics.course import Outcome, share, tell
+from foldyn.dynamics.equation import acceleration, advance_clock, longest_step, observe
 from foldyn.jit.compiled import shared
 from foldyn.jit.intrinsics import borrowed, flat
-from foldyn.mechanics.term import clock_to
 
 ORDER = 2
 NEWTON = 4  # iterations: few, where c is small
@@ -49,19 +48,17 @@ def growth(omega, damping, dt):
 
 
 @shared
-def advance(model, system, mass, course, plan, out, work, s, stretch):
+def advance(equation, course, plan, room, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
     `course.carry` is the acceleration, kept from one step and stretch to the next; the tally keeps
     the powers beside the energies. Each thread of a team advances its own nodes.
     """
-    model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
-    course, out, s = borrowed(course), borrowed(out), borrowed(s)
-    team, a = work.team, course.carry
-    low, high = 3 * work.strips.own[0], 3 * work.strips.own[1]
+    equation, course = borrowed(equation), borrowed(course)
+    team, stage, a, powers = equation.team, equation.stage, course.carry, equation.before
+    low, high = 3 * equation.own[0], 3 * equation.own[1]
     u, v = flat(course.u)[low:high], flat(course.v)[low:high]
-    fa, ahead = flat(a)[low:high], flat(s.stage[0])[low:high]
-    powers = s.powers
+    fa, ahead = flat(a)[low:high], flat(stage[0])[low:high]
     begun = course.tally.steps
     end = min(begun + stretch, plan.steps)
     tell(team, 0.0, 0.0, 0)
@@ -72,17 +69,15 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         while True:  # once, unless contact asks for shorter steps
             dt = 0.0
             if step > 0:
-                dt = share(longest_step(model, system, course.u, course.v, left, s), left)
+                dt = share(longest_step(equation, course.u, course.v, left), left)
             for i in range(u.size):
                 v[i] += 0.5 * dt * fa[i]
                 u[i] += dt * v[i]
                 ahead[i] = v[i] + 0.5 * dt * fa[i]
             left = 0.0 if dt == left else left - dt
             now = plan.start + step * plan.dt - left
-            clock_to(model, span - left)
-            power_in, power_out = acceleration(
-                model, system, mass, course.u, s.stage[0], now, a, work, s
-            )
+            advance_clock(equation, span - left)
+            power_in, power_out = acceleration(equation, course.u, stage[0], now, a)
             for i in range(u.size):
                 v[i] += 0.5 * dt * fa[i]  # the kick that ends the step
                 wrong += not abs(v[i]) < np.inf
@@ -94,7 +89,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             if left == 0.0 or wrong > 0:
                 break
         tell(team, work_in, work_out, wrong)
-        outcome, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
+        outcome, hinge = observe(equation, a, step)
         if outcome != Outcome.DONE:
             return outcome, hinge
     return Outcome.DONE, -1

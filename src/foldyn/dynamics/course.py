@@ -9,12 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.dynamics.actuation import offset_work
-from foldyn.dynamics.record import record
-from foldyn.jit.compiled import inner, inner_scalar, scalar
+from foldyn.jit.compiled import inner_scalar, scalar
 from foldyn.materials.memory_law import VARIABLES
-from foldyn.mechanics.term import commit_all, states_of
-from foldyn.mechanics.threads import largest, part, total, wait
 
 
 class Outcome(IntEnum):
@@ -128,22 +124,6 @@ def passed_through(now, before, first, last):
     return -1
 
 
-@inner
-def sample(model, system, mass, u, v, a, t, course, out, s):
-    """Write the next sample, after `acceleration` at u, v and t; returns an outcome."""
-    k = course.tally.samples - out.first
-    out.time[k] = t
-    record(
-        model, system, mass, u, v, a, course.tally, s,
-        out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
-    )  # fmt: skip
-    states_of(model, out.memory[k])
-    if not np.isfinite(out.energy[k].sum()):
-        return Outcome.NOT_FINITE
-    course.tally.samples += 1
-    return Outcome.DONE
-
-
 @scalar
 def share(longest, left):
     """Length (s) of the equal parts, none longer than `longest`, into which `left` is divided."""
@@ -157,44 +137,3 @@ def tell(team, work_in, work_out, wrong):
     """Note for the team the work, the energy dissipated (J), and how many values are not finite."""
     note = team.note[team.number]
     note[WORK], note[DISSIPATED], note[WRONG] = work_in, work_out, wrong
-
-
-@inner_scalar
-def observe(model, system, mass, course, a, step, plan, out, work, s):
-    """What follows `acceleration` at the time of a fixed step; every member of a team calls it.
-
-    Adds up the work that the members have noted. The motion ends where it is no longer finite and
-    where panels pass through each other; every plan.every steps a sample is written. Returns
-    (outcome, hinge), the same to all.
-    """
-    team, tally = work.team, course.tally
-    wait(team)  # for the others' accelerations, dihedrals and notes
-    t = plan.start + step * plan.dt
-    if system.turns:
-        team.note[team.number, WORK] += offset_work(
-            model.folds, system.actuators, work.fold_angle, s.turned[0], s.turned[1], True
-        )
-        wait(team)
-    wrong = total(team, WRONG)
-    first, last = part(team, work.angle.size)
-    hinge = passed_through(work.angle, course.angle, first, last)
-    team.note[team.number, HINGE] = hinge
-    wait(team)
-    hinge = int(largest(team, HINGE))
-    if team.number == 0:
-        tally.work += total(team, WORK)
-        tally.dissipated += total(team, DISSIPATED)
-        tally.time = t
-        tally.steps = step
-        outcome = Outcome.DONE
-        if wrong == 0.0 and hinge < 0:
-            commit_all(model)
-        if wrong == 0.0 and hinge < 0 and step == tally.samples * plan.every:
-            outcome = sample(model, system, mass, course.u, course.v, a, t, course, out, s)
-        team.note[0, OUTCOME] = outcome + 0  # as a number
-    wait(team)
-    if wrong > 0.0:
-        return Outcome.NOT_FINITE, -1
-    if hinge >= 0:
-        return Outcome.PENETRATION, hinge
-    return int(team.note[0, OUTCOME]), -1

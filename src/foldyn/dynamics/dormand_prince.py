@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.actuation import offset_work
-from foldyn.dynamics.course import Outcome, passed_through, sample
+from foldyn.dynamics.course import Outcome, passed_through
+from foldyn.dynamics.equation import acceleration, longest_step, sample, work_of_offsets
 from foldyn.dynamics.stability import roots
-from foldyn.dynamics.system import acceleration, longest_step
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import borrowed, flat
 
@@ -106,50 +105,27 @@ def _weights(theta, out):
         out[j] = theta * (p[0] + theta * (p[1] + theta * (p[2] + theta * p[3])))
 
 
-@inner
-def _accelerate(model, system, mass, q, w, t, out, work, s):
-    """See `acceleration`: one function that is called, as five copies take long to compile."""
-    return acceleration(model, system, mass, q, w, t, out, work, s)
-
-
-@inner
-def _offset_work(model, system, work, accepted):
-    """Work of offsets since the last step (see `actuation.offset_work`)."""
-    if not system.turns:
-        return 0.0
-    last = system.actuators.hinge.size
-    return offset_work(model.folds, system.actuators, work.fold_angle, 0, last, accepted)
-
-
-@inner
-def _longest(model, system, q, w, dt, s):
-    return longest_step(model, system, q, w, dt, s)
-
-
 @kernel
-def advance(model, system, mass, course, plan, out, work, s, stretch):
+def advance(equation, course, plan, room, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
     The error of a step is that of the worst node, relative to the largest displacement and the
     largest velocity that the motion has had so far. Steps end at the stops of the plan, where
     loads may jump.
     """
-    model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
-    course, out, s = borrowed(course), borrowed(out), borrowed(s)
-    tally, n, room = course.tally, course.u.size, out.first + out.time.size
+    equation, course = borrowed(equation), borrowed(course)
+    tally, n = course.tally, course.u.size
     u, v = flat(course.u), flat(course.v)
     speeds, accelerations = np.empty((7, n)), np.empty((7, n))
     powers, weights = np.empty((2, 7)), np.empty(7)
     ut, vt, a = np.empty_like(course.u), np.empty_like(course.u), np.empty_like(course.u)
     fut, fvt, fa = flat(ut), flat(vt), flat(a)
     if tally.steps == 0:
-        powers[0, 0], powers[1, 0] = _accelerate(
-            model, system, mass, course.u, course.v, plan.start, a, work, s
-        )
-        tally.wanted = _longest(model, system, course.u, course.v, tally.wanted, s)
+        powers[0, 0], powers[1, 0] = acceleration(equation, course.u, course.v, plan.start, a)
+        tally.wanted = longest_step(equation, course.u, course.v, tally.wanted)
         if tally.samples == 0:
             tally.farthest, tally.fastest = _largest(u), _largest(v)
-            outcome = sample(model, system, mass, course.u, course.v, a, plan.start, course, out, s)
+            outcome = sample(equation, course.u, course.v, a, plan.start)
             if outcome != Outcome.DONE:
                 return outcome, -1
     else:
@@ -178,9 +154,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             moment = t + C[stage] * h
             if stops and C[stage] == 1.0:  # before what happens there
                 moment = np.nextafter(goal, -np.inf)
-            powers[0, stage], powers[1, stage] = _accelerate(
-                model, system, mass, ut, vt, moment, a, work, s
-            )
+            powers[0, stage], powers[1, stage] = acceleration(equation, ut, vt, moment, a)
             for i in range(n):
                 speeds[stage, i], accelerations[stage, i] = fvt[i], fa[i]
         tally.evaluations += 6
@@ -201,15 +175,15 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             tally.wanted = h * max(0.2, min(factor, 0.9))
             tally.refused += 1
             continue
-        hinge = passed_through(work.angle, course.angle, 0, work.angle.size)
+        hinge = passed_through(equation.angle, course.angle, 0, equation.angle.size)
         if hinge >= 0:
             return Outcome.PENETRATION, hinge
-        longest = _longest(model, system, ut, vt, plan.dt, s)
+        longest = longest_step(equation, ut, vt, plan.dt)
         after = goal if h == goal - t else t + h
         tally.steps += 1
         tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
         due = plan.start + tally.samples * plan.interval
-        done = _offset_work(model, system, work, True)
+        done = work_of_offsets(equation, True)
         begun = tally.work + done, tally.dissipated
         while plan.every == 0 and tally.samples < room and due <= after + ROUNDING * h:
             _weights(min(1.0, (due - t) / h), weights)
@@ -217,10 +191,10 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             _combine(v, accelerations, weights, h, 7, fvt)
             tally.work = _integral(begun[0], powers[0], h, weights, 7)
             tally.dissipated = _integral(begun[1], powers[1], h, weights, 7)
-            _accelerate(model, system, mass, ut, vt, due, a, work, s)
+            acceleration(equation, ut, vt, due, a)
             tally.evaluations += 1
-            tally.work += _offset_work(model, system, work, False)
-            outcome = sample(model, system, mass, ut, vt, a, due, course, out, s)
+            tally.work += work_of_offsets(equation, False)
+            outcome = sample(equation, ut, vt, a, due)
             if outcome != Outcome.DONE:
                 return outcome, -1
             due = plan.start + tally.samples * plan.interval
@@ -237,18 +211,16 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         tally.wanted = min(plan.dt, h * max(0.2, min(factor, 5.0)))
         if stops:
             tally.wanted = max(tally.wanted, min(wanted, plan.dt))
-            powers[0, 0], powers[1, 0] = _accelerate(
-                model, system, mass, course.u, course.v, after, a, work, s
-            )
+            powers[0, 0], powers[1, 0] = acceleration(equation, course.u, course.v, after, a)
             tally.evaluations += 1
-            tally.work += _offset_work(model, system, work, True)
+            tally.work += work_of_offsets(equation, True)
             for i in range(n):
                 accelerations[0, i] = fa[i]
         tally.wanted = min(tally.wanted, longest)
         if plan.every > 0 and tally.steps % plan.every == 0:
-            _accelerate(model, system, mass, course.u, course.v, after, a, work, s)
+            acceleration(equation, course.u, course.v, after, a)
             tally.evaluations += 1
-            outcome = sample(model, system, mass, course.u, course.v, a, after, course, out, s)
+            outcome = sample(equation, course.u, course.v, a, after)
             if outcome != Outcome.DONE:
                 return outcome, -1
     tally.power_in, tally.power_out = powers[0, 0], powers[1, 0]

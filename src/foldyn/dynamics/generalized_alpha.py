@@ -28,8 +28,9 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.banded import substitute
 from foldyn.dynamics.actuation import actuator_power, offset_work, turn
-from foldyn.dynamics.course import Course
+from foldyn.dynamics.course import Course, StepPlan
 from foldyn.dynamics.damping import dampers_work, drag, drag_works, viscous_work
+from foldyn.dynamics.equation import acceleration, advance_clock
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import (
     GO_ON,
@@ -41,11 +42,10 @@ from foldyn.dynamics.implicit.scheme import (
     norms,
 )
 from foldyn.dynamics.inertia import times_mass
-from foldyn.dynamics.system import Packed, acceleration, carry
+from foldyn.dynamics.system import Packed, carry
 from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import borrowed, flat
-from foldyn.mechanics.term import clock_to
 
 ORDER = 2
 SPECTRAL_RADIUS = 0.8
@@ -73,10 +73,10 @@ class Alpha(Scheme):
     symmetric, tolerance = True, 1e-7
 
     def __init__(
-        self, packed: Packed, course: Course, parameters: Parameters,
+        self, packed: Packed, course: Course, plan: StepPlan, parameters: Parameters,
         facts: Mapping[str, float] = Scheme.facts,
     ) -> None:  # fmt: skip
-        super().__init__(packed, course)
+        super().__init__(packed, course, plan)
         self._p, self.facts = parameters, facts
 
     def weights(self, h: float) -> Weights:
@@ -89,8 +89,8 @@ class Alpha(Scheme):
     def residual(self, h: float, t: float) -> tuple[float, float]:
         """See `Scheme`."""
         return residual(
-            *self.arrays, self._p, h, t, self.old, self.new, self.shift, self.out, self.share,
-            self.scratch,
+            self.equation.still, self.packed.system, self.packed.mass, self._p, h, t, self.old,
+            self.new, self.shift, self.out, self.scratch,
         )  # fmt: skip
 
     def iterate(
@@ -101,8 +101,9 @@ class Alpha(Scheme):
         if matrix.band is None:
             return super().iterate(matrix, goal, h, t, last, lowest, most)
         return _iterate(
-            *self.arrays, self._p, h, t, self.old, self.new, self.shift, self.out, self.share,
-            self.scratch, self.earlier, matrix.band, matrix.free, goal, last, lowest, most,
+            self.equation.still, self.packed.system, self.packed.mass, self._p, h, t, self.old,
+            self.new, self.shift, self.out, self.scratch, self.earlier, matrix.band, matrix.free,
+            goal, last, lowest, most,
         )  # fmt: skip
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
@@ -114,13 +115,14 @@ class Alpha(Scheme):
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""
-        terms, system, mass = self.arrays
+        packed = self.packed
+        system, mass = packed.system, packed.mass
         done, lost = _works(system, mass, h, self.old, self.new, self.shift, self.scratch)
         if system.damping.follows:
             lost += _taken(system, self.old, self.new, self.scratch)
         if system.turns:
             done += _actuation(
-                terms.folds, system, self.old, self.new, self.folds, self.work.fold_angle
+                packed.body.folds, system, self.old, self.new, self.folds, self.work.fold_angle
             )
         return done, lost
 
@@ -143,16 +145,16 @@ numerical damping: a linear system keeps its energy; another one may gain some w
 """
 
 
-def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[Packed, Course], Alpha]:
+def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[Packed, Course, StepPlan], Alpha]:
     """Make the steps of the method for a spectral radius."""
     facts = {"spectral_radius": spectral_radius}
     return partial(Alpha, parameters=parameters(spectral_radius), facts=facts)
 
 
 @kernel
-def residual(model, system, mass, p, h, t, old, new, shift, out, work, s):
+def residual(equation, system, mass, p, h, t, old, new, shift, out, s):
     """Residual of a step into `out`; returns its norm and that of the forces at play, N."""
-    model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
+    equation, system, mass = borrowed(equation), borrowed(system), borrowed(mass)
     old, new, s = borrowed(old), borrowed(new), borrowed(s)
     am, af, beta, gamma = p
     q0, w0, a0, b0 = flat(old.q), flat(old.w), flat(old.a), flat(old.force)
@@ -170,8 +172,8 @@ def residual(model, system, mass, p, h, t, old, new, shift, out, work, s):
     if system.ties.slave.size > 0:  # of which the masters may be such nodes
         follow_masters(system.ties, a1)
         follow_masters(system.ties, w1)
-    clock_to(model, h)
-    acceleration(model, system, mass, new.q, new.w, t, out, work, s)
+    advance_clock(equation, h)
+    acceleration(equation, new.q, new.w, t, out)
     for i in range(q0.size):
         b1[i] = flat(s.force)[i]
         slowed = drag(system.damping, (1.0 - af) * w1[i] + af * w0[i])
@@ -188,7 +190,7 @@ def residual(model, system, mass, p, h, t, old, new, shift, out, work, s):
 
 @kernel
 def _iterate(
-    model, system, mass, p, h, t, old, new, shift, out, work, s, earlier, band, free, goal, last,
+    equation, system, mass, p, h, t, old, new, shift, out, s, earlier, band, free, goal, last,
     lowest, most,
 ):  # fmt: skip
     """Iterate with the factors of a band; see `Scheme.iterate`."""
@@ -196,7 +198,7 @@ def _iterate(
     step = np.empty(free.size)
     norm = np.inf
     for steps in range(most):
-        norm, reference = residual(model, system, mass, p, h, t, old, new, shift, out, work, s)
+        norm, reference = residual(equation, system, mass, p, h, t, old, new, shift, out, s)
         verdict = judge(goal, norm, reference, last, lowest)
         if verdict != GO_ON:
             return verdict, norm, steps

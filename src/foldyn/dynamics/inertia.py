@@ -235,10 +235,16 @@ def moving_energy(mass, factor):
 
 
 @inner_scalar
+def lumped_energy(diagonal, v, own):
+    """The same for a diagonal matrix (n,)."""
+    return 0.5 * _lumped_sum(diagonal[own[0] : own[1]], v[own[0] : own[1]])
+
+
+@inner_scalar
 def kinetic_energy(m, v, own):
     """v M v / 2 (J), the part of the nodes own[0] to own[1]; v (n, 3)."""
     if m.lumped:
-        return 0.5 * _lumped_sum(m.diagonal[own[0] : own[1]], v[own[0] : own[1]])
+        return lumped_energy(m.diagonal, v, own)
     total = 0.0
     for i in range(own[0], own[1]):
         for c in range(3):

@@ -18,6 +18,7 @@ from foldyn.dynamics import (
     rk4,
 )
 from foldyn.dynamics.course import Course, Samples, StepPlan
+from foldyn.dynamics.equation import EquationOfMotion
 from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.modal_damping import ModalRows, modal_rows
 from foldyn.dynamics.snapshot import parts_of, restore, snapshot
@@ -33,7 +34,6 @@ from foldyn.dynamics.system import Packed, scratches
 from foldyn.dynamics.timing import jumps
 from foldyn.errors import InputError
 from foldyn.jit.compiled import ready
-from foldyn.mechanics.term import Model
 from foldyn.mechanics.threads import run_together
 from foldyn.values import of_kind
 
@@ -69,17 +69,17 @@ class Compiled:
     ) -> None:  # fmt: skip
         self._loop, self._packed, self._course, self._plan = loop, packed, course, plan
         self._works = packed.body.workspaces(threads)
-        self._models = [Model(packed.body, work) for work in self._works]
         self._memories = scratches(packed.system, self._works)
+        self._equations = [
+            EquationOfMotion(packed, work, memory, course, plan)
+            for work, memory in zip(self._works, self._memories, strict=True)
+        ]
         self.threads = len(self._works)
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
-        case = self._packed.system, self._packed.mass, self._course, self._plan, out
-        arguments = [
-            (model.terms, *case, model.share, memory, stretch)
-            for model, memory in zip(self._models, self._memories, strict=True)
-        ]
+        case = self._course, self._plan, out.end, stretch
+        arguments = [(equation.sampled(out), *case) for equation in self._equations]
         return run_together(self._loop, [work.team for work in self._works], arguments)[0]
 
     def standing(self) -> dict[str, NDArray]:

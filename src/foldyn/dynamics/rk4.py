@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import Outcome, observe, share, tell
+from foldyn.dynamics.course import Outcome, share, tell
+from foldyn.dynamics.equation import acceleration, advance_clock, longest_step, observe
 from foldyn.dynamics.stability import roots
-from foldyn.dynamics.system import acceleration, longest_step
 from foldyn.jit.compiled import shared
 from foldyn.jit.intrinsics import borrowed, flat
-from foldyn.mechanics.term import clock_to
 
 ORDER = 4
 
@@ -25,17 +24,16 @@ def growth(omega, damping, dt):
 
 
 @shared
-def advance(model, system, mass, course, plan, out, work, s, stretch):
+def advance(equation, course, plan, room, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
     Work and dissipated energy are integrated with the method's own weights. Each thread of a team
     advances its own nodes.
     """
-    model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
-    course, out, s = borrowed(course), borrowed(out), borrowed(s)
-    team = work.team
-    low, high = 3 * work.strips.own[0], 3 * work.strips.own[1]
-    stage_u, stage_v, a = s.stage[0], s.stage[1], s.stage[2]
+    equation, course = borrowed(equation), borrowed(course)
+    team, stage = equation.team, equation.stage
+    low, high = 3 * equation.own[0], 3 * equation.own[1]
+    stage_u, stage_v, a = stage[0], stage[1], stage[2]
     u, v = flat(course.u)[low:high], flat(course.v)[low:high]
     ut, vt, fa = flat(stage_u)[low:high], flat(stage_v)[low:high], flat(a)[low:high]
     du, dv = np.empty_like(u), np.empty_like(v)
@@ -54,21 +52,17 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
                 since = 0.5 * ((stage + 1) // 2) * dt
                 t = now + since
                 if stage > 0:
-                    clock_to(model, plan.dt - left + since)
-                power_in, power_out = acceleration(
-                    model, system, mass, stage_u, stage_v, t, a, work, s
-                )
+                    advance_clock(equation, plan.dt - left + since)
+                power_in, power_out = acceleration(equation, stage_u, stage_v, t, a)
                 weight = 2.0 if 0 < stage < 3 else 1.0
                 part_in += weight * power_in
                 part_out += weight * power_out
                 if stage == 0:
                     if first:
-                        outcome, hinge = observe(
-                            model, system, mass, course, a, step, plan, out, work, s
-                        )
+                        outcome, hinge = observe(equation, a, step)
                         if outcome != Outcome.DONE or step == end:
                             return outcome, hinge
-                    dt = share(longest_step(model, system, course.u, course.v, left, s), left)
+                    dt = share(longest_step(equation, course.u, course.v, left), left)
                 ahead = 0.5 * dt if stage < 2 else dt
                 if stage == 0:
                     for i in range(u.size):

@@ -19,35 +19,25 @@ from scipy import sparse
 from foldyn.cases import Case, History
 from foldyn.cases.waveforms import Callbacks, Waveforms, evaluate
 from foldyn.cases.waveforms import pack as pack_waveforms
-from foldyn.dynamics.actuation import Actuators, actuators, power_of_part, turn_part
+from foldyn.dynamics.actuation import Actuators, actuators
 from foldyn.dynamics.damping import (
     Damping,
-    add_dampers,
-    add_viscous,
     damping_of,
-    drag,
-    drag_power,
-    has_dampers,
 )
 from foldyn.dynamics.hereditary import with_memory
 from foldyn.dynamics.inertia import (
     Inertia,
     inertia,
-    kinetic_energy,
     lightness,
-    moving_energy,
-    solve_mass,
     substitute,
     times_mass,
 )
 from foldyn.dynamics.modal_damping import ModalRows, modal_rows
 from foldyn.dynamics.ties import Ties, ties_of
-from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.body import Body, Numbering, renumbered
-from foldyn.mechanics.following import Following, joined, push_following
-from foldyn.mechanics.term import forces_of, limit_of, obstacles_to
-from foldyn.mechanics.threads import wait
+from foldyn.mechanics.following import Following, joined
 
 
 class Entries(NamedTuple):
@@ -268,11 +258,11 @@ def place(system, q, w, t, s):
 def carry(moved, factor, derivative, still, out):
     """Add the motion of the supports, S f or a derivative of it, to q, w or q'', all (n, 3)."""
     values, rest = flat(out), flat(still)
-    _carry_part(moved, factor, derivative, rest, values, (0, values.size), (0, moved.dof.size))
+    carry_part(moved, factor, derivative, rest, values, (0, values.size), (0, moved.dof.size))
 
 
 @inner
-def _carry_part(moved, factor, derivative, rest, values, dofs, supports):
+def carry_part(moved, factor, derivative, rest, values, dofs, supports):
     """The same for the dofs dofs[0] to dofs[1] with their supports."""
     for i in range(dofs[0], dofs[1]):
         values[i] = rest[i]
@@ -281,98 +271,9 @@ def _carry_part(moved, factor, derivative, rest, values, dofs, supports):
 
 
 @inner
-def _moving_power(moved, force, factor, first, last):
+def moving_power(moved, force, factor, first, last):
     """Power (W) of some moving supports against the bracket of the forces."""
     power, bracket = 0.0, flat(force)
     for k in range(first, last):
         power += bracket[moved.dof[k]] * moved.value[k] * factor[moved.row[k], 1]
     return power
-
-
-@inner_scalar
-def acceleration(model, system, mass, q, w, t, out, work, s):
-    """Acceleration q'' (n, 3) at time t, q and w the displacement and velocity without S f.
-
-    q'' = - M^-1 (F_int + beta K0 v - p) - alpha w on free dofs. Returns the power of loads,
-    supports and actuators, and the power dissipated (W). The bracket stays in `s.force`.
-
-    A member of a team computes this for its own nodes, q and w changed there only.
-    """
-    first, last = 3 * work.strips.own[0], 3 * work.strips.own[1]
-    if system.varies and t != s.time[0]:  # two stages of a step may share their time
-        derive = system.moves or system.turns or system.presses
-        evaluate(system.waves, t, derive, s.factor)
-        s.time[0] = t
-    if system.turns:
-        turn_part(model.folds, system.actuators, s.factor, s.turned[0], s.turned[1])
-    if system.moves:
-        own, supports = (first, last), (s.moved[0], s.moved[1])
-        here, there = flat(s.displacement), flat(s.velocity)
-        _carry_part(system.moved, s.factor, 0, flat(q), here, own, supports)
-        _carry_part(system.moved, s.factor, 1, flat(w), there, own, supports)
-    if system.presses:
-        obstacles_to(model, s.factor)
-    u = s.displacement if system.moves else q
-    v = s.velocity if system.moves else w
-    wait(work.team)  # for q and w of the others
-    power_in, power_out = forces_of(model, u, v, t, s.force)
-    force, speed = flat(s.force), flat(v)
-    loads, damping = system.loads, system.damping
-    for k in range(s.loads[0], s.loads[1]):
-        dof = loads.dof[k]
-        load = loads.value[k] * s.factor[loads.row[k], 0]
-        force[dof] -= load
-        power_in += load * speed[dof]
-    if system.follows:  # on one thread only
-        power_in += push_following(system.following, u, v, s.factor, s.pushed, s.force)
-    if damping.data.size > 0:
-        power_out += add_viscous(damping, speed, force, first, last)
-        wait(work.team)  # others look at this member's velocities
-    if has_dampers(damping):  # on one thread only
-        power_out += add_dampers(damping, u, v, s.force)
-    kinetic = 0.0
-    if damping.alpha > 0.0:
-        kinetic = kinetic_energy(mass, v, work.strips.own)
-    if not mass.lumped:
-        wait(work.team)  # for the forces of the others, and their look at this member's velocities
-        solve_mass(mass, s.force, out, s.line, work.team.number, work.team.size)
-        wait(work.team)  # each has solved for its axes
-    accelerated, relative = flat(out)[first:last], flat(w)[first:last]
-    if mass.lumped:
-        bracket, inverse = force[first:last], flat(mass.inverse)[first:last]
-        for i in range(bracket.size):
-            accelerated[i] = -bracket[i] * inverse[i] - drag(damping, relative[i])
-    else:
-        for i in range(relative.size):
-            accelerated[i] = -accelerated[i] - drag(damping, relative[i])
-    if damping.alpha > 0.0:
-        power_out += drag_power(damping, kinetic)
-    if system.moves:
-        # but for what changes the kinetic energy of S f'
-        power_in += _moving_power(system.moved, s.force, s.factor, s.moved[0], s.moved[1])
-        if work.team.number == 0:
-            power_in += drag_power(damping, moving_energy(system.moved_mass, s.factor))
-    if system.turns:
-        power_in += power_of_part(
-            model.folds, system.actuators, s.factor, work.fold_angle, s.turned[0], s.turned[1]
-        )
-    return power_in, power_out
-
-
-@inner_scalar
-def longest_step(model, system, q, w, dt, s):
-    """The longest step (s), at most dt, that contact allows: after `acceleration` at q and w.
-
-    Once before each step, where the last one has ended.
-    """
-    if not system.touches:
-        return dt
-    u = s.displacement if system.moves else q
-    v = s.velocity if system.moves else w
-    return limit_of(model, u, v, dt, system.lightness)
-
-
-@kernel
-def accelerate(model, system, mass, q, w, t, out, work, s):
-    """See `acceleration`: for Python."""
-    return acceleration(model, system, mass, q, w, t, out, work, s)

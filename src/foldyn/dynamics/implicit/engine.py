@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.banded import one_thread
 from foldyn.dynamics.actuation import jolt
-from foldyn.dynamics.course import Course, Outcome, Samples, StepPlan, sample
+from foldyn.dynamics.course import Course, Outcome, Samples, StepPlan
+from foldyn.dynamics.equation import accelerate, write
 from foldyn.dynamics.implicit.impulse import impulse_lasts
 from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.newton import Newton
@@ -31,8 +32,7 @@ from foldyn.dynamics.implicit.step_control import (
 from foldyn.dynamics.implicit.touching import TouchingNewton
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.snapshot import parts_of, restore, snapshot
-from foldyn.dynamics.system import Packed, accelerate, acceleration
-from foldyn.jit.compiled import kernel
+from foldyn.dynamics.system import Packed
 
 LEAST_STEP = 2.0**-20  # of the step wanted: where Newton's method fails with less, it fails
 LEAST_TIME = 1e-13  # step relative to the end of the motion
@@ -66,11 +66,11 @@ class Implicit:
     threads = 1
 
     def __init__(
-        self, make: Callable[[Packed, Course], Scheme], packed: Packed, course: Course,
+        self, make: Callable[[Packed, Course, StepPlan], Scheme], packed: Packed, course: Course,
         plan: StepPlan, jumps: tuple[float, ...],
     ) -> None:  # fmt: skip
         self._packed, self._course, self._plan, self._jumps = packed, course, plan, jumps
-        self._scheme = make(packed, course)
+        self._scheme = make(packed, course, plan)
         self._matrix = StepMatrix(packed, self._scheme.symmetric)
         touches = packed.system.touches
         self._touching = TouchingNewton(self._scheme, self._matrix) if touches else None
@@ -143,7 +143,7 @@ class Implicit:
             memory.still()
         old, t = self._scheme.old, float(self._course.tally.time)
         scheme = self._scheme
-        accelerate(*scheme.arrays, old.q, old.w, t, out, scheme.share, scheme.scratch)
+        accelerate(scheme.equation.still, old.q, old.w, t, out)
         out[scheme.massless] = 0.0
         return out
 
@@ -218,10 +218,8 @@ class Implicit:
 
     def _sample(self, t: float, out: Samples) -> int:
         """Write a sample."""
-        scheme = self._scheme
-        return _write(
-            *scheme.arrays, self._course, t, out, scheme.share, scheme.scratch, scheme.out
-        )
+        scheme, course = self._scheme, self._course
+        return write(scheme.equation.sampled(out), course.u, course.v, t, scheme.out)
 
     def _fixed(self, out: Samples) -> tuple[int, int]:
         """One step of dt, in parts where a load jumps or Newton's method fails."""
@@ -378,10 +376,3 @@ def _same(now: NDArray, then: NDArray) -> bool:
 
 def _largest(values: NDArray) -> float:
     return float(np.abs(values).max(initial=0.0))
-
-
-@kernel
-def _write(model, system, mass, course, t, out, work, s, a):
-    """Write the next sample at time t."""
-    acceleration(model, system, mass, course.u, course.v, t, a, work, s)
-    return sample(model, system, mass, course.u, course.v, a, t, course, out, s)

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases.waveforms import unseen
-from foldyn.dynamics.course import Course
+from foldyn.dynamics.course import Course, StepPlan
+from foldyn.dynamics.equation import EquationOfMotion, accelerate
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.system import Packed, Scratch, accelerate, place, scratch
+from foldyn.dynamics.system import Packed, Scratch, place, scratch
 from foldyn.dynamics.ties import hand_over
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
@@ -21,7 +22,6 @@ from foldyn.mechanics.contact.body import contact_tangent
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.tables import Tables
 from foldyn.mechanics.following import following_force
-from foldyn.mechanics.term import Model
 
 EPS = float(np.finfo(float).eps)
 FAST = 0.3  # share of the residual that an iteration leaves, below which its matrix is kept
@@ -81,6 +81,7 @@ class Scheme(ABC):
         The case.
     course : Course
         Where the motion stands: q, w and a of `old` are its arrays.
+    plan : StepPlan
 
     Attributes
     ----------
@@ -96,13 +97,11 @@ class Scheme(ABC):
     tolerance: ClassVar[float]
     facts: Mapping[str, float] = {}
 
-    def __init__(self, packed: Packed, course: Course) -> None:
+    def __init__(self, packed: Packed, course: Course, plan: StepPlan) -> None:
         self.packed, self.course = packed, course
         self.work: Any = packed.body.workspaces(1)[0]
-        self.model = Model(packed.body, self.work)
-        self.share = self.model.share
-        self.arrays = self.model.terms, packed.system, packed.mass
         self.scratch: Scratch = scratch(packed.system)
+        self.equation = EquationOfMotion(packed, self.work, self.scratch, course, plan)
         shape, histories = course.u.shape, self.scratch.factor.shape
         self.out, self.step = np.zeros(shape), np.zeros(shape)
         self.shift = np.zeros(shape)  # new.q - old.q: their difference would lose digits
@@ -180,7 +179,7 @@ class Scheme(ABC):
     def begin(self, t: float) -> None:
         """Make `old` the beginning of a motion, or of its part after a jump, at t (s)."""
         old, s = self.old, self.scratch
-        accelerate(*self.arrays, old.q, old.w, t, old.a, self.share, s)
+        accelerate(self.equation.still, old.q, old.w, t, old.a)
         old.a[self.massless] = 0.0
         self._speed[:], self._last = old.w, 0.0
         self._growth[:] = 0.0
@@ -252,7 +251,7 @@ class Scheme(ABC):
         for moved, force in ((change, self._pushed), (np.zeros_like(change), self.out)):
             s.factor[:], s.time[0] = phase.factor, 0.0  # evaluated as if for this time
             s.factor[:, 0] += moved
-            accelerate(*self.arrays, phase.q, phase.w, 0.0, self.earlier, self.share, s)
+            accelerate(self.equation.still, phase.q, phase.w, 0.0, self.earlier)
             force[:] = s.force
         s.time[0] = np.nan
         self._pushed -= self.out

@@ -1,0 +1,528 @@
+"""The equation of motion behind a few addresses: what every integrator calls, compiled once.
+
+With terms by address, what a case consists of has the same types in every motion. Loops get the
+addresses of the functions here, so that they hold nothing but their own arithmetic. What only some
+motions have (histories, supports and rest angles that move, dampers, a mass matrix that is not
+diagonal) are parts of their own, which are compiled where they are used; elsewhere their address is
+0. Dead loads, drag and a diagonal mass, which nearly all have, are not: calls take some ns.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.waveforms import evaluate
+from foldyn.dynamics.actuation import offset_work, power_of_part, turn_part
+from foldyn.dynamics.course import (
+    DISSIPATED,
+    HINGE,
+    OUTCOME,
+    WORK,
+    WRONG,
+    Course,
+    Outcome,
+    Samples,
+    StepPlan,
+    passed_through,
+)
+from foldyn.dynamics.damping import add_dampers, add_viscous, drag_power
+from foldyn.dynamics.inertia import (
+    Inertia,
+    kinetic_energy,
+    lumped_energy,
+    moving_energy,
+    solve_mass,
+)
+from foldyn.dynamics.record import record
+from foldyn.dynamics.system import Entries, Packed, Scratch, System, carry_part, moving_power
+from foldyn.jit.compiled import addressed, inner_scalar, kernel
+from foldyn.jit.context import Context, contents, numbers_at, rows_at, run_at, value_at
+from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.following import push_following
+from foldyn.mechanics.term import (
+    ADDRESS,
+    ADVANCE_CLOCK,
+    LIMIT,
+    NUMBER,
+    Model,
+    Share,
+    Terms,
+    clock_to,
+    commit_all,
+    forces_of,
+    limit_of,
+    obstacles_to,
+    states_of,
+)
+from foldyn.mechanics.threads import Team, largest, part, total, wait
+
+DONE, NOT_FINITE = float(Outcome.DONE), float(Outcome.NOT_FINITE)
+PENETRATION = float(Outcome.PENETRATION)
+
+
+class Setting(NamedTuple):
+    """A case on one thread: what parts work with."""
+
+    terms: Terms
+    system: System
+    mass: Inertia
+    share: Share
+    s: Scratch
+
+
+class Balance(NamedTuple):
+    """What every acceleration needs; what only some have are addresses, or 0."""
+
+    terms: Terms
+    setting: int  # context of the parts
+    histories: int  # evaluates them
+    turn: int  # moves rest angles,
+    carry: int  # supports,
+    presses: bool  # and obstacles
+    follow: int  # loads that depend on the displacement
+    viscous: int
+    dampers: int
+    solve: int  # M^-1, unless M is diagonal,
+    kinetic: int  # and the kinetic energy
+    moving_power: int  # of supports
+    turning_power: int  # of rest angles
+    alpha: float
+    diagonal: NDArray
+    inverse: NDArray
+    loads: Entries
+    loads_own: NDArray  # (2,) first and last + 1 of the thread's own
+    factor: NDArray
+    force: NDArray
+    displacement: NDArray
+    velocity: NDArray
+    team: Team
+    own: NDArray  # (2,) first and last + 1 of the thread's own rows
+
+
+class Recording(NamedTuple):
+    """A case on one thread, and where samples go."""
+
+    setting: Setting
+    course: Course
+    out: Samples
+
+
+class Observing(NamedTuple):
+    """The same for methods with fixed steps, which call other functions here."""
+
+    setting: Setting
+    course: Course
+    plan: StepPlan
+    sample: int  # kernels, and their contexts
+    recording: int
+    offsets: int
+    setting_at: int
+
+
+class Equation(NamedTuple):
+    """What a loop gets: addresses, and its thread's share."""
+
+    acceleration: int
+    limit: int  # 0 without contact
+    clock: int  # 0 without memory
+    offsets: int  # 0 where nothing turns
+    sample: int
+    observe: int
+    balance: int  # contexts
+    setting: int
+    recording: int
+    observing: int
+    powers: NDArray  # (2,) in and out at the last acceleration, W
+    before: NDArray  # (2,) and at the last step, for methods that keep them
+    found: NDArray  # (2,) outcome and hinge of the last observation
+    team: Team
+    own: NDArray  # (2,)
+    stage: NDArray  # (3, n, 3) memory of methods with several stages
+    angle: NDArray  # (nh,) dihedrals at the last acceleration, rad
+
+
+# ------------------------------------------------------------------ parts
+@addressed(NUMBER)
+def _histories(context, t):
+    m = contents(context)
+    if t != m.s.time[0]:  # two stages of a step may share their time
+        derive = m.system.moves or m.system.turns or m.system.presses
+        evaluate(m.system.waves, t, derive, m.s.factor)
+        m.s.time[0] = t
+
+
+@addressed()
+def _turn(context):
+    m = contents(context)
+    turn_part(m.terms.folds, m.system.actuators, m.s.factor, m.s.turned[0], m.s.turned[1])
+
+
+@addressed(ADDRESS, ADDRESS)
+def _carry(context, q, w):
+    m = contents(context)
+    rows, own = m.s.force.shape[0], m.share.strips.own
+    dofs, supports = (3 * own[0], 3 * own[1]), (m.s.moved[0], m.s.moved[1])
+    here, there, moved = flat(m.s.displacement), flat(m.s.velocity), m.system.moved
+    carry_part(moved, m.s.factor, 0, flat(rows_at(q, rows)), here, dofs, supports)
+    carry_part(moved, m.s.factor, 1, flat(rows_at(w, rows)), there, dofs, supports)
+
+
+@addressed(ADDRESS, ADDRESS)
+def _follow(context, u, v):  # on one thread only
+    m = contents(context)
+    rows, loads = m.s.force.shape[0], m.system.following
+    moved, speed = rows_at(u, rows), rows_at(v, rows)
+    return push_following(loads, moved, speed, m.s.factor, m.s.pushed, m.s.force)
+
+
+@addressed(ADDRESS)
+def _viscous(context, v):
+    m = contents(context)
+    speed, own = flat(rows_at(v, m.s.force.shape[0])), m.share.strips.own
+    return add_viscous(m.system.damping, speed, flat(m.s.force), 3 * own[0], 3 * own[1])
+
+
+@addressed(ADDRESS, ADDRESS)
+def _dampers(context, u, v):  # on one thread only
+    m = contents(context)
+    rows = m.s.force.shape[0]
+    return add_dampers(m.system.damping, rows_at(u, rows), rows_at(v, rows), m.s.force)
+
+
+@addressed(ADDRESS)
+def _solve(context, out):
+    m = contents(context)
+    rows, team = m.s.force.shape[0], m.share.team
+    wait(team)  # for the forces of the others, and their look at this member's velocities
+    solve_mass(m.mass, m.s.force, rows_at(out, rows), m.s.line, team.number, team.size)
+    wait(team)  # each has solved for its axes
+
+
+@addressed(ADDRESS)
+def _kinetic(context, v):
+    m = contents(context)
+    return kinetic_energy(m.mass, rows_at(v, m.s.force.shape[0]), m.share.strips.own)
+
+
+@addressed()
+def _moving_power(context):
+    m = contents(context)
+    power = moving_power(m.system.moved, m.s.force, m.s.factor, m.s.moved[0], m.s.moved[1])
+    if m.share.team.number == 0:
+        power += drag_power(m.system.damping, moving_energy(m.system.moved_mass, m.s.factor))
+    return power
+
+
+@addressed()
+def _turning_power(context):
+    m = contents(context)
+    return power_of_part(
+        m.terms.folds, m.system.actuators, m.s.factor, m.share.fold_angle, m.s.turned[0],
+        m.s.turned[1],
+    )  # fmt: skip
+
+
+@addressed(NUMBER)
+def _offsets(context, accepted):
+    m = contents(context)
+    return offset_work(
+        m.terms.folds, m.system.actuators, m.share.fold_angle, m.s.turned[0], m.s.turned[1],
+        accepted > 0.0,
+    )  # fmt: skip
+
+
+@addressed(ADDRESS, ADDRESS, NUMBER)
+def _limit(context, q, w, dt):
+    m = contents(context)
+    rows = m.s.force.shape[0]
+    u = m.s.displacement if m.system.moves else rows_at(q, rows)
+    v = m.s.velocity if m.system.moves else rows_at(w, rows)
+    return limit_of(m.terms, u, v, dt, m.system.lightness)
+
+
+@addressed(NUMBER)
+def _clock(context, since):
+    clock_to(contents(context).terms, since)
+
+
+# ------------------------------------------------------------------ the equation
+@addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS)
+def _acceleration(context, q, w, t, out, powers):
+    m = contents(context)
+    rows, first, last = m.force.shape[0], 3 * m.own[0], 3 * m.own[1]
+    if m.histories != 0:
+        run_at(m.histories, (m.setting, t))
+    if m.turn != 0:
+        run_at(m.turn, (m.setting,))
+    if m.carry != 0:
+        run_at(m.carry, (m.setting, q, w))
+    if m.presses:
+        obstacles_to(m.terms, m.factor)
+    u = m.displacement if m.carry != 0 else rows_at(q, rows)
+    v = m.velocity if m.carry != 0 else rows_at(w, rows)
+    wait(m.team)  # for q and w of the others
+    power_in, power_out = forces_of(m.terms, u, v, t, m.force)
+    force, speed, loads = flat(m.force), flat(v), m.loads
+    for k in range(m.loads_own[0], m.loads_own[1]):
+        dof = loads.dof[k]
+        load = loads.value[k] * m.factor[loads.row[k], 0]
+        force[dof] -= load
+        power_in += load * speed[dof]
+    if m.follow != 0:
+        power_in += value_at(m.follow, (m.setting, u, v))
+    if m.viscous != 0:
+        power_out += value_at(m.viscous, (m.setting, v))
+        wait(m.team)  # others look at this member's velocities
+    if m.dampers != 0:
+        power_out += value_at(m.dampers, (m.setting, u, v))
+    kinetic = 0.0
+    if m.alpha > 0.0:
+        if m.kinetic != 0:
+            kinetic = value_at(m.kinetic, (m.setting, v))
+        else:
+            kinetic = lumped_energy(m.diagonal, v, m.own)
+    accelerated, relative = flat(rows_at(out, rows))[first:last], flat(rows_at(w, rows))[first:last]
+    if m.solve != 0:
+        run_at(m.solve, (m.setting, out))
+        for i in range(relative.size):
+            accelerated[i] = -accelerated[i] - m.alpha * relative[i]
+    else:
+        bracket, inverse = force[first:last], flat(m.inverse)[first:last]
+        for i in range(bracket.size):
+            accelerated[i] = -bracket[i] * inverse[i] - m.alpha * relative[i]
+    if m.alpha > 0.0:
+        power_out += 2.0 * m.alpha * kinetic
+    if m.moving_power != 0:  # but for what changes the kinetic energy of S f'
+        power_in += value_at(m.moving_power, (m.setting,))
+    if m.turning_power != 0:
+        power_in += value_at(m.turning_power, (m.setting,))
+    both = numbers_at(powers, 2)
+    both[0], both[1] = power_in, power_out
+
+
+# ------------------------------------------------------------------ what is seen of a motion
+@addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER)
+def _sample(context, u, v, a, t):
+    r = contents(context)
+    m, course, out, rows = r.setting, r.course, r.out, r.setting.s.force.shape[0]
+    k = course.tally.samples - out.first
+    out.time[k] = t
+    record(
+        m.terms, m.system, m.mass, rows_at(u, rows), rows_at(v, rows), rows_at(a, rows),
+        course.tally, m.s, out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
+    )  # fmt: skip
+    states_of(m.terms, out.memory[k])
+    sound = 0.0
+    for c in range(out.energy.shape[1]):
+        sound += out.energy[k, c]
+    if not abs(sound) < np.inf:
+        return NOT_FINITE
+    course.tally.samples += 1
+    return DONE
+
+
+@addressed(ADDRESS, NUMBER, ADDRESS)
+def _observe(context, a, step, found):
+    r = contents(context)
+    course, plan, share = r.course, r.plan, r.setting.share
+    team, tally, both = share.team, course.tally, numbers_at(found, 2)
+    wait(team)  # for the others' accelerations, dihedrals and notes
+    t = plan.start + step * plan.dt
+    if r.offsets != 0:
+        team.note[team.number, WORK] += value_at(r.offsets, (r.setting_at, 1.0))
+        wait(team)
+    wrong = total(team, WRONG)
+    first, last = part(team, share.angle.size)
+    hinge = passed_through(share.angle, course.angle, first, last)
+    team.note[team.number, HINGE] = hinge
+    wait(team)
+    hinge = int(largest(team, HINGE))
+    if team.number == 0:
+        tally.work += total(team, WORK)
+        tally.dissipated += total(team, DISSIPATED)
+        tally.time = t
+        tally.steps = int(step)
+        outcome = DONE
+        if wrong == 0.0 and hinge < 0:
+            commit_all(r.setting.terms)
+        if wrong == 0.0 and hinge < 0 and int(step) == tally.samples * plan.every:
+            outcome = value_at(r.sample, (r.recording, course.u, course.v, a, t))
+        team.note[0, OUTCOME] = outcome
+    wait(team)
+    both[0], both[1] = team.note[0, OUTCOME], -1.0
+    if wrong > 0.0:
+        both[0] = NOT_FINITE
+    elif hinge >= 0:
+        both[0], both[1] = PENETRATION, float(hinge)
+
+
+# ------------------------------------------------------------------ what loops call
+@inner_scalar
+def acceleration(equation, q, w, t, a):
+    """Acceleration q'' (n, 3) at time t, q and w the displacement and velocity without S f.
+
+    q'' = - M^-1 (F_int + beta K0 v - p) - alpha w on free dofs. Returns the power of loads,
+    supports and actuators, and the power dissipated (W). The bracket stays in `Scratch.force`.
+
+    A member of a team computes this for its own nodes, q and w changed there only.
+    """
+    run_at(equation.acceleration, (equation.balance, q, w, t, a, equation.powers))
+    return equation.powers[0], equation.powers[1]
+
+
+@inner_scalar
+def longest_step(equation, q, w, dt):
+    """The longest step (s), at most dt, that contact allows: after `acceleration` at q and w.
+
+    Once before each step, where the last one has ended.
+    """
+    if equation.limit == 0:
+        return dt
+    return value_at(equation.limit, (equation.setting, q, w, dt))
+
+
+@inner_scalar
+def advance_clock(equation, since):
+    """Tell laws with memory how long (s) after the last accepted step the next evaluation is."""
+    if equation.clock != 0:
+        run_at(equation.clock, (equation.setting, since))
+
+
+@inner_scalar
+def work_of_offsets(equation, accepted):
+    """Work (J) of offsets since the last step; see `actuation.offset_work`."""
+    if equation.offsets == 0:
+        return 0.0
+    return value_at(equation.offsets, (equation.setting, 1.0 if accepted else 0.0))
+
+
+@inner_scalar
+def sample(equation, u, v, a, t):
+    """Write the next sample, after `acceleration` at u, v and t; returns an outcome."""
+    return int(value_at(equation.sample, (equation.recording, u, v, a, t)))
+
+
+@inner_scalar
+def observe(equation, a, step):
+    """What follows `acceleration` at the time of a fixed step; every member of a team calls it.
+
+    Adds up the work that the members have noted. The motion ends where it is no longer finite and
+    where panels pass through each other; every plan.every steps a sample is written. Returns
+    (outcome, hinge), the same to all.
+    """
+    run_at(equation.observe, (equation.observing, a, float(step), equation.found))
+    return int(equation.found[0]), int(equation.found[1])
+
+
+@kernel
+def accelerate(equation, q, w, t, out):
+    """See `acceleration`: for Python."""
+    return acceleration(equation, q, w, t, out)
+
+
+@kernel
+def write(equation, q, w, t, a):
+    """Write the next sample at time t; a (n, 3) is memory."""
+    acceleration(equation, q, w, t, a)
+    return sample(equation, q, w, a, t)
+
+
+# ------------------------------------------------------------------ its owner
+class EquationOfMotion:
+    """The equation of motion of a case on one thread; it owns all contexts.
+
+    Parameters
+    ----------
+    packed : Packed
+    work : memory of the thread, one of `Body.workspaces`
+    s : Scratch
+    course : Course
+    plan : StepPlan
+    """
+
+    def __init__(
+        self, packed: Packed, work: Any, s: Scratch, course: Course, plan: StepPlan
+    ) -> None:
+        system, mass, model = packed.system, packed.mass, Model(packed.body, work)
+        self._model, self._course, self._plan, share = model, course, plan, model.share
+        self._setting = Setting(model.terms, system, mass, share, s)
+        self._whole = whole = Context(self._setting)
+        self._balance = balance = Context(_balance(self._setting, whole))
+        kernel = model.terms.kernel
+        self._equation = Equation(
+            acceleration=_acceleration.at(balance),
+            limit=_limit.at(whole) if kernel[:, LIMIT].any() else 0,
+            clock=_clock.at(whole) if kernel[:, ADVANCE_CLOCK].any() else 0,
+            offsets=_offsets.at(whole) if system.turns else 0,
+            sample=0,
+            observe=0,
+            balance=balance.address,
+            setting=whole.address,
+            recording=0,
+            observing=0,
+            powers=np.zeros(2),
+            before=s.powers,
+            found=np.zeros(2),
+            team=share.team,
+            own=share.strips.own,
+            stage=s.stage,
+            angle=share.angle,
+        )
+        self._out: Samples | None = None
+
+    @property
+    def still(self) -> Equation:
+        """The equation, for accelerations alone."""
+        return self._equation
+
+    def sampled(self, out: Samples) -> Equation:
+        """The equation with samples that go to `out`."""
+        if self._out is not out:  # contexts are filled by Python: once for each window of samples
+            course, setting, now = self._course, self._setting, self._equation
+            self._recording = recording = Context(Recording(setting, course, out))
+            self._out, at = out, recording.address
+            now = now._replace(sample=_sample.at(recording), recording=at)
+            if self._plan.steps:
+                own = Observing(
+                    setting, course, self._plan, now.sample, at, now.offsets, now.setting
+                )
+                self._observing = observing = Context(own)
+                now = now._replace(observe=_observe.at(observing), observing=observing.address)
+            self._equation = now
+        return self._equation
+
+
+def _balance(setting: Setting, whole: Context) -> Balance:
+    """What accelerations need of a case; `whole` is the context of the setting."""
+    terms, system, mass, share, s = setting
+    damping = system.damping
+    damped = len(damping.modal) or len(damping.elements.coefficient)
+    return Balance(
+        terms=terms,
+        setting=whole.address,
+        histories=_histories.at(whole) if system.varies else 0,
+        turn=_turn.at(whole) if system.turns else 0,
+        carry=_carry.at(whole) if system.moves else 0,
+        presses=system.presses,
+        follow=_follow.at(whole) if system.follows else 0,
+        viscous=_viscous.at(whole) if damping.data.size else 0,
+        dampers=_dampers.at(whole) if damped else 0,
+        solve=0 if mass.lumped else _solve.at(whole),
+        kinetic=0 if mass.lumped or not damping.alpha else _kinetic.at(whole),
+        moving_power=_moving_power.at(whole) if system.moves else 0,
+        turning_power=_turning_power.at(whole) if system.turns else 0,
+        alpha=damping.alpha,
+        diagonal=mass.diagonal,
+        inverse=mass.inverse,
+        loads=system.loads,
+        loads_own=s.loads,
+        factor=s.factor,
+        force=s.force,
+        displacement=s.displacement,
+        velocity=s.velocity,
+        team=share.team,
+        own=share.strips.own,
+    )
