@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import re
 import subprocess
 import sys
 from functools import cache
@@ -56,10 +55,12 @@ def files_of(path: str, name: str) -> set[str]:
 
 def test_what_a_kernel_is_made_from():
     law, switch, fields = "materials/superlinear.py", "materials/switch.py", "mechanics/model.py"
-    shell = files_of("shells/kernels.py", "ShellModel")
-    assert {law, switch, fields, "jit/compiled.py"} <= shell
+    assert {law, switch, "jit/compiled.py"} <= files_of("shells/kernels.py", "_forces")
+    assert {law, switch, fields} <= files_of("mechanics/bars_hinges.py", "_forces")
+    assert "cases/waveforms.py" in files_of("dynamics/equation.py", "_histories")
+    # a loop holds none of what it calls by address
     loop = files_of("dynamics/rk4.py", "advance")
-    assert {law, switch, fields, "cases/waveforms.py"} <= loop
+    assert not {law, switch, "mechanics/force.py", "cases/waveforms.py"} & loop
     # and not from what only tells or draws, which would compile all anew with every change
     others = {"cases/document.py", "cases/case.py", "dynamics/driver.py", "shells/kernels.py"}
     assert not others & loop
@@ -72,11 +73,10 @@ def package(monkeypatch, tmp_path):
     monkeypatch.setattr(sources, "PACKAGE", tmp_path)
     files = {
         "kernels.py": (
-            "from foldyn.jit.compiled import kernel, overload\n"
+            "from foldyn.jit.compiled import kernel\n"
             "from foldyn.values import SCALE, other\n\n\n"
             "def told(x):\n    raise ValueError('a message')\n\n\n"
-            "def general(x):\n    raise NotImplementedError\n\n\n"
-            "@overload(general)\ndef _general(x):\n    return lambda x: 3.0 * x\n\n\n"
+            "@kernel\ndef general(x):\n    return 3.0 * x\n\n\n"
             "@kernel\ndef total(x):\n    return SCALE * general(x) + A\n\n\n"
             "@kernel\ndef alone(x):\n    return x\n\n\n"
             "A, B = 1.0, 2.0\n"
@@ -107,7 +107,7 @@ def package(monkeypatch, tmp_path):
     ("path", "old", "new", "same"),
     [
         ("kernels.py", "SCALE *", "SCALE +", False),
-        ("kernels.py", "3.0 * x", "4.0 * x", False),  # what stands in for a function that it calls
+        ("kernels.py", "3.0 * x", "4.0 * x", False),  # a function that it calls
         ("kernels.py", "A, B = 1.0", "A, B = 5.0", False),
         ("values.py", "FACTOR = 3.0", "FACTOR = 4.0", False),
         ("jit/compiled.py", "return function", "return None", False),
@@ -207,16 +207,6 @@ def test_all_that_compiles_is_compiled_in_one_place():
             elif isinstance(node, ast.Import):
                 whole = [name.name for name in node.names if name.name.startswith("numba")]
                 assert not whole or path.parent == PACKAGE / "jit", path
-
-
-def test_what_stands_in_for_a_function_is_in_its_file_or_that_of_an_argument():
-    """Kernels that call it import the one, and are told apart by the sources of the other."""
-    for path in FILES:
-        text, kinds = path.read_text("utf-8"), (ast.FunctionDef, ast.ClassDef)
-        defined = {node.name for node in tree(path).body if isinstance(node, kinds)}
-        stands_for = set(re.findall(r"^@overload\w*\((\w+)", text, re.MULTILINE))
-        classes = set(re.findall(r"\.instance_class is (?:not )?(\w+)", text))
-        assert stands_for <= defined or (classes and classes <= defined), path
 
 
 THREE = """

@@ -27,7 +27,7 @@ def failure(
     hinge : that whose dihedral jumped.
     """
     plan, tally, order = motion.plan, motion.course.tally, motion.packed.numbering.order
-    hinges = motion.packed.model.hinges
+    hinges = motion.packed.body.hinges
     moment = f"at t = {tally.time:.6g} s (step {tally.steps})"
     rest, rows = motion.packed.body.turned()
     turned = rows[np.isnan(rest)]
@@ -79,7 +79,7 @@ def _apart(motion: Motion, hinge: int) -> str:
     angle = motion.course.angle[hinge]
     if motion.plan.dt > motion.critical or _from_closed(angle) > SWING:
         return f"the hinge has turned too far within a step: {smaller_step(motion)}"
-    j, k = motion.packed.numbering.order[motion.packed.model.hinges[hinge, :2]].tolist()
+    j, k = motion.packed.numbering.order[motion.packed.body.hinges[hinge, :2]].tolist()
     return kept_apart(motion.case.structure, j, k)
 
 

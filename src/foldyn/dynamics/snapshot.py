@@ -22,7 +22,7 @@ def parts_of(packed: Packed, course: Course) -> dict[str, Any]:
     if memory is not None:
         parts["branches"] = memory.own
     if packed.system.turns:
-        parts["model"] = packed.model
+        parts["folds"] = [packed.body.folds, packed.body.series()[1]]
     return parts
 
 

@@ -126,10 +126,8 @@ class Addressed:
 
     def __init__(self, function: Callable[..., Any], signature: tuple[Any, ...]) -> None:
         self._signature = signature
-        compiled = njit(
-            error_model="numpy", pipeline_class=Alone, fastmath=_FUSED, no_cpython_wrapper=True,
-            no_cfunc_wrapper=False,
-        )  # fmt: skip
+        options: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": False}
+        compiled = njit(error_model="numpy", pipeline_class=Alone, fastmath=_FUSED, **options)
         self._dispatcher: Any = compiled(function)
         self._dispatcher._cache = self._cache = Kept(function)
         _shut(self._dispatcher)

@@ -3,7 +3,7 @@
 Numba's own files know a function again by the text of its file alone: with a change in a compiled
 function or a constant imported from another file, the old one goes on; two processes that write at
 once may exchange their kernels; and a damaged file is a traceback. Here the name of a file says
-what was compiled: from which sources (`sources.digest`), for which arguments, with the sources of
+what was compiled: from which sources (`sources.digest`), for which arguments, with all fields of
 the named tuples among them, and for which processor. So what is found is what would be compiled,
 whoever wrote it, and a check sum tells whether it is whole.
 
@@ -147,10 +147,7 @@ def _spelled(kind: Any) -> str:
         inside = [f"{name}: {of}" for name, of in zip(kind.fields, inside, strict=True)]
     owner = getattr(kind, "instance_class", type(kind))
     text = f"{owner.__module__}.{owner.__qualname__}({', '.join(inside)})"
-    # kernels that stand for a general function are chosen by the class, and stand beside it
-    if not hasattr(kind, "fields"):
-        return text
-    return text + digest(Path(inspect.getfile(owner)).resolve(), owner.__name__)
+    return text
 
 
 def _plain(constant: Any) -> bool:

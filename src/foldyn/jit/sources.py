@@ -35,8 +35,6 @@ _DOCSTRING = re.compile(r'^\s*[rb]?"""[\s\S]*?"""', re.MULTILINE)
 _STATEMENT = re.compile(r"^(?=[@\w])", re.MULTILINE)
 _DEFINES = re.compile(r"(?:def|class) +(\w+)|(\w+)(?: *:[^=\n]*)? *=(?!=)")
 _WORD = re.compile(r"[A-Za-z_]\w*")
-# a general function, by its name or by the class of an argument
-_STANDS_FOR = re.compile(r"^@overload\w*\(\s*(\w+)|\.instance_class is (?:not )?(\w+)", re.M)
 _NO_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")  # variables that leave the code as it is
 # where kernels are kept leaves their code as it is; the rest of `jit` may change Numba itself
 _KEEPING, _COMPILING = ("kept.py", "sources.py"), PACKAGE / "jit"
@@ -50,7 +48,6 @@ class Module(NamedTuple):
 
     parts: dict[str, str]  # statements by the name that they define
     names: dict[str, tuple[str, str]]  # module and name there, "" for all of it, by name here
-    stand_in: dict[str, set[str]]  # parts that stand in for the function or the class of a name
 
 
 @cache
@@ -82,11 +79,10 @@ def made_from(source: Path, name: str) -> set[Part]:
 
 @cache
 def _needed(path: Path, name: str) -> frozenset[Part]:
-    """Parts that a part of a file names, and those that stand in for it."""
+    """Parts that a part of a file names."""
     own = _module(path)
     words = set(_WORD.findall(own.parts.get(name, "")))
     needed = {(path, word) for word in words & own.parts.keys()} | {(path, REST)}
-    needed |= {(path, part) for part in own.stand_in.get(name, ())}
     for word in words & own.names.keys():
         module, original = own.names[word]
         for home in _home(module, original):
@@ -108,7 +104,7 @@ def _module(path: Path) -> Module:
     """What kernels may take from a file."""
     text = _DOCSTRING.sub("", _text(path))
     names = {alias: (module, name) for module, name, alias in imports(text)}
-    parts, stand_in, decorators = {REST: ""}, {}, ""
+    parts, decorators = {REST: ""}, ""
     for statement in _STATEMENT.split(text):
         if statement.startswith("@"):
             decorators += statement
@@ -117,11 +113,8 @@ def _module(path: Path) -> Module:
         name = (defined.group(1) or defined.group(2)) if defined else REST
         if not statement.startswith(("from ", "import ")):
             parts[name] = parts.get(name, "") + decorators + statement
-        if "@overload" in decorators:
-            for target in _STANDS_FOR.findall(decorators + statement):
-                stand_in.setdefault("".join(target), set()).add(name)
         decorators = ""
-    return Module(parts, names, stand_in)
+    return Module(parts, names)
 
 
 def imports(text: str) -> Iterator[tuple[str, str, str]]:

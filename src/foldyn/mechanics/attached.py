@@ -49,22 +49,6 @@ class Springs(NamedTuple):
     axial_stiffness: NDArray  # (a,) N/m
 
 
-class Attached(NamedTuple):
-    """A model with clamps and springs."""
-
-    inner: Any
-    clamps: Clamps
-    springs: Springs
-    groups: int  # of the inner model's energies
-
-    @property
-    def hinges(self) -> NDArray:
-        """Rows (nh, 4) of all hinges; the wing of a clamp has no number: -1."""
-        own = self.clamps.nodes
-        rows = np.column_stack([own, np.full(len(own), GROUND)])
-        return np.concatenate([self.inner.hinges.astype(np.int64), rows])
-
-
 class AttachedWork(NamedTuple):
     """Memory of one evaluation."""
 

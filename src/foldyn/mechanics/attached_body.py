@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.mechanics.attached import (
-    Attached,
+    GROUND,
     AttachedWork,
     Clamps,
     Springs,
@@ -72,7 +72,6 @@ class AttachedBody(WrappedBody):
         self.clamps, self.springs = clamps, springs
         sprung = len(springs.stiffness) + len(springs.axial_stiffness) > 0
         self.energy_groups = (*inner.energy_groups, *([GROUP] if sprung else []))
-        self.model = Attached(inner.model, clamps, springs, len(inner.energy_groups))
 
     def around(self, inner: Body) -> AttachedBody:
         """See `WrappedBody`."""
@@ -151,6 +150,13 @@ class AttachedBody(WrappedBody):
             angle = np.empty(count + len(self.clamps.rest))
             inner = inner._replace(angle=angle[:count], fold_angle=angle[:count])
         return [AttachedWork(inner, angle, inner.fold_angle, inner.strips, inner.team)]
+
+    @property
+    def hinges(self) -> NDArray:
+        """See `Body`."""
+        own = self.clamps.nodes
+        rows = np.column_stack([own, np.full(len(own), GROUND)])
+        return np.concatenate([self.inner.hinges.astype(np.int64), rows])
 
     def terms(self, work: AttachedWork) -> list[Term]:
         """See `Body`."""

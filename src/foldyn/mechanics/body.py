@@ -209,6 +209,11 @@ class Body(ABC):
         """What adds to its forces, for a thread with this memory; see `mechanics.term`."""
 
     @property
+    def hinges(self) -> NDArray:
+        """Rows (nh, 4) of all hinges; -1 for a wing that is no node."""
+        return np.zeros((0, 4), np.int64)
+
+    @property
     @abstractmethod
     def folds(self) -> Folds:
         """What actuators turn, as arrays that change in place."""

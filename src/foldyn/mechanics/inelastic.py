@@ -7,7 +7,7 @@ makes that the state. A step that is refused or tried again leaves no trace.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,19 +62,6 @@ class MemoryHinges(NamedTuple):
     lost: NDArray  # (2,) energy dissipated up to the last accepted step, and since then, J
     elapsed: NDArray  # (1,) time since then, s
     gradient: NDArray  # (14,) memory of one hinge
-
-
-class Inelastic(NamedTuple):
-    """A model whose hinges have memory."""
-
-    inner: Any
-    hinges_with_memory: MemoryHinges
-    offset: NDArray  # (., 4) see `Body.series`
-
-    @property
-    def hinges(self) -> NDArray:
-        """Rows (nh, 4) of all hinges."""
-        return self.inner.hinges
 
 
 @scalar

@@ -11,7 +11,6 @@ from scipy import sparse
 
 from foldyn.mechanics.body import Blocks, Body, Unstrained
 from foldyn.mechanics.inelastic import (
-    Inelastic,
     MemoryHinges,
     add_memory_forces,
     evaluate_at,
@@ -43,7 +42,7 @@ class Memory:
     def start(self, offset: NDArray, q: NDArray, state: NDArray | str | None = None) -> None:
         """Begin at the dofs q (rows, 3) in a state (b, 2), "fresh", or the default.
 
-        offset : see `Inelastic`.
+        offset : see `Body.series`.
         """
         own = self.own
         for array in (own.angle, own.state, own.elapsed, own.lost):
@@ -105,7 +104,6 @@ class InelasticBody(WrappedBody):
         self.memory = memory
         self.energy_groups = inner.energy_groups
         self._offset = inner.series()[1]
-        self.model = Inelastic(inner.model, memory.own, self._offset)
 
     def _rows(self, q: NDArray) -> NDArray:
         """Dofs (m,) or (rows, 3) as (rows, 3)."""

@@ -106,6 +106,11 @@ class WrappedBody(Body):
         return self.around(inner), rows, place
 
     @property
+    def hinges(self) -> NDArray:
+        """See `Body`."""
+        return self.inner.hinges
+
+    @property
     def folds(self) -> Folds:
         """See `Body`."""
         return self.inner.folds

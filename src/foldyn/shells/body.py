@@ -137,6 +137,11 @@ class ShellBody(Body):
         return [shell_term(self.model, work)]
 
     @property
+    def hinges(self) -> NDArray:
+        """See `Body`."""
+        return self.model.hinges
+
+    @property
     def folds(self) -> Folds:
         """See `Body`."""
         model = self.model

@@ -120,6 +120,11 @@ class BarsHingesBody(Body):
         return [bars_hinges_term(self.model, work, len(GROUPS))]
 
     @property
+    def hinges(self) -> NDArray:
+        """See `Body`."""
+        return self.model.hinges
+
+    @property
     def folds(self) -> Folds:
         """See `Body`."""
         model = self.model

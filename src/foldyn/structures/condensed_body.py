@@ -69,6 +69,11 @@ class CondensedBody(Body):
         return [condensed_term(self.model, work)]
 
     @property
+    def hinges(self) -> NDArray:
+        """See `Body`."""
+        return self.inner.hinges
+
+    @property
     def folds(self) -> Folds:
         """See `Body`."""
         return self.inner.folds

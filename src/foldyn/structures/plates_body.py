@@ -140,6 +140,11 @@ class BarsPlatesBody(Body):
         return [plates_term(self.model, work, self.rows)]
 
     @property
+    def hinges(self) -> NDArray:
+        """See `Body`."""
+        return self.model.hinges
+
+    @property
     def folds(self) -> Folds:
         """See `Body`."""
         return Folds(self.model.fold_rest, self.model.fold_parameters, self.model.fold_stiffness)

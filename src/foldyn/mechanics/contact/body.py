@@ -18,7 +18,7 @@ from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.friction import Friction, stored
 from foldyn.mechanics.contact.holding import held_by_panels, held_by_planes
 from foldyn.mechanics.contact.memory import Memory, memories, memory
-from foldyn.mechanics.contact.model import Touching, TouchingWork, contact_term
+from foldyn.mechanics.contact.model import TouchingWork, contact_term
 from foldyn.mechanics.contact.pairs import VERTEX
 from foldyn.mechanics.contact.rubbing import add_rubs
 from foldyn.mechanics.contact.tables import HISTORY, NORMAL, Sheets, Tables, tables
@@ -66,12 +66,7 @@ class TouchingBody(WrappedBody):
         """What may touch, as arrays."""
         if self._like is not None:
             return self._like.tables
-        return tables(self.sheets, np.asarray(self.inner.model.hinges).astype(np.int64))
-
-    @cached_property
-    def model(self) -> Touching:  # type: ignore[override]
-        """See `Body`."""
-        return Touching(self.inner.model, self.tables, len(self.inner.energy_groups))
+        return tables(self.sheets, self.inner.hinges.astype(np.int64))
 
     @cached_property
     def _memory(self) -> Memory:

@@ -28,19 +28,6 @@ from foldyn.mechanics.term import (
 from foldyn.mechanics.threads import Team
 
 
-class Touching(NamedTuple):
-    """A model with contact."""
-
-    inner: Any
-    contact: Tables
-    groups: int  # of the inner model's energies
-
-    @property
-    def hinges(self) -> NDArray:
-        """Rows (nh, 4) of all hinges."""
-        return self.inner.hinges
-
-
 class TouchingWork(NamedTuple):
     """Memory of evaluations, one after the other."""
 
