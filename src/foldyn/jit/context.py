@@ -11,7 +11,7 @@ kernels (`jit.kept`) all fields of the tuple.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from itertools import count
 from typing import Any
 
@@ -58,27 +58,34 @@ class Context:
     """
 
     def __init__(self, value: tuple) -> None:
-        kind = typeof(value)
-        self._value, self._slots = value, np.array(list(_slots(kind, value)), np.uint64)
-        self.kind, self.address = ContextType(kind), int(self._slots.ctypes.data)
+        slots: list[int] = []
+        looks = _fill(value, slots)
+        if looks not in _KINDS:  # Numba takes ms to tell the type of a large tuple
+            _KINDS[looks] = ContextType(typeof(value))
+        self._value, self._slots = value, np.array(slots, np.uint64)
+        self.kind, self.address = _KINDS[looks], int(self._slots.ctypes.data)
 
 
-def _slots(kind: Any, value: Any) -> Iterator[int]:
-    if isinstance(kind, types.BaseTuple):
-        for inside, item in zip(kind.types, value, strict=True):  # type: ignore[attr-defined]
-            yield from _slots(inside, item)
-    elif isinstance(kind, types.Array):
-        yield value.ctypes.data
-        yield from value.shape
-        yield from (stride & WORD for stride in value.strides)
-    elif isinstance(kind, types.Record):
-        yield np.frombuffer(value.data, np.uint8).ctypes.data
-    elif isinstance(kind, types.Float):
-        yield int(np.float64(value).view(np.uint64))
-    elif isinstance(kind, types.Boolean | types.Integer):
-        yield int(value) & WORD
-    else:
-        raise TypeError(f"{kind} has no place in a context")
+_KINDS: dict[tuple, ContextType] = {}  # by what `_fill` says
+
+
+def _fill(value: Any, slots: list[int]) -> tuple:
+    """Fill the slots of a value; returns what its type depends on."""
+    if isinstance(value, tuple):
+        return type(value), *(_fill(item, slots) for item in value)
+    if isinstance(value, np.ndarray):
+        slots += value.ctypes.data, *value.shape, *(stride & WORD for stride in value.strides)
+        return value.dtype.num, value.ndim, value.flags.num
+    if isinstance(value, np.void):
+        slots.append(np.frombuffer(value.data, np.uint8).ctypes.data)
+        return (value.dtype,)
+    if isinstance(value, float):
+        slots.append(int(np.float64(value).view(np.uint64)))
+        return (float,)
+    if isinstance(value, bool | np.bool_ | int | np.integer):
+        slots.append(int(value) & WORD)
+        return (type(value),)
+    raise TypeError(f"{type(value).__name__} has no place in a context")
 
 
 def _array(context: Any, builder: Any, kind: Any, numbers: Sequence[Any]) -> Any:
