@@ -13,6 +13,7 @@ from foldyn.dynamics.course import Outcome, observe, share, tell
 from foldyn.dynamics.system import acceleration, longest_step
 from foldyn.jit.compiled import shared
 from foldyn.jit.intrinsics import borrowed, flat
+from foldyn.mechanics.contact.step_limit import RESOLVED
 from foldyn.mechanics.kernels import elapse
 
 ORDER = 2
@@ -72,7 +73,8 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         while True:  # once, unless contact asks for shorter steps
             dt = 0.0
             if step > 0:
-                dt = share(longest_step(model, system, course.u, course.v, left, work, s), left)
+                dt = longest_step(model, system, course.u, course.v, a, left, RESOLVED, work, s)
+                dt = share(dt, left)
             for i in range(u.size):
                 v[i] += 0.5 * dt * fa[i]
                 u[i] += dt * v[i]

@@ -12,10 +12,14 @@ import numpy as np
 
 from foldyn.dynamics.actuation import offset_work
 from foldyn.dynamics.course import Outcome, passed_through, sample
+from foldyn.dynamics.inertia import kinetic_energy
+from foldyn.dynamics.slow_contacts import slow_down
 from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration, longest_step
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import borrowed, flat
+from foldyn.mechanics.contact.step_limit import Pace
+from foldyn.mechanics.kernels import contact_inertia
 
 ORDER = 5
 
@@ -46,6 +50,8 @@ P = np.array(
     ]
 )
 SMALLEST = 1e-13  # step relative to the end of the motion
+RESOLVED = 0.6  # radians of a contact's vibration that a step may take: its error is controlled
+EASED = 0.1  # of the tolerance: part of the energy that slow contacts may have unresolved
 ROUNDING = 1e-9  # of a step: how far a sample may lie beyond its end
 
 
@@ -122,8 +128,14 @@ def _offset_work(model, system, work, accepted):
 
 
 @inner
-def _longest(model, system, q, w, dt, work, s):
-    return longest_step(model, system, q, w, dt, work, s)
+def _longest(model, system, mass, q, w, a, plan, tally, work, s):
+    """See `longest_step`; slow contacts need not be resolved where they can be given inertia."""
+    if not system.touches:
+        return plan.dt
+    tally.kinetic = max(tally.kinetic, kinetic_energy(mass, w, work.strips.own))
+    still = not system.moves and not system.presses  # else the inertia would resist their motion
+    energy = EASED * plan.tolerance * tally.kinetic if still else 0.0
+    return longest_step(model, system, q, w, a, plan.dt, Pace(RESOLVED, energy), work, s)
 
 
 @kernel
@@ -142,11 +154,15 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     powers, weights = np.empty((2, 7)), np.empty(7)
     ut, vt, a = np.empty_like(course.u), np.empty_like(course.u), np.empty_like(course.u)
     fut, fvt, fa = flat(ut), flat(vt), flat(a)
+    raw, last = flat(course.carry), np.empty(n)  # accelerations without added inertia
     if tally.steps == 0:
         powers[0, 0], powers[1, 0] = _accelerate(
             model, system, mass, course.u, course.v, plan.start, a, work, s
         )
-        tally.wanted = _longest(model, system, course.u, course.v, tally.wanted, work, s)
+        for i in range(n):
+            raw[i] = fa[i]
+        longest = _longest(model, system, mass, course.u, course.v, a, plan, tally, work, s)
+        tally.wanted = min(tally.wanted, longest)
         if tally.samples == 0:
             tally.farthest, tally.fastest = _largest(u), _largest(v)
             outcome = sample(
@@ -156,12 +172,10 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
                 return outcome, -1
     else:
         powers[0, 0], powers[1, 0] = tally.power_in, tally.power_out
-        for i in range(n):
-            fa[i] = flat(course.carry)[i]
     for i in range(n):
-        speeds[0, i], accelerations[0, i] = v[i], fa[i]
-    last = tally.steps + stretch
-    while tally.steps < last and tally.time < plan.end:
+        speeds[0, i] = v[i]
+    stretched = tally.steps + stretch
+    while tally.steps < stretched and tally.time < plan.end:
         if plan.every > 0 and tally.samples == room:
             break
         t, wanted = tally.time, tally.wanted
@@ -174,6 +188,12 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         stops = stops and h == goal - t
         if h < SMALLEST * max(abs(plan.end), abs(t)):
             return Outcome.STUCK, -1
+        added = contact_inertia(model, course.u, h, RESOLVED, system.lightness, work)
+        for i in range(n):
+            fa[i] = raw[i]
+        slow_down(added, system, mass, course.v, a, s)
+        for i in range(n):
+            accelerations[0, i] = fa[i]
         for stage in range(1, 7):
             _combine(u, speeds, A[stage], h, stage, fut)
             _combine(v, accelerations, A[stage], h, stage, fvt)
@@ -183,6 +203,9 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             powers[0, stage], powers[1, stage] = _accelerate(
                 model, system, mass, ut, vt, moment, a, work, s
             )
+            for i in range(n):
+                last[i] = fa[i]
+            slow_down(added, system, mass, vt, a, s)
             for i in range(n):
                 speeds[stage, i], accelerations[stage, i] = fvt[i], fa[i]
         tally.evaluations += 6
@@ -206,7 +229,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         hinge = passed_through(work.angle, course.angle, 0, work.angle.size)
         if hinge >= 0:
             return Outcome.PENETRATION, hinge
-        longest = _longest(model, system, ut, vt, plan.dt, work, s)
+        longest = _longest(model, system, mass, ut, vt, a, plan, tally, work, s)
         after = goal if h == goal - t else t + h
         tally.steps += 1
         tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
@@ -231,7 +254,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         _combine(u, speeds, A[6], h, 6, fut)
         for i in range(n):
             u[i], v[i] = fut[i], speeds[6, i]
-            speeds[0, i], accelerations[0, i] = speeds[6, i], accelerations[6, i]
+            speeds[0, i], raw[i] = speeds[6, i], last[i]
         for k in range(2):
             powers[k, 0] = powers[k, 6]
         tally.time, tally.error = after, max(error, 1e-4)
@@ -245,7 +268,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             tally.evaluations += 1
             tally.work += _offset_work(model, system, work, True)
             for i in range(n):
-                accelerations[0, i] = fa[i]
+                raw[i] = fa[i]
         tally.wanted = min(tally.wanted, longest)
         if plan.every > 0 and tally.steps % plan.every == 0:
             _accelerate(model, system, mass, course.u, course.v, after, a, work, s)
@@ -256,7 +279,5 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             if outcome != Outcome.DONE:
                 return outcome, -1
     tally.power_in, tally.power_out = powers[0, 0], powers[1, 0]
-    for i in range(n):
-        flat(course.carry)[i] = accelerations[0, i]
     full = plan.every > 0 and tally.samples == room and tally.time < plan.end
     return (Outcome.FULL if full else Outcome.DONE), -1

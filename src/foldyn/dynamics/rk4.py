@@ -9,6 +9,7 @@ from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration, longest_step
 from foldyn.jit.compiled import shared
 from foldyn.jit.intrinsics import borrowed, flat
+from foldyn.mechanics.contact.step_limit import RESOLVED
 from foldyn.mechanics.kernels import elapse
 
 ORDER = 4
@@ -68,7 +69,8 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
                         )
                         if outcome != Outcome.DONE or step == end:
                             return outcome, hinge
-                    dt = share(longest_step(model, system, course.u, course.v, left, work, s), left)
+                    dt = longest_step(model, system, course.u, course.v, a, left, RESOLVED, work, s)
+                    dt = share(dt, left)
                 ahead = 0.5 * dt if stage < 2 else dt
                 if stage == 0:
                     for i in range(u.size):

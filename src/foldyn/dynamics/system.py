@@ -371,16 +371,17 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
 
 
 @inner_scalar
-def longest_step(model, system, q, w, dt, work, s):
+def longest_step(model, system, q, w, a, dt, pace, work, s):
     """The longest step (s), at most dt, that contact allows: after `acceleration` at q and w.
 
-    Once before each step, where the last one has ended.
+    Once before each step, where the last one has ended; a : the acceleration there, pace : see
+    `contact.step_limit`.
     """
     if not system.touches:
         return dt
     u = s.displacement if system.moves else q
     v = s.velocity if system.moves else w
-    return contact_limit(model, u, v, dt, system.lightness, work)
+    return contact_limit(model, u, v, a, dt, pace, system.lightness, work)
 
 
 @kernel

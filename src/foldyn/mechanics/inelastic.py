@@ -205,11 +205,11 @@ def _powers(model, v, work):
 
 
 @overload(contact_limit, inline="always")
-def _limit(model, u, v, dt, lightness, work):
+def _limit(model, u, v, a, dt, pace, lightness, work):
     if model.instance_class is not Inelastic:
         return None
-    return lambda model, u, v, dt, lightness, work: contact_limit(
-        model.inner, u, v, dt, lightness, work
+    return lambda model, u, v, a, dt, pace, lightness, work: contact_limit(
+        model.inner, u, v, a, dt, pace, lightness, work
     )
 
 

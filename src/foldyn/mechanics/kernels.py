@@ -77,12 +77,22 @@ def contact_powers(model: Any, v: Any, work: Any) -> Any:
     raise NotImplementedError
 
 
-def contact_limit(model: Any, u: Any, v: Any, dt: Any, lightness: Any, work: Any) -> Any:
+def contact_limit(
+    model: Any, u: Any, v: Any, a: Any, dt: Any, pace: Any, lightness: Any, work: Any
+) -> Any:
     """The longest step (s), at most dt, in which nothing is overrun that touches.
 
     To be called before each step, after the force where the last one ended.
 
-    lightness : (n,) 1 / mass of the nodes, 1/kg.
+    pace : see `contact.step_limit`; lightness : (n,) 1 / mass of the nodes, 1/kg.
+    """
+    raise NotImplementedError
+
+
+def contact_inertia(model: Any, u: Any, dt: Any, beta: Any, lightness: Any, work: Any) -> Any:
+    """Inertia of contacts that a step from u (n, 3) does not resolve; None for other models.
+
+    beta : radians of a contact's vibration that a step may take; lightness : (n,) 1/kg.
     """
     raise NotImplementedError
 
@@ -102,10 +112,17 @@ def _no_powers(model, v, work):
 
 
 @overload(contact_limit, inline="always")
-def _no_limit(model, u, v, dt, lightness, work):
+def _no_limit(model, u, v, a, dt, pace, lightness, work):
     if CONTACT in model.fields or remembers(model):
         return None
-    return lambda model, u, v, dt, lightness, work: dt
+    return lambda model, u, v, a, dt, pace, lightness, work: dt
+
+
+@overload(contact_inertia, inline="always")
+def _no_inertia(model, u, dt, beta, lightness, work):
+    if CONTACT in model.fields or remembers(model):
+        return None
+    return lambda model, u, dt, beta, lightness, work: None
 
 
 @overload(force_of, inline="always")

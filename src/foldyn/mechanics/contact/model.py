@@ -8,6 +8,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from foldyn.mechanics.contact.forces import add_contact
+from foldyn.mechanics.contact.inertia import added_inertia
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import move_planes, plane_powers
 from foldyn.mechanics.contact.rubbing import rub_power
@@ -15,6 +16,7 @@ from foldyn.mechanics.contact.share import energy_of_all
 from foldyn.mechanics.contact.step_limit import limited
 from foldyn.mechanics.contact.tables import Tables
 from foldyn.mechanics.kernels import (
+    contact_inertia,
     contact_limit,
     contact_powers,
     energies_of,
@@ -106,11 +108,22 @@ def _powers(model, v, work):
 
 
 @overload(contact_limit, inline="always")
-def _limit(model, u, v, dt, lightness, work):
+def _limit(model, u, v, a, dt, pace, lightness, work):
     if model.instance_class is not Touching:
         return None
 
-    def touching(model, u, v, dt, lightness, work):
-        return limited(model.contact, u, v, work.angle, dt, lightness, work.memory)
+    def touching(model, u, v, a, dt, pace, lightness, work):
+        return limited(model.contact, u, v, a, work.angle, dt, pace, lightness, work.memory)
+
+    return touching
+
+
+@overload(contact_inertia, inline="always")
+def _inertia(model, u, dt, beta, lightness, work):
+    if model.instance_class is not Touching:
+        return None
+
+    def touching(model, u, dt, beta, lightness, work):
+        return added_inertia(model.contact, u, dt, beta, lightness, work.memory)
 
     return touching

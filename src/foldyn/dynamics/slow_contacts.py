@@ -1,0 +1,96 @@
+"""Accelerations where contacts that are slow have inertia; see `mechanics.contact.inertia`.
+
+(M + sum g g' / e) a = F is solved for the forces y of the contacts by conjugate gradients,
+
+    (e + G M^-1 G') y = G (a0 + alpha w),    a = a0 - M^-1 G' y,
+
+with the accelerations a0 without that inertia, among them the drag -alpha w, and the rows g of G.
+That inertia is dragged as all mass is: else what vibrates in it would not come to rest.
+"""
+
+from __future__ import annotations
+
+from foldyn.dynamics.damping import drag
+from foldyn.dynamics.inertia import solve_mass
+from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.intrinsics import flat
+
+ACCURATE = 1e-10  # of the contacts' accelerations
+ITERATIONS = 200
+
+
+@inner
+def _solve(mass, r, out, line):
+    """M^-1 r to out, both (n, 3)."""
+    if mass.lumped:
+        values, given, inverse = flat(out), flat(r), flat(mass.inverse)
+        for i in range(values.size):
+            values[i] = inverse[i] * given[i]
+    else:
+        solve_mass(mass, r, out, line, 0, 1)
+
+
+@inner
+def _pushed(added, mass, y, r, out, line):
+    """M^-1 G' y to out (n, 3)."""
+    for i in range(len(r)):
+        for c in range(3):
+            r[i, c] = 0.0
+    for k in range(y.size):
+        for i in range(4):
+            for c in range(3):
+                r[added.nodes[k, i], c] += added.gradient[k, i, c] * y[k]
+    _solve(mass, r, out, line)
+
+
+@inner
+def _along(added, k, a):
+    """Acceleration of contact k at nodal ones (n, 3)."""
+    total = 0.0
+    for i in range(4):
+        for c in range(3):
+            total += added.gradient[k, i, c] * a[added.nodes[k, i], c]
+    return total
+
+
+@kernel
+def slow_down(added, system, mass, w, a, s):
+    """Change accelerations a (n, 3) at velocities w to those with the inertia of contacts.
+
+    added : see `contact_inertia`; s : memory.
+    """
+    if added is None:
+        return
+    size, r, out, line = added.ease.size, s.stage[0], s.stage[1], s.line
+    if size == 0:
+        return
+    own, left, y, q = added.ease.copy(), added.ease.copy(), added.ease.copy(), added.ease.copy()
+    before = 0.0
+    for k in range(size):
+        left[k] = _along(added, k, a) + drag(system.damping, _along(added, k, w))
+        y[k] = 0.0
+        for i in range(4):
+            for c in range(3):
+                own[k] += added.gradient[k, i, c] ** 2 * system.lightness[added.nodes[k, i]]
+        before += left[k] * left[k] / own[k]
+    p, goal = left / own, before * ACCURATE * ACCURATE
+    for _ in range(ITERATIONS):
+        if not before > goal:
+            break
+        _pushed(added, mass, p, r, out, line)
+        along = 0.0
+        for k in range(size):
+            q[k] = added.ease[k] * p[k] + _along(added, k, out)
+            along += p[k] * q[k]
+        now = 0.0
+        for k in range(size):
+            y[k] += before / along * p[k]
+            left[k] -= before / along * q[k]
+            now += left[k] * left[k] / own[k]
+        for k in range(size):
+            p[k] = left[k] / own[k] + now / before * p[k]
+        before = now
+    _pushed(added, mass, y, r, out, line)
+    for i in range(len(a)):
+        for c in range(3):
+            a[i, c] -= out[i, c]
