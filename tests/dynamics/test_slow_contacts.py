@@ -5,21 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from contact_cases import tower
+from scipy.sparse import csr_array
 
 import foldyn as fd
 from contact_sheets import SHEET, crossing, on_a_panel
 from foldyn.dynamics.slow_contacts import slow_down
 from foldyn.dynamics.system import pack, scratch
-from foldyn.mechanics.contact.inertia import added_inertia
+from foldyn.mechanics.contact.inertia import added_inertia, room_for
 
-DT, ALPHA = 1e-4, 30.0
+DT, ALPHA = 1e-2, 30.0
+HALF = 0.5 * SHEET.thickness
+DEPTH = 0.98 * HALF
+
+
+def curvature(x):
+    """f'' of (1 - x)^3 / x^4."""
+    return 20 * (1 - x) ** 3 / x**6 + 24 * (1 - x) ** 2 / x**5 + 6 * (1 - x) / x**4
 
 
 def pressed(mass: str):
     """A packed case in which a strip lies on a panel and a corner on the ground."""
     s = on_a_panel()[0]
     s = fd.discretize(s.pattern, SHEET, fold_law="linear", mass=mass)
-    ground = fd.Plane((0, 0, -0.49 * SHEET.thickness), (0.0, 0.0, 1.0))
+    ground = fd.Plane((0, 0, -DEPTH), (0.0, 0.0, 1.0))
     contact = fd.Contact(planes=[ground])
     return pack(fd.Case(s, damping=fd.Rayleigh(alpha=ALPHA), contact=contact), 1e-4)
 
@@ -31,40 +39,40 @@ def test_accelerations_are_those_of_the_mass_with_the_inertia_of_contacts(mass):
     u = np.zeros((len(order), 3))
     body.contact(u)
     kept = body._memory
-    kept.facts.resolved = np.inf
-    assert (
-        len(added_inertia(body.tables, u, DT, 0.7, system.lightness, kept).ease) == 0
-    )  # the step resolves all
+    arguments = u, DT, 0.7, system.lightness, kept
+    kept.facts.resolved = DT
+    assert added_inertia(body.tables, room_for(0), *arguments).count == 0
     kept.facts.resolved = 0.0
-    added = added_inertia(body.tables, u, DT, 0.7, system.lightness, kept)
+    added = added_inertia(body.tables, room_for(0), *arguments)
     pairs = kept.counts.near_first + kept.counts.near_second
-    assert len(added.ease) > len(body.tables.meeting) - 8 and pairs > 0
+    assert added.count > len(body.tables.meeting) - 8 and pairs > 0
+    again = added_inertia(body.tables, added, *arguments)
+    assert again.gradient.ctypes.data == added.gradient.ctypes.data  # the same memory
+    assert again.count == added.count
+    nodes, gradient = added.nodes[: added.count], added.gradient[: added.count]
+    rows = np.zeros((added.count, u.size))
+    for row, corners, slopes in zip(rows, nodes, gradient, strict=True):
+        for node, slope in zip(corners, slopes, strict=True):
+            row[3 * node : 3 * node + 3] += slope
+    # a tau of two steps, and the stiffness of contact: here of corners on the ground
+    stiffness = 1.0 / (4.0 * DT**2 * added.ease[: added.count])
+    grounded = stiffness[nodes[:, 0] == nodes[:, 1]]
+    own = body.tables.stiffness * curvature(DEPTH / HALF)
+    assert len(grounded) == 5 and grounded == pytest.approx(own, rel=1e-9)
     rng = np.random.default_rng(0)
     before, w = rng.standard_normal((2, *u.shape))
     a = before.copy()
     slow_down(added, system, packed.mass, w, a, scratch(system))
-    rows = np.zeros((len(added.ease), u.size))
-    for row, nodes, gradient in zip(rows, added.nodes, added.gradient, strict=True):
-        for node, slope in zip(nodes, gradient, strict=True):
-            row[3 * node : 3 * node + 3] += slope
     nodal = packed.mass
-    count = len(u)
-    plain = np.zeros((count, count))
-    for i in range(count):
-        for k in range(nodal.indptr[i], nodal.indptr[i + 1]):
-            plain[i, nodal.indices[k]] = nodal.data[k]
-    m = np.kron(plain, np.eye(3))
-    whole = m + rows.T @ (rows / added.ease[:, None])
-    forced = (before + ALPHA * w).ravel()
-    expected = np.linalg.solve(whole, m @ forced) - ALPHA * w.ravel()
+    m = np.kron(csr_array((nodal.data, nodal.indices, nodal.indptr)).toarray(), np.eye(3))
+    whole = m + rows.T @ (rows / added.ease[: added.count, None])
+    expected = np.linalg.solve(whole, m @ (before + ALPHA * w).ravel()) - ALPHA * w.ravel()
     np.testing.assert_allclose(a.ravel(), expected, rtol=0, atol=1e-8 * np.abs(expected).max())
     assert np.abs(a - before).max() > 0.1
     # what panels do to each other changes neither momentum
-    panels = (added.nodes[:, 0] != added.nodes[:, 1]).nonzero()[0]
-    push = rows[panels].reshape(-1, count, 3)
-    x = body.tables.rest
+    push = rows[(nodes[:, 0] != nodes[:, 1]).nonzero()[0]].reshape(-1, len(u), 3)
     assert np.abs(push.sum(axis=1)).max() < 1e-12
-    assert np.abs(np.cross(x, push).sum(axis=1)).max() < 1e-12
+    assert np.abs(np.cross(body.tables.rest, push).sum(axis=1)).max() < 1e-12
 
 
 def test_a_tower_that_is_pressed_flat_takes_few_steps():

@@ -19,7 +19,7 @@ from foldyn.dynamics.system import acceleration, longest_step
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics.contact.step_limit import Pace
-from foldyn.mechanics.kernels import contact_inertia
+from foldyn.mechanics.kernels import contact_inertia, room_for_inertia
 
 ORDER = 5
 
@@ -154,7 +154,8 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     powers, weights = np.empty((2, 7)), np.empty(7)
     ut, vt, a = np.empty_like(course.u), np.empty_like(course.u), np.empty_like(course.u)
     fut, fvt, fa = flat(ut), flat(vt), flat(a)
-    raw, last = flat(course.carry), np.empty(n)  # accelerations without added inertia
+    # the inertia of contacts, and the acceleration without it at both ends of a step
+    added, raw, last = room_for_inertia(model), flat(course.carry), np.empty(n)
     if tally.steps == 0:
         powers[0, 0], powers[1, 0] = _accelerate(
             model, system, mass, course.u, course.v, plan.start, a, work, s
@@ -188,7 +189,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         stops = stops and h == goal - t
         if h < SMALLEST * max(abs(plan.end), abs(t)):
             return Outcome.STUCK, -1
-        added = contact_inertia(model, course.u, h, RESOLVED, system.lightness, work)
+        added = contact_inertia(model, added, course.u, h, RESOLVED, system.lightness, work)
         for i in range(n):
             fa[i] = raw[i]
         slow_down(added, system, mass, course.v, a, s)

@@ -36,7 +36,7 @@ def _pushed(added, mass, y, r, out, line):
     for i in range(len(r)):
         for c in range(3):
             r[i, c] = 0.0
-    for k in range(y.size):
+    for k in range(added.count):
         for i in range(4):
             for c in range(3):
                 r[added.nodes[k, i], c] += added.gradient[k, i, c] * y[k]
@@ -61,34 +61,31 @@ def slow_down(added, system, mass, w, a, s):
     """
     if added is None:
         return
-    size, r, out, line = added.ease.size, s.stage[0], s.stage[1], s.line
-    if size == 0:
+    if added.count == 0:
         return
-    own, left, y, q = added.ease.copy(), added.ease.copy(), added.ease.copy(), added.ease.copy()
+    size, r, out, line = added.count, s.stage[0], s.stage[1], s.line
+    ease, lightness = added.ease, added.lightness
+    y, left, p, q = added.lines[0], added.lines[1], added.lines[2], added.lines[3]
     before = 0.0
     for k in range(size):
-        left[k] = _along(added, k, a) + drag(system.damping, _along(added, k, w))
-        y[k] = 0.0
-        for i in range(4):
-            for c in range(3):
-                own[k] += added.gradient[k, i, c] ** 2 * system.lightness[added.nodes[k, i]]
-        before += left[k] * left[k] / own[k]
-    p, goal = left / own, before * ACCURATE * ACCURATE
+        y[k], left[k] = 0.0, _along(added, k, a) + drag(system.damping, _along(added, k, w))
+        p[k] = left[k] / (ease[k] + lightness[k])
+        before += left[k] * p[k]
+    goal = before * ACCURATE * ACCURATE
     for _ in range(ITERATIONS):
         if not before > goal:
             break
         _pushed(added, mass, p, r, out, line)
-        along = 0.0
+        along, now = 0.0, 0.0
         for k in range(size):
-            q[k] = added.ease[k] * p[k] + _along(added, k, out)
+            q[k] = ease[k] * p[k] + _along(added, k, out)
             along += p[k] * q[k]
-        now = 0.0
         for k in range(size):
             y[k] += before / along * p[k]
             left[k] -= before / along * q[k]
-            now += left[k] * left[k] / own[k]
+            now += left[k] * left[k] / (ease[k] + lightness[k])
         for k in range(size):
-            p[k] = left[k] / own[k] + now / before * p[k]
+            p[k] = left[k] / (ease[k] + lightness[k]) + now / before * p[k]
         before = now
     _pushed(added, mass, y, r, out, line)
     for i in range(len(a)):

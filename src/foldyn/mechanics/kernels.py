@@ -89,10 +89,18 @@ def contact_limit(
     raise NotImplementedError
 
 
-def contact_inertia(model: Any, u: Any, dt: Any, beta: Any, lightness: Any, work: Any) -> Any:
-    """Inertia of contacts that a step from u (n, 3) does not resolve; None for other models.
+def room_for_inertia(model: Any) -> Any:
+    """Room for what `contact_inertia` finds; None for models without contact."""
+    raise NotImplementedError
 
-    beta : radians of a contact's vibration that a step may take; lightness : (n,) 1/kg.
+
+def contact_inertia(
+    model: Any, added: Any, u: Any, dt: Any, beta: Any, lightness: Any, work: Any
+) -> Any:
+    """The inertia of contacts that a step from u (n, 3) does not resolve; None without contact.
+
+    added : room for it, as of the last step; beta : radians of a contact's vibration that a step
+    may take; lightness : (n,) 1 / mass of the nodes, 1/kg.
     """
     raise NotImplementedError
 
@@ -118,11 +126,18 @@ def _no_limit(model, u, v, a, dt, pace, lightness, work):
     return lambda model, u, v, a, dt, pace, lightness, work: dt
 
 
-@overload(contact_inertia, inline="always")
-def _no_inertia(model, u, dt, beta, lightness, work):
-    if CONTACT in model.fields or remembers(model):
+@overload(room_for_inertia, inline="always")
+def _no_room(model):
+    if CONTACT in model.fields:
         return None
-    return lambda model, u, dt, beta, lightness, work: None
+    return lambda model: None
+
+
+@overload(contact_inertia, inline="always")
+def _no_inertia(model, added, u, dt, beta, lightness, work):
+    if CONTACT in model.fields:
+        return None
+    return lambda model, added, u, dt, beta, lightness, work: None
 
 
 @overload(force_of, inline="always")

@@ -34,44 +34,55 @@ STRETCH = 1.02  # of what resolves a contact: steps that end where a load jumps 
 
 
 class Added(NamedTuple):
-    """Contacts with inertia in a step."""
+    """The contacts with inertia in a step, and room for more."""
 
-    nodes: NDArray  # (k, 4)
-    gradient: NDArray  # (k, 4, 3) of the distance, or dihedral
-    ease: NDArray  # (k,) 1 / (tau^2 K)
+    count: int
+    nodes: NDArray  # (room, 4)
+    gradient: NDArray  # (room, 4, 3) of the distance, or dihedral
+    ease: NDArray  # (room,) 1 / (tau^2 K)
+    lightness: NDArray  # (room,) 1 / mass that each moves, about
+    lines: NDArray  # (4, room) memory for solving
 
 
 @kernel
-def _slow(added, k, stiffness, square, beta, lightness):
+def room_for(contacts):
+    """Room for so many contacts."""
+    nodes, gradient = np.empty((contacts, 4), np.int64), np.empty((contacts, 4, 3))
+    lines = np.empty((4, contacts))
+    return Added(0, nodes, gradient, np.empty(contacts), np.empty(contacts), lines)
+
+
+@kernel
+def _slow(added, k, stiffness, dt, beta, lightness):
     """Whether a step does not resolve contact k of some stiffness, which then gets its inertia."""
-    rate = 0.0
+    light = 0.0
     for i in range(4):
         for axis in range(3):
-            slope = added.gradient[k, i, axis]
-            rate += stiffness * slope * slope * lightness[added.nodes[k, i]]
-    if not square * rate > (STRETCH * beta) ** 2:
+            light += added.gradient[k, i, axis] ** 2 * lightness[added.nodes[k, i]]
+    if not dt * math.sqrt(stiffness * light) > STRETCH * beta:
         return False
-    added.ease[k] = 1.0 / (SLOWNESS * SLOWNESS * square * stiffness)
+    added.ease[k] = 1.0 / ((SLOWNESS * dt) ** 2 * stiffness)
+    added.lightness[k] = light
     return True
 
 
 @kernel
-def added_inertia(tables, u, dt, beta, lightness, memory):
+def added_inertia(tables, added, u, dt, beta, lightness, memory):
     """Contacts at displacement u that a step of dt from there does not resolve; see `Added`.
 
-    beta : radians of a contact's vibration that a step may take; lightness : (n,) 1 / mass, 1/kg.
+    added : room for them, more is made where it does not do; beta : radians of a contact's
+    vibration that a step may take; lightness : (n,) 1 / mass of the nodes, 1/kg.
     """
     counts, x, found = memory.counts, memory.x, 0
+    if not dt > STRETCH * memory.facts.resolved:
+        return Added(0, *added[1:])
     meeting, planes, stiffness = tables.meeting.size, len(tables.planes), tables.stiffness
     hinges = tables.hinge_limit.size if counts.hinges > 0 else 0
-    room = counts.near_first + counts.near_second + hinges + meeting * planes
-    if not dt > STRETCH * memory.facts.resolved:
-        room = 0
-    added = Added(np.empty((room, 4), np.int64), np.zeros((room, 4, 3)), np.empty(room))
-    if room == 0:
-        return added
+    most = counts.near_first + counts.near_second + hinges + meeting * planes
+    if most > added.ease.size:
+        added = room_for(2 * most)
+    nodes, gradient = added.nodes, added.gradient
     place(tables, u, memory)
-    nodes, gradient, square = added.nodes, added.gradient, dt * dt
     for kind in range(2):
         for near in range(counts.near_first if kind == VERTEX else counts.near_second):
             k = memory.near[kind, near]
@@ -90,7 +101,7 @@ def added_inertia(tables, u, dt, beta, lightness, memory):
             if distance < d0:
                 gradient[found] /= distance
                 own = stiffness * barrier(distance / d0)[2]
-                found += _slow(added, found, own, square, beta, lightness)
+                found += _slow(added, found, own, dt, beta, lightness)
     for h in range(hinges):
         turn = gradient_at(tables, x, h)
         theta, begin = min(turn[0], TURN - turn[0]), tables.hinge_limit[h]
@@ -100,7 +111,7 @@ def added_inertia(tables, u, dt, beta, lightness, memory):
                 for axis in range(3):
                     gradient[found, i, axis] = turn[1 + 3 * i + axis]
             own = tables.hinge_stiffness[h] * barrier(theta / begin)[2]
-            found += _slow(added, found, own, square, beta, lightness)
+            found += _slow(added, found, own, dt, beta, lightness)
     for p in range(planes):
         for m in range(meeting):
             i = tables.meeting[m]
@@ -111,5 +122,5 @@ def added_inertia(tables, u, dt, beta, lightness, memory):
                 for axis in range(3):
                     gradient[found, 0, axis] = tables.planes[p, NORMAL + axis]
                 own = stiffness * barrier(d / d0)[2]
-                found += _slow(added, found, own, square, beta, lightness)
-    return Added(nodes[:found], gradient[:found], added.ease[:found])
+                found += _slow(added, found, own, dt, beta, lightness)
+    return Added(found, *added[1:])

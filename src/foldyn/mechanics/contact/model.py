@@ -8,7 +8,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from foldyn.mechanics.contact.forces import add_contact
-from foldyn.mechanics.contact.inertia import added_inertia
+from foldyn.mechanics.contact.inertia import added_inertia, room_for
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import move_planes, plane_powers
 from foldyn.mechanics.contact.rubbing import rub_power
@@ -23,6 +23,7 @@ from foldyn.mechanics.kernels import (
     folds_of,
     force_of,
     place_obstacles,
+    room_for_inertia,
 )
 from foldyn.mechanics.threads import Team
 
@@ -118,12 +119,19 @@ def _limit(model, u, v, a, dt, pace, lightness, work):
     return touching
 
 
+@overload(room_for_inertia, inline="always")
+def _room(model):
+    if model.instance_class is not Touching:
+        return None
+    return lambda model: room_for(0)
+
+
 @overload(contact_inertia, inline="always")
-def _inertia(model, u, dt, beta, lightness, work):
+def _inertia(model, added, u, dt, beta, lightness, work):
     if model.instance_class is not Touching:
         return None
 
-    def touching(model, u, dt, beta, lightness, work):
-        return added_inertia(model.contact, u, dt, beta, lightness, work.memory)
+    def touching(model, added, u, dt, beta, lightness, work):
+        return added_inertia(model.contact, added, u, dt, beta, lightness, work.memory)
 
     return touching

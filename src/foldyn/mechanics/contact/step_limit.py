@@ -68,13 +68,13 @@ def _bound(limit, d, d0, closing, change, stiffness, lightness, pace, memory):
         limit = min(limit, (max(d - d0, 0.0) + APPROACH * min(d, d0)) / closing)
     if d < d0:
         k = stiffness * barrier(d / d0)[2]
-        resolved = _spring_bound(limit, k * lightness, pace)
+        resolved = _spring_bound(math.inf, k * lightness, pace)
         memory.facts.resolved = min(memory.facts.resolved, resolved)
-        slow = resolved
         if pace.energy > 0.0:  # h |closing| + h^2 |change| = most
             most, speed = math.sqrt(pace.energy / k), abs(closing) + TINY
             slow = 2.0 * most / (speed + math.sqrt(speed * speed + 4.0 * most * abs(change)))
-        limit = max(resolved, min(limit, slow))
+            resolved = max(resolved, slow)
+        limit = min(limit, resolved)
     return limit
 
 
