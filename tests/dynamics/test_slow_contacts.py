@@ -12,6 +12,7 @@ from contact_sheets import SHEET, crossing, on_a_panel
 from foldyn.dynamics.slow_contacts import slow_down
 from foldyn.dynamics.system import pack, scratch
 from foldyn.mechanics.contact.inertia import added_inertia, room_for
+from foldyn.mechanics.contact.step_limit import Pace, limited
 
 DT, ALPHA = 1e-2, 30.0
 HALF = 0.5 * SHEET.thickness
@@ -78,17 +79,40 @@ def test_accelerations_are_those_of_the_mass_with_the_inertia_of_contacts(mass):
 def test_a_tower_that_is_pressed_flat_takes_few_steps():
     """It snaps shut under 38 N on each node and stays so; its vibrations die within some 10 ms.
 
-    With steps that resolve each contact everywhere (beta = 0.25) it took 289,739 steps and ended
-    at this height.
+    With steps that resolve each contact everywhere (beta = 0.25) it took 284,675 of them, and its
+    top came down by 59.4141 mm. How the panels come to lie depends on their rattling: heights of
+    0.585 and 0.586 mm are both equilibria.
     """
     pytest.importorskip("ipctk")
     case = tower(38.0, fd.Contact(), fd.Ramp(0.02, smooth=True), alpha=1000.0)
     run = fd.simulate(case, 0.1, method="auto", every=1e-3)
     u = run.displacement.values
     assert run.attrs["method"] == "dormand_prince"
-    assert run.attrs["steps"] < 289_739 / 10
-    assert run.attrs["energy_error"] < 1e-3
+    assert run.attrs["steps"] < 284_675 / 10
+    assert run.attrs["energy_error"] < 1e-4
     assert crossing(case.structure, u) == 0
-    height = 0.06 + u[-1, 6:12, 2].mean()
-    assert height == pytest.approx(0.58503143e-3, rel=1e-3)
+    assert u[-1, 6:12, 2].mean() == pytest.approx(-59.4141e-3, rel=1e-4)
     assert float(run.contact[-1]) > 0.01  # its panels press on each other
+    # what is at rest does not feel the inertia: supports carry the load
+    assert np.abs(run.velocity.values[-1]).max() < 1e-4
+    carried = run.reaction[-1, (run.support_axis == "z").values].sum()
+    assert float(carried) == pytest.approx(6 * 38.0, rel=1e-4)
+
+
+def test_steps_overrun_no_gap_where_they_resolve_no_contact():
+    """Only the stiffness of what touches may be left unresolved, not how fast a gap closes."""
+    packed = pressed("centroid")
+    body, lightness = packed.body, packed.system.lightness
+    u = np.zeros((len(packed.numbering.order), 3))
+    body.contact(u)
+    v, a = 0.5 * np.random.default_rng(1).standard_normal((2, *u.shape))
+    angle = body.inner.angles(body.dofs(u))
+
+    def longest(beta, energy):
+        pace = Pace(beta, energy)
+        return limited(body.tables, u, v, a, angle, 1.0, pace, lightness, body._memory)
+
+    closing = longest(1e9, 0.0)
+    assert longest(0.6, 1e9) == closing > 10.0 * longest(1e-3, 0.0)
+    assert longest(1e-3, 1e-30) == longest(1e-3, 0.0)  # the energy is what they may have
+    assert longest(1e-3, 0.0) < longest(1e-3, 1e-9) < longest(1e-3, 4e-9) < closing
