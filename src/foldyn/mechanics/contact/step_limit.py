@@ -59,7 +59,7 @@ def _spring_bound(limit, rate, pace):
 
 
 @scalar
-def _bound(limit, d, d0, closing, change, stiffness, lightness, pace, memory):
+def _bound(limit, d, d0, closing, change, stiffness, lightness, pace, facts):
     """The lesser of a step (s) and what a gap d allows that closes at some speed.
 
     change : rate of that speed, which tells a contact at rest from one that turns round.
@@ -69,7 +69,7 @@ def _bound(limit, d, d0, closing, change, stiffness, lightness, pace, memory):
     if d < d0:
         k = stiffness * barrier(d / d0)[2]
         resolved = _spring_bound(math.inf, k * lightness, pace)
-        memory.facts.resolved = min(memory.facts.resolved, resolved)
+        facts.resolved = min(facts.resolved, resolved)
         if pace.energy > 0.0:  # h |closing| + h^2 |change| = most
             most, speed = math.sqrt(pace.energy / k), abs(closing) + TINY
             slow = 2.0 * most / (speed + math.sqrt(speed * speed + 4.0 * most * abs(change)))
@@ -79,7 +79,7 @@ def _bound(limit, d, d0, closing, change, stiffness, lightness, pace, memory):
 
 
 @kernel
-def _vertex_bound(tables, x, v, a, lightness, i, t, d0, reach, limit, pace, memory):
+def _vertex_bound(tables, x, v, a, lightness, i, t, d0, reach, limit, pace, facts):
     """See `_bound`, for a vertex and a triangle; nan where they are farther than reach."""
     j, k, l = tables.triangles[t, 0], tables.triangles[t, 1], tables.triangles[t, 2]  # noqa: E741
     p, pa, pb, pc = point(x, i), point(x, j), point(x, k), point(x, l)
@@ -94,11 +94,11 @@ def _vertex_bound(tables, x, v, a, lightness, i, t, d0, reach, limit, pace, memo
         limit = _spring_bound(limit, tables.stiffness * light, pace)
     q = apart(point(a, i), point(a, j), point(a, k), point(a, l), wa, wb, wc)
     closing, change, stiffness = -dot(r, w) / d, dot(r, q) / d, tables.stiffness
-    return _bound(limit, d, d0, closing, change, stiffness, light, pace, memory)
+    return _bound(limit, d, d0, closing, change, stiffness, light, pace, facts)
 
 
 @kernel
-def _edge_bound(tables, x, v, a, lightness, i, j, d0, reach, limit, pace, memory):
+def _edge_bound(tables, x, v, a, lightness, i, j, d0, reach, limit, pace, facts):
     """See `_bound`, for two edges; nan where they are farther than reach."""
     k, l = tables.edges[i, 0], tables.edges[i, 1]  # noqa: E741
     m, n = tables.edges[j, 0], tables.edges[j, 1]
@@ -114,7 +114,7 @@ def _edge_bound(tables, x, v, a, lightness, i, j, d0, reach, limit, pace, memory
         limit = _spring_bound(limit, tables.stiffness * light, pace)
     q = between(point(a, k), point(a, l), point(a, m), point(a, n), s, t)
     closing, change, stiffness = -dot(r, w) / d, dot(r, q) / d, tables.stiffness
-    return _bound(limit, d, d0, closing, change, stiffness, light, pace, memory)
+    return _bound(limit, d, d0, closing, change, stiffness, light, pace, facts)
 
 
 @inner_scalar
@@ -132,11 +132,11 @@ def _pairs_bound(tables, x, v, a, lightness, far, reach, limit, pace, memory):
             d0 = memory.d0[kind, k]
             if kind == VERTEX:
                 now = _vertex_bound(
-                    tables, x, v, a, lightness, one, other, d0, reach, limit, pace, memory
+                    tables, x, v, a, lightness, one, other, d0, reach, limit, pace, memory.facts
                 )
             else:
                 now = _edge_bound(
-                    tables, x, v, a, lightness, one, other, d0, reach, limit, pace, memory
+                    tables, x, v, a, lightness, one, other, d0, reach, limit, pace, memory.facts
                 )
             if now == now:
                 limit = now
@@ -172,7 +172,7 @@ def _hinges_bound(tables, x, v, a, lightness, angle, reach, limit, pace, memory)
         if theta > math.pi:
             theta, rate = TURN - theta, -rate
         limit = _bound(
-            limit, theta, begin, -rate, change, tables.hinge_stiffness[h], light, pace, memory
+            limit, theta, begin, -rate, change, tables.hinge_stiffness[h], light, pace, memory.facts
         )
     team.note[team.number, HINGES] = near
     return limit
@@ -191,7 +191,7 @@ def _planes_bound(tables, x, v, a, lightness, memory, limit, pace):
                 speed = memory.moved[p, 3 + c] - v[i, c]
                 closing += speed * tables.planes[p, NORMAL + c]
                 change += a[i, c] * tables.planes[p, NORMAL + c]
-            limit = _bound(limit, d, d0, closing, change, k, lightness[i], pace, memory)
+            limit = _bound(limit, d, d0, closing, change, k, lightness[i], pace, memory.facts)
             if d < d0 and tables.planes[p, FRICTION] > 0.0:
                 limit = _spring_bound(limit, k * lightness[i], pace)
     return limit
