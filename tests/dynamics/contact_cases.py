@@ -9,6 +9,7 @@ from contact_sheets import SHEET, strip
 from foldyn.dynamics import driver, prepare
 
 G = 9.81
+PULSE = fd.HalfSine(0.02)
 
 
 def two_sheets() -> tuple[fd.Structure, np.ndarray]:
@@ -33,13 +34,13 @@ def folded_from_both_ends(contact: fd.Contact | None) -> fd.Case:
     )  # fmt: skip
 
 
-def tower(force: float, contact: fd.Contact | None) -> fd.Case:
-    """The Kresling tower of the gallery, its top pushed down within 20 ms."""
+def tower(force: float, contact: fd.Contact | None, history=PULSE, alpha: float = 200.0) -> fd.Case:
+    """The Kresling tower of the gallery, its top pushed down."""
     pattern = fd.patterns.kresling(sides=6, radius=0.04, height=0.06, twist=30, storeys=1)
     s = fd.discretize(pattern, SHEET)
-    push = fd.Force(nodes=list(range(6, 12)), vector=(0, 0, -force), history=fd.HalfSine(0.02))
+    push = fd.Force(nodes=list(range(6, 12)), vector=(0, 0, -force), history=history)
     return fd.Case(
-        s, [fd.Fix(nodes=list(range(6)))], [push], fd.Rayleigh(alpha=200.0), contact=contact
+        s, [fd.Fix(nodes=list(range(6)))], [push], fd.Rayleigh(alpha=alpha), contact=contact
     )
 
 

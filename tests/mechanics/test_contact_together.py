@@ -11,7 +11,7 @@ from foldyn.jit.compiled import shared
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.memory import memories
 from foldyn.mechanics.contact.planes import plane_powers
-from foldyn.mechanics.contact.step_limit import limited
+from foldyn.mechanics.contact.step_limit import RESOLVED, limited
 from foldyn.mechanics.threads import run_together, team, wait
 
 ROUNDING = 1e-13  # of the largest force: sums of some ten numbers in another order
@@ -24,10 +24,10 @@ DT = 1e-4
 def two_steps(tables, u, v, angle, lightness, memory, force):
     """The first force, two steps' limits, and the forces after them; returns limits and powers."""
     add_contact(tables, u[0], angle[0], force[0], memory)
-    one = limited(tables, u[0], v, angle[0], DT, lightness, memory)
+    one = limited(tables, u[0], v, v, angle[0], DT, RESOLVED, lightness, memory)
     wait(memory.share.team)
     add_contact(tables, u[1], angle[1], force[1], memory)
-    other = limited(tables, u[1], v, angle[1], DT, lightness, memory)
+    other = limited(tables, u[1], v, v, angle[1], DT, RESOLVED, lightness, memory)
     wait(memory.share.team)
     add_contact(tables, u[2], angle[2], force[2], memory)
     work, dissipated = plane_powers(tables, v, memory)

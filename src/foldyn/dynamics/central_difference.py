@@ -13,6 +13,7 @@ from foldyn.dynamics.course import Outcome, share, tell
 from foldyn.dynamics.equation import acceleration, advance_clock, longest_step, observe
 from foldyn.jit.compiled import shared
 from foldyn.jit.intrinsics import borrowed, flat
+from foldyn.mechanics.contact.step_limit import RESOLVED
 
 ORDER = 2
 NEWTON = 4  # iterations: few, where c is small
@@ -69,7 +70,8 @@ def advance(equation, course, plan, room, stretch):
         while True:  # once, unless contact asks for shorter steps
             dt = 0.0
             if step > 0:
-                dt = share(longest_step(equation, course.u, course.v, left), left)
+                dt = longest_step(equation, course.u, course.v, a, left, RESOLVED)
+                dt = share(dt, left)
             for i in range(u.size):
                 v[i] += 0.5 * dt * fa[i]
                 u[i] += dt * v[i]

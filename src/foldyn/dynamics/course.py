@@ -46,10 +46,11 @@ class StepPlan(NamedTuple):
 COUNTED = ("steps", "samples", "refused", "evaluations")
 # What is measured: work of the loads and energy dissipated (J), their powers at the last step (W);
 # the time reached, and of steps that vary the next one wanted, the last, shortest and longest (s);
-# the last one's error over the tolerance; the largest displacement (m) and velocity (m/s) so far
+# the last one's error over the tolerance; the largest displacement (m), velocity (m/s) and kinetic
+# energy (J) so far
 MEASURED = (
     "work", "dissipated", "power_in", "power_out", "time", "wanted", "last", "shortest", "longest",
-    "error", "farthest", "fastest",
+    "error", "farthest", "fastest", "kinetic",
 )  # fmt: skip
 TALLY = np.dtype(
     (np.record, [(n, np.int64) for n in COUNTED] + [(n, np.float64) for n in MEASURED])

@@ -11,10 +11,19 @@ from __future__ import annotations
 import numpy as np
 
 from foldyn.dynamics.course import Outcome, passed_through
-from foldyn.dynamics.equation import acceleration, longest_step, sample, work_of_offsets
+from foldyn.dynamics.equation import (
+    acceleration,
+    gather_slow,
+    longest_step,
+    sample,
+    slow_contacts_down,
+    work_of_offsets,
+)
 from foldyn.dynamics.stability import roots
 from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.context import value_at
 from foldyn.jit.intrinsics import borrowed, flat
+from foldyn.mechanics.contact.step_limit import Pace
 
 ORDER = 5
 
@@ -45,6 +54,8 @@ P = np.array(
     ]
 )
 SMALLEST = 1e-13  # step relative to the end of the motion
+RESOLVED = 0.6  # radians of a contact's vibration that a step may take: its error is controlled
+EASED = 0.1  # of the tolerance: part of the energy that slow contacts may have unresolved
 ROUNDING = 1e-9  # of a step: how far a sample may lie beyond its end
 
 
@@ -105,6 +116,16 @@ def _weights(theta, out):
         out[j] = theta * (p[0] + theta * (p[1] + theta * (p[2] + theta * p[3])))
 
 
+@inner
+def _longest(equation, q, w, a, plan, tally):
+    """See `longest_step`; slow contacts need not be resolved where they can be given inertia."""
+    energy = 0.0
+    if equation.kinetic != 0:
+        tally.kinetic = max(tally.kinetic, value_at(equation.kinetic, (equation.setting, w)))
+        energy = EASED * plan.tolerance * tally.kinetic
+    return longest_step(equation, q, w, a, plan.dt, Pace(RESOLVED, energy))
+
+
 @kernel
 def advance(equation, course, plan, room, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
@@ -120,9 +141,13 @@ def advance(equation, course, plan, room, stretch):
     powers, weights = np.empty((2, 7)), np.empty(7)
     ut, vt, a = np.empty_like(course.u), np.empty_like(course.u), np.empty_like(course.u)
     fut, fvt, fa = flat(ut), flat(vt), flat(a)
+    raw = flat(course.carry)  # the acceleration at the begin of a step, without inertia of contacts
     if tally.steps == 0:
         powers[0, 0], powers[1, 0] = acceleration(equation, course.u, course.v, plan.start, a)
-        tally.wanted = longest_step(equation, course.u, course.v, tally.wanted)
+        for i in range(n):
+            raw[i] = fa[i]
+        longest = _longest(equation, course.u, course.v, a, plan, tally)
+        tally.wanted = min(tally.wanted, longest)
         if tally.samples == 0:
             tally.farthest, tally.fastest = _largest(u), _largest(v)
             outcome = sample(equation, course.u, course.v, a, plan.start)
@@ -130,10 +155,8 @@ def advance(equation, course, plan, room, stretch):
                 return outcome, -1
     else:
         powers[0, 0], powers[1, 0] = tally.power_in, tally.power_out
-        for i in range(n):
-            fa[i] = flat(course.carry)[i]
     for i in range(n):
-        speeds[0, i], accelerations[0, i] = v[i], fa[i]
+        speeds[0, i] = v[i]
     last = tally.steps + stretch
     while tally.steps < last and tally.time < plan.end:
         if plan.every > 0 and tally.samples == room:
@@ -148,6 +171,10 @@ def advance(equation, course, plan, room, stretch):
         stops = stops and h == goal - t
         if h < SMALLEST * max(abs(plan.end), abs(t)):
             return Outcome.STUCK, -1
+        gather_slow(equation, course.u, h, RESOLVED)
+        for i in range(n):
+            accelerations[0, i] = raw[i]
+        slow_contacts_down(equation, course.v, accelerations[0])
         for stage in range(1, 7):
             _combine(u, speeds, A[stage], h, stage, fut)
             _combine(v, accelerations, A[stage], h, stage, fvt)
@@ -157,6 +184,7 @@ def advance(equation, course, plan, room, stretch):
             powers[0, stage], powers[1, stage] = acceleration(equation, ut, vt, moment, a)
             for i in range(n):
                 speeds[stage, i], accelerations[stage, i] = fvt[i], fa[i]
+            slow_contacts_down(equation, vt, accelerations[stage])
         tally.evaluations += 6
         scale_u = max(tally.farthest, _largest(fut), plan.floor) * plan.tolerance
         scale_v = max(tally.fastest, _largest(fvt), plan.floor / plan.dt) * plan.tolerance
@@ -178,7 +206,9 @@ def advance(equation, course, plan, room, stretch):
         hinge = passed_through(equation.angle, course.angle, 0, equation.angle.size)
         if hinge >= 0:
             return Outcome.PENETRATION, hinge
-        longest = longest_step(equation, ut, vt, plan.dt)
+        longest = _longest(equation, ut, vt, accelerations[6], plan, tally)
+        for i in range(n):
+            raw[i] = fa[i]
         after = goal if h == goal - t else t + h
         tally.steps += 1
         tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
@@ -203,7 +233,7 @@ def advance(equation, course, plan, room, stretch):
         _combine(u, speeds, A[6], h, 6, fut)
         for i in range(n):
             u[i], v[i] = fut[i], speeds[6, i]
-            speeds[0, i], accelerations[0, i] = speeds[6, i], accelerations[6, i]
+            speeds[0, i] = speeds[6, i]
         for k in range(2):
             powers[k, 0] = powers[k, 6]
         tally.time, tally.error = after, max(error, 1e-4)
@@ -215,7 +245,7 @@ def advance(equation, course, plan, room, stretch):
             tally.evaluations += 1
             tally.work += work_of_offsets(equation, True)
             for i in range(n):
-                accelerations[0, i] = fa[i]
+                raw[i] = fa[i]
         tally.wanted = min(tally.wanted, longest)
         if plan.every > 0 and tally.steps % plan.every == 0:
             acceleration(equation, course.u, course.v, after, a)
@@ -224,7 +254,5 @@ def advance(equation, course, plan, room, stretch):
             if outcome != Outcome.DONE:
                 return outcome, -1
     tally.power_in, tally.power_out = powers[0, 0], powers[1, 0]
-    for i in range(n):
-        flat(course.carry)[i] = accelerations[0, i]
     full = plan.every > 0 and tally.samples == room and tally.time < plan.end
     return (Outcome.FULL if full else Outcome.DONE), -1

@@ -3,8 +3,9 @@
 With terms by address, what a case consists of has the same types in every motion. Loops get the
 addresses of the functions here, so that they hold nothing but their own arithmetic. What only some
 motions have (histories, supports and rest angles that move, dampers, a mass matrix that is not
-diagonal) are parts of their own, which are compiled where they are used; elsewhere their address is
-0. Dead loads, drag and a diagonal mass, which nearly all have, are not: calls take some ns.
+diagonal, inertia of slow contacts) are parts of their own, which are compiled where they are used;
+elsewhere their address is 0. Dead loads, drag and a diagonal mass, which nearly all have, are not:
+calls take some ns.
 """
 
 from __future__ import annotations
@@ -37,15 +38,18 @@ from foldyn.dynamics.inertia import (
     solve_mass,
 )
 from foldyn.dynamics.record import record
+from foldyn.dynamics.slow_contacts import slow_down
 from foldyn.dynamics.system import Entries, Packed, Scratch, System, carry_part, moving_power
 from foldyn.jit.compiled import addressed, inner_scalar, kernel
 from foldyn.jit.context import Context, contents, numbers_at, rows_at, run_at, value_at
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.contact.inertia import Added, added_inertia, room_for
+from foldyn.mechanics.contact.memory import Memory
+from foldyn.mechanics.contact.tables import Tables
 from foldyn.mechanics.following import push_following
 from foldyn.mechanics.term import (
     ADDRESS,
     ADVANCE_CLOCK,
-    LIMIT,
     NUMBER,
     Model,
     Share,
@@ -71,6 +75,15 @@ class Setting(NamedTuple):
     mass: Inertia
     share: Share
     s: Scratch
+
+
+class Slowing(NamedTuple):
+    """A case whose slow contacts have inertia; those of a step stand in `added`."""
+
+    setting: Setting
+    tables: Tables
+    memory: Memory
+    added: Added
 
 
 class Balance(NamedTuple):
@@ -129,10 +142,14 @@ class Equation(NamedTuple):
     limit: int  # 0 without contact
     clock: int  # 0 without memory
     offsets: int  # 0 where nothing turns
+    gather_slow: int  # 0 where slow contacts have no inertia,
+    slow_down: int
+    kinetic: int  # as has this
     sample: int
     observe: int
     balance: int  # contexts
     setting: int
+    slowing: int
     recording: int
     observing: int
     powers: NDArray  # (2,) in and out at the last acceleration, W
@@ -234,13 +251,27 @@ def _offsets(context, accepted):
     )  # fmt: skip
 
 
-@addressed(ADDRESS, ADDRESS, NUMBER)
-def _limit(context, q, w, dt):
+@addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER, NUMBER, NUMBER)
+def _limit(context, q, w, a, dt, beta, energy):
     m = contents(context)
     rows = m.s.force.shape[0]
     u = m.s.displacement if m.system.moves else rows_at(q, rows)
     v = m.s.velocity if m.system.moves else rows_at(w, rows)
-    return limit_of(m.terms, u, v, dt, m.system.lightness)
+    return limit_of(m.terms, u, v, a, dt, beta, energy, m.system.lightness)
+
+
+@addressed(ADDRESS, NUMBER, NUMBER)
+def _gather_slow(context, u, dt, beta):
+    own = contents(context)
+    moved, light = rows_at(u, own.setting.s.force.shape[0]), own.setting.system.lightness
+    added_inertia(own.tables, own.added, moved, dt, beta, light, own.memory)
+
+
+@addressed(ADDRESS, ADDRESS)
+def _slow_down(context, w, a):
+    own = contents(context)
+    m, rows = own.setting, own.setting.s.force.shape[0]
+    slow_down(own.added, m.system, m.mass, rows_at(w, rows), rows_at(a, rows), m.s)
 
 
 @addressed(NUMBER)
@@ -374,14 +405,32 @@ def acceleration(equation, q, w, t, a):
 
 
 @inner_scalar
-def longest_step(equation, q, w, dt):
+def longest_step(equation, q, w, a, dt, pace):
     """The longest step (s), at most dt, that contact allows: after `acceleration` at q and w.
 
-    Once before each step, where the last one has ended.
+    Once before each step, where the last one has ended; a : the acceleration there, pace : see
+    `contact.step_limit`.
     """
     if equation.limit == 0:
         return dt
-    return value_at(equation.limit, (equation.setting, q, w, dt))
+    return value_at(equation.limit, (equation.setting, q, w, a, dt, pace.resolved, pace.energy))
+
+
+@inner_scalar
+def gather_slow(equation, u, dt, beta):
+    """Find the contacts that a step of dt (s) from u does not resolve: for `slow_contacts_down`.
+
+    beta : radians of a contact's vibration that a step may take.
+    """
+    if equation.gather_slow != 0:
+        run_at(equation.gather_slow, (equation.slowing, u, dt, beta))
+
+
+@inner_scalar
+def slow_contacts_down(equation, w, a):
+    """Change accelerations a at velocities w to those with the inertia of slow contacts."""
+    if equation.slow_down != 0:
+        run_at(equation.slow_down, (equation.slowing, w, a))
 
 
 @inner_scalar
@@ -441,26 +490,40 @@ class EquationOfMotion:
     s : Scratch
     course : Course
     plan : StepPlan
+    slows : bool
+        Whether the method gives slow contacts inertia; none has it where supports or obstacles
+        move, whose motion it would resist.
     """
 
     def __init__(
-        self, packed: Packed, work: Any, s: Scratch, course: Course, plan: StepPlan
-    ) -> None:
+        self, packed: Packed, work: Any, s: Scratch, course: Course, plan: StepPlan,
+        slows: bool = False,
+    ) -> None:  # fmt: skip
         system, mass, model = packed.system, packed.mass, Model(packed.body, work)
         self._model, self._course, self._plan, share = model, course, plan, model.share
         self._setting = Setting(model.terms, system, mass, share, s)
         self._whole = whole = Context(self._setting)
         self._balance = balance = Context(_balance(self._setting, whole))
         kernel = model.terms.kernel
+        slowing = None
+        if slows and system.touches and not system.moves and not system.presses:
+            body: Any = packed.body
+            own = body.tables, work.memory
+            slowing = Context(Slowing(self._setting, *own, room_for(*own)))
+        self._slowing = slowing
         self._equation = Equation(
             acceleration=_acceleration.at(balance),
-            limit=_limit.at(whole) if kernel[:, LIMIT].any() else 0,
+            limit=_limit.at(whole) if system.touches else 0,
             clock=_clock.at(whole) if kernel[:, ADVANCE_CLOCK].any() else 0,
             offsets=_offsets.at(whole) if system.turns else 0,
+            gather_slow=_gather_slow.at(slowing) if slowing else 0,
+            slow_down=_slow_down.at(slowing) if slowing else 0,
+            kinetic=_kinetic.at(whole) if slowing else 0,
             sample=0,
             observe=0,
             balance=balance.address,
             setting=whole.address,
+            slowing=slowing.address if slowing else 0,
             recording=0,
             observing=0,
             powers=np.zeros(2),

@@ -59,19 +59,20 @@ class Compiled:
         The case.
     course : Course
     plan : StepPlan
-    threads : int
-        On how many threads it shall run at most; fewer where elements reach too far.
+    adaptive : bool
+        Whether it chooses its steps by their error: then it runs on one thread, and gives slow
+        contacts inertia.
     """
 
     def __init__(
         self, loop: Callable[..., tuple[int, int]], packed: Packed, course: Course, plan: StepPlan,
-        threads: int,
+        adaptive: bool,
     ) -> None:  # fmt: skip
         self._loop, self._packed, self._course, self._plan = loop, packed, course, plan
-        self._works = packed.body.workspaces(threads)
+        self._works = packed.body.workspaces(1 if adaptive else threads_of(packed))
         self._memories = scratches(packed.system, self._works)
         self._equations = [
-            EquationOfMotion(packed, work, memory, course, plan)
+            EquationOfMotion(packed, work, memory, course, plan, adaptive)
             for work, memory in zip(self._works, self._memories, strict=True)
         ]
         self.threads = len(self._works)
@@ -173,7 +174,7 @@ class Integrator(NamedTuple):
         """The method with a case, its motion and the memory that it works with."""
         if self.scheme is not None:
             return Implicit(self.scheme, packed, course, plan, jumps(case))
-        return Compiled(self.loop, packed, course, plan, 1 if self.adaptive else threads_of(packed))
+        return Compiled(self.loop, packed, course, plan, self.adaptive)
 
     def critical_step(
         self, case: Case, u: ArrayLike | None = None, modal: ModalRows | None = None

@@ -9,6 +9,7 @@ from foldyn.dynamics.equation import acceleration, advance_clock, longest_step, 
 from foldyn.dynamics.stability import roots
 from foldyn.jit.compiled import shared
 from foldyn.jit.intrinsics import borrowed, flat
+from foldyn.mechanics.contact.step_limit import RESOLVED
 
 ORDER = 4
 
@@ -62,7 +63,8 @@ def advance(equation, course, plan, room, stretch):
                         outcome, hinge = observe(equation, a, step)
                         if outcome != Outcome.DONE or step == end:
                             return outcome, hinge
-                    dt = share(longest_step(equation, course.u, course.v, left), left)
+                    dt = longest_step(equation, course.u, course.v, a, left, RESOLVED)
+                    dt = share(dt, left)
                 ahead = 0.5 * dt if stage < 2 else dt
                 if stage == 0:
                     for i in range(u.size):

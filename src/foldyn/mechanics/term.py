@@ -12,9 +12,12 @@ are (rows, 3), as in `mechanics.body`. The signatures, after the address of the 
                                      `powers` the power that it puts in and the one that it
                                      dissipates, W; that of the body comes first, and writes
     energies(u, out)                 adds its energies to their groups; the body's are written, too
-    limit(u, v, h, lightness) -> h   the longest step (s), at most h, in which nothing is overrun:
+    limit(u, v, a, h, beta, energy, lightness) -> h
+                                     the longest step (s), at most h, in which nothing is overrun:
                                      before each step, after the forces where the last one ended;
-                                     lightness (n,) is 1 / mass of the nodes, 1/kg
+                                     a is the acceleration there, beta and energy are those of
+                                     `contact.step_limit.Pace`; lightness (n,) is 1 / mass of the
+                                     nodes, 1/kg
     place_obstacles(factors)         puts what moves with histories where their factors (h, 3) say
     advance_clock(since)             it is evaluated next so long (s) after the last accepted step
     commit()                         the step is accepted that ends where it was evaluated last
@@ -42,7 +45,7 @@ ADDRESS, NUMBER = types.int64, types.float64
 
 forces = addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS)
 energies = addressed(ADDRESS, ADDRESS)
-limit = addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS)
+limit = addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER, NUMBER, NUMBER, ADDRESS)
 place_obstacles = addressed(ADDRESS)
 advance_clock = addressed(NUMBER)
 commit = dissipated = addressed()
@@ -135,11 +138,12 @@ def energies_of(terms, u, out):
 
 
 @inner_scalar
-def limit_of(terms, u, v, dt, lightness):
+def limit_of(terms, u, v, a, dt, beta, energy, lightness):
     """The longest step (s), at most dt, of all terms."""
     for k in range(terms.context.size):
         if terms.kernel[k, LIMIT] != 0:
-            dt = value_at(terms.kernel[k, LIMIT], (terms.context[k], u, v, dt, lightness))
+            own = terms.context[k]
+            dt = value_at(terms.kernel[k, LIMIT], (own, u, v, a, dt, beta, energy, lightness))
     return dt
 
 

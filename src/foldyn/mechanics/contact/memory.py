@@ -52,8 +52,9 @@ COUNTED = (
     "full",  # whether the last list could not be made
     "lagged",  # whether friction is bounded by the normal force at the end of the last step
 )
-# energy at the last force (J), skin of the list (m), shortest step asked for so far (s)
-MEASURED = ("energy", "skin", "shortest")
+# energy at the last force (J), skin of the list (m), the shortest step asked for so far (s), the
+# longest one that resolves what touches now (s)
+MEASURED = ("energy", "skin", "shortest", "resolved")
 COUNTS = np.dtype((np.record, [(name, np.int64) for name in COUNTED]))
 FACTS = np.dtype((np.record, [(name, np.float64) for name in MEASURED]))
 

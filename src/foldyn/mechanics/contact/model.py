@@ -12,7 +12,7 @@ from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import move_planes, plane_powers
 from foldyn.mechanics.contact.rubbing import rub_power
 from foldyn.mechanics.contact.share import energy_of_all
-from foldyn.mechanics.contact.step_limit import limited
+from foldyn.mechanics.contact.step_limit import Pace, limited
 from foldyn.mechanics.contact.tables import HISTORY, Tables
 from foldyn.mechanics.term import (
     ENERGIES,
@@ -73,11 +73,11 @@ def _place(context, factors):
 
 
 @limit
-def _limit(context, u, v, dt, lightness):
+def _limit(context, u, v, a, dt, beta, energy, lightness):
     own = contents(context)
-    light = numbers_at(lightness, own.rows)
-    moved, speed = rows_at(u, own.rows), rows_at(v, own.rows)
-    return limited(own.tables, moved, speed, own.angle, dt, light, own.memory)
+    pace, light = Pace(beta, energy), numbers_at(lightness, own.rows)
+    moved, speed, change = rows_at(u, own.rows), rows_at(v, own.rows), rows_at(a, own.rows)
+    return limited(own.tables, moved, speed, change, own.angle, dt, pace, light, own.memory)
 
 
 def contact_term(tables: Tables, memory: Memory, angle: NDArray, group: int, rows: int) -> Term:

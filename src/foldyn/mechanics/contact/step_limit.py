@@ -5,12 +5,14 @@ at the speed at its begin; and the stiffness of what touches is resolved,
 
     h <= ((d - d0)+ + eta min(d, d0)) / closing speed,    h <= beta / sqrt(k f'' sum w_i^2 / m_i),
 
-with the weights w_i of the closest points and the masses m_i.
+with the weights w_i of the closest points and the masses m_i. A method that gives slow contacts
+inertia (`inertia`) goes beyond the latter where little energy is in it.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,64 +37,88 @@ from foldyn.mechanics.contact.tables import FRICTION, NORMAL
 from foldyn.mechanics.threads import largest, part, wait
 
 APPROACH = 0.1
-RESOLVED = 0.25
 REACH = 4.0  # times the fastest motion in a step: how far away pairs are looked at in it
+TINY = 1e-300  # m/s
 MARGIN = 0.05  # of the skin: how much farther, as speeds change within a step
 
 
+class Pace(NamedTuple):
+    """What a method asks of its steps where something touches."""
+
+    resolved: float  # beta: part of the angular period of a contact
+    energy: float  # k f'' (change of the gap)^2 of contacts that need not be resolved, at most, J
+
+
+RESOLVED = Pace(0.25, 0.0)  # without an estimate of its error
+
+
 @scalar
-def _spring_bound(limit, rate):
+def _spring_bound(limit, rate, pace):
     """The lesser of a step and what a spring allows, of stiffness over mass `rate` (1/s2)."""
-    return min(limit, RESOLVED / math.sqrt(rate)) if rate > 0.0 else limit
+    return min(limit, pace.resolved / math.sqrt(rate)) if rate > 0.0 else limit
 
 
 @scalar
-def _bound(limit, d, d0, closing, stiffness, lightness):
-    """The lesser of a step (s) and what a gap d allows that closes at some speed."""
+def _bound(limit, d, d0, closing, change, stiffness, lightness, pace, facts):
+    """The lesser of a step (s) and what a gap d allows that closes at some speed.
+
+    change : rate of that speed, which tells a contact at rest from one that turns round.
+    """
     if closing > 0.0:
         limit = min(limit, (max(d - d0, 0.0) + APPROACH * min(d, d0)) / closing)
     if d < d0:
-        limit = _spring_bound(limit, stiffness * barrier(d / d0)[2] * lightness)
+        k = stiffness * barrier(d / d0)[2]
+        resolved = _spring_bound(math.inf, k * lightness, pace)
+        facts.resolved = min(facts.resolved, resolved)
+        if pace.energy > 0.0:  # h |closing| + h^2 |change| = most
+            most, speed = math.sqrt(pace.energy / k), abs(closing) + TINY
+            slow = 2.0 * most / (speed + math.sqrt(speed * speed + 4.0 * most * abs(change)))
+            resolved = max(resolved, slow)
+        limit = min(limit, resolved)
     return limit
 
 
 @kernel
-def _vertex_bound(tables, x, v, lightness, i, t, d0, reach, limit):
+def _vertex_bound(tables, x, v, a, lightness, i, t, d0, reach, limit, pace, facts):
     """See `_bound`, for a vertex and a triangle; nan where they are farther than reach."""
-    a, b, c = tables.triangles[t, 0], tables.triangles[t, 1], tables.triangles[t, 2]
-    p, pa, pb, pc = point(x, i), point(x, a), point(x, b), point(x, c)
+    j, k, l = tables.triangles[t, 0], tables.triangles[t, 1], tables.triangles[t, 2]  # noqa: E741
+    p, pa, pb, pc = point(x, i), point(x, j), point(x, k), point(x, l)
     wa, wb, wc, _ = closest_on_triangle(p, pa, pb, pc)
     r = apart(p, pa, pb, pc, wa, wb, wc)
     d = math.sqrt(dot(r, r))
     if d - d0 > reach:
         return np.nan
-    w = apart(point(v, i), point(v, a), point(v, b), point(v, c), wa, wb, wc)
-    light = lightness[i] + wa * wa * lightness[a] + wb * wb * lightness[b] + wc * wc * lightness[c]
+    w = apart(point(v, i), point(v, j), point(v, k), point(v, l), wa, wb, wc)
+    light = lightness[i] + wa * wa * lightness[j] + wb * wb * lightness[k] + wc * wc * lightness[l]
     if d < d0 and tables.friction > 0.0:
-        limit = _spring_bound(limit, tables.stiffness * light)
-    return _bound(limit, d, d0, -dot(r, w) / d, tables.stiffness, light)
+        limit = _spring_bound(limit, tables.stiffness * light, pace)
+    q = apart(point(a, i), point(a, j), point(a, k), point(a, l), wa, wb, wc)
+    closing, change, stiffness = -dot(r, w) / d, dot(r, q) / d, tables.stiffness
+    return _bound(limit, d, d0, closing, change, stiffness, light, pace, facts)
 
 
 @kernel
-def _edge_bound(tables, x, v, lightness, i, j, d0, reach, limit):
+def _edge_bound(tables, x, v, a, lightness, i, j, d0, reach, limit, pace, facts):
     """See `_bound`, for two edges; nan where they are farther than reach."""
-    a, b = tables.edges[i, 0], tables.edges[i, 1]
-    c, d = tables.edges[j, 0], tables.edges[j, 1]
-    s, t, _ = closest_of_segments(point(x, a), point(x, b), point(x, c), point(x, d))
-    r = between(point(x, a), point(x, b), point(x, c), point(x, d), s, t)
-    distance = math.sqrt(dot(r, r))
-    if distance - d0 > reach:
+    k, l = tables.edges[i, 0], tables.edges[i, 1]  # noqa: E741
+    m, n = tables.edges[j, 0], tables.edges[j, 1]
+    s, t, _ = closest_of_segments(point(x, k), point(x, l), point(x, m), point(x, n))
+    r = between(point(x, k), point(x, l), point(x, m), point(x, n), s, t)
+    d = math.sqrt(dot(r, r))
+    if d - d0 > reach:
         return np.nan
-    w = between(point(v, a), point(v, b), point(v, c), point(v, d), s, t)
-    light = (1.0 - s) ** 2 * lightness[a] + s * s * lightness[b]
-    light += (1.0 - t) ** 2 * lightness[c] + t * t * lightness[d]
-    if distance < d0 and tables.friction > 0.0:
-        limit = _spring_bound(limit, tables.stiffness * light)
-    return _bound(limit, distance, d0, -dot(r, w) / distance, tables.stiffness, light)
+    w = between(point(v, k), point(v, l), point(v, m), point(v, n), s, t)
+    light = (1.0 - s) ** 2 * lightness[k] + s * s * lightness[l]
+    light += (1.0 - t) ** 2 * lightness[m] + t * t * lightness[n]
+    if d < d0 and tables.friction > 0.0:
+        limit = _spring_bound(limit, tables.stiffness * light, pace)
+    q = between(point(a, k), point(a, l), point(a, m), point(a, n), s, t)
+    closing, change, stiffness = -dot(r, w) / d, dot(r, q) / d, tables.stiffness
+    return _bound(limit, d, d0, closing, change, stiffness, light, pace, facts)
 
 
 @inner_scalar
-def _pairs_bound(tables, x, v, lightness, far, reach, limit, memory):
+def _pairs_bound(tables, x, v, a, lightness, far, reach, limit, pace, memory):
     """See `_bound`, for a member's part of all listed pairs; notes those that are near."""
     counts, team = memory.counts, memory.share.team
     for kind in range(2):
@@ -105,9 +131,13 @@ def _pairs_bound(tables, x, v, lightness, far, reach, limit, memory):
             one, other = memory.pairs[kind, k, 0], memory.pairs[kind, k, 1]
             d0 = memory.d0[kind, k]
             if kind == VERTEX:
-                now = _vertex_bound(tables, x, v, lightness, one, other, d0, reach, limit)
+                now = _vertex_bound(
+                    tables, x, v, a, lightness, one, other, d0, reach, limit, pace, memory.facts
+                )
             else:
-                now = _edge_bound(tables, x, v, lightness, one, other, d0, reach, limit)
+                now = _edge_bound(
+                    tables, x, v, a, lightness, one, other, d0, reach, limit, pace, memory.facts
+                )
             if now == now:
                 limit = now
                 memory.share.found[kind, found] = k
@@ -117,12 +147,12 @@ def _pairs_bound(tables, x, v, lightness, far, reach, limit, memory):
 
 
 @kernel
-def _hinges_bound(tables, x, v, lightness, angle, reach, limit, team):
+def _hinges_bound(tables, x, v, a, lightness, angle, reach, limit, pace, memory):
     """See `_bound`, for a member's part of the guarded hinges.
 
     Notes how many of them a motion by reach may bring to their guard.
     """
-    near = 0
+    near, team = 0, memory.share.team
     first, last = part(team, tables.hinge_limit.size)
     for h in range(first, last):
         begin, theta = tables.hinge_limit[h], angle[tables.hinge_row[h]]
@@ -130,51 +160,56 @@ def _hinges_bound(tables, x, v, lightness, angle, reach, limit, team):
             continue
         near += 1
         found = gradient_at(tables, x, h)
-        rate, light = 0.0, 0.0
+        rate, change, light = 0.0, 0.0, 0.0
         for k in range(4):
             node = tables.hinges[h, k]
             for c in range(3):
                 slope = found[1 + 3 * k + c]
                 rate += slope * v[node, c]
+                change += slope * a[node, c]
                 light += slope * slope * lightness[node]
         theta = found[0]
         if theta > math.pi:
             theta, rate = TURN - theta, -rate
-        limit = _bound(limit, theta, begin, -rate, tables.hinge_stiffness[h], light)
+        limit = _bound(
+            limit, theta, begin, -rate, change, tables.hinge_stiffness[h], light, pace, memory.facts
+        )
     team.note[team.number, HINGES] = near
     return limit
 
 
 @kernel
-def _planes_bound(tables, x, v, lightness, memory, limit):
+def _planes_bound(tables, x, v, a, lightness, memory, limit, pace):
     """See `_bound`, for a member's nodes and planes; friction's springs are resolved, too."""
     k, mine = tables.stiffness, memory.share.meeting
     for p in range(len(tables.planes)):
         for m in range(mine[0], mine[1]):
             i = tables.meeting[m]
             d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory.moved, p, i)
-            closing = 0.0
+            closing, change = 0.0, 0.0
             for c in range(3):
                 speed = memory.moved[p, 3 + c] - v[i, c]
                 closing += speed * tables.planes[p, NORMAL + c]
-            limit = _bound(limit, d, d0, closing, k, lightness[i])
+                change += a[i, c] * tables.planes[p, NORMAL + c]
+            limit = _bound(limit, d, d0, closing, change, k, lightness[i], pace, memory.facts)
             if d < d0 and tables.planes[p, FRICTION] > 0.0:
-                limit = _spring_bound(limit, k * lightness[i])
+                limit = _spring_bound(limit, k * lightness[i], pace)
     return limit
 
 
 @kernel
-def limited(tables, u, v, angle, dt, lightness, memory):
-    """The longest step (s), at most dt, from displacement u with velocity v, both (rows, 3).
+def limited(tables, u, v, a, angle, dt, pace, lightness, memory):
+    """The longest step (s), at most dt, from displacement u with velocity v, all (rows, 3).
 
     Lists are renewed, pairs that may touch in the step are gathered, and friction slips: to be
     called once before each step, where the last one has ended. Each member of a team looks at its
     share; all get the same step.
 
-    angle : dihedrals (nh,) at u; lightness : (n,) 1 / mass of the nodes, 1/kg.
+    a : acceleration, which is looked at where contacts need not be resolved; angle : dihedrals
+    (nh,) at u; pace : see `Pace`; lightness : (n,) 1 / mass of the nodes, 1/kg.
     """
     limit, counts, x, team = dt, memory.counts, memory.x, memory.share.team
-    rubs = tables.friction > 0.0
+    rubs, memory.facts.resolved = tables.friction > 0.0, dt
     panels = memory.d0.shape[1] > 0
     place(tables, u, memory)
     if panels:
@@ -191,11 +226,11 @@ def limited(tables, u, v, angle, dt, lightness, memory):
         if 2.0 * fast * dt > 0.5 * skin - far:
             limit = (0.25 * skin - 0.5 * far) / fast
         reach = REACH * fast * limit + MARGIN * skin
-        limit = _pairs_bound(tables, x, v, lightness, far, reach, limit, memory)
-        limit = _hinges_bound(tables, x, v, lightness, angle, reach, limit, team)
+        limit = _pairs_bound(tables, x, v, a, lightness, far, reach, limit, pace, memory)
+        limit = _hinges_bound(tables, x, v, a, lightness, angle, reach, limit, pace, memory)
     if len(tables.planes) > 0:
         slip(tables, x, memory)
-        limit = _planes_bound(tables, x, v, lightness, memory, limit)
+        limit = _planes_bound(tables, x, v, a, lightness, memory, limit, pace)
     team.note[team.number, LIMIT] = -limit
     wait(team)
     limit = -largest(team, LIMIT)

@@ -1,0 +1,91 @@
+"""Accelerations where contacts that are slow have inertia; see `mechanics.contact.inertia`.
+
+(M + sum g g' / e) a = F is solved for the forces y of the contacts by conjugate gradients,
+
+    (e + G M^-1 G') y = G (a0 + alpha w),    a = a0 - M^-1 G' y,
+
+with the accelerations a0 without that inertia, among them the drag -alpha w, and the rows g of G.
+That inertia is dragged as all mass is: else what vibrates in it would not come to rest.
+"""
+
+from __future__ import annotations
+
+from foldyn.dynamics.damping import drag
+from foldyn.dynamics.inertia import solve_mass
+from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.intrinsics import flat
+
+ACCURATE = 1e-10  # of the contacts' accelerations
+ITERATIONS = 200
+
+
+@inner
+def _solve(mass, r, out, line):
+    """M^-1 r to out, both (n, 3)."""
+    if mass.lumped:
+        values, given, inverse = flat(out), flat(r), flat(mass.inverse)
+        for i in range(values.size):
+            values[i] = inverse[i] * given[i]
+    else:
+        solve_mass(mass, r, out, line, 0, 1)
+
+
+@inner
+def _pushed(added, mass, y, r, out, line):
+    """M^-1 G' y to out (n, 3)."""
+    for i in range(len(r)):
+        for c in range(3):
+            r[i, c] = 0.0
+    for k in range(added.count[0]):
+        for i in range(4):
+            for c in range(3):
+                r[added.nodes[k, i], c] += added.gradient[k, i, c] * y[k]
+    _solve(mass, r, out, line)
+
+
+@inner
+def _along(added, k, a):
+    """Acceleration of contact k at nodal ones (n, 3)."""
+    total = 0.0
+    for i in range(4):
+        for c in range(3):
+            total += added.gradient[k, i, c] * a[added.nodes[k, i], c]
+    return total
+
+
+@kernel
+def slow_down(added, system, mass, w, a, s):
+    """Change accelerations a (n, 3) at velocities w to those with the inertia of contacts.
+
+    added : see `added_inertia`; s : memory.
+    """
+    size, r, out, line = added.count[0], s.stage[0], s.stage[1], s.line
+    if size == 0:
+        return
+    ease, lightness = added.ease, added.lightness
+    y, left, p, q = added.lines[0], added.lines[1], added.lines[2], added.lines[3]
+    before = 0.0
+    for k in range(size):
+        y[k], left[k] = 0.0, _along(added, k, a) + drag(system.damping, _along(added, k, w))
+        p[k] = left[k] / (ease[k] + lightness[k])
+        before += left[k] * p[k]
+    goal = before * ACCURATE * ACCURATE
+    for _ in range(ITERATIONS):
+        if not before > goal:
+            break
+        _pushed(added, mass, p, r, out, line)
+        along, now = 0.0, 0.0
+        for k in range(size):
+            q[k] = ease[k] * p[k] + _along(added, k, out)
+            along += p[k] * q[k]
+        for k in range(size):
+            y[k] += before / along * p[k]
+            left[k] -= before / along * q[k]
+            now += left[k] * left[k] / (ease[k] + lightness[k])
+        for k in range(size):
+            p[k] = left[k] / (ease[k] + lightness[k]) + now / before * p[k]
+        before = now
+    _pushed(added, mass, y, r, out, line)
+    for i in range(len(a)):
+        for c in range(3):
+            a[i, c] -= out[i, c]

@@ -1,0 +1,129 @@
+"""Inertia of contacts that a step need not resolve.
+
+Where panels press on each other their contacts are stiff, and in them next to nothing moves. Steps
+that an explicit method could take of these vibrations alone would be as short as their period. So a
+distance (or dihedral) g of stiffness K gets the inertia tau^2 K, of the order of the step squared,
+
+    (M + tau^2 sum K g_i g_i') a = F,
+
+which no vibration of it outruns: 1/tau is the highest frequency. What moves slowly against each
+other does not feel it, nor do rigid motions, so that both momenta are kept; `step_limit` says how
+much energy may be in it. Here is which contacts get it; integrators solve for the accelerations.
+
+Selective mass scaling: Olovsson, Simonsson and Unosson, Int. J. Numer. Meth. Engng 63, 2005.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.jit.compiled import kernel
+from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
+from foldyn.mechanics.contact.memory import Memory
+from foldyn.mechanics.contact.pairs import VERTEX, closest_of, nodes_of, weights_of
+from foldyn.mechanics.contact.planes import height
+from foldyn.mechanics.contact.potential import barrier
+from foldyn.mechanics.contact.search import place
+from foldyn.mechanics.contact.tables import NORMAL, Tables
+
+SLOWNESS = 2.0  # tau over the step: no vibration of a contact is faster than half a radian a step
+STRETCH = 1.02  # of what resolves a contact: steps that end where a load jumps may be so long
+
+
+class Added(NamedTuple):
+    """The contacts with inertia in a step, and room for all that may have it."""
+
+    count: NDArray  # (1,) int64
+    nodes: NDArray  # (room, 4)
+    gradient: NDArray  # (room, 4, 3) of the distance, or dihedral
+    ease: NDArray  # (room,) 1 / (tau^2 K)
+    lightness: NDArray  # (room,) 1 / mass that each moves, about
+    lines: NDArray  # (4, room) memory for solving
+
+
+def room_for(tables: Tables, memory: Memory) -> Added:
+    """Room for all pairs, hinges and nodes on planes that may touch in one step."""
+    room = memory.near.size + tables.hinge_limit.size + tables.meeting.size * len(tables.planes)
+    nodes, gradient = np.empty((room, 4), np.int64), np.empty((room, 4, 3))
+    ease, lightness, lines = np.empty(room), np.empty(room), np.empty((4, room))
+    return Added(np.zeros(1, np.int64), nodes, gradient, ease, lightness, lines)
+
+
+@kernel
+def _slow(added, k, stiffness, dt, beta, lightness):
+    """Whether a step does not resolve contact k of some stiffness, which then gets its inertia."""
+    light = 0.0
+    for i in range(4):
+        for axis in range(3):
+            light += added.gradient[k, i, axis] ** 2 * lightness[added.nodes[k, i]]
+    if not dt * math.sqrt(stiffness * light) > STRETCH * beta:
+        return False
+    added.ease[k] = 1.0 / ((SLOWNESS * dt) ** 2 * stiffness)
+    added.lightness[k] = light
+    return True
+
+
+@kernel
+def added_inertia(tables, added, u, dt, beta, lightness, memory):
+    """Put the contacts at displacement u that a step of dt from there does not resolve in `added`.
+
+    beta : radians of a contact's vibration that a step may take; lightness : (n,) 1 / mass of the
+    nodes, 1/kg.
+    """
+    counts, x, found = memory.counts, memory.x, 0
+    added.count[0] = 0
+    if not dt > STRETCH * memory.facts.resolved:
+        return
+    meeting, planes, stiffness = tables.meeting.size, len(tables.planes), tables.stiffness
+    hinges = tables.hinge_limit.size if counts.hinges > 0 else 0
+    nodes, gradient = added.nodes, added.gradient
+    place(tables, u, memory)
+    for kind in range(2):
+        for near in range(counts.near_first if kind == VERTEX else counts.near_second):
+            k = memory.near[kind, near]
+            one, other, d0 = memory.pairs[kind, k, 0], memory.pairs[kind, k, 1], memory.d0[kind, k]
+            a, b, c, d = nodes_of(tables.triangles, tables.edges, kind, one, other)
+            p, q, _ = closest_of(tables.triangles, tables.edges, x, kind, one, other)
+            weights, distance = weights_of(kind, p, q), 0.0
+            nodes[found, 0], nodes[found, 1], nodes[found, 2], nodes[found, 3] = a, b, c, d
+            for axis in range(3):
+                r = weights[0] * x[a, axis] + weights[1] * x[b, axis]
+                r += weights[2] * x[c, axis] + weights[3] * x[d, axis]
+                distance += r * r
+                for i in range(4):
+                    gradient[found, i, axis] = weights[i] * r
+            distance = math.sqrt(distance)
+            if distance < d0:
+                for i in range(4):
+                    for axis in range(3):
+                        gradient[found, i, axis] /= distance
+                own = stiffness * barrier(distance / d0)[2]
+                found += _slow(added, found, own, dt, beta, lightness)
+    for h in range(hinges):
+        turn = gradient_at(tables, x, h)
+        theta, begin = min(turn[0], TURN - turn[0]), tables.hinge_limit[h]
+        if theta < begin:
+            for i in range(4):
+                nodes[found, i] = tables.hinges[h, i]
+                for axis in range(3):
+                    gradient[found, i, axis] = turn[1 + 3 * i + axis]
+            own = tables.hinge_stiffness[h] * barrier(theta / begin)[2]
+            found += _slow(added, found, own, dt, beta, lightness)
+    for p in range(planes):
+        for m in range(meeting):
+            i = tables.meeting[m]
+            d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory.moved, p, i)
+            if d < d0:
+                for one in range(4):
+                    nodes[found, one] = i
+                    for axis in range(3):
+                        gradient[found, one, axis] = 0.0
+                for axis in range(3):
+                    gradient[found, 0, axis] = tables.planes[p, NORMAL + axis]
+                own = stiffness * barrier(d / d0)[2]
+                found += _slow(added, found, own, dt, beta, lightness)
+    added.count[0] = found

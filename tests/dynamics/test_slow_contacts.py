@@ -1,0 +1,150 @@
+"""Contacts that press but hardly move get inertia, so that steps need not resolve them."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+from contact_cases import tower
+from scipy.sparse import csr_array
+
+import foldyn as fd
+from contact_sheets import SHEET, crossing, on_a_panel
+from foldyn.dynamics import motion, prepare
+from foldyn.dynamics.slow_contacts import slow_down
+from foldyn.dynamics.system import pack, scratch
+from foldyn.mechanics.contact.inertia import added_inertia, room_for
+from foldyn.mechanics.contact.step_limit import Pace, limited
+
+DT, ALPHA = 1e-2, 30.0
+HALF = 0.5 * SHEET.thickness
+DEPTH = 0.98 * HALF
+
+
+def curvature(x):
+    """f'' of (1 - x)^3 / x^4."""
+    return 20 * (1 - x) ** 3 / x**6 + 24 * (1 - x) ** 2 / x**5 + 6 * (1 - x) / x**4
+
+
+def pressed(mass: str):
+    """A packed case in which a strip lies on a panel and a corner on the ground."""
+    s = on_a_panel()[0]
+    s = fd.discretize(s.pattern, SHEET, fold_law="linear", mass=mass)
+    ground = fd.Plane((0, 0, -DEPTH), (0.0, 0.0, 1.0))
+    contact = fd.Contact(planes=[ground])
+    return pack(fd.Case(s, damping=fd.Rayleigh(alpha=ALPHA), contact=contact), 1e-4)
+
+
+@pytest.mark.parametrize("mass", ["centroid", "consistent"])
+def test_accelerations_are_those_of_the_mass_with_the_inertia_of_contacts(mass):
+    packed = pressed(mass)
+    body, system, order = packed.body, packed.system, packed.numbering.order
+    u = np.zeros((len(order), 3))
+    body.contact(u)
+    kept = body._memory
+    added = room_for(body.tables, kept)
+    arguments = body.tables, added, u, DT, 0.7, system.lightness, kept
+    kept.facts.resolved = 0.0
+    added_inertia(*arguments)
+    count, pairs = int(added.count[0]), kept.counts.near_first + kept.counts.near_second
+    assert count > len(body.tables.meeting) - 8 and pairs > 0
+    kept.facts.resolved = DT
+    added_inertia(*arguments)
+    assert added.count[0] == 0
+    kept.facts.resolved = 0.0
+    added_inertia(*arguments)
+    assert added.count[0] == count
+    nodes, gradient = added.nodes[:count], added.gradient[:count]
+    rows = np.zeros((count, u.size))
+    for row, corners, slopes in zip(rows, nodes, gradient, strict=True):
+        for node, slope in zip(corners, slopes, strict=True):
+            row[3 * node : 3 * node + 3] += slope
+    # a tau of two steps, and the stiffness of contact: here of corners on the ground
+    stiffness = 1.0 / (4.0 * DT**2 * added.ease[:count])
+    grounded = stiffness[nodes[:, 0] == nodes[:, 1]]
+    own = body.tables.stiffness * curvature(DEPTH / HALF)
+    assert len(grounded) == 5 and grounded == pytest.approx(own, rel=1e-9)
+    rng = np.random.default_rng(0)
+    before, w = rng.standard_normal((2, *u.shape))
+    a = before.copy()
+    slow_down(added, system, packed.mass, w, a, scratch(system))
+    nodal = packed.mass
+    m = np.kron(csr_array((nodal.data, nodal.indices, nodal.indptr)).toarray(), np.eye(3))
+    whole = m + rows.T @ (rows / added.ease[:count, None])
+    expected = np.linalg.solve(whole, m @ (before + ALPHA * w).ravel()) - ALPHA * w.ravel()
+    np.testing.assert_allclose(a.ravel(), expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+    assert np.abs(a - before).max() > 0.1
+    # what panels do to each other changes neither momentum
+    push = rows[(nodes[:, 0] != nodes[:, 1]).nonzero()[0]].reshape(-1, len(u), 3)
+    assert np.abs(push.sum(axis=1)).max() < 1e-12
+    assert np.abs(np.cross(body.tables.rest, push).sum(axis=1)).max() < 1e-12
+
+
+def test_a_tower_that_is_pressed_flat_takes_few_steps():
+    """It snaps shut under 38 N on each node and stays so; its vibrations die within some 10 ms.
+
+    With steps that resolve each contact everywhere (beta = 0.25) it took 284,675 of them, and its
+    top came down by 59.4141 mm. How the panels come to lie depends on their rattling: heights of
+    0.585 and 0.586 mm are both equilibria.
+    """
+    pytest.importorskip("ipctk")
+    case = tower(38.0, fd.Contact(), fd.Ramp(0.02, smooth=True), alpha=1000.0)
+    run = fd.simulate(case, 0.1, method="auto", every=1e-3)
+    u = run.displacement.values
+    assert run.attrs["method"] == "dormand_prince"
+    assert run.attrs["steps"] < 284_675 / 10
+    assert run.attrs["energy_error"] < 1e-4
+    assert crossing(case.structure, u) == 0
+    assert u[-1, 6:12, 2].mean() == pytest.approx(-59.4141e-3, rel=1e-4)
+    assert float(run.contact[-1]) > 0.01  # its panels press on each other
+    # what is at rest does not feel the inertia: supports carry the load
+    assert np.abs(run.velocity.values[-1]).max() < 1e-4
+    carried = run.reaction[-1, (run.support_axis == "z").values].sum()
+    assert float(carried) == pytest.approx(6 * 38.0, rel=1e-4)
+
+
+def test_steps_overrun_no_gap_where_they_resolve_no_contact():
+    """Only the stiffness of what touches may be left unresolved, not how fast a gap closes."""
+    packed = pressed("centroid")
+    body, lightness = packed.body, packed.system.lightness
+    u = np.zeros((len(packed.numbering.order), 3))
+    body.contact(u)
+    v, a = 0.5 * np.random.default_rng(1).standard_normal((2, *u.shape))
+    angle = body.inner.angles(body.dofs(u))
+
+    def longest(beta, energy):
+        pace = Pace(beta, energy)
+        return limited(body.tables, u, v, a, angle, 1.0, pace, lightness, body._memory)
+
+    closing = longest(1e9, 0.0)
+    assert longest(0.6, 1e9) == closing > 10.0 * longest(1e-3, 0.0)
+    assert longest(1e-3, 1e-30) == longest(1e-3, 0.0)  # the energy is what they may have
+    assert longest(1e-3, 0.0) < longest(1e-3, 1e-9) < longest(1e-3, 4e-9) < closing
+
+
+class Killed(BaseException):
+    """What ends a run without a word."""
+
+
+def test_a_motion_with_slow_contacts_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path):
+    monkeypatch.setattr(os, "fsync", lambda _: None)
+    monkeypatch.setattr(motion, "CHUNK", 256)
+    monkeypatch.setattr(motion, "REPORT_EVERY", 0.0)
+    case = tower(38.0, fd.Contact(), fd.Ramp(0.005, smooth=True), alpha=2000.0)
+    given = {"duration": 0.04, "method": "dormand_prince", "every": 1e-3}
+    once = prepare(case, **given)
+    whole = once.run()
+    assert once._engine._equations[0]._slowing._value.added.count[0] > 0
+
+    def stop(now):
+        if now.time > 0.7 * given["duration"]:
+            raise Killed
+
+    kept = given | {"store": tmp_path / "run.nc", "checkpoint": 1e-9, "resume": True}
+    with pytest.raises(Killed):
+        fd.simulate(case, **kept, progress=stop)
+    found = fd.simulate(case, **kept)
+    for name in whole.data_vars:
+        np.testing.assert_array_equal(found[name].values, whole[name].values)
+    assert found.attrs["steps"] == whole.attrs["steps"]
