@@ -45,7 +45,6 @@ from foldyn.mechanics.following import push_following
 from foldyn.mechanics.term import (
     ADDRESS,
     ADVANCE_CLOCK,
-    LIMIT,
     NUMBER,
     Model,
     Share,
@@ -451,11 +450,11 @@ class EquationOfMotion:
         self._setting = Setting(model.terms, system, mass, share, s)
         self._whole = whole = Context(self._setting)
         self._balance = balance = Context(_balance(self._setting, whole))
-        kernel = model.terms.kernel
+        remembers = model.terms.kernel[:, ADVANCE_CLOCK].any()
         self._equation = Equation(
             acceleration=_acceleration.at(balance),
-            limit=_limit.at(whole) if kernel[:, LIMIT].any() else 0,
-            clock=_clock.at(whole) if kernel[:, ADVANCE_CLOCK].any() else 0,
+            limit=_limit.at(whole) if system.touches else 0,
+            clock=_clock.at(whole) if remembers else 0,
             offsets=_offsets.at(whole) if system.turns else 0,
             sample=0,
             observe=0,
