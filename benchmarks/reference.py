@@ -143,7 +143,7 @@ MOVED = """
 """
 BIG = """
     big+force big+force+prony big+force+lumped big+force+axial big+base+alpha big+start+plane
-    big+actuate big+force+modal
+    big+start+actuate big+force+modal
 """
 TRACED = {  # up to which factor of the loads
     "force": 1e-3, "gravity": 1e-3, "pressure": 1e-3, "moment": 1e-2, "temperature": 0.5,
