@@ -352,12 +352,14 @@ def line(name: str, old: Arrays, new: Arrays) -> tuple[str, bool]:
         cells[column] = max(cells.get(column, 0.0), gap)
     worst = max(cells.values(), default=0.0)
     row = [f"{cells[c]:.1e}" if cells.get(c) else "=" if c in cells else "" for c in COLUMNS]
-    told = "" if worst else "bit-equal" if apart else one["end"].partition(":")[0]
+    ends = [about["end"].partition(":")[0] for about in (one, other)]
+    told = "" if worst else "bit-equal" if apart else ends[1]
+    if ends[0] != ends[1]:
+        told = f"{ends[0]} before, {ends[1]} now"
     text = f"{name:48}" + "".join(f"{cell:>14}" for cell in row) + f"  {told}"
     for key in sorted(one.keys() | other.keys()):
         if one.get(key) != other.get(key):
             text += f"\n    {key}: {other.get(key)}\n    recorded: {one.get(key)}"
-    ends = [about["end"].partition(":")[0] for about in (one, other)]
     return text, worst <= CLOSE and ends[0] == ends[1]
 
 
