@@ -71,7 +71,7 @@ class Compiled:
         self._works = packed.body.workspaces(threads)
         self._memories = scratches(packed.system, self._works)
         self._equations = [
-            EquationOfMotion(packed, work, memory, course, plan)
+            EquationOfMotion(packed, work, memory, course)
             for work, memory in zip(self._works, self._memories, strict=True)
         ]
         self.threads = len(self._works)
