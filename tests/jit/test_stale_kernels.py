@@ -10,11 +10,8 @@ from pathlib import Path
 
 import pytest
 from jit_lab import ask, copy_package, edit, environment
-from numba import typeof
 
-import foldyn as fd
 from foldyn.jit import sources
-from foldyn.jit.kept import _spelled
 from foldyn.jit.sources import PACKAGE, digest, imports, made_from, read
 
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -136,13 +133,6 @@ def test_a_message_compiles_nothing_anew(tmp_path):
         text = (copy / path).read_text("utf-8")
         edit(copy / path, old, old + " ") if old == 'f"' else edit(copy / path, text, "\n" + text)
     assert ask(copy, **where)[2] == 1
-
-
-def test_kernels_for_a_model_are_made_from_the_file_of_its_class():
-    pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
-    model = fd.shell(pattern, fd.Sheet(1e6, 0.25, 0.01), divisions=1).model
-    own = digest(PACKAGE / "shells/kernels.py", type(model).__name__)
-    assert _spelled(typeof((model,))).count(own) == 1
 
 
 def test_imports_are_read_as_python_reads_them():

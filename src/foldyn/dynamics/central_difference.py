@@ -91,7 +91,7 @@ def advance(equation, course, plan, room, stretch):
             if left == 0.0 or wrong > 0:
                 break
         tell(team, work_in, work_out, wrong)
-        outcome, hinge = observe(equation, a, step)
+        outcome, hinge = observe(equation, course, plan, a, step)
         if outcome != Outcome.DONE:
             return outcome, hinge
     return Outcome.DONE, -1

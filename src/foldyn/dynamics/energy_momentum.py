@@ -23,7 +23,7 @@ from scipy import sparse
 
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.actuation import turn
-from foldyn.dynamics.course import Course, StepPlan
+from foldyn.dynamics.course import Course
 from foldyn.dynamics.damping import (
     add_dampers,
     add_viscous,
@@ -58,8 +58,8 @@ class EnergyMomentum(Scheme):
     symmetric = False
     tolerance = 1e-11  # what is left of the residual is energy
 
-    def __init__(self, packed: Packed, course: Course, plan: StepPlan) -> None:
-        super().__init__(packed, course, plan)
+    def __init__(self, packed: Packed, course: Course) -> None:
+        super().__init__(packed, course)
         body: Any = packed.body
         self._contact: StepContact | None = None
         if packed.system.touches:

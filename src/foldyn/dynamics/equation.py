@@ -26,7 +26,6 @@ from foldyn.dynamics.course import (
     Course,
     Outcome,
     Samples,
-    StepPlan,
     passed_through,
 )
 from foldyn.dynamics.damping import add_dampers, add_viscous, drag_power
@@ -63,8 +62,8 @@ from foldyn.mechanics.term import (
 )
 from foldyn.mechanics.threads import Team, largest, part, total, wait
 
-DONE, NOT_FINITE = float(Outcome.DONE), float(Outcome.NOT_FINITE)
-PENETRATION = float(Outcome.PENETRATION)
+DONE, NOT_FINITE = int(Outcome.DONE), int(Outcome.NOT_FINITE)
+PENETRATION = int(Outcome.PENETRATION)
 
 
 class Setting(NamedTuple):
@@ -123,38 +122,24 @@ class Recording(NamedTuple):
     out: Samples
 
 
-class Observing(NamedTuple):
-    """The same for methods with fixed steps, which call other functions here."""
-
-    setting: Setting
-    course: Course
-    plan: StepPlan
-    sample: int  # kernels, and their contexts
-    recording: int
-    offsets: int
-    setting_at: int
-
-
 class Equation(NamedTuple):
     """What a loop gets: addresses, and its thread's share."""
 
     acceleration: int
     limit: int  # 0 without contact
     clock: int  # 0 without memory
+    commit: int  # 0 without memory
     offsets: int  # 0 where nothing turns
     gather_slow: int  # 0 where slow contacts have no inertia,
     slow_down: int
     kinetic: int  # as has this
     sample: int
-    observe: int
     balance: int  # contexts
     setting: int
     slowing: int
     recording: int
-    observing: int
     powers: NDArray  # (2,) in and out at the last acceleration, W
     before: NDArray  # (2,) and at the last step, for methods that keep them
-    found: NDArray  # (2,) outcome and hinge of the last observation
     team: Team
     own: NDArray  # (2,)
     stage: NDArray  # (3, n, 3) memory of methods with several stages
@@ -279,6 +264,11 @@ def _clock(context, since):
     clock_to(contents(context).terms, since)
 
 
+@addressed()
+def _commit(context):
+    commit_all(contents(context).terms)
+
+
 # ------------------------------------------------------------------ the equation
 @addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS)
 def _acceleration(context, q, w, t, out, powers):
@@ -350,44 +340,9 @@ def _sample(context, u, v, a, t):
     for c in range(out.energy.shape[1]):
         sound += out.energy[k, c]
     if not abs(sound) < np.inf:
-        return NOT_FINITE
+        return float(NOT_FINITE)
     course.tally.samples += 1
-    return DONE
-
-
-@addressed(ADDRESS, NUMBER, ADDRESS)
-def _observe(context, a, step, found):
-    r = contents(context)
-    course, plan, share = r.course, r.plan, r.setting.share
-    team, tally, both = share.team, course.tally, numbers_at(found, 2)
-    wait(team)  # for the others' accelerations, dihedrals and notes
-    t = plan.start + step * plan.dt
-    if r.offsets != 0:
-        team.note[team.number, WORK] += value_at(r.offsets, (r.setting_at, 1.0))
-        wait(team)
-    wrong = total(team, WRONG)
-    first, last = part(team, share.angle.size)
-    hinge = passed_through(share.angle, course.angle, first, last)
-    team.note[team.number, HINGE] = hinge
-    wait(team)
-    hinge = int(largest(team, HINGE))
-    if team.number == 0:
-        tally.work += total(team, WORK)
-        tally.dissipated += total(team, DISSIPATED)
-        tally.time = t
-        tally.steps = int(step)
-        outcome = DONE
-        if wrong == 0.0 and hinge < 0:
-            commit_all(r.setting.terms)
-        if wrong == 0.0 and hinge < 0 and int(step) == tally.samples * plan.every:
-            outcome = value_at(r.sample, (r.recording, course.u, course.v, a, t))
-        team.note[0, OUTCOME] = outcome
-    wait(team)
-    both[0], both[1] = team.note[0, OUTCOME], -1.0
-    if wrong > 0.0:
-        both[0] = NOT_FINITE
-    elif hinge >= 0:
-        both[0], both[1] = PENETRATION, float(hinge)
+    return float(DONE)
 
 
 # ------------------------------------------------------------------ what loops call
@@ -455,15 +410,42 @@ def sample(equation, u, v, a, t):
 
 
 @inner_scalar
-def observe(equation, a, step):
+def observe(equation, course, plan, a, step):
     """What follows `acceleration` at the time of a fixed step; every member of a team calls it.
 
     Adds up the work that the members have noted. The motion ends where it is no longer finite and
     where panels pass through each other; every plan.every steps a sample is written. Returns
     (outcome, hinge), the same to all.
     """
-    run_at(equation.observe, (equation.observing, a, float(step), equation.found))
-    return int(equation.found[0]), int(equation.found[1])
+    team, tally = equation.team, course.tally
+    wait(team)  # for the others' accelerations, dihedrals and notes
+    t = plan.start + step * plan.dt
+    if equation.offsets != 0:
+        team.note[team.number, WORK] += work_of_offsets(equation, True)
+        wait(team)
+    wrong = total(team, WRONG)
+    first, last = part(team, equation.angle.size)
+    hinge = passed_through(equation.angle, course.angle, first, last)
+    team.note[team.number, HINGE] = hinge
+    wait(team)
+    hinge = int(largest(team, HINGE))
+    if team.number == 0:
+        tally.work += total(team, WORK)
+        tally.dissipated += total(team, DISSIPATED)
+        tally.time = t
+        tally.steps = step
+        outcome = DONE
+        if wrong == 0.0 and hinge < 0 and equation.commit != 0:
+            run_at(equation.commit, (equation.setting,))
+        if wrong == 0.0 and hinge < 0 and step == tally.samples * plan.every:
+            outcome = sample(equation, course.u, course.v, a, t)
+        team.note[0, OUTCOME] = outcome
+    wait(team)
+    if wrong > 0.0:
+        return NOT_FINITE, -1
+    if hinge >= 0:
+        return PENETRATION, hinge
+    return int(team.note[0, OUTCOME]), -1
 
 
 @kernel
@@ -489,46 +471,42 @@ class EquationOfMotion:
     work : memory of the thread, one of `Body.workspaces`
     s : Scratch
     course : Course
-    plan : StepPlan
     slows : bool
         Whether the method gives slow contacts inertia; none has it where supports or obstacles
         move, whose motion it would resist.
     """
 
     def __init__(
-        self, packed: Packed, work: Any, s: Scratch, course: Course, plan: StepPlan,
-        slows: bool = False,
-    ) -> None:  # fmt: skip
+        self, packed: Packed, work: Any, s: Scratch, course: Course, slows: bool = False
+    ) -> None:
         system, mass, model = packed.system, packed.mass, Model(packed.body, work)
-        self._model, self._course, self._plan, share = model, course, plan, model.share
+        self._model, self._course, share = model, course, model.share
         self._setting = Setting(model.terms, system, mass, share, s)
         self._whole = whole = Context(self._setting)
         self._balance = balance = Context(_balance(self._setting, whole))
-        kernel = model.terms.kernel
         slowing = None
         if slows and system.touches and not system.moves and not system.presses:
             body: Any = packed.body
             own = body.tables, work.memory
             slowing = Context(Slowing(self._setting, *own, room_for(*own)))
         self._slowing = slowing
+        remembers = model.terms.kernel[:, ADVANCE_CLOCK].any()
         self._equation = Equation(
             acceleration=_acceleration.at(balance),
             limit=_limit.at(whole) if system.touches else 0,
-            clock=_clock.at(whole) if kernel[:, ADVANCE_CLOCK].any() else 0,
+            clock=_clock.at(whole) if remembers else 0,
+            commit=_commit.at(whole) if remembers else 0,
             offsets=_offsets.at(whole) if system.turns else 0,
             gather_slow=_gather_slow.at(slowing) if slowing else 0,
             slow_down=_slow_down.at(slowing) if slowing else 0,
             kinetic=_kinetic.at(whole) if slowing else 0,
             sample=0,
-            observe=0,
             balance=balance.address,
             setting=whole.address,
             slowing=slowing.address if slowing else 0,
             recording=0,
-            observing=0,
             powers=np.zeros(2),
             before=s.powers,
-            found=np.zeros(2),
             team=share.team,
             own=share.strips.own,
             stage=s.stage,
@@ -544,17 +522,11 @@ class EquationOfMotion:
     def sampled(self, out: Samples) -> Equation:
         """The equation with samples that go to `out`."""
         if self._out is not out:  # contexts are filled by Python: once for each window of samples
-            course, setting, now = self._course, self._setting, self._equation
-            self._recording = recording = Context(Recording(setting, course, out))
-            self._out, at = out, recording.address
-            now = now._replace(sample=_sample.at(recording), recording=at)
-            if self._plan.steps:
-                own = Observing(
-                    setting, course, self._plan, now.sample, at, now.offsets, now.setting
-                )
-                self._observing = observing = Context(own)
-                now = now._replace(observe=_observe.at(observing), observing=observing.address)
-            self._equation = now
+            self._recording = recording = Context(Recording(self._setting, self._course, out))
+            self._equation = self._equation._replace(
+                sample=_sample.at(recording), recording=recording.address
+            )
+            self._out = out
         return self._equation
 
 

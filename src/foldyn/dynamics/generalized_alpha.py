@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.banded import substitute
 from foldyn.dynamics.actuation import actuator_power, offset_work, turn
-from foldyn.dynamics.course import Course, StepPlan
+from foldyn.dynamics.course import Course
 from foldyn.dynamics.damping import dampers_work, drag, drag_works, viscous_work
 from foldyn.dynamics.equation import acceleration, advance_clock
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
@@ -73,10 +73,10 @@ class Alpha(Scheme):
     symmetric, tolerance = True, 1e-7
 
     def __init__(
-        self, packed: Packed, course: Course, plan: StepPlan, parameters: Parameters,
+        self, packed: Packed, course: Course, parameters: Parameters,
         facts: Mapping[str, float] = Scheme.facts,
     ) -> None:  # fmt: skip
-        super().__init__(packed, course, plan)
+        super().__init__(packed, course)
         self._p, self.facts = parameters, facts
 
     def weights(self, h: float) -> Weights:
@@ -145,7 +145,7 @@ numerical damping: a linear system keeps its energy; another one may gain some w
 """
 
 
-def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[Packed, Course, StepPlan], Alpha]:
+def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[Packed, Course], Alpha]:
     """Make the steps of the method for a spectral radius."""
     facts = {"spectral_radius": spectral_radius}
     return partial(Alpha, parameters=parameters(spectral_radius), facts=facts)

@@ -72,7 +72,7 @@ class Compiled:
         self._works = packed.body.workspaces(1 if adaptive else threads_of(packed))
         self._memories = scratches(packed.system, self._works)
         self._equations = [
-            EquationOfMotion(packed, work, memory, course, plan, adaptive)
+            EquationOfMotion(packed, work, memory, course, adaptive)
             for work, memory in zip(self._works, self._memories, strict=True)
         ]
         self.threads = len(self._works)

@@ -60,7 +60,7 @@ def advance(equation, course, plan, room, stretch):
                 part_out += weight * power_out
                 if stage == 0:
                     if first:
-                        outcome, hinge = observe(equation, a, step)
+                        outcome, hinge = observe(equation, course, plan, a, step)
                         if outcome != Outcome.DONE or step == end:
                             return outcome, hinge
                     dt = longest_step(equation, course.u, course.v, a, left, RESOLVED)

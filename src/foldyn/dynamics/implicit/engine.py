@@ -66,11 +66,11 @@ class Implicit:
     threads = 1
 
     def __init__(
-        self, make: Callable[[Packed, Course, StepPlan], Scheme], packed: Packed, course: Course,
+        self, make: Callable[[Packed, Course], Scheme], packed: Packed, course: Course,
         plan: StepPlan, jumps: tuple[float, ...],
     ) -> None:  # fmt: skip
         self._packed, self._course, self._plan, self._jumps = packed, course, plan, jumps
-        self._scheme = make(packed, course, plan)
+        self._scheme = make(packed, course)
         self._matrix = StepMatrix(packed, self._scheme.symmetric)
         touches = packed.system.touches
         self._touching = TouchingNewton(self._scheme, self._matrix) if touches else None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases.waveforms import unseen
-from foldyn.dynamics.course import Course, StepPlan
+from foldyn.dynamics.course import Course
 from foldyn.dynamics.equation import EquationOfMotion, accelerate
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.system import Packed, Scratch, place, scratch
@@ -81,7 +81,6 @@ class Scheme(ABC):
         The case.
     course : Course
         Where the motion stands: q, w and a of `old` are its arrays.
-    plan : StepPlan
 
     Attributes
     ----------
@@ -97,11 +96,11 @@ class Scheme(ABC):
     tolerance: ClassVar[float]
     facts: Mapping[str, float] = {}
 
-    def __init__(self, packed: Packed, course: Course, plan: StepPlan) -> None:
+    def __init__(self, packed: Packed, course: Course) -> None:
         self.packed, self.course = packed, course
         self.work: Any = packed.body.workspaces(1)[0]
         self.scratch: Scratch = scratch(packed.system)
-        self.equation = EquationOfMotion(packed, self.work, self.scratch, course, plan)
+        self.equation = EquationOfMotion(packed, self.work, self.scratch, course)
         shape, histories = course.u.shape, self.scratch.factor.shape
         self.out, self.step = np.zeros(shape), np.zeros(shape)
         self.shift = np.zeros(shape)  # new.q - old.q: their difference would lose digits
