@@ -11,17 +11,15 @@ from __future__ import annotations
 import numpy as np
 
 from foldyn.dynamics.course import Outcome, passed_through
-from foldyn.dynamics.equation import (
-    acceleration,
+from foldyn.dynamics.equation import acceleration, sample, work_of_offsets
+from foldyn.dynamics.explicit_contact import (
     gather_slow,
     longest_step,
-    sample,
     slow_contacts_down,
-    work_of_offsets,
+    slow_energy,
 )
 from foldyn.dynamics.stability import roots
 from foldyn.jit.compiled import inner, kernel
-from foldyn.jit.context import value_at
 from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics.contact.step_limit import Pace
 
@@ -119,11 +117,9 @@ def _weights(theta, out):
 @inner
 def _longest(equation, q, w, a, plan, tally):
     """See `longest_step`; slow contacts need not be resolved where they can be given inertia."""
-    energy = 0.0
-    if equation.kinetic != 0:
-        tally.kinetic = max(tally.kinetic, value_at(equation.kinetic, (equation.setting, w)))
-        energy = EASED * plan.tolerance * tally.kinetic
-    return longest_step(equation, q, w, a, plan.dt, Pace(RESOLVED, energy))
+    tally.kinetic = max(tally.kinetic, slow_energy(equation, w))
+    pace = Pace(RESOLVED, EASED * plan.tolerance * tally.kinetic)
+    return longest_step(equation, q, w, a, plan.dt, pace)
 
 
 @kernel

@@ -2,10 +2,9 @@
 
 With terms by address, what a case consists of has the same types in every motion. Loops get the
 addresses of the functions here, so that they hold nothing but their own arithmetic. What only some
-motions have (histories, supports and rest angles that move, dampers, a mass matrix that is not
-diagonal, inertia of slow contacts) are parts of their own, which are compiled where they are used;
-elsewhere their address is 0. Dead loads, drag and a diagonal mass, which nearly all have, are not:
-calls take some ns.
+motions have (histories, supports and rest angles that move, dampers, contact, a mass matrix that is
+not diagonal) are parts of their own, which are compiled where they are used; elsewhere their
+address is 0. Dead loads, drag and a diagonal mass, which nearly all have, are no parts: calls cost.
 """
 
 from __future__ import annotations
@@ -29,6 +28,7 @@ from foldyn.dynamics.course import (
     passed_through,
 )
 from foldyn.dynamics.damping import add_dampers, add_viscous, drag_power
+from foldyn.dynamics.explicit_contact import ContactParts, contact_parts, slow_contacts
 from foldyn.dynamics.inertia import (
     Inertia,
     kinetic_energy,
@@ -37,14 +37,10 @@ from foldyn.dynamics.inertia import (
     solve_mass,
 )
 from foldyn.dynamics.record import record
-from foldyn.dynamics.slow_contacts import slow_down
 from foldyn.dynamics.system import Entries, Packed, Scratch, System, carry_part, moving_power
 from foldyn.jit.compiled import addressed, inner_scalar, kernel
 from foldyn.jit.context import Context, contents, numbers_at, rows_at, run_at, value_at
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.contact.inertia import Added, added_inertia, room_for
-from foldyn.mechanics.contact.memory import Memory
-from foldyn.mechanics.contact.tables import Tables
 from foldyn.mechanics.following import push_following
 from foldyn.mechanics.term import (
     ADDRESS,
@@ -56,7 +52,6 @@ from foldyn.mechanics.term import (
     clock_to,
     commit_all,
     forces_of,
-    limit_of,
     obstacles_to,
     states_of,
 )
@@ -74,15 +69,6 @@ class Setting(NamedTuple):
     mass: Inertia
     share: Share
     s: Scratch
-
-
-class Slowing(NamedTuple):
-    """A case whose slow contacts have inertia; those of a step stand in `added`."""
-
-    setting: Setting
-    tables: Tables
-    memory: Memory
-    added: Added
 
 
 class Balance(NamedTuple):
@@ -126,17 +112,13 @@ class Equation(NamedTuple):
     """What a loop gets: addresses, and its thread's share."""
 
     acceleration: int
-    limit: int  # 0 without contact
+    contact: ContactParts
     clock: int  # 0 without memory
     commit: int  # 0 without memory
     offsets: int  # 0 where nothing turns
-    gather_slow: int  # 0 where slow contacts have no inertia,
-    slow_down: int
-    kinetic: int  # as has this
     sample: int
     balance: int  # contexts
     setting: int
-    slowing: int
     recording: int
     powers: NDArray  # (2,) in and out at the last acceleration, W
     before: NDArray  # (2,) and at the last step, for methods that keep them
@@ -234,29 +216,6 @@ def _offsets(context, accepted):
         m.terms.folds, m.system.actuators, m.share.fold_angle, m.s.turned[0], m.s.turned[1],
         accepted > 0.0,
     )  # fmt: skip
-
-
-@addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER, NUMBER, NUMBER)
-def _limit(context, q, w, a, dt, beta, energy):
-    m = contents(context)
-    rows = m.s.force.shape[0]
-    u = m.s.displacement if m.system.moves else rows_at(q, rows)
-    v = m.s.velocity if m.system.moves else rows_at(w, rows)
-    return limit_of(m.terms, u, v, a, dt, beta, energy, m.system.lightness)
-
-
-@addressed(ADDRESS, NUMBER, NUMBER)
-def _gather_slow(context, u, dt, beta):
-    own = contents(context)
-    moved, light = rows_at(u, own.setting.s.force.shape[0]), own.setting.system.lightness
-    added_inertia(own.tables, own.added, moved, dt, beta, light, own.memory)
-
-
-@addressed(ADDRESS, ADDRESS)
-def _slow_down(context, w, a):
-    own = contents(context)
-    m, rows = own.setting, own.setting.s.force.shape[0]
-    slow_down(own.added, m.system, m.mass, rows_at(w, rows), rows_at(a, rows), m.s)
 
 
 @addressed(NUMBER)
@@ -360,35 +319,6 @@ def acceleration(equation, q, w, t, a):
 
 
 @inner_scalar
-def longest_step(equation, q, w, a, dt, pace):
-    """The longest step (s), at most dt, that contact allows: after `acceleration` at q and w.
-
-    Once before each step, where the last one has ended; a : the acceleration there, pace : see
-    `contact.step_limit`.
-    """
-    if equation.limit == 0:
-        return dt
-    return value_at(equation.limit, (equation.setting, q, w, a, dt, pace.resolved, pace.energy))
-
-
-@inner_scalar
-def gather_slow(equation, u, dt, beta):
-    """Find the contacts that a step of dt (s) from u does not resolve: for `slow_contacts_down`.
-
-    beta : radians of a contact's vibration that a step may take.
-    """
-    if equation.gather_slow != 0:
-        run_at(equation.gather_slow, (equation.slowing, u, dt, beta))
-
-
-@inner_scalar
-def slow_contacts_down(equation, w, a):
-    """Change accelerations a at velocities w to those with the inertia of slow contacts."""
-    if equation.slow_down != 0:
-        run_at(equation.slow_down, (equation.slowing, w, a))
-
-
-@inner_scalar
 def advance_clock(equation, since):
     """Tell laws with memory how long (s) after the last accepted step the next evaluation is."""
     if equation.clock != 0:
@@ -472,8 +402,7 @@ class EquationOfMotion:
     s : Scratch
     course : Course
     slows : bool
-        Whether the method gives slow contacts inertia; none has it where supports or obstacles
-        move, whose motion it would resist.
+        Whether the method gives slow contacts inertia.
     """
 
     def __init__(
@@ -484,26 +413,17 @@ class EquationOfMotion:
         self._setting = Setting(model.terms, system, mass, share, s)
         self._whole = whole = Context(self._setting)
         self._balance = balance = Context(_balance(self._setting, whole))
-        slowing = None
-        if slows and system.touches and not system.moves and not system.presses:
-            body: Any = packed.body
-            own = body.tables, work.memory
-            slowing = Context(Slowing(self._setting, *own, room_for(*own)))
-        self._slowing = slowing
+        self._slow = slow = slow_contacts(packed, work, s) if slows else None
         remembers = model.terms.kernel[:, ADVANCE_CLOCK].any()
         self._equation = Equation(
             acceleration=_acceleration.at(balance),
-            limit=_limit.at(whole) if system.touches else 0,
+            contact=contact_parts(system, whole, slow),
             clock=_clock.at(whole) if remembers else 0,
             commit=_commit.at(whole) if remembers else 0,
             offsets=_offsets.at(whole) if system.turns else 0,
-            gather_slow=_gather_slow.at(slowing) if slowing else 0,
-            slow_down=_slow_down.at(slowing) if slowing else 0,
-            kinetic=_kinetic.at(whole) if slowing else 0,
             sample=0,
             balance=balance.address,
             setting=whole.address,
-            slowing=slowing.address if slowing else 0,
             recording=0,
             powers=np.zeros(2),
             before=s.powers,

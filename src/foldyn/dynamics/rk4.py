@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from foldyn.dynamics.course import Outcome, share, tell
-from foldyn.dynamics.equation import acceleration, advance_clock, longest_step, observe
+from foldyn.dynamics.equation import acceleration, advance_clock, observe
+from foldyn.dynamics.explicit_contact import longest_step
 from foldyn.dynamics.stability import roots
 from foldyn.jit.compiled import shared
 from foldyn.jit.intrinsics import borrowed, flat

@@ -1,0 +1,127 @@
+"""What contact asks of explicit steps: how long they may be, and inertia where it is slow.
+
+Parts of the equation of motion (`equation`): their address is 0 where a motion has none.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from foldyn.dynamics.inertia import Inertia, kinetic_energy
+from foldyn.dynamics.slow_contacts import slow_down
+from foldyn.dynamics.system import Packed, Scratch, System
+from foldyn.jit.compiled import addressed, inner_scalar
+from foldyn.jit.context import Context, contents, rows_at, run_at, value_at
+from foldyn.mechanics.contact.inertia import Added, added_inertia, room_for
+from foldyn.mechanics.contact.memory import Memory
+from foldyn.mechanics.contact.tables import Tables
+from foldyn.mechanics.term import ADDRESS, NUMBER, limit_of
+
+
+class SlowContacts(NamedTuple):
+    """A case on one thread, and the contacts that have inertia in a step."""
+
+    system: System
+    mass: Inertia
+    s: Scratch
+    tables: Tables
+    memory: Memory
+    added: Added
+
+
+class ContactParts(NamedTuple):
+    """Addresses of kernels, and of the context of the last three."""
+
+    limit: int  # 0 without contact
+    gather: int  # 0 where slow contacts have no inertia,
+    slow_down: int
+    kinetic: int
+    slow: int
+
+
+@addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER, NUMBER, NUMBER)
+def _limit(context, q, w, a, dt, beta, energy):
+    m = contents(context)
+    rows = m.s.force.shape[0]
+    u = m.s.displacement if m.system.moves else rows_at(q, rows)
+    v = m.s.velocity if m.system.moves else rows_at(w, rows)
+    return limit_of(m.terms, u, v, a, dt, beta, energy, m.system.lightness)
+
+
+@addressed(ADDRESS, NUMBER, NUMBER)
+def _gather(context, u, dt, beta):
+    m = contents(context)
+    moved = rows_at(u, m.s.force.shape[0])
+    added_inertia(m.tables, m.added, moved, dt, beta, m.system.lightness, m.memory)
+
+
+@addressed(ADDRESS, ADDRESS)
+def _slow_down(context, w, a):
+    m = contents(context)
+    rows = m.s.force.shape[0]
+    slow_down(m.added, m.system, m.mass, rows_at(w, rows), rows_at(a, rows), m.s)
+
+
+@addressed(ADDRESS)
+def _kinetic(context, w):
+    m = contents(context)
+    rows = m.s.force.shape[0]
+    return kinetic_energy(m.mass, rows_at(w, rows), (0, rows))
+
+
+@inner_scalar
+def longest_step(equation, q, w, a, dt, pace):
+    """The longest step (s), at most dt, that contact allows: after `acceleration` at q and w.
+
+    Once before each step, where the last one has ended.
+
+    a : the acceleration there; pace : see `contact.step_limit`.
+    """
+    if equation.contact.limit == 0:
+        return dt
+    given = (equation.setting, q, w, a, dt, pace.resolved, pace.energy)
+    return value_at(equation.contact.limit, given)
+
+
+@inner_scalar
+def slow_energy(equation, w):
+    """Kinetic energy (J) at velocities w where slow contacts are given inertia, else 0."""
+    if equation.contact.kinetic == 0:
+        return 0.0
+    return value_at(equation.contact.kinetic, (equation.contact.slow, w))
+
+
+@inner_scalar
+def gather_slow(equation, u, dt, beta):
+    """Find the contacts that a step of dt (s) from u does not resolve: for `slow_contacts_down`.
+
+    beta : radians of a contact's vibration that a step may take.
+    """
+    if equation.contact.gather != 0:
+        run_at(equation.contact.gather, (equation.contact.slow, u, dt, beta))
+
+
+@inner_scalar
+def slow_contacts_down(equation, w, a):
+    """Change accelerations a at velocities w to those with the inertia of slow contacts."""
+    if equation.contact.slow_down != 0:
+        run_at(equation.contact.slow_down, (equation.contact.slow, w, a))
+
+
+def slow_contacts(packed: Packed, work: Any, s: Scratch) -> Context | None:
+    """Context of slow contacts; none where their inertia would resist supports or planes."""
+    system, body = packed.system, packed.body
+    if not system.touches or system.moves or system.presses:
+        return None
+    tables: Tables = body.tables  # type: ignore[attr-defined]
+    added = room_for(tables, work.memory)
+    return Context(SlowContacts(system, packed.mass, s, tables, work.memory, added))
+
+
+def contact_parts(system: System, whole: Context, slow: Context | None) -> ContactParts:
+    """The parts of a motion; `whole` is the context of its setting."""
+    limit = _limit.at(whole) if system.touches else 0
+    if slow is None:
+        return ContactParts(limit, 0, 0, 0, 0)
+    gather, down, kinetic = (kernel.at(slow) for kernel in (_gather, _slow_down, _kinetic))
+    return ContactParts(limit, gather, down, kinetic, slow.address)
