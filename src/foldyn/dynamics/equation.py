@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.waveforms import evaluate
-from foldyn.dynamics.actuation import offset_work, power_of_part, turn_part
+from foldyn.dynamics import parts
 from foldyn.dynamics.course import (
     DISSIPATED,
     HINGE,
@@ -27,30 +26,22 @@ from foldyn.dynamics.course import (
     Samples,
     passed_through,
 )
-from foldyn.dynamics.damping import add_dampers, add_viscous, drag_power
 from foldyn.dynamics.explicit_contact import ContactParts, contact_parts, slow_contacts
 from foldyn.dynamics.inertia import (
-    Inertia,
-    kinetic_energy,
     lumped_energy,
-    moving_energy,
-    solve_mass,
 )
+from foldyn.dynamics.parts import Setting
 from foldyn.dynamics.record import record
-from foldyn.dynamics.system import Entries, Packed, Scratch, System, carry_part, moving_power
+from foldyn.dynamics.system import Entries, Packed, Scratch
 from foldyn.jit.compiled import addressed, inner_scalar, kernel
 from foldyn.jit.context import Context, contents, numbers_at, rows_at, run_at, value_at
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.following import push_following
 from foldyn.mechanics.term import (
     ADDRESS,
     ADVANCE_CLOCK,
     NUMBER,
     Model,
-    Share,
     Terms,
-    clock_to,
-    commit_all,
     forces_of,
     obstacles_to,
     states_of,
@@ -59,16 +50,6 @@ from foldyn.mechanics.threads import Team, largest, part, total, wait
 
 DONE, NOT_FINITE = int(Outcome.DONE), int(Outcome.NOT_FINITE)
 PENETRATION = int(Outcome.PENETRATION)
-
-
-class Setting(NamedTuple):
-    """A case on one thread: what parts work with."""
-
-    terms: Terms
-    system: System
-    mass: Inertia
-    share: Share
-    s: Scratch
 
 
 class Balance(NamedTuple):
@@ -126,106 +107,6 @@ class Equation(NamedTuple):
     own: NDArray  # (2,)
     stage: NDArray  # (3, n, 3) memory of methods with several stages
     angle: NDArray  # (nh,) dihedrals at the last acceleration, rad
-
-
-# ------------------------------------------------------------------ parts
-@addressed(NUMBER)
-def _histories(context, t):
-    m = contents(context)
-    if t != m.s.time[0]:  # two stages of a step may share their time
-        derive = m.system.moves or m.system.turns or m.system.presses
-        evaluate(m.system.waves, t, derive, m.s.factor)
-        m.s.time[0] = t
-
-
-@addressed()
-def _turn(context):
-    m = contents(context)
-    turn_part(m.terms.folds, m.system.actuators, m.s.factor, m.s.turned[0], m.s.turned[1])
-
-
-@addressed(ADDRESS, ADDRESS)
-def _carry(context, q, w):
-    m = contents(context)
-    rows, own = m.s.force.shape[0], m.share.strips.own
-    dofs, supports = (3 * own[0], 3 * own[1]), (m.s.moved[0], m.s.moved[1])
-    here, there, moved = flat(m.s.displacement), flat(m.s.velocity), m.system.moved
-    carry_part(moved, m.s.factor, 0, flat(rows_at(q, rows)), here, dofs, supports)
-    carry_part(moved, m.s.factor, 1, flat(rows_at(w, rows)), there, dofs, supports)
-
-
-@addressed(ADDRESS, ADDRESS)
-def _follow(context, u, v):  # on one thread only
-    m = contents(context)
-    rows, loads = m.s.force.shape[0], m.system.following
-    moved, speed = rows_at(u, rows), rows_at(v, rows)
-    return push_following(loads, moved, speed, m.s.factor, m.s.pushed, m.s.force)
-
-
-@addressed(ADDRESS)
-def _viscous(context, v):
-    m = contents(context)
-    speed, own = flat(rows_at(v, m.s.force.shape[0])), m.share.strips.own
-    return add_viscous(m.system.damping, speed, flat(m.s.force), 3 * own[0], 3 * own[1])
-
-
-@addressed(ADDRESS, ADDRESS)
-def _dampers(context, u, v):  # on one thread only
-    m = contents(context)
-    rows = m.s.force.shape[0]
-    return add_dampers(m.system.damping, rows_at(u, rows), rows_at(v, rows), m.s.force)
-
-
-@addressed(ADDRESS)
-def _solve(context, out):
-    m = contents(context)
-    rows, team = m.s.force.shape[0], m.share.team
-    wait(team)  # for the forces of the others, and their look at this member's velocities
-    solve_mass(m.mass, m.s.force, rows_at(out, rows), m.s.line, team.number, team.size)
-    wait(team)  # each has solved for its axes
-
-
-@addressed(ADDRESS)
-def _kinetic(context, v):
-    m = contents(context)
-    return kinetic_energy(m.mass, rows_at(v, m.s.force.shape[0]), m.share.strips.own)
-
-
-@addressed()
-def _moving_power(context):
-    m = contents(context)
-    power = moving_power(m.system.moved, m.s.force, m.s.factor, m.s.moved[0], m.s.moved[1])
-    if m.share.team.number == 0:
-        power += drag_power(m.system.damping, moving_energy(m.system.moved_mass, m.s.factor))
-    return power
-
-
-@addressed()
-def _turning_power(context):
-    m = contents(context)
-    return power_of_part(
-        m.terms.folds, m.system.actuators, m.s.factor, m.share.fold_angle, m.s.turned[0],
-        m.s.turned[1],
-    )  # fmt: skip
-
-
-@addressed(NUMBER)
-def _offsets(context, accepted):
-    m = contents(context)
-    return offset_work(
-        m.terms.folds, m.system.actuators, m.share.fold_angle, m.s.turned[0], m.s.turned[1],
-        accepted > 0.0,
-    )  # fmt: skip
-
-
-@addressed(NUMBER)
-def _clock(context, since):
-    clock_to(contents(context).terms, since)
-
-
-@addressed()
-def _commit(context):
-    commit_all(contents(context).terms)
 
 
 # ------------------------------------------------------------------ the equation
@@ -418,9 +299,9 @@ class EquationOfMotion:
         self._equation = Equation(
             acceleration=_acceleration.at(balance),
             contact=contact_parts(system, whole, slow),
-            clock=_clock.at(whole) if remembers else 0,
-            commit=_commit.at(whole) if remembers else 0,
-            offsets=_offsets.at(whole) if system.turns else 0,
+            clock=parts.clock.at(whole) if remembers else 0,
+            commit=parts.commit.at(whole) if remembers else 0,
+            offsets=parts.offsets.at(whole) if system.turns else 0,
             sample=0,
             balance=balance.address,
             setting=whole.address,
@@ -458,17 +339,17 @@ def _balance(setting: Setting, whole: Context) -> Balance:
     return Balance(
         terms=terms,
         setting=whole.address,
-        histories=_histories.at(whole) if system.varies else 0,
-        turn=_turn.at(whole) if system.turns else 0,
-        carry=_carry.at(whole) if system.moves else 0,
+        histories=parts.histories.at(whole) if system.varies else 0,
+        turn=parts.turn.at(whole) if system.turns else 0,
+        carry=parts.carry.at(whole) if system.moves else 0,
         presses=system.presses,
-        follow=_follow.at(whole) if system.follows else 0,
-        viscous=_viscous.at(whole) if damping.data.size else 0,
-        dampers=_dampers.at(whole) if damped else 0,
-        solve=0 if mass.lumped else _solve.at(whole),
-        kinetic=0 if mass.lumped or not damping.alpha else _kinetic.at(whole),
-        moving_power=_moving_power.at(whole) if system.moves else 0,
-        turning_power=_turning_power.at(whole) if system.turns else 0,
+        follow=parts.follow.at(whole) if system.follows else 0,
+        viscous=parts.viscous.at(whole) if damping.data.size else 0,
+        dampers=parts.dampers.at(whole) if damped else 0,
+        solve=0 if mass.lumped else parts.solve.at(whole),
+        kinetic=0 if mass.lumped or not damping.alpha else parts.kinetic.at(whole),
+        moving_power=parts.moving_power.at(whole) if system.moves else 0,
+        turning_power=parts.turning_power.at(whole) if system.turns else 0,
         alpha=damping.alpha,
         diagonal=mass.diagonal,
         inverse=mass.inverse,

@@ -271,7 +271,7 @@ def carry_part(moved, factor, derivative, rest, values, dofs, supports):
 
 
 @inner
-def moving_power(moved, force, factor, first, last):
+def power_of_moved(moved, force, factor, first, last):
     """Power (W) of some moving supports against the bracket of the forces."""
     power, bracket = 0.0, flat(force)
     for k in range(first, last):

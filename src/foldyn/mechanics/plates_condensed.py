@@ -223,14 +223,14 @@ class _CondensedTerm(NamedTuple):
 @forces
 def _forces(context, u, v, t, force, powers):
     own = contents(context)
-    rows = own.model.plates.nodes
+    rows = own.model.plates.bars.rest.shape[0]
     condensed_force(own.model, rows_at(u, rows), rows_at(force, rows), own.work)
 
 
 @energies
 def _energies(context, u, out):
     own = contents(context)
-    moved = rows_at(u, own.model.plates.nodes)
+    moved = rows_at(u, own.model.plates.bars.rest.shape[0])
     condensed_energy(own.model, moved, own.work, numbers_at(out, 3))
 
 

@@ -1,0 +1,143 @@
+"""Parts of the equation of motion that only some motions have, as kernels called by address.
+
+They are compiled where they are used: a motion without them has the address 0 in their place. What
+contact asks for is in `explicit_contact`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from foldyn.cases.waveforms import evaluate
+from foldyn.dynamics.actuation import offset_work, power_of_part, turn_part
+from foldyn.dynamics.damping import add_dampers, add_viscous, drag_power
+from foldyn.dynamics.inertia import Inertia, kinetic_energy, moving_energy, solve_mass
+from foldyn.dynamics.system import Scratch, System, carry_part, power_of_moved
+from foldyn.jit.compiled import addressed
+from foldyn.jit.context import contents, rows_at
+from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.following import push_following
+from foldyn.mechanics.term import ADDRESS, NUMBER, Share, Terms, clock_to, commit_all
+from foldyn.mechanics.threads import wait
+
+
+class Setting(NamedTuple):
+    """A case on one thread: what parts work with."""
+
+    terms: Terms
+    system: System
+    mass: Inertia
+    share: Share
+    s: Scratch
+
+
+@addressed(NUMBER)
+def histories(context, t):
+    """Evaluate the histories at t; two stages of a step may share their time."""
+    m = contents(context)
+    if t != m.s.time[0]:
+        derive = m.system.moves or m.system.turns or m.system.presses
+        evaluate(m.system.waves, t, derive, m.s.factor)
+        m.s.time[0] = t
+
+
+@addressed()
+def turn(context):
+    """Turn rest angles to where the histories say."""
+    m = contents(context)
+    turn_part(m.terms.folds, m.system.actuators, m.s.factor, m.s.turned[0], m.s.turned[1])
+
+
+@addressed(ADDRESS, ADDRESS)
+def carry(context, q, w):
+    """Displacement and velocity with those of the supports that move, from q and w."""
+    m = contents(context)
+    rows, own = m.s.force.shape[0], m.share.strips.own
+    dofs, supports = (3 * own[0], 3 * own[1]), (m.s.moved[0], m.s.moved[1])
+    here, there, moved = flat(m.s.displacement), flat(m.s.velocity), m.system.moved
+    carry_part(moved, m.s.factor, 0, flat(rows_at(q, rows)), here, dofs, supports)
+    carry_part(moved, m.s.factor, 1, flat(rows_at(w, rows)), there, dofs, supports)
+
+
+@addressed(ADDRESS, ADDRESS)
+def follow(context, u, v):
+    """Add loads that depend on the displacement; returns their power, W. On one thread only."""
+    m = contents(context)
+    rows, loads = m.s.force.shape[0], m.system.following
+    moved, speed = rows_at(u, rows), rows_at(v, rows)
+    return push_following(loads, moved, speed, m.s.factor, m.s.pushed, m.s.force)
+
+
+@addressed(ADDRESS)
+def viscous(context, v):
+    """Add the forces of a constant matrix of damping; returns the power taken, W."""
+    m = contents(context)
+    speed, own = flat(rows_at(v, m.s.force.shape[0])), m.share.strips.own
+    return add_viscous(m.system.damping, speed, flat(m.s.force), 3 * own[0], 3 * own[1])
+
+
+@addressed(ADDRESS, ADDRESS)
+def dampers(context, u, v):
+    """Add those of dashpots, creases and modes; returns the power taken, W. On one thread only."""
+    m = contents(context)
+    rows = m.s.force.shape[0]
+    return add_dampers(m.system.damping, rows_at(u, rows), rows_at(v, rows), m.s.force)
+
+
+@addressed(ADDRESS)
+def solve(context, out):
+    """Solve with a mass matrix that is not diagonal."""
+    m = contents(context)
+    rows, team = m.s.force.shape[0], m.share.team
+    wait(team)  # for the forces of the others, and their look at this member's velocities
+    solve_mass(m.mass, m.s.force, rows_at(out, rows), m.s.line, team.number, team.size)
+    wait(team)  # each has solved for its axes
+
+
+@addressed(ADDRESS)
+def kinetic(context, v):
+    """Kinetic energy (J) of a thread's nodes with such a matrix."""
+    m = contents(context)
+    return kinetic_energy(m.mass, rows_at(v, m.s.force.shape[0]), m.share.strips.own)
+
+
+@addressed()
+def moving_power(context):
+    """Power (W) of supports that move, but for what changes the kinetic energy of S f'."""
+    m = contents(context)
+    power = power_of_moved(m.system.moved, m.s.force, m.s.factor, m.s.moved[0], m.s.moved[1])
+    if m.share.team.number == 0:
+        power += drag_power(m.system.damping, moving_energy(m.system.moved_mass, m.s.factor))
+    return power
+
+
+@addressed()
+def turning_power(context):
+    """Power (W) of rest angles that turn."""
+    m = contents(context)
+    return power_of_part(
+        m.terms.folds, m.system.actuators, m.s.factor, m.share.fold_angle, m.s.turned[0],
+        m.s.turned[1],
+    )  # fmt: skip
+
+
+@addressed(NUMBER)
+def offsets(context, accepted):
+    """Work (J) of offsets since the last step; see `actuation.offset_work`."""
+    m = contents(context)
+    return offset_work(
+        m.terms.folds, m.system.actuators, m.share.fold_angle, m.s.turned[0], m.s.turned[1],
+        accepted > 0.0,
+    )  # fmt: skip
+
+
+@addressed(NUMBER)
+def clock(context, since):
+    """Say how long (s) after the last accepted step terms are evaluated next."""
+    clock_to(contents(context).terms, since)
+
+
+@addressed()
+def commit(context):
+    """Accept the step that ends where terms were evaluated last."""
+    commit_all(contents(context).terms)
