@@ -54,7 +54,7 @@ def test_what_a_kernel_is_made_from():
     law, switch, fields = "materials/superlinear.py", "materials/switch.py", "mechanics/model.py"
     assert {law, switch, "jit/compiled.py"} <= files_of("shells/kernels.py", "_forces")
     assert {law, switch, fields} <= files_of("mechanics/bars_hinges.py", "_forces")
-    assert "cases/waveforms.py" in files_of("dynamics/equation.py", "_histories")
+    assert "cases/waveforms.py" in files_of("dynamics/parts.py", "histories")
     # a loop holds none of what it calls by address
     loop = files_of("dynamics/rk4.py", "advance")
     assert not {law, switch, "mechanics/force.py", "cases/waveforms.py"} & loop
