@@ -7,7 +7,9 @@ import pytest
 from numba import typeof
 
 import foldyn as fd
-from foldyn.dynamics.system import pack
+from foldyn.dynamics.course import TALLY, Course
+from foldyn.dynamics.equation import EquationOfMotion
+from foldyn.dynamics.system import pack, scratch
 from foldyn.dynamics.warm_up import MODELS
 
 FOLD = fd.patterns.simple_fold(a=1.0, b=1.3, dihedral=100)
@@ -25,10 +27,22 @@ def packed(model, supports=(), loads=(), contact=None, **options):
     return pack(fd.Case(structure, [HELD, *supports], loads, contact=contact), 1e-4)
 
 
-def test_springs_and_clamps_are_one_type_of_model():
-    """Not so in shells, which clamp edges by themselves."""
-    springs, clamps = packed("herkal", [SPRING]), packed("herkal", clamped=[(0, 1)])
-    assert typeof(springs.model) == typeof(clamps.model)
+def test_loops_see_one_type_whatever_a_case_consists_of():
+    """Else they would be compiled for each, as they were for nested models."""
+    plane = fd.Contact(planes=[fd.Plane((0, 0, -2), (0, 0, 1))], panels=False)
+    cases = [
+        packed("herkal"),
+        packed("herkal", [SPRING, fd.Impose([2], "z", 0.1, fd.Ramp(0.2))], [TURN]),
+        packed("plate", [SPRING], contact=plane, clamped=[(0, 1)], mass="mixed_voronoi"),
+    ]
+    kinds = set()
+    for one in cases:
+        (work,) = one.body.workspaces(1)
+        still = np.zeros((one.system.rows, 3))
+        course = Course(still, still, still, np.zeros(1, TALLY)[0], np.zeros(0))
+        equation = EquationOfMotion(one, work, scratch(one.system), course)
+        kinds.add((typeof(equation.still), typeof(course)))
+    assert len(kinds) == 1
 
 
 @pytest.mark.parametrize("loads", [(), [TURN], [fd.Gravity("-z"), fd.Pressure(1.0)]])
@@ -42,7 +56,7 @@ def test_what_does_not_depend_on_the_model_has_one_type(supports, loads):
 def test_what_touches_has_one_type():
     plane = fd.Plane((0, 0, -2), (0, 0, 1))
     contacts = [fd.Contact(), fd.Contact(planes=[plane], panels=False), fd.Contact(thickness=0.01)]
-    tables = [packed(model, contact=of).model.contact for model in MODELS for of in contacts]
+    tables = [packed(model, contact=of).body.tables for model in MODELS for of in contacts]
     assert len({typeof(arrays) for arrays in tables}) == 1
     whole = [array for array in tables[0] if isinstance(array, np.ndarray)]
     assert all(array.flags.writeable for array in whole)
