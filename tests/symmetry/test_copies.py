@@ -44,14 +44,15 @@ def to_rounding(monkeypatch):
 
 
 def jumps_late(case: fd.Case) -> bool:
-    """Whether what follows a jump of a load depends on the step before it, to the first order.
+    """Whether what follows a jump depends on the step before it, to the first order.
 
-    So it does where dofs without mass are damped: their velocities there are those of that step.
+    So it does where damped dofs have no mass and a load jumps: their velocities there are those of
+    that step. And where the velocity of damped supports jumps, which no step ends at.
     """
     damped = case.crease_damping.any() or case.rayleigh.beta > 0.0 or case.remembering
-    return bool(
-        len(case.body.hidden) and damped and any(load.history.jumps() for load in case.loads)
-    )
+    late = len(case.body.hidden) and any(load.history.jumps() for load in case.loads)
+    moved = any(history.knots() for _, history in (*case.imposed_terms, *case.base_terms))
+    return bool(damped and (late or moved))
 
 
 def check(seed: int, drawn: Draw) -> None:
