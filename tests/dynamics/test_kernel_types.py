@@ -40,7 +40,7 @@ def test_loops_see_one_type_whatever_a_case_consists_of():
         (work,) = one.body.workspaces(1)
         still = np.zeros((one.system.rows, 3))
         course = Course(still, still, still, np.zeros(1, TALLY)[0], np.zeros(0))
-        equation = EquationOfMotion(one, work, scratch(one.system), course)
+        equation = EquationOfMotion(one, work, scratch(one.system), course, False)
         kinds.add((typeof(equation.still), typeof(course)))
     assert len(kinds) == 1
 

@@ -137,7 +137,7 @@ def advance(equation, course, plan, room, stretch):
     powers, weights = np.empty((2, 7)), np.empty(7)
     ut, vt, a = np.empty_like(course.u), np.empty_like(course.u), np.empty_like(course.u)
     fut, fvt, fa = flat(ut), flat(vt), flat(a)
-    raw = flat(course.carry)  # the acceleration at the begin of a step, without inertia of contacts
+    raw = flat(course.carry)  # the acceleration at the beginning of a step, without inertia
     if tally.steps == 0:
         powers[0, 0], powers[1, 0] = acceleration(equation, course.u, course.v, plan.start, a)
         for i in range(n):

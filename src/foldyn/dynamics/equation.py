@@ -27,9 +27,7 @@ from foldyn.dynamics.course import (
     passed_through,
 )
 from foldyn.dynamics.explicit_contact import ContactParts, contact_parts, slow_contacts
-from foldyn.dynamics.inertia import (
-    lumped_energy,
-)
+from foldyn.dynamics.inertia import lumped_energy
 from foldyn.dynamics.parts import Setting
 from foldyn.dynamics.record import record
 from foldyn.dynamics.system import Entries, Packed, Scratch
@@ -282,14 +280,15 @@ class EquationOfMotion:
     work : memory of the thread, one of `Body.workspaces`
     s : Scratch
     course : Course
-    slows : bool
-        Whether the method gives slow contacts inertia.
+    slows : bool, optional
+        Whether the method gives slow contacts inertia; None if contact does not limit its steps.
     """
 
     def __init__(
-        self, packed: Packed, work: Any, s: Scratch, course: Course, slows: bool = False
+        self, packed: Packed, work: Any, s: Scratch, course: Course, slows: bool | None
     ) -> None:
-        system, mass, model = packed.system, packed.mass, Model(packed.body, work)
+        limited = slows is not None
+        system, mass, model = packed.system, packed.mass, Model(packed.body, work, limited)
         self._model, self._course, share = model, course, model.share
         self._setting = Setting(model.terms, system, mass, share, s)
         self._whole = whole = Context(self._setting)
@@ -298,7 +297,7 @@ class EquationOfMotion:
         remembers = model.terms.kernel[:, ADVANCE_CLOCK].any()
         self._equation = Equation(
             acceleration=_acceleration.at(balance),
-            contact=contact_parts(system, whole, slow),
+            contact=contact_parts(whole, limited and system.touches, slow),
             clock=parts.clock.at(whole) if remembers else 0,
             commit=parts.commit.at(whole) if remembers else 0,
             offsets=parts.offsets.at(whole) if system.turns else 0,

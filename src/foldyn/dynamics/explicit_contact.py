@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from foldyn.dynamics.inertia import Inertia, kinetic_energy
+from foldyn.dynamics.inertia import Inertia
+from foldyn.dynamics.parts import kinetic
 from foldyn.dynamics.slow_contacts import slow_down
 from foldyn.dynamics.system import Packed, Scratch, System
 from foldyn.jit.compiled import addressed, inner_scalar
@@ -30,7 +31,7 @@ class SlowContacts(NamedTuple):
 
 
 class ContactParts(NamedTuple):
-    """Addresses of kernels, and of the context of the last three."""
+    """Addresses of kernels, and of the context of slow contacts."""
 
     limit: int  # 0 without contact
     gather: int  # 0 where slow contacts have no inertia,
@@ -62,13 +63,6 @@ def _slow_down(context, w, a):
     slow_down(m.added, m.system, m.mass, rows_at(w, rows), rows_at(a, rows), m.s)
 
 
-@addressed(ADDRESS)
-def _kinetic(context, w):
-    m = contents(context)
-    rows = m.s.force.shape[0]
-    return kinetic_energy(m.mass, rows_at(w, rows), (0, rows))
-
-
 @inner_scalar
 def longest_step(equation, q, w, a, dt, pace):
     """The longest step (s), at most dt, that contact allows: after `acceleration` at q and w.
@@ -88,7 +82,7 @@ def slow_energy(equation, w):
     """Kinetic energy (J) at velocities w where slow contacts are given inertia, else 0."""
     if equation.contact.kinetic == 0:
         return 0.0
-    return value_at(equation.contact.kinetic, (equation.contact.slow, w))
+    return value_at(equation.contact.kinetic, (equation.setting, w))
 
 
 @inner_scalar
@@ -118,10 +112,11 @@ def slow_contacts(packed: Packed, work: Any, s: Scratch) -> Context | None:
     return Context(SlowContacts(system, packed.mass, s, tables, work.memory, added))
 
 
-def contact_parts(system: System, whole: Context, slow: Context | None) -> ContactParts:
+def contact_parts(whole: Context, limited: bool, slow: Context | None) -> ContactParts:
     """The parts of a motion; `whole` is the context of its setting."""
-    limit = _limit.at(whole) if system.touches else 0
+    limit = _limit.at(whole) if limited else 0
     if slow is None:
         return ContactParts(limit, 0, 0, 0, 0)
-    gather, down, kinetic = (kernel.at(slow) for kernel in (_gather, _slow_down, _kinetic))
-    return ContactParts(limit, gather, down, kinetic, slow.address)
+    return ContactParts(
+        limit, _gather.at(slow), _slow_down.at(slow), kinetic.at(whole), slow.address
+    )

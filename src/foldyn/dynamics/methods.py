@@ -59,20 +59,21 @@ class Compiled:
         The case.
     course : Course
     plan : StepPlan
-    adaptive : bool
-        Whether it chooses its steps by their error: then it runs on one thread, and gives slow
-        contacts inertia.
+    threads : int
+        On how many threads it shall run at most; fewer where elements reach too far.
+    slows : bool
+        Whether it gives slow contacts inertia: on one thread only.
     """
 
     def __init__(
         self, loop: Callable[..., tuple[int, int]], packed: Packed, course: Course, plan: StepPlan,
-        adaptive: bool,
+        threads: int, slows: bool = False,
     ) -> None:  # fmt: skip
         self._loop, self._packed, self._course, self._plan = loop, packed, course, plan
-        self._works = packed.body.workspaces(1 if adaptive else threads_of(packed))
+        self._works = packed.body.workspaces(threads)
         self._memories = scratches(packed.system, self._works)
         self._equations = [
-            EquationOfMotion(packed, work, memory, course, adaptive)
+            EquationOfMotion(packed, work, memory, course, slows)
             for work, memory in zip(self._works, self._memories, strict=True)
         ]
         self.threads = len(self._works)
@@ -174,7 +175,8 @@ class Integrator(NamedTuple):
         """The method with a case, its motion and the memory that it works with."""
         if self.scheme is not None:
             return Implicit(self.scheme, packed, course, plan, jumps(case))
-        return Compiled(self.loop, packed, course, plan, self.adaptive)
+        threads = 1 if self.adaptive else threads_of(packed)
+        return Compiled(self.loop, packed, course, plan, threads, self.adaptive)
 
     def critical_step(
         self, case: Case, u: ArrayLike | None = None, modal: ModalRows | None = None

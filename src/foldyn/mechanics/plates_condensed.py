@@ -59,11 +59,6 @@ class CondensedPlates(NamedTuple):
     band: NDArray
     factor: NDArray
 
-    @property
-    def hinges(self) -> NDArray:
-        """Rows (nh, 4) of all hinges."""
-        return self.plates.hinges
-
 
 class CondensedWork(NamedTuple):
     """Memory of one evaluation."""

@@ -98,6 +98,8 @@ class Model:
     ----------
     body : Body
     work : memory of the thread, one of `Body.workspaces`
+    limited : bool
+        Whether terms limit the steps; else what does so is not compiled.
 
     Attributes
     ----------
@@ -105,12 +107,13 @@ class Model:
     share : Share
     """
 
-    def __init__(self, body: Any, work: Any) -> None:
+    def __init__(self, body: Any, work: Any, limited: bool) -> None:
         self._held = terms = body.terms(work)
         kernel = np.zeros((len(terms), 8), np.int64)
         for row, term in zip(kernel, terms, strict=True):
             for place, function in term.kernels.items():
-                row[place] = function.at(term.context)
+                if limited or place != LIMIT:
+                    row[place] = function.at(term.context)
         context = np.array([term.context.address for term in terms], np.int64)
         self.terms = Terms(context, kernel, body.folds, np.zeros(2))
         own = Whole(np.asarray(work.strips.own))

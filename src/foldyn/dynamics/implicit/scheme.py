@@ -100,7 +100,7 @@ class Scheme(ABC):
         self.packed, self.course = packed, course
         self.work: Any = packed.body.workspaces(1)[0]
         self.scratch: Scratch = scratch(packed.system)
-        self.equation = EquationOfMotion(packed, self.work, self.scratch, course)
+        self.equation = EquationOfMotion(packed, self.work, self.scratch, course, None)
         shape, histories = course.u.shape, self.scratch.factor.shape
         self.out, self.step = np.zeros(shape), np.zeros(shape)
         self.shift = np.zeros(shape)  # new.q - old.q: their difference would lose digits
