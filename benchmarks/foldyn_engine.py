@@ -41,7 +41,7 @@ class FoldynEngine:
         case, packed, dt = self.problem.case, self.packed, self.problem.dt
         plan = StepPlan(0.0, steps * dt, dt, steps, 1 << 60, 0.0, 0.0, 0.0, np.zeros(0))
         start = self.problem.start[self._back]
-        course = begin(case, start, np.zeros_like(start), plan, packed)
+        course = begin(case, start, np.zeros_like(start), None, None, plan, packed)
         course.tally.samples = 1  # so that no step is due for a sample
         out = samples(0, len(start), len(packed.system.supported), 6)
         engine = Compiled(rk4.advance, packed, course, plan, self._threads)
