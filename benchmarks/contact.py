@@ -53,9 +53,9 @@ def step_times(structure: fd.Structure, method: str, steps: int) -> tuple[float,
 
 def list_time(structure: fd.Structure) -> tuple[float, int]:
     """Seconds of a list of near pairs, and how many pairs it has."""
-    body = fd.Case(structure, contact=fd.Contact()).body
-    body.contact(np.zeros(structure.nodes.size))
-    tables, kept = body.tables, body._memory
+    contact = fd.Case(structure, contact=fd.Contact()).contact_term
+    contact.contact(np.zeros(structure.nodes.size))
+    tables, kept = contact.tables, contact.memory
     seconds = quickest(lambda: list_pairs(tables, kept.listed, kept))
     return seconds, int(kept.counts.listed_first + kept.counts.listed_second)
 
@@ -88,12 +88,12 @@ def two_sheets(cells: tuple[int, int]) -> tuple[fd.Structure, np.ndarray]:
 
 def own_times(structure: fd.Structure, u: np.ndarray) -> tuple[float, int, float, int]:
     """Seconds of the search, pairs that it lists, seconds of the force, pairs that touch."""
-    body = fd.Case(structure, contact=fd.Contact()).body
-    body.contact(u.ravel())
-    tables, kept = body.tables, body._memory
+    contact = fd.Case(structure, contact=fd.Contact()).contact_term
+    contact.contact(u.ravel())
+    tables, kept = contact.tables, contact.memory
     search = quickest(lambda: list_pairs(tables, u, kept))
     use_near(kept)
-    angles, force = body.inner.angles(u.ravel()), np.zeros_like(u)
+    angles, force = structure.body.angles(u.ravel()), np.zeros_like(u)
     kept.counts.watched, kept.counts.hinges = 1, 1
     seconds = quickest(lambda: add_contact(tables, u, angles, force, kept))
     counts = kept.counts
@@ -114,7 +114,10 @@ def ipctk_times(structure: fd.Structure, u: np.ndarray) -> tuple[float, int, flo
     import ipctk
 
     ipctk.set_num_threads(1)
-    thickness, skin = PAPER.thickness, fd.Case(structure, contact=fd.Contact()).body.tables.skin
+    thickness, skin = (
+        PAPER.thickness,
+        fd.Case(structure, contact=fd.Contact()).contact_term.tables.skin,
+    )
     mesh = ipctk.CollisionMesh(
         np.asfortranarray(structure.nodes), ipctk.edges(structure.triangles), structure.triangles
     )

@@ -8,7 +8,7 @@ import pytest
 import foldyn as fd
 from contact_sheets import SHEET, strip
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.mechanics.contact.body import TouchingBody
+from foldyn.mechanics.contact.term import ContactTerm
 
 T = SHEET.thickness
 DOWN = fd.Force([0, 1], (0, 0, -1e-3))
@@ -43,7 +43,7 @@ def test_panels_that_cross_are_refused_before_contact_is_looked_at(
     def never(*arguments):
         raise AssertionError("contact's kernels were called")
 
-    monkeypatch.setattr(TouchingBody, "contact", never)
+    monkeypatch.setattr(ContactTerm, "contact", never)
     with pytest.raises(InputError, match=r"contact: at the start .* through each other: 0 and 1;"):
         ANALYSES[analysis](case, None)
 
@@ -54,7 +54,7 @@ def test_so_are_displacements_that_make_them_cross(analysis, monkeypatch):
     case = fd.Case(s, [fd.Fix([2, 3])], [DOWN], contact=fd.Contact())
     u = np.zeros_like(s.nodes)
     u[s.nodes[:, 2] > 0.0, 2] = -0.02
-    monkeypatch.setattr(TouchingBody, "contact", None)
+    monkeypatch.setattr(ContactTerm, "contact", None)
     with pytest.raises(InputError, match="through each other: 0 and 1;"):
         ANALYSES[analysis](case, fd.State(displacement=u))
 
@@ -86,7 +86,7 @@ def test_panels_that_meet_are_named(gap, message):
     ],
 )
 def test_nodes_in_or_behind_a_plane_are_refused(height, message, monkeypatch):
-    monkeypatch.setattr(TouchingBody, "contact", None)
+    monkeypatch.setattr(ContactTerm, "contact", None)
     plane = fd.Plane((0, 0, -height), (0, 0, 1))
     case = fd.Case(strip(), contact=fd.Contact(panels=False, planes=[plane]))
     with pytest.raises(InputError, match=rf"contact.planes\[0\]: {message}"):

@@ -11,6 +11,7 @@ from foldyn.dynamics.course import TALLY, Course
 from foldyn.dynamics.equation import EquationOfMotion
 from foldyn.dynamics.system import pack, scratch
 from foldyn.dynamics.warm_up import MODELS
+from foldyn.mechanics.contact.term import ContactTerm
 
 FOLD = fd.patterns.simple_fold(a=1.0, b=1.3, dihedral=100)
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=100.0)
@@ -56,7 +57,11 @@ def test_what_does_not_depend_on_the_model_has_one_type(supports, loads):
 def test_what_touches_has_one_type():
     plane = fd.Plane((0, 0, -2), (0, 0, 1))
     contacts = [fd.Contact(), fd.Contact(planes=[plane], panels=False), fd.Contact(thickness=0.01)]
-    tables = [packed(model, contact=of).body.tables for model in MODELS for of in contacts]
+    tables = [
+        packed(model, contact=of).body.find(ContactTerm).tables
+        for model in MODELS
+        for of in contacts
+    ]
     assert len({typeof(arrays) for arrays in tables}) == 1
     whole = [array for array in tables[0] if isinstance(array, np.ndarray)]
     assert all(array.flags.writeable for array in whole)

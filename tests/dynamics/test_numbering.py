@@ -7,9 +7,8 @@ import pytest
 
 import foldyn as fd
 from foldyn.dynamics import METHODS
-from foldyn.mechanics.body import renumbered
 from foldyn.mechanics.model import renumber
-from foldyn.structures import body
+from foldyn.structures import bars_hinges
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1000.0)
 
@@ -50,8 +49,8 @@ def test_a_motion_in_another_order(mass, method, monkeypatch):
     def shuffled(model):
         return np.random.default_rng(2).permutation(len(model.rest))
 
-    monkeypatch.setattr(body, "SMALL", 0)
-    monkeypatch.setattr(body, "node_order", shuffled)
+    monkeypatch.setattr(bars_hinges, "SMALL", 0)
+    monkeypatch.setattr(bars_hinges, "node_order", shuffled)
     two = fd.simulate(case, 0.05, **options)
     assert two.displacement.dtype == np.float64
     for name in one.data_vars:
@@ -72,11 +71,11 @@ def test_hinges_keep_their_numbers():
 def test_the_order_of_a_large_sheet_brings_neighbors_together():
     pattern = fd.patterns.miura(cells=(12, 12), a=1.0, b=1.0, panel_angle=60, dihedral=100)
     plain = fd.discretize(pattern, SHEET, preset="herkal").body
-    found, by = renumbered(plain)
+    found, by = plain.renumbered()
     np.testing.assert_array_equal(by.order[by.rank], np.arange(plain.rows))
 
     def reach(of):
-        return int(np.abs(np.diff(of.model.bars.astype(np.int64), axis=1)).max())
+        return int(np.abs(np.diff(of.sheet.model.bars.astype(np.int64), axis=1)).max())
 
     assert reach(found) < 0.3 * reach(plain)
 

@@ -16,6 +16,7 @@ from foldyn.dynamics.slow_contacts import slow_down
 from foldyn.dynamics.system import pack, scratch
 from foldyn.mechanics.contact.inertia import added_inertia, room_for
 from foldyn.mechanics.contact.step_limit import Pace, limited
+from foldyn.mechanics.contact.term import ContactTerm
 
 DT, ALPHA = 1e-2, 30.0
 HALF = 0.5 * SHEET.thickness
@@ -41,14 +42,15 @@ def test_accelerations_are_those_of_the_mass_with_the_inertia_of_contacts(mass):
     packed = pressed(mass)
     body, system, order = packed.body, packed.system, packed.numbering.order
     u = np.zeros((len(order), 3))
-    body.contact(u)
-    kept = body._memory
-    added = room_for(body.tables, kept)
-    arguments = body.tables, added, u, DT, 0.7, system.lightness, kept
+    contact = body.find(ContactTerm)
+    contact.contact(u)
+    kept = contact.memory
+    added = room_for(contact.tables, kept)
+    arguments = contact.tables, added, u, DT, 0.7, system.lightness, kept
     kept.facts.resolved = 0.0
     added_inertia(*arguments)
     count, pairs = int(added.count[0]), kept.counts.near_first + kept.counts.near_second
-    assert count > len(body.tables.meeting) - 8 and pairs > 0
+    assert count > len(contact.tables.meeting) - 8 and pairs > 0
     kept.facts.resolved = DT
     added_inertia(*arguments)
     assert added.count[0] == 0
@@ -63,7 +65,7 @@ def test_accelerations_are_those_of_the_mass_with_the_inertia_of_contacts(mass):
     # a tau of two steps, and the stiffness of contact: here of corners on the ground
     stiffness = 1.0 / (4.0 * DT**2 * added.ease[:count])
     grounded = stiffness[nodes[:, 0] == nodes[:, 1]]
-    own = body.tables.stiffness * curvature(DEPTH / HALF)
+    own = contact.tables.stiffness * curvature(DEPTH / HALF)
     assert len(grounded) == 5 and grounded == pytest.approx(own, rel=1e-9)
     rng = np.random.default_rng(0)
     before, w = rng.standard_normal((2, *u.shape))
@@ -78,7 +80,7 @@ def test_accelerations_are_those_of_the_mass_with_the_inertia_of_contacts(mass):
     # what panels do to each other changes neither momentum
     push = rows[(nodes[:, 0] != nodes[:, 1]).nonzero()[0]].reshape(-1, len(u), 3)
     assert np.abs(push.sum(axis=1)).max() < 1e-12
-    assert np.abs(np.cross(body.tables.rest, push).sum(axis=1)).max() < 1e-12
+    assert np.abs(np.cross(contact.tables.rest, push).sum(axis=1)).max() < 1e-12
 
 
 def test_a_tower_that_is_pressed_flat_takes_few_steps():
@@ -109,13 +111,14 @@ def test_steps_overrun_no_gap_where_they_resolve_no_contact():
     packed = pressed("centroid")
     body, lightness = packed.body, packed.system.lightness
     u = np.zeros((len(packed.numbering.order), 3))
-    body.contact(u)
+    contact = body.find(ContactTerm)
+    contact.contact(u)
     v, a = 0.5 * np.random.default_rng(1).standard_normal((2, *u.shape))
-    angle = body.inner.angles(body.dofs(u))
+    angle = body.angles(body.dofs(u))
 
     def longest(beta, energy):
         pace = Pace(beta, energy)
-        return limited(body.tables, u, v, a, angle, 1.0, pace, lightness, body._memory)
+        return limited(contact.tables, u, v, a, angle, 1.0, pace, lightness, contact.memory)
 
     closing = longest(1e9, 0.0)
     assert longest(0.6, 1e9) == closing > 10.0 * longest(1e-3, 0.0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import foldyn as fd
-from foldyn.mechanics.contact.body import TouchingBody
 from foldyn.mechanics.contact.tables import PLANE_COLUMNS, Sheets, Tables, tables
+from foldyn.mechanics.contact.term import ContactTerm
 
 T = 0.24e-3
 SHEET = fd.Sheet(
@@ -41,9 +41,7 @@ def tables_of(structure: fd.Structure, thickness: float = T) -> Tables:
     return tables(own, NO_HINGES)
 
 
-def touching(structure: fd.Structure, planes=(), thickness: float = T) -> TouchingBody:
-    """A structure with contact."""
+def touching(structure: fd.Structure, planes=(), thickness: float = T) -> ContactTerm:
+    """Contact of a structure."""
     nodes, panel = structure.nodes, structure.triangle_panel
-    return TouchingBody(
-        structure.body, sheets(nodes, structure.triangles, panel, thickness, planes)
-    )
+    return ContactTerm(sheets(nodes, structure.triangles, panel, thickness, planes), structure.body)

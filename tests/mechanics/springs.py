@@ -1,7 +1,7 @@
 """A third model, as anyone may add one: points joined by linear springs.
 
 It needs what is here and nothing in the package: a named tuple of arrays, a term with kernels for
-its forces and energies, a `Body`, and a structure that gives it.
+its forces and energies, a `SheetTerm` that compiles them, and a structure that gives it.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from foldyn.algebra.solvers import Fill
 from foldyn.jit.compiled import kernel
 from foldyn.jit.context import Context, contents, numbers_at, rows_at
 from foldyn.materials import hinge_law
-from foldyn.mechanics.body import Body
+from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.sheet_term import SheetTerm
 from foldyn.mechanics.step_tangent import SparseBlocks
-from foldyn.mechanics.term import ENERGIES, FORCES, Folds, Term, Whole, energies, forces
+from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Folds, Whole, energies, forces
 from foldyn.mechanics.threads import Team, team
 from foldyn.structures.discretized import Discretized
 
@@ -61,7 +62,7 @@ def spring_force(model, u, force):
     return energy
 
 
-class SpringsTerm(NamedTuple):
+class SpringsContext(NamedTuple):
     """What the kernels of the term work with."""
 
     model: Springs
@@ -82,21 +83,13 @@ def _energies(context, u, out):
     numbers_at(out, 1)[0] = spring_force(own.model, moved, own.unused)
 
 
-class SpringsBody(Body):
+class SpringsTerm(SheetTerm):
     """Points and springs as solvers take them."""
 
     energy_groups = ("strain_springs",)
 
     def __init__(self, model: Springs) -> None:
         self.model, self.size, self.rows = model, model.rest.size, len(model.rest)
-
-    def energies(self, q: NDArray) -> NDArray:
-        return np.array([spring_force(self.model, q.reshape(-1, 3), np.empty((self.rows, 3)))])
-
-    def internal(self, q: NDArray, work=None) -> NDArray:
-        force = np.empty((self.rows, 3))
-        spring_force(self.model, q.reshape(-1, 3), force)
-        return force.ravel()
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
         x, matrix = self.model.rest + q.reshape(-1, 3), np.zeros((self.rows, 3, self.rows, 3))
@@ -118,9 +111,9 @@ class SpringsBody(Body):
         own = Whole(np.array([0, self.rows]))
         return [SpringsWork(np.zeros(0), np.zeros(0), own, team(1)[0])]
 
-    def terms(self, work: SpringsWork) -> list[Term]:
-        own = Context(SpringsTerm(self.model, np.zeros((self.rows, 3))))
-        return [Term(own, {FORCES: _forces, ENERGIES: _energies})]
+    def compiled(self, work, kept: SpringsWork, group: int) -> Compiled:
+        own = Context(SpringsContext(self.model, np.zeros((self.rows, 3))))
+        return Compiled(own, {FORCES: _forces, ENERGIES: _energies})
 
     @property
     def folds(self) -> Folds:
@@ -167,6 +160,6 @@ class Net(Discretized):
         return sparse.csr_array(sparse.diags_array(self.node_mass))
 
     @cached_property
-    def body(self) -> SpringsBody:
+    def body(self) -> Assembly:
         model = Springs(self.nodes, self.bars, self.stiffness, self.bar_length)
-        return SpringsBody(model)
+        return Assembly(SpringsTerm(model))

@@ -8,13 +8,13 @@ from contact_samples import T, miura, sheets, touching
 
 from foldyn.checks import tangent_error
 from foldyn.mechanics.contact.approach import KEEP, clear_share
-from foldyn.mechanics.contact.body import TouchingBody, contact_tangent
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.memory import memory
 from foldyn.mechanics.contact.pairs import edge_gap, vertex_gap
 from foldyn.mechanics.contact.planes import slip
 from foldyn.mechanics.contact.search import list_pairs, place
 from foldyn.mechanics.contact.tables import tables
+from foldyn.mechanics.contact.term import ContactTerm, contact_tangent
 
 NO_HINGES = np.zeros((0, 4), np.int64)
 FLAT = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
@@ -105,15 +105,16 @@ def test_planes_and_sheets_that_meet_share_the_gap():
 
 
 def test_no_hinge_passes_zero():
-    body = touching(miura(20.0))
+    made = miura(20.0)
+    body, contact = made.body, touching(made)
     u = np.zeros(body.size)
     rng = np.random.default_rng(2)
     for _ in range(10):
         step = 0.02 * rng.standard_normal(body.size)
-        share = body.clear(u, step, NO_PLANES)
+        share = contact.clear(u, step, NO_PLANES)
         assert 0.0 < share < 1.0
-        angles = body.angles(share * step)[body.tables.hinge_row]
-        before = body.angles(u)[body.tables.hinge_row]
+        angles = body.angles(share * step)[contact.tables.hinge_row]
+        before = body.angles(u)[contact.tables.hinge_row]
         near, was = (np.minimum(a, 2 * np.pi - a) for a in (angles, before))
         assert (np.abs(angles - before) < np.pi).all() and (near >= KEEP * was).all()
 
@@ -123,8 +124,8 @@ def test_the_tangent_of_lagged_friction_is_exact(stretch):
     """Sticking with a small stretch, slipping with a large one."""
     made = miura(70.0)
     floor = ((0.0, 0.0, float(made.nodes[:, 2].min()) - 0.4 * T), (0.0, 0.0, 1.0), 0.3)
-    body = TouchingBody(
-        made.body, sheets(made.nodes, made.triangles, made.triangle_panel, T, [floor])
+    body = ContactTerm(
+        sheets(made.nodes, made.triangles, made.triangle_panel, T, [floor]), made.body
     )
     kept, u = memory(body.tables), np.zeros((len(made.nodes), 3))
     place(body.tables, u, kept)
@@ -135,12 +136,12 @@ def test_the_tangent_of_lagged_friction_is_exact(stretch):
 
     def force(v):
         out = np.zeros_like(u)
-        add_contact(body.tables, v.reshape(-1, 3), body.angles(v), out, kept)
+        add_contact(body.tables, v.reshape(-1, 3), made.body.angles(v), out, kept)
         return out.ravel()
 
     def tangent(v):
         force(v)
-        return contact_tangent(body.tables, kept, body.size)
+        return contact_tangent(body.tables, kept, made.body.size)
 
     assert np.abs(force(u.ravel())[0::3]).max() > 0.0
     assert tangent_error(force, tangent, u.ravel(), size=1e-9) < 1e-6

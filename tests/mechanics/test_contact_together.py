@@ -41,7 +41,7 @@ def moved(count: int, growth: float):
     u = 2e-5 * rng.standard_normal((n, 3)) + 1e-6 * rng.standard_normal((3, n, 3))
     u += growth * np.arange(3)[:, None, None] * (STACK.nodes - FLOOR[0])
     v, force = 0.1 * rng.standard_normal((n, 3)), np.zeros_like(u)
-    angle = np.array([body.angles(one.ravel()) for one in u])
+    angle = np.array([STACK.body.angles(one.ravel()) for one in u])
     cuts = np.linspace(0, n, count + 1).astype(np.int64)
     kept = memories(tables, True, team(count), [cuts[k : k + 2] for k in range(count)])
     for one in kept:

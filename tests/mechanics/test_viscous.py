@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import foldyn as fd
 from foldyn.dynamics.dampers import dampers
+from foldyn.mechanics.term import Model, evaluate
 from foldyn.mechanics.viscous import (
     WIDTH,
     add_viscous_elements,
@@ -42,8 +43,9 @@ def scalars(case: fd.Case, q: np.ndarray) -> np.ndarray:
     x = case.structure.nodes + q.reshape(-1, 3)[:n]
     lengths = [np.linalg.norm(x[b] - x[a]) for a, b in case.dashpots[0][1].between]
     work = case.body.workspaces(1)[0]
-    case.body.internal(q.reshape(-1)[: case.body.size], work)
-    hinges = case.body.fold_hinges()
+    model, moved = Model(case.body, work, limited=False), case.body.in_rows(q)
+    evaluate(model.terms, moved, 0.0 * moved, 0.0 * moved, np.zeros(0))
+    hinges = case.body.sheet.fold_hinges()
     angles = work.fold_angle
     if len(angles) != len(hinges.fold):  # bars and hinges: all hinges stand there
         angles = case.structure.dihedrals(q[: case.structure.nodes.size])[0]
@@ -105,8 +107,8 @@ def test_what_cannot_be_damped_is_said():
     """A model that does not tell which hinges are those of a fold is refused, not left undamped."""
     case = damped("bars")
     body = case.body
-    hinges = body.fold_hinges()
-    body.fold_hinges = lambda: hinges._replace(
+    hinges = body.sheet.fold_hinges()
+    body.sheet.fold_hinges = lambda: hinges._replace(
         fold=hinges.fold[1:], nodes=hinges.nodes[1:], corners=hinges.corners[1:],
         hidden=hinges.hidden[1:],
     )  # fmt: skip

@@ -11,8 +11,10 @@ import foldyn as fd
 from contact_sheets import SHEET, crossing, strip
 from foldyn.checks import gradient_error, tangent_error
 from foldyn.errors import CrossingWarning, FoldynWarning, InputError
-from foldyn.mechanics.contact.body import TouchingBody
+from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.tangent import guard_tangents
+from foldyn.mechanics.contact.term import ContactTerm
+from foldyn.mechanics.term import nodal
 from foldyn.viewer.fields import fields
 
 T, G = SHEET.thickness, 9.81
@@ -29,10 +31,8 @@ def strip_shell(panels: int = 3, divisions: int = 4) -> fd.Shell:
 
 def touching(
     shell: fd.Structure | fd.Shell, planes=(), thickness: float | None = None
-) -> TouchingBody:
-    body = fd.Case(shell, contact=fd.Contact(thickness, planes=planes)).body
-    assert isinstance(body, TouchingBody)
-    return body
+) -> ContactTerm:
+    return fd.Case(shell, contact=fd.Contact(thickness, planes=planes)).contact_term
 
 
 THICK = 2e-3  # m: gaps that are large against rounding
@@ -45,41 +45,38 @@ def miura_stack(clamped: bool) -> fd.Shell:
     return fd.shell(pattern, SHEET, divisions=3, fold_law="linear", clamped=edges)
 
 
-@pytest.fixture(scope="module")
-def stack():
-    """It lies on the ground."""
-    shell = miura_stack(clamped=True)
-    ground = fd.Plane((0, 0, shell.nodes[:, 2].min() - 0.3 * THICK), (0, 0, 1))
-    return touching(shell, [ground], THICK)
-
-
-def states(body: TouchingBody, count: int = 3):
+def states(body: Assembly, count: int = 3):
     rng = np.random.default_rng(5)
     u = 1e-4 * rng.standard_normal((count, (body.size - len(body.hidden)) // 3, 3))
     return [np.append(each, np.zeros(len(body.hidden))) for each in u]
 
 
-def force_of(body: TouchingBody):
-    return lambda q: body.added(body.contact(q)[1])
+def test_forces_are_the_gradient_and_tangents_exact():
+    shell = miura_stack(clamped=True)
+    ground = fd.Plane((0, 0, shell.nodes[:, 2].min() - 0.3 * THICK), (0, 0, 1))
+    stack = touching(shell, [ground], THICK)
+    body = shell.body.with_terms(stack)
 
+    def contact(q):
+        return np.append(stack.contact(q)[1], np.zeros(len(body.hidden)))
 
-def test_forces_are_the_gradient_and_tangents_exact(stack):
-    for q in states(stack):
+    for q in states(body):
         energy = stack.contact(q)[0]
-        assert energy == stack.energies(q)[-1] > 0.0
+        assert energy == body.energies(q)[-1] > 0.0
         assert np.abs(stack.plane_forces(q)).max() > 0.0
         blocks = np.zeros((len(stack.tables.hinge_limit), 4, 3, 4, 3))
         assert guard_tangents(stack.tables, stack.tables.rest, blocks).any()
-        contact, size = force_of(stack), 3e-5
+        size = 3e-5
         assert gradient_error(lambda q: stack.contact(q)[0], contact, q, size=size) < 1e-10
-        assert tangent_error(contact, stack.contact_tangent, q, size=size) < 1e-8
-        assert tangent_error(stack.internal, stack.tangent, q, size=size) < 1e-8
+        assert tangent_error(contact, stack.tangent, q, size=size) < 1e-8
+        assert tangent_error(body.internal, body.tangent, q, size=size) < 1e-8
 
 
 def test_contact_has_no_resultant_and_no_moment():
-    body = touching(miura_stack(clamped=False), thickness=THICK)
-    for q in states(body):
-        force, x = body.contact(q)[1], body.tables.rest + body.nodal(q)
+    shell = miura_stack(clamped=False)
+    body = touching(shell, thickness=THICK)
+    for q in states(shell.body):
+        force, x = body.contact(q)[1], body.tables.rest + nodal(q)[: len(shell.nodes)]
         size = np.abs(force).max() * len(force)
         assert size > 0.0
         assert np.abs(force.sum(axis=0)).max() < 1e-13 * size
@@ -106,8 +103,8 @@ def test_neighbors_meet_everywhere_at_once():
         pattern = fd.patterns.simple_fold(
             a=0.02, b=0.02, dihedral=factor * np.degrees(2.0 * T / 0.02)
         )
-        body = touching(fd.shell(pattern, SHEET, divisions=4, fold_law="linear"))
-        energies.append(body.contact(np.zeros(body.size))[0])
+        shell = fd.shell(pattern, SHEET, divisions=4, fold_law="linear")
+        energies.append(touching(shell).contact(np.zeros(shell.body.size))[0])
     assert energies[0] == 0.0 < energies[1]
 
 
@@ -115,7 +112,7 @@ def test_an_edge_between_elements_cannot_turn_inside_out():
     """Nothing else keeps two triangles of one panel from folding onto each other."""
     square = fd.Pattern([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1, 2, 3]])
     shell = fd.shell(square, fd.Sheet(1e6, 0.25, 0.01, density=1.0), divisions=1)
-    body = touching(shell)
+    body, dofs = touching(shell), shell.body.dofs
     axis, (free,) = shell.sides.hinges[0, :2], shell.sides.hinges[:, 2]
     x = body.tables.rest
     along = x[axis[1]] - x[axis[0]]
@@ -126,10 +123,10 @@ def test_an_edge_between_elements_cannot_turn_inside_out():
         u = np.zeros_like(x)
         up = np.linalg.norm(across) * np.array([0.0, 0.0, np.sin(np.radians(turn))])
         u[free] = (np.cos(np.radians(turn)) - 1.0) * across + up
-        energies.append(body.contact(body.dofs(u))[0])
+        energies.append(body.contact(dofs(u))[0])
         back = u.copy()
         back[free, 2] *= -1.0
-        assert body.clear(body.dofs(u), body.dofs(back) - body.dofs(u), np.zeros((0, 3))) < 1.0
+        assert body.clear(dofs(u), dofs(back) - dofs(u), np.zeros((0, 3))) < 1.0
     assert energies[0] == 0.0 < energies[1]
 
 
@@ -144,9 +141,7 @@ def folded(structure, contact=True, steps=4):
 
 def push_of_panels(case: fd.Case, path) -> np.ndarray:
     """Force (3,) of the last panel of the strip on the first one, N."""
-    body = case.body
-    assert isinstance(body, TouchingBody)
-    force = -body.contact(body.dofs(path.displacement.values[-1]))[1]
+    force = -case.contact_term.contact(case.body.dofs(path.displacement.values[-1]))[1]
     return force[case.structure.nodes[:, 0] < 0.04 - 1e-9].sum(axis=0)
 
 

@@ -7,7 +7,6 @@ import pytest
 
 import foldyn as fd
 from foldyn import checks
-from foldyn.mechanics.inelastic_body import InelasticBody
 from foldyn.structures.remembering import memory
 from one_hinge import STIFFNESS, WING, moment, one_hinge, opened
 
@@ -127,11 +126,12 @@ def test_tangents_of_bodies_with_memory_are_exact(law, model):
         structure = fd.discretize(pattern, sheet, scheme=scheme, fold_law=law)
     body = structure.body
     case = fd.Case(structure)
-    whole = InelasticBody(body, memory(case.remembering, body))
+    branches = memory(case.remembering, body)
+    whole = body.with_terms(branches)
     random = np.random.default_rng(3)
     q0, q1 = (3e-3 * random.normal(size=body.size) for _ in range(2))
-    whole.memory.start(body.series()[1], whole._rows(q0))
-    own = whole.memory.own
+    branches.start(q0)
+    own = branches.own
     own.elapsed[0] = 0.1
     assert checks.tangent_error(whole.internal, whole.tangent, q1, size=1e-3) < 1e-7
     assert np.abs(own.moment).min() > 0.0

@@ -10,11 +10,6 @@ import foldyn as fd
 from case_texts import HELD_MIURA_TEXT
 from foldyn.checks import gradient_error, observed_order, tangent_error
 from foldyn.errors import InputError
-from foldyn.mechanics.plates_condensed import (
-    condensed_energy,
-    condensed_force,
-    condensed_work,
-)
 from foldyn.structures.condensed_panel import _condensed, panel_stiffness
 from foldyn.structures.panel_plate import outline
 
@@ -262,11 +257,8 @@ def test_explicit_methods_balance_the_edges(law, method):
     s = miura(fold_law=law)
     twin = s.condensed
     u = displaced(s)[: s.nodes.size]
-    work = condensed_work(twin.body.model)
-    force, energy = np.zeros(s.nodes.shape), np.zeros(3)
     for at in (0.3 * u, u):  # from one state to the next
-        condensed_force(twin.body.model, at.reshape(-1, 3), force, work)
-        condensed_energy(twin.body.model, at.reshape(-1, 3), work, energy)
+        force, energy = twin.body.internal(at).reshape(-1, 3), twin.body.energies(at)
         np.testing.assert_allclose(force, s.internal_force(at), rtol=1e-8, atol=1e-8)
         np.testing.assert_allclose(energy, list(s.energies(at).values()), rtol=1e-9)
     load = fd.Force([6, 7, 8], (0, 0, 2e-2), fd.HalfSine(0.5))

@@ -24,7 +24,7 @@ def test_hinges_turn_as_on_a_paraboloid(scheme: str) -> None:
         u = np.zeros_like(s.nodes)
         u[:, 2] = 0.5 * curvature * (s.nodes[:, :2] ** 2).sum(axis=1)
         angles = np.concatenate(s.dihedrals(u))
-        turned = angles - s.body.rest_angles[: len(angles)]
+        turned = angles - s.body.sheet.rest_angles[: len(angles)]
         swelling = s.swollen(np.zeros(2), np.full(2, curvature))
         assert (swelling.turns[: len(s.folds)] < 0.0).all()  # as at a valley
         assert not swelling.forces.tension.any()

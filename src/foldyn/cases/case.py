@@ -22,10 +22,10 @@ from foldyn.cases.masses import PointMass, nodal_masses
 from foldyn.cases.supported import Supported
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
 from foldyn.errors import Faults, FoldynWarning, InputError, within
-from foldyn.mechanics.attached_body import GROUP, attached
-from foldyn.mechanics.body import Body
-from foldyn.mechanics.contact.body import GROUP as CONTACT
-from foldyn.mechanics.contact.body import TouchingBody
+from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.contact.term import GROUP as CONTACT
+from foldyn.mechanics.contact.term import ContactTerm
+from foldyn.mechanics.springs import GROUP, SpringsTerm
 from foldyn.patterns.picture import picture
 from foldyn.structures.discretized import read_only
 from foldyn.structures.mass import center_of_mass, inertia_tensor, row_sums
@@ -90,7 +90,7 @@ class Case(Supported, Loaded, Damped):
         Changes (rad) of the rest angles of the folds at factor 1, zero elsewhere, with their
         history; equal histories are one term.
     rest_terms : tuple of (ndarray of shape (nr,), History)
-        The same of all rest angles (`body.rest_angles`: folds first), whatever changes them.
+        The same of all rest angles (`body.sheet.rest_angles`: folds first), whatever changes them.
 
     Raises
     ------
@@ -166,19 +166,26 @@ class Case(Supported, Loaded, Damped):
             return replace(self, **changes)
 
     @cached_property
-    def body(self) -> Body:
+    def body(self) -> Assembly:
         """What solvers take: the structure with what the case adds to its stiffness."""
         body = self.elastic_body
         if self.contact is None:
             return body
         still = np.all(self.still, axis=1)
-        return TouchingBody(body, self.contact.sheets(self.structure, still))
+        return body.with_terms(ContactTerm(self.contact.sheets(self.structure, still), body))
+
+    @property
+    def contact_term(self) -> ContactTerm:
+        """What contact adds to `body`, if there is any."""
+        found = self.body.find(ContactTerm)
+        assert found is not None
+        return found
 
     @cached_property
-    def elastic_body(self) -> Body:
+    def elastic_body(self) -> Assembly:
         """The same without contact: what vibrations, damping and critical steps are about."""
         body = self.structure.body
-        return body if self.springs is None else attached(body, springs=self.springs)
+        return body if self.springs is None else body.with_terms(SpringsTerm(self.springs))
 
     @cached_property
     def remembering(self) -> tuple[Remembering, ...]:
@@ -188,9 +195,9 @@ class Case(Supported, Loaded, Damped):
     def check_flow(self) -> None:
         """Refuse changes of rest angles from which laws measure what has flowed."""
         for change, _ in self.rest_terms:
-            rest = len(change) - self.body.offsets
+            rest = len(change) - self.body.sheet.offsets
             for number in np.flatnonzero(change[:rest]).tolist():
-                law = self.body.rest_law(number)
+                law = self.body.sheet.rest_law(number)
                 if any(part.law is law and not part.law.relaxes for part in self.remembering):
                     raise InputError(
                         f"loads: something turns the rest angle of a hinge with the law "

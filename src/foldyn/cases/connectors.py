@@ -12,7 +12,7 @@ from foldyn.cases.decode import Part
 from foldyn.cases.directions import check_direction, check_pairs, unit_vector
 from foldyn.cases.selection import check_nodes, resolve_nodes
 from foldyn.errors import InputError
-from foldyn.mechanics.attached import GROUND
+from foldyn.mechanics.springs import GROUND
 
 NEAR = 1e-9  # of the structure's size: nodes closer than that have no line between them
 

@@ -14,8 +14,8 @@ from foldyn.cases.load import Load
 from foldyn.cases.regions import check_panels, resolve_panels
 from foldyn.cases.selection import check_creases, resolve_creases
 from foldyn.errors import InputError
-from foldyn.mechanics.body import NO_DOF
 from foldyn.mechanics.following import Following, joined, moments, pressures, pushes
+from foldyn.mechanics.sheet_term import NO_DOF
 from foldyn.values import brief, number, number_or_list, show
 
 
@@ -116,7 +116,7 @@ class CreaseMoment(Load):
         creases, moment = self.of_creases(structure, place)
         each = np.zeros(len(structure.folds))
         each[creases] = moment
-        pieces = structure.body.fold_hinges()
+        pieces = structure.body.sheet.fold_hinges()
         chosen = np.isin(pieces.fold, creases)
         part = (each[pieces.fold] * pieces.share)[chosen]
         turning = moments(pieces.corners[chosen], pieces.nodes[chosen], part)
@@ -127,17 +127,19 @@ class CreaseMoment(Load):
     def turns(self, structure: Any, place: str) -> NDArray | None:
         """See `Load`: the panels beside a crease give way to all of its moment."""
         body = structure.body
-        if not body.offsets:
+        if not body.sheet.offsets:
             return None
         creases, moment = self.of_creases(structure, place)
-        out = np.zeros(len(body.rest_angles))
-        out[len(out) - body.offsets + creases] = moment * body.fold_hinges().softness[creases]
+        out = np.zeros(len(body.sheet.rest_angles))
+        out[len(out) - body.sheet.offsets + creases] = (
+            moment * body.sheet.fold_hinges().softness[creases]
+        )
         return out
 
     def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse moments of creases between panels that are held."""
         creases, _ = self.of_creases(structure, place)
-        pieces = structure.body.fold_hinges()
+        pieces = structure.body.sheet.fold_hinges()
         held = fixed[pieces.nodes].all(axis=(1, 2)) & (pieces.hidden == NO_DOF).all(axis=1)
         still = np.intersect1d(creases, pieces.fold[held])
         if still.size:

@@ -35,7 +35,7 @@ class Loaded:
         return summed(self._turned())
 
     def _turned(self) -> Summands:
-        count = len(self.structure.body.rest_angles)
+        count = len(self.structure.body.sheet.rest_angles)
         for change, history in self.actuation_terms:
             yield np.pad(change, (0, count - len(change))), history
         for place, load in self._loads():

@@ -10,7 +10,7 @@ import numpy as np
 
 from foldyn.cases.connectors import Connector
 from foldyn.errors import InputError
-from foldyn.mechanics.attached import Springs, no_springs
+from foldyn.mechanics.springs import Springs
 from foldyn.values import brief, number
 
 
@@ -86,9 +86,9 @@ def packed(parts: Iterable[tuple[str, Spring]], structure: Any) -> Springs:
     InputError
         A node is out of range, or the ends of a spring without a direction coincide.
     """
-    x, none = structure.nodes, no_springs()
-    ends, direction, stiffness = [none.ends], [none.direction], [none.stiffness]
-    axial, vector, natural, along = [none.ends], [none.vector], [none.length], [none.length]
+    x, pair, line, none = structure.nodes, np.zeros((0, 2), np.int64), np.zeros((0, 3)), np.zeros(0)
+    ends, direction, stiffness = [pair], [line], [none]
+    axial, vector, natural, along = [pair], [line], [none], [none]
     for place, spring in parts:
         pairs, axes = spring.ends(structure, place), spring.directions
         if axes is not None:

@@ -18,7 +18,7 @@ from foldyn.cases.supports import BaseMotion, Fix, Impose, Link, Spring
 from foldyn.cases.terms import Summands, Terms, summed
 from foldyn.cases.ties import equations_of, values_of
 from foldyn.errors import InputError
-from foldyn.mechanics.attached import Springs
+from foldyn.mechanics.springs import Springs
 from foldyn.structures.discretized import read_only
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,8 +57,8 @@ def _check_planes(case: Case, u: NDArray, moved: NDArray) -> None:
     surface = surface[~case.still[surface].all(axis=1)]  # what stays where it is is left alone
     if not len(surface):
         return
-    body: Any = case.body
-    x, half = case.structure.nodes[surface] + u[surface], 0.5 * body.tables.node_thickness[surface]
+    tables = case.contact_term.tables
+    x, half = case.structure.nodes[surface] + u[surface], 0.5 * tables.node_thickness[surface]
     for i, plane in enumerate(case.contact.planes):
         point, normal = np.array(plane.point) + moved[i], np.array(plane.normal)
         height = (x - point) @ normal / np.linalg.norm(normal)
@@ -86,8 +85,7 @@ def _check_panels(case: Case, u: NDArray) -> None:
             f": at the start panels pass through each other: {pairs_text(pairs)}; {APART}",
             "contact",
         )
-    body: Any = case.body
-    energy, share, panels = body.nearest(body.dofs(u))
+    energy, share, panels = case.contact_term.nearest(case.body.dofs(u))
     most = f" ({pairs_text(panels)})" if len(panels) else ""
     if not (np.isfinite(energy) and share > NEAREST):
         raise InputError(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.materials.series import series_moment, series_rest_slope
 from foldyn.materials.switch import move_rest
-from foldyn.mechanics.body import Body
+from foldyn.mechanics.assembly import Assembly
 
 
 class Actuators(NamedTuple):
@@ -35,11 +35,13 @@ class Actuators(NamedTuple):
     address: NDArray  # (a, 3) of the law's functions, if it is the user's own
     span: NDArray  # (p,)
     row: NDArray  # (p,) of the waveforms
-    share: NDArray  # see `Body.series`
+    share: NDArray  # see `SheetTerm.series`
     offset: NDArray
 
 
-def actuators(body: Body, numbers: NDArray, span: NDArray, row: NDArray) -> tuple[Body, Actuators]:
+def actuators(
+    body: Assembly, numbers: NDArray, span: NDArray, row: NDArray
+) -> tuple[Assembly, Actuators]:
     """A body whose rest angles can be changed, and what turns.
 
     numbers, span, row : (p,) of its rest angles, how far each turns (rad), and its waveform.
@@ -48,20 +50,21 @@ def actuators(body: Body, numbers: NDArray, span: NDArray, row: NDArray) -> tupl
     turned, first, count = np.unique(numbers[order], return_index=True, return_counts=True)
     hinge, which = np.zeros(0, np.int64), np.zeros(0, np.int64)
     if len(turned):
-        body, hinge, which = body.actuated(turned)
-    lowest = body.lowest_nodes(hinge).astype(np.int64)
+        sheet, hinge, which = body.sheet.actuated(turned)
+        body = body.on(sheet)
+    lowest = body.sheet.lowest_nodes(hinge).astype(np.int64)
     along = np.argsort(lowest, kind="stable")
     hinge, which, lowest = hinge[along], which[along], lowest[along]
-    laws = [body.rest_law(number) for number in turned.tolist()]
+    laws = [body.sheet.rest_law(number) for number in turned.tolist()]
     code = np.array([law.code for law in laws], np.int64)
     address = np.array([law.addresses or (0, 0, 0) for law in laws], np.int64).reshape(-1, 3)
-    share, offset = body.series()
-    is_offset = (turned >= len(body.rest_angles) - body.offsets)[which]
+    share, offset = body.sheet.series()
+    is_offset = (turned >= len(body.sheet.rest_angles) - body.sheet.offsets)[which]
     return body, Actuators(
         hinge=hinge,
         lowest=lowest,
         is_offset=is_offset,
-        start=np.where(is_offset, offset[hinge, 0], body.turned()[0][hinge]),
+        start=np.where(is_offset, offset[hinge, 0], body.sheet.turned()[0][hinge]),
         part=np.stack([first, first + count], axis=1)[which].astype(np.int64),
         code=code[which],
         address=address[which],

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.mechanics.body import Body
+from foldyn.mechanics.assembly import Assembly
 
 EPS = float(np.finfo(float).eps)
 MARGIN = 16.0  # times the rounding errors of single operations: what they add up to
@@ -94,8 +94,8 @@ class Balance:
 class Rounding:
     """What rounding hides in the motions of a body."""
 
-    def __init__(self, body: Body) -> None:
-        self.length = body.longest()
+    def __init__(self, body: Assembly) -> None:
+        self.length = body.sheet.longest()
         self._force, self._moment = float(np.linalg.norm(body.scale())), body.turning_moments()
 
     def energy(self, energy: NDArray | float, moved: float) -> float:

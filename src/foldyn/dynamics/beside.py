@@ -29,7 +29,7 @@ from foldyn.dynamics.system import Packed
 from foldyn.dynamics.timing import check_samples
 from foldyn.errors import FoldynError
 from foldyn.mechanics.lanes import WIDTH, lanes, side_by_side, topology
-from foldyn.structures.body import BarsHingesBody
+from foldyn.structures.bars_hinges import BarsHingesTerm
 
 METHOD = METHODS["central_difference"]
 STRETCH = 1000  # steps for which the factors of the loads are in memory
@@ -54,7 +54,7 @@ def lacking(motion: Motion) -> str:
         "constraints": len(system.ties.slave) > 0,
         "a mass matrix that is not lumped": not packed.mass.lumped,
         "clamped edges, springs, or another model than bars and hinges": not isinstance(
-            packed.body, BarsHingesBody
+            packed.body, BarsHingesTerm
         ),
     }
     found = [what for what, there in lacks.items() if there]

@@ -14,8 +14,9 @@ from scipy import sparse
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
+from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.block_matrix import assembled, blocks_of_ends, pairs_of_ends
-from foldyn.mechanics.body import NO_DOF, Body, Numbering, no_fold_hinges
+from foldyn.mechanics.sheet_term import NO_DOF, no_fold_hinges
 from foldyn.mechanics.viscous import Viscous, viscous, viscous_matrix
 
 
@@ -76,12 +77,12 @@ def dampers(case: Case, quasi_static: bool = False) -> Dampers:
 
 
 def _elements(
-    case: Case, body: Body, nodes: NDArray, pairs: NDArray, strength: list[NDArray],
+    case: Case, body: Assembly, nodes: NDArray, pairs: NDArray, strength: list[NDArray],
     quasi_static: bool,
 ) -> Viscous:  # fmt: skip
     """Axial dashpots between pairs (p, 2) of nodes, damped creases, and what strains a sheet."""
     damping = case.crease_damping
-    hinges = body.fold_hinges() if damping.any() else no_fold_hinges()
+    hinges = body.sheet.fold_hinges() if damping.any() else no_fold_hinges()
     unknown = np.setdiff1d(np.flatnonzero(damping), hinges.fold)
     if unknown.size:
         raise InputError(f"damping: this structure cannot damp crease {unknown[0]}: leave it out")

@@ -24,7 +24,7 @@ from foldyn.dynamics.inertia import kinetic_energy, moving_energy
 from foldyn.dynamics.modal_damping import ModalRows
 from foldyn.jit.compiled import inner, inner_scalar, scalar
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.body import Numbering
+from foldyn.mechanics.assembly import Numbering
 from foldyn.mechanics.viscous import Viscous, add_viscous_elements, viscous_elements_work
 
 

@@ -290,7 +290,7 @@ def _plan(
     if method.adaptive or (method.implicit and (dt is None or tolerance is not None)):
         default = IMPLICIT_TOLERANCE if method.implicit else TOLERANCE
         largest = math.inf if force else critical
-        tolerance, floor = tolerance or default, FLOOR * case.body.longest()
+        tolerance, floor = tolerance or default, FLOOR * case.body.sheet.longest()
         return timing.variable_steps(
             duration, dt, every, largest, start, tolerance, floor, timing.knots(case)
         )

@@ -15,7 +15,6 @@ damps the vibrations that a step does not resolve.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +44,7 @@ from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics import strain_energies
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.tables import Tables
+from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import add_following
 from foldyn.mechanics.step_tangent import FLOOR, expected_stress
 from foldyn.mechanics.term import Folds
@@ -60,12 +60,12 @@ class EnergyMomentum(Scheme):
 
     def __init__(self, packed: Packed, course: Course) -> None:
         super().__init__(packed, course)
-        body: Any = packed.body
-        self._contact: StepContact | None = None
-        if packed.system.touches:
-            self._contact = StepContact(body.tables, self.work.memory, packed.system.rows)
-            body = body.inner
-        model = body.model
+        body, self._contact = packed.body, None
+        contact = body.find(ContactTerm)
+        if contact is not None:
+            kept = body.kept(self.work, ContactTerm)
+            self._contact = StepContact(contact.tables, kept, packed.system.rows)
+        model = body.sheet.model
         self._arrays = model, packed.system, packed.mass
         self._touch = np.zeros((0, 3)) if self._contact is None else self._contact.force
         self._stress, self._start = np.zeros((2, len(model.bars)))

@@ -277,7 +277,7 @@ class EquationOfMotion:
     Parameters
     ----------
     packed : Packed
-    work : memory of the thread, one of `Body.workspaces`
+    work : memory of the thread, one of `Assembly.workspaces`
     s : Scratch
     course : Course
     slows : bool, optional

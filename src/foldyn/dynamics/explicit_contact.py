@@ -16,6 +16,7 @@ from foldyn.jit.context import Context, contents, rows_at, run_at, value_at
 from foldyn.mechanics.contact.inertia import Added, added_inertia, room_for
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.tables import Tables
+from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.term import ADDRESS, NUMBER, limit_of
 
 
@@ -107,9 +108,11 @@ def slow_contacts(packed: Packed, work: Any, s: Scratch) -> Context | None:
     system, body = packed.system, packed.body
     if not system.touches or system.moves or system.presses:
         return None
-    tables: Tables = body.tables  # type: ignore[attr-defined]
-    added = room_for(tables, work.memory)
-    return Context(SlowContacts(system, packed.mass, s, tables, work.memory, added))
+    contact = body.find(ContactTerm)
+    assert contact is not None
+    tables, memory = contact.tables, body.kept(work, ContactTerm)
+    added = room_for(tables, memory)
+    return Context(SlowContacts(system, packed.mass, s, tables, memory, added))
 
 
 def contact_parts(whole: Context, limited: bool, slow: Context | None) -> ContactParts:

@@ -29,7 +29,7 @@ def failure(
     plan, tally, order = motion.plan, motion.course.tally, motion.packed.numbering.order
     hinges = motion.packed.body.hinges
     moment = f"at t = {tally.time:.6g} s (step {tally.steps})"
-    rest, rows = motion.packed.body.turned()
+    rest, rows = motion.packed.body.sheet.turned()
     turned = rows[np.isnan(rest)]
     if len(turned):
         j, k = order[hinges[turned[0], :2]].tolist()

@@ -122,7 +122,12 @@ class Alpha(Scheme):
             lost += _taken(system, self.old, self.new, self.scratch)
         if system.turns:
             done += _actuation(
-                packed.body.folds, system, self.old, self.new, self.folds, self.work.fold_angle
+                packed.body.sheet.folds,
+                system,
+                self.old,
+                self.new,
+                self.folds,
+                self.work.fold_angle,
             )
         return done, lost
 

@@ -12,13 +12,13 @@ from foldyn.cases import Case
 from foldyn.dynamics.dampers import placed
 from foldyn.errors import InputError
 from foldyn.materials.memory_law import VARIABLES
-from foldyn.mechanics.body import Body, Numbering
-from foldyn.mechanics.inelastic_body import InelasticBody, Memory
+from foldyn.mechanics.assembly import Assembly, Numbering
+from foldyn.mechanics.hinge_memory import HingeMemory
 from foldyn.structures.remembering import memory
 from foldyn.values import show
 
 
-def with_memory(case: Case, body: Body, by: Numbering) -> Body:
+def with_memory(case: Case, body: Assembly, by: Numbering) -> Assembly:
     """The body of a motion, as it stands in memory, with the branches of its laws if it has any.
 
     Raises
@@ -31,13 +31,13 @@ def with_memory(case: Case, body: Body, by: Numbering) -> Body:
         return body
     case.check_flow()
     state = memory_of_case(case)
-    hinges = {"fold": body.fold_hinges, "bend": body.bend_hinges}
+    hinges = {"fold": body.sheet.fold_hinges, "bend": body.sheet.bend_hinges}
     row = np.concatenate([hinges[part.kind]().row for part in parts])
     own = state.own._replace(dofs=placed(state.own.dofs, by), row=row)
-    return InelasticBody(body, Memory(own, state.settles))
+    return body.with_terms(HingeMemory(own, state.settles, body.sheet))
 
 
-def memory_of_case(case: Case) -> Memory:
+def memory_of_case(case: Case) -> HingeMemory:
     """State of the branches of a case, which begins at rest; dofs in the order of the structure."""
     return memory(case.remembering, case.body)
 

@@ -23,6 +23,7 @@ from foldyn.dynamics.system import Packed, follow, place, scratch
 from foldyn.dynamics.timing import histories
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.following import following_force
+from foldyn.mechanics.hinge_memory import HingeMemory
 from foldyn.results.contents import check_variable
 from foldyn.results.quantities import CONTINUATIONS
 from foldyn.values import whole
@@ -227,7 +228,7 @@ def begin(
     tally.time, tally.wanted, tally.error, tally.shortest = plan.start, first, 1e-4, np.inf
     inward = by.inward(q)
     if system.turns:
-        turn(body.folds, system.actuators, s.factor)
+        turn(body.sheet.folds, system.actuators, s.factor)
         system.actuators.offset[:, 2] = system.actuators.offset[:, 0]
         system.actuators.offset[:, 3] = np.nan  # no moment known yet
     if len(body.hidden):  # they stand where they are in balance
@@ -235,10 +236,11 @@ def begin(
         inward.ravel()[body.hidden] = body.dofs(by.inward(u)[: len(u)], push)[body.hidden]
         if continued is not None and len(continued.values) > inward.size:
             inward.ravel()[body.hidden] = continued.values[body.hidden]
-    if body.memory is not None:
+    memory = body.find(HingeMemory)
+    if memory is not None:
         there = by.inward(u)
         there.ravel()[body.hidden] = inward.ravel()[body.hidden]
-        body.memory.start(body.series()[1], there, remembered)
+        memory.start(there, remembered)
     return Course(
         u=inward,
         v=by.inward(w),

@@ -213,12 +213,12 @@ def _applied(case: Case, u: NDArray) -> NDArray:
         force += load.ravel()
     for part, _ in case.following_terms:
         force += following_force(part, u.ravel(), np.ones((1, 1)))
-    change = np.zeros_like(body.rest_angles)
+    change = np.zeros_like(body.sheet.rest_angles)
     for turn, _ in case.rest_terms:
         change += turn
     if change.any():
         linear = body.nominal(u)
-        force -= linear.folded(linear.rest_angles + change).internal(u) - linear.internal(u)
+        force -= linear.folded(linear.sheet.rest_angles + change).internal(u) - linear.internal(u)
     return force
 
 

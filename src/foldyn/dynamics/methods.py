@@ -34,6 +34,7 @@ from foldyn.dynamics.system import Packed, scratches
 from foldyn.dynamics.timing import jumps
 from foldyn.errors import InputError
 from foldyn.jit.compiled import ready
+from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.threads import run_together
 from foldyn.values import of_kind
 
@@ -93,7 +94,7 @@ class Compiled:
         restore(self._parts(), standing)
 
     def _parts(self) -> dict[str, Any]:
-        contact = [getattr(work, "memory", ()) for work in self._works]
+        contact = [self._packed.body.kept(work, ContactTerm) or () for work in self._works]
         powers = [memory.powers for memory in self._memories]
         parts = parts_of(self._packed, self._course) | {"powers": powers, "contact": contact}
         if self._packed.system.touches:  # a step's limit looks at the end of the one before
@@ -103,7 +104,7 @@ class Compiled:
 
     def facts(self) -> dict[str, Any]:
         """Statistics of its own, for the result's attributes: what contact has cost."""
-        kept = getattr(self._works[0], "memory", None)
+        kept = self._packed.body.kept(self._works[0], ContactTerm)
         if kept is None:
             return {}
         shortest = float(kept.facts.shortest)

@@ -25,7 +25,7 @@ from foldyn.algebra.eigen import Pencil, Spectrum, lowest
 from foldyn.cases import Case, ModalDamping
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import Superlinear
-from foldyn.mechanics.body import Body
+from foldyn.mechanics.assembly import Assembly
 from foldyn.statics.rigid import free_rigid_motions
 
 SOFT = 0.01  # of k: slope below which a superlinear hinge stands at its rest angle to rounding
@@ -37,17 +37,17 @@ STILL = 1e-9  # of a hinge's gradient: what constraints leave of that of one tha
 BEYOND = 6  # modes that are sought beyond those asked for: the rigid ones
 
 
-def soft_slopes(case: Case, body: Body, q: NDArray) -> tuple[sparse.csr_array | None, int]:
+def soft_slopes(case: Case, body: Assembly, q: NDArray) -> tuple[sparse.csr_array | None, int]:
     """What to add to the tangent (m, m) so that hinges at rest have no slope, and how many do so.
 
     Superlinear ones, whose slope at their rest angle is the root of rounding errors. Hinges that
     constraints keep from turning are left alone.
     """
-    hinges = body.soft_hinges(q)
+    hinges = body.sheet.soft_hinges(q)
     slope = Superlinear().slope(hinges.offset, np.zeros(len(hinges.offset)))
     at_rest = (slope < SOFT) & (hinges.stiffness > 0.0) & _turns(case, hinges.gradient)
     change = np.where(at_rest, -slope, 0.0)
-    return (body.soft_tangent(q, change) if change.any() else None), int(at_rest.sum())
+    return (body.sheet.soft_tangent(q, change) if change.any() else None), int(at_rest.sum())
 
 
 def _turns(case: Case, gradient: sparse.csr_array) -> NDArray[np.bool_]:

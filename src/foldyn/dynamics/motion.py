@@ -43,6 +43,7 @@ from foldyn.errors import (
     MotionInterrupted,
     StretchWarning,
 )
+from foldyn.mechanics.hinge_memory import HingeMemory
 from foldyn.results import trajectory_dataset
 from foldyn.results.crossings import Crossings, crossings_of
 from foldyn.structures.stretching import REMEDY, stretch
@@ -219,7 +220,7 @@ class Motion:
     @property
     def _branches(self) -> int:
         """Number of the branches of laws with memory."""
-        memory = self.packed.body.memory
+        memory = self.packed.body.find(HingeMemory)
         return 0 if memory is None else len(memory.own.state)
 
     def _start(self) -> None:

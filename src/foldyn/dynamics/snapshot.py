@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.system import Packed
+from foldyn.mechanics.hinge_memory import HingeMemory
 
 CONSTANT = ("team", "strips", "packed", "course", "_packed", "_course", "_plan", "share")
 """Fields that stay what they are, or serve one evaluation."""
@@ -17,12 +18,12 @@ CONSTANT = ("team", "strips", "packed", "course", "_packed", "_course", "_plan",
 
 def parts_of(packed: Packed, course: Course) -> dict[str, Any]:
     """What changes in a case and its state, for all methods."""
-    memory = packed.body.memory
+    memory = packed.body.find(HingeMemory)
     parts: dict[str, Any] = {"course": course}
     if memory is not None:
         parts["branches"] = memory.own
     if packed.system.turns:
-        parts["folds"] = [packed.body.folds, packed.body.series()[1]]
+        parts["folds"] = [packed.body.sheet.folds, packed.body.sheet.series()[1]]
     return parts
 
 

@@ -36,7 +36,7 @@ from foldyn.dynamics.modal_damping import ModalRows, modal_rows
 from foldyn.dynamics.ties import Ties, ties_of
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.body import Body, Numbering, renumbered
+from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.following import Following, joined
 
 
@@ -98,7 +98,7 @@ class Scratch(NamedTuple):
 class Packed(NamedTuple):
     """A case for compiled integrators; `callbacks` must live as long as the others serve."""
 
-    body: Body
+    body: Assembly
     system: System
     mass: Inertia
     callbacks: Callbacks
@@ -106,8 +106,8 @@ class Packed(NamedTuple):
 
     @property
     def model(self) -> Any:
-        """The arrays of the body."""
-        return self.body.model
+        """The arrays of the sheet."""
+        return self.body.sheet.model
 
 
 def pack(
@@ -124,7 +124,7 @@ def pack(
     for _, history in (*forces, *supports, *others):
         if history not in histories:
             histories.append(history)
-    body, by = renumbered(_driven(case, histories))
+    body, by = _driven(case, histories).renumbered()
     nodal = by.matrix(case.mass)
     ties = ties_of(case.constraints, by)
     mass = inertia(nodal, by.held(case.fixed), ties)
@@ -163,13 +163,12 @@ def pack(
     return Packed(body, system, mass, callbacks, by)
 
 
-def _driven(case: Case, histories: list[History]) -> Body:
+def _driven(case: Case, histories: list[History]) -> Assembly:
     """The body of a case, its obstacles driven by these histories."""
-    body: Any = case.body
     if not case.obstacle_terms:
-        return body
+        return case.body
     rows = {plane: histories.index(history) for plane, history in case.obstacle_terms}
-    return body.driven(rows)
+    return case.elastic_body.with_terms(case.contact_term.driven(rows))
 
 
 def _entries(terms, histories) -> Entries:

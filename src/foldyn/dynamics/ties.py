@@ -15,7 +15,7 @@ from scipy import sparse
 
 from foldyn.cases.constraints import Constraints
 from foldyn.jit.compiled import inner, kernel
-from foldyn.mechanics.body import Numbering
+from foldyn.mechanics.assembly import Numbering
 
 
 class Rows(NamedTuple):

@@ -167,7 +167,9 @@ def check_room(samples: int, nodes: int, supported: int, room: float) -> None:
 
 def histories(case: Case) -> Iterator[tuple[str, History]]:
     """Histories of a case that vary, each with what it drives."""
-    rest = len(case.body.rest_angles) - case.body.offsets  # moments of creases are loads
+    rest = (
+        len(case.body.sheet.rest_angles) - case.body.sheet.offsets
+    )  # moments of creases are loads
     driven = {
         "a load": (*case.load_terms, *case.following_terms),
         "an imposed displacement": case.imposed_terms,

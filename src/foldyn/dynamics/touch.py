@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
+from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.results import Quantity
 from foldyn.results.quantities import CONTACT
 
@@ -20,12 +19,11 @@ def contact_quantities(case: Case) -> dict[str, Quantity]:
         return {}
     planes = case.contact.planes
 
-    def placed(time: float) -> Any:
+    def placed(time: float) -> ContactTerm:
         moved = np.zeros((len(planes), 3))
         for plane, history in case.obstacle_terms:
             moved[plane] = float(history(time)) * np.array(planes[plane].motion)
-        body: Any = case.body
-        return body.displaced(moved)
+        return case.contact_term.displaced(moved)
 
     def force(u: NDArray, v: NDArray, time: float) -> NDArray:
         return placed(time).touch(u)

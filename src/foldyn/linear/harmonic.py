@@ -83,7 +83,7 @@ def harmonic(
     """
     case = system.case
     turned = [k for change, _ in case.rest_terms for k in np.flatnonzero(change).tolist()]
-    if any(isinstance(case.body.rest_law(k), Superlinear) for k in turned):
+    if any(isinstance(case.body.sheet.rest_law(k), Superlinear) for k in turned):
         raise InputError(
             " = 'harmonic': cannot tell how far actuated folds (or heated bends) of the "
             "superlinear law are from their rest angle; give another law, or take stepped_sine",
@@ -134,7 +134,7 @@ class _Hinges:
 
     def __init__(self, system: Linearized) -> None:
         body = system.case.body
-        hinges = body.soft_hinges(body.dofs(system.displacement))
+        hinges = body.sheet.soft_hinges(body.dofs(system.displacement))
         gradient = hinges.gradient
         if ties := system.case.constraints:
             gradient = gradient @ ties.extended(gradient.shape[1])

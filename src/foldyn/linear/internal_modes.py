@@ -134,7 +134,7 @@ def amplitudes(structure: Any, displacement: NDArray, size: int, count: int) -> 
     assert plates is not None
     kinds, kind = sheet.kinds(len(surface.faces))
     rule, total = condensed_panels(surface), surface.panel_mass
-    per_hidden = structure.body.fold_hinges().per_hidden
+    per_hidden = structure.body.sheet.fold_hinges().per_hidden
     first, stiffness, masses, points, between = size, [np.zeros(0)], [], [np.zeros((0, 3))], []
     for p, panel in enumerate(_outlines(structure)):
         if panel is None:

@@ -40,7 +40,7 @@ from foldyn.linear.hereditary import Branches, branches_of
 from foldyn.linear.internal_modes import Amplitudes, amplitudes, check_internal
 from foldyn.linear.operating_point import operating_point
 from foldyn.materials import Superlinear
-from foldyn.mechanics.body import Body
+from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.values import brief, number
 
@@ -242,7 +242,7 @@ def _symmetric(loads: sparse.csr_array, free: NDArray) -> sparse.csr_array:
 
 
 def _slope_change(
-    case: Case, body: Body, q: NDArray, amplitude: float | None
+    case: Case, body: Assembly, q: NDArray, amplitude: float | None
 ) -> tuple[sparse.csr_array | None, int]:
     """What to add to the tangent (m, m) for other slopes, and how many hinges are soft.
 
@@ -250,10 +250,10 @@ def _slope_change(
     """
     if amplitude is None:
         return soft_slopes(case, body, q)
-    hinges = body.soft_hinges(q)
+    hinges = body.sheet.soft_hinges(q)
     slope = Superlinear().slope(hinges.offset, np.zeros(len(hinges.offset)))
     change = equivalent_slope(hinges.offset, amplitude) - slope
-    return (body.soft_tangent(q, change) if change.any() else None), 0
+    return (body.sheet.soft_tangent(q, change) if change.any() else None), 0
 
 
 def _inertia(case: Case, whole: NDArray, inner: Amplitudes) -> NDArray:

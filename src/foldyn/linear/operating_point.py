@@ -12,7 +12,7 @@ from scipy import sparse
 from foldyn.cases import Case, State
 from foldyn.cases.loaded import SomeLoads
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.mechanics.body import Body
+from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import NO_POTENTIAL
 from foldyn.statics import OrigamiProblem, trace
 from foldyn.statics.memories import AT_REST, REFUSED
@@ -31,7 +31,7 @@ class OperatingPoint(NamedTuple):
     displacement: NDArray  # (n, 3) m
     problem: OrigamiProblem
     factor: float  # of actuated folds and of loads that depend on the displacement, there
-    body: Body  # with its folds as they are actuated
+    body: Assembly  # with its folds as they are actuated
     dofs: NDArray  # (m,) the state on all dofs of the body
     balance: Balance
     kind: str  # "rest", "equilibrium" or "state"
@@ -114,7 +114,7 @@ def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> Opera
     return OperatingPoint(displacement, problem, factor, body, u, reached, kind)
 
 
-def _load_vectors(case: Case, body: Body) -> NDArray:
+def _load_vectors(case: Case, body: Assembly) -> NDArray:
     """Forces (m, loads), N, of each load in full."""
     alone = [SomeLoads(case, [i]) for i in range(len(case.loads))]
     vectors = [vector.ravel() for one in alone for vector, _ in one.load_terms]

@@ -8,10 +8,10 @@ from foldyn.jit.context import Context, contents, numbers_at, rows_at
 from foldyn.mechanics.energy import strain_energies
 from foldyn.mechanics.force import Workspace, internal_force
 from foldyn.mechanics.model import BarsHinges
-from foldyn.mechanics.term import ENERGIES, FORCES, Term, energies, forces
+from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, energies, forces
 
 
-class _BarsHingesTerm(NamedTuple):
+class _Context(NamedTuple):
     model: BarsHinges
     work: Workspace
     groups: int
@@ -31,7 +31,7 @@ def _energies(context, u, out):
     strain_energies(own.model, moved, numbers_at(out, own.groups))
 
 
-def bars_hinges_term(model: BarsHinges, work: Workspace, groups: int) -> Term:
+def bars_hinges_kernels(model: BarsHinges, work: Workspace, groups: int) -> Compiled:
     """Bars and hinges, whose energies have so many groups."""
-    own = Context(_BarsHingesTerm(model, work, groups))
-    return Term(own, {FORCES: _forces, ENERGIES: _energies})
+    own = Context(_Context(model, work, groups))
+    return Compiled(own, {FORCES: _forces, ENERGIES: _energies})

@@ -34,10 +34,14 @@ def blocks_of_ends(ends: NDArray, resistance: NDArray) -> NDArray:
     return np.concatenate([resistance[grounded], between])
 
 
+def places_of(pairs: NDArray) -> tuple[NDArray, NDArray]:
+    """Rows and columns (9 k,) of the entries of blocks (k, 3, 3) at pairs (k, 2) of nodes."""
+    shape, axis = (len(pairs), 3, 3), np.arange(3)
+    row = np.broadcast_to(3 * pairs[:, 0, None, None] + axis[:, None], shape)
+    column = np.broadcast_to(3 * pairs[:, 1, None, None] + axis, shape)
+    return row.ravel(), column.ravel()
+
+
 def assembled(pairs: NDArray, blocks: NDArray, size: int) -> sparse.csr_array:
     """Matrix (size, size) of blocks (k, 3, 3) at pairs (k, 2) of nodes, those of a pair added."""
-    axis = np.arange(3)
-    row = np.broadcast_to(3 * pairs[:, 0, None, None] + axis[:, None], blocks.shape)
-    column = np.broadcast_to(3 * pairs[:, 1, None, None] + axis, blocks.shape)
-    entries = (blocks.ravel(), (row.ravel(), column.ravel()))
-    return sparse.csr_array(sparse.coo_array(entries, shape=(size, size)))
+    return sparse.csr_array(sparse.coo_array((blocks.ravel(), places_of(pairs)), (size, size)))

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, kernel, scalar
 from foldyn.jit.context import Context, contents, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.branch_switch import update
@@ -24,7 +24,7 @@ from foldyn.mechanics.term import (
     DISSIPATED,
     ENERGIES,
     FORCES,
-    Term,
+    Compiled,
     advance_clock,
     branch_states,
     commit,
@@ -39,7 +39,7 @@ class MemoryHinges(NamedTuple):
     """Arrays of h hinges with b branches in all; dofs are 3 row + column of arrays (rows, 3).
 
     Those from `angle` on change in place. The angles in them are turns from the rest angle, with
-    the offset that the laws of the body see (`Body.series`).
+    the offset that the laws of the body see (`SheetTerm.series`).
     """
 
     dofs: NDArray  # (h, 14), see `viscous.hinge_gradient`
@@ -86,7 +86,7 @@ def evaluate_branches(own, offset, e, turn):
     return own.stiffness[e] * lost
 
 
-@kernel
+@inner
 def add_memory_forces(own, offset, u, force):
     """Add the forces of the branches at u to `force`, both (rows, 3)."""
     moved, out, g, lost = flat(u), flat(force), own.gradient, 0.0
@@ -147,7 +147,7 @@ def memory_gradients(own, u, out):
         hinge_gradient(own.corners[e], own.dofs[e], own.hidden_turn[e], moved, out[e])
 
 
-class _MemoryTerm(NamedTuple):
+class _Context(NamedTuple):
     own: MemoryHinges
     offset: NDArray
     rows: int
@@ -192,10 +192,10 @@ def _branch_states(context, out):
         to[k] = reached[k]
 
 
-def memory_term(own: MemoryHinges, offset: NDArray, rows: int, groups: int) -> Term:
+def memory_kernels(own: MemoryHinges, offset: NDArray, rows: int, groups: int) -> Compiled:
     """What the branches of hinges with memory add, with so many groups of energies."""
-    context = Context(_MemoryTerm(own, offset, rows, groups))
-    return Term(
+    context = Context(_Context(own, offset, rows, groups))
+    return Compiled(
         context,
         {
             FORCES: _forces, ENERGIES: _energies, ADVANCE_CLOCK: _advance_clock, COMMIT: _commit,

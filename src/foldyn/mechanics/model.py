@@ -41,7 +41,7 @@ class BarsHinges(NamedTuple):
     hinge_rest: NDArray  # (nh,) rad
     hinge_parameters: NDArray  # (nh, 4)
     hinge_share: NDArray  # (nh,) of its crease in small turns; the rest is its panels'
-    hinge_offset: NDArray  # (nh, 4) beside the dihedral, see `Body.series`
+    hinge_offset: NDArray  # (nh, 4) beside the dihedral, see `SheetTerm.series`
     hinge_group: NDArray  # (nh,) int64: energies are summed per group
     hinge_runs: NDArray  # (rh, 4) int64
     addresses: NDArray  # (na, 3) int64: compiled user laws (energy, response, slope)

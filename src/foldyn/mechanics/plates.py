@@ -24,7 +24,7 @@ from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.energy import strain_energies
 from foldyn.mechanics.force import Workspace, internal_force, workspace
 from foldyn.mechanics.model import BarsHinges
-from foldyn.mechanics.term import ENERGIES, FORCES, Term, Whole, energies, forces
+from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Whole, energies, forces
 from foldyn.mechanics.threads import Team, team
 
 
@@ -193,7 +193,7 @@ def turn_moments(model, x, couple, work):
                 couple[-1 - h] += model.per_reach * moment
 
 
-class _PlatesTerm(NamedTuple):
+class _Context(NamedTuple):
     model: BarsPlates
     work: PlatesWork
     rows: int
@@ -219,7 +219,7 @@ def _energies(context, u, out):
     plates_energy(model, moved[:n], x, own.work, numbers_at(out, 3))
 
 
-def plates_term(model: BarsPlates, work: PlatesWork, rows: int) -> Term:
+def plates_kernels(model: BarsPlates, work: PlatesWork, rows: int) -> Compiled:
     """Bars, folds and plates, whose dofs fill so many rows."""
-    own = Context(_PlatesTerm(model, work, rows))
-    return Term(own, {FORCES: _forces, ENERGIES: _energies})
+    own = Context(_Context(model, work, rows))
+    return Compiled(own, {FORCES: _forces, ENERGIES: _energies})

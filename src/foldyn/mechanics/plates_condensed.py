@@ -30,7 +30,7 @@ from foldyn.mechanics.plates import (
     turn_hinges,
     turn_moments,
 )
-from foldyn.mechanics.term import ENERGIES, FORCES, Term, Whole, energies, forces
+from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Whole, energies, forces
 from foldyn.mechanics.threads import Team
 
 STEPS = 50  # of Newton's method, at most
@@ -210,7 +210,7 @@ def condensed_energy(model, u, work, out):
     plates_energy(model.plates, u, work.x, work.plates, out)
 
 
-class _CondensedTerm(NamedTuple):
+class _Context(NamedTuple):
     model: CondensedPlates
     work: CondensedWork
 
@@ -229,7 +229,7 @@ def _energies(context, u, out):
     condensed_energy(own.model, moved, own.work, numbers_at(out, 3))
 
 
-def condensed_term(model: CondensedPlates, work: CondensedWork) -> Term:
+def condensed_kernels(model: CondensedPlates, work: CondensedWork) -> Compiled:
     """Bars, folds and plates with their rotations in balance."""
-    own = Context(_CondensedTerm(model, work))
-    return Term(own, {FORCES: _forces, ENERGIES: _energies})
+    own = Context(_Context(model, work))
+    return Compiled(own, {FORCES: _forces, ENERGIES: _energies})

@@ -26,9 +26,9 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from foldyn.jit.compiled import kernel
 from foldyn.materials.switch import bar_slope, bar_stress
-from foldyn.mechanics.body import Body
 from foldyn.mechanics.energy import bar_extension
 from foldyn.mechanics.model import BarsHinges, node_order, ranks
+from foldyn.mechanics.sheet_term import SheetTerm
 from foldyn.mechanics.tangent import Sparsity, add_tangent, add_to_bar, block_keys, sparsity
 
 FLOOR = 1e-3  # of a hinge's stiffness: its least slope in steps, as in MERLIN2
@@ -98,7 +98,7 @@ def _replace_stress(model, u, stress, slots, data):
 
 
 class BarsHingesBlocks:
-    """Blocks of bars and hinges; see `mechanics.body.Blocks`."""
+    """Blocks of bars and hinges; see `mechanics.sheet_term.Blocks`."""
 
     def __init__(self, model: BarsHinges) -> None:
         self.pattern = sparsity(model)
@@ -108,10 +108,16 @@ class BarsHingesBlocks:
         self.unused = np.zeros(0, np.int64)
 
     def put(
-        self, body: Body, pattern: Sparsity, u: NDArray, before: NDArray, again: bool, out: NDArray
+        self,
+        of: SheetTerm,
+        pattern: Sparsity,
+        u: NDArray,
+        before: NDArray,
+        again: bool,
+        out: NDArray,
     ) -> None:
         """See `Blocks`."""
-        put_tangent(body.model, pattern, u, before, again, out)
+        put_tangent(of.model, pattern, u, before, again, out)
 
     def filled(self, pattern: Sparsity) -> NDArray:
         """See `Blocks`."""
@@ -124,7 +130,7 @@ class SparseBlocks:
     Parameters
     ----------
     tangent : csr_array, shape (m, m)
-        Where its entries are: those of `Body.step_tangent`, in their order.
+        Where its entries are: those of `SheetTerm.step_tangent`, in their order.
     rows : int
     position : ndarray, shape (3 rows, 3)
         Where the dofs are, m.
@@ -149,11 +155,17 @@ class SparseBlocks:
         self.order = narrowest(order, position, self._row, self._column)
 
     def put(
-        self, body: Body, pattern: Sparsity, u: NDArray, before: NDArray, again: bool, out: NDArray
+        self,
+        of: SheetTerm,
+        pattern: Sparsity,
+        u: NDArray,
+        before: NDArray,
+        again: bool,
+        out: NDArray,
     ) -> None:
         """See `Blocks`."""
         out[:] = 0.0
-        matrix = body.step_tangent(u, before if again else None)
+        matrix = of.step_tangent(u, before if again else None)
         out.reshape(-1)[self._places(pattern)] = matrix.data
 
     def filled(self, pattern: Sparsity) -> NDArray:

@@ -1,17 +1,18 @@
 """Terms of a model: what adds to its energy and forces, called by address.
 
-A model is a flat list of terms. Each is a context, a named tuple of all that the term works with
-(`jit.context`), and kernels of fixed signatures, each compiled once for a kind of term. They reach
-the loops of integrators as data, by their addresses, so that a loop is compiled once, not once for
-every combination of terms. A kernel that a term lacks has the address 0.
+A model is a flat list of terms (`mechanics.assembly`). Each is a `Term`, which tells solvers its
+tangent and what else they ask, and compiles itself: a context, a named tuple of all that it works
+with (`jit.context`), and kernels of fixed signatures, each compiled once for a kind of term. They
+reach loops as data, by their addresses, so that a loop is compiled once, not once for every
+combination of terms. A kernel that a term lacks has the address 0.
 
 Arrays reach a kernel by their addresses, as `rows_at` and `numbers_at` find them: u, v and force
-are (rows, 3), as in `mechanics.body`. The signatures, after the address of the context:
+are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of the context:
 
     forces(u, v, t, force, powers)   adds its forces at u, v and the time t to `force`, N, and to
                                      `powers` the power that it puts in and the one that it
-                                     dissipates, W; that of the body comes first, and writes
-    energies(u, out)                 adds its energies to their groups; the body's are written, too
+                                     dissipates, W; that of the sheet comes first, and writes
+    energies(u, out)                 adds its energies to their groups; the sheet's are written
     limit(u, v, a, h, beta, energy, lightness) -> h
                                      the longest step (s), at most h, in which nothing is overrun:
                                      before each step, after the forces where the last one ended;
@@ -27,16 +28,21 @@ are (rows, 3), as in `mechanics.body`. The signatures, after the address of the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
+from scipy import sparse
 
-from foldyn.jit.compiled import Addressed, addressed, inner_scalar
+from foldyn.jit.compiled import Addressed, addressed, inner_scalar, kernel
 from foldyn.jit.context import Context, run_at, value_at
 from foldyn.mechanics.threads import Team
+
+if TYPE_CHECKING:
+    from foldyn.mechanics.sheet_term import Strains, Unstrained
 
 (
     FORCES, ENERGIES, LIMIT, PLACE_OBSTACLES, ADVANCE_CLOCK, COMMIT, DISSIPATED, BRANCH_STATES
@@ -52,11 +58,130 @@ commit = dissipated = addressed()
 branch_states = addressed(ADDRESS)
 
 
-class Term(NamedTuple):
-    """A term: its context, and its kernels by what they do."""
+class Compiled(NamedTuple):
+    """A term as loops see it: its context, and its kernels by what they do."""
 
     context: Context
     kernels: Mapping[int, Addressed]
+
+
+class Term(ABC):
+    """What adds to the energy and the forces of a sheet: springs, contact, hinges with memory.
+
+    A term never changes but for memory that is said to; what makes another one of it leaves it as
+    it was. `compiled` and, unless it has no stiffness, `places` and `entries` are all that it must
+    have: the defaults are those of a term on the nodes without anything else. Dofs q are (m,), as
+    in `mechanics.assembly`, or arrays (rows, 3).
+
+    Attributes
+    ----------
+    energy_groups : tuple of str
+        Names of the energies that are its own; none where it adds to those of others.
+    of_hinges : bool
+        Whether its forces are moments of hinges, which are at play even where all is at rest.
+    shared : bool
+        Whether threads may share a model with it.
+    has_discrete_gradient : bool
+        Whether `dynamics.energy_momentum` takes it.
+    """
+
+    energy_groups: tuple[str, ...] = ()
+    of_hinges: ClassVar[bool] = False
+    shared: ClassVar[bool] = False
+    has_discrete_gradient: ClassVar[bool] = False
+
+    # ------------------------------------------------------------------ what is compiled
+    @abstractmethod
+    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+        """The term for a thread.
+
+        work : `assembly.Work` of the thread.
+        kept : memory of its own, from `memories` or `memory`.
+        group : of the energies, the first that is its own.
+        """
+
+    def memories(self, works: Sequence[Any]) -> Sequence[Any]:
+        """Memory of its kernels, for each of the threads that share a motion."""
+        return [None] * len(works)
+
+    @property
+    def memory(self) -> Any:
+        """The same for evaluations one after the other, from Python."""
+        return None
+
+    def prepare(self) -> None:  # noqa: B027
+        """Put into that memory what the term has of its own, before an evaluation."""
+
+    def stored(self) -> float:
+        """Energy (J) in its own group that its kernels leave out, after an evaluation."""
+        return 0.0
+
+    # ------------------------------------------------------------------ stiffness
+    @property
+    def places(self) -> tuple[NDArray, NDArray]:
+        """Rows and columns (k,) of the dofs that its tangent couples in any state."""
+        none = np.zeros(0, np.int64)
+        return none, none
+
+    def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
+        """Derivative of its forces there (k,), N/m; those of the same place are added.
+
+        floor : least slope per unit stiffness of a hinge.
+        """
+        return np.zeros(0)
+
+    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
+        """The same as a matrix (m, m)."""
+        entries = (self.entries(q, floor), self.places)
+        return sparse.csr_array(sparse.coo_array(entries, shape=(q.size, q.size)))
+
+    def unstrained(self, q: NDArray) -> Unstrained | None:
+        """The term as if it had no strain at q; None where it holds nothing."""
+        return None
+
+    # ------------------------------------------------------------------ measures
+    @property
+    def hinges(self) -> NDArray:
+        """Rows (nh, 4) of its hinges; -1 for a wing that is no node."""
+        return np.zeros((0, 4), np.int64)
+
+    def angles(self, q: NDArray) -> NDArray:
+        """Their dihedrals (nh,), rad."""
+        return np.zeros(0)
+
+    def add_scale(self, scale: NDArray) -> None:  # noqa: B027
+        """Add its forces, N, at the dofs (m,) under a strain of one, whose rounding errors stay."""
+
+    def holds(self, q: NDArray) -> sparse.csr_array:
+        """Unit rows (s, m) of what keeps it in place beside supports: motions along them strain."""
+        return sparse.csr_array((0, q.size))
+
+    def turning_moments(self) -> float:
+        """Sum of its hinges' moments (N m) for a turn of one."""
+        return 0.0
+
+    def strains(self, others: Strains) -> Strains:
+        """Bars and hinges of the terms before it, with its own."""
+        return others
+
+    # ------------------------------------------------------------------ other terms
+    def placed(self, order: NDArray, before: Any) -> Self:
+        """The same with the nodes in this order (n,) in memory, after the terms of an assembly."""
+        return self
+
+    def on(self, sheet: Any) -> Self:
+        """The same on a sheet with other rest angles."""
+        return self
+
+    def nominal(self, q: NDArray) -> Self | None:
+        """The same as stiff as it is meant to be, about its state at q; None where it is not."""
+        return self
+
+
+def nodal(q: NDArray) -> NDArray:
+    """Displacements of the nodes, and whole rows of hidden dofs, of dofs (m,) or (rows, 3)."""
+    flat = np.ascontiguousarray(q, float).reshape(-1)
+    return flat[: flat.size // 3 * 3].reshape(-1, 3)
 
 
 class Whole(NamedTuple):
@@ -96,8 +221,9 @@ class Model:
 
     Parameters
     ----------
-    body : Body
-    work : memory of the thread, one of `Body.workspaces`
+    body : Assembly
+    work : Work
+        Of the thread, one of `Assembly.workspaces`.
     limited : bool
         Whether terms limit the steps; else what does so is not compiled.
 
@@ -108,14 +234,14 @@ class Model:
     """
 
     def __init__(self, body: Any, work: Any, limited: bool) -> None:
-        self._held = terms = body.terms(work)
+        self._held = terms = body.compiled(work)
         kernel = np.zeros((len(terms), 8), np.int64)
         for row, term in zip(kernel, terms, strict=True):
             for place, function in term.kernels.items():
                 if limited or place != LIMIT:
                     row[place] = function.at(term.context)
         context = np.array([term.context.address for term in terms], np.int64)
-        self.terms = Terms(context, kernel, body.folds, np.zeros(2))
+        self.terms = Terms(context, kernel, body.sheet.folds, np.zeros(2))
         own = Whole(np.asarray(work.strips.own))
         self.share = Share(work.angle, work.fold_angle, own, work.team)
 
@@ -190,3 +316,11 @@ def states_of(terms, out):
     for k in range(terms.context.size):
         if terms.kernel[k, BRANCH_STATES] != 0:
             run_at(terms.kernel[k, BRANCH_STATES], (terms.context[k], out))
+
+
+@kernel
+def evaluate(terms, u, v, force, energy):
+    """Internal forces (rows, 3), N, and strain energies (J), if there is room: for Python."""
+    forces_of(terms, u, v, 0.0, force)
+    if energy.size > 0:
+        energies_of(terms, u, energy)

@@ -19,8 +19,8 @@ from scipy import sparse
 
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.body import NO_DOF
 from foldyn.mechanics.dihedral import dihedral_gradient
+from foldyn.mechanics.sheet_term import NO_DOF
 
 WIDTH = 14  # dofs of an element at most: four nodes, and two beside displacements
 

@@ -9,7 +9,7 @@ from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D
 
 from foldyn.cases.supports import Spring
-from foldyn.mechanics.attached import GROUND
+from foldyn.mechanics.springs import GROUND
 from foldyn.patterns.topology import around, edge_of
 from foldyn.plots import scene, style
 from foldyn.plots.scene import Points, Sheet3D, View

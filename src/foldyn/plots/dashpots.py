@@ -6,7 +6,7 @@ import numpy as np
 
 from foldyn.cases import Case, Dashpot
 from foldyn.cases.directions import unit_vector
-from foldyn.mechanics.attached import GROUND
+from foldyn.mechanics.springs import GROUND
 from foldyn.plots.scene import Points, View
 
 CUP = (-0.5, 0.5)  # beginning and end of the cup along the line, in lengths of it

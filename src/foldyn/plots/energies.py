@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics import audit
 from foldyn.errors import InputError
-from foldyn.mechanics.attached_body import GROUP
-from foldyn.mechanics.contact.body import GROUP as CONTACT
+from foldyn.mechanics.contact.term import GROUP as CONTACT
+from foldyn.mechanics.springs import GROUP
 from foldyn.plots import style
 from foldyn.plots.along import along, asked, check_path, way
 from foldyn.plots.given import alone

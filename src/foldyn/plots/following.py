@@ -72,7 +72,7 @@ def crease_arcs(case: Case, points: Points, share: Share, radius: float) -> Poin
     They lie on the front. Those of a positive moment point towards the panels, which it opens;
     those of a negative one away from them.
     """
-    pieces, arcs = case.structure.body.fold_hinges(), []
+    pieces, arcs = case.structure.body.sheet.fold_hinges(), []
     for crease, moment in zip(share.numbers, share.value, strict=True):
         own = pieces.nodes[pieces.fold == crease]
         ends = points[own[:, :2]].reshape(-1, 3)

@@ -12,12 +12,12 @@ from foldyn.cases import Case
 from foldyn.cases.directions import signed
 from foldyn.errors import InputError
 from foldyn.linear.frf import PER_FORCE, quantity_of
-from foldyn.mechanics.attached_body import GROUP
-from foldyn.mechanics.contact.body import GROUP as CONTACT
+from foldyn.mechanics.contact.term import GROUP as CONTACT
+from foldyn.mechanics.springs import GROUP
 from foldyn.plots.along import AXES, check_path, evenly, farthest
 from foldyn.results.quantities import RESPONSES
-from foldyn.shells.body import GROUPS as OF_SHELLS
-from foldyn.structures.body import GROUPS as OF_BARS_AND_HINGES
+from foldyn.shells.term import GROUPS as OF_SHELLS
+from foldyn.structures.bars_hinges import GROUPS as OF_BARS_AND_HINGES
 
 STRAIN: Mapping[str, str] = {
     "strain_bars": "bars",

@@ -17,7 +17,7 @@ from foldyn.jit.context import Context, contents, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
-from foldyn.mechanics.term import ENERGIES, FORCES, Term, Whole, energies, forces
+from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Whole, energies, forces
 from foldyn.mechanics.threads import Team, team
 
 
@@ -229,7 +229,7 @@ def carry(model, force, work):
                 force[model.hinges[h, end], c] += carried
 
 
-class _ShellTerm(NamedTuple):
+class _Context(NamedTuple):
     model: ShellModel
     work: ShellWork
     rows: int
@@ -255,7 +255,7 @@ def _energies(context, u, out):
     shell_energy(model, moved[:n], x, own.work, numbers_at(out, 3))
 
 
-def shell_term(model: ShellModel, work: ShellWork) -> Term:
+def shell_kernels(model: ShellModel, work: ShellWork) -> Compiled:
     """A shell."""
-    own = Context(_ShellTerm(model, work, model.rows))
-    return Term(own, {FORCES: _forces, ENERGIES: _energies})
+    own = Context(_Context(model, work, model.rows))
+    return Compiled(own, {FORCES: _forces, ENERGIES: _energies})

@@ -15,15 +15,16 @@ from foldyn import mechanics
 from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, hinge_law
+from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import joined, moments, pushes, tensions
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned
 from foldyn.patterns.topology import Edge
-from foldyn.shells.body import GROUPS, ShellBody
 from foldyn.shells.kernels import ShellModel
 from foldyn.shells.mesh import shell_mesh
 from foldyn.shells.sides import Sides, sides, stiffness, without_free_sides
+from foldyn.shells.term import GROUPS, ShellTerm
 from foldyn.structures import Sheet
 from foldyn.structures.calibration import check_sheet
 from foldyn.structures.clamps import boundary_edges
@@ -140,9 +141,9 @@ class Shell(Discretized):
         return np.full(len(self.pattern.faces), -1)
 
     @cached_property
-    def body(self) -> ShellBody:
+    def body(self) -> Assembly:
         """What solvers take."""
-        return ShellBody(self.model, self.sides.piece_crease, self.fold_law)
+        return Assembly(ShellTerm(self.model, self.sides.piece_crease, self.fold_law))
 
     @property
     def rotations(self) -> int:
@@ -209,7 +210,7 @@ class Shell(Discretized):
     @cached_property
     def fold_rest(self) -> NDArray:
         """Rest dihedrals of the folds (nf,), rad: the mean along each crease."""
-        return read_only(self.body.rest_angles)
+        return read_only(self.body.sheet.rest_angles)
 
     @cached_property
     def _reach(self) -> float:

@@ -6,7 +6,7 @@ iterations, steps that are cut and points that are located between others leave 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.materials.memory_law import VARIABLES
-from foldyn.mechanics.inelastic_body import InelasticBody
 from foldyn.structures.remembering import Remembering
 from foldyn.structures.remembering import memory as memory_of
 
@@ -40,21 +39,20 @@ class Memories:
 
     Attributes
     ----------
-    body : Body
+    body : Assembly
         With memory of its own, where there is any.
     """
 
     def __init__(self, case: Case, flow: str) -> None:
         self._case, flows = case, _flows(case, flow)
-        body: Any = case.body
+        body = case.body
         self._creases = self._friction = None
-        if flows and flow == FOLLOWED:
-            inner = case.elastic_body
-            self._creases = memory_of(flows, inner)
-            yielding = InelasticBody(inner, self._creases)
-            body = yielding if case.contact is None else body.around(yielding)
         if _rubs(case, flow):
-            body, self._friction = body.rubbing()
+            contact, self._friction = case.contact_term.rubbing()
+            body = case.elastic_body.with_terms(contact)
+        if flows and flow == FOLLOWED:
+            self._creases = memory_of(flows, body)
+            body = body.with_terms(self._creases)
         self.body = body
 
     def __bool__(self) -> bool:
@@ -69,7 +67,7 @@ class Memories:
     def start(self, q: NDArray, state: NDArray | str | None) -> None:
         """Begin at the body's dofs q (m,), with creases in a state (b, 2); see `cases.State`."""
         if self._creases is not None:
-            self._creases.start(self.body.series()[1], q, state)
+            self._creases.start(q, state)
 
     def tie(self) -> None:
         """Begin with springs of friction at rest where the body was evaluated last."""

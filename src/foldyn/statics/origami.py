@@ -14,7 +14,8 @@ from scipy import sparse
 from foldyn.cases import Actuate, Case
 from foldyn.cases.loaded import SomeLoads
 from foldyn.errors import InputError
-from foldyn.mechanics.body import Body
+from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import following_force, following_tangent, joined
 from foldyn.statics.memories import REFUSED, Memories
 from foldyn.statics.plates import Plates
@@ -32,24 +33,24 @@ class Actuation:
     A rest angle that leaves 0..2 pi becomes nan, which no solver accepts.
     """
 
-    def __init__(self, body: Body, change: NDArray, constant: NDArray) -> None:
+    def __init__(self, body: Assembly, change: NDArray, constant: NDArray) -> None:
         self._body, self._change, self._constant = body, change, constant
         self.acts = bool(change.any() or constant.any())
         self.body = lru_cache(maxsize=4)(self._folded)
 
     def rest(self, factor: float) -> NDArray:
         """Rest angles (nr,), rad."""
-        angle = self._body.rest_angles + self._constant + factor * self._change
+        angle = self._body.sheet.rest_angles + self._constant + factor * self._change
         possible = (angle >= 0.0) & (angle <= 2.0 * math.pi)
-        possible[len(angle) - self._body.offsets :] = True
+        possible[len(angle) - self._body.sheet.offsets :] = True
         return np.where(possible, angle, np.nan)
 
-    def _folded(self, factor: float) -> Body:
+    def _folded(self, factor: float) -> Assembly:
         return self._body.folded(self.rest(factor)) if self.acts else self._body
 
 
 class OrigamiProblem:
-    """Equilibrium of a case along the load factor; dofs as in `mechanics.body`.
+    """Equilibrium of a case along the load factor; dofs as in `mechanics.assembly`.
 
     Where constraints tie displacements together, states and forces are those of `Constraints`, x
     and E' f: in place of each slave stands the value of its equation, which is held. `dofs` and
@@ -101,7 +102,7 @@ class OrigamiProblem:
         self.structure, self._adaptive = structure, adaptive_load
         body = self.memories.body
         self.groups, self._hidden = body.energy_groups, len(body.hidden)
-        self._work, self._ties = body.workspaces(1)[0], case.constraints
+        self._ties = case.constraints
         self._shape = structure.nodes.shape
         loads, chosen = range(len(case.loads)), set(constant)
         steady = SomeLoads(case, [i for i in loads if i in chosen])
@@ -122,7 +123,7 @@ class OrigamiProblem:
         motion = np.where(moves, self._ties.coordinates(moved), 0.0)
         self.motion = self._plates.joined(motion, self._plates.length)
         self._moves = np.append(moves, self._plates.held)
-        angles = body.rest_angles.shape
+        angles = body.sheet.rest_angles.shape
         self.actuation = Actuation(
             body, _total(growing.rest_terms, angles), _total(steady.rest_terms, angles)
         )
@@ -166,9 +167,15 @@ class OrigamiProblem:
         """Displacements (p, 3) of the planes of contact in a state (m,), m."""
         return self._plates.moved(u)
 
-    def body(self, u: NDArray, factor: float) -> Any:
+    def body(self, u: NDArray, factor: float) -> Assembly:
         """The body, its folds actuated and its planes where they are in a state (m,)."""
         return self._plates.placed(self.actuation.body(factor), u)
+
+    def _contact(self, u: NDArray) -> ContactTerm:
+        """Its contact, planes where they are in a state (m,)."""
+        found = self.body(u, 0.0).find(ContactTerm)
+        assert found is not None
+        return found
 
     def prescribed(self, factor: float) -> NDArray:
         """Displacements of held dofs: imposed ones times the factor, others where they stood."""
@@ -199,14 +206,14 @@ class OrigamiProblem:
     def unbalanced(self, u: NDArray, factor: float) -> NDArray:
         """Internal minus external force (m,) on the body's dofs, N."""
         q = self.dofs(u)
-        return self.body(u, factor).internal(q, self._work) - self._external(q, factor)
+        return self.body(u, factor).internal(q) - self._external(q, factor)
 
     def residual(self, u: NDArray, factor: float) -> NDArray:
         """Internal minus external force (m,), N."""
         force = self._ties.force(self.unbalanced(u, factor))
         if not self._plates:
             return force
-        return np.append(force, self._plates.force(self.body(u, factor), self.dofs(u)))
+        return np.append(force, self._plates.force(self._contact(u), self.dofs(u)))
 
     def reactions(self, u: NDArray, factor: float) -> NDArray:
         """What supports exert, N, on `case.reaction_dofs`."""
@@ -214,13 +221,16 @@ class OrigamiProblem:
         return self._ties.reactions @ force[: math.prod(self._shape)]
 
     def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> sparse.csr_array:
-        """Tangent stiffness (m, m), N/m, for steps; see `Body.step_tangent`."""
+        """Tangent stiffness (m, m), N/m, for steps; see `Assembly.step_tangent`."""
         q, old = self.dofs(u), None if before is None else self.dofs(before)
         body = self.body(u, factor)
         matrix = body.step_tangent(q, old)
         if self.following.acts:
             matrix = sparse.csr_array(matrix + self.load_stiffness(q, factor))
-        return self._plates.bordered(self._ties.matrix(matrix), body, q, self._ties.force)
+        matrix = self._ties.matrix(matrix)
+        if not self._plates:
+            return matrix
+        return self._plates.bordered(matrix, self._contact(u), q, self._ties.force)
 
     def following_force(self, q: NDArray, factor: float) -> NDArray:
         """Forces (m,), N, of loads that depend on the displacement, on the body's dofs q (m,)."""
@@ -243,9 +253,9 @@ class OrigamiProblem:
     def reference(self, u: NDArray, factor: float) -> float:
         """Largest of the norms of the external forces and of the hinges' forces alone, N."""
         q, body = self.dofs(u), self.body(u, factor)
-        forces = [body.hinge_forces(q, self._work), self._external(q, factor)]
+        forces = [body.hinge_forces(q), self._external(q, factor)]
         if self.case.contact is not None:
-            forces.append(body.contact(q)[1])
+            forces.append(self._contact(u).contact(q)[1])
         return max(float(np.linalg.norm(force)) for force in forces)
 
     def begin(self, factor: float) -> None:
@@ -282,20 +292,20 @@ class OrigamiProblem:
         """Forces of contact in a state (m,), as `results.quantities.CONTACT` names them, N."""
         if self.case.contact is None:
             return {}
-        q, body = self.dofs(u), self.body(u, 0.0)
-        out = {"contact_force": body.touch(q)}
+        q, contact = self.dofs(u), self._contact(u)
+        out = {"contact_force": contact.touch(q)}
         if self.case.contact.planes:
-            out["plane_force"] = body.plane_forces(q)
+            out["plane_force"] = contact.plane_forces(q)
             if self.memories.rubs:
-                out["plane_friction"] = body.plane_friction(q)
+                out["plane_friction"] = contact.plane_friction(q)
         return out
 
     def clear(self, u: NDArray, step: NDArray) -> float:
         """Share of a step (m,) from a state in which nothing crosses."""
         if self.case.contact is None:
             return 1.0
-        q, body = self.dofs(u), self.body(u, 0.0)
-        return body.clear(q, self.dofs(u + step) - q, self._plates.moved(step))
+        q, contact = self.dofs(u), self._contact(u)
+        return contact.clear(q, self.dofs(u + step) - q, self._plates.moved(step))
 
     def energies(self, u: NDArray, factor: float) -> NDArray:
         """Strain energies (J) by `groups`."""

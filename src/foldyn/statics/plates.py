@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case
+from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.contact.term import ContactTerm
 
 
 class Plates:
@@ -57,24 +59,31 @@ class Plates:
         """Displacements (p, 3) of the planes, m, of the values of all dofs."""
         return float(values[-1]) * self._motion if self else np.zeros_like(self._motion)
 
-    def placed(self, body: Any, values: NDArray) -> Any:
+    def placed(self, body: Assembly, values: NDArray) -> Assembly:
         """A body with its planes where they are in a state."""
-        return body.displaced(self.moved(values)) if self else body
+        if not self:
+            return body
+        moved = self.moved(values)
+        return Assembly(
+            body.sheet,
+            *(t.displaced(moved) if isinstance(t, ContactTerm) else t for t in body.others),
+        )
 
-    def force(self, body: Any, q: NDArray) -> float:
+    def force(self, contact: ContactTerm, q: NDArray) -> float:
         """What moves the planes along their motion, N; q (m,) of the body."""
-        return float(((body.plane_forces(q) + body.plane_friction(q)) * self._motion).sum())
+        pushed = contact.plane_forces(q) + contact.plane_friction(q)
+        return float((pushed * self._motion).sum())
 
-    def bordered(self, matrix: sparse.csr_array, body: Any, q: NDArray, project: Any) -> Any:
+    def bordered(
+        self, matrix: sparse.csr_array, contact: ContactTerm, q: NDArray, project: Any
+    ) -> sparse.csr_array:
         """A tangent of the other dofs with the row and column of this one, N/m.
 
         project : makes of forces on the body's dofs those on states.
         """
-        if not self:
-            return matrix
-        blocks = body.plane_tangents(q)
+        blocks = contact.plane_tangents(q)
         nodal = blocks.shape[1] * 3
-        column, row = np.zeros((2, body.size))
+        column, row = np.zeros((2, q.size))
         column[:nodal] = -np.einsum("pnab,pb->na", blocks, self._motion).ravel()
         row[:nodal] = -np.einsum("pnab,pa->nb", blocks, self._motion).ravel()
         own = np.einsum("pnab,pa,pb->", blocks, self._motion, self._motion)

@@ -42,7 +42,7 @@ def free_rigid_motions(
 ) -> NDArray:
     """Rigid motions (3n, r) of points x (n, 3) that supports and constraints allow.
 
-    holds : what else keeps them in place, see `Body.holds`.
+    holds : what else keeps them in place, see `Assembly.holds`.
     """
     motions = rigid_motions(x)
     return motions @ _free_space(motions, ties, holds)

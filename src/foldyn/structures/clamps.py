@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.mechanics.attached import Clamps
+from foldyn.mechanics.clamps import Clamps
 from foldyn.patterns import Pattern
 from foldyn.patterns.selection import given_as, select
 from foldyn.patterns.topology import Edge, edge_lookup

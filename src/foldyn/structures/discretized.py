@@ -16,7 +16,7 @@ from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, PlateSuperlinear, hinge_law
 from foldyn.materials.memory_law import memory_of
 from foldyn.materials.series import in_series
-from foldyn.mechanics.body import Body
+from foldyn.mechanics.assembly import Assembly
 from foldyn.patterns.picture import picture
 from foldyn.structures.mass import Surface, center_of_mass, inertia_tensor, row_sums
 from foldyn.structures.mesh import double_areas, lengths
@@ -90,7 +90,7 @@ class Discretized:
         Nodal mass matrix, kg; one value serves the three axes.
     folds, fold_rest : (nf, 4), (nf,)
         Hinge row and rest angle (rad) of each fold.
-    body : Body
+    body : Assembly
         What solvers take.
     kind : str
         Its name in case files.
@@ -120,7 +120,7 @@ class Discretized:
     mass: sparse.csr_array
     folds: NDArray
     fold_rest: NDArray
-    body: Body
+    body: Assembly
     fill: Fill
     energy_groups: ClassVar[Mapping[str, str]]
     kind: ClassVar[str]

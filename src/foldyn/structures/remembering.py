@@ -11,9 +11,10 @@ from foldyn.materials.law import PARAMETERS
 from foldyn.materials.memory_law import VARIABLES, Branch, MemoryLaw, memory_of
 from foldyn.materials.prony import CODE as MAXWELL
 from foldyn.materials.prony import CreaseDampers, in_series, maxwell
-from foldyn.mechanics.body import Body, FoldHinges
+from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.hinge_memory import HingeMemory
 from foldyn.mechanics.inelastic import MemoryHinges
-from foldyn.mechanics.inelastic_body import Memory
+from foldyn.mechanics.sheet_term import FoldHinges
 from foldyn.mechanics.viscous import WIDTH, hinge_dofs
 
 LEAST = 1e-9  # stiffness of a crease over that of its panels: one without has so much
@@ -63,21 +64,21 @@ class Remembering(NamedTuple):
 
 
 def remembering(
-    structure: Any, body: Body | None = None, damping: NDArray | None = None
+    structure: Any, body: Assembly | None = None, damping: NDArray | None = None
 ) -> tuple[Remembering, ...]:
     """What of a structure remembers: its folds, its bends, both or nothing.
 
-    body : the structure's, or one that has it within.
+    body : the structure's, or one with further terms.
     damping : (nf,) of its creases, N m s/rad per m; none by default.
     """
     laws = {"fold": structure.fold_law, "bend": getattr(structure, "bend_law", None)}
-    out, whole = [], structure.body if body is None else body
-    damped = damping is not None and damping.any() and bool(whole.offsets)
+    out, sheet = [], (structure.body if body is None else body).sheet
+    damped = damping is not None and damping.any() and bool(sheet.offsets)
     for kind, given in laws.items():
         law = memory_of(given)
         if law is None and not (damped and kind == "fold"):
             continue
-        hinges = whole.fold_hinges() if kind == "fold" else whole.bend_hinges()
+        hinges = sheet.fold_hinges() if kind == "fold" else sheet.bend_hinges()
         dampers = np.zeros(len(hinges.rest))
         if damping is not None and kind == "fold":
             dampers = np.where(hinges.softness > 0.0, damping[hinges.fold] * hinges.length, 0.0)
@@ -88,7 +89,7 @@ def remembering(
     return tuple(out)
 
 
-def memory(parts: tuple[Remembering, ...], body: Body) -> Memory:
+def memory(parts: tuple[Remembering, ...], body: Assembly) -> HingeMemory:
     """State of the branches of these parts of a body, which begins at rest."""
     columns: dict[str, list[NDArray]] = {name: [] for name in MemoryHinges._fields}
     settles, count = [], 0
@@ -129,4 +130,4 @@ def memory(parts: tuple[Remembering, ...], body: Body) -> Memory:
         )
         for name, parts in columns.items()
     }
-    return Memory(MemoryHinges(**arrays), np.concatenate(settles))
+    return HingeMemory(MemoryHinges(**arrays), np.concatenate(settles), body.sheet)

@@ -23,20 +23,20 @@ from foldyn.materials import (
     hinge_law,
 )
 from foldyn.materials.plate_superlinear import onset_parameters
-from foldyn.mechanics.attached_body import attached
-from foldyn.mechanics.body import Body
+from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.clamps import ClampsTerm
 from foldyn.mechanics.following import joined, moments, tensions
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge
-from foldyn.structures.body import GROUPS, BarsHingesBody
+from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm
+from foldyn.structures.bars_plates import BarsPlatesTerm
 from foldyn.structures.clamps import clamps
-from foldyn.structures.condensed_body import CondensedBody, balanced
+from foldyn.structures.condensed_plates import CondensedPlatesTerm, balanced
 from foldyn.structures.creases import PerCrease, per_crease
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.edge_angles import EdgePlates, plates_model
 from foldyn.structures.mass import MASS_RULES, lumped
 from foldyn.structures.mesh import hinge_angles
-from foldyn.structures.plates_body import BarsPlatesBody
 from foldyn.structures.rigid_plates import Plate, rigid_plates
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.swelling import Chords, Swelling, chords
@@ -182,17 +182,19 @@ class Structure(Discretized):
         )
 
     @cached_property
-    def body(self) -> Body:
+    def body(self) -> Assembly:
         """What solvers take."""
         if self.edge_plates is not None:
-            return self._plates_body(self.edge_plates)
+            return Assembly(self._plates_term(self.edge_plates))
         rows = [self._rows(group, kind.nodes) for group, kind in enumerate(self.hinge_kinds)]
         laws = tuple((kind.law, len(kind.nodes)) for kind in self.hinge_kinds)
-        body = BarsHingesBody(self.model, np.concatenate(rows), laws, self._softness)
+        body = Assembly(BarsHingesTerm(self.model, np.concatenate(rows), laws, self._softness))
         if not len(self.clamps):
             return body
         bends = tuple(GROUPS).index("strain_bends")
-        return attached(body, clamps(self.nodes, self.clamps, self.clamp_stiffness, bends))
+        return body.with_terms(
+            ClampsTerm(clamps(self.nodes, self.clamps, self.clamp_stiffness, bends))
+        )
 
     @property
     def massless(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -200,14 +202,14 @@ class Structure(Discretized):
         there = self.edge_plates is not None and not self.without_edge_angles
         return "the edge angles of the scheme n5b8e" if there else ""
 
-    def _plates_body(self, plates: EdgePlates) -> Body:
+    def _plates_term(self, plates: EdgePlates) -> BarsPlatesTerm:
         stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
         model = plates_model(
             self.nodes, self.bars, stiffness, self.bar_law, self.folds, self.fold_stiffness,
             self.fold_rest, self.fold_law, self.bends, self.bend_rest, plates,
         )  # fmt: skip
-        body = BarsPlatesBody(model, (self.fold_law, self.bend_law))
-        return CondensedBody(body) if self.without_edge_angles else body
+        kind = CondensedPlatesTerm if self.without_edge_angles else BarsPlatesTerm
+        return kind(model, (self.fold_law, self.bend_law))
 
     @cached_property
     def condensed(self) -> Structure | None:

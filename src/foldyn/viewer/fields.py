@@ -94,10 +94,10 @@ def hinge_angles(structure: Structure, hinges: NDArray, displacement: NDArray) -
 def rest_angles(case: Case, result: Any, samples: int) -> tuple[NDArray, NDArray]:
     """Rest angles (samples, k) of folds and bends, rad, as loads turn them, and offsets of folds.
 
-    Offsets are what the laws of folds see beside the dihedrals (`Body.series`).
+    Offsets are what the laws of folds see beside the dihedrals (`SheetTerm.series`).
     """
     body, structure = case.body, case.structure
-    turned = np.tile(body.rest_angles, (samples, 1))
+    turned = np.tile(body.sheet.rest_angles, (samples, 1))
     if "time" in result.sizes:
         for change, history in case.rest_terms:
             turned += np.outer(history(result["time"].values), change)
@@ -108,7 +108,7 @@ def rest_angles(case: Case, result: Any, samples: int) -> tuple[NDArray, NDArray
             for change, _ in SomeLoads(case, [k]).rest_terms:
                 turned += np.outer(factor, change)
     count = len(structure.fold_rest) + len(structure.bend_rest)
-    return turned[:, :count], turned[:, count:] if body.offsets else np.zeros((samples, 1))
+    return turned[:, :count], turned[:, count:] if body.sheet.offsets else np.zeros((samples, 1))
 
 
 def energy_density(

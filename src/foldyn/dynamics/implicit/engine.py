@@ -33,6 +33,7 @@ from foldyn.dynamics.implicit.touching import TouchingNewton
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.snapshot import parts_of, restore, snapshot
 from foldyn.dynamics.system import Packed
+from foldyn.mechanics.hinge_memory import HingeMemory
 
 LEAST_STEP = 2.0**-20  # of the step wanted: where Newton's method fails with less, it fails
 LEAST_TIME = 1e-13  # step relative to the end of the motion
@@ -80,6 +81,10 @@ class Implicit:
         self._end: NDArray | None = None
         self.continues = False
 
+    @property
+    def _memory(self) -> HingeMemory | None:
+        return self._packed.body.find(HingeMemory)
+
     def facts(self) -> dict[str, Any]:
         """Statistics of the run."""
         return dict(self._scheme.facts) | {
@@ -122,8 +127,8 @@ class Implicit:
             scheme.begin(self._plan.start)
             return False
         counted = len(scheme.state())
-        memory, factor = self._packed.body.memory, old.factor.copy()
-        branches = None if memory is None else memory.snapshot()
+        memory, factor = self._memory, old.factor.copy()
+        branches = () if memory is None else memory.snapshot()
         with one_thread():
             self._newton.resume(state[counted + 2 : -1])
         if memory is not None:
@@ -138,7 +143,7 @@ class Implicit:
 
     def _acceleration(self) -> NDArray:
         """Acceleration (n, 3) where the motion stands, of nodes with mass."""
-        memory, out = self._packed.body.memory, np.zeros_like(self._scheme.old.a)
+        memory, out = self._memory, np.zeros_like(self._scheme.old.a)
         if memory is not None:
             memory.still()
         old, t = self._scheme.old, float(self._course.tally.time)
@@ -211,8 +216,8 @@ class Implicit:
         if self._touching is not None:
             self._touching.begin()
         self._newton.prepare(plan.dt, plan.start)
-        if self._packed.body.memory is not None:
-            self._packed.body.memory.still()
+        if self._memory is not None:
+            self._memory.still()
         self.continues = self._end is not None and self._resume(self._end)
         return self._sample(plan.start, out)
 
@@ -329,15 +334,15 @@ class Implicit:
             self._touching.begin()
         course.angle[:] = scheme.work.angle
         scheme.accept(h)
-        if self._packed.body.memory is not None:
-            self._packed.body.memory.commit()
+        if self._memory is not None:
+            self._memory.commit()
         if jump is not None:
             course.tally.work += scheme.settle(max(end, jump))
             scheme.begin(max(end, jump))
             system = self._packed.system
             if system.turns:
                 course.tally.work += jolt(
-                    self._packed.body.folds, system.actuators, scheme.work.fold_angle
+                    self._packed.body.sheet.folds, system.actuators, scheme.work.fold_angle
                 )
             if self._touching is not None:
                 self._touching.begin()

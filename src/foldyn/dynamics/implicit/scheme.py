@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,11 @@ from foldyn.dynamics.system import Packed, Scratch, place, scratch
 from foldyn.dynamics.ties import hand_over
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.contact.body import contact_tangent
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.tables import Tables
+from foldyn.mechanics.contact.term import contact_tangent
 from foldyn.mechanics.following import following_force
+from foldyn.mechanics.hinge_memory import HingeMemory
 
 EPS = float(np.finfo(float).eps)
 FAST = 0.3  # share of the residual that an iteration leaves, below which its matrix is kept
@@ -98,7 +99,7 @@ class Scheme(ABC):
 
     def __init__(self, packed: Packed, course: Course) -> None:
         self.packed, self.course = packed, course
-        self.work: Any = packed.body.workspaces(1)[0]
+        self.work = packed.body.workspaces(1)[0]
         self.scratch: Scratch = scratch(packed.system)
         self.equation = EquationOfMotion(packed, self.work, self.scratch, course, None)
         shape, histories = course.u.shape, self.scratch.factor.shape
@@ -192,7 +193,7 @@ class Scheme(ABC):
         """
         body, system, s = self.packed.body, self.packed.system, self.scratch
         damping, hidden = system.damping, body.hidden
-        damped = damping.elements.coefficient.size or body.memory is not None
+        damped = damping.elements.coefficient.size or body.find(HingeMemory) is not None
         if damping.data.size:
             damped = damped or np.diff(damping.indptr)[hidden].any()
         if not len(hidden) or damped:
@@ -212,7 +213,7 @@ class Scheme(ABC):
 
     def hinge_forces(self) -> float:
         """Norm of the hinges' forces at old.q, N: forces at play even where all is at rest."""
-        forces = self.packed.body.hinge_forces(self.displacement(), self.work)
+        forces = self.packed.body.hinge_forces(self.displacement())
         return float(np.linalg.norm(forces))
 
     def displacement(self) -> NDArray:
@@ -281,7 +282,7 @@ class Scheme(ABC):
 
     def origin(self) -> tuple[NDArray, ...]:
         """From what `tangent` makes the matrix after `residual`, beside the step and the case."""
-        own, memory = self, self.packed.body.memory
+        own, memory = self, self.packed.body.find(HingeMemory)
         kept = () if memory is None else memory.snapshot()
         arrays = (own.old.q, own.old.factor, own.shift, own.new.factor, own.course.angle)
         return tuple(array.copy() for array in (*arrays, *kept))
@@ -289,7 +290,7 @@ class Scheme(ABC):
     def back(self, h: float, origin: Sequence[NDArray]) -> None:
         """Go back to where the matrix of a step h (s) was made; `resume` leads on from there."""
         q, factor, shift, ahead, angle, *kept = origin
-        old, memory, s = self.old, self.packed.body.memory, self.scratch
+        old, memory, s = self.old, self.packed.body.find(HingeMemory), self.scratch
         if memory is not None:
             memory.recall(kept)
         old.q[:], old.factor[:], self.shift[:], self.course.angle[:] = q, factor, shift, angle

@@ -18,8 +18,6 @@ potential. Anchors and ties follow what slips where a step is accepted, as in ex
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -39,12 +37,12 @@ from foldyn.dynamics.implicit.scheme import (
 )
 from foldyn.dynamics.system import place
 from foldyn.mechanics.contact.approach import KEEP, clear_share
-from foldyn.mechanics.contact.body import TouchingBody
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import move_planes, slip
 from foldyn.mechanics.contact.rubbing import add_rubs, slip_pairs
 from foldyn.mechanics.contact.search import place as put_at
 from foldyn.mechanics.contact.tables import NORMAL, POINT
+from foldyn.mechanics.contact.term import ContactTerm
 
 MOST = 60  # iterations, many of which are cut
 CUTS = 12  # of one iteration by the residual along it
@@ -58,10 +56,10 @@ class TouchingNewton(Newton):
 
     def __init__(self, scheme: Scheme, matrix: StepMatrix) -> None:
         super().__init__(scheme, matrix)
-        body: Any = scheme.packed.body
-        while not isinstance(body, TouchingBody):
-            body = body.inner
-        self._tables, self._memory = body.tables, scheme.work.memory
+        body = scheme.packed.body
+        contact = body.find(ContactTerm)
+        assert contact is not None
+        self._tables, self._memory = contact.tables, body.kept(scheme.work, ContactTerm)
         self._memory.counts.lagged = 1
         self._size = 3 * scheme.packed.system.rows
         self._free = np.zeros(self._size, bool)

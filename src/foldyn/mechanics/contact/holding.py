@@ -8,11 +8,11 @@ import numpy as np
 from scipy import sparse
 
 from foldyn.jit.compiled import kernel
-from foldyn.mechanics.body import unit_rows
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.pairs import EDGES, VERTEX, closest_of, nodes_of, weights_of
 from foldyn.mechanics.contact.tables import FRICTION, NORMAL, Tables
 from foldyn.mechanics.contact.tangent import touching_pairs
+from foldyn.mechanics.sheet_term import unit_rows
 
 
 def held_by_planes(own: Tables, kept: Memory, size: int) -> sparse.csr_array:

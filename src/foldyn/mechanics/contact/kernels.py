@@ -1,8 +1,8 @@
-"""A model whose parts touch each other and planes: a further term of its energy."""
+"""Contact as loops see it: a term whose parts touch each other and planes."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from numpy.typing import NDArray
 
@@ -19,27 +19,15 @@ from foldyn.mechanics.term import (
     FORCES,
     LIMIT,
     PLACE_OBSTACLES,
-    Term,
+    Compiled,
     energies,
     forces,
     limit,
     place_obstacles,
 )
-from foldyn.mechanics.threads import Team
 
 
-class TouchingWork(NamedTuple):
-    """Memory of evaluations, one after the other."""
-
-    inner: Any
-    angle: NDArray  # (nh,) dihedrals, rad
-    fold_angle: NDArray  # the inner model's
-    strips: Any
-    team: Team
-    memory: Memory
-
-
-class _ContactTerm(NamedTuple):
+class _Context(NamedTuple):
     tables: Tables
     memory: Memory
     angle: NDArray
@@ -80,12 +68,13 @@ def _limit(context, u, v, a, dt, beta, energy, lightness):
     return limited(own.tables, moved, speed, change, own.angle, dt, pace, light, own.memory)
 
 
-def contact_term(tables: Tables, memory: Memory, angle: NDArray, group: int, rows: int) -> Term:
+def contact_kernels(tables: Tables, memory: Memory, angle: NDArray, group: int) -> Compiled:
     """Contact of what the tables hold, with the group of its energy.
 
     That is the energy at the last force; all members of a team have waited for each other then.
     """
     histories = 1 + int(tables.planes[:, HISTORY].max(initial=-1.0))
-    own = Context(_ContactTerm(tables, memory, angle, group, rows, histories))
+    rows = len(tables.rest)
+    own = Context(_Context(tables, memory, angle, group, rows, histories))
     kernels = {FORCES: _forces, ENERGIES: _energies, LIMIT: _limit}
-    return Term(own, kernels | ({PLACE_OBSTACLES: _place} if histories else {}))
+    return Compiled(own, kernels | ({PLACE_OBSTACLES: _place} if histories else {}))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,26 +13,23 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, Superlinear
-from foldyn.mechanics.body import (
+from foldyn.mechanics.sheet_term import (
     NO_DOF,
-    Body,
     FoldHinges,
+    SheetTerm,
     SoftHinges,
-    hidden_in_balance,
     largest_turn,
     unit_rows,
 )
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
-from foldyn.mechanics.term import Folds, Term
+from foldyn.mechanics.term import Compiled, Folds
 from foldyn.shells.kernels import (
     ShellModel,
     ShellWork,
     fold,
     ride,
-    shell_energy,
-    shell_force,
-    shell_term,
+    shell_kernels,
     shell_work,
 )
 from foldyn.shells.tangent import (
@@ -48,8 +46,8 @@ GROUPS: Mapping[str, str] = {
 }
 
 
-class ShellBody(Body):
-    """A shell of triangles; see `mechanics.body.Body`.
+class ShellTerm(SheetTerm):
+    """A shell of triangles; see `mechanics.sheet_term.SheetTerm`.
 
     Parameters
     ----------
@@ -58,23 +56,24 @@ class ShellBody(Body):
         The fold that each piece of a crease belongs to.
     law : HingeLaw
         Law of the folds.
-    like : ShellBody, optional
+    like : ShellTerm, optional
         One with the same mesh.
     """
 
     energy_groups = tuple(GROUPS)
 
     def __init__(
-        self, model: ShellModel, crease: NDArray, law: HingeLaw, like: ShellBody | None = None
+        self, model: ShellModel, crease: NDArray, law: HingeLaw, like: ShellTerm | None = None
     ) -> None:
         self.model, self._crease, self._law, self._like = model, crease, law, like
         self._nodal = 3 * model.nodes
         self.size, self.rows = self._nodal + model.rotations, model.rows
         self.hidden = np.arange(self._nodal, self.size)
+        self.per_hidden = model.per_reach
 
-    def _with(self, model: ShellModel) -> ShellBody:
-        """Another body of the same mesh."""
-        return ShellBody(model, self._crease, self._law, self)
+    def _with(self, model: ShellModel) -> ShellTerm:
+        """Another sheet of the same mesh."""
+        return ShellTerm(model, self._crease, self._law, self)
 
     def _split(self, q: NDArray) -> tuple[NDArray, NDArray]:
         """Displacements (n, 3) and rotations (r,)."""
@@ -86,34 +85,16 @@ class ShellBody(Body):
         """Pattern of the tangent."""
         return self._like.sparsity if self._like else shell_pattern(self.model)
 
-    def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
-        """See `Body`."""
-        return hidden_in_balance(self, displacement, push, self.model.per_reach)
-
-    def energies(self, q: NDArray) -> NDArray:
-        """See `Body`."""
-        out = np.empty(len(GROUPS))
-        shell_energy(self.model, *self._split(q), shell_work(self.model), out)
-        return out
-
-    def internal(self, q: NDArray, work: ShellWork | None = None) -> NDArray:
-        """See `Body`."""
-        out = np.empty(self.size)
-        work = shell_work(self.model) if work is None else work
-        shell_force(self.model, *self._split(q), *self._split(out), work)
-        return out
-
-    def hinge_forces(self, q: NDArray, work: ShellWork | None = None) -> NDArray:
-        """See `Body`."""
-        loose = self.model._replace(membrane=np.zeros_like(self.model.membrane))
-        return self._with(loose).internal(q, work)
+    def hinges_alone(self) -> ShellTerm:
+        """See `SheetTerm`: bending and folds."""
+        return self._with(self.model._replace(membrane=np.zeros_like(self.model.membrane)))
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return shell_tangent(self.model, self.sparsity, *self._split(q), floor)
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
-        """See `Body`."""
+        """See `SheetTerm`."""
         own = self.model.code < 0  # slopes of a user's law may fall on purpose
         matrix = self.tangent(q, -np.inf if own else STEP_FLOOR)
         if before is not None:
@@ -122,33 +103,33 @@ class ShellBody(Body):
         return matrix
 
     def blocks(self) -> SparseBlocks:
-        """See `Body`."""
+        """See `SheetTerm`."""
         pattern = self.sparsity
         entries = (np.zeros(len(pattern.indices)), pattern.indices, pattern.indptr)
         matrix = sparse.csr_array(entries, (self.size, self.size))
         return SparseBlocks(matrix, self.rows, positions(self.model))
 
     def workspaces(self, threads: int) -> list[ShellWork]:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return [shell_work(self.model)]
 
-    def terms(self, work: ShellWork) -> list[Term]:
-        """See `Body`."""
-        return [shell_term(self.model, work)]
+    def compiled(self, work: Any, kept: ShellWork, group: int) -> Compiled:
+        """See `Term`."""
+        return shell_kernels(self.model, kept)
 
     @property
     def hinges(self) -> NDArray:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return self.model.hinges
 
     @property
     def folds(self) -> Folds:
-        """See `Body`."""
+        """See `SheetTerm`."""
         model = self.model
         return Folds(model.piece_rest, model.piece_parameters, model.piece_stiffness)
 
     def angles(self, q: NDArray) -> NDArray:
-        """See `Body`."""
+        """See `SheetTerm`."""
         model, u = self.model, self._split(q)[0]
         x = model.rest.copy()
         x[: model.nodes] += u
@@ -157,8 +138,8 @@ class ShellBody(Body):
         return mechanics.angles(x, model.hinges.astype(np.uint32))
 
     def holds(self, q: NDArray) -> sparse.csr_array:
-        """See `Body`: clamped edges as they turn."""
-        model, (u, x) = self.model, self._split(np.append(q, np.zeros(self.size - len(q))))
+        """See `SheetTerm`: clamped edges as they turn."""
+        model, (u, x) = self.model, self._split(q)
         rows = np.flatnonzero(model.hinges[:, 3] >= model.nodes)
         work = shell_work(model)
         if len(rows):
@@ -186,15 +167,15 @@ class ShellBody(Body):
         return np.concatenate([np.repeat(nodal, 3), np.full(len(self.hidden), bending)])
 
     def turning_moments(self) -> float:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return float(np.abs(self.model.bending).sum() + self.model.piece_stiffness.sum())
 
     def longest(self) -> float:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return float(1.0 / np.sqrt(self.model.per_length2.min()))
 
     def soft_hinges(self, q: NDArray) -> SoftHinges:
-        """See `Body`: none."""
+        """See `SheetTerm`: none."""
         if self.model.code == Superlinear.code:
             raise InputError(
                 ' = "superlinear": the folds of a shell have no slope at rest; modes and '
@@ -205,15 +186,15 @@ class ShellBody(Body):
 
     @property
     def rest_angles(self) -> NDArray:
-        """See `Body`: of the folds, the mean along each crease."""
+        """See `SheetTerm`: of the folds, the mean along each crease."""
         return np.bincount(self._crease, self.model.piece_rest) / np.bincount(self._crease)
 
     def rest_law(self, number: int) -> HingeLaw:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return self._law
 
     def fold_hinges(self) -> FoldHinges:
-        """See `Body`: the pieces of the creases."""
+        """See `SheetTerm`: the pieces of the creases."""
         model = self.model
         nodes = model.hinges[model.piece_hinge]
         turns = model.piece_rotations
@@ -223,14 +204,14 @@ class ShellBody(Body):
             model.piece_stiffness, np.zeros(len(nodes)), np.arange(len(nodes)),
         )  # fmt: skip
 
-    def folded(self, rest: NDArray) -> ShellBody:
-        """See `Body`."""
+    def folded(self, rest: NDArray) -> ShellTerm:
+        """See `SheetTerm`."""
         angle = self.model.piece_rest + (rest - self.rest_angles)[self._crease]
         parameters = self._law.parameters(angle).reshape(-1, 4)
         return self._with(self.model._replace(piece_rest=angle, piece_parameters=parameters))
 
-    def actuated(self, numbers: NDArray) -> tuple[ShellBody, NDArray, NDArray]:
-        """See `Body`."""
+    def actuated(self, numbers: NDArray) -> tuple[ShellTerm, NDArray, NDArray]:
+        """See `SheetTerm`."""
         model = self.model
         own = model._replace(
             piece_rest=model.piece_rest.copy(), piece_parameters=model.piece_parameters.copy()
@@ -240,7 +221,7 @@ class ShellBody(Body):
         return self._with(own), np.concatenate([np.zeros(0, np.int64), *pieces]), place
 
     def turned(self) -> tuple[NDArray, NDArray]:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return self.model.piece_rest, self.model.piece_hinge
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,58 +12,56 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, LinearHinge, Superlinear
-from foldyn.mechanics.body import (
-    NO_DOF,
-    Body,
-    FoldHinges,
-    SoftHinges,
-    Unstrained,
-    hidden_in_balance,
-    largest_turn,
-)
 from foldyn.mechanics.plates import (
     BarsPlates,
     PlatesWork,
-    plates_energy,
-    plates_force,
-    plates_term,
+    plates_kernels,
     plates_work,
 )
 from foldyn.mechanics.plates_tangent import PlatesPattern, add_plates_tangent, plates_pattern
+from foldyn.mechanics.sheet_term import (
+    NO_DOF,
+    FoldHinges,
+    SheetTerm,
+    SoftHinges,
+    Unstrained,
+    largest_turn,
+)
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
-from foldyn.mechanics.term import Folds, Term
-from foldyn.structures.body import GROUPS, BarsHingesBody, stretch
+from foldyn.mechanics.term import Compiled, Folds
+from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm, stretch
 
 
-class BarsPlatesBody(Body):
-    """A model of bars, folds and plates; see `mechanics.body.Body`.
+class BarsPlatesTerm(SheetTerm):
+    """A model of bars, folds and plates; see `mechanics.sheet_term.SheetTerm`.
 
     Parameters
     ----------
     model : BarsPlates
     laws : tuple of HingeLaw
         Laws of the folds and of the bends.
-    like : BarsPlatesBody, optional
+    like : BarsPlatesTerm, optional
         One whose elements have the same dofs.
     """
 
     energy_groups = tuple(GROUPS)
 
     def __init__(
-        self, model: BarsPlates, laws: tuple[HingeLaw, HingeLaw], like: BarsPlatesBody | None = None
+        self, model: BarsPlates, laws: tuple[HingeLaw, HingeLaw], like: BarsPlatesTerm | None = None
     ) -> None:
         self.model, self._laws, self._like = model, laws, like
         self._nodal = 3 * model.nodes
         self.size, self.rows = self._nodal + model.rotations, model.rows
         self.hidden = np.arange(self._nodal, self.size)
-        self._bars = BarsHingesBody(
+        self.per_hidden = model.per_reach
+        self._bars = BarsHingesTerm(
             model.bars, np.zeros(0, np.int64), (), np.zeros(0), like._bars if like else None
         )
 
-    def _with(self, model: BarsPlates) -> BarsPlatesBody:
-        """Another body whose elements have the same dofs."""
-        return BarsPlatesBody(model, self._laws, self)
+    def _with(self, model: BarsPlates) -> Self:
+        """Another sheet whose elements have the same dofs."""
+        return type(self)(model, self._laws, self)
 
     def _split(self, q: NDArray) -> tuple[NDArray, NDArray]:
         """Displacements (n, 3) and rotations (r,)."""
@@ -82,33 +81,12 @@ class BarsPlatesBody(Body):
         """Whether the law of the folds is linear."""
         return isinstance(self._laws[0], LinearHinge)
 
-    def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
-        """See `Body`."""
-        return hidden_in_balance(self, displacement, push, self.model.per_reach)
-
-    def energies(self, q: NDArray) -> NDArray:
-        """See `Body`."""
-        out = np.empty(len(GROUPS))
-        plates_energy(self.model, *self._split(q), plates_work(self.model), out)
-        return out
-
-    def internal(self, q: NDArray, work: PlatesWork | None = None) -> NDArray:
-        """See `Body`."""
-        out = np.empty(self.size)
-        work = plates_work(self.model) if work is None else work
-        plates_force(self.model, *self._split(q), *self._split(out), work)
-        return out
-
-    def hinge_forces(self, q: NDArray, work: PlatesWork | None = None) -> NDArray:
-        """See `Body`."""
-        return self._hinges_alone().internal(q, work)
-
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return self._assembled(q, self._bars.tangent(q[: self._nodal]), floor)
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
-        """See `Body`."""
+        """See `SheetTerm`."""
         q = np.ascontiguousarray(q, float).reshape(-1)
         old = None if before is None else np.reshape(before, -1)[: self._nodal]
         bars = self._bars.step_tangent(q[: self._nodal], old)
@@ -125,33 +103,33 @@ class BarsPlatesBody(Body):
         return sparse.csr_array(entries, (self.size, self.size))
 
     def blocks(self) -> SparseBlocks:
-        """See `Body`."""
+        """See `SheetTerm`."""
         pattern = self.sparsity
         entries = (np.zeros(len(pattern.indices)), pattern.indices, pattern.indptr)
         matrix = sparse.csr_array(entries, (self.size, self.size))
         return SparseBlocks(matrix, self.rows, positions(self.model))
 
     def workspaces(self, threads: int) -> list[PlatesWork]:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return [plates_work(self.model)]
 
-    def terms(self, work: PlatesWork) -> list[Term]:
-        """See `Body`."""
-        return [plates_term(self.model, work, self.rows)]
+    def compiled(self, work: Any, kept: PlatesWork, group: int) -> Compiled:
+        """See `Term`."""
+        return plates_kernels(self.model, kept, self.rows)
 
     @property
     def hinges(self) -> NDArray:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return self.model.hinges
 
     @property
     def folds(self) -> Folds:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return Folds(self.model.fold_rest, self.model.fold_parameters, self.model.fold_stiffness)
 
     # ------------------------------------------------------------------ measures
     def angles(self, q: NDArray) -> NDArray:
-        """See `Body`."""
+        """See `SheetTerm`."""
         x = self.model.bars.rest + self._split(q)[0]
         return mechanics.angles(x, self.model.hinges.astype(np.uint32))
 
@@ -166,15 +144,15 @@ class BarsPlatesBody(Body):
         return np.concatenate([self._bars.scale(), np.full(len(self.hidden), turning)])
 
     def turning_moments(self) -> float:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return float(self.model.fold_stiffness.sum() + np.abs(self.model.stiffness).sum())
 
     def longest(self) -> float:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return self._bars.longest()
 
     def soft_hinges(self, q: NDArray) -> SoftHinges:
-        """See `Body`: none."""
+        """See `SheetTerm`: none."""
         if self.model.code == Superlinear.code:
             raise InputError(
                 ' = "superlinear": such folds have no slope at rest; with the scheme n5b8e modes '
@@ -186,15 +164,15 @@ class BarsPlatesBody(Body):
     # ------------------------------------------------------------------ rest angles
     @property
     def rest_angles(self) -> NDArray:
-        """See `Body`: of the folds, then of the bends."""
+        """See `SheetTerm`: of the folds, then of the bends."""
         return np.concatenate([self.model.fold_rest, self.model.bend_rest])
 
     def rest_law(self, number: int) -> HingeLaw:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return self._laws[number >= len(self.model.fold_rest)]
 
     def fold_hinges(self) -> FoldHinges:
-        """See `Body`: one of each."""
+        """See `SheetTerm`: one of each."""
         nodes = self.model.hinges[: len(self.model.fold_rest)]
         turns = self.model.fold_rotations
         hidden = np.where(turns >= 0, self._nodal + turns, NO_DOF)
@@ -205,8 +183,8 @@ class BarsPlatesBody(Body):
             np.arange(len(nodes)),
         )  # fmt: skip
 
-    def folded(self, rest: NDArray) -> BarsPlatesBody:
-        """See `Body`."""
+    def folded(self, rest: NDArray) -> Self:
+        """See `SheetTerm`."""
         folds = np.array(rest[: len(self.model.fold_rest)], float)
         parameters, law = self.model.fold_parameters, self._laws[0]
         if law.follows_rest:
@@ -215,8 +193,8 @@ class BarsPlatesBody(Body):
         model = self.model._replace(fold_rest=folds, fold_parameters=parameters, bend_rest=bends)
         return self._with(model)
 
-    def actuated(self, numbers: NDArray) -> tuple[BarsPlatesBody, NDArray, NDArray]:
-        """See `Body`."""
+    def actuated(self, numbers: NDArray) -> tuple[Self, NDArray, NDArray]:
+        """See `SheetTerm`."""
         model = self.model
         own = model._replace(
             fold_rest=model.fold_rest.copy(), fold_parameters=model.fold_parameters.copy()
@@ -224,28 +202,28 @@ class BarsPlatesBody(Body):
         return self._with(own), np.asarray(numbers), np.arange(len(numbers))
 
     def turned(self) -> tuple[NDArray, NDArray]:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return self.model.fold_rest, np.arange(len(self.model.fold_rest))
 
     # ------------------------------------------------------------------ other bodies
-    def _hinges_alone(self) -> BarsPlatesBody:
-        """The body without its bars."""
+    def hinges_alone(self) -> Self:
+        """See `SheetTerm`."""
         bars = self.model.bars._replace(bar_runs=self.model.bars.bar_runs[:0])
         return self._with(self.model._replace(bars=bars))
 
     def unstrained(self, q: NDArray) -> Unstrained:
-        """See `Body`."""
+        """See `SheetTerm`."""
         model, bars = self.model, self._bars.unstrained_model(q[: self._nodal])
         angle, folds = self.angles(q), len(model.fold_rest)
-        body = self._with(
+        sheet = self._with(
             model._replace(
                 bars=bars, fold_rest=angle[:folds], bend_rest=angle[folds:], code=LinearHinge.code
             )
         )
         rest = np.zeros(self.size)
         return Unstrained(
-            body.tangent(rest),
-            body._hinges_alone().tangent(rest),
+            sheet.tangent(rest),
+            sheet.hinges_alone().tangent(rest),
             lambda motion: stretch(bars, motion[: self._nodal]),
         )
 

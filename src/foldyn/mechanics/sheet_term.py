@@ -1,35 +1,24 @@
-"""What solvers need of a structure: energies, forces and tangents on a flat vector of dofs.
+"""The first term of a model: the sheet itself, which numbers the dofs.
 
-The m dofs are 3 node + axis, then the hidden ones: those without mass that a model may have beside
-the displacements of its nodes. Compiled loops hold them in arrays with a row of three per node,
-(rows, 3); hidden dofs follow in further rows, the last one filled up. Either form is taken.
-
-A model is a named tuple of arrays, its kernels, a `Body` that tells its terms (`mechanics.term`),
-and a structure that gives it. A body changes nothing in place; what makes another one of it
-(`folded`, `nominal`, ...) leaves it as it was.
+A model is a named tuple of arrays, its kernels, a `SheetTerm` that compiles them, and a structure
+that gives it, within its `mechanics.assembly.Assembly`.
 """
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
-from foldyn.errors import ComputationError
 from foldyn.materials import HingeLaw
-from foldyn.mechanics.model import ranks
 from foldyn.mechanics.tangent import Sparsity
 from foldyn.mechanics.term import Folds, Term
 
-ITERATIONS = 50
-BALANCED = 1e-13  # rad, of the last step of Newton's method for hidden dofs
-LEAST_SLOPE = 1e-3  # of a fold's stiffness, in these steps
 NO_DOF = np.iinfo(np.int64).max  # where there is none: no array has it as an index
 
 
@@ -42,7 +31,7 @@ class SoftHinges(NamedTuple):
 
 
 class Unstrained(NamedTuple):
-    """A body with linear laws and without strain, whose soft motions are mechanisms."""
+    """A model with linear laws and without strain, whose soft motions are mechanisms."""
 
     tangent: sparse.csr_array  # (m, m)
     hinges: sparse.csr_array  # (m, m) of the hinges alone
@@ -78,7 +67,7 @@ class FoldHinges(NamedTuple):
     rest: NDArray  # (k,) rad
     stiffness: NDArray  # (k,) N m/rad
     softness: NDArray  # (k,) rad/(N m), of the panels beside
-    row: NDArray  # (k,) of each in `Body.series`
+    row: NDArray  # (k,) of each in `SheetTerm.series`
 
     @property
     def length(self) -> NDArray:
@@ -105,7 +94,7 @@ def no_fold_hinges() -> FoldHinges:
 
 
 class Blocks(Protocol):
-    """A body's tangent as 3x3 blocks, for the matrix of an implicit step.
+    """A tangent as 3x3 blocks, for the matrix of an implicit step.
 
     Attributes
     ----------
@@ -122,9 +111,11 @@ class Blocks(Protocol):
     unused: NDArray
 
     def put(
-        self, body: Any, pattern: Sparsity, u: NDArray, before: NDArray, again: bool, out: NDArray
+        self, of: Any, pattern: Sparsity, u: NDArray, before: NDArray, again: bool, out: NDArray
     ) -> None:
-        """Fill `out` (nnz, 3, 3) of a pattern that contains this one with a body's tangent at u.
+        """Fill `out` (nnz, 3, 3) of a pattern that contains this one with the tangent at u.
+
+        of : what has made the blocks, or the same with other rest angles.
 
         before : the start of the step or, `again`, the last iterate, from which stresses are
         extrapolated to u; all (rows, 3).
@@ -136,10 +127,11 @@ class Blocks(Protocol):
         ...
 
 
-class Body(ABC):
-    """A structure with its rest angles, m dofs.
+class SheetTerm(Term):
+    """A sheet with its rest angles, m dofs; see `Term`.
 
-    What has a default here is that of a body without hinges and hidden dofs.
+    Its kernels write forces and energies; those of other terms add to them. What has a default here
+    is that of a sheet without hinges and hidden dofs.
 
     Attributes
     ----------
@@ -149,48 +141,24 @@ class Body(ABC):
         Number m of the dofs, and rows of the arrays that hold them.
     hidden : ndarray of int
         Dofs beside the displacements of the nodes: they have no mass.
-    energy_groups : tuple of str
-        Names of the parts of the energy.
+    per_hidden : float
+        Turn that a hidden dof of 1 m stands for, rad/m.
     offsets : int
         Folds whose panels give way to moments of the crease alone: nf, or none.
-    has_discrete_gradient : bool
-        Whether the kernels of `dynamics.energy_momentum` take its model.
-    memory : Memory or None
-        State of hinges with memory (`mechanics.inelastic_body`), which changes in place.
     """
 
     model: Any
     size: int
     rows: int
     hidden: NDArray = np.zeros(0, np.int64)
-    energy_groups: tuple[str, ...]
+    per_hidden: float = 0.0
     offsets: int = 0
-    has_discrete_gradient: ClassVar[bool] = False
-    memory: Any = None
+    shared = True
 
     # ------------------------------------------------------------------ mechanics
-    def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
-        """Vector (m,) of displacements (n, 3), the hidden dofs in balance.
-
-        push : forces (m,), N, of which those on the hidden dofs count; none by default.
-        """
-        return np.asarray(displacement, float).ravel()
-
-    @abstractmethod
-    def energies(self, q: NDArray) -> NDArray:
-        """Strain energies (J) by group."""
-
-    @abstractmethod
-    def internal(self, q: NDArray, work: Any = None) -> NDArray:
-        """Internal forces (m,), N, the gradient of the energy; `work` from `workspaces`."""
-
-    def hinge_forces(self, q: NDArray, work: Any = None) -> NDArray:
-        """Those of hinges (bending and folds) alone: forces at play even where all is at rest."""
-        return np.zeros(self.size)
-
     @abstractmethod
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """Their derivative (m, m); slopes per unit stiffness below `floor` are raised to it."""
+        """Derivative (m, m) of its forces; slopes per unit stiffness below `floor` are raised."""
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
         """The matrix that a step of Newton's method takes at q, after one from `before`."""
@@ -204,14 +172,9 @@ class Body(ABC):
     def workspaces(self, threads: int) -> Sequence[Any]:
         """Memory of the kernels on each thread, on fewer than asked for if need be."""
 
-    @abstractmethod
-    def terms(self, work: Any) -> list[Term]:
-        """What adds to its forces, for a thread with this memory; see `mechanics.term`."""
-
-    @property
-    def hinges(self) -> NDArray:
-        """Rows (nh, 4) of all hinges; -1 for a wing that is no node."""
-        return np.zeros((0, 4), np.int64)
+    def hinges_alone(self) -> SheetTerm | None:
+        """The sheet with nothing but its hinges; None if it has none."""
+        return None
 
     @property
     @abstractmethod
@@ -224,10 +187,6 @@ class Body(ABC):
         return 1
 
     # ------------------------------------------------------------------ measures
-    def angles(self, q: NDArray) -> NDArray:
-        """Dihedrals (nh,), rad, of all hinges of the model."""
-        return np.zeros(0)
-
     @abstractmethod
     def turn(self, q: NDArray, other: NDArray) -> float:
         """Largest turn (rad) of a part between two states; inf if parts collide."""
@@ -240,14 +199,6 @@ class Body(ABC):
     def longest(self) -> float:
         """Length (m) of the longest bar or side; the extent of the nodes where there is none."""
 
-    def holds(self, q: NDArray) -> sparse.csr_array:
-        """Unit rows (s, m) of what keeps it in place beside supports: motions along them strain."""
-        return sparse.csr_array((0, self.size))
-
-    def turning_moments(self) -> float:
-        """Sum of the hinges' moments (N m) for a turn of one."""
-        return 0.0
-
     def soft_hinges(self, q: NDArray) -> SoftHinges:
         """Hinges of the superlinear law; InputError where the model cannot do without slopes."""
         return SoftHinges(np.zeros(0), np.zeros(0), sparse.csr_array((0, self.size)))
@@ -255,6 +206,10 @@ class Body(ABC):
     def soft_tangent(self, q: NDArray, slope: NDArray) -> sparse.csr_array:
         """Tangent (m, m) of these hinges alone, without moment and with given slopes / k (h,)."""
         return sparse.csr_array((self.size, self.size))
+
+    def own_strains(self) -> Strains | None:
+        """Its bars and hinges; None where panels bend as plates."""
+        return None
 
     # ------------------------------------------------------------------ rest angles
     @property
@@ -277,18 +232,14 @@ class Body(ABC):
         """Hinges within panels, for models that bend by hinges."""
         return no_fold_hinges()
 
-    def strains(self) -> Strains | None:
-        """Its bars and hinges; None where panels bend as plates."""
-        return None
-
-    def folded(self, rest: NDArray) -> Body:
-        """The body with other rest angles (nr,), rad."""
+    def folded(self, rest: NDArray) -> Self:
+        """The sheet with other rest angles (nr,), rad."""
         return self
 
-    def actuated(self, numbers: NDArray) -> tuple[Body, NDArray, NDArray]:
-        """A body whose rest angles may be changed in place, and what turns with some (a,).
+    def actuated(self, numbers: NDArray) -> tuple[Self, NDArray, NDArray]:
+        """A sheet whose rest angles may be changed in place, and what turns with some (a,).
 
-        Rows (k,) of `kernels.folds_of`, and of each the place (k,) in `numbers`.
+        Rows (k,) of `folds`, and of each the place (k,) in `numbers`.
         """
         return self, np.zeros(0, np.int64), np.zeros(0, np.int64)
 
@@ -301,7 +252,7 @@ class Body(ABC):
 
         Offsets (., 4) are what the laws see beside the dihedrals (rad), the moment of branches of
         laws with memory (N m), and both offset and whole moment at the last accepted step. In a
-        body from `actuated` they are changed in place.
+        sheet from `actuated` they are changed in place.
         """
         count = len(self.turned()[0])
         return np.ones(count), np.zeros((count, 4))
@@ -310,47 +261,10 @@ class Body(ABC):
         """Lowest node of what turns in these rows (k,): whose thread it is, where there are any."""
         return np.zeros(len(turned), np.int64)
 
-    # ------------------------------------------------------------------ other bodies
-    def renumbered(self) -> tuple[Body, NDArray]:
-        """The body for long motions, and the nodes (n,) in the order in which it has them."""
+    # ------------------------------------------------------------------ other sheets
+    def renumbered(self) -> tuple[Self, NDArray]:
+        """The sheet for long motions, and the nodes (n,) in the order in which it has them."""
         return self, np.arange((self.size - len(self.hidden)) // 3)
-
-    def nominal(self, q: NDArray) -> Body:
-        """The body with hinges as stiff as they are meant to be, about their angles at q."""
-        return self
-
-    def unstrained(self, q: NDArray) -> Unstrained | None:
-        """The body as if it had no strain at q; None where only rigid motions could keep it so."""
-        return None
-
-
-def hidden_in_balance(
-    body: Body, displacement: NDArray, push: NDArray | None, per_reach: float
-) -> NDArray:
-    """Vector (m,) of displacements (n, 3) with its hidden dofs in balance, by Newton's method.
-
-    push : forces (m,), N, of which those on the hidden dofs count; none by default.
-    per_reach : turn (rad) that a hidden dof of 1 m stands for.
-
-    Raises
-    ------
-    ComputationError
-        There are none near zero.
-    """
-    first, work = body.size - len(body.hidden), body.workspaces(1)[0]
-    q = np.concatenate([np.asarray(displacement, float).ravel(), np.zeros(len(body.hidden))])
-    for _ in range(ITERATIONS):
-        couple = body.internal(q, work)[first:]
-        if push is not None:
-            couple -= push[body.hidden]
-        if not couple.any():
-            return q
-        stiffness = body.tangent(q, LEAST_SLOPE)[first:][:, first:]
-        step = splu(sparse.csc_array(stiffness)).solve(-couple)
-        q[first:] += step
-        if per_reach * np.abs(step).max(initial=0.0) <= BALANCED:
-            return q
-    raise ComputationError("the rotations of the panels do not balance at this displacement")
 
 
 def largest_turn(largest: float, before: NDArray, after: NDArray) -> float:
@@ -367,55 +281,3 @@ def unit_rows(nodes: NDArray, entries: NDArray, size: int) -> sparse.csr_array:
     row = np.repeat(np.arange(len(nodes)), columns.shape[1])
     unit = entries / np.linalg.norm(entries, axis=1, keepdims=True)
     return sparse.csr_array((unit.ravel(), (row, columns.ravel())), (len(nodes), size))
-
-
-class Numbering(NamedTuple):
-    """The order of the nodes in memory while a motion is computed: along the sheet.
-
-    What goes in and what comes out has the structure's own numbers. Place k in memory holds node
-    order[k]; node i stands at place rank[i].
-
-    After the nodes come the rows of the dofs beside displacements, which keep their order.
-    """
-
-    order: NDArray  # (n,)
-    rank: NDArray  # (n,)
-    rows: int  # of arrays in memory, n or more
-
-    def inward(self, values: NDArray) -> NDArray:
-        """Values per node (n, ...) as they stand in memory, zero in further rows (rows, ...)."""
-        out = np.zeros((self.rows, *values.shape[1:]), values.dtype)
-        out[: len(self.order)] = values[self.order]
-        return out
-
-    def held(self, fixed: NDArray) -> NDArray:
-        """Mask of held dofs (n, 3) as it stands in memory, True in further rows (rows, 3)."""
-        out = self.inward(fixed)
-        out[len(self.order) :] = True
-        return out
-
-    def outward(self, values: NDArray) -> NDArray:
-        """Values per place (n, ...) by node."""
-        return np.ascontiguousarray(values[self.rank])
-
-    def dofs(self, dofs: NDArray) -> NDArray:
-        """Numbers 3 place + axis of dofs 3 node + axis."""
-        return (3 * self.rank[np.asarray(dofs) // 3] + np.asarray(dofs) % 3).astype(np.int64)
-
-    def matrix(self, matrix: sparse.csr_array) -> sparse.csr_array:
-        """Nodal (n, n) matrix, or one of all dofs, as it stands in memory."""
-        places, size = self.order, self.rows
-        if matrix.shape[0] > len(places):
-            places = (3 * places[:, None] + np.arange(3)).ravel()
-            places = np.concatenate([places, np.arange(len(places), matrix.shape[0])])
-            size = 3 * self.rows
-        placed = sparse.csr_array(sparse.csr_array(matrix)[places][:, places])
-        placed.resize((size, size))
-        placed.sort_indices()
-        return placed
-
-
-def renumbered(body: Body) -> tuple[Body, Numbering]:
-    """The body as it stands in memory while a motion is computed."""
-    body, order = body.renumbered()
-    return body, Numbering(order, ranks(order), body.rows)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,20 +12,20 @@ from scipy import sparse
 
 from foldyn import mechanics
 from foldyn.materials import BarLaw, HingeLaw, Superlinear
-from foldyn.mechanics.bars_hinges import bars_hinges_term
-from foldyn.mechanics.body import (
+from foldyn.mechanics.bars_hinges import bars_hinges_kernels
+from foldyn.mechanics.energy import gradients
+from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
+from foldyn.mechanics.sheet_term import (
     NO_DOF,
-    Body,
     FoldHinges,
+    SheetTerm,
     SoftHinges,
     Strains,
     Unstrained,
     largest_turn,
 )
-from foldyn.mechanics.energy import gradients
-from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
 from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_tangent
-from foldyn.mechanics.term import Folds, Term
+from foldyn.mechanics.term import Compiled, Folds
 
 GROUPS: Mapping[str, str] = {
     "strain_bars": "strain energy of the bars",
@@ -34,8 +35,8 @@ GROUPS: Mapping[str, str] = {
 SMALL = 300  # nodes below which all values are in the cache anyway, whatever their order
 
 
-class BarsHingesBody(Body):
-    """A model of bars and hinges; see `mechanics.body.Body`.
+class BarsHingesTerm(SheetTerm):
+    """A model of bars and hinges; see `mechanics.sheet_term.SheetTerm`.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ class BarsHingesBody(Body):
         Laws of the folds and of the bends, and how many there are of each.
     softness : ndarray, shape (nf,)
         Of the panels beside the folds, rad/(N m).
-    like : BarsHingesBody, optional
+    like : BarsHingesTerm, optional
         One whose elements have the same nodes.
     """
 
@@ -55,15 +56,15 @@ class BarsHingesBody(Body):
 
     def __init__(
         self, model: BarsHinges, turning: NDArray, laws: tuple[tuple[HingeLaw, int], ...],
-        softness: NDArray, like: BarsHingesBody | None = None,
+        softness: NDArray, like: BarsHingesTerm | None = None,
     ) -> None:  # fmt: skip
         self.model, self._turning, self._laws, self._like = model, turning, laws, like
         self._softness, self.offsets = softness, len(softness) if softness.any() else 0
         self.size, self.rows = model.rest.size, len(model.rest)
 
-    def _with(self, model: BarsHinges) -> BarsHingesBody:
-        """Another body whose elements have the same nodes."""
-        return BarsHingesBody(model, self._turning, self._laws, self._softness, self)
+    def _with(self, model: BarsHinges) -> BarsHingesTerm:
+        """Another sheet whose elements have the same nodes."""
+        return BarsHingesTerm(model, self._turning, self._laws, self._softness, self)
 
     def _nodal(self, q: NDArray) -> NDArray:
         return np.ascontiguousarray(q, float).reshape(self.model.rest.shape)
@@ -75,32 +76,15 @@ class BarsHingesBody(Body):
 
     @property
     def threads(self) -> int:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return mechanics.threads_for(self.model)
 
-    def energies(self, q: NDArray) -> NDArray:
-        """See `Body`."""
-        out = np.empty(len(GROUPS))
-        mechanics.strain_energies(self.model, self._nodal(q), out)
-        return out
-
-    def internal(self, q: NDArray, work: mechanics.Workspace | None = None) -> NDArray:
-        """See `Body`."""
-        force = np.empty(self.model.rest.shape)
-        work = mechanics.workspace(self.model) if work is None else work
-        mechanics.internal_force(self.model, self._nodal(q), force, work, False)
-        return force.ravel()
-
-    def hinge_forces(self, q: NDArray, work: mechanics.Workspace | None = None) -> NDArray:
-        """See `Body`."""
-        return self._hinges_alone().internal(q, work)
-
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return mechanics.tangent(self.model, self.sparsity, self._nodal(q), floor).tocsr()
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
-        """See `Body` and `mechanics.step_tangent`."""
+        """See `SheetTerm` and `mechanics.step_tangent`."""
         pattern, again = self.sparsity, before is not None
         data, old = np.empty((len(pattern.indices), 3, 3)), q if before is None else before
         put_tangent(self.model, pattern, self._nodal(q), self._nodal(old), again, data)
@@ -108,30 +92,30 @@ class BarsHingesBody(Body):
         return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=shape).tocsr()
 
     def blocks(self) -> BarsHingesBlocks:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return BarsHingesBlocks(self.model)
 
     def workspaces(self, threads: int) -> list[mechanics.Workspace]:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return mechanics.workspaces(self.model, threads)
 
-    def terms(self, work: mechanics.Workspace) -> list[Term]:
-        """See `Body`."""
-        return [bars_hinges_term(self.model, work, len(GROUPS))]
+    def compiled(self, work: Any, kept: mechanics.Workspace, group: int) -> Compiled:
+        """See `Term`."""
+        return bars_hinges_kernels(self.model, kept, len(GROUPS))
 
     @property
     def hinges(self) -> NDArray:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return self.model.hinges
 
     @property
     def folds(self) -> Folds:
-        """See `Body`."""
+        """See `SheetTerm`."""
         model = self.model
         return Folds(model.hinge_rest, model.hinge_parameters, model.hinge_stiffness)
 
     def angles(self, q: NDArray) -> NDArray:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return mechanics.angles(self.model.rest + self._nodal(q), self.model.hinges)
 
     def turn(self, q: NDArray, other: NDArray) -> float:
@@ -150,11 +134,11 @@ class BarsHingesBody(Body):
         return np.repeat(nodal, 3)
 
     def turning_moments(self) -> float:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return float(self.model.hinge_stiffness.sum())
 
     def longest(self) -> float:
-        """See `Body`."""
+        """See `SheetTerm`."""
         per_length2 = self.model.bar_per_length2
         if not per_length2.size:
             return float(np.ptp(self.model.rest, axis=0).max())
@@ -167,7 +151,7 @@ class BarsHingesBody(Body):
         return np.flatnonzero(np.repeat(runs[:, 2], runs[:, 1] - runs[:, 0]) == Superlinear.code)
 
     def soft_hinges(self, q: NDArray) -> SoftHinges:
-        """See `Body`."""
+        """See `SheetTerm`."""
         model, rows = self.model, self._soft
         columns = 3 * model.hinges[rows].astype(np.int64)[:, :, None] + np.arange(3)
         entries = gradients(model, self._nodal(q))[rows].ravel()
@@ -177,29 +161,29 @@ class BarsHingesBody(Body):
         return SoftHinges(offset, model.hinge_stiffness[rows], gradient)
 
     def soft_tangent(self, q: NDArray, slope: NDArray) -> sparse.csr_array:
-        """See `Body`."""
-        alone = self.nominal(q)._hinges_alone().model
+        """See `SheetTerm`."""
+        alone = self.nominal(q).hinges_alone().model
         stiffness = np.zeros(len(alone.hinges))
         stiffness[self._soft] = alone.hinge_stiffness[self._soft] * slope
         return self._with(alone._replace(hinge_stiffness=stiffness)).tangent(q)
 
     @property
     def rest_angles(self) -> NDArray:
-        """See `Body`: of the folds, of the bends, and offsets."""
+        """See `SheetTerm`: of the folds, of the bends, and offsets."""
         offsets = self.model.hinge_offset[self._turning[: self.offsets], 0]
         return np.append(self.model.hinge_rest[self._turning], offsets)
 
     def rest_law(self, number: int) -> HingeLaw:
-        """See `Body`."""
+        """See `SheetTerm`."""
         (folds, count), (bends, _) = self._laws
         return bends if count <= number < len(self._turning) else folds
 
     def fold_hinges(self) -> FoldHinges:
-        """See `Body`: one of each."""
+        """See `SheetTerm`: one of each."""
         return self._hinges_at(self._turning[: self._laws[0][1]], self._softness)
 
     def bend_hinges(self) -> FoldHinges:
-        """See `Body`."""
+        """See `SheetTerm`."""
         rows = self._turning[self._laws[0][1] :]
         return self._hinges_at(rows, np.zeros(len(rows)))
 
@@ -211,8 +195,8 @@ class BarsHingesBody(Body):
             model.hinge_stiffness[rows], softness, rows,
         )  # fmt: skip
 
-    def strains(self) -> Strains:
-        """See `Body`."""
+    def own_strains(self) -> Strains:
+        """See `SheetTerm`."""
         model, angle = self.model, self.angles(np.zeros(self.size))
         bars, hinges = model.bars.astype(np.int64), model.hinges.astype(np.int64)
         slope, turn = np.empty(len(bars)), np.empty(len(hinges))
@@ -228,8 +212,8 @@ class BarsHingesBody(Body):
             hinges, model.rest[hinges], model.hinge_stiffness * turn,
         )  # fmt: skip
 
-    def folded(self, rest: NDArray) -> BarsHingesBody:
-        """See `Body`."""
+    def folded(self, rest: NDArray) -> BarsHingesTerm:
+        """See `SheetTerm`."""
         angle, parameters = self.model.hinge_rest.copy(), self.model.hinge_parameters.copy()
         offset, count = self.model.hinge_offset.copy(), len(self._turning)
         angle[self._turning], start = rest[:count], 0
@@ -244,8 +228,8 @@ class BarsHingesBody(Body):
         )
         return self._with(model)
 
-    def actuated(self, numbers: NDArray) -> tuple[BarsHingesBody, NDArray, NDArray]:
-        """See `Body`."""
+    def actuated(self, numbers: NDArray) -> tuple[BarsHingesTerm, NDArray, NDArray]:
+        """See `SheetTerm`."""
         model = self.model
         own = model._replace(
             hinge_rest=model.hinge_rest.copy(), hinge_parameters=model.hinge_parameters.copy(),
@@ -255,32 +239,32 @@ class BarsHingesBody(Body):
         return self._with(own), rows[numbers], np.arange(len(numbers))
 
     def turned(self) -> tuple[NDArray, NDArray]:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return self.model.hinge_rest, np.arange(len(self.model.hinge_rest))
 
     def series(self) -> tuple[NDArray, NDArray]:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return self.model.hinge_share, self.model.hinge_offset
 
     def lowest_nodes(self, turned: NDArray) -> NDArray:
-        """See `Body`."""
+        """See `SheetTerm`."""
         return self.model.hinges[turned].min(axis=1)
 
-    def renumbered(self) -> tuple[BarsHingesBody, NDArray]:
-        """See `Body`: along the sheet, unless it is small."""
+    def renumbered(self) -> tuple[BarsHingesTerm, NDArray]:
+        """See `SheetTerm`: along the sheet, unless it is small."""
         if self.rows < SMALL:
             return self, np.arange(self.rows)
         order = node_order(self.model)
         model, rows = renumber(self.model, order)
         turning = ranks(rows)[self._turning]
-        return BarsHingesBody(model, turning, self._laws, self._softness), order
+        return BarsHingesTerm(model, turning, self._laws, self._softness), order
 
-    def _hinges_alone(self) -> BarsHingesBody:
-        """The body without its bars."""
+    def hinges_alone(self) -> BarsHingesTerm:
+        """See `SheetTerm`."""
         return self._with(self.model._replace(bar_runs=self.model.bar_runs[:0]))
 
-    def nominal(self, q: NDArray) -> BarsHingesBody:
-        """See `Body`."""
+    def nominal(self, q: NDArray) -> BarsHingesTerm:
+        """See `SheetTerm`."""
         runs = self.model.hinge_runs.copy()
         runs[:, 2] = 0  # the linear law
         model, offset = self.model, np.zeros_like(self.model.hinge_offset)
@@ -289,11 +273,11 @@ class BarsHingesBody(Body):
         )
 
     def unstrained(self, q: NDArray) -> Unstrained:
-        """See `Body`."""
-        body = self._with(self.unstrained_model(q))
+        """See `SheetTerm`."""
+        sheet = self._with(self.unstrained_model(q))
         rest = np.zeros(self.size)
         return Unstrained(
-            body.tangent(rest), body._hinges_alone().tangent(rest), partial(stretch, body.model)
+            sheet.tangent(rest), sheet.hinges_alone().tangent(rest), partial(stretch, sheet.model)
         )
 
     def unstrained_model(self, q: NDArray) -> BarsHinges:

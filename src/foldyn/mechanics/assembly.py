@@ -1,0 +1,407 @@
+"""A model as solvers see it: the energies, forces and tangents of a list of terms, added up.
+
+The m dofs are 3 node + axis, then the hidden ones: those without mass that a sheet may have beside
+the displacements of its nodes. Compiled loops hold them in arrays with a row of three per node,
+(rows, 3); hidden dofs follow in further rows, the last one filled up. Either form is taken.
+
+The first term is the sheet, which numbers the dofs; springs, clamped edges, contact and hinges with
+memory follow. They are added up in the order of the list. What makes another assembly of one
+(`folded`, `nominal`, ...) leaves it as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from foldyn.errors import ComputationError
+from foldyn.mechanics.model import ranks
+from foldyn.mechanics.sheet_term import Blocks, SheetTerm, Strains, Unstrained, largest_turn
+from foldyn.mechanics.step_tangent import FLOOR
+from foldyn.mechanics.tangent import Sparsity, block_keys, joined
+from foldyn.mechanics.term import Compiled, Model, Term, evaluate
+from foldyn.mechanics.threads import Team
+
+ITERATIONS = 50
+BALANCED = 1e-13  # rad, of the last step of Newton's method for hidden dofs
+LEAST_SLOPE = 1e-3  # of a fold's stiffness, in these steps
+
+Kind = TypeVar("Kind", bound=Term)
+
+
+class Work(NamedTuple):
+    """Memory of a thread."""
+
+    sheet: Any  # of the sheet's kernels
+    angle: NDArray  # (nh,) dihedrals of all hinges at the last force, rad
+    fold_angle: NDArray  # those of what actuators turn
+    strips: Any
+    team: Team
+    kept: tuple[Any, ...]  # of the other terms
+
+
+class Assembly:
+    """A list of terms; the arrays and contexts of their kernels live as long as it does.
+
+    Parameters
+    ----------
+    sheet : SheetTerm
+    *others : Term
+        What adds to it.
+
+    Attributes
+    ----------
+    sheet : SheetTerm
+    others : tuple of Term
+    size, rows : int
+        Number m of the dofs, and rows of the arrays that hold them.
+    hidden : ndarray of int
+        Dofs beside the displacements of the nodes: they have no mass.
+    energy_groups : tuple of str
+        Names of the parts of the energy.
+    """
+
+    def __init__(self, sheet: SheetTerm, *others: Term) -> None:
+        self.sheet, self.others = sheet, others
+        self.terms: tuple[Term, ...] = (sheet, *others)
+        self.size, self.rows, self.hidden = sheet.size, sheet.rows, sheet.hidden
+        self.energy_groups = tuple(name for term in self.terms for name in term.energy_groups)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what holds addresses of this process."""
+        return {name: value for name, value in vars(self).items() if name != "_evaluated"}
+
+    def find(self, kind: type[Kind]) -> Kind | None:
+        """The term of a kind, if there is one."""
+        return next((term for term in self.others if isinstance(term, kind)), None)
+
+    def with_terms(self, *terms: Term) -> Assembly:
+        """The same with further terms."""
+        return Assembly(self.sheet, *self.others, *terms)
+
+    # ------------------------------------------------------------------ energies and forces
+    def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
+        """Vector (m,) of displacements (n, 3), the hidden dofs in balance, by Newton's method.
+
+        push : forces (m,), N, of which those on the hidden dofs count; none by default.
+
+        Raises
+        ------
+        ComputationError
+            There are none near zero.
+        """
+        q = np.concatenate([np.asarray(displacement, float).ravel(), np.zeros(len(self.hidden))])
+        if not len(self.hidden):
+            return q
+        first, body = self.size - len(self.hidden), self._sheet_alone
+        for _ in range(ITERATIONS):
+            couple = body.internal(q)[first:]
+            if push is not None:
+                couple -= push[self.hidden]
+            if not couple.any():
+                return q
+            stiffness = self.sheet.tangent(q, LEAST_SLOPE)[first:][:, first:]
+            step = splu(sparse.csc_array(stiffness)).solve(-couple)
+            q[first:] += step
+            if self.sheet.per_hidden * np.abs(step).max(initial=0.0) <= BALANCED:
+                return q
+        raise ComputationError("the rotations of the panels do not balance at this displacement")
+
+    @cached_property
+    def _sheet_alone(self) -> Assembly:
+        return Assembly(self.sheet) if self.others else self
+
+    @cached_property
+    def _evaluated(self) -> Model:
+        """The model for evaluations one after the other."""
+        return Model(self, self._work(1, [term.memory for term in self.others])[0], limited=False)
+
+    def _at(self, q: NDArray, energy: NDArray) -> NDArray:
+        """Internal forces (m,) at q; with energies by group, to `energy`, if there is room."""
+        for term in self.others:
+            term.prepare()
+        u, force = self.in_rows(q), np.zeros((2, self.rows, 3))
+        evaluate(self._evaluated.terms, u, force[0], force[1], energy)
+        return force[1].ravel()[: self.size]
+
+    def in_rows(self, q: NDArray) -> NDArray:
+        """Dofs (m,) or (rows, 3) as (rows, 3)."""
+        flat = np.ascontiguousarray(q, float).ravel()
+        return np.pad(flat, (0, 3 * self.rows - flat.size)).reshape(-1, 3)
+
+    def energies(self, q: NDArray) -> NDArray:
+        """Strain energies (J) by group."""
+        energy, first = np.empty(len(self.energy_groups)), len(self.sheet.energy_groups)
+        self._at(q, energy)
+        for term in self.others:
+            energy[first : first + len(term.energy_groups)] += term.stored()
+            first += len(term.energy_groups)
+        return energy
+
+    def internal(self, q: NDArray) -> NDArray:
+        """Internal forces (m,), N, the gradient of the energy."""
+        return self._at(q, np.zeros(0))
+
+    def hinge_forces(self, q: NDArray) -> NDArray:
+        """Those of hinges (bending and folds) alone: forces at play even where all is at rest."""
+        return np.zeros(self.size) if self._hinges is None else self._hinges.internal(q)
+
+    @cached_property
+    def _hinges(self) -> Assembly | None:
+        alone = self.sheet.hinges_alone()
+        others = [term for term in self.others if term.of_hinges]
+        return None if alone is None else Assembly(alone, *others)
+
+    # ------------------------------------------------------------------ tangents
+    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
+        """Derivative (m, m) of the forces; slopes per unit stiffness below `floor` are raised."""
+        return self._plus(self.sheet.tangent(q, floor), q, floor)
+
+    def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
+        """The matrix that a step of Newton's method takes at q, after one from `before`."""
+        return self._plus(self.sheet.step_tangent(q, before), q, FLOOR)
+
+    def _plus(self, matrix: sparse.csr_array, q: NDArray, floor: float) -> sparse.csr_array:
+        flat = np.ascontiguousarray(q, float).ravel()[: self.size]
+        for term in self.others:
+            matrix = sparse.csr_array(matrix + term.tangent(flat, floor))
+        return matrix
+
+    def blocks(self) -> Blocks:
+        """The same for implicit integrators, but for contact; see `mechanics.step_tangent`."""
+        return AssembledBlocks(self)
+
+    # ------------------------------------------------------------------ what is compiled
+    def workspaces(self, threads: int) -> list[Work]:
+        """Memory of the kernels on each thread, on fewer than asked for if need be."""
+        return self._work(threads)
+
+    def _work(self, threads: int, kept: Sequence[Any] | None = None) -> list[Work]:
+        """The same, with what the terms keep for evaluations or new memory for all."""
+        alone = not all(term.shared for term in self.terms)
+        works: Sequence[Any] = self.sheet.workspaces(1 if alone else threads)
+        count = sum(len(term.hinges) for term in self.others)
+        if count:  # whose dihedrals follow, as bars and hinges alone have them
+            angle = np.empty(len(works[0].angle) + count)
+            own = angle[: len(works[0].angle)]
+            works = [works[0]._replace(angle=own, fold_angle=own)]
+        else:
+            angle = works[0].angle
+        columns = (
+            [term.memories(works) for term in self.others]
+            if kept is None
+            else [[memory] for memory in kept]
+        )
+        return [
+            Work(
+                work, angle if count else work.angle, work.fold_angle, work.strips, work.team,
+                tuple(column[k] for column in columns),
+            )
+            for k, work in enumerate(works)
+        ]  # fmt: skip
+
+    def compiled(self, work: Work) -> list[Compiled]:
+        """The terms for a thread with this memory."""
+        found, group = [self.sheet.compiled(work, work.sheet, 0)], len(self.sheet.energy_groups)
+        for term, kept in zip(self.others, work.kept, strict=True):
+            found.append(term.compiled(work, kept, group))
+            group += len(term.energy_groups)
+        return found
+
+    def kept(self, work: Work, kind: type[Term]) -> Any:
+        """What the term of a kind has in the memory of a thread; None without such a term."""
+        terms = zip(self.others, work.kept, strict=True)
+        return next((kept for term, kept in terms if isinstance(term, kind)), None)
+
+    @property
+    def threads(self) -> int:
+        """Threads on which a motion runs fastest."""
+        return self.sheet.threads if all(term.shared for term in self.terms) else 1
+
+    @property
+    def has_discrete_gradient(self) -> bool:
+        """Whether `dynamics.energy_momentum` takes it."""
+        return all(term.has_discrete_gradient for term in self.terms)
+
+    # ------------------------------------------------------------------ measures
+    @property
+    def hinges(self) -> NDArray:
+        """Rows (nh, 4) of all hinges; -1 for a wing that is no node."""
+        return np.concatenate([term.hinges.astype(np.int64) for term in self.terms])
+
+    def angles(self, q: NDArray) -> NDArray:
+        """Their dihedrals (nh,), rad."""
+        return np.concatenate([term.angles(q) for term in self.terms])
+
+    def turn(self, q: NDArray, other: NDArray) -> float:
+        """Largest turn (rad) of a part between two states; inf if parts collide."""
+        turn = self.sheet.turn(q, other)
+        for term in self.others:
+            turn = largest_turn(turn, term.angles(q), term.angles(other))
+        return turn
+
+    def scale(self) -> NDArray:
+        """Forces (m,), N, at the dofs under a strain of one, whose rounding errors stay."""
+        scale = self.sheet.scale()
+        for term in self.others:
+            term.add_scale(scale)
+        return scale
+
+    def holds(self, q: NDArray) -> sparse.csr_array:
+        """Unit rows (s, m) of what keeps it in place beside supports: motions along them strain."""
+        q = np.append(q, np.zeros(self.size - len(q)))
+        return sparse.csr_array(sparse.vstack([term.holds(q) for term in self.terms]))
+
+    def turning_moments(self) -> float:
+        """Sum of the hinges' moments (N m) for a turn of one."""
+        return sum(term.turning_moments() for term in self.terms)
+
+    def strains(self) -> Strains | None:
+        """Its bars and hinges; None where panels bend as plates."""
+        found = self.sheet.own_strains()
+        if found is not None:
+            for term in self.others:
+                found = term.strains(found)
+        return found
+
+    # ------------------------------------------------------------------ other assemblies
+    def on(self, sheet: SheetTerm) -> Assembly:
+        """The same terms on a sheet with other rest angles."""
+        return Assembly(sheet, *(term.on(sheet) for term in self.others))
+
+    def folded(self, rest: NDArray) -> Assembly:
+        """The same with other rest angles (nr,), rad."""
+        return self.on(self.sheet.folded(rest))
+
+    def renumbered(self) -> tuple[Assembly, Numbering]:
+        """The same as it stands in memory while a motion is computed."""
+        sheet, order = self.sheet.renumbered()
+        body = Assembly(sheet)
+        for term in self.others:
+            body = body.with_terms(term.placed(order, body))
+        return body, Numbering(order, ranks(order), self.rows)
+
+    def nominal(self, q: NDArray) -> Assembly:
+        """The same with hinges as stiff as they are meant to be, about their angles at q."""
+        sheet: Any = self.sheet.nominal(q)
+        others = (term.nominal(q) for term in self.others)
+        return Assembly(sheet, *(term.on(sheet) for term in others if term is not None))
+
+    def unstrained(self, q: NDArray) -> Unstrained | None:
+        """The same as if it had no strain at q; None where only rigid motions could keep it so."""
+        whole = self.sheet.unstrained(q)
+        if whole is None:
+            return None
+        for term in self.others:
+            own = term.unstrained(q)
+            whole = whole if own is None else _together(whole, own)
+        return whole
+
+
+class AssembledBlocks:
+    """Blocks of all terms that have places in a tangent; see `mechanics.sheet_term.Blocks`."""
+
+    def __init__(self, body: Assembly) -> None:
+        self._sheet, self._rows = body.sheet.blocks(), body.rows
+        self._places = [term.places for term in _with_places(body)]
+        self.pattern = self._sheet.pattern
+        for row, column in self._places:
+            self.pattern = joined(self.pattern, self._keys(row, column))
+        self.order, self.unused = self._sheet.order, self._sheet.unused
+        self._slots: tuple[Sparsity, list[NDArray]] | None = None
+
+    def put(
+        self, of: Assembly, pattern: Sparsity, u: NDArray, before: NDArray, again: bool,
+        out: NDArray,
+    ) -> None:  # fmt: skip
+        """See `Blocks`."""
+        self._sheet.put(of.sheet, pattern, u, before, again, out)
+        for slots, term in zip(self._slots_in(pattern), _with_places(of), strict=True):
+            np.add.at(out.reshape(-1), slots, term.entries(u, FLOOR))
+
+    def filled(self, pattern: Sparsity) -> NDArray:
+        """See `Blocks`."""
+        filled = self._sheet.filled(pattern)
+        for slots in self._slots_in(pattern):
+            filled.reshape(-1)[slots] = True
+        return filled
+
+    def _keys(self, row: NDArray, column: NDArray) -> NDArray:
+        return row // 3 * self._rows + column // 3
+
+    def _slots_in(self, pattern: Sparsity) -> list[NDArray]:
+        """Where the entries of each term stand among those of a pattern's blocks."""
+        if self._slots is None or self._slots[0] is not pattern:
+            keys = block_keys(pattern.indptr, pattern.indices)
+            found = [
+                9 * np.searchsorted(keys, self._keys(row, column)) + 3 * (row % 3) + column % 3
+                for row, column in self._places
+            ]
+            self._slots = pattern, found
+        return self._slots[1]
+
+
+def _with_places(body: Assembly) -> list[Term]:
+    """Its terms, without the sheet, that have places in a tangent."""
+    return [term for term in body.others if len(term.places[0])]
+
+
+def _together(one: Unstrained, other: Unstrained) -> Unstrained:
+    """Two of them, of the same dofs."""
+    return Unstrained(
+        sparse.csr_array(one.tangent + other.tangent),
+        sparse.csr_array(one.hinges + other.hinges),
+        lambda motion: max(one.stretch(motion), other.stretch(motion)),
+    )
+
+
+class Numbering(NamedTuple):
+    """The order of the nodes in memory while a motion is computed: along the sheet.
+
+    What goes in and what comes out has the structure's own numbers. Place k in memory holds node
+    order[k]; node i stands at place rank[i].
+
+    After the nodes come the rows of the dofs beside displacements, which keep their order.
+    """
+
+    order: NDArray  # (n,)
+    rank: NDArray  # (n,)
+    rows: int  # of arrays in memory, n or more
+
+    def inward(self, values: NDArray) -> NDArray:
+        """Values per node (n, ...) as they stand in memory, zero in further rows (rows, ...)."""
+        out = np.zeros((self.rows, *values.shape[1:]), values.dtype)
+        out[: len(self.order)] = values[self.order]
+        return out
+
+    def held(self, fixed: NDArray) -> NDArray:
+        """Mask of held dofs (n, 3) as it stands in memory, True in further rows (rows, 3)."""
+        out = self.inward(fixed)
+        out[len(self.order) :] = True
+        return out
+
+    def outward(self, values: NDArray) -> NDArray:
+        """Values per place (n, ...) by node."""
+        return np.ascontiguousarray(values[self.rank])
+
+    def dofs(self, dofs: NDArray) -> NDArray:
+        """Numbers 3 place + axis of dofs 3 node + axis."""
+        return (3 * self.rank[np.asarray(dofs) // 3] + np.asarray(dofs) % 3).astype(np.int64)
+
+    def matrix(self, matrix: sparse.csr_array) -> sparse.csr_array:
+        """Nodal (n, n) matrix, or one of all dofs, as it stands in memory."""
+        places, size = self.order, self.rows
+        if matrix.shape[0] > len(places):
+            places = (3 * places[:, None] + np.arange(3)).ravel()
+            places = np.concatenate([places, np.arange(len(places), matrix.shape[0])])
+            size = 3 * self.rows
+        placed = sparse.csr_array(sparse.csr_array(matrix)[places][:, places])
+        placed.resize((size, size))
+        placed.sort_indices()
+        return placed

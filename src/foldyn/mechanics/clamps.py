@@ -1,0 +1,206 @@
+"""Clamped edges: they hold the tangents of panels.
+
+A *clamp* at an edge j-k is a hinge (j, k, i, wing) with a linear law, whose wing is no node but
+rides on the mean displacement of j and k. It keeps its direction in space and strains nothing when
+the edge is moved as a whole.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.jit.context import Context, contents, numbers_at, rows_at
+from foldyn.mechanics.block_matrix import pairs_within, places_of
+from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient
+from foldyn.mechanics.model import ranks
+from foldyn.mechanics.sheet_term import Strains, Unstrained, unit_rows
+from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Term, energies, forces, nodal
+
+RIDES = -1  # in place of the node of a wing that rides
+
+
+class Clamps(NamedTuple):
+    """Arrays of c clamped edges."""
+
+    nodes: NDArray  # (c, 3) axis j, k and wing i
+    points: NDArray  # (c, 4, 3) rest positions of j, k, i and of the wing that rides, m
+    rest: NDArray  # (c,) rad
+    stiffness: NDArray  # (c,) N m/rad
+    group: int  # of the model's energies, to which theirs is added
+
+
+@inner_scalar
+def clamp_dihedral(clamps, u, e):
+    """Dihedral (rad) of a clamp at displacement u, followed by its gradient (12 numbers)."""
+    p = clamps.points
+    j, k, i = clamps.nodes[e, 0], clamps.nodes[e, 1], clamps.nodes[e, 2]
+    return dihedral_gradient(
+        p[e, 0, 0] + u[j, 0], p[e, 0, 1] + u[j, 1], p[e, 0, 2] + u[j, 2],
+        p[e, 1, 0] + u[k, 0], p[e, 1, 1] + u[k, 1], p[e, 1, 2] + u[k, 2],
+        p[e, 2, 0] + u[i, 0], p[e, 2, 1] + u[i, 1], p[e, 2, 2] + u[i, 2],
+        p[e, 3, 0] + 0.5 * (u[j, 0] + u[k, 0]),
+        p[e, 3, 1] + 0.5 * (u[j, 1] + u[k, 1]),
+        p[e, 3, 2] + 0.5 * (u[j, 2] + u[k, 2]),
+    )  # fmt: skip
+
+
+@kernel
+def clamp_angles(clamps, u):
+    """Dihedrals (c,), rad, and their gradients (c, 9) with respect to j, k, i."""
+    angle, gradient = np.empty(clamps.rest.size), np.empty((clamps.rest.size, 9))
+    for e in range(angle.size):
+        found = clamp_dihedral(clamps, u, e)
+        angle[e] = found[0]
+        for c in range(9):
+            gradient[e, c] = found[1 + c]
+            if c < 6:
+                gradient[e, c] += 0.5 * found[10 + c % 3]
+    return angle, gradient
+
+
+@inner
+def add_clamp_forces(clamps, u, force, angle):
+    """Add the forces of clamps to those of the nodes; their dihedrals end `angle`."""
+    first = angle.size - clamps.rest.size
+    for e in range(clamps.rest.size):
+        found = clamp_dihedral(clamps, u, e)
+        angle[first + e] = found[0]
+        moment = clamps.stiffness[e] * (found[0] - clamps.rest[e])
+        for c in range(3):
+            carried = 0.5 * found[10 + c]
+            force[clamps.nodes[e, 0], c] += moment * (found[1 + c] + carried)
+            force[clamps.nodes[e, 1], c] += moment * (found[4 + c] + carried)
+            force[clamps.nodes[e, 2], c] += moment * found[7 + c]
+
+
+@inner
+def clamp_energy(clamps, u):
+    """Energy (J) of clamps."""
+    energy = 0.0
+    for e in range(clamps.rest.size):
+        turned = clamp_dihedral(clamps, u, e)[0] - clamps.rest[e]
+        energy += 0.5 * clamps.stiffness[e] * turned * turned
+    return energy
+
+
+@kernel
+def clamp_blocks(clamps, u):
+    """Tangent (c, 3, 3, 3, 3), N/m, of clamps: node, node, axis, axis."""
+    out = np.empty((clamps.rest.size, 3, 3, 3, 3))
+    points, gradient, block = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3, 4, 3))
+    for e in range(clamps.rest.size):
+        found = clamp_dihedral(clamps, u, e)
+        for c in range(3):
+            for v in range(3):
+                points[v, c] = clamps.points[e, v, c] + u[clamps.nodes[e, v], c]
+            mean = 0.5 * (u[clamps.nodes[e, 0], c] + u[clamps.nodes[e, 1], c])
+            points[3, c] = clamps.points[e, 3, c] + mean
+            for v in range(4):
+                gradient[v, c] = found[1 + 3 * v + c]
+        stiffness = clamps.stiffness[e]
+        for v in range(4):
+            for a in range(3):
+                for w in range(4):
+                    for b in range(3):
+                        block[v, a, w, b] = stiffness * gradient[v, a] * gradient[w, b]
+        add_hessian(points, gradient, stiffness * (found[0] - clamps.rest[e]), block)
+        carry_wing(block)
+        for v in range(3):
+            for w in range(3):
+                for a in range(3):
+                    for b in range(3):
+                        out[e, v, w, a, b] = block[v, a, w, b]
+    return out
+
+
+class _Context(NamedTuple):
+    clamps: Clamps
+    angle: NDArray  # (nh + c,) dihedrals of all hinges, theirs at the end
+    rows: int
+
+
+@forces
+def _forces(context, u, v, t, force, powers):
+    own = contents(context)
+    add_clamp_forces(own.clamps, rows_at(u, own.rows), rows_at(force, own.rows), own.angle)
+
+
+@energies
+def _energies(context, u, out):
+    own = contents(context)
+    group = own.clamps.group
+    numbers_at(out, group + 1)[group] += clamp_energy(own.clamps, rows_at(u, own.rows))
+
+
+class ClampsTerm(Term):
+    """Clamped edges, whose energy belongs to a group of the sheet.
+
+    Parameters
+    ----------
+    clamps : Clamps
+    """
+
+    of_hinges = True
+
+    def __init__(self, clamps: Clamps) -> None:
+        self.clamps = clamps
+
+    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+        """See `Term`; their dihedrals end those of the thread."""
+        own = Context(_Context(self.clamps, work.angle, int(work.strips.own[1])))
+        return Compiled(own, {FORCES: _forces, ENERGIES: _energies})
+
+    @cached_property
+    def places(self) -> tuple[NDArray, NDArray]:
+        """See `Term`."""
+        return places_of(pairs_within(self.clamps.nodes))
+
+    def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
+        """See `Term`."""
+        return clamp_blocks(self.clamps, nodal(q)).ravel()
+
+    def unstrained(self, q: NDArray) -> Unstrained:
+        """See `Term`."""
+        tangent = self.nominal(q).tangent(q)
+        return Unstrained(tangent, tangent, lambda motion: 0.0)
+
+    @property
+    def hinges(self) -> NDArray:
+        """See `Term`."""
+        own = self.clamps.nodes
+        return np.column_stack([own, np.full(len(own), RIDES)])
+
+    def angles(self, q: NDArray) -> NDArray:
+        """See `Term`."""
+        return clamp_angles(self.clamps, nodal(q))[0]
+
+    def holds(self, q: NDArray) -> sparse.csr_array:
+        """See `Term`: as they turn."""
+        return unit_rows(self.clamps.nodes, clamp_angles(self.clamps, nodal(q))[1], q.size)
+
+    def turning_moments(self) -> float:
+        """See `Term`."""
+        return float(self.clamps.stiffness.sum())
+
+    def strains(self, others: Strains) -> Strains:
+        """See `Term`; a clamp's wing has the node of its first end (`viscous.hinge_gradient`)."""
+        clamps = self.clamps
+        return others._replace(
+            hinges=np.concatenate([others.hinges, clamps.nodes[:, [0, 1, 2, 0]]]),
+            corners=np.concatenate([others.corners, clamps.points]),
+            hinge_stiffness=np.concatenate([others.hinge_stiffness, clamps.stiffness]),
+        )
+
+    def placed(self, order: NDArray, before: Any) -> ClampsTerm:
+        """See `Term`."""
+        return ClampsTerm(self.clamps._replace(nodes=ranks(order)[self.clamps.nodes]))
+
+    def nominal(self, q: NDArray) -> ClampsTerm:
+        """See `Term`."""
+        return ClampsTerm(self.clamps._replace(rest=self.angles(q)))

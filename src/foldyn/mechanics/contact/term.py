@@ -1,0 +1,224 @@
+"""Contact: parts of a sheet touch each other and planes, as solvers see it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.block_matrix import assembled, pairs_within
+from foldyn.mechanics.contact.approach import KEEP, clear_share
+from foldyn.mechanics.contact.forces import add_contact
+from foldyn.mechanics.contact.friction import Friction, stored
+from foldyn.mechanics.contact.holding import held_by_panels, held_by_planes
+from foldyn.mechanics.contact.kernels import contact_kernels
+from foldyn.mechanics.contact.memory import Memory, memories, memory
+from foldyn.mechanics.contact.pairs import VERTEX
+from foldyn.mechanics.contact.rubbing import add_rubs
+from foldyn.mechanics.contact.tables import HISTORY, NORMAL, Sheets, Tables, tables
+from foldyn.mechanics.contact.tangent import (
+    guard_tangents,
+    pair_tangents,
+    plane_tangents,
+    touching_pairs,
+)
+from foldyn.mechanics.sheet_term import Unstrained
+from foldyn.mechanics.term import Compiled, Term, nodal
+
+GROUP = "contact"
+
+
+class ContactTerm(Term):
+    """Contact; see `Term`.
+
+    Friction acts where springs are tied: on paths of equilibria (`rubbing`), and in motions, which
+    have memory of their own. Elsewhere there is none.
+
+    Which nodes touch changes, so its tangent has no places of its own in a step's matrix.
+
+    Parameters
+    ----------
+    sheets : Sheets
+        What may touch.
+    guarded : Assembly
+        The terms before it, whose hinges it guards.
+    """
+
+    energy_groups = (GROUP,)
+    shared = True
+    has_discrete_gradient = True  # that of the solver
+
+    def __init__(self, sheets: Sheets, guarded: Assembly) -> None:
+        self.sheets, self._guarded = sheets, guarded
+        self._moved = np.zeros((len(sheets.planes), 3))
+
+    @cached_property
+    def tables(self) -> Tables:
+        """What may touch, as arrays."""
+        return tables(self.sheets, self._guarded.hinges)
+
+    @cached_property
+    def memory(self) -> Memory:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """See `Term`: lists of pairs, which evaluations find again where they serve."""
+        return memory(self.tables, self.sheets.panels)
+
+    def _copy(self, **changes: Any) -> ContactTerm:
+        """The same but for some attributes, with the same tables and, unless given, lists."""
+        _ = self.tables, self.memory
+        other = copy(self)
+        vars(other).update(changes)
+        return other
+
+    def displaced(self, moved: NDArray) -> ContactTerm:
+        """The same with planes displaced by `moved` (p, 3), m."""
+        return self._copy(_moved=np.asarray(moved, float))
+
+    def rubbing(self) -> tuple[ContactTerm, Friction]:
+        """The same with springs of friction, and what keeps where they are tied."""
+        own = memory(self.tables, self.sheets.panels)
+        return self._copy(memory=own), Friction(self.tables, own)
+
+    def driven(self, rows: Mapping[int, int]) -> ContactTerm:
+        """The same with planes, by number, that move with histories of these numbers."""
+        planes = self.sheets.planes.copy()
+        for plane, row in rows.items():
+            planes[plane, HISTORY] = row
+        return ContactTerm(replace(self.sheets, planes=planes), self._guarded)
+
+    # ------------------------------------------------------------------ as a term
+    def compiled(self, work: Any, kept: Memory, group: int) -> Compiled:
+        """See `Term`."""
+        return contact_kernels(self.tables, kept, work.angle, group)
+
+    def memories(self, works: Sequence[Any]) -> list[Memory]:
+        """See `Term`."""
+        if len(works) == 1:  # which owns further rows, if there are some
+            return [memory(self.tables, self.sheets.panels)]
+        teams, own = [work.team for work in works], [work.strips.own for work in works]
+        return memories(self.tables, self.sheets.panels, teams, own)
+
+    def prepare(self) -> None:
+        """See `Term`: planes stand where they are."""
+        self.memory.moved[:, :3] = self._moved
+
+    def stored(self) -> float:
+        """See `Term`: what springs of friction store."""
+        return stored(self.tables, self.memory)
+
+    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
+        """See `Term`."""
+        self.contact(q)
+        return contact_tangent(self.tables, self.memory, q.size)
+
+    def placed(self, order: NDArray, before: Assembly) -> ContactTerm:
+        """See `Term`."""
+        return ContactTerm(self.sheets.placed(order), before)
+
+    def nominal(self, q: NDArray) -> None:
+        """See `Term`: none."""
+
+    def holds(self, q: NDArray) -> sparse.csr_array:
+        """See `Term`: planes hold nodes that touch them, panels each other, friction all axes."""
+        self.contact(q)
+        on_planes = held_by_planes(self.tables, self.memory, q.size)
+        on_panels = held_by_panels(self.tables, self.memory, q.size)
+        return sparse.csr_array(sparse.vstack([on_planes, on_panels]))
+
+    def unstrained(self, q: NDArray) -> Unstrained | None:
+        """See `Term`: what holds."""
+        held = self.holds(q)
+        if not held.shape[0]:
+            return None
+        return Unstrained(
+            sparse.csr_array(self.tables.stiffness * (held.T @ held)),
+            sparse.csr_array((q.size, q.size)),
+            lambda motion: float(np.abs(held @ motion).max() / np.abs(motion).max()),
+        )
+
+    # ------------------------------------------------------------------ forces
+    def contact(self, q: NDArray) -> tuple[float, NDArray]:
+        """Energy (J) of contact alone and the force (n, 3), N, against it, friction included."""
+        u = nodal(q)[: len(self.tables.rest)]
+        force = np.zeros_like(u)
+        self.prepare()
+        add_contact(self.tables, u, self._guarded.angles(q), force, self.memory)
+        return float(self.memory.facts.energy), force
+
+    def nearest(self, q: NDArray) -> tuple[float, float, NDArray]:
+        """Energy (J) of contact between panels, and which of them are nearest to each other.
+
+        That is the least distance over the one at which they begin to touch, and the panels
+        (1, 2), the lower first; inf and none, (0, 2), where no panels are near.
+        """
+        own = self.tables._replace(planes=self.tables.planes[:0])
+        kept = memory(own, self.sheets.panels)  # pairs are listed here
+        energy = self._copy(tables=own, memory=kept, _moved=np.zeros((0, 3))).contact(q)[0]
+        counts = int(kept.counts.listed_first), int(kept.counts.listed_second)
+        share = np.concatenate(
+            [1.0 + kept.gap[k, :n] / kept.d0[k, :n] for k, n in enumerate(counts)]
+        )
+        if not share.size:
+            return energy, np.inf, np.zeros((0, 2), np.int64)
+        worst = int(share.argmin())
+        kind, row = (0, worst) if worst < counts[0] else (1, worst - counts[0])
+        one, other = kept.pairs[kind, row]
+        panels = own.edge_panels[[one, other], 0]
+        if kind == VERTEX:
+            panels = np.array([own.ranges.own[own.ranges.own_start[one]], own.panel[other]])
+        return energy, float(share[worst]), np.sort(panels)[None]
+
+    def touch(self, q: NDArray) -> NDArray:
+        """Size (n,), N, of the force of contact on each node, without friction."""
+        force, kept = self.contact(q)[1], self.memory
+        rub = np.zeros_like(force)
+        if self.tables.friction > 0.0:
+            add_rubs(self.tables, kept, rub)
+        return np.linalg.norm(force - rub - kept.friction[:, :, :3].sum(axis=0), axis=1)
+
+    def clear(self, q: NDArray, step: NDArray, moves: NDArray, keep: float = KEEP) -> float:
+        """Share of a step (m,) from q in which nothing crosses, while planes move (p, 3), m."""
+        self.prepare()
+        u, motion = (nodal(one)[: len(self.tables.rest)] for one in (q, step))
+        return clear_share(self.tables, self.memory, u, motion, moves, keep)
+
+    def plane_forces(self, q: NDArray) -> NDArray:
+        """Force (p, 3), N, of each plane on the nodes, without friction."""
+        self.contact(q)
+        pressed = self.memory.friction[:, :, 3].sum(axis=1)
+        return pressed[:, None] * self.tables.planes[:, NORMAL : NORMAL + 3]
+
+    def plane_friction(self, q: NDArray) -> NDArray:
+        """Friction (p, 3), N, of each plane on the nodes."""
+        self.contact(q)
+        return -self.memory.friction[:, :, :3].sum(axis=1)
+
+    def plane_tangents(self, q: NDArray) -> NDArray:
+        """Derivatives (p, n, 3, 3), N/m, of the forces against each plane."""
+        self.contact(q)
+        return plane_tangents(self.tables, self.memory.x, self.memory)
+
+
+def contact_tangent(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
+    """The derivative (size, size), N/m, of the forces of contact where they were last found."""
+    first, second = touching_pairs(own, kept)
+    nodes = np.empty((len(first) + len(second), 4), np.int64)
+    blocks = np.zeros((len(nodes), 12, 12))
+    pair_tangents(own, kept, first, second, nodes, blocks)
+    guards = np.zeros((len(own.hinge_limit), 4, 3, 4, 3))
+    acts = guard_tangents(own, kept.x, guards)
+    nodes = np.concatenate([nodes, own.hinges[acts]])
+    four = np.concatenate([blocks.reshape(-1, 4, 3, 4, 3), guards[acts]])
+    pairs, entries = [pairs_within(nodes)], [four.swapaxes(2, 3).reshape(-1, 3, 3)]
+    if len(own.planes):
+        normal = plane_tangents(own, kept.x, kept).sum(axis=0)
+        met = np.flatnonzero(normal.any(axis=(1, 2)))
+        pairs.append(np.column_stack([met, met]))
+        entries.append(normal[met])
+    return assembled(np.concatenate(pairs), np.concatenate(entries), size)

@@ -1,0 +1,123 @@
+"""Hinges with memory: what the branches of their laws add to the elastic parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.mechanics.inelastic import (
+    MemoryHinges,
+    evaluate_at,
+    make_last,
+    memory_gradients,
+    memory_kernels,
+    memory_tangents,
+)
+from foldyn.mechanics.sheet_term import SheetTerm
+from foldyn.mechanics.term import Compiled, Term
+from foldyn.mechanics.viscous import WIDTH
+
+
+class HingeMemory(Term):
+    """The branches of hinges on a sheet with the elastic parts of their laws; see `Term`.
+
+    Their state changes in place, and is that of all terms made of this one.
+
+    Parameters
+    ----------
+    own : MemoryHinges
+    settles : ndarray of bool, shape (b,)
+        Branches that a motion finds settled where it starts, unless it is told otherwise.
+    sheet : SheetTerm
+    """
+
+    def __init__(self, own: MemoryHinges, settles: NDArray, sheet: SheetTerm) -> None:
+        self.own, self.settles = own, settles
+        self._offset, self._rows = sheet.series()[1], sheet.rows
+
+    def start(self, q: NDArray, state: NDArray | str | None = None) -> None:
+        """Begin at the dofs q (m,) or (rows, 3) in a state (b, 2), "fresh", or the default."""
+        own, offset, q = self.own, self._offset, self._in_rows(q)
+        for array in (own.angle, own.state, own.elapsed, own.lost):
+            array[:] = 0.0
+        evaluate_at(own, offset, q)  # turned from rest in no time
+        make_last(own)
+        own.lost[:] = 0.0
+        if isinstance(state, np.ndarray):
+            own.state[:] = state
+        elif state is None:
+            own.state[self.settles] = 0.0
+        evaluate_at(own, offset, q)
+
+    def commit(self) -> None:
+        """Accept the step that ends where the body was evaluated last."""
+        make_last(self.own)
+
+    def still(self) -> None:
+        """Evaluate next at the last accepted step."""
+        self.own.elapsed[0] = 0.0
+
+    def snapshot(self) -> tuple[NDArray, ...]:
+        """The last accepted step, to `recall`."""
+        return tuple(array.copy() for array in self._kept)
+
+    def recall(self, snapshot: Sequence[NDArray]) -> None:
+        """Go back to an accepted step."""
+        for array, kept in zip(self._kept, snapshot, strict=True):
+            array[:] = kept
+        self.still()
+
+    @property
+    def _kept(self) -> tuple[NDArray, ...]:
+        return self.own.angle, self.own.state, self.own.lost
+
+    def gradients(self, q: NDArray, size: int) -> sparse.csr_array:
+        """Gradients (h, size) of the angles at the dofs q (m,)."""
+        out = np.zeros((len(self.own.rest), WIDTH))
+        memory_gradients(self.own, np.ascontiguousarray(q, float), out)
+        row = np.repeat(np.arange(len(out)), WIDTH)
+        entries = (out.ravel(), (row, self.own.dofs.ravel()))
+        rates = sparse.csr_array(sparse.coo_array(entries, shape=(len(out), size)))
+        rates.eliminate_zeros()
+        return rates
+
+    # ------------------------------------------------------------------ as a term
+    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+        """See `Term`; the energy belongs to groups of the sheet."""
+        return memory_kernels(self.own, self._offset, self._rows, group)
+
+    @cached_property
+    def _pairs(self) -> NDArray:
+        """Which pairs (h, 14, 14) of its dofs a hinge has."""
+        mine = np.ones(self.own.dofs.shape, bool)
+        mine[:, 12:] = self.own.hidden_turn > 0.0
+        return mine[:, :, None] & mine[:, None, :]
+
+    @cached_property
+    def places(self) -> tuple[NDArray, NDArray]:
+        """See `Term`."""
+        dofs, shape = self.own.dofs, self._pairs.shape
+        row, column = (np.broadcast_to(one, shape) for one in (dofs[:, :, None], dofs[:, None, :]))
+        return row[self._pairs], column[self._pairs]
+
+    def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
+        """See `Term`; the elastic part of a hinge has a slope of 1 per unit stiffness."""
+        own, u = self.own, self._in_rows(q)
+        out = np.empty((len(own.rest), WIDTH, WIDTH))
+        evaluate_at(own, self._offset, u)
+        np.maximum(own.slope, (floor - 1.0) * own.stiffness, out=own.slope)
+        memory_tangents(own, u, out)
+        return out[self._pairs]
+
+    def _in_rows(self, q: NDArray) -> NDArray:
+        flat = np.ascontiguousarray(q, float).ravel()
+        return np.pad(flat, (0, 3 * self._rows - flat.size)).reshape(-1, 3)
+
+    def on(self, sheet: SheetTerm) -> HingeMemory:
+        """See `Term`; the branches measure from the rest angles that they have had."""
+        return HingeMemory(self.own, self.settles, sheet)

@@ -1,0 +1,220 @@
+"""Springs between nodes, and from nodes to the ground.
+
+A spring is of one of two kinds. A directed one pulls with k (u_a - u_b) . d along a direction d
+that stays; without b its foot stands on the ground, in space. An axial one pulls with k (l - l0)
+along the current line between its ends.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.jit.context import Context, contents, numbers_at, rows_at
+from foldyn.mechanics.block_matrix import blocks_of_ends, pairs_of_ends, places_of
+from foldyn.mechanics.model import ranks
+from foldyn.mechanics.sheet_term import Unstrained, unit_rows
+from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Term, energies, forces, nodal
+
+GROUP = "strain_springs"
+GROUND = -1  # row of a foot that stands still
+
+
+class Springs(NamedTuple):
+    """Arrays of d directed and a axial springs."""
+
+    ends: NDArray  # (d, 2) a and b; `GROUND` in place of b
+    direction: NDArray  # (d, 3) unit vectors
+    stiffness: NDArray  # (d,) N/m
+    axial_ends: NDArray  # (a, 2)
+    vector: NDArray  # (a, 3) from the first end to the second at rest, m
+    length: NDArray  # (a,) its length, m
+    stretch: NDArray  # (a,) how much longer that is than the spring without force, m
+    axial_stiffness: NDArray  # (a,) N/m
+
+
+@inner_scalar
+def directed_extension(springs, u, s):
+    """(u_a - u_b) . d of a directed spring, m."""
+    a, b = springs.ends[s, 0], springs.ends[s, 1]
+    extension = 0.0
+    for c in range(3):
+        moved = u[a, c] - (u[b, c] if b >= 0 else 0.0)
+        extension += moved * springs.direction[s, c]
+    return extension
+
+
+@inner_scalar
+def axial_extension(springs, u, s):
+    """l - l0 of an axial spring, and l, m; from displacements, so that nothing cancels."""
+    a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
+    length, x = springs.length[s], 0.0
+    for c in range(3):
+        du = u[b, c] - u[a, c]
+        x += du * (2.0 * springs.vector[s, c] + du)
+    now = math.sqrt(max(length * length + x, 0.0))
+    longer = x / (now + length) if now + length > 0.0 else 0.0
+    return longer + springs.stretch[s], now
+
+
+@inner
+def add_spring_forces(springs, u, force):
+    """Add the forces of springs to those of the nodes."""
+    for s in range(springs.stiffness.size):
+        a, b = springs.ends[s, 0], springs.ends[s, 1]
+        pull = springs.stiffness[s] * directed_extension(springs, u, s)
+        for c in range(3):
+            force[a, c] += pull * springs.direction[s, c]
+            if b >= 0:
+                force[b, c] -= pull * springs.direction[s, c]
+    for s in range(springs.axial_stiffness.size):
+        a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
+        extension, length = axial_extension(springs, u, s)
+        per_length = springs.axial_stiffness[s]
+        if springs.stretch[s] < springs.length[s]:  # else it is k, also where the ends meet
+            per_length *= extension / length
+        for c in range(3):
+            pull = per_length * (springs.vector[s, c] + u[b, c] - u[a, c])
+            force[b, c] += pull
+            force[a, c] -= pull
+
+
+@inner
+def spring_energy(springs, u):
+    """Energy (J) of springs."""
+    energy = 0.0
+    for s in range(springs.stiffness.size):
+        extension = directed_extension(springs, u, s)
+        energy += 0.5 * springs.stiffness[s] * extension * extension
+    for s in range(springs.axial_stiffness.size):
+        extension = axial_extension(springs, u, s)[0]
+        energy += 0.5 * springs.axial_stiffness[s] * extension * extension
+    return energy
+
+
+@kernel
+def axial_blocks(springs, u, loose):
+    """Derivative (a, 3, 3), N/m, of the forces of axial springs; `loose`: without their force."""
+    out = np.empty((springs.axial_stiffness.size, 3, 3))
+    for s in range(springs.axial_stiffness.size):
+        a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
+        extension, length = axial_extension(springs, u, s)
+        across, along = 1.0, 1.0
+        if springs.stretch[s] < springs.length[s]:  # else it is k in all directions
+            across = 0.0 if loose else extension / length
+        for p in range(3):
+            x = springs.vector[s, p] + u[b, p] - u[a, p]
+            for q in range(3):
+                y = springs.vector[s, q] + u[b, q] - u[a, q]
+                out[s, p, q] = across if p == q else 0.0
+                if across != along:
+                    out[s, p, q] += (along - across) * x * y / (length * length)
+                out[s, p, q] *= springs.axial_stiffness[s]
+    return out
+
+
+class _Context(NamedTuple):
+    springs: Springs
+    group: int  # of the energies
+    rows: int
+
+
+@forces
+def _forces(context, u, v, t, force, powers):
+    own = contents(context)
+    add_spring_forces(own.springs, rows_at(u, own.rows), rows_at(force, own.rows))
+
+
+@energies
+def _energies(context, u, out):
+    own = contents(context)
+    numbers_at(out, own.group + 1)[own.group] = spring_energy(own.springs, rows_at(u, own.rows))
+
+
+class SpringsTerm(Term):
+    """Springs, with a group of energy of their own.
+
+    Parameters
+    ----------
+    springs : Springs
+    """
+
+    energy_groups = (GROUP,)
+
+    def __init__(self, springs: Springs) -> None:
+        self.springs = springs
+
+    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+        """See `Term`."""
+        own = Context(_Context(self.springs, group, int(work.strips.own[1])))
+        return Compiled(own, {FORCES: _forces, ENERGIES: _energies})
+
+    @cached_property
+    def _ends(self) -> NDArray:
+        """Ends (s, 2) of all, directed and axial."""
+        return np.concatenate([self.springs.ends, self.springs.axial_ends])
+
+    @cached_property
+    def places(self) -> tuple[NDArray, NDArray]:
+        """See `Term`."""
+        return places_of(pairs_of_ends(self._ends))
+
+    def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
+        """See `Term`."""
+        return self._entries(q, loose=False)
+
+    def _entries(self, q: NDArray, loose: bool) -> NDArray:
+        """The same; loose : without the forces of axial springs."""
+        stiffness, direction = self.springs.stiffness, self.springs.direction
+        along = np.einsum("s,sa,sb->sab", stiffness, direction, direction)
+        axial = axial_blocks(self.springs, nodal(q), loose)
+        return blocks_of_ends(self._ends, np.concatenate([along, axial])).ravel()
+
+    def unstrained(self, q: NDArray) -> Unstrained:
+        """See `Term`."""
+        size = (q.size, q.size)
+        tangent = sparse.csr_array(sparse.coo_array((self._entries(q, True), self.places), size))
+        return Unstrained(tangent, sparse.csr_array(size), partial(self._stretch, self._lines(q)))
+
+    def _lines(self, q: NDArray) -> NDArray:
+        """Unit vectors (s, 3) along all springs; zero for those that pull in all directions."""
+        ends, springs, u = self.springs.axial_ends, self.springs, nodal(q)
+        apart = springs.vector + u[ends[:, 1]] - u[ends[:, 0]]
+        apart[springs.stretch == springs.length] = 0.0
+        length = np.linalg.norm(apart, axis=1, keepdims=True)
+        return np.concatenate([springs.direction, apart / np.where(length > 0.0, length, 1.0)])
+
+    def _stretch(self, lines: NDArray, motion: NDArray) -> float:
+        """As `Unstrained.stretch`, along lines (s, 3)."""
+        ends, u, springs = self._ends, nodal(motion), self.springs
+        first, second = u[ends[:, 0]], np.where(ends[:, 1:] < 0, 0.0, u[ends[:, 1]])
+        stiffness = np.concatenate([springs.stiffness, springs.axial_stiffness])
+        apart, most = first - second, np.linalg.norm(first, axis=1) + np.linalg.norm(second, axis=1)
+        along = np.where(lines.any(axis=1), np.einsum("sa,sa->s", apart, lines), most)
+        whole = float((stiffness * most**2).sum())
+        return np.sqrt(float((stiffness * along**2).sum()) / whole) if whole > 0.0 else 0.0
+
+    def add_scale(self, scale: NDArray) -> None:
+        """See `Term`; axial springs count as bars do."""
+        ends, force = self.springs.axial_ends, self.springs.axial_stiffness * self.springs.length
+        np.add.at(scale, 3 * ends[:, :, None] + np.arange(3), force[:, None, None])
+
+    def holds(self, q: NDArray) -> sparse.csr_array:
+        """See `Term`: directed ones along their directions."""
+        ends, direction = self.springs.ends, self.springs.direction
+        grounded = ends[:, 1:] < 0
+        entries = np.concatenate([direction, np.where(grounded, 0.0, -direction)], axis=1)
+        return unit_rows(np.where(grounded, ends[:, :1], ends), entries, q.size)
+
+    def placed(self, order: NDArray, before: Any) -> SpringsTerm:
+        """See `Term`."""
+        rank, springs = np.append(ranks(order), GROUND), self.springs  # that of the ground stays
+        return SpringsTerm(
+            springs._replace(ends=rank[springs.ends], axial_ends=rank[springs.axial_ends])
+        )

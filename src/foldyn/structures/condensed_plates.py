@@ -1,0 +1,87 @@
+"""Bars, folds and plates without their edge angles, which stay in balance: for explicit methods."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from foldyn.errors import InputError
+from foldyn.materials import HingeLaw
+from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.plates import BarsPlates
+from foldyn.mechanics.plates_condensed import (
+    CondensedWork,
+    condensed_kernels,
+    condensed_plates,
+    condensed_work,
+)
+from foldyn.mechanics.sheet_term import FoldHinges, Unstrained
+from foldyn.mechanics.step_tangent import SparseBlocks
+from foldyn.mechanics.term import Compiled
+from foldyn.structures.bars_plates import BarsPlatesTerm
+
+
+class CondensedPlatesTerm(BarsPlatesTerm):
+    """Bars, folds and plates by their displacements alone; see `mechanics.sheet_term.SheetTerm`."""
+
+    def __init__(
+        self, model: BarsPlates, laws: tuple[HingeLaw, HingeLaw], like: BarsPlatesTerm | None = None
+    ) -> None:
+        super().__init__(model, laws, like)
+        self._full = BarsPlatesTerm(model, laws, like)  # the same with edge angles
+        self.condensed = condensed_plates(model, self.linear_folds)
+        self.size, self.rows, self.hidden = self._nodal, model.nodes, np.zeros(0, np.int64)
+
+    def _whole(self, q: NDArray) -> NDArray:
+        """All dofs at displacements q, with edge angles in balance."""
+        return Assembly(self._full).dofs(np.ravel(q)[: self.size])
+
+    def compiled(self, work: Any, kept: CondensedWork, group: int) -> Compiled:
+        """See `Term`."""
+        return condensed_kernels(self.condensed, kept)
+
+    def workspaces(self, threads: int) -> list[CondensedWork]:
+        """See `SheetTerm`."""
+        return [condensed_work(self.condensed)]
+
+    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
+        """See `SheetTerm`."""
+        return balanced(self._full.tangent(self._whole(q), floor), self._full.hidden)
+
+    def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
+        """See `SheetTerm`."""
+        return self.tangent(q)
+
+    def blocks(self) -> SparseBlocks:
+        """See `SheetTerm`: all are full."""
+        full = sparse.csr_array(np.ones((self.size, self.size)))
+        return SparseBlocks(full, self.rows, np.repeat(self.model.bars.rest, 3, axis=0))
+
+    def fold_hinges(self) -> FoldHinges:
+        """See `SheetTerm`: moments of creases act on edge angles, which are not there."""
+        raise InputError(
+            ': with scheme = "n5b8e" explicit methods take neither moments on creases nor their '
+            'damping; choose "generalized_alpha"',
+            "method",
+        )
+
+    def unstrained(self, q: NDArray) -> Unstrained:
+        """See `SheetTerm`."""
+        found, hidden = self._full.unstrained(self._whole(q)), self._full.hidden
+        return Unstrained(
+            balanced(found.tangent, hidden), balanced(found.hinges, hidden), found.stretch
+        )
+
+
+def balanced(matrix: sparse.csr_array, hidden: NDArray) -> sparse.csr_array:
+    """The tangent (3n, 3n) of displacements where the `hidden` last dofs give way."""
+    if not len(hidden):
+        return matrix
+    first = hidden[0]
+    across = sparse.csc_array(matrix[first:, :first])
+    given = sparse.csc_array(splu(sparse.csc_array(matrix[first:, first:])).solve(across.toarray()))
+    return sparse.csr_array(matrix[:first, :first] - across.T @ given)
