@@ -86,7 +86,7 @@ def _energies(context, u, out):
 class SpringsTerm(SheetTerm):
     """Points and springs as solvers take them."""
 
-    energy_groups = ("strain_springs",)
+    energy_groups = {"strain_springs": "strain energy of the springs"}  # noqa: RUF012
 
     def __init__(self, model: Springs) -> None:
         self.model, self.size, self.rows = model, model.rest.size, len(model.rest)

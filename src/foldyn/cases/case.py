@@ -23,9 +23,7 @@ from foldyn.cases.supported import Supported
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
 from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.contact.term import GROUP as CONTACT
 from foldyn.mechanics.contact.term import ContactTerm
-from foldyn.mechanics.springs import GROUP, SpringsTerm
 from foldyn.patterns.picture import picture
 from foldyn.structures.discretized import read_only
 from foldyn.structures.mass import center_of_mass, inertia_tensor, row_sums
@@ -147,7 +145,7 @@ class Case(Supported, Loaded, Damped):
             with faults.collected():
                 self._nodes_of(place, support)
         self._check_damping(faults)
-        for name in ("springs", "point_masses"):
+        for name in ("terms", "point_masses"):
             with faults.collected():
                 getattr(self, name)
         for place, load in self._loads():
@@ -184,8 +182,7 @@ class Case(Supported, Loaded, Damped):
     @cached_property
     def elastic_body(self) -> Assembly:
         """The same without contact: what vibrations, damping and critical steps are about."""
-        body = self.structure.body
-        return body if self.springs is None else body.with_terms(SpringsTerm(self.springs))
+        return self.structure.body.with_terms(*self.terms)
 
     @cached_property
     def remembering(self) -> tuple[Remembering, ...]:
@@ -214,12 +211,7 @@ class Case(Supported, Loaded, Damped):
     @property
     def energy_groups(self) -> Mapping[str, str]:
         """Parts of its strain energy, and what they are."""
-        groups = dict(self.structure.energy_groups)
-        if self.springs is not None:
-            groups[GROUP] = "strain energy of the springs"
-        if self.contact is not None:
-            groups[CONTACT] = "energy of contact"
-        return groups
+        return self.body.energy_groups
 
     @cached_property
     def mass(self) -> sparse.csr_array:

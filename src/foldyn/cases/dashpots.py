@@ -42,6 +42,7 @@ class Dashpot(Connector):
         "between": "between",
         "direction": "direction",
     }
+    own = "dashpot"
     apart = "dashpots are a support of their own"
     asked = (
         "either nodes, which it ties to the ground, or between, the two nodes that it ties to each "

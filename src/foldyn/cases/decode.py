@@ -7,13 +7,14 @@ that the caller puts "loads[0].history" in front.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any, ClassVar, Self, cast, get_args, get_origin, get_type_hints
 
 from foldyn.cases.histories import HISTORIES, History, Table
 from foldyn.errors import Faults, InputError, within
+from foldyn.mechanics.term import Term
 from foldyn.values import choice, number, plain, show, suggest, whole
 
 
@@ -162,10 +163,20 @@ class Part:
     missing : mapping of str to str
         Remedies in messages where a key is missing that must not be: those of arguments without a
         default, and those given here; "history" may be among them.
+    own, apart : str
+        A key that none but its tables have, and what the message says where another kind's keys
+        stand beside it.
     """
 
     keys: ClassVar[Mapping[str, str]]
     missing: ClassVar[Mapping[str, str]] = {}
+    own: ClassVar[str] = ""
+    apart: ClassVar[str] = ""
+
+    @classmethod
+    def term(cls, parts: Sequence[tuple[str, Any]], structure: Any) -> Term | None:
+        """What all of a kind, each with its place for messages, add to the energy of a case."""
+        return None
 
     @classmethod
     def of(cls, table: Mapping[str, Any], folder: Path | None = None) -> Self:

@@ -10,7 +10,7 @@ import numpy as np
 
 from foldyn.cases.connectors import Connector
 from foldyn.errors import InputError
-from foldyn.mechanics.springs import Springs
+from foldyn.mechanics.springs import Springs, SpringsTerm
 from foldyn.values import brief, number
 
 
@@ -54,6 +54,7 @@ class Spring(Connector):
         "rest_length": "rest_length",
     }
     missing = {"stiffness": "give it (N/m) for each spring"}
+    own = "stiffness"
     apart = "springs are a support of their own"
     asked = "nodes, for springs to the ground, or between, for springs between nodes"
     no_line = (
@@ -76,6 +77,11 @@ class Spring(Connector):
                 "give between and no direction",
                 "rest_length",
             )
+
+    @classmethod
+    def term(cls, parts: Sequence[tuple[str, Any]], structure: Any) -> SpringsTerm:
+        """See `Part`."""
+        return SpringsTerm(packed(parts, structure))
 
 
 def packed(parts: Iterable[tuple[str, Spring]], structure: Any) -> Springs:

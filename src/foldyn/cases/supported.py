@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from foldyn.cases.constraints import Constraints
 from foldyn.cases.directions import AXES, unit_vector
 from foldyn.cases.selection import resolve_nodes
-from foldyn.cases.springs import packed
 from foldyn.cases.straight import Straight
-from foldyn.cases.supports import BaseMotion, Fix, Impose, Link, Spring
+from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
 from foldyn.cases.terms import Summands, Terms, summed
 from foldyn.cases.ties import equations_of, values_of
 from foldyn.errors import InputError
-from foldyn.mechanics.springs import Springs
+from foldyn.mechanics.term import Term
 from foldyn.structures.discretized import read_only
 
 
@@ -162,10 +161,11 @@ class Supported:
             yield self._tied(self._straight.carried(vector), place, along), support.history
 
     @cached_property
-    def springs(self) -> Springs | None:
-        """Its springs as arrays; None without any."""
-        parts = list(self._supports(Spring))
-        return packed(parts, self.structure) if parts else None
+    def terms(self) -> tuple[Term, ...]:
+        """What its supports add to the energy, by their kinds."""
+        kinds = dict.fromkeys(type(support) for support in self.supports)
+        terms = (kind.term(list(self._supports(kind)), self.structure) for kind in kinds)
+        return tuple(term for term in terms if term is not None)
 
     def _supports(self, *kinds: type) -> Iterator[tuple[str, Any]]:
         """Supports of some kinds, with their places for messages."""

@@ -201,15 +201,15 @@ def support_from(table: Any, folder: Path | None = None) -> Support:
             "and history (a base that moves), nodes and link or to (tied together), or nodes or "
             "between with stiffness (springs) or dashpot (damped)"
         )
-    for own, kind in (("stiffness", Spring), ("dashpot", Dashpot)):
-        if own not in given:
+    for kind in SUPPORTS:
+        if not kind.own or kind.own not in given:
             continue
         strange = [key for key in table if key in given and key not in kind.keys]
         if strange:
             raise InputError(
                 f": {kind.apart}; leave out {' and '.join(strange)}, or write [[supports]] for "
                 "each",
-                f".{own}",
+                f".{kind.own}",
             )
         return kind.of(table, folder)
     if left := [key for key in table if key in ("between", "rest_length")]:

@@ -53,9 +53,8 @@ def lacking(motion: Motion) -> str:
         "modal damping, dashpots or damped creases": has_dampers.py_func(system.damping),
         "constraints": len(system.ties.slave) > 0,
         "a mass matrix that is not lumped": not packed.mass.lumped,
-        "clamped edges, springs, or another model than bars and hinges": not isinstance(
-            packed.body, BarsHingesTerm
-        ),
+        "clamped edges, springs, or another model than bars and hinges": bool(packed.body.others)
+        or not isinstance(packed.body.sheet, BarsHingesTerm),
     }
     found = [what for what, there in lacks.items() if there]
     if not found and packed.model.addresses.any():

@@ -279,7 +279,7 @@ def _check(case: Case) -> None:
         ),
         (case.imposed.any(), "supports", "move nodes; hold them with Fix, and load them"),
         (case.constraints, "supports", "hold oblique directions or tie nodes; hold axes"),
-        (case.springs is not None, "supports", "have springs; leave them out"),
+        (case.terms, "supports", "have springs; leave them out"),
         (case.following_terms, "loads", "follow the sheet or come from temperature; give forces"),
         (case.contact, "contact", "leave it out: decks have no contact"),
         (case.rest_terms, "loads", "fold creases; give the folded pattern, and forces"),

@@ -191,13 +191,12 @@ def drive_terms(system: Linearized, drive: Drive) -> list[Term]:
     axis, damping = AXES.index(drive.axis), system.case.rayleigh
     inertia = system.inertia[:, axis]
     terms = [Term(inertia, lambda omega: omega**2 - 1j * omega * damping.alpha)]
-    held, springs = np.zeros_like(drive.vector), system.case.springs
-    if springs is not None:
-        stands = springs.ends[:, 1] < 0
-        pull = springs.stiffness[stands] * springs.direction[stands, axis]
-        np.add.at(held, springs.ends[stands, 0], pull[:, None] * springs.direction[stands])
+    held, along = np.zeros(drive.vector.size), np.zeros_like(drive.vector)
+    along[:, axis] = 1.0
+    for term in system.case.terms:  # what stands on the ground resists a motion of the whole
+        held += term.tangent(system.displacement.ravel()) @ along.ravel()
     if held.any():
-        shape = system.projected(held.ravel())
+        shape = system.projected(held)
         terms.append(Term(shape, lambda omega: -1.0 - 1j * omega * damping.beta))
     dragged = system.drag[:, axis]
     if dragged.any():

@@ -63,15 +63,15 @@ class Assembly:
         Number m of the dofs, and rows of the arrays that hold them.
     hidden : ndarray of int
         Dofs beside the displacements of the nodes: they have no mass.
-    energy_groups : tuple of str
-        Names of the parts of the energy.
+    energy_groups : mapping of str to str
+        The parts of the energy, and what they are.
     """
 
     def __init__(self, sheet: SheetTerm, *others: Term) -> None:
         self.sheet, self.others = sheet, others
         self.terms: tuple[Term, ...] = (sheet, *others)
         self.size, self.rows, self.hidden = sheet.size, sheet.rows, sheet.hidden
-        self.energy_groups = tuple(name for term in self.terms for name in term.energy_groups)
+        self.energy_groups = {k: v for term in self.terms for k, v in term.energy_groups.items()}
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what holds addresses of this process."""
@@ -83,7 +83,7 @@ class Assembly:
 
     def with_terms(self, *terms: Term) -> Assembly:
         """The same with further terms."""
-        return Assembly(self.sheet, *self.others, *terms)
+        return Assembly(self.sheet, *self.others, *terms) if terms else self
 
     # ------------------------------------------------------------------ energies and forces
     def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:

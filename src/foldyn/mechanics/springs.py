@@ -8,8 +8,9 @@ along the current line between its ends.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,7 +146,7 @@ class SpringsTerm(Term):
     springs : Springs
     """
 
-    energy_groups = (GROUP,)
+    energy_groups: ClassVar[Mapping[str, str]] = {GROUP: "strain energy of the springs"}
 
     def __init__(self, springs: Springs) -> None:
         self.springs = springs

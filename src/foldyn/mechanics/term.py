@@ -75,8 +75,8 @@ class Term(ABC):
 
     Attributes
     ----------
-    energy_groups : tuple of str
-        Names of the energies that are its own; none where it adds to those of others.
+    energy_groups : mapping of str to str
+        Energies that are its own, and what they are; none where it adds to those of others.
     of_hinges : bool
         Whether its forces are moments of hinges, which are at play even where all is at rest.
     shared : bool
@@ -85,7 +85,7 @@ class Term(ABC):
         Whether `dynamics.energy_momentum` takes it.
     """
 
-    energy_groups: tuple[str, ...] = ()
+    energy_groups: ClassVar[Mapping[str, str]] = {}
     of_hinges: ClassVar[bool] = False
     shared: ClassVar[bool] = False
     has_discrete_gradient: ClassVar[bool] = False

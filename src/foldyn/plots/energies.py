@@ -17,7 +17,7 @@ from foldyn.mechanics.springs import GROUP
 from foldyn.plots import style
 from foldyn.plots.along import along, asked, check_path, way
 from foldyn.plots.given import alone
-from foldyn.plots.readings import STRAIN, energy_shares, parts_of, stacked
+from foldyn.plots.readings import energy_shares, parts_of, stacked, strain_name
 
 COLORS: Mapping[str, str] = {
     "strain_bars": style.VERMILLION,
@@ -68,7 +68,9 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     InputError
         Where an energy is missing from the trajectory.
     """
-    strain = {part: f"strain, {STRAIN[part]}" for part in parts_of(alone("trajectory", trajectory))}
+    strain = {
+        part: f"strain, {strain_name(part)}" for part in parts_of(alone("trajectory", trajectory))
+    }
     others = {"dissipated": "dissipated", "work": "work of the loads"}
     names = {"kinetic": "kinetic", **strain, **others}
     missing = [name for name in names if name not in trajectory]
@@ -139,7 +141,9 @@ def plot_path_energies(
     labels = ["strain energy (J)", "share"]
     figure, (upper, lower) = style.rows((7.0, 5.0), title, name, labels, heights=[1.8, 1.0])
     energies = stacked(path)
-    names, colors = zip(*((STRAIN[part], COLORS[part]) for part in energies), strict=True)
+    names, colors = zip(
+        *((strain_name(part), COLORS.get(part, style.GRAY)) for part in energies), strict=True
+    )
     handles = upper.stackplot(x, *energies.values(), labels=names, colors=colors, alpha=0.75)
     work = float(sum(layer[0] for layer in energies.values())) + path["work"].values
     (line,) = upper.plot(

@@ -96,12 +96,20 @@ def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:
 def parts_of(result: xr.Dataset) -> tuple[str, ...]:
     """Parts of the strain energy of a result, in the order of its structure."""
     own = OF_SHELLS if set(OF_SHELLS) <= set(result.data_vars) else OF_BARS_AND_HINGES
-    return (*own, *(group for group in (GROUP, CONTACT) if group in result))
+    others = (str(name) for name in result.data_vars if name not in own)
+    return (*own, *(name for name in others if name.startswith("strain_") or name == CONTACT))
+
+
+def strain_name(part: str) -> str:
+    """Name of a part of the strain energy."""
+    return STRAIN.get(part, part.removeprefix("strain_").replace("_", " "))
 
 
 def stacked(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
     """Return the parts of the strain energy (J) in the order of a stack."""
-    return {part: path[part].values for part in STRAIN if part in parts_of(path)}
+    parts = parts_of(path)
+    order = [*(part for part in STRAIN if part in parts), *(p for p in parts if p not in STRAIN)]
+    return {part: path[part].values for part in order}
 
 
 def energy_shares(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
@@ -122,7 +130,7 @@ def energy_shares(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
     energies = stacked(path)
     total = np.asarray(sum(energies.values()))
     total = np.where(total > _NONE * max(float(total.max(initial=0.0)), 0.0), total, np.nan)
-    return {STRAIN[part]: energy / total for part, energy in energies.items()}
+    return {strain_name(part): energy / total for part, energy in energies.items()}
 
 
 def chosen_modes(modes: xr.Dataset, which: Sequence[int] | None) -> list[int]:

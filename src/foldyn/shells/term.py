@@ -60,7 +60,7 @@ class ShellTerm(SheetTerm):
         One with the same mesh.
     """
 
-    energy_groups = tuple(GROUPS)
+    energy_groups = GROUPS
 
     def __init__(
         self, model: ShellModel, crease: NDArray, law: HingeLaw, like: ShellTerm | None = None

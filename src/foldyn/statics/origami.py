@@ -101,7 +101,7 @@ class OrigamiProblem:
         self.case, structure = case, case.structure
         self.structure, self._adaptive = structure, adaptive_load
         body = self.memories.body
-        self.groups, self._hidden = body.energy_groups, len(body.hidden)
+        self.groups, self._hidden = tuple(body.energy_groups), len(body.hidden)
         self._ties = case.constraints
         self._shape = structure.nodes.shape
         loads, chosen = range(len(case.loads)), set(constant)

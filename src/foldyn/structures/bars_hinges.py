@@ -51,7 +51,7 @@ class BarsHingesTerm(SheetTerm):
         One whose elements have the same nodes.
     """
 
-    energy_groups = tuple(GROUPS)
+    energy_groups = GROUPS
     has_discrete_gradient = True
 
     def __init__(

@@ -45,7 +45,7 @@ class BarsPlatesTerm(SheetTerm):
         One whose elements have the same dofs.
     """
 
-    energy_groups = tuple(GROUPS)
+    energy_groups = GROUPS
 
     def __init__(
         self, model: BarsPlates, laws: tuple[HingeLaw, HingeLaw], like: BarsPlatesTerm | None = None

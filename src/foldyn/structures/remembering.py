@@ -96,7 +96,7 @@ def memory(parts: tuple[Remembering, ...], body: Assembly) -> HingeMemory:
     for part in parts:
         hinges, branches = part.hinges, part.branches
         n, b = len(hinges.rest), len(branches)
-        group = body.energy_groups.index(f"strain_{part.kind}s")
+        group = list(body.energy_groups).index(f"strain_{part.kind}s")
         own = {
             "dofs": hinge_dofs(hinges.nodes, hinges.hidden),
             "corners": hinges.corners,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +51,7 @@ class ContactTerm(Term):
         The terms before it, whose hinges it guards.
     """
 
-    energy_groups = (GROUP,)
+    energy_groups: ClassVar[Mapping[str, str]] = {GROUP: "energy of contact"}
     shared = True
     has_discrete_gradient = True  # that of the solver
 

@@ -1,0 +1,110 @@
+"""The terms of CONTRIBUTING, added to a copy of the package as the page says: three files each."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PROBE = """
+import numpy as np
+import foldyn as fd
+from foldyn import checks
+{imports}
+structure = fd.discretize(fd.patterns.miura(cells=(2, 1)), fd.Sheet(1e6, 0.25, 0.01, 1.0))
+BELOW = (structure.nodes[9] - (0.0, 0.0, 0.3999)).tolist()
+case = fd.Case(structure, [fd.Fix("xmin"), {support}], [fd.Force([9], (0.0, 0.0, -0.05), fd.Ramp(0.05, smooth=True))])
+q = 0.2 * np.random.default_rng(1).standard_normal(case.body.size)
+q[29] = -0.05  # of node 9, along z
+assert checks.gradient_error(lambda q: case.body.energies(q).sum(), case.body.internal, q, size=1e-5) < 1e-6
+assert checks.tangent_error(case.body.internal, case.body.tangent, q, size=1e-5) < 1e-6
+alone = structure.body
+assert np.abs(case.body.internal(q) - alone.internal(q)).max() > 1e-3  # it acts
+path = fd.trace(case, load_factors=[1.0])
+modes = fd.modes(case, 4)
+assert modes.frequency.values.min() > 0.0
+ends = []
+for method in ("rk4", "central_difference", "dormand_prince", "newmark", "generalized_alpha"):
+    step = 1e-4 if method in ("newmark", "generalized_alpha") else None
+    found = fd.simulate(case, 0.05, method, dt=step)
+    ends.append(found.displacement.values[-1])
+    balance = found.kinetic + sum(found[name] for name in case.energy_groups) + found.dissipated - found.work
+    off = np.ptp(balance.values) / float(found.work.max())
+    assert off < 2e-2, (method, off)
+    assert float(found[{group!r}].max()) > 0.0
+apart = [np.abs(end - ends[0]).max() / np.abs(ends[0]).max() for end in ends]
+assert max(apart) < 2e-2, apart
+from foldyn.cases.supports import support_from
+assert support_from({table}) == case.supports[1]
+"""
+
+
+def blocks(title: str) -> list[str]:
+    """The Python blocks below a heading of CONTRIBUTING."""
+    text = (ROOT / "CONTRIBUTING.md").read_text("utf-8").split(f"### {title}\n")[1]
+    return re.findall(r"```python\n(.*?)```", re.split(r"\n##", text)[0], re.S)
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """A copy of the package with the kernels that are compiled already."""
+    package = tmp_path / "foldyn"
+    shutil.copytree(ROOT / "src/foldyn", package, ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in (ROOT / "src/foldyn").rglob("__pycache__"):
+        kept = package / folder.relative_to(ROOT / "src/foldyn")
+        shutil.copytree(folder, kept, copy_function=os.link, ignore=shutil.ignore_patterns("*.pyc"))
+    return package
+
+
+def register(package: Path, module: str, name: str) -> None:
+    """Put a support into its registry."""
+    path = package / "cases/supports.py"
+    text = path.read_text("utf-8")
+    text = text.replace(
+        "\n\n\n@brief", f"\nfrom foldyn.cases.{module} import {name}\n\n\n@brief", 1
+    )
+    text = text.replace("Dashpot | Link\n", f"Dashpot | Link | {name}\n")
+    path.write_text(text.replace("Dashpot, Link)", f"Dashpot, Link, {name})"), "utf-8")
+
+
+def run(package: Path, **names: str) -> None:
+    command = [sys.executable, "-W", "ignore", "-c", PROBE.format(**names)]
+    environment = {**os.environ, "PYTHONPATH": str(package.parent)}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.thorough
+def test_springs_with_a_cubic_force(copy):
+    kernels, support, _ = blocks("A term")
+    (copy / "mechanics/cubic_springs.py").write_text(kernels, "utf-8")
+    (copy / "cases/cubic_springs.py").write_text(support, "utf-8")
+    register(copy, "cubic_springs", "CubicSpring")
+    run(
+        copy, imports="from foldyn.cases.cubic_springs import CubicSpring", group="strain_cubic",
+        support="CubicSpring(300.0, [(3, 9), (7, 14)])",
+        table="{'cubic': 300.0, 'between': [[3, 9], [7, 14]]}",
+    )  # fmt: skip
+
+
+@pytest.mark.thorough
+def test_a_sphere(copy):
+    (copy / "cases/spheres.py").write_text(blocks("A term")[2], "utf-8")
+    register(copy, "spheres", "Sphere")
+    stub = copy / "__init__.pyi"
+    text = stub.read_text("utf-8")
+    line = next(line for line in text.splitlines() if line.startswith("from foldyn.cases import"))
+    stub.write_text(
+        text.replace(line, f"from foldyn.cases.spheres import Sphere as Sphere\n{line}")
+    )
+    run(
+        copy, imports="", group="strain_spheres", support="fd.Sphere(BELOW, 0.4, 20.0)",
+        table="{'center': BELOW, 'radius': 0.4, 'sphere': 20.0}",
+    )  # fmt: skip
