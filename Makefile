@@ -11,6 +11,7 @@ DEMO_CASES ?= case1 case2 case3 case4
 DEMO_OUT   ?= demo-results
 DEMO_FLAGS ?=
 PYTEST_FLAGS ?=
+DRAWS ?= 500
 OLDEST ?= .venv-oldest
 # without those of contact, which compile longest and ask nothing else of the oldest versions
 OLDEST_TESTS := tests/jit tests/materials tests/mechanics tests/results --ignore-glob='*contact*' \
@@ -27,6 +28,7 @@ help:  ## list what can be made
 	@echo '  PYTHON=python3.12        the interpreter that .venv is made with'
 	@echo '  DEMO_CASES="case1"       a part of the demo;  DEMO_FLAGS="..." more flags of foldyn run'
 	@echo '  PYTEST_FLAGS="-k mass"   more flags of pytest;  WORKERS="-n 0": one test at a time'
+	@echo '  DRAWS=50                 cases that test-all draws at random'
 
 # ------------------------------------------------------------------------------ set-up
 $(BIN)/python:
@@ -64,7 +66,7 @@ test: $(STAMP)  ## run the tests that a change can plausibly break
 	@$(BIN)/python -m pytest $(WORKERS) $(PYTEST_FLAGS)
 
 test-all: test  ## run these, and then those that are long or one of many of a kind
-	@$(BIN)/python -m pytest $(WORKERS) $(PYTEST_FLAGS) -m thorough
+	@DRAWS=$(DRAWS) $(BIN)/python -m pytest $(WORKERS) $(PYTEST_FLAGS) -m thorough
 
 test-oldest: $(BIN)/python  ## run the tests of compiling, laws and results with the oldest versions that pyproject.toml allows
 	@rm -rf $(OLDEST) && $(BIN)/python -m venv $(OLDEST)

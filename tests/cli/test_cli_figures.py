@@ -54,6 +54,7 @@ def test_figures_of_a_tiny_case(workplace, edited) -> None:
     assert f"figures and {Path('r/report.html')}" in done.out
 
 
+@pytest.mark.thorough
 def test_a_film_where_it_is_asked_for(workplace, edited) -> None:
     workplace.write(edited(("every = 0.01", "every = 0.02")))
     done = workplace.call("run", "case.toml", "--out", "r", "--film", "gif")
@@ -138,6 +139,7 @@ def test_a_page_without_figures(workplace, edited) -> None:
     assert "The structure" in page and "The motion" in page
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("form", ["svg", "pdf"])
 def test_figures_for_a_paper_stand_beside_the_page(workplace, edited, form) -> None:
     workplace.write(edited(("every = 0.01", "every = 0.02")))

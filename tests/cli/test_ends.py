@@ -41,6 +41,7 @@ def limited(size: int):
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
+@pytest.mark.thorough
 def test_signals_keep_what_was_computed_and_four_at_once_are_one(tmp_path, edited) -> None:
     (tmp_path / "case.toml").write_text(edited())
     fd.read_case(tmp_path / "case.toml").run()  # compiles, which would take each of them minutes
@@ -91,6 +92,7 @@ def test_a_kill_between_rules_leaves_no_old_result(workplace, tmp_path, edited) 
     assert names(folder) == [stamp.NAME, "result-centroid.nc", "result-panel.nc"]
 
 
+@pytest.mark.thorough
 def test_ctrl_c_and_a_full_disk_while_figures_are_drawn(workplace, tmp_path, edited) -> None:
     workplace.run(edited(("every = 0.01", "every = 0.001")), "--out", "before")  # compiles
     stopped = start(tmp_path, "run", "case.toml", "--out", "stopped", "--figures", "png")
@@ -225,6 +227,7 @@ def watched(process: subprocess.Popen[str], folder: Path, kind: str) -> list[int
 FORCES = "displacement [mm],force [mN]\n-75,1.6\n-150,4.4\n-225,8.1\n-300,13.0\n"
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 @pytest.mark.parametrize(
     "number", [signal.SIGTERM, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 9))]

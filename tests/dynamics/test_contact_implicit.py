@@ -47,6 +47,7 @@ def conserved(structure: fd.Structure, run) -> dict[str, float]:
     return {k: np.abs(v - v[0]).max() / np.abs(v[0]).max() for k, v in kept.items()}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("options", [{"dt": 1e-4, "every": 1}, {"tolerance": 1e-3, "every": 1e-4}])
 def test_the_conserving_method_keeps_all_in_a_collision(options):
     """With steps that do not resolve what bars do, fixed or not: energy and both momenta."""
@@ -59,6 +60,7 @@ def test_the_conserving_method_keeps_all_in_a_collision(options):
     assert crossing(s, run.displacement.values) == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("method", [*METHODS, "energy_momentum"])
 def test_a_rebound_converges_with_order_two(method):
     """Of displacements, which steps resolve that are far above the period of a bar."""
@@ -84,6 +86,7 @@ def test_a_strip_folded_from_both_ends_stops_where_it_touches():
     assert run.attrs["contact_lists"] > 1
 
 
+@pytest.mark.thorough
 def test_a_conserving_strip_loses_no_energy_where_it_touches():
     """The same with actuators, damping, guards of hinges and friction, also on a plane beneath."""
     pytest.importorskip("ipctk")

@@ -42,6 +42,7 @@ def energy(motion) -> np.ndarray:
     return total.to_numpy()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "mass", ["mixed_voronoi", pytest.param("consistent", marks=pytest.mark.slow)]
 )

@@ -89,6 +89,7 @@ RUNS = [
 ]
 
 
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 @pytest.mark.parametrize(("kind", "method"), RUNS)
 def test_a_run_that_is_killed_again_and_again_gives_the_same_bits(tmp_path, kind, method):
@@ -285,6 +286,7 @@ def refused(other: int, options) -> None:
         simulated(**options)
 
 
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 @pytest.mark.parametrize("kills", [3, pytest.param(10, marks=pytest.mark.slow)])
 def test_sigkill_at_random_moments_with_a_second_process(tmp_path, kills):

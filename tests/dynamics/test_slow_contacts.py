@@ -130,6 +130,7 @@ class Killed(BaseException):
     """What ends a run without a word."""
 
 
+@pytest.mark.thorough
 def test_a_motion_with_slow_contacts_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path):
     monkeypatch.setattr(os, "fsync", lambda _: None)
     monkeypatch.setattr(motion, "CHUNK", 256)

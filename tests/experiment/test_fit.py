@@ -97,6 +97,7 @@ def test_what_the_data_cannot_tell_is_said(pressed) -> None:
     assert found["sheet.density"].note == "the data do not determine it"
 
 
+@pytest.mark.thorough
 def test_parameters_of_which_only_quotients_count(swung) -> None:
     """Mass, stiffness and force times the same number make the same motion."""
     data = histories(swung, [0], 1e-6)

@@ -25,6 +25,7 @@ def photos(tmp_path_factory):
     return paths, states
 
 
+@pytest.mark.thorough
 def test_every_node_is_recognized_in_every_photograph(photos):
     paths, states = photos
     true = camera().project(states[:, :25])

@@ -13,6 +13,7 @@ SHORT = 40  # a few seconds
 MAIN = runpy.run_path(str(Path(__file__).with_name("__main__.py")))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("target", TARGETS)
 def test_damaged_input_is_read_or_refused(target):
     report = fuzz(target, SHORT, seed=1)
@@ -53,6 +54,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.thorough
 def test_the_judge_finds_every_kind_of_fault(tmp_path):
     kinds = list(FAULTS)
     body = "\n".join(f"        case {i}:\n            {FAULTS[kind][0]}"

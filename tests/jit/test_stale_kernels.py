@@ -135,6 +135,7 @@ def test_a_message_compiles_nothing_anew(tmp_path):
     assert ask(copy, **where)[2] == 1
 
 
+@pytest.mark.thorough
 def test_imports_are_read_as_python_reads_them():
     for path in FILES:
         wanted = set()
@@ -211,6 +212,7 @@ for kind in kinds[turn:] + kinds[:turn]:
 """
 
 
+@pytest.mark.thorough
 def test_processes_that_compile_the_same_at_once(tmp_path):
     package = copy_package(tmp_path)
     (package / "probes" / "sums.py").write_text(

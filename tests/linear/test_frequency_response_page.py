@@ -26,6 +26,7 @@ def names():
     return found
 
 
+@pytest.mark.thorough
 def test_the_examples_run(names):
     weak, full = names["first"]
     assert 0.3 < weak < full < 1.5

@@ -122,6 +122,7 @@ def specimen(alpha, beta=0.0, **options):
     return fd.Case(case.structure, case.supports, damping=damping)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("alpha", "beta", "mass", "within"),
     [

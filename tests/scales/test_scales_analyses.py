@@ -188,6 +188,7 @@ ALL = {
 LONG = ("motion: base", "motion: imposed")
 
 
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")  # of the analysis, not of units
 @pytest.mark.parametrize(
     "name",

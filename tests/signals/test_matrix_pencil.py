@@ -81,6 +81,7 @@ def test_the_order_by_a_threshold():
     assert (np.diff(ratios) <= 0).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("n", [100, 300, 900])
 @pytest.mark.parametrize("noise", [1e-4, 1e-2])
 def test_the_order_is_found_in_white_noise(n, noise):

@@ -96,6 +96,7 @@ def test_the_loads_are_scaled_by_the_linear_shell(fold):
     assert release.largest(made[SHELL], small) >= small
 
 
+@pytest.mark.thorough
 def test_an_amplitude_beyond_the_path_is_left_out():
     case = documented()[39]  # an eggbox that gives way at 12 degrees
     made = structures(case.pattern(), case.sheet, 4)
@@ -108,6 +109,7 @@ def test_an_amplitude_beyond_the_path_is_left_out():
     assert len(held) < len(within) + 1
 
 
+@pytest.mark.thorough
 def test_stored_results_are_what_the_code_gives():
     case = documented()[1]
     again = runs(next(iter(released(case))))

@@ -528,6 +528,7 @@ def test_true_motion_is_taken_at_the_times_of_the_film(released, motion) -> None
     assert page._tracked(front)[0].text.startswith("The front nodes were measured in 100.0%")
 
 
+@pytest.mark.thorough
 def test_a_fit_that_is_none_says_so(released) -> None:
     summary = released.fits["glued"].summary()
     assert page._doubt(summary, "node 8") == []

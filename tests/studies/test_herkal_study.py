@@ -331,6 +331,7 @@ def test_claims_of_one_case(small):
     assert {v.target.key for v in table1(small)} == {f"case1_{m}" for m in paper_rules()}
 
 
+@pytest.mark.thorough
 # ---------------------------------------------------------------------- page and command
 def test_page_of_a_study(small):
     page = report.write(small).read_text("utf-8")

@@ -131,6 +131,7 @@ def test_a_fine_shell_moves_alike():
     assert compare.motion_away(motion, finest) < 0.005
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", [name for name in CASES if stored_motions(name)])
 def test_motions_of_all_cases_begin_alike(name):
     """The first 2 s with 10 divisions: at worst 4.8 % (case 2); see docs/opensees.md for 10 s."""

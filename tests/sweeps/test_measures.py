@@ -40,6 +40,7 @@ def take(results, kind: str, text: str):
 EVERY = [(one, kind) for one in MEASURES.values() for kind in one.kinds if kind in TEXTS]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("one", "kind"), EVERY, ids=lambda one: getattr(one, "name", one))
 def test_every_measure_can_be_taken_of_all_its_kinds(results, one, kind):
     words = [GIVEN[what] if kind != "statics" else {"node": "0", "axis": "x"}[what]

@@ -7,6 +7,8 @@ again by its seed: draw(seed, combinations).
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 from copies import copied, split, symmetries
@@ -102,6 +104,6 @@ def test_copies_move_alike(seed):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("seed", range(1000, 1500))
-def test_500_copies_move_alike(seed):
+@pytest.mark.parametrize("seed", range(1000, 1000 + int(os.environ.get("DRAWS", "500"))))
+def test_many_copies_move_alike(seed):
     check(seed, draw(seed, ALL))
