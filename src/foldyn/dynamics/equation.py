@@ -32,7 +32,7 @@ from foldyn.dynamics.parts import Setting
 from foldyn.dynamics.record import record
 from foldyn.dynamics.system import Entries, Packed, Scratch
 from foldyn.jit.compiled import addressed, inner_scalar, kernel
-from foldyn.jit.context import Context, contents, numbers_at, rows_at, run_at, value_at
+from foldyn.jit.context import Context, numbers_at, rows_at, run_at, value_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.term import (
     ADDRESS,
@@ -109,8 +109,7 @@ class Equation(NamedTuple):
 
 # ------------------------------------------------------------------ the equation
 @addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS)
-def _acceleration(context, q, w, t, out, powers):
-    m = contents(context)
+def _acceleration(m, q, w, t, out, powers):
     rows, first, last = m.force.shape[0], 3 * m.own[0], 3 * m.own[1]
     if m.histories != 0:
         run_at(m.histories, (m.setting, t))
@@ -164,8 +163,7 @@ def _acceleration(context, q, w, t, out, powers):
 
 # ------------------------------------------------------------------ what is seen of a motion
 @addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER)
-def _sample(context, u, v, a, t):
-    r = contents(context)
+def _sample(r, u, v, a, t):
     m, course, out, rows = r.setting, r.course, r.out, r.setting.s.force.shape[0]
     k = course.tally.samples - out.first
     out.time[k] = t

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner_scalar, kernel
-from foldyn.jit.context import Context, contents, numbers_at, rows_at
+from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient
 from foldyn.mechanics.term import ENERGIES, FORCES, Term, energies, forces
 from foldyn.mechanics.threads import Team
@@ -242,14 +242,12 @@ class _ClampsTerm(NamedTuple):
 
 
 @forces
-def _clamp_forces(context, u, v, t, force, powers):
-    own = contents(context)
+def _clamp_forces(own, u, v, t, force, powers):
     add_clamp_forces(own.clamps, rows_at(u, own.rows), rows_at(force, own.rows), own.angle)
 
 
 @energies
-def _clamp_energies(context, u, out):
-    own = contents(context)
+def _clamp_energies(own, u, out):
     group = own.clamps.group
     numbers_at(out, group + 1)[group] += clamp_energy(own.clamps, rows_at(u, own.rows))
 
@@ -267,14 +265,12 @@ class _SpringsTerm(NamedTuple):
 
 
 @forces
-def _spring_forces(context, u, v, t, force, powers):
-    own = contents(context)
+def _spring_forces(own, u, v, t, force, powers):
     add_spring_forces(own.springs, rows_at(u, own.rows), rows_at(force, own.rows))
 
 
 @energies
-def _spring_energies(context, u, out):
-    own = contents(context)
+def _spring_energies(own, u, out):
     numbers_at(out, own.group + 1)[own.group] = spring_energy(own.springs, rows_at(u, own.rows))
 
 
