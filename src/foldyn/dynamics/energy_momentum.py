@@ -179,8 +179,8 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, to
     mean = 0.5 * (old.factor + new.factor)
     if system.turns:
         turn(_folds(model), system.actuators, mean)
-    carry(system.moved, old.factor, 0, old.q, s.displacement)
-    carry(system.moved, new.factor, 0, new.q, s.velocity)
+    carry(system.moved, old.factor[:, 0], old.q, s.displacement)
+    carry(system.moved, new.factor[:, 0], new.q, s.velocity)
     new.force[:] = 0.0
     discrete_gradient.add_bar_forces(model, s.displacement, s.velocity, new.force)
     discrete_gradient.add_hinge_forces(model, s.displacement, s.velocity, angle0, angle1, new.force)
@@ -233,8 +233,8 @@ def _halfway(h, s):
 @kernel
 def _taken(system, h, old, new, s):
     """Energy that dampers dissipate in a step."""
-    carry(system.moved, old.factor, 0, old.q, s.displacement)
-    carry(system.moved, new.factor, 0, new.q, s.velocity)
+    carry(system.moved, old.factor[:, 0], old.q, s.displacement)
+    carry(system.moved, new.factor[:, 0], new.q, s.velocity)
     _halfway(h, s)
     return h * dampers_work(system.damping, s.stage[0], s.product, s.product)
 

@@ -333,6 +333,7 @@ def _balance(setting: Setting, whole: Context) -> Balance:
     terms, system, mass, share, s = setting
     damping = system.damping
     damped = len(damping.modal) or len(damping.elements.coefficient)
+    solve = parts.solve_constrained if len(mass.ties.slave) else parts.solve
     return Balance(
         terms=terms,
         setting=whole.address,
@@ -343,7 +344,7 @@ def _balance(setting: Setting, whole: Context) -> Balance:
         follow=parts.follow.at(whole) if system.follows else 0,
         viscous=parts.viscous.at(whole) if damping.data.size else 0,
         dampers=parts.dampers.at(whole) if damped else 0,
-        solve=0 if mass.lumped else parts.solve.at(whole),
+        solve=0 if mass.lumped else solve.at(whole),
         kinetic=0 if mass.lumped or not damping.alpha else parts.kinetic.at(whole),
         moving_power=parts.moving_power.at(whole) if system.moves else 0,
         turning_power=parts.turning_power.at(whole) if system.turns else 0,

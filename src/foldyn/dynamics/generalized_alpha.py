@@ -242,8 +242,8 @@ def _taken(system, old, new, s):
     """Energy that dampers dissipate in a step, after `_works`: their mean force along it."""
     work = 0.0
     for phase in (old, new):
-        carry(system.moved, phase.factor, 0, phase.q, s.product)
-        carry(system.moved, phase.factor, 1, phase.w, s.moving)
+        carry(system.moved, phase.factor[:, 0], phase.q, s.product)
+        carry(system.moved, phase.factor[:, 1], phase.w, s.moving)
         work += 0.5 * dampers_work(system.damping, s.product, s.moving, s.displacement)
     return work
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.actuation import offset_work, power_of_part, turn_part
 from foldyn.dynamics.damping import add_dampers, add_viscous, drag_power
-from foldyn.dynamics.inertia import Inertia, kinetic_energy, moving_energy, solve_mass
+from foldyn.dynamics.inertia import Inertia, kinetic_energy, moving_energy, solve_mass, solve_tied
 from foldyn.dynamics.system import Scratch, System, carry_part, power_of_moved
 from foldyn.jit.compiled import addressed
 from foldyn.jit.context import rows_at
@@ -52,8 +52,8 @@ def carry(m, q, w):
     rows, own = m.s.force.shape[0], m.share.strips.own
     dofs, supports = (3 * own[0], 3 * own[1]), (m.s.moved[0], m.s.moved[1])
     here, there, moved = flat(m.s.displacement), flat(m.s.velocity), m.system.moved
-    carry_part(moved, m.s.factor, 0, flat(rows_at(q, rows)), here, dofs, supports)
-    carry_part(moved, m.s.factor, 1, flat(rows_at(w, rows)), there, dofs, supports)
+    carry_part(moved, m.s.factor[:, 0], flat(rows_at(q, rows)), here, dofs, supports)
+    carry_part(moved, m.s.factor[:, 1], flat(rows_at(w, rows)), there, dofs, supports)
 
 
 @addressed(ADDRESS, ADDRESS)
@@ -85,6 +85,13 @@ def solve(m, out):
     wait(team)  # for the forces of the others, and their look at this member's velocities
     solve_mass(m.mass, m.s.force, rows_at(out, rows), m.s.line, team.number, team.size)
     wait(team)  # each has solved for its axes
+
+
+@addressed(ADDRESS)
+def solve_constrained(m, out):
+    """The same where constraints tie dofs together. On one thread only."""
+    values = flat(rows_at(out, m.s.force.shape[0]))
+    solve_tied(m.mass, flat(m.s.force), values, m.s.line)
 
 
 @addressed(ADDRESS)
