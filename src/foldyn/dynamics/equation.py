@@ -280,6 +280,12 @@ class EquationOfMotion:
     course : Course
     slows : bool, optional
         Whether the method gives slow contacts inertia; None if contact does not limit its steps.
+
+    Attributes
+    ----------
+    setting : Setting
+    balance, still : Context
+        What accelerations need of the case, and the equation, for accelerations alone.
     """
 
     def __init__(
@@ -288,12 +294,12 @@ class EquationOfMotion:
         limited = slows is not None
         system, mass, model = packed.system, packed.mass, Model(packed.body, work, limited)
         self._model, self._course, share = model, course, model.share
-        self._setting = Setting(model.terms, system, mass, share, s)
-        self._whole = whole = Context(self._setting)
-        self._balance = balance = Context(_balance(self._setting, whole))
+        self.setting = Setting(model.terms, system, mass, share, s)
+        self._whole = whole = Context(self.setting)
+        self.balance = balance = Context(_balance(self.setting, whole))
         self._slow = slow = slow_contacts(packed, work, s) if slows else None
         remembers = model.terms.kernel[:, ADVANCE_CLOCK].any()
-        self._equation = Equation(
+        equation = Equation(
             acceleration=_acceleration.at(balance),
             contact=contact_parts(whole, limited and system.touches, slow),
             clock=parts.clock.at(whole) if remembers else 0,
@@ -310,22 +316,18 @@ class EquationOfMotion:
             stage=s.stage,
             angle=share.angle,
         )
+        self.still = Context(equation)
         self._out: Samples | None = None
 
-    @property
-    def still(self) -> Equation:
-        """The equation, for accelerations alone."""
-        return self._equation
-
-    def sampled(self, out: Samples) -> Equation:
+    def sampled(self, out: Samples) -> Context:
         """The equation with samples that go to `out`."""
         if self._out is not out:  # contexts are filled by Python: once for each window of samples
-            self._recording = recording = Context(Recording(self._setting, self._course, out))
-            self._equation = self._equation._replace(
-                sample=_sample.at(recording), recording=recording.address
+            self._recording = recording = Context(Recording(self.setting, self._course, out))
+            self._sampled = Context(
+                self.still.value._replace(sample=_sample.at(recording), recording=recording.address)
             )
             self._out = out
-        return self._equation
+        return self._sampled
 
 
 def _balance(setting: Setting, whole: Context) -> Balance:

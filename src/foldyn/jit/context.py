@@ -20,7 +20,7 @@ from llvmlite import ir
 from numba import typeof, types
 from numba.core.imputils import lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
-from numba.extending import models, register_model
+from numba.extending import NativeValue, models, register_model, unbox
 from numba.np.arrayobj import make_array, populate_array
 
 from foldyn.jit.intrinsics import DOUBLE, INT64, data_of, intrinsic
@@ -43,7 +43,7 @@ class _Address(models.PrimitiveModel):
 
 
 class Context:
-    """A tuple at an address; it holds the arrays.
+    """A tuple at an address, for compiled functions; it holds the arrays.
 
     Numbers in the tuple are those of now. Arrays and records are shared, and may change in place.
 
@@ -54,6 +54,8 @@ class Context:
 
     Attributes
     ----------
+    value : tuple
+        As it was given.
     kind : ContextType
     address : int
     """
@@ -63,11 +65,21 @@ class Context:
         looks = _fill(value, slots)
         if looks not in _KINDS:  # Numba takes ms to tell the type of a large tuple
             _KINDS[looks] = ContextType(typeof(value))
-        self._value, self._slots = value, np.array(slots, np.uint64)
+        self.value: Any = value
+        self._slots = np.array(slots, np.uint64)
         self.kind, self.address = _KINDS[looks], int(self._slots.ctypes.data)
+        self._numba_type_ = self.kind
 
 
 _KINDS: dict[tuple, ContextType] = {}  # by what `_fill` says
+
+
+@unbox(ContextType)
+def _from_python(kind: Any, held: Any, c: Any) -> NativeValue:
+    number = c.pyapi.object_getattr_string(held, "address")
+    address = c.pyapi.number_as_ssize_t(number)
+    c.pyapi.decref(number)
+    return NativeValue(address)
 
 
 def _fill(value: Any, slots: list[int]) -> tuple:

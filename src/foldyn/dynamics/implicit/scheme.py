@@ -16,7 +16,7 @@ from foldyn.dynamics.equation import EquationOfMotion, accelerate
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.system import Packed, Scratch, carried, place, scratch
 from foldyn.dynamics.ties import hand_over
-from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.contact.body import contact_tangent
 from foldyn.mechanics.contact.memory import Memory
@@ -302,7 +302,15 @@ class Scheme(ABC):
         self.folds[:] = self.work.fold_angle
 
 
-@kernel
+@inner_scalar
+def copy(source, out):
+    """out = source, of one size: Numba's own check of sizes compiles the text of its message."""
+    values, given = flat(out), flat(source)
+    for i in range(values.size):
+        values[i] = given[i]
+
+
+@inner
 def norms(system, force, inertia, factor, following):
     """Norms of an out-of-balance force (n, 3) on the free dofs, N, and of the forces at play.
 
