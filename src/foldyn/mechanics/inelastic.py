@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.branch_switch import update
@@ -64,7 +64,7 @@ class MemoryHinges(NamedTuple):
     gradient: NDArray  # (14,) memory of one hinge
 
 
-@scalar
+@inner_scalar
 def evaluate_branches(own, offset, e, turn):
     """Note what the branches of a hinge do at a turn (rad); returns the energy dissipated, J."""
     moment, slope, stored, lost = 0.0, 0.0, 0.0, 0.0
