@@ -17,7 +17,7 @@ from scipy import sparse
 import foldyn as fd
 from foldyn.algebra.solvers import Fill
 from foldyn.jit.compiled import kernel
-from foldyn.jit.context import Context, contents, numbers_at, rows_at
+from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.materials import hinge_law
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.sheet_term import SheetTerm
@@ -70,15 +70,13 @@ class SpringsContext(NamedTuple):
 
 
 @forces
-def _forces(context, u, v, t, force, powers):
-    own = contents(context)
+def _forces(own, u, v, t, force, powers):
     rows = own.unused.shape[0]
     spring_force(own.model, rows_at(u, rows), rows_at(force, rows))
 
 
 @energies
-def _energies(context, u, out):
-    own = contents(context)
+def _energies(own, u, out):
     moved = rows_at(u, own.unused.shape[0])
     numbers_at(out, 1)[0] = spring_force(own.model, moved, own.unused)
 

@@ -92,7 +92,7 @@ def pack(histories: Sequence[Any], callbacks: Callbacks, span: float = 0.0) -> W
     )
 
 
-@kernel
+@inner
 def waveform(w, row, t, derive):
     """Factor of a history at time t and its two derivatives (per s and s2).
 

@@ -56,7 +56,7 @@ def advance(equation, course, plan, room, stretch):
     `course.carry` is the acceleration, kept from one step and stretch to the next; the tally keeps
     the powers beside the energies. Each thread of a team advances its own nodes.
     """
-    equation, course = borrowed(equation), borrowed(course)
+    course = borrowed(course)
     team, stage, a, powers = equation.team, equation.stage, course.carry, equation.before
     low, high = 3 * equation.own[0], 3 * equation.own[1]
     u, v = flat(course.u)[low:high], flat(course.v)[low:high]

@@ -130,7 +130,7 @@ def advance(equation, course, plan, room, stretch):
     largest velocity that the motion has had so far. Steps end at the stops of the plan, where
     loads may jump.
     """
-    equation, course = borrowed(equation), borrowed(course)
+    course = borrowed(course)
     tally, n = course.tally, course.u.size
     u, v = flat(course.u), flat(course.v)
     speeds, accelerations = np.empty((7, n)), np.empty((7, n))

@@ -15,12 +15,12 @@ damps the vibrations that a step does not resolve.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.damping import (
@@ -35,21 +35,40 @@ from foldyn.dynamics.damping import (
 from foldyn.dynamics.implicit import discrete_gradient
 from foldyn.dynamics.implicit.contact_step import StepContact
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.implicit.scheme import Scheme, add_load_work, norms
+from foldyn.dynamics.implicit.scheme import Phase, Scheme, add_load_work, copy, norms
 from foldyn.dynamics.inertia import times_mass
+from foldyn.dynamics.parts import Setting
 from foldyn.dynamics.system import Packed, carry, place
 from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import inner, inner_scalar, kernel
-from foldyn.jit.intrinsics import borrowed, flat
+from foldyn.jit.context import Context, run_at
+from foldyn.jit.intrinsics import flat
 from foldyn.mechanics import strain_energies
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.tables import Tables
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import add_following
+from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.step_tangent import FLOOR, expected_stress
-from foldyn.mechanics.term import Folds
 
 ORDER = 2
+
+
+class Step(NamedTuple):
+    """What compiled functions of a step work with."""
+
+    model: BarsHinges
+    setting: Setting
+    context: int  # of the setting
+    histories: int  # evaluates them; 0 where they are constant
+    old: Phase
+    new: Phase
+    mean: NDArray  # (h, 3) factors of the histories
+    shift: NDArray
+    out: NDArray
+    before: NDArray  # (nh,) dihedrals at the start, rad,
+    after: NDArray  # and at the end
+    touch: NDArray  # (n, 3) force of contact, N, or none (0, 3)
 
 
 class EnergyMomentum(Scheme):
@@ -60,14 +79,21 @@ class EnergyMomentum(Scheme):
 
     def __init__(self, packed: Packed, course: Course) -> None:
         super().__init__(packed, course)
-        body, self._contact = packed.body, None
+        body, touch = packed.body, None
         contact = body.find(ContactTerm)
         if contact is not None:
             kept = body.kept(self.work, ContactTerm)
-            self._contact = StepContact(contact.tables, kept, packed.system.rows)
-        model = body.sheet.model
-        self._arrays = model, packed.system, packed.mass
-        self._touch = np.zeros((0, 3)) if self._contact is None else self._contact.force
+            touch = StepContact(contact.tables, kept, packed.system.rows)
+        self._contact, self._model = touch, body.sheet.model
+        equation, model = self.equation, self._model
+        balance = equation.balance.value
+        self._step = Context(
+            Step(
+                model, equation.setting, balance.setting, balance.histories, self.old, self.new,
+                np.zeros_like(self.new.factor), self.shift, self.out, course.angle,
+                self.work.angle, np.zeros((0, 3)) if touch is None else touch.force,
+            )
+        )  # fmt: skip
         self._stress, self._start = np.zeros((2, len(model.bars)))
         self._before = 0.0  # the last step, s
 
@@ -100,14 +126,11 @@ class EnergyMomentum(Scheme):
         if self._contact is not None:
             place(self.packed.system, old.q + self.shift, old.w, t, s)
             self._contact.put(self.displacement(), s.displacement, old.factor, s.factor)
-        return residual(
-            *self._arrays, h, t, old, self.new, self.shift, self.out, self.course.angle,
-            self.work.angle, self._touch, s,
-        )  # fmt: skip
+        return residual(self._step, h, t)
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
         """See `Scheme`."""
-        model, pattern, out = self._arrays[0], matrix.pattern, matrix.stiffness
+        model, pattern, out = self._model, matrix.pattern, matrix.stiffness
         u0, u1, slots = self.displacement(), self.moved(), pattern.hinge_slots
         expected_stress(model, u0, u0, False, self._start)
         expected_stress(model, u1, before, again, self._stress)
@@ -135,13 +158,12 @@ class EnergyMomentum(Scheme):
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; exactly those of the step's forces."""
-        (model, system, mass), old, new = self._arrays, self.old, self.new
-        done, lost = _works(system, mass, h, old, new, self.shift, self.scratch)
+        system = self.packed.system
+        done, lost = _works(self._step, h)
         if system.damping.follows:
-            lost += _taken(system, h, old, new, self.scratch)
+            lost += _taken(self._step, h)
         if system.turns:
-            u0, u1 = self.displacement(), self.moved()
-            done += _actuation(model, system, old, new, u0, u1, self.scratch)
+            done += _actuation(self._step, self.displacement(), self.moved())
         return done, lost
 
     def change(self, h: float) -> NDArray:
@@ -150,16 +172,12 @@ class EnergyMomentum(Scheme):
 
 
 @kernel
-def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, touch, s):
-    """Residual of a step into `out`; returns its norm and that of the forces at play, N.
-
-    The dihedrals angle0 (nh,) belong to the start; angle1 gets those of the end. The force of
-    contact in the step is touch (n, 3), N, or none (0, 3).
-    """
-    model, system, mass = borrowed(model), borrowed(system), borrowed(mass)
-    old, new, s = borrowed(old), borrowed(new), borrowed(s)
+def residual(step, h, t):
+    """Residual of a step into `out`; returns its norm and that of the forces at play, N."""
+    model, old, new, out = step.model, step.old, step.new, step.out
+    system, mass, s = step.setting.system, step.setting.mass, step.setting.s
     q0, w0, q1, w1, a1 = flat(old.q), flat(old.w), flat(new.q), flat(new.w), flat(new.a)
-    d, x, left, bracket = flat(shift), flat(s.moving), flat(out), flat(new.force)
+    d, x, left, bracket = flat(step.shift), flat(s.moving), flat(out), flat(new.force)
     for i in range(q0.size):
         q1[i] = q0[i] + d[i]
         w1[i] = 2.0 * d[i] / h - w0[i]
@@ -172,20 +190,22 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, to
     if system.ties.slave.size > 0:  # of which the masters may be such nodes
         follow_masters(system.ties, a1)
         follow_masters(system.ties, w1)
-    if system.varies and t != s.time[0]:
-        evaluate(system.waves, t, system.moves or system.turns, s.factor)
-        s.time[0] = t
-    new.factor[:] = s.factor
-    mean = 0.5 * (old.factor + new.factor)
+    if step.histories != 0:
+        run_at(step.histories, (step.context, t))
+    copy(s.factor, new.factor)
+    mean = mean_factors(step)
     if system.turns:
-        turn(_folds(model), system.actuators, mean)
-    carry(system.moved, old.factor, 0, old.q, s.displacement)
-    carry(system.moved, new.factor, 0, new.q, s.velocity)
+        turn(step.setting.terms.folds, system.actuators, mean)
+    carry(system.moved, old.factor[:, 0], old.q, s.displacement)
+    carry(system.moved, new.factor[:, 0], new.q, s.velocity)
     new.force[:] = 0.0
     discrete_gradient.add_bar_forces(model, s.displacement, s.velocity, new.force)
-    discrete_gradient.add_hinge_forces(model, s.displacement, s.velocity, angle0, angle1, new.force)
+    discrete_gradient.add_hinge_forces(
+        model, s.displacement, s.velocity, step.before, step.after, new.force
+    )
+    touch = flat(step.touch)
     for i in range(touch.size):
-        bracket[i] += flat(touch)[i]
+        bracket[i] += touch[i]
     u0, u1 = flat(s.displacement), flat(s.velocity)
     if system.damping.data.size > 0:
         speed = flat(s.product)
@@ -213,8 +233,12 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, to
 
 
 @inner_scalar
-def _folds(model):
-    return Folds(model.hinge_rest, model.hinge_parameters, model.hinge_stiffness)
+def mean_factors(step):
+    """Mean (h, 3) of the histories' factors at the ends of the step."""
+    mean, one, other = flat(step.mean), flat(step.old.factor), flat(step.new.factor)
+    for k in range(mean.size):
+        mean[k] = 0.5 * (one[k] + other[k])
+    return step.mean
 
 
 @inner
@@ -231,21 +255,24 @@ def _halfway(h, s):
 
 
 @kernel
-def _taken(system, h, old, new, s):
+def _taken(step, h):
     """Energy that dampers dissipate in a step."""
-    carry(system.moved, old.factor, 0, old.q, s.displacement)
-    carry(system.moved, new.factor, 0, new.q, s.velocity)
+    system, s, old, new = step.setting.system, step.setting.s, step.old, step.new
+    carry(system.moved, old.factor[:, 0], old.q, s.displacement)
+    carry(system.moved, new.factor[:, 0], new.q, s.velocity)
     _halfway(h, s)
     return h * dampers_work(system.damping, s.stage[0], s.product, s.product)
 
 
 @kernel
-def _works(system, mass, h, old, new, shift, s):
+def _works(step, h):
     """Work put in and energy dissipated in a step."""
+    system, mass, s = step.setting.system, step.setting.mass, step.setting.s
+    old, new = step.old, step.new
     moved, bracket = system.moved, flat(new.force)
     du, speed = flat(s.displacement), flat(s.moving)
     for i in range(du.size):
-        du[i] = flat(shift)[i]
+        du[i] = flat(step.shift)[i]
         speed[i] = 0.5 * (flat(old.w)[i] + flat(new.w)[i])
     done, lost = drag_works(
         system.damping, mass, system.moved_mass, h, old.factor, new.factor, s.moving
@@ -260,17 +287,18 @@ def _works(system, mass, h, old, new, shift, s):
 
 
 @kernel
-def _actuation(model, system, old, new, u0, u1, s):
+def _actuation(step, u0, u1):
     """Work of the actuators in a step: what turning the rest angles at either end changes."""
-    done, mean = 0.0, 0.5 * (old.factor + new.factor)
-    turn(_folds(model), system.actuators, old.factor)
+    model, folds, old, new = step.model, step.setting.terms.folds, step.old, step.new
+    done, mean, system, s = 0.0, mean_factors(step), step.setting.system, step.setting.s
+    turn(folds, system.actuators, old.factor)
     strain_energies(model, u0, s.energy)
     done -= s.energy.sum()
-    turn(_folds(model), system.actuators, mean)
+    turn(folds, system.actuators, mean)
     strain_energies(model, u0, s.energy)
     done += s.energy.sum()
     strain_energies(model, u1, s.energy)
     done -= s.energy.sum()
-    turn(_folds(model), system.actuators, new.factor)
+    turn(folds, system.actuators, new.factor)
     strain_energies(model, u1, s.energy)
     return done + s.energy.sum()

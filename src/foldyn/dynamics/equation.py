@@ -32,7 +32,7 @@ from foldyn.dynamics.parts import Setting
 from foldyn.dynamics.record import record
 from foldyn.dynamics.system import Entries, Packed, Scratch
 from foldyn.jit.compiled import addressed, inner_scalar, kernel
-from foldyn.jit.context import Context, contents, numbers_at, rows_at, run_at, value_at
+from foldyn.jit.context import Context, numbers_at, rows_at, run_at, value_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.term import (
     ADDRESS,
@@ -109,8 +109,7 @@ class Equation(NamedTuple):
 
 # ------------------------------------------------------------------ the equation
 @addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS)
-def _acceleration(context, q, w, t, out, powers):
-    m = contents(context)
+def _acceleration(m, q, w, t, out, powers):
     rows, first, last = m.force.shape[0], 3 * m.own[0], 3 * m.own[1]
     if m.histories != 0:
         run_at(m.histories, (m.setting, t))
@@ -164,8 +163,7 @@ def _acceleration(context, q, w, t, out, powers):
 
 # ------------------------------------------------------------------ what is seen of a motion
 @addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER)
-def _sample(context, u, v, a, t):
-    r = contents(context)
+def _sample(r, u, v, a, t):
     m, course, out, rows = r.setting, r.course, r.out, r.setting.s.force.shape[0]
     k = course.tally.samples - out.first
     out.time[k] = t
@@ -282,6 +280,12 @@ class EquationOfMotion:
     course : Course
     slows : bool, optional
         Whether the method gives slow contacts inertia; None if contact does not limit its steps.
+
+    Attributes
+    ----------
+    setting : Setting
+    balance, still : Context
+        What accelerations need of the case, and the equation, for accelerations alone.
     """
 
     def __init__(
@@ -290,12 +294,12 @@ class EquationOfMotion:
         limited = slows is not None
         system, mass, model = packed.system, packed.mass, Model(packed.body, work, limited)
         self._model, self._course, share = model, course, model.share
-        self._setting = Setting(model.terms, system, mass, share, s)
-        self._whole = whole = Context(self._setting)
-        self._balance = balance = Context(_balance(self._setting, whole))
+        self.setting = Setting(model.terms, system, mass, share, s)
+        self._whole = whole = Context(self.setting)
+        self.balance = balance = Context(_balance(self.setting, whole))
         self._slow = slow = slow_contacts(packed, work, s) if slows else None
         remembers = model.terms.kernel[:, ADVANCE_CLOCK].any()
-        self._equation = Equation(
+        equation = Equation(
             acceleration=_acceleration.at(balance),
             contact=contact_parts(whole, limited and system.touches, slow),
             clock=parts.clock.at(whole) if remembers else 0,
@@ -312,22 +316,18 @@ class EquationOfMotion:
             stage=s.stage,
             angle=share.angle,
         )
+        self.still = Context(equation)
         self._out: Samples | None = None
 
-    @property
-    def still(self) -> Equation:
-        """The equation, for accelerations alone."""
-        return self._equation
-
-    def sampled(self, out: Samples) -> Equation:
+    def sampled(self, out: Samples) -> Context:
         """The equation with samples that go to `out`."""
         if self._out is not out:  # contexts are filled by Python: once for each window of samples
-            self._recording = recording = Context(Recording(self._setting, self._course, out))
-            self._equation = self._equation._replace(
-                sample=_sample.at(recording), recording=recording.address
+            self._recording = recording = Context(Recording(self.setting, self._course, out))
+            self._sampled = Context(
+                self.still.value._replace(sample=_sample.at(recording), recording=recording.address)
             )
             self._out = out
-        return self._equation
+        return self._sampled
 
 
 def _balance(setting: Setting, whole: Context) -> Balance:
@@ -335,6 +335,7 @@ def _balance(setting: Setting, whole: Context) -> Balance:
     terms, system, mass, share, s = setting
     damping = system.damping
     damped = len(damping.modal) or len(damping.elements.coefficient)
+    solve = parts.solve_constrained if len(mass.ties.slave) else parts.solve
     return Balance(
         terms=terms,
         setting=whole.address,
@@ -345,7 +346,7 @@ def _balance(setting: Setting, whole: Context) -> Balance:
         follow=parts.follow.at(whole) if system.follows else 0,
         viscous=parts.viscous.at(whole) if damping.data.size else 0,
         dampers=parts.dampers.at(whole) if damped else 0,
-        solve=0 if mass.lumped else parts.solve.at(whole),
+        solve=0 if mass.lumped else solve.at(whole),
         kinetic=0 if mass.lumped or not damping.alpha else parts.kinetic.at(whole),
         moving_power=parts.moving_power.at(whole) if system.moves else 0,
         turning_power=parts.turning_power.at(whole) if system.turns else 0,

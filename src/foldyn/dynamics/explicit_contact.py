@@ -12,7 +12,7 @@ from foldyn.dynamics.parts import kinetic
 from foldyn.dynamics.slow_contacts import slow_down
 from foldyn.dynamics.system import Packed, Scratch, System
 from foldyn.jit.compiled import addressed, inner_scalar
-from foldyn.jit.context import Context, contents, rows_at, run_at, value_at
+from foldyn.jit.context import Context, rows_at, run_at, value_at
 from foldyn.mechanics.contact.inertia import Added, added_inertia, room_for
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.tables import Tables
@@ -42,8 +42,7 @@ class ContactParts(NamedTuple):
 
 
 @addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER, NUMBER, NUMBER)
-def _limit(context, q, w, a, dt, beta, energy):
-    m = contents(context)
+def _limit(m, q, w, a, dt, beta, energy):
     rows = m.s.force.shape[0]
     u = m.s.displacement if m.system.moves else rows_at(q, rows)
     v = m.s.velocity if m.system.moves else rows_at(w, rows)
@@ -51,15 +50,13 @@ def _limit(context, q, w, a, dt, beta, energy):
 
 
 @addressed(ADDRESS, NUMBER, NUMBER)
-def _gather(context, u, dt, beta):
-    m = contents(context)
+def _gather(m, u, dt, beta):
     moved = rows_at(u, m.s.force.shape[0])
     added_inertia(m.tables, m.added, moved, dt, beta, m.system.lightness, m.memory)
 
 
 @addressed(ADDRESS, ADDRESS)
-def _slow_down(context, w, a):
-    m = contents(context)
+def _slow_down(m, w, a):
     rows = m.s.force.shape[0]
     slow_down(m.added, m.system, m.mass, rows_at(w, rows), rows_at(a, rows), m.s)
 

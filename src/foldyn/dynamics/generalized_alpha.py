@@ -30,22 +30,26 @@ from foldyn.algebra.banded import substitute
 from foldyn.dynamics.actuation import actuator_power, offset_work, turn
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.damping import dampers_work, drag, drag_works, viscous_work
-from foldyn.dynamics.equation import acceleration, advance_clock
+from foldyn.dynamics.equation import Equation, acceleration, advance_clock
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import (
     GO_ON,
     NOT_CONVERGED,
     Goal,
+    Phase,
     Scheme,
     add_load_work,
+    copy,
     judge,
     norms,
 )
 from foldyn.dynamics.inertia import times_mass
+from foldyn.dynamics.parts import Setting
 from foldyn.dynamics.system import Packed, carry
 from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import kernel
-from foldyn.jit.intrinsics import borrowed, flat
+from foldyn.jit.context import Context
+from foldyn.jit.intrinsics import flat
 
 ORDER = 2
 SPECTRAL_RADIUS = 0.8
@@ -67,6 +71,19 @@ def parameters(spectral_radius: float) -> Parameters:
     return Parameters(am, af, 0.25 * (1.0 - am + af) ** 2, 0.5 - am + af)
 
 
+class Step(NamedTuple):
+    """What compiled functions of a step work with."""
+
+    equation: Equation
+    setting: Setting
+    p: Parameters
+    old: Phase
+    new: Phase
+    shift: NDArray
+    out: NDArray
+    earlier: NDArray
+
+
 class Alpha(Scheme):
     """A method of the family; see `Scheme`."""
 
@@ -77,7 +94,13 @@ class Alpha(Scheme):
         facts: Mapping[str, float] = Scheme.facts,
     ) -> None:  # fmt: skip
         super().__init__(packed, course)
-        self._p, self.facts = parameters, facts
+        self._p, self.facts, equation = parameters, facts, self.equation
+        self._step = Context(
+            Step(
+                equation.still.value, equation.setting, parameters, self.old, self.new, self.shift,
+                self.out, self.earlier,
+            )
+        )  # fmt: skip
 
     def weights(self, h: float) -> Weights:
         """See `Scheme`; the mass carries what multiplies alpha M too."""
@@ -88,10 +111,7 @@ class Alpha(Scheme):
 
     def residual(self, h: float, t: float) -> tuple[float, float]:
         """See `Scheme`."""
-        return residual(
-            self.equation.still, self.packed.system, self.packed.mass, self._p, h, t, self.old,
-            self.new, self.shift, self.out, self.scratch,
-        )  # fmt: skip
+        return residual(self._step, h, t)
 
     def iterate(
         self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
@@ -100,11 +120,7 @@ class Alpha(Scheme):
         """See `Scheme`; with the factors of a band it is one compiled function."""
         if matrix.band is None:
             return super().iterate(matrix, goal, h, t, last, lowest, most)
-        return _iterate(
-            self.equation.still, self.packed.system, self.packed.mass, self._p, h, t, self.old,
-            self.new, self.shift, self.out, self.scratch, self.earlier, matrix.band, matrix.free,
-            goal, last, lowest, most,
-        )  # fmt: skip
+        return _iterate(self._step, h, t, matrix.band, matrix.free, goal, last, lowest, most)
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
         """See `Scheme`."""
@@ -115,20 +131,12 @@ class Alpha(Scheme):
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""
-        packed = self.packed
-        system, mass = packed.system, packed.mass
-        done, lost = _works(system, mass, h, self.old, self.new, self.shift, self.scratch)
+        system = self.packed.system
+        done, lost = _works(self._step, h)
         if system.damping.follows:
-            lost += _taken(system, self.old, self.new, self.scratch)
+            lost += _taken(self._step)
         if system.turns:
-            done += _actuation(
-                packed.body.sheet.folds,
-                system,
-                self.old,
-                self.new,
-                self.folds,
-                self.work.fold_angle,
-            )
+            done += _actuation(self._step, self.folds, self.work.fold_angle)
         return done, lost
 
     def change(self, h: float) -> NDArray:
@@ -157,14 +165,14 @@ def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[Packed, Course
 
 
 @kernel
-def residual(equation, system, mass, p, h, t, old, new, shift, out, s):
+def residual(step, h, t):
     """Residual of a step into `out`; returns its norm and that of the forces at play, N."""
-    equation, system, mass = borrowed(equation), borrowed(system), borrowed(mass)
-    old, new, s = borrowed(old), borrowed(new), borrowed(s)
-    am, af, beta, gamma = p
+    equation, old, new, out = step.equation, step.old, step.new, step.out
+    system, mass, s = step.setting.system, step.setting.mass, step.setting.s
+    am, af, beta, gamma = step.p.am, step.p.af, step.p.beta, step.p.gamma
     q0, w0, a0, b0 = flat(old.q), flat(old.w), flat(old.a), flat(old.force)
     q1, w1, a1, b1 = flat(new.q), flat(new.w), flat(new.a), flat(new.force)
-    d, x, left = flat(shift), flat(s.moving), flat(out)
+    d, x, left = flat(step.shift), flat(s.moving), flat(out)
     curvature = 1.0 / (beta * h * h)
     for i in range(q0.size):
         q1[i] = q0[i] + d[i]
@@ -183,8 +191,8 @@ def residual(equation, system, mass, p, h, t, old, new, shift, out, s):
         b1[i] = flat(s.force)[i]
         slowed = drag(system.damping, (1.0 - af) * w1[i] + af * w0[i])
         x[i] = (1.0 - am) * a1[i] + am * a0[i] + slowed
-    new.factor[:] = s.factor
-    new.pushed[:] = s.pushed
+    copy(s.factor, new.factor)
+    copy(s.pushed, new.pushed)
     times_mass(mass, s.moving, out)
     inertia = 0.0
     for i in range(q0.size):
@@ -194,40 +202,37 @@ def residual(equation, system, mass, p, h, t, old, new, shift, out, s):
 
 
 @kernel
-def _iterate(
-    equation, system, mass, p, h, t, old, new, shift, out, s, earlier, band, free, goal, last,
-    lowest, most,
-):  # fmt: skip
+def _iterate(step, h, t, band, free, goal, last, lowest, most):
     """Iterate with the factors of a band; see `Scheme.iterate`."""
-    d, q, before, left = flat(shift), flat(new.q), flat(earlier), flat(out)
-    step = np.empty(free.size)
+    d, left = flat(step.shift), flat(step.out)
+    change, ties = np.empty(free.size), step.setting.system.ties
     norm = np.inf
     for steps in range(most):
-        norm, reference = residual(equation, system, mass, p, h, t, old, new, shift, out, s)
+        norm, reference = residual(step, h, t)
         verdict = judge(goal, norm, reference, last, lowest)
         if verdict != GO_ON:
             return verdict, norm, steps
         lowest, last = min(lowest, norm), norm
-        for i in range(q.size):
-            before[i] = q[i]
+        copy(step.new.q, step.earlier)
         for k in range(free.size):
-            step[k] = left[free[k]]
-        substitute(band, step)
+            change[k] = left[free[k]]
+        substitute(band, change)
         for k in range(free.size):
-            d[free[k]] -= step[k]
-        if system.ties.slave.size > 0:
-            follow_masters(system.ties, d)
+            d[free[k]] -= change[k]
+        if ties.slave.size > 0:
+            follow_masters(ties, d)
     return NOT_CONVERGED, norm, most
 
 
 @kernel
-def _works(system, mass, h, old, new, shift, s):
+def _works(step, h):
     """Work put in and energy dissipated in a step."""
-    du = flat(s.displacement)
+    system, mass, s = step.setting.system, step.setting.mass, step.setting.s
+    old, new, du = step.old, step.new, flat(s.displacement)
     v0, v1, b0, b1 = flat(old.w), flat(new.w), flat(old.force), flat(new.force)
     moved = system.moved
     for i in range(du.size):
-        du[i] = flat(shift)[i]
+        du[i] = flat(step.shift)[i]
         flat(s.velocity)[i] = 0.5 * (v0[i] + v1[i])
     done, lost = drag_works(
         system.damping, mass, system.moved_mass, h, old.factor, new.factor, s.velocity
@@ -243,19 +248,20 @@ def _works(system, mass, h, old, new, shift, s):
 
 
 @kernel
-def _taken(system, old, new, s):
+def _taken(step):
     """Energy that dampers dissipate in a step, after `_works`: their mean force along it."""
-    work = 0.0
-    for phase in (old, new):
-        carry(system.moved, phase.factor, 0, phase.q, s.product)
-        carry(system.moved, phase.factor, 1, phase.w, s.moving)
+    work, system, s = 0.0, step.setting.system, step.setting.s
+    for phase in (step.old, step.new):
+        carry(system.moved, phase.factor[:, 0], phase.q, s.product)
+        carry(system.moved, phase.factor[:, 1], phase.w, s.moving)
         work += 0.5 * dampers_work(system.damping, s.product, s.moving, s.displacement)
     return work
 
 
 @kernel
-def _actuation(folds, system, old, new, angle0, angle1):
+def _actuation(step, angle0, angle1):
     """Work of the actuators in a step, from angles angle0 to angle1 of the folds."""
+    folds, system, old, new = step.setting.terms.folds, step.setting.system, step.old, step.new
     change = np.zeros_like(new.factor)
     change[:, 1] = 0.5 * (new.factor[:, 0] - old.factor[:, 0])
     turn(folds, system.actuators, old.factor)

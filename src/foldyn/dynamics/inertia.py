@@ -161,15 +161,15 @@ def substitute(m, r, a, scratch):
 
     scratch holds n numbers, 3 n where there are constraints.
     """
-    solve_mass(m, r, a, scratch, 0, 1)
+    if m.ties.slave.size > 0:
+        solve_tied(m, flat(r), flat(a), scratch)
+    else:
+        solve_mass(m, r, a, scratch, 0, 1)
 
 
 @inner
 def solve_mass(m, r, a, scratch, member, members):
-    """The same by one of several threads, which share the axes; one alone with constraints."""
-    if m.ties.slave.size > 0:
-        _substitute_tied(m, flat(r), flat(a), scratch)
-        return
+    """The same without constraints, by one of several threads, which share the axes."""
     for c in range(member, 3, members):
         for i in range(a.shape[0]):
             a[i, c] = 0.0
@@ -193,7 +193,7 @@ def solve_mass(m, r, a, scratch, member, members):
 
 
 @inner
-def _substitute_tied(m, r, a, scratch):
+def solve_tied(m, r, a, scratch):
     """The same with constraints; r, a (3n,)."""
     for i in range(a.size):
         a[i] = r[i]

@@ -203,7 +203,8 @@ def begin(
     """
     body, system, mass, callbacks, by = packed
     s = scratch(system)
-    place(system, np.zeros_like(u), np.zeros_like(v), plan.start, s)
+    still = np.zeros((system.rows, 3))
+    place(system, still, still, plan.start, s)
     if callbacks.error is not None:
         raise callbacks.error
     carried, imposed = by.outward(s.displacement), case.imposed

@@ -11,10 +11,10 @@ from typing import NamedTuple
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.actuation import offset_work, power_of_part, turn_part
 from foldyn.dynamics.damping import add_dampers, add_viscous, drag_power
-from foldyn.dynamics.inertia import Inertia, kinetic_energy, moving_energy, solve_mass
+from foldyn.dynamics.inertia import Inertia, kinetic_energy, moving_energy, solve_mass, solve_tied
 from foldyn.dynamics.system import Scratch, System, carry_part, power_of_moved
 from foldyn.jit.compiled import addressed
-from foldyn.jit.context import contents, rows_at
+from foldyn.jit.context import rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.following import push_following
 from foldyn.mechanics.term import ADDRESS, NUMBER, Share, Terms, clock_to, commit_all
@@ -32,9 +32,8 @@ class Setting(NamedTuple):
 
 
 @addressed(NUMBER)
-def histories(context, t):
+def histories(m, t):
     """Evaluate the histories at t; two stages of a step may share their time."""
-    m = contents(context)
     if t != m.s.time[0]:
         derive = m.system.moves or m.system.turns or m.system.presses
         evaluate(m.system.waves, t, derive, m.s.factor)
@@ -42,52 +41,46 @@ def histories(context, t):
 
 
 @addressed()
-def turn(context):
+def turn(m):
     """Turn rest angles to where the histories say."""
-    m = contents(context)
     turn_part(m.terms.folds, m.system.actuators, m.s.factor, m.s.turned[0], m.s.turned[1])
 
 
 @addressed(ADDRESS, ADDRESS)
-def carry(context, q, w):
+def carry(m, q, w):
     """Displacement and velocity with those of the supports that move, from q and w."""
-    m = contents(context)
     rows, own = m.s.force.shape[0], m.share.strips.own
     dofs, supports = (3 * own[0], 3 * own[1]), (m.s.moved[0], m.s.moved[1])
     here, there, moved = flat(m.s.displacement), flat(m.s.velocity), m.system.moved
-    carry_part(moved, m.s.factor, 0, flat(rows_at(q, rows)), here, dofs, supports)
-    carry_part(moved, m.s.factor, 1, flat(rows_at(w, rows)), there, dofs, supports)
+    carry_part(moved, m.s.factor[:, 0], flat(rows_at(q, rows)), here, dofs, supports)
+    carry_part(moved, m.s.factor[:, 1], flat(rows_at(w, rows)), there, dofs, supports)
 
 
 @addressed(ADDRESS, ADDRESS)
-def follow(context, u, v):
+def follow(m, u, v):
     """Add loads that depend on the displacement; returns their power, W. On one thread only."""
-    m = contents(context)
     rows, loads = m.s.force.shape[0], m.system.following
     moved, speed = rows_at(u, rows), rows_at(v, rows)
     return push_following(loads, moved, speed, m.s.factor, m.s.pushed, m.s.force)
 
 
 @addressed(ADDRESS)
-def viscous(context, v):
+def viscous(m, v):
     """Add the forces of a constant matrix of damping; returns the power taken, W."""
-    m = contents(context)
     speed, own = flat(rows_at(v, m.s.force.shape[0])), m.share.strips.own
     return add_viscous(m.system.damping, speed, flat(m.s.force), 3 * own[0], 3 * own[1])
 
 
 @addressed(ADDRESS, ADDRESS)
-def dampers(context, u, v):
+def dampers(m, u, v):
     """Add those of dashpots, creases and modes; returns the power taken, W. On one thread only."""
-    m = contents(context)
     rows = m.s.force.shape[0]
     return add_dampers(m.system.damping, rows_at(u, rows), rows_at(v, rows), m.s.force)
 
 
 @addressed(ADDRESS)
-def solve(context, out):
+def solve(m, out):
     """Solve with a mass matrix that is not diagonal."""
-    m = contents(context)
     rows, team = m.s.force.shape[0], m.share.team
     wait(team)  # for the forces of the others, and their look at this member's velocities
     solve_mass(m.mass, m.s.force, rows_at(out, rows), m.s.line, team.number, team.size)
@@ -95,16 +88,21 @@ def solve(context, out):
 
 
 @addressed(ADDRESS)
-def kinetic(context, v):
+def solve_constrained(m, out):
+    """The same where constraints tie dofs together. On one thread only."""
+    values = flat(rows_at(out, m.s.force.shape[0]))
+    solve_tied(m.mass, flat(m.s.force), values, m.s.line)
+
+
+@addressed(ADDRESS)
+def kinetic(m, v):
     """Kinetic energy (J) of a thread's nodes with such a matrix."""
-    m = contents(context)
     return kinetic_energy(m.mass, rows_at(v, m.s.force.shape[0]), m.share.strips.own)
 
 
 @addressed()
-def moving_power(context):
+def moving_power(m):
     """Power (W) of supports that move, but for what changes the kinetic energy of S f'."""
-    m = contents(context)
     power = power_of_moved(m.system.moved, m.s.force, m.s.factor, m.s.moved[0], m.s.moved[1])
     if m.share.team.number == 0:
         power += drag_power(m.system.damping, moving_energy(m.system.moved_mass, m.s.factor))
@@ -112,9 +110,8 @@ def moving_power(context):
 
 
 @addressed()
-def turning_power(context):
+def turning_power(m):
     """Power (W) of rest angles that turn."""
-    m = contents(context)
     return power_of_part(
         m.terms.folds, m.system.actuators, m.s.factor, m.share.fold_angle, m.s.turned[0],
         m.s.turned[1],
@@ -122,9 +119,8 @@ def turning_power(context):
 
 
 @addressed(NUMBER)
-def offsets(context, accepted):
+def offsets(m, accepted):
     """Work (J) of offsets since the last step; see `actuation.offset_work`."""
-    m = contents(context)
     return offset_work(
         m.terms.folds, m.system.actuators, m.share.fold_angle, m.s.turned[0], m.s.turned[1],
         accepted > 0.0,
@@ -132,12 +128,12 @@ def offsets(context, accepted):
 
 
 @addressed(NUMBER)
-def clock(context, since):
+def clock(m, since):
     """Say how long (s) after the last accepted step terms are evaluated next."""
-    clock_to(contents(context).terms, since)
+    clock_to(m.terms, since)
 
 
 @addressed()
-def commit(context):
+def commit(m):
     """Accept the step that ends where terms were evaluated last."""
-    commit_all(contents(context).terms)
+    commit_all(m.terms)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from foldyn.dynamics.damping import drag
 from foldyn.dynamics.inertia import kinetic_energy, moving_energy, times_mass
 from foldyn.dynamics.system import carry
 from foldyn.dynamics.ties import add_reactions
@@ -18,31 +17,22 @@ def record(model, system, mass, q, w, a, tally, s, displacement, velocity, react
     The reaction is what the supports exert: M (a + alpha v) + F_int + beta K0 v - p there. energy
     gets the strain energies, the kinetic energy, what was dissipated and the work.
     """
-    carry(system.moved, s.factor, 0, q, s.displacement)
-    carry(system.moved, s.factor, 1, w, s.velocity)
-    carry(system.moved, s.factor, 2, a, s.moving)
+    carry(system.moved, s.factor[:, 0], q, s.displacement)
+    carry(system.moved, s.factor[:, 1], w, s.velocity)
+    carry(system.moved, s.factor[:, 2], a, s.moving)
     for i in range(system.order.size):
         for c in range(3):
             displacement[system.order[i], c] = s.displacement[i, c]
             velocity[system.order[i], c] = s.velocity[i, c]
     product, force = flat(s.product), flat(s.force)
     times_mass(mass, s.moving, s.product)
-    tied = system.ties.slave.size > 0
-    if tied:
-        reaction[:] = 0.0
-        add_reactions(system.ties.reactions, product, 1.0, reaction)
-        add_reactions(system.ties.reactions, force, 1.0, reaction)
-    else:
-        for k in range(system.supported.size):
-            reaction[k] = product[system.supported[k]] + force[system.supported[k]]
+    reaction[:] = 0.0
+    add_reactions(system.ties.reactions, product, 1.0, reaction)
+    add_reactions(system.ties.reactions, force, 1.0, reaction)
     groups = s.energy.size
     energy[groups] = kinetic_energy(mass, s.velocity, (0, s.velocity.shape[0]))
     times_mass(mass, s.velocity, s.product)
-    if tied:
-        add_reactions(system.ties.reactions, product, system.damping.alpha, reaction)
-    else:
-        for k in range(system.supported.size):
-            reaction[k] += drag(system.damping, product[system.supported[k]])
+    add_reactions(system.ties.reactions, product, system.damping.alpha, reaction)
     energies_of(model, s.displacement, s.energy)
     for k in range(groups):
         energy[k] = s.energy[k]

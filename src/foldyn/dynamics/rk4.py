@@ -32,7 +32,7 @@ def advance(equation, course, plan, room, stretch):
     Work and dissipated energy are integrated with the method's own weights. Each thread of a team
     advances its own nodes.
     """
-    equation, course = borrowed(equation), borrowed(course)
+    course = borrowed(course)
     team, stage = equation.team, equation.stage
     low, high = 3 * equation.own[0], 3 * equation.own[1]
     stage_u, stage_v, a = stage[0], stage[1], stage[2]

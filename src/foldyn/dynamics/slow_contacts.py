@@ -11,7 +11,7 @@ That inertia is dragged as all mass is: else what vibrates in it would not come 
 from __future__ import annotations
 
 from foldyn.dynamics.damping import drag
-from foldyn.dynamics.inertia import solve_mass
+from foldyn.dynamics.inertia import solve_mass, solve_tied
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
 
@@ -26,6 +26,8 @@ def _solve(mass, r, out, line):
         values, given, inverse = flat(out), flat(r), flat(mass.inverse)
         for i in range(values.size):
             values[i] = inverse[i] * given[i]
+    elif mass.ties.slave.size > 0:
+        solve_tied(mass, flat(r), flat(out), line)
     else:
         solve_mass(mass, r, out, line, 0, 1)
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case, History
-from foldyn.cases.waveforms import Callbacks, Waveforms, evaluate
+from foldyn.cases.waveforms import CONSTANT, Callbacks, Waveforms, evaluate
 from foldyn.cases.waveforms import pack as pack_waveforms
 from foldyn.dynamics.actuation import Actuators, actuators
 from foldyn.dynamics.damping import (
@@ -34,7 +34,7 @@ from foldyn.dynamics.inertia import (
 )
 from foldyn.dynamics.modal_damping import ModalRows, modal_rows
 from foldyn.dynamics.ties import Ties, ties_of
-from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.compiled import inner
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.following import Following, joined
@@ -51,7 +51,7 @@ class Entries(NamedTuple):
 class System(NamedTuple):
     """What compiled integrators need beside the model: n nodes, h histories, s supported dofs."""
 
-    varies: bool  # whether there are histories,
+    varies: bool  # whether there are histories that are not constant,
     moves: bool  # supports that move,
     turns: bool  # rest angles that change
     follows: bool  # loads that depend on the displacement
@@ -140,7 +140,7 @@ def pack(
     body, turned = actuators(body, *turns)
     body = with_memory(case, body, by)
     system = System(
-        varies=bool(histories),
+        varies=any(history.code != CONSTANT for history in histories),
         moves=bool(moves),
         turns=len(turned.hinge) > 0,
         follows=following.acts,
@@ -193,7 +193,7 @@ def follow(mass: Inertia, shape: NDArray) -> NDArray:
 
     shape : (n, 3), with what constraints tie to the supports.
     """
-    if mass.lumped:
+    if mass.lumped or not shape.any():
         return shape
     product, out = np.empty_like(shape), np.empty_like(shape)
     times_mass(mass, shape, product)
@@ -215,7 +215,7 @@ def scratch(system: System) -> Scratch:
     nodes, histories = system.rows, len(system.waves.code)
     force, product, displacement, velocity, moving = np.zeros((5, nodes, 3))
     line = np.zeros(3 * nodes if len(system.ties.slave) else nodes)
-    energy, factor = np.zeros(system.energies), np.zeros((histories, 3))
+    energy, factor = np.zeros(system.energies), np.tile([1.0, 0.0, 0.0], (histories, 1))
     never = np.full(1, np.nan)
     counts = len(system.loads.dof), len(system.moved.dof), len(system.actuators.hinge)
     loads, moved, turned = (np.array([0, count]) for count in counts)
@@ -244,29 +244,38 @@ def scratches(system: System, works: Sequence[Any]) -> list[Scratch]:
     ]
 
 
-@kernel
-def place(system, q, w, t, s):
+def place(system: System, q: NDArray, w: NDArray, t: float, s: Scratch) -> None:
     """Displacement and velocity at time t, q + S f and w + S f', into `s`."""
-    evaluate(system.waves, t, True, s.factor)
+    if system.varies:
+        evaluate(system.waves, t, True, s.factor)
     s.time[0] = t
-    carry(system.moved, s.factor, 0, q, s.displacement)
-    carry(system.moved, s.factor, 1, w, s.velocity)
+    s.displacement[:] = carried(system.moved, s.factor[:, 0], q)
+    s.velocity[:] = carried(system.moved, s.factor[:, 1], w)
 
 
-@kernel
-def carry(moved, factor, derivative, still, out):
-    """Add the motion of the supports, S f or a derivative of it, to q, w or q'', all (n, 3)."""
-    values, rest = flat(out), flat(still)
-    carry_part(moved, factor, derivative, rest, values, (0, values.size), (0, moved.dof.size))
+def carried(moved: Entries, factor: NDArray, still: NDArray) -> NDArray:
+    """A motion (n, 3) with that of the supports, for factors (h,) or a derivative of them."""
+    if not len(moved.dof):
+        return still
+    out = still.copy()
+    np.add.at(out.reshape(-1), moved.dof, moved.value * factor[moved.row])
+    return out
 
 
 @inner
-def carry_part(moved, factor, derivative, rest, values, dofs, supports):
+def carry(moved, factor, still, out):
+    """The same into `out`."""
+    values, rest = flat(out), flat(still)
+    carry_part(moved, factor, rest, values, (0, values.size), (0, moved.dof.size))
+
+
+@inner
+def carry_part(moved, factor, rest, values, dofs, supports):
     """The same for the dofs dofs[0] to dofs[1] with their supports."""
     for i in range(dofs[0], dofs[1]):
         values[i] = rest[i]
     for k in range(supports[0], supports[1]):
-        values[moved.dof[k]] += moved.value[k] * factor[moved.row[k], derivative]
+        values[moved.dof[k]] += moved.value[k] * factor[moved.row[k]]
 
 
 @inner

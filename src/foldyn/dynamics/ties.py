@@ -40,7 +40,7 @@ def ties_of(constraints: Constraints, by: Numbering) -> Ties:
     if not constraints:
         nothing, empty = np.zeros(0, np.int64), Rows(np.zeros(1, np.int64), *np.zeros((2, 0)))
         empty = empty._replace(dof=nothing)
-        return Ties(nothing, empty, nothing, empty)
+        return Ties(nothing, empty, nothing, _rows(constraints.reactions, by))
     slaves, free = constraints.slaves, constraints.free
     only = sparse.csr_array(constraints.basis[slaves][:, free])
     return Ties(

@@ -1,9 +1,10 @@
 """Tuples of arrays that reach compiled functions as one address.
 
 A context is an array of slots of eight bytes, one for each number, address, length and stride of a
-(nested) named tuple. Python fills it, so nothing is compiled for that; inside a kernel, `contents`
-makes the tuple again. There it owns no memory: no references are counted, and what is not used is
-not even loaded. Whoever holds the `Context` keeps all arrays alive.
+(nested) named tuple. Python fills it, so nothing is compiled for that. A kernel names the fields of
+a context as those of the tuple. What it names is loaded there, so whatever else the tuple has costs
+neither time nor code, and a tuple in it is passed on as an address. No references are counted:
+whoever holds the `Context` keeps all arrays alive.
 
 The layout is known to the type of a context alone, `ContextType`, whose `types` tell the store of
 kernels (`jit.kept`) all fields of the tuple.
@@ -12,14 +13,14 @@ kernels (`jit.kept`) all fields of the tuple.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import count
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import typeof, types
-from numba.core.imputils import impl_ret_untracked
-from numba.extending import models, register_model
+from numba.core.imputils import lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate, infer_getattr
+from numba.extending import NativeValue, models, register_model, unbox
 from numba.np.arrayobj import make_array, populate_array
 
 from foldyn.jit.intrinsics import DOUBLE, INT64, data_of, intrinsic
@@ -42,7 +43,7 @@ class _Address(models.PrimitiveModel):
 
 
 class Context:
-    """A tuple at an address; it holds the arrays.
+    """A tuple at an address, for compiled functions; it holds the arrays.
 
     Numbers in the tuple are those of now. Arrays and records are shared, and may change in place.
 
@@ -53,6 +54,8 @@ class Context:
 
     Attributes
     ----------
+    value : tuple
+        As it was given.
     kind : ContextType
     address : int
     """
@@ -62,11 +65,21 @@ class Context:
         looks = _fill(value, slots)
         if looks not in _KINDS:  # Numba takes ms to tell the type of a large tuple
             _KINDS[looks] = ContextType(typeof(value))
-        self._value, self._slots = value, np.array(slots, np.uint64)
+        self.value: Any = value
+        self._slots = np.array(slots, np.uint64)
         self.kind, self.address = _KINDS[looks], int(self._slots.ctypes.data)
+        self._numba_type_ = self.kind
 
 
 _KINDS: dict[tuple, ContextType] = {}  # by what `_fill` says
+
+
+@unbox(ContextType)
+def _from_python(kind: Any, held: Any, c: Any) -> NativeValue:
+    number = c.pyapi.object_getattr_string(held, "address")
+    address = c.pyapi.number_as_ssize_t(number)
+    c.pyapi.decref(number)
+    return NativeValue(address)
 
 
 def _fill(value: Any, slots: list[int]) -> tuple:
@@ -103,34 +116,48 @@ def _array(context: Any, builder: Any, kind: Any, numbers: Sequence[Any]) -> Any
     return out._getvalue()
 
 
-def _made(context: Any, builder: Any, kind: Any, slot: Callable[[], Any]) -> Any:
-    """Value of a kind from the next slots."""
+def _width(kind: Any) -> int:
+    """How many slots a value of a kind takes."""
     if isinstance(kind, types.BaseTuple):
-        items = [_made(context, builder, one, slot) for one in kind.types]  # type: ignore[attr-defined]
-        return context.make_tuple(builder, kind, items)
+        return sum(map(_width, kind.types))  # type: ignore[attr-defined]
+    return 1 + 2 * kind.ndim if isinstance(kind, types.Array) else 1
+
+
+@infer_getattr
+class _Fields(AttributeTemplate):
+    key = ContextType
+
+    def generic_resolve(self, typ: Any, attr: str) -> Any:
+        """Type of a field; a tuple in the tuple is a context of its own."""
+        (kind,) = typ.types
+        if attr not in kind.fields:
+            return None
+        found = kind.types[kind.fields.index(attr)]
+        return ContextType(found) if isinstance(found, types.BaseTuple) else found
+
+
+@lower_getattr_generic(ContextType)
+def _field(context: Any, builder: Any, owner: Any, address: Any, name: str) -> Any:
+    """Value of a field, which compiled code may load once for all: nothing writes to slots."""
+    (fields,) = owner.types
+    place = fields.fields.index(name)
+    kind, first = fields.types[place], 8 * sum(map(_width, fields.types[:place]))
+    address = builder.add(address, INT64(first))
+    if isinstance(kind, types.BaseTuple):
+        return address
+    slots = []
+    for k in range(_width(kind)):
+        slot = builder.gep(builder.inttoptr(address, INT64.as_pointer()), [INT64(k)])
+        slots.append(builder.load(slot))
+        slots[-1].set_metadata("invariant.load", builder.module.add_metadata([]))
     if isinstance(kind, types.Array):
-        return _array(context, builder, kind, [slot() for _ in range(1 + 2 * kind.ndim)])
-    found, wanted = slot(), context.get_value_type(kind)
+        return _array(context, builder, kind, slots)
+    wanted = context.get_value_type(kind)
     if isinstance(kind, types.Record):
-        return builder.inttoptr(found, wanted)
+        return builder.inttoptr(slots[0], wanted)
     if isinstance(kind, types.Float):
-        return builder.bitcast(found, DOUBLE)
-    return found if wanted == INT64 else builder.trunc(found, wanted)
-
-
-@intrinsic
-def contents(typing_context, context):
-    """Return the tuple that a context holds."""
-    (kind,) = context.types
-
-    def codegen(target, builder, signature, arguments):
-        base, place = builder.inttoptr(arguments[0], INT64.as_pointer()), count()
-        out = _made(
-            target, builder, kind, lambda: builder.load(builder.gep(base, [INT64(next(place))]))
-        )
-        return impl_ret_untracked(target, builder, kind, out)
-
-    return kind(context), codegen
+        return builder.bitcast(slots[0], DOUBLE)
+    return slots[0] if wanted == INT64 else builder.trunc(slots[0], wanted)
 
 
 # ------------------------------------------------------------------ arrays by address

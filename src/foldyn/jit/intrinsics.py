@@ -15,7 +15,7 @@ from numba.core import cgutils
 from numba.core.imputils import impl_ret_borrowed, impl_ret_untracked
 from numba.np.arrayobj import make_array, populate_array
 
-from foldyn.jit.compiled import scalar
+from foldyn.jit.compiled import inner_scalar
 
 LINE = 64  # bytes that come into the cache together
 INT32, INT64, DOUBLE = ir.IntType(32), ir.IntType(64), ir.DoubleType()
@@ -139,7 +139,7 @@ def prefetch(typing_context, array, index):
     return types.void(array, index), codegen
 
 
-@scalar
+@inner_scalar
 def prefetch_range(array, first, count):
     """Bring array[first : first + count] into the cache."""
     for k in range(first, first + count, LINE // array.itemsize):

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner_scalar, kernel, scalar
 from foldyn.materials.law import PARAMETERS, HingeLaw
 from foldyn.values import choice, number
 
@@ -71,13 +71,13 @@ def rest_slope(theta, rest):
     return rest - theta
 
 
-@scalar
+@inner_scalar
 def stress_free_rest_slope(theta, rest, theta1, theta2):
     """The same of the stress-free law, whose moment and energy at rest move along."""
     return slope(rest, theta1, theta2) * (rest - theta)
 
 
-@scalar
+@inner_scalar
 def relieve(rest, parameters):
     """Set the moment and the energy at rest, which the stress-free law subtracts."""
     theta1, theta2 = parameters[0], parameters[1]

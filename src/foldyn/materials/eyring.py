@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import scalar
+from foldyn.jit.compiled import inner_scalar, scalar
 from foldyn.materials.law import HingeLaw
 from foldyn.materials.memory_law import Branch, MemoryLaw, columns
 from foldyn.values import number
@@ -44,7 +44,7 @@ def update(before, after, dt, spring, barrier, rate):
     return now, 0.0, now - after, slope - 1.0, 0.5 * (now * now - after * after), lost
 
 
-@scalar
+@inner_scalar
 def _relaxed(turn, dt, spring, barrier, rate):
     """Elastic turn after a step, and its derivative with respect to the turn in it."""
     sign = -1.0 if turn < 0.0 else 1.0

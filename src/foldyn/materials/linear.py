@@ -5,44 +5,44 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from foldyn.jit.compiled import scalar
+from foldyn.jit.compiled import inner_scalar
 from foldyn.materials.law import BarLaw, HingeLaw
 
 CODE = 0
 
 
-@scalar
+@inner_scalar
 def bar_energy(e):
     """W / E_y = E^2 / 2 with E = e + e^2/2."""
     green = e + 0.5 * e * e
     return 0.5 * green * green
 
 
-@scalar
+@inner_scalar
 def bar_stress(e):
     """S / E_y = E."""
     return e + 0.5 * e * e
 
 
-@scalar
+@inner_scalar
 def bar_slope(e):
     """(dS/dE) / E_y."""
     return 1.0
 
 
-@scalar
+@inner_scalar
 def hinge_energy(theta, rest):
     """Energy / k."""
     return 0.5 * (theta - rest) ** 2
 
 
-@scalar
+@inner_scalar
 def hinge_moment(theta, rest):
     """Moment / k."""
     return theta - rest
 
 
-@scalar
+@inner_scalar
 def hinge_rest_slope(theta, rest):
     """Derivative of energy / k with respect to rest."""
     return rest - theta

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner_scalar, kernel, scalar
 from foldyn.jit.intrinsics import call1, call2
 from foldyn.materials import enhanced_linear, linear, ogden, plate_superlinear, superlinear
 from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
 from foldyn.materials.law import BarLaw, HingeLaw
 
 
-@scalar
+@inner_scalar
 def bar_energy(code, e, address):
     """W / E_y at e = stretch - 1."""
     if code == linear.CODE:
@@ -26,7 +26,7 @@ def bar_energy(code, e, address):
     return call1(address, 1.0 + e) if address != 0 else np.nan
 
 
-@scalar
+@inner_scalar
 def bar_stress(code, e, address):
     """S / E_y at e = stretch - 1."""
     if code == linear.CODE:
@@ -36,7 +36,7 @@ def bar_stress(code, e, address):
     return call1(address, 1.0 + e) if address != 0 else np.nan
 
 
-@scalar
+@inner_scalar
 def bar_slope(code, e, address):
     """(dS/dE) / E_y at e = stretch - 1."""
     if code == linear.CODE:
@@ -46,7 +46,7 @@ def bar_slope(code, e, address):
     return call1(address, 1.0 + e) if address != 0 else np.nan
 
 
-@scalar
+@inner_scalar
 def hinge_energy(code, theta, rest, a, b, c, d, address):
     """Energy / k at dihedral theta."""
     if code == linear.CODE:
@@ -62,7 +62,7 @@ def hinge_energy(code, theta, rest, a, b, c, d, address):
     return call2(address, theta, rest) if address != 0 else np.nan
 
 
-@scalar
+@inner_scalar
 def hinge_moment(code, theta, rest, a, b, c, d, address):
     """Moment / k at dihedral theta."""
     if code == linear.CODE:
@@ -78,7 +78,7 @@ def hinge_moment(code, theta, rest, a, b, c, d, address):
     return call2(address, theta, rest) if address != 0 else np.nan
 
 
-@scalar
+@inner_scalar
 def hinge_slope(code, theta, rest, a, b, address):
     """Slope of the moment / k at dihedral theta."""
     if code == linear.CODE:
@@ -92,7 +92,7 @@ def hinge_slope(code, theta, rest, a, b, address):
     return call2(address, theta, rest) if address != 0 else np.nan
 
 
-@scalar
+@inner_scalar
 def hinge_rest_slope(code, theta, rest, a, b, address):
     """Derivative of energy / k with respect to the rest angle; `address` is that of the energy."""
     if code == linear.CODE:

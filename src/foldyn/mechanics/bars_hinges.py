@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from foldyn.jit.context import Context, contents, numbers_at, rows_at
+from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.energy import strain_energies
 from foldyn.mechanics.force import Workspace, internal_force
 from foldyn.mechanics.model import BarsHinges
@@ -18,15 +18,13 @@ class _Context(NamedTuple):
 
 
 @forces
-def _forces(context, u, v, t, force, powers):
-    own = contents(context)
+def _forces(own, u, v, t, force, powers):
     rows = own.model.rest.shape[0]
     internal_force(own.model, rows_at(u, rows), rows_at(force, rows), own.work)
 
 
 @energies
-def _energies(context, u, out):
-    own = contents(context)
+def _energies(own, u, out):
     moved = rows_at(u, own.model.rest.shape[0])
     strain_energies(own.model, moved, numbers_at(out, own.groups))
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
-from foldyn.jit.context import Context, contents, numbers_at, rows_at
+from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.block_matrix import pairs_within, places_of
 from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient
 from foldyn.mechanics.model import ranks
@@ -126,14 +126,12 @@ class _Context(NamedTuple):
 
 
 @forces
-def _forces(context, u, v, t, force, powers):
-    own = contents(context)
+def _forces(own, u, v, t, force, powers):
     add_clamp_forces(own.clamps, rows_at(u, own.rows), rows_at(force, own.rows), own.angle)
 
 
 @energies
-def _energies(context, u, out):
-    own = contents(context)
+def _energies(own, u, out):
     group = own.clamps.group
     numbers_at(out, group + 1)[group] += clamp_energy(own.clamps, rows_at(u, own.rows))
 

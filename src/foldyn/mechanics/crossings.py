@@ -18,10 +18,13 @@ average, and those that share a cell are compared: time and memory grow with the
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
-from foldyn.jit.compiled import inner, kernel, scalar
+from foldyn.jit.compiled import inner, kernel
 
 TOUCHING = 1e-9  # of a triangle's size: a corner so near a plane lies in it
 LEVEL = 1e-3  # rad between planes: triangles lie upon each other
@@ -32,6 +35,25 @@ FEWEST, SPREAD = 64, 2  # the grid has at most this many cells, and this many pe
 LARGEST = 0.0625  # of the largest box: the least size of a cell
 ROOM = 64  # pairs at first
 MOST_SHOWN = 8  # pairs of panels that a text names
+
+
+class Boxes(NamedTuple):
+    """Bounds and planes of m triangles."""
+
+    low: NDArray  # (m, 3)
+    high: NDArray
+    normal: NDArray  # (m, 3) of one, or zero where a triangle has no area
+    size: NDArray  # (m,) longest side of each box
+
+
+class Grid(NamedTuple):
+    """A regular grid of cells: cell c holds the boxes members[start[c]:start[c + 1]]."""
+
+    start: NDArray
+    members: NDArray
+    cell: float  # size
+    origin: NDArray  # (3,)
+    shape: NDArray  # (3,) cells along each axis
 
 
 def crossing_panels(points: NDArray, triangles: NDArray, panels: NDArray) -> NDArray[np.int64]:
@@ -48,9 +70,12 @@ def crossing_panels(points: NDArray, triangles: NDArray, panels: NDArray) -> NDA
     """
     x = np.array(points, np.float64, order="C")
     rows, owners = np.array(triangles, np.int64), np.array(panels, np.int64)
-    found = np.empty((ROOM, 4), np.int64)
-    while (count := _overlapping(x, rows, owners, found)) > len(found):
-        found = np.empty((count, 4), np.int64)
+    found, count = np.empty((ROOM, 4), np.int64), 0
+    if len(rows):
+        boxes = _boxes(x[rows])
+        grid = _grid(boxes)
+        while (count := _overlapping(x, rows, owners, boxes, grid, found)) > len(found):
+            found = np.empty((count, 4), np.int64)
     if not count:
         return np.zeros((0, 2), np.int64)
     pairs, which = np.unique(found[:count, :2], axis=0, return_inverse=True)
@@ -67,14 +92,14 @@ def pairs_text(panels: NDArray) -> str:
 
 
 @kernel
-def _overlapping(x, triangles, panels, found):
+def _overlapping(x, triangles, panels, boxes, grid, found):
     """Panels of triangles that overlap, and the sides of the other on which each is.
 
     Rows (lower panel, higher panel, sides of the one, of the other) go into `found` as far as there
     is room; returns their number.
     """
-    low, high, normal, size = _boxes(x, triangles)
-    start, members, cell, origin, shape = _grid(low, high, size)
+    low, high, normal, size = boxes.low, boxes.high, boxes.normal, boxes.size
+    start, members, shape = grid.start, grid.members, grid.shape
     count = 0
     for here in range(start.size - 1):
         for first in range(start[here], start[here + 1]):
@@ -86,7 +111,8 @@ def _overlapping(x, triangles, panels, found):
                 for axis in range(3):
                     lower = max(low[i, axis], low[j, axis])
                     apart |= lower > min(high[i, axis], high[j, axis])
-                    at = at * shape[axis] + _place(lower, origin[axis], cell, shape[axis])
+                    place = min(int((lower - grid.origin[axis]) / grid.cell), shape[axis] - 1)
+                    at = at * shape[axis] + place
                 if apart or at != here:  # two may meet in several cells
                     continue
                 shared = 0
@@ -108,7 +134,7 @@ def _overlapping(x, triangles, panels, found):
     return count
 
 
-@kernel
+@inner
 def _sides(x, triangles, normal, size, one, other):
     """On which sides of each other two triangles are that overlap; (0, 0) where they do not."""
     least = TOUCHING * max(size[one], size[other])
@@ -128,7 +154,7 @@ def _sides(x, triangles, normal, size, one, other):
     return of_one, of_other
 
 
-@kernel
+@inner
 def _cut(x, triangles, normal, one, other, origin, least, lx, ly, lz):
     """Sides of the other's plane on which a triangle is, and what the plane cuts from it.
 
@@ -158,86 +184,35 @@ def _cut(x, triangles, normal, one, other, origin, least, lx, ly, lz):
     return (sides if first <= last else 0), first, last
 
 
-@inner
-def _boxes(x, triangles):
-    """Bounds (m, 3), unit normals (m, 3) and sizes (m,) of triangles, their boxes' longest sides.
-
-    The normal is zero where a triangle has no area.
-    """
-    count = len(triangles)
-    low, high = np.empty((count, 3)), np.empty((count, 3))
-    normal, size = np.zeros((count, 3)), np.empty(count)
-    for i in range(count):
-        a, b, c = triangles[i, 0], triangles[i, 1], triangles[i, 2]
-        largest = 0.0
-        for axis in range(3):
-            low[i, axis] = min(x[a, axis], x[b, axis], x[c, axis])
-            high[i, axis] = max(x[a, axis], x[b, axis], x[c, axis])
-            largest = max(largest, high[i, axis] - low[i, axis])
-        size[i] = largest
-        total = 0.0
-        for axis in range(3):
-            p, q = (axis + 1) % 3, (axis + 2) % 3
-            across = (x[b, p] - x[a, p]) * (x[c, q] - x[a, q])
-            across -= (x[b, q] - x[a, q]) * (x[c, p] - x[a, p])
-            normal[i, axis] = across
-            total += across * across
-        for axis in range(3):
-            normal[i, axis] /= np.sqrt(total) if total > 0.0 else 1.0
-    return low, high, normal, size
+def _boxes(corners: NDArray) -> Boxes:
+    """Boxes of triangles with these corners (m, 3, 3)."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    return Boxes(low, high, normal / np.where(length > 0.0, length, 1.0), (high - low).max(axis=1))
 
 
-@kernel
-def _grid(low, high, size):
-    """Cells of a regular grid with the boxes that they hold.
-
-    Returns `start` (cells + 1,) and `members`: cell c holds members[start[c]:start[c + 1]]; the
-    size of a cell, the grid's origin and how many cells it has along each axis.
-    """
-    count = len(low)
-    origin, span = np.zeros(3), np.zeros(3)
-    shape = np.ones(3, np.int64)
-    cell = 1.0
-    if count:
-        for axis in range(3):
-            origin[axis], top = low[0, axis], high[0, axis]
-            for i in range(count):
-                origin[axis], top = min(origin[axis], low[i, axis]), max(top, high[i, axis])
-            span[axis] = top - origin[axis]
-        total, largest = 0.0, 1e-300
-        for i in range(count):
-            total, largest = total + size[i], max(largest, size[i])
-        cell = max(total / count, LARGEST * largest)
-    most = FEWEST + SPREAD * count
-    while (span[0] / cell + 1.0) * (span[1] / cell + 1.0) * (span[2] / cell + 1.0) > most:
+def _grid(boxes: Boxes) -> Grid:
+    """Put boxes into cells."""
+    low, high, size = boxes.low, boxes.high, boxes.size
+    origin, most = low.min(axis=0), FEWEST + SPREAD * len(size)
+    span, cell = high.max(axis=0) - origin, max(size.mean(), LARGEST * size.max(), 1e-300)
+    while np.prod(span / cell + 1.0) > most:
         cell *= 1.25
-    for axis in range(3):
-        shape[axis] = int(span[axis] / cell) + 1
-    start = np.zeros(shape[0] * shape[1] * shape[2] + 1, np.int64)
-    members = np.empty(0, np.int64)
-    lower, upper = np.empty(3, np.int64), np.empty(3, np.int64)
-    for filling in (False, True):
-        for i in range(count):
-            for axis in range(3):
-                lower[axis] = _place(low[i, axis], origin[axis], cell, shape[axis])
-                upper[axis] = _place(high[i, axis], origin[axis], cell, shape[axis])
-            for p in range(lower[0], upper[0] + 1):
-                for q in range(lower[1], upper[1] + 1):
-                    for r in range(lower[2], upper[2] + 1):
-                        here = (p * shape[1] + q) * shape[2] + r
-                        if filling:
-                            start[here] -= 1
-                            members[start[here]] = i
-                        else:
-                            start[here] += 1
-        if not filling:
-            for here in range(1, start.size):
-                start[here] += start[here - 1]
-            members = np.empty(start[start.size - 1], np.int64)
-    return start, members, cell, origin, shape
-
-
-@scalar
-def _place(value, origin, cell, number):
-    """Place of a coordinate among `number` cells of a grid along an axis."""
-    return min(int((value - origin) / cell), number - 1)
+    shape = (span / cell).astype(np.int64) + 1
+    lower, upper = (
+        np.minimum(((x - origin) / cell).astype(np.int64), shape - 1) for x in (low, high)
+    )
+    many = upper - lower + 1
+    each = many.prod(axis=1)
+    # the cells of each box one after the other, counted along the last axis first
+    which = np.repeat(np.arange(len(each)), each)
+    place = np.arange(len(which)) - np.repeat(np.cumsum(each) - each, each)
+    here, step = np.zeros_like(place), 1
+    for axis in (2, 1, 0):
+        place, along = np.divmod(place, many[which, axis])
+        here += step * (lower[which, axis] + along)
+        step *= int(shape[axis])
+    held = sparse.csr_array((np.ones(len(here), bool), (here, which)), (step, len(each)))
+    start, members = held.indptr.astype(np.int64), held.indices.astype(np.int64)
+    return Grid(start, members, float(cell), origin, shape)

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import inner, kernel, scalar
-from foldyn.jit.context import Context, contents, numbers_at, rows_at
+from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.branch_switch import update
 from foldyn.mechanics.dihedral import add_hessian
@@ -64,7 +64,7 @@ class MemoryHinges(NamedTuple):
     gradient: NDArray  # (14,) memory of one hinge
 
 
-@scalar
+@inner_scalar
 def evaluate_branches(own, offset, e, turn):
     """Note what the branches of a hinge do at a turn (rad); returns the energy dissipated, J."""
     moment, slope, stored, lost = 0.0, 0.0, 0.0, 0.0
@@ -155,38 +155,36 @@ class _Context(NamedTuple):
 
 
 @forces
-def _forces(context, u, v, t, force, powers):
-    term = contents(context)
+def _forces(term, u, v, t, force, powers):
     add_memory_forces(term.own, term.offset, rows_at(u, term.rows), rows_at(force, term.rows))
 
 
 @energies
-def _energies(context, u, out):
-    term = contents(context)
+def _energies(term, u, out):
     own, energy = term.own, numbers_at(out, term.groups)
     for e in range(own.rest.size):  # as at the last evaluation, which was at u
         energy[own.group[e]] += own.stored[e]
 
 
 @advance_clock
-def _advance_clock(context, since):
-    contents(context).own.elapsed[0] = since
+def _advance_clock(term, since):
+    term.own.elapsed[0] = since
 
 
 @commit
-def _commit(context):
-    make_last(contents(context).own)
+def _commit(term):
+    make_last(term.own)
 
 
 @dissipated
-def _dissipated(context):
-    own = contents(context).own
+def _dissipated(term):
+    own = term.own
     return own.lost[0] + own.lost[1]
 
 
 @branch_states
-def _branch_states(context, out):
-    reached = flat(contents(context).own.reached)
+def _branch_states(term, out):
+    reached = flat(term.own.reached)
     to = numbers_at(out, reached.size)
     for k in range(reached.size):
         to[k] = reached[k]

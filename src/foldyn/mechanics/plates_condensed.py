@@ -17,7 +17,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from foldyn.jit.compiled import inner, kernel
-from foldyn.jit.context import Context, contents, numbers_at, rows_at
+from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_slope
 from foldyn.mechanics.model import ranks
@@ -216,15 +216,13 @@ class _Context(NamedTuple):
 
 
 @forces
-def _forces(context, u, v, t, force, powers):
-    own = contents(context)
+def _forces(own, u, v, t, force, powers):
     rows = own.model.plates.bars.rest.shape[0]
     condensed_force(own.model, rows_at(u, rows), rows_at(force, rows), own.work)
 
 
 @energies
-def _energies(context, u, out):
-    own = contents(context)
+def _energies(own, u, out):
     moved = rows_at(u, own.model.plates.bars.rest.shape[0])
     condensed_energy(own.model, moved, own.work, numbers_at(out, 3))
 

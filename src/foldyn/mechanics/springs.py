@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
-from foldyn.jit.context import Context, contents, numbers_at, rows_at
+from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.block_matrix import blocks_of_ends, pairs_of_ends, places_of
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.sheet_term import Unstrained, unit_rows
@@ -127,14 +127,12 @@ class _Context(NamedTuple):
 
 
 @forces
-def _forces(context, u, v, t, force, powers):
-    own = contents(context)
+def _forces(own, u, v, t, force, powers):
     add_spring_forces(own.springs, rows_at(u, own.rows), rows_at(force, own.rows))
 
 
 @energies
-def _energies(context, u, out):
-    own = contents(context)
+def _energies(own, u, out):
     numbers_at(out, own.group + 1)[own.group] = spring_energy(own.springs, rows_at(u, own.rows))
 
 

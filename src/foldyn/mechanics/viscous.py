@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.sheet_term import NO_DOF
@@ -86,7 +86,7 @@ def hinge_dofs(hinges: NDArray, hidden: NDArray) -> NDArray:
     return dofs
 
 
-@scalar
+@inner_scalar
 def hinge_gradient(x, dofs, hidden_turn, moved, out):
     """Angle (rad) of a hinge at flat displacements, and its gradient to `out` (14,).
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
-from foldyn.jit.context import Context, contents, numbers_at, rows_at
+from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
@@ -236,8 +236,7 @@ class _Context(NamedTuple):
 
 
 @forces
-def _forces(context, u, v, t, force, powers):
-    own = contents(context)
+def _forces(own, u, v, t, force, powers):
     model, moved, out = own.model, rows_at(u, own.rows), rows_at(force, own.rows)
     n, r = model.nodes, model.rotations
     for k in range(3 * n + r, out.size):
@@ -247,8 +246,7 @@ def _forces(context, u, v, t, force, powers):
 
 
 @energies
-def _energies(context, u, out):
-    own = contents(context)
+def _energies(own, u, out):
     model, moved = own.model, rows_at(u, own.rows)
     n, r = model.nodes, model.rotations
     x = flat(moved)[3 * n : 3 * n + r]

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
 from foldyn.jit.intrinsics import flat
 
 NOISE = 16.0 * float(np.finfo(float).eps)  # of positions: what a measure may miss by rounding
@@ -104,7 +104,7 @@ def _moment(r, d):
     return t0, t1, t2
 
 
-@scalar
+@inner_scalar
 def _inertia_inverse(r):
     """Inverse of the inertia of points r (4, 3) about their mean: xx, yy, zz, xy, xz, yz."""
     xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -122,7 +122,7 @@ def _inertia_inverse(r):
     return once * axx, once * ayy, once * azz, once * axy, once * axz, once * ayz
 
 
-@scalar
+@inner_scalar
 def _turned_by(inverse, t0, t1, t2):
     """Vector of the rotation that gives points with such an inertia some moment."""
     axx, ayy, azz, axy, axz, ayz = inverse
@@ -133,7 +133,7 @@ def _turned_by(inverse, t0, t1, t2):
     )
 
 
-@kernel
+@inner
 def _by_end(move, r, w, inverse):
     """The derivative of D = dx - w x r: of its turn w, and of r, half of what the end moves by."""
     one, moved = np.zeros(3), np.zeros(3)
@@ -161,7 +161,7 @@ def _by_end(move, r, w, inverse):
                 move.by_end[row + 2, column] = share * moved[2] - turn[0] * b[1] + turn[1] * b[0]
 
 
-@kernel
+@inner
 def add_measure(move, size, farthest, change, law, law_slope, tangent, force, block):
     """Add the force (12,) of a measure, and its derivative (12, 12) with respect to the end.
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from foldyn.dynamics.implicit.contact_measure import add_measure, go
 from foldyn.dynamics.implicit.contact_quotient import quotient
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.contact.distances import cross, dot, minus, point
 from foldyn.mechanics.contact.edge_edge import PARALLEL, mollifier, square_of_cross, weigh_edges
 from foldyn.mechanics.contact.pairs import EDGES, VERTEX
@@ -23,7 +23,7 @@ from foldyn.mechanics.contact.second import apart_of, half_square
 from foldyn.mechanics.contact.vertex_triangle import PARTS, share_of, weigh_triangle
 
 
-@kernel
+@inner
 def _weigh(kind, which, corners, move):
     """Weights and moves of a distance; how many are free, and whether a pair of edges counts."""
     if kind == VERTEX:
@@ -31,7 +31,7 @@ def _weigh(kind, which, corners, move):
     return weigh_edges(corners, which, move.weights, move.moves)
 
 
-@kernel
+@inner
 def _add_distance(kind, which, d0, k, move, size, tangent, force, block, push):
     """Add force and tangent of k d0^2 f(d/d0); its energies (J) at both ends.
 
@@ -101,7 +101,7 @@ def edges_step(tables, i, j, d0, move, tangent, force, block):
     return m1 * after
 
 
-@kernel
+@inner
 def _across(corners, c0):
     """Squared vector product of two edges over c0."""
     n = cross(*_edges(corners))
@@ -115,7 +115,7 @@ def _edges(corners):
     return e, minus(point(corners, 3), point(corners, 2))
 
 
-@kernel
+@inner
 def _mollified(u0, u1):
     """Quotient of the differences of the mollifier m, and its derivative by u1.
 
@@ -131,7 +131,7 @@ def _mollified(u0, u1):
     return value, (value - 2.0 * v1) / (u0 - u1)
 
 
-@kernel
+@inner
 def _add_mollifier(
     u0, u1, c0, before, after, move, size, tangent, inner, push, force, block
 ):  # fmt: skip

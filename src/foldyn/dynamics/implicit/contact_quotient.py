@@ -10,11 +10,11 @@ sums of terms of one sign: no digits are lost, however near x0 and x1 are.
 
 from __future__ import annotations
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner
 from foldyn.mechanics.contact.potential import barrier
 
 
-@kernel
+@inner
 def quotient(x0, x1):
     """The quotient (f(x1) - f(x0)) / (x1 - x0), and its derivative with respect to x1.
 

@@ -18,7 +18,7 @@ from foldyn.dynamics.implicit.contact_measure import new_move
 from foldyn.dynamics.implicit.contact_pairs import edges_step, vertex_step
 from foldyn.dynamics.implicit.contact_quotient import quotient
 from foldyn.dynamics.implicit.discrete_gradient import discrete_gradient
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
 from foldyn.mechanics.contact.memory import Memory
@@ -213,7 +213,7 @@ def _add_rubs(tables, middle, memory, pairs, first, second, rub, force):
             force[i, c] += rub[i, c]
 
 
-@kernel
+@inner
 def _guard(tables, h, theta0, theta1):
     """Mean moment (N m) of a guard, its slope by the dihedral at the end, its energy there (J)."""
     limit, k = tables.hinge_limit[h], tables.hinge_stiffness[h]
@@ -245,7 +245,7 @@ def _turn(tables, h, start, end, move, points, plain, gradient):
     discrete_gradient(move.middle, move.motion, change, points, plain, gradient)
 
 
-@kernel
+@inner
 def _add_guards(tables, start, memory, move, force):
     """Add the moments of the guards; their energy at the end to that of contact."""
     points, plain, gradient = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
@@ -297,7 +297,7 @@ def _add_others(tables, start, middle, moved, memory, move, push, force):
         _add_planes(tables, start, middle, moved, memory, push, force)
 
 
-@kernel
+@inner
 def _plane_quotient(tables, start, moved, memory, p, i):
     """Mean normal force over -k d0 and its slope, of node i at plane p; its energy (J) at the end.
 
@@ -311,7 +311,7 @@ def _plane_quotient(tables, start, moved, memory, p, i):
     return value, slope, energy
 
 
-@kernel
+@inner
 def _add_planes(tables, start, middle, moved, memory, push, force):
     """Add the forces of the planes; they go to push (q, n, 4), too."""
     k, halfway = tables.stiffness, 0.5 * (moved[0] + moved[1])

@@ -14,9 +14,9 @@ from foldyn.cases.waveforms import unseen
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.equation import EquationOfMotion, accelerate
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.system import Packed, Scratch, place, scratch
+from foldyn.dynamics.system import Packed, Scratch, carried, place, scratch
 from foldyn.dynamics.ties import hand_over
-from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.tables import Tables
@@ -226,12 +226,7 @@ class Scheme(ABC):
 
     def carried(self, q: NDArray, factor: NDArray) -> NDArray:
         """Displacement (n, 3) of q with that of the supports for factors (h, 3)."""
-        moved = self.packed.system.moved
-        if not len(moved.dof):
-            return q
-        out = q.copy()
-        np.add.at(out.reshape(-1), moved.dof, moved.value * factor[moved.row, 0])
-        return out
+        return carried(self.packed.system.moved, factor[:, 0], q)
 
     def unseen(self, first: float, last: float) -> NDArray | None:
         """Force (n, 3) at the end of a step that what histories do within it would exert, N.
@@ -308,7 +303,15 @@ class Scheme(ABC):
         self.folds[:] = self.work.fold_angle
 
 
-@kernel
+@inner_scalar
+def copy(source, out):
+    """out = source, of one size: Numba's own check of sizes compiles the text of its message."""
+    values, given = flat(out), flat(source)
+    for i in range(values.size):
+        values[i] = given[i]
+
+
+@inner
 def norms(system, force, inertia, factor, following):
     """Norms of an out-of-balance force (n, 3) on the free dofs, N, and of the forces at play.
 

@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, kernel, scalar
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
 from foldyn.mechanics.contact.motions import farthest, fastest
 from foldyn.mechanics.contact.pairs import VERTEX, corners_gap, nodes_of, put_corners
@@ -37,7 +37,7 @@ def _length(values, i):
     return math.sqrt(values[i, 0] ** 2 + values[i, 1] ** 2 + values[i, 2] ** 2)
 
 
-@kernel
+@inner
 def _pair_share(corners, motion, kind, keep, best):
     """The lesser of `best` and the share of a motion (4, 3) that leaves corners (4, 3) apart."""
     for c in range(3):
@@ -63,7 +63,7 @@ def _pair_share(corners, motion, kind, keep, best):
     return min(best, now)
 
 
-@kernel
+@inner
 def _pairs_share(tables, memory, step, keep, best):
     """Share of a motion (n, 3) that leaves all listed pairs apart."""
     x, corners, motion = memory.x, np.empty((4, 3)), np.empty((4, 3))
@@ -79,7 +79,7 @@ def _pairs_share(tables, memory, step, keep, best):
     return best
 
 
-@kernel
+@inner
 def _planes_share(tables, memory, step, moves, keep, best):
     """Share of a motion (n, 3) that leaves all nodes before the planes, which move (q, 3)."""
     for p in range(len(tables.planes)):
@@ -94,7 +94,7 @@ def _planes_share(tables, memory, step, moves, keep, best):
     return best
 
 
-@kernel
+@inner
 def _hinges_share(tables, x, step, keep, best):
     """Share of a motion (n, 3) in which no guarded hinge passes 0 or 2 pi."""
     ahead, n = np.empty_like(x), len(x)
@@ -116,7 +116,7 @@ def _hinges_share(tables, x, step, keep, best):
     return 0.0
 
 
-@kernel
+@inner
 def _listed_share(tables, memory, u, step, keep, fast):
     """Share of a motion from u, where memory.x is, that leaves all pairs apart.
 

@@ -7,7 +7,7 @@ Real-Time Collision Detection, 2005, section 5.1.5; of two segments: section 5.1
 
 from __future__ import annotations
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
 
 INSIDE, SIDE_AB, SIDE_BC, SIDE_CA, CORNER_A, CORNER_B, CORNER_C = range(7)  # regions
 PARALLEL = 1e-14  # of the product of squared lengths: segments that count as parallel
@@ -89,7 +89,7 @@ def closest_on_triangle(p, a, b, c):
     return 1.0 - v - w, v, w, INSIDE
 
 
-@scalar
+@inner_scalar
 def closest_on_segment(p, a, b):
     """Fraction of the segment ab at which it is closest to p."""
     ab = minus(b, a)
@@ -113,7 +113,7 @@ def closest_of_segments(a, b, c, d):
     return s, t, 0.0 < s < 1.0 and 0.0 < t < 1.0
 
 
-@kernel
+@inner
 def closest_end(a, b, c, d):
     """Fractions of the segments ab and cd of the closest of their four pairs of end and segment."""
     s, t = 0.0, closest_on_segment(a, c, d)

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.mechanics.contact.distances import (
     between,
     closest_end,
@@ -32,7 +32,7 @@ from foldyn.mechanics.contact.second import add_second
 PARALLEL = 1e-3
 
 
-@scalar
+@inner_scalar
 def mollifier(cc, c0):
     """The factor m at a squared cross product, and its first two derivatives."""
     if cc >= c0:
@@ -101,7 +101,7 @@ def edge_edge(tables, x, force, i, j, d0):
     return energy, pressed, first, second
 
 
-@kernel
+@inner
 def weigh_edges(corners, which, weights, moves):
     """Set weights (4,) and moves (2, 4) of the distance of two edges, or of the closest end.
 
@@ -164,7 +164,7 @@ def edge_edge_tangent(tables, x, i, j, d0, out):
     return m * energy
 
 
-@kernel
+@inner
 def square_of_cross(e, g):
     """First and second derivative, (12,) and (12, 12), of |e x g|^2 by the ends of both edges."""
     ee, gg, eg = dot(e, e), dot(g, g), dot(e, g)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.contact.edge_edge import edge_edge
 from foldyn.mechanics.contact.hinge_guards import add_guards
 from foldyn.mechanics.contact.planes import add_planes
@@ -15,7 +15,7 @@ from foldyn.mechanics.contact.vertex_triangle import vertex_triangle
 from foldyn.mechanics.threads import part, wait
 
 
-@kernel
+@inner
 def _add_pairs(tables, angle, force, memory):
     """Energy (J) of a member's part of near pairs and guards.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.mechanics.contact.distances import point
 from foldyn.mechanics.contact.potential import barrier
 from foldyn.mechanics.dihedral import dihedral_gradient
@@ -16,7 +16,7 @@ from foldyn.mechanics.dihedral import dihedral_gradient
 TURN = 2.0 * math.pi
 
 
-@scalar
+@inner_scalar
 def gradient_at(tables, x, h):
     """Dihedral (rad) of a guarded hinge and its gradient (12 numbers)."""
     a, b = point(x, tables.hinges[h, 0]), point(x, tables.hinges[h, 1])

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from numpy.typing import NDArray
 
-from foldyn.jit.context import Context, contents, numbers_at, rows_at
+from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import move_planes, plane_powers
@@ -37,8 +37,7 @@ class _Context(NamedTuple):
 
 
 @forces
-def _forces(context, u, v, t, force, powers):
-    own = contents(context)
+def _forces(own, u, v, t, force, powers):
     speed, both = rows_at(v, own.rows), numbers_at(powers, 2)
     add_contact(own.tables, rows_at(u, own.rows), own.angle, rows_at(force, own.rows), own.memory)
     given, taken = plane_powers(own.tables, speed, own.memory)
@@ -49,20 +48,17 @@ def _forces(context, u, v, t, force, powers):
 
 
 @energies
-def _energies(context, u, out):
-    own = contents(context)
+def _energies(own, u, out):
     numbers_at(out, own.group + 1)[own.group] = energy_of_all(own.memory)
 
 
 @place_obstacles
-def _place(context, factors):
-    own = contents(context)
+def _place(own, factors):
     move_planes(own.tables, rows_at(factors, own.histories), own.memory)
 
 
 @limit
-def _limit(context, u, v, a, dt, beta, energy, lightness):
-    own = contents(context)
+def _limit(own, u, v, a, dt, beta, energy, lightness):
     pace, light = Pace(beta, energy), numbers_at(lightness, own.rows)
     moved, speed, change = rows_at(u, own.rows), rows_at(v, own.rows), rows_at(a, own.rows)
     return limited(own.tables, moved, speed, change, own.angle, dt, pace, light, own.memory)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from foldyn.jit.compiled import inner, scalar
+from foldyn.jit.compiled import inner, inner_scalar, scalar
 from foldyn.mechanics.contact.distances import (
     apart,
     between,
@@ -25,7 +25,7 @@ def nodes_of(triangles, edges, kind, one, other):
     return edges[one, 0], edges[one, 1], edges[other, 0], edges[other, 1]
 
 
-@scalar
+@inner_scalar
 def weights_of(kind, p, q):
     """Weights (4) of the vector from the second part of a pair to the first.
 
@@ -46,7 +46,7 @@ def put_corners(x, nodes, out):
         out[2, axis], out[3, axis] = x[c, axis], x[d, axis]
 
 
-@scalar
+@inner_scalar
 def vertex_distance(p, a, b, c):
     """Distance (m) of a point from a triangle."""
     wa, wb, wc, _ = closest_on_triangle(p, a, b, c)
@@ -54,7 +54,7 @@ def vertex_distance(p, a, b, c):
     return math.sqrt(dot(r, r))
 
 
-@scalar
+@inner_scalar
 def edge_distance(a, b, c, d):
     """Distance (m) of the segments ab and cd."""
     s, t, _ = closest_of_segments(a, b, c, d)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.mechanics.contact.potential import barrier
 from foldyn.mechanics.contact.tables import FRICTION, HISTORY, MOTION, NORMAL, POINT
 
@@ -41,7 +41,7 @@ def height(tables, x, moved, p, i):
     return out
 
 
-@kernel
+@inner
 def add_planes(tables, x, memory, force):
     """Energy (J) of a member's nodes at planes; adds its gradient and friction to force (n, 3)."""
     energy, k, mine = 0.0, tables.stiffness, memory.share.meeting
@@ -69,7 +69,7 @@ def add_planes(tables, x, memory, force):
     return energy
 
 
-@scalar
+@inner_scalar
 def farthest_stretch(tables, memory, p, i):
     """Stretch (m) at which the spring of node i on plane p slips, after its normal force."""
     lagged = memory.counts.lagged == 1
@@ -77,7 +77,7 @@ def farthest_stretch(tables, memory, p, i):
     return tables.planes[p, FRICTION] * normal / tables.stiffness
 
 
-@kernel
+@inner
 def stretch_of(tables, x, moved, memory, p, i):
     """Stretch (m) of the spring of node i on plane p: its vector along the plane, its length.
 

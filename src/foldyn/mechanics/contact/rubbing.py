@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from foldyn.jit.compiled import inner, kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
 from foldyn.mechanics.contact.distances import dot, point
 from foldyn.mechanics.contact.edge_edge import edge_edge
 from foldyn.mechanics.contact.pairs import VERTEX, closest_of, gap_of, nodes_of, weights_of
@@ -36,7 +36,7 @@ def pressed_pair(tables, memory, x, kind, pair):
     return pressed, p, q
 
 
-@scalar
+@inner_scalar
 def _across(x, nodes, weights):
     """Vector between two points of a pair."""
     a, b, c, d = point(x, nodes[0]), point(x, nodes[1]), point(x, nodes[2]), point(x, nodes[3])
@@ -70,7 +70,7 @@ def bound(tables, memory, kind, pair, pressed):
     return tables.friction * normal / tables.stiffness
 
 
-@scalar
+@inner_scalar
 def pull_of(k, stretch, most):
     """Pull of a spring over its stretch (N/m)."""
     return k if stretch <= most else k * most / stretch

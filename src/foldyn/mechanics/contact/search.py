@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, kernel, scalar
 from foldyn.mechanics.contact.motions import farthest
 from foldyn.mechanics.contact.pairs import VERTEX, edge_gap, vertex_gap
 from foldyn.mechanics.contact.share import pass_on
@@ -20,7 +20,7 @@ CELLS = 8.0  # per node, at most
 THINNEST = 1e-3  # of the skin: where lists are full it is halved, at most to that
 
 
-@kernel
+@inner
 def panel_d0(ranges, v, panel):
     """d0 (m) of a node against a panel; 0 if it belongs to it."""
     for at in range(ranges.own_start[v], ranges.own_start[v + 1]):
@@ -32,7 +32,7 @@ def panel_d0(ranges, v, panel):
     return 0.5 * (ranges.node_thickness[v] + ranges.panel_thickness[panel])
 
 
-@kernel
+@inner
 def edge_d0(ranges, edges, panels, i, j):
     """d0 (m) of two edges (e, 2) of some panels (e, 2); 0 if they share a panel or a node."""
     a, b, c, d = edges[i, 0], edges[i, 1], edges[j, 0], edges[j, 1]
@@ -85,7 +85,7 @@ def _cell(value, low, size, count):
     return min(count - 1, max(0, int((value - low) / size)))
 
 
-@kernel
+@inner
 def _sort(points, low, size, counts, start, items):
     """Sort points (m, 3) into cells; those of a cell follow each other in `items`."""
     start[:] = 0
@@ -230,7 +230,7 @@ def list_pairs(tables, u, memory):
             memory.listed[i, c] = u[i, c]
 
 
-@kernel
+@inner
 def relist(tables, u, memory):
     """`list_pairs` by the first member of a team, for all: after a `wait` for their positions."""
     if memory.share.team.number == 0:

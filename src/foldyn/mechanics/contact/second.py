@@ -14,11 +14,11 @@ import math
 
 import numpy as np
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner
 from foldyn.mechanics.contact.potential import barrier
 
 
-@kernel
+@inner
 def apart_of(corners, weights, r):
     """Set r (3,) to the vector sum w_i x_i of corners (4, 3) and weights (4,); its square."""
     for c in range(3):
@@ -28,7 +28,7 @@ def apart_of(corners, weights, r):
     return r[0] ** 2 + r[1] ** 2 + r[2] ** 2
 
 
-@kernel
+@inner
 def half_square(corners, weights, moves, free, r, slope, second):
     """Set slope (12,) and second (12, 12) to the derivatives of d^2 / 2.
 
@@ -61,7 +61,7 @@ def half_square(corners, weights, moves, free, r, slope, second):
             second[i, j] = value
 
 
-@kernel
+@inner
 def add_second(corners, weights, moves, free, d0, k, out, slope):
     """Add the derivatives of k d0^2 f(d/d0): the second to out (12, 12), the first to slope (12,).
 

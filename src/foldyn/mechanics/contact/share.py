@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import inner_scalar, kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
 from foldyn.mechanics.contact.pairs import VERTEX
 from foldyn.mechanics.threads import Team, part, total, wait
 
@@ -42,7 +42,7 @@ def reaches(team, first, last):
     team.note[team.number, LOW], team.note[team.number, HIGH] = first, last
 
 
-@kernel
+@inner
 def pass_on(share):
     """Wait for the first member; then all have its counts and facts."""
     wait(share.team)
@@ -89,7 +89,7 @@ def finish(share, force):
                 sums[i, c] = 0.0
 
 
-@scalar
+@inner_scalar
 def energy_of_all(memory):
     """Energy (J) of contact at the last force of all members: after a `wait` for them."""
     if memory.share.team.size == 1:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foldyn.jit.compiled import inner_scalar, kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.mechanics.contact.distances import (
     apart,
     between,
@@ -52,13 +52,13 @@ class Pace(NamedTuple):
 RESOLVED = Pace(0.25, 0.0)  # without an estimate of its error
 
 
-@scalar
+@inner_scalar
 def _spring_bound(limit, rate, pace):
     """The lesser of a step and what a spring allows, of stiffness over mass `rate` (1/s2)."""
     return min(limit, pace.resolved / math.sqrt(rate)) if rate > 0.0 else limit
 
 
-@scalar
+@inner_scalar
 def _bound(limit, d, d0, closing, change, stiffness, lightness, pace, facts):
     """The lesser of a step (s) and what a gap d allows that closes at some speed.
 
@@ -78,7 +78,7 @@ def _bound(limit, d, d0, closing, change, stiffness, lightness, pace, facts):
     return limit
 
 
-@kernel
+@inner
 def _vertex_bound(tables, x, v, a, lightness, i, t, d0, reach, limit, pace, facts):
     """See `_bound`, for a vertex and a triangle; nan where they are farther than reach."""
     j, k, l = tables.triangles[t, 0], tables.triangles[t, 1], tables.triangles[t, 2]  # noqa: E741
@@ -97,7 +97,7 @@ def _vertex_bound(tables, x, v, a, lightness, i, t, d0, reach, limit, pace, fact
     return _bound(limit, d, d0, closing, change, stiffness, light, pace, facts)
 
 
-@kernel
+@inner
 def _edge_bound(tables, x, v, a, lightness, i, j, d0, reach, limit, pace, facts):
     """See `_bound`, for two edges; nan where they are farther than reach."""
     k, l = tables.edges[i, 0], tables.edges[i, 1]  # noqa: E741
@@ -146,7 +146,7 @@ def _pairs_bound(tables, x, v, a, lightness, far, reach, limit, pace, memory):
     return limit
 
 
-@kernel
+@inner
 def _hinges_bound(tables, x, v, a, lightness, angle, reach, limit, pace, memory):
     """See `_bound`, for a member's part of the guarded hinges.
 
@@ -178,7 +178,7 @@ def _hinges_bound(tables, x, v, a, lightness, angle, reach, limit, pace, memory)
     return limit
 
 
-@kernel
+@inner
 def _planes_bound(tables, x, v, a, lightness, memory, limit, pace):
     """See `_bound`, for a member's nodes and planes; friction's springs are resolved, too."""
     k, mine = tables.stiffness, memory.share.meeting

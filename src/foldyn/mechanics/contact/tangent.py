@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.contact.distances import closest_of_segments, point
 from foldyn.mechanics.contact.edge_edge import edge_edge_tangent
@@ -108,7 +108,7 @@ def plane_tangents(tables, x, memory):
     return out
 
 
-@kernel
+@inner
 def friction_tangent(tables, x, moved, memory, p, i, stiffness, out):
     """Add the derivative of the spring of node i on plane p to out (3, 3).
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.jit.context import Context
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.contact.approach import KEEP, clear_share
@@ -75,6 +76,15 @@ class ContactTerm(Term):
         other = copy(self)
         vars(other).update(changes)
         return other
+
+    @cached_property
+    def _contexts(self) -> tuple[Context, Context]:
+        """Tables and memory as loops pass them on, so that both call the same kernels."""
+        return Context(self.tables), Context(self.memory)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what holds addresses of this process."""
+        return {name: value for name, value in vars(self).items() if name != "_contexts"}
 
     def displaced(self, moved: NDArray) -> ContactTerm:
         """The same with planes displaced by `moved` (p, 3), m."""
@@ -148,7 +158,8 @@ class ContactTerm(Term):
         u = nodal(q)[: len(self.tables.rest)]
         force = np.zeros_like(u)
         self.prepare()
-        add_contact(self.tables, u, self._guarded.angles(q), force, self.memory)
+        tables, kept = self._contexts
+        add_contact(tables, u, self._guarded.angles(q), force, kept)
         return float(self.memory.facts.energy), force
 
     def nearest(self, q: NDArray) -> tuple[float, float, NDArray]:

@@ -27,9 +27,11 @@ def take_ties(memory):
                     continue
                 if go == 1:
                     parts[count, 0] = kind
-                    parts[count, 1], parts[count, 2] = memory.pairs[kind, k]
+                    pair, tie = memory.pairs[kind, k], memory.tie[kind, k]
+                    parts[count, 1], parts[count, 2] = pair[0], pair[1]
                     ties[count, 0] = memory.d0[kind, k]
-                    ties[count, 1:] = memory.tie[kind, k]
+                    for c in range(tie.size):
+                        ties[count, 1 + c] = tie[c]
                 count += 1
     return parts, ties
 
@@ -44,7 +46,8 @@ def lay_ties(memory, parts, ties):
         k = counts.listed_first if kind == VERTEX else counts.listed_second
         memory.pairs[kind, k, 0], memory.pairs[kind, k, 1] = parts[m, 1], parts[m, 2]
         memory.d0[kind, k] = ties[m, 0]
-        memory.tie[kind, k] = ties[m, 1:]
+        for c in range(ties.shape[1] - 1):
+            memory.tie[kind, k, c] = ties[m, 1 + c]
         if kind == VERTEX:
             counts.listed_first = k + 1
         else:
@@ -82,7 +85,8 @@ def put_ties(tables, memory, parts, ties, loose, found):
                 tables.triangles, tables.edges, memory.x, kind, parts[m, 1], parts[m, 2]
             )  # fmt: skip
             memory.gap[kind, k] = gap - ties[m, 0]
-        memory.tie[kind, k] = ties[m, 1:]
+        for c in range(ties.shape[1] - 1):
+            memory.tie[kind, k, c] = ties[m, 1 + c]
 
 
 @inner

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
 from foldyn.mechanics.contact.distances import (
     CORNER_A,
     CORNER_B,
@@ -35,7 +35,7 @@ from foldyn.mechanics.contact.second import add_second
 PARTS = 7  # of a triangle: itself, its sides, its corners
 
 
-@scalar
+@inner_scalar
 def _push(force, i, by, r):
     force[i, 0] += by * r[0]
     force[i, 1] += by * r[1]
@@ -107,13 +107,13 @@ def vertex_triangle(tables, x, force, v, t, d0):
     return energy, pressed, second, third
 
 
-@scalar
+@inner_scalar
 def _on_side(s, side, first, second):
     """Region of the point at the fraction s of a side between two corners."""
     return first if s <= 0.0 else (second if s >= 1.0 else side)
 
 
-@kernel
+@inner
 def weigh_triangle(corners, which, weights, moves):
     """Set weights (4,) and moves (2, 4) of the distance of a vertex from a part of a triangle.
 
@@ -149,7 +149,7 @@ def weigh_triangle(corners, which, weights, moves):
     return 0
 
 
-@scalar
+@inner_scalar
 def share_of(tables, t, which):
     """What a part of triangle t counts; see `weigh_triangle`."""
     if which == 0:
