@@ -144,7 +144,7 @@ def test_gradient_of_the_dihedral_needs_little_help(turn, order):
 def test_tangent_is_the_derivative_of_the_forces(laws):
     """To first order in the step: the error of the blocks falls with it."""
     s = miura(laws)
-    model, pattern = s.model, s.body.sparsity
+    model, pattern = s.model, s.body.sheet.sparsity
     u0 = two_states(s, 0.0, 0.0)[0]
     step = np.random.default_rng(5).standard_normal(s.nodes.shape)
     direction = np.random.default_rng(6).standard_normal(s.nodes.shape)
