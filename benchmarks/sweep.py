@@ -4,11 +4,6 @@ The two take turns; ratios of one run mean something, seconds are those of the m
 first round the kernels are compiled; after it no process may add any.
 
     python benchmarks/sweep.py --cells 12 --processes 2 --rounds 3
-
-With --motions, motions side by side against the same one after the other, in processor time of one
-process: 256 of a specimen of 333 dofs by central differences, of so many seconds each.
-
-    python benchmarks/sweep.py --motions 1 --rounds 3
 """
 
 from __future__ import annotations
@@ -21,12 +16,10 @@ import time
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
-from unittest.mock import patch
 
 import machine
 
 import foldyn as fd
-from foldyn.analyses.motion import MotionAnalysis
 
 CASE = """
 [pattern]
@@ -43,33 +36,6 @@ nodes = "xmin"
 kind = "modes"
 count = 6
 """
-MOTION = """
-[pattern]
-kind = "miura"
-cells = [4, 3]
-dihedral = 120.0
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
-[model]
-mass = "circumcenter"
-[damping]
-alpha = 0.0628
-[[supports]]
-nodes = "xmin"
-[[loads]]
-nodes = "xmax"
-force = [0.0, 0.0, -1e-3]
-[analysis]
-kind = "dynamics"
-method = "central_difference"
-duration = {duration}
-[output]
-every = 0.01
-"""
-MOVED = {"sheet.youngs_modulus": "1e6:1.2e6:16", "sheet.density": "1:1.2:16"}
 VARY = {"sheet.length_scale_ratio": "1:5:9", "pattern.dihedral": "40:140:9"}
 
 
@@ -94,45 +60,13 @@ def kernels(folder: str) -> set[Path]:
     return set(Path(folder).rglob("*.nbc"))
 
 
-def moved(case: Path, beside: bool) -> float:
-    """Processor time of a sweep of motions."""
-    before = time.process_time()
-    with patch.object(MotionAnalysis, "goes_beside", beside):
-        found = fd.sweep(case, MOVED, ["displacement[20,z]"], processes=1)
-    if found.attrs["failed"] or (found["side_by_side"].values.mean() > 7.0) != beside:
-        sys.exit("points failed, or were not computed as they should be")
-    return time.process_time() - before
-
-
-def motions(duration: float, rounds: int) -> None:
-    """Measure motions side by side, and print a table."""
-    with tempfile.TemporaryDirectory() as folder:
-        case = Path(folder) / "case.toml"
-        case.write_text(MOTION.format(duration=duration), "utf-8")
-        steps = fd.read_case(case).run().attrs["steps"]
-        fd.sweep(case, {"sheet.density": "1:1.1:8"}, ["displacement[20,z]"], processes=1)
-        costs = []
-        for number in range(rounds):
-            print(f"round {number + 1} of {rounds}", file=sys.stderr)
-            costs.append((moved(case, False), moved(case, True)))
-    alone, beside = (median(column) for column in zip(*costs, strict=True))
-    print("\n".join(machine.describe(None)))
-    print(f"256 motions of 333 dofs, {steps} steps, processor time of one process")
-    print(f"one after the other: {alone:.1f} s, side by side: {beside:.1f} s")
-    print(f"throughput: {median(a / b for a, b in costs):.2f} times that of one after the other")
-
-
 def main() -> None:
     """Measure, and print a table."""
     ask = argparse.ArgumentParser(description=__doc__)
     ask.add_argument("--cells", type=int, default=12, help="cells of the sheet along both sides")
     ask.add_argument("--processes", type=int, default=2)
     ask.add_argument("--rounds", type=int, default=3)
-    ask.add_argument("--motions", type=float, metavar="SECONDS", help="of motions side by side")
     given = ask.parse_args()
-    if given.motions is not None:
-        motions(given.motions, given.rounds)
-        return
     with tempfile.TemporaryDirectory() as folder:
         os.environ["NUMBA_CACHE_DIR"] = folder  # of this run alone, to see what is compiled
         case = Path(folder) / "case.toml"

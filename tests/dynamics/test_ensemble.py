@@ -1,4 +1,4 @@
-"""Many models side by side: equal to one after the other; what they cannot be is refused."""
+"""Many models at once: equal to one after the other, whatever lanes take of them."""
 
 from __future__ import annotations
 
@@ -110,29 +110,56 @@ def test_one_that_fails_does_not_stop_the_others():
     np.testing.assert_array_equal(without.displacement[0], many.displacement[0])
 
 
+def test_what_lanes_do_not_take_is_computed_alone(cases):
+    """Between cases that they take, of two kinds of laws; each with the bits of `simulate`."""
+    s, (fix,) = cases[0].structure, cases[0].supports
+    held = fd.Fix(np.flatnonzero(s.nodes[:, 0] <= s.nodes[:, 0].min() + 1e-9))
+    gravity = [fd.Gravity("-z")]
+    consistent = fd.discretize(s.pattern, s.sheet, mass="consistent")
+    alone = [
+        fd.Case(s, [fix], [fd.Actuate("all", 120.0, fd.Ramp(0.1))]),
+        fd.Case(s, [fix, fd.BaseMotion("x", fd.Harmonic(2.0), 1e-3)], gravity),
+        fd.Case(s, [fix], gravity, fd.Rayleigh(0.0, 1e-6)),
+        fd.Case(s, [fix], [fd.Pressure(1e-3)]),
+        fd.Case(consistent, [held], gravity),
+    ]
+    laws = [sheet(k, bend_law="linear") for k in range(2)]
+    given = [cases[0], *alone, *laws, cases[1]]
+    many = fd.simulate_many(given, 0.01, dt=2e-5, every=50)
+    assert (many.outcome == "done").all()
+    for k, case in enumerate(given):
+        single = fd.simulate(case, 0.01, "central_difference", dt=2e-5, every=50)
+        for name in ("displacement", "velocity", "reaction", "kinetic", "work"):
+            wanted, found = single[name].values, many[name].values[k]
+            rounding = 0.0 if case in alone else 1e-11
+            assert np.abs(found - wanted).max() <= rounding * np.abs(wanted).max(), (k, name)
+
+
+def test_contact_is_computed_alone(cases):
+    touching = [case.altered(contact=fd.Contact()) for case in cases[:2]]
+    many = fd.simulate_many(touching, 0.002, dt=2e-5, every=10)
+    single = fd.simulate(touching[1], 0.002, "central_difference", dt=2e-5, every=10)
+    np.testing.assert_array_equal(many["displacement"][1], single["displacement"])
+    np.testing.assert_array_equal(many["contact"][1], single["contact"])
+
+
 def test_what_does_not_fit_is_refused_by_name(cases):
-    s = cases[0].structure
-    fix = cases[0].supports[0]
-    twisted = fd.Case(s, [fix], [fd.Actuate("all", 120.0, fd.Ramp(1.0))])
-    swung = fd.Case(s, [fix, fd.BaseMotion("x", fd.Harmonic(2.0), 1e-3)])
-    heavy = fd.Case(fd.discretize(s.pattern, s.sheet, mass="consistent"), [fix])
+    s, (fix,) = cases[0].structure, cases[0].supports
     for other, text in [
         (sheet(0, (2, 1)), "has other nodes than cases"),
-        (sheet(0, bend_law="linear"), "has other bars, hinges or kinds of laws"),
         (fd.Case(s, [fd.Fix([0, 1])]), "has other supported dofs"),
-        (twisted, "actuated folds: not taken side by side yet"),
-        (swung, "supports that move"),
-        (fd.Case(s, [fix], damping=fd.Rayleigh(0.0, 1e-5)), "damping by beta"),
-        (fd.Case(s, [fix], contact=fd.Contact()), "contact"),
-        (heavy, "a mass matrix that is not lumped"),
+        (fd.Case(s, [fix], contact=fd.Contact()), "has other energies"),
         (3, "got int, give a Case"),
     ]:
         with pytest.raises(InputError, match=rf"cases\[1\].*{text}"):
             fd.simulate_many([cases[0], other], 0.01)
+    fast = fd.State(velocity=np.ones(s.nodes.shape))
     for given, text in [
         ({"cases": []}, "give a list of cases"),
-        ({"dt": 1.0, "duration": 2.0}, "above the critical step"),
+        ({"dt": 6e-4}, r"^dt = 0.0006 s is above the critical step of .* s of cases\[10\]"),
+        ({"every": 0}, "^every = 0: must be"),
         ({"initial": [None]}, "give one State, or a list of 11"),
+        ({"initial": [None] * 10 + [fast]}, r"cases\[10\]: initial: velocity of node"),
         ({"threads": 0}, "threads"),
     ]:
         with pytest.raises(InputError, match=text):

@@ -151,7 +151,7 @@ def test_tangent_is_symmetric(model):
 
 def test_pattern_of_the_tangent(model):
     """Columns ascend, none twice; symmetric; the dofs of a triangle and its neighbors only."""
-    found = model.body.sparsity
+    found = model.body.sheet.sparsity
     size = model.nodes.size + model.rotations
     assert found.size == size == len(found.indptr) - 1
     assert found.indptr[-1] == len(found.indices)
@@ -165,7 +165,7 @@ def test_pattern_of_the_tangent(model):
 
 def test_addresses_take_little_memory():
     """At 1e5 triangles the tables of addresses stay far below the matrix (some 2 kB a triangle)."""
-    found = shell(fd.patterns.miura(), THICK, divisions=8).body.sparsity
+    found = shell(fd.patterns.miura(), THICK, divisions=8).body.sheet.sparsity
     tables = sum(table.nbytes for table in found[3:])
     assert tables / len(found.triangle) < 450
 
@@ -186,7 +186,7 @@ def test_extrapolated_strain(model):
     u0, u = split(model, before)[0], split(model, now)[0]
     matrix = tangent(model, now)
     expected = matrix.toarray()
-    add_extrapolated_strain(model.model, model.body.sparsity, u, u0, matrix.data)
+    add_extrapolated_strain(model.model, model.body.sheet.sparsity, u, u0, matrix.data)
     for t, tri in enumerate(model.triangles):
         ends = [(tri[k], tri[(k + 1) % 3]) for k in range(3)]
         gap2 = [np.sum(((u - u0)[b] - (u - u0)[a]) ** 2) for a, b in ends]

@@ -155,18 +155,6 @@ class Analysis(ABC):
         ]
         return write_report(folder / "report.html", case_file.heading, sections)
 
-    @property
-    def goes_beside(self) -> bool:
-        """Whether its computations may be done side by side, several at a time."""
-        return False
-
-    def side_by_side(self, computations: Sequence[Compute]) -> list[list[int]]:
-        """Which of some computations are done `together`, by their places in the list."""
-        return [[k] for k in range(len(computations))]
-
-    def together(self, computations: Sequence[Compute]) -> None:  # noqa: B027
-        """Compute what is done side by side; each then has its result, or fails, when called."""
-
     def check(self, computations: Sequence[Compute], figures: bool) -> None:  # noqa: B027
         """Refuse computations of several mass rules that cannot run, or be drawn, together."""
 

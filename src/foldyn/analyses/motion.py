@@ -16,11 +16,9 @@ from foldyn.analyses.start import MotionStart
 from foldyn.cases import Case
 from foldyn.cases.models import SHELL
 from foldyn.dynamics import METHODS, Keeping, prepare
-from foldyn.dynamics.beside import METHOD as BESIDE
-from foldyn.dynamics.beside import groups, integrate
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.timing import check_room, check_samples
-from foldyn.errors import FoldynError, InputError
+from foldyn.errors import InputError
 from foldyn.report.album import (
     LOADS,
     Album,
@@ -118,23 +116,6 @@ class MotionAnalysis(Analysis):
         given = {"initial": case_file.start(mass).state, **self.arguments, **changes}
         return _Prepared(prepare(case_file.case(mass), **given, kept=True))
 
-    @property
-    def goes_beside(self) -> bool:
-        """See `Analysis`."""
-        return self.arguments["method"] in (AUTO, BESIDE.name)
-
-    def side_by_side(self, computations: Sequence[Compute]) -> list[list[int]]:
-        """See `Analysis`."""
-        motions = [one.motion for one in computations if isinstance(one, _Prepared)]
-        return groups(motions) if len(motions) > 1 else super().side_by_side(computations)
-
-    def together(self, computations: Sequence[Compute]) -> None:
-        """See `Analysis`."""
-        prepared = [one for one in computations if isinstance(one, _Prepared)]
-        errors, _ = integrate([one.motion for one in prepared])
-        for one, error in zip(prepared, errors, strict=True):
-            one.integrated, one.error = True, error
-
     def check(self, computations: Sequence[Compute], figures: bool) -> None:
         """Refuse more samples than memory holds, or fewer than spectra need."""
         prepared = [one for one in computations if isinstance(one, _Prepared)]
@@ -226,8 +207,6 @@ class _Prepared:
         self.motion = motion
         self.kept: Keeping | None = None
         self.shown = True  # whether its result is looked at as a whole
-        self.integrated = False  # beside others
-        self.error: FoldynError | None = None  # with which that ended
 
     def keep(self, keeping: Keeping, shown: bool) -> None:
         """See `Kept`."""
@@ -235,10 +214,6 @@ class _Prepared:
 
     def __call__(self, progress: bool, begun: Begun) -> xarray.Dataset:
         begun()
-        if self.error is not None:
-            raise self.error
-        if self.integrated:
-            return self.motion.result()
         found = None if self.kept is None else self.motion.finished(self.kept)
         return self.motion.run(progress, self.kept) if found is None else found
 

@@ -1,52 +1,38 @@
-"""Central differences of many models side by side, in the lanes of `mechanics.lanes`."""
+"""Central differences of up to WIDTH motions side by side, in the lanes of `mechanics.lanes`.
+
+All take the same steps, and each is looked at along the way as a motion alone is.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.dynamics.course import Outcome
+from foldyn.dynamics.course import Samples
+from foldyn.dynamics.motion import Motion
+from foldyn.errors import ComputationError
 from foldyn.jit.compiled import inner, shared
 from foldyn.jit.eights import eight, put
 from foldyn.jit.intrinsics import borrowed
-from foldyn.mechanics.lanes import (
-    WIDTH,
-    add_bar_lanes,
-    add_hinge_lanes,
-    energies_of_lanes,
-)
-
-OUTCOME, STEP, HINGE = range(3)
-"""What is noted of a model: how it ended, after which step, at which hinge."""
-
-
-class LanePlan(NamedTuple):
-    """Steps and samples of WIDTH models; one that takes no steps has -1 of them."""
-
-    dt: NDArray  # (WIDTH,) s
-    steps: NDArray  # (WIDTH,)
-    every: NDArray  # (WIDTH,) steps between samples
+from foldyn.mechanics.lanes import SHARED, WIDTH, add_bars, add_hinges, lanes, side_by_side
+from foldyn.structures.bars_hinges import BarsHingesTerm
 
 
 class LaneState(NamedTuple):
-    """WIDTH models of d dofs on their way, flat."""
+    """WIDTH models of d dofs on their way."""
 
-    u: NDArray  # (d WIDTH,) m
-    v: NDArray  # m/s
-    a: NDArray  # m/s2
-    force: NDArray  # N
-    position: NDArray  # m
+    dofs: NDArray  # (5, d WIDTH) displacement, velocity, acceleration, force, position (SI)
     angle: NDArray  # (nh WIDTH,) at the last step, rad
-    before: NDArray  # (WIDTH,) of the hinge at which a model ended, before that, rad
     work: NDArray  # (4, WIDTH) work and energy dissipated, J, and their powers, W
-    strain: NDArray  # (groups, WIDTH) J
-    note: NDArray  # (3, WIDTH) int64; of the hinge -1 before
+    wrong: NDArray  # (WIDTH,) not 0 once something is not finite, or a hinge has jumped by pi
 
 
 class LaneLoads(NamedTuple):
-    """Loads on k dofs, in t terms with a history each."""
+    """Loads on k dofs, in t terms with a history each; masses and drag."""
 
     dof: NDArray  # (k,)
     value: NDArray  # (t, k WIDTH) N
@@ -55,109 +41,163 @@ class LaneLoads(NamedTuple):
     alpha: NDArray  # (WIDTH,) 1/s
 
 
-class LaneSamples(NamedTuple):
-    """Output of k samples of WIDTH models, n nodes, s supported dofs."""
+class LanePlaces(NamedTuple):
+    """Where numbers of the lanes stand in the results, n nodes, s supported dofs."""
 
-    order: NDArray  # (n,) node number of each place in memory
-    supported: NDArray  # (s,) dofs
-    displacement: NDArray  # (WIDTH, k, n, 3)
-    velocity: NDArray  # (WIDTH, k, n, 3)
-    reaction: NDArray  # (WIDTH, k, s)
-    energy: NDArray  # (WIDTH, k, groups + 3)
+    motion: NDArray  # (models,) number of the motion in each lane
+    node: NDArray  # (n,) number of the node at each place in memory
+    supported: NDArray  # (s,) dofs, as they stand in memory
 
 
 @inner
-def write_samples(topology, own, loads, state, out, step, chosen):
-    """Write a sample of each chosen (WIDTH,) model; one that is not finite ends instead."""
-    u, v, strain, energies = state.u, state.v, state.strain, state.work
-    energies_of_lanes(topology, own, u, state.angle, strain)
-    groups = strain.shape[0]
-    for q in range(WIDTH):
-        if chosen[q] == 0:
-            continue
-        k = step // chosen[q]
-        kinetic = 0.0
-        for place in range(out.order.size):
+def write_samples(mass, state, strain, places, out, k):
+    """Write sample k of each model."""
+    u, v, force = state.dofs[0], state.dofs[1], state.dofs[3]
+    for q in range(places.motion.size):
+        m, kinetic, energy = places.motion[q], 0.0, out.energy[places.motion[q], k]
+        for i in range(places.node.size):
             for c in range(3):
-                i = (3 * place + c) * WIDTH + q
-                out.displacement[q, k, out.order[place], c] = u[i]
-                out.velocity[q, k, out.order[place], c] = v[i]
-                kinetic += 0.5 * loads.mass[i] * v[i] * v[i]
-        for s in range(out.supported.size):
-            out.reaction[q, k, s] = state.force[out.supported[s] * WIDTH + q]
-        for g in range(groups):
-            out.energy[q, k, g] = strain[g, q]
-        out.energy[q, k, groups] = kinetic
-        out.energy[q, k, groups + 1] = energies[1, q]
-        out.energy[q, k, groups + 2] = energies[0, q]
-        if not abs(out.energy[q, k].sum()) < np.inf:
-            state.note[OUTCOME, q], state.note[STEP, q] = Outcome.NOT_FINITE, step
+                at = (3 * i + c) * WIDTH + q
+                out.displacement[m, k, places.node[i], c] = u[at]
+                out.velocity[m, k, places.node[i], c] = v[at]
+                kinetic += 0.5 * mass[at] * v[at] * v[at]
+        for s in range(places.supported.size):
+            out.reaction[m, k, s] = force[places.supported[s] * WIDTH + q]
+        energy[:-3] = strain[:, q]
+        energy[-3], energy[-2], energy[-1] = kinetic, state.work[1, q], state.work[0, q]
+        state.wrong[q] += 0.0 * energy.sum()  # nan, if one is not finite
 
 
 @shared
-def advance_lanes(topology, own, loads, factor, state, out, plan, first, last):
+def advance_lanes(model, loads, factor, state, plan, places, out, first, last):
     """Do the steps from the first to the last one of WIDTH models; step 0 is the start.
 
-    factor : (last - first + 1, t WIDTH) of the histories, at the ends of these steps. A model that
-    has ended, or done its steps, stands still.
+    factor : (last - first + 1, t WIDTH) of the histories, at the ends of these steps.
     """
-    topology, own, loads = borrowed(topology), borrowed(own), borrowed(loads)
-    state, out = borrowed(state), borrowed(out)
-    u, v, a, force = state.u, state.v, state.a, state.force
-    position, size, note = state.position, state.u.size, state.note
-    energies, alpha = state.work, loads.alpha
-    h, half, none = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH)
-    power_in, power_out, finite = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH)
-    chosen, scratch = np.zeros(WIDTH, np.int64), np.zeros(WIDTH)
-    zero, slowed = eight(none, 0), eight(alpha, 0)
+    model, loads, state = borrowed(model), borrowed(loads), borrowed(state)
+    dofs, work, groups, scratch = state.dofs, state.work, out.energy.shape[2] - 3, np.zeros(WIDTH)
+    u, v, a, force, position = dofs[0], dofs[1], dofs[2], dofs[3], dofs[4]
+    terms, count, strain = loads.value.shape[0], loads.dof.size, np.zeros((groups, WIDTH))
+    zero, slowed = eight(scratch, 0), eight(loads.alpha, 0)
     for step in range(first, last + 1):
-        now = step - first
-        for q in range(WIDTH):
-            goes_on = note[OUTCOME, q] == Outcome.DONE and step <= plan.steps[q]
-            h[q] = plan.dt[q] if goes_on and step > 0 else 0.0
-            chosen[q] = plan.every[q] if goes_on and step % plan.every[q] == 0 else 0
-            half[q] = 0.5 * h[q]
-            power_in[q] = 0.0
-        span, kick = eight(h, 0), eight(half, 0)
-        for i in range(0, size, WIDTH):
-            speed = eight(v, i) + kick * eight(a, i)
-            there = eight(u, i) + span * speed
+        h = plan.dt if step > 0 else 0.0
+        for i in range(0, u.size, WIDTH):
+            speed = eight(v, i) + 0.5 * h * eight(a, i)
             put(v, i, speed)
-            put(u, i, there)
-            put(position, i, eight(own.rest, i) + there)
+            put(u, i, eight(u, i) + h * speed)
+            put(position, i, eight(model.rest, i) + eight(u, i))
             put(force, i, zero)
-        add_bar_lanes(topology, own, u, force, scratch)
-        jumped = add_hinge_lanes(
-            topology, own, position, force, scratch, state.angle, state.before, note[HINGE]
-        )
-        for term in range(loads.value.shape[0]):
-            for k in range(loads.dof.size):
+        sampled, strain[:] = step % plan.every == 0, 0.0
+        if sampled:
+            add_bars(model, u, force, scratch, strain)
+            add_hinges(model, position, force, state.angle, state.wrong, scratch, strain)
+        else:
+            add_bars(model, u, force, scratch, None)
+            add_hinges(model, position, force, state.angle, state.wrong, scratch, None)
+        power_in, drag, wrong = zero, zero, eight(state.wrong, 0)
+        for term in range(terms):
+            now = eight(factor, ((step - first) * terms + term) * WIDTH)
+            for k in range(count):
                 at = loads.dof[k] * WIDTH
-                for q in range(WIDTH):
-                    load = loads.value[term, k * WIDTH + q] * factor[now, term * WIDTH + q]
-                    force[at + q] -= load
-                    power_in[q] += load * (v[at + q] + half[q] * a[at + q])
-        drag, wrong = zero, zero
-        for i in range(0, size, WIDTH):
-            speed, old = eight(v, i), eight(a, i)
-            ahead = speed + kick * old  # velocity that drag sees
+                load = eight(loads.value, (term * count + k) * WIDTH) * now
+                put(force, at, eight(force, at) - load)
+                power_in = power_in + load * (eight(v, at) + 0.5 * h * eight(a, at))
+        for i in range(0, u.size, WIDTH):
+            ahead = eight(v, i) + 0.5 * h * eight(a, i)  # velocity that drag sees
             new = -eight(force, i) * eight(loads.inverse, i) - slowed * ahead
-            speed = speed + kick * new
+            speed = eight(v, i) + 0.5 * h * new
             put(a, i, new)
             put(v, i, speed)
             drag = drag + eight(loads.mass, i) * ahead * ahead
             wrong = wrong + zero * speed  # nan, once one of them is inf or nan
-        put(power_out, 0, drag * slowed)
-        put(finite, 0, wrong)
-        for q in range(WIDTH):
-            energies[0, q] += 0.5 * h[q] * (energies[2, q] + power_in[q])
-            energies[1, q] += 0.5 * h[q] * (energies[3, q] + power_out[q])
-            energies[2, q], energies[3, q] = power_in[q], power_out[q]
-            if finite[q] != 0.0 and note[OUTCOME, q] == Outcome.DONE:
-                note[OUTCOME, q], note[STEP, q] = Outcome.NOT_FINITE, step
-                chosen[q] = 0
-            if jumped and note[HINGE, q] >= 0 and note[OUTCOME, q] == Outcome.DONE:
-                note[OUTCOME, q], note[STEP, q] = Outcome.PENETRATION, step
-                chosen[q] = 0
-        if chosen.any():
-            write_samples(topology, own, loads, state, out, step, chosen)
+        for row, power in enumerate((power_in, drag * slowed)):
+            before = eight(work, (2 + row) * WIDTH)
+            put(work, row * WIDTH, eight(work, row * WIDTH) + 0.5 * h * (before + power))
+            put(work, (2 + row) * WIDTH, power)
+        put(state.wrong, 0, wrong)
+        if sampled:
+            write_samples(loads.mass, state, strain, places, out, step // plan.every)
+
+
+def topology(motion: Motion) -> tuple[bytes, ...]:
+    """What motions side by side have in common; nothing of one that lanes do not take.
+
+    They take bars and hinges with laws of the package, lumped masses, drag, and dead loads.
+    """
+    packed, system, damping = motion.packed, motion.packed.system, motion.packed.system.damping
+    drives = system.moves, system.turns, system.follows, damping.data.size, damping.follows
+    plain = isinstance(packed.body.sheet, BarsHingesTerm) and packed.mass.lumped
+    if not plain or packed.body.others or any(drives) or packed.model.addresses.any():
+        return ()
+    arrays = [getattr(packed.model, name) for name in SHARED]
+    return tuple(array.tobytes() for array in (*arrays, system.order, system.supported))
+
+
+def integrate(motions: Sequence[tuple[int, Motion]], out: Samples) -> set[int]:
+    """Integrate up to WIDTH motions of one topology and plan; numbers of those that go wrong.
+
+    motions : with their numbers in `out`.
+    out : room for samples: times (k,), the others (m, k, ...).
+    """
+    numbers, own = zip(*motions, strict=True)
+    plan, system = own[0].plan, own[0].packed.system
+    filled = [*own, *own[-1:] * (WIDTH - len(own))]
+    model = lanes([motion.packed.model for motion in filled])
+    state, loads = _start(filled), _loads(filled)
+    places = LanePlaces(np.array(numbers), system.order, system.supported)
+    sound, done = set(range(len(own))), -1
+    while sound and done < plan.steps:
+        first, done = done + 1, min(plan.steps, max(0, done) + own[0].recheck_after)
+        times = plan.start + plan.dt * np.arange(first, done + 1)
+        factor = _factors(filled, times, len(loads.value))
+        advance_lanes(model, loads, factor, state, plan, places, out, first, done)
+        sound = {lane for lane in sound if _is_sound(own[lane], lane, state, done)}
+    return {number for lane, number in enumerate(numbers) if lane not in sound}
+
+
+def _is_sound(motion: Motion, lane: int, state: LaneState, step: int) -> bool:
+    """Whether a motion can go on after a step: it is audited as if it were alone."""
+    if state.wrong[lane] != 0.0:
+        return False
+    motion.course.tally.samples = step // motion.plan.every + 1
+    with suppress(ComputationError):
+        motion.audit()
+        if step < motion.plan.steps:
+            u = state.dofs[0, lane::WIDTH].reshape(-1, 3)
+            motion.recheck(motion.packed.numbering.outward(u))
+        return True
+    return False
+
+
+def _start(motions: Sequence[Motion]) -> LaneState:
+    """The models at their beginning."""
+    courses = [motion.course for motion in motions]
+    dofs = side_by_side([np.stack([c.u, c.v, *np.zeros((3, *c.u.shape))]) for c in courses])
+    angle = side_by_side([course.angle for course in courses])
+    return LaneState(dofs.reshape(5, -1), angle, np.zeros((4, WIDTH)), np.zeros(WIDTH))
+
+
+def _loads(motions: Sequence[Motion]) -> LaneLoads:
+    """Loads, masses and drag."""
+    masses = [motion.packed.mass for motion in motions]
+    terms = max(len(motion.case.load_terms) for motion in motions)
+    value = np.zeros((terms, masses[0].inverse.size, WIDTH))
+    for lane, motion in enumerate(motions):
+        for term, (vector, _) in enumerate(motion.case.load_terms):
+            value[term, :, lane] = motion.packed.numbering.inward(vector).ravel()
+    dof = np.flatnonzero(value.any(axis=(0, 2)))
+    return LaneLoads(
+        dof, value[:, dof].reshape(len(value), len(dof) * WIDTH),
+        side_by_side([mass.inverse for mass in masses]),
+        side_by_side([np.repeat(mass.diagonal, 3) for mass in masses]),
+        np.array([motion.packed.system.damping.alpha for motion in motions]),
+    )  # fmt: skip
+
+
+def _factors(motions: Sequence[Motion], times: NDArray, terms: int) -> NDArray:
+    """Factors of all histories at times (k,), (k, terms WIDTH)."""
+    out = np.zeros((len(times), terms, WIDTH))
+    for lane, motion in enumerate(motions):
+        for term, (_, history) in enumerate(motion.case.load_terms):
+            out[:, term, lane] = history(times)
+    return out.reshape(len(times), -1)

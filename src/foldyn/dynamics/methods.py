@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,16 +37,6 @@ from foldyn.jit.compiled import ready
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.threads import run_together
 from foldyn.values import of_kind
-
-
-class Engine(Protocol):
-    """What advances a motion, as far as it is asked about afterwards."""
-
-    threads: int
-
-    def facts(self) -> dict[str, Any]:
-        """Statistics of its own, for the result's attributes."""
-        ...
 
 
 class Compiled:

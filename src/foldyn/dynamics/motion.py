@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -19,7 +19,7 @@ from foldyn.dynamics.failures import failure, smaller_step
 from foldyn.dynamics.identity import identity, key_of
 from foldyn.dynamics.initial import begin
 from foldyn.dynamics.keeping import KEY, Keeping
-from foldyn.dynamics.methods import Compiled, Engine, Implicit, Integrator
+from foldyn.dynamics.methods import Compiled, Implicit, Integrator
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
@@ -75,8 +75,7 @@ class Motion:
         self._state, self.packed, self._sampler = state, packed, sampler
         self._better = better
         self._rounding = Rounding(packed.body)
-        self._engine: Engine | None = None
-        self._ended = int(Outcome.DONE), -1
+        self._engine: Compiled | Implicit | None = None
         self._keeping: Keeping | None = None
         self.seconds = 0.0
         self._start()
@@ -92,6 +91,11 @@ class Motion:
         """Samples computed so far."""
         return int(self.course.tally.samples)
 
+    @property
+    def recheck_after(self) -> int:
+        """Steps after which it is looked at whether they are still stable."""
+        return max(1000, -(-self.plan.steps // RECHECKS))
+
     def run(
         self, progress: bool | Reporter | None = None, keeping: Keeping | None = None
     ) -> xarray.Dataset:
@@ -103,14 +107,14 @@ class Motion:
         again = keeping is not None and keeping.resume and self._other
         if keeping and again and keeping.keeps(again._identity()):
             return again.run(progress, keeping)
-        self._integrated(progress, keeping)
+        self.integrate(progress, keeping)
         return self.result(progress)
 
     def samples(self, progress: bool | Reporter | None = None) -> Samples:
         """Integrate the motion; its samples alone, which do not carry the case."""
-        self._integrated(progress)
+        self.integrate(progress)
         self._judge()
-        return self._output.written(self.stored)
+        return self.output.written(self.stored)
 
     def result(self, progress: bool | Reporter | None = None) -> xarray.Dataset:
         """What was integrated, with the warnings that it deserves.
@@ -118,12 +122,12 @@ class Motion:
         Where the energies do not balance and there is a better method, it is computed anew.
         """
         self.audit()
-        if self._better is not None and is_off(self._output.balance, self._rounding):
+        if self._better is not None and is_off(self.output.balance, self._rounding):
             return self._anew(progress)
         self._judge()
         crossings = self._crossings()
         if len(crossings.first):
-            when = f"t = {self._output.time(crossings.first[0]):.6g} s"
+            when = f"t = {self.output.time(crossings.first[0]):.6g} s"
             text = crossings.text(when, self.stored)
             warnings.warn(text, CrossingWarning, stacklevel=4)
         result = self._dataset(crossings)
@@ -153,7 +157,7 @@ class Motion:
 
     def _anew(self, progress: bool | Reporter | None) -> xarray.Dataset:
         assert self._other is not None
-        text = announced(self._other, self, self._output.balance.relative)
+        text = announced(self._other, self, self.output.balance.relative)
         warnings.warn(text, FoldynWarning, stacklevel=5)
         self._start()  # gives its samples' memory back
         if self._keeping is not None:
@@ -163,14 +167,17 @@ class Motion:
     def _judge(self) -> None:
         self.audit()
         size, remedy = float(self.course.tally.farthest), smaller_step(self)
-        texts = [doubts(self._output.balance, self._rounding, self.plan, size, remedy)]
+        texts = [doubts(self.output.balance, self._rounding, self.plan, size, remedy)]
         if resists_turns(self.case, self.packed):
-            seen, scale = self._output.looked_at(self.stored, LOOKS), self._output.balance.scale
+            seen, scale = self.output.looked_at(self.stored, LOOKS), self.output.balance.scale
             texts.append(turns_told(self.case, self.packed, self._state[0], *seen, scale))
         for text in filter(None, texts):
             warnings.warn(text, FoldynWarning, stacklevel=5)
 
-    def _integrated(self, progress: bool | Reporter | None, keeping: Keeping | None = None) -> None:
+    def integrate(
+        self, progress: bool | Reporter | None = None, keeping: Keeping | None = None
+    ) -> None:
+        """Integrate the motion; see `simulate`."""
         self._keeping = keeping
         size = self.expected_samples, len(self.case.structure.nodes), len(self.case.reaction_dofs)
         if keeping is None:
@@ -178,7 +185,7 @@ class Motion:
         else:
             check_room(*size, keeping.room)
         self._start()
-        self._output.begin()
+        self.output.begin()
         report, close = reporter(progress)
         try:
             engine = self.method.engine(self.case, self.packed, self.course, self.plan)
@@ -186,8 +193,7 @@ class Motion:
             if isinstance(engine, Implicit) and continued and continued.method == self.method.name:
                 engine.go_on_from(continued.values)
             self._engine = engine
-            for stretch in self._stretches(report, self._resumed(engine)):
-                self._ended = engine.advance(self._output.window, stretch)
+            self._advance(engine, report)
         except KeyboardInterrupt:
             kept = self._keeping.summary if self._keeping else ""
             raise MotionInterrupted(
@@ -195,21 +201,6 @@ class Motion:
             ) from None
         finally:
             close()
-
-    def beside(self, engine: Engine, window: Samples) -> Iterator[int]:
-        """Stretches of steps for an engine that advances several motions; `ended` follows each.
-
-        Its samples go to the window. What there is then is the `result`.
-        """
-        self._keeping = None
-        if self.stored:
-            self._start()
-        self._output.window, self._engine = window, engine
-        return self._stretches(lambda _: None, 0.0)
-
-    def ended(self, code: int, hinge: int) -> None:
-        """Say how the last stretch of steps ended."""
-        self._ended = code, hinge
 
     @property
     def _origin(self) -> str:
@@ -226,26 +217,20 @@ class Motion:
     def _start(self) -> None:
         """Go back to the start."""
         self.course = begin(self.case, *self._state, self.plan, self.packed)
-        self._output = Output(self.case, self.plan, self._sampler, self._branches, self._keeping)
+        self.output = Output(self.case, self.plan, self._sampler, self._branches, self._keeping)
 
-    def _stretches(self, report: Reporter, earlier: float) -> Iterator[int]:
-        """How many steps at most are to follow, again and again until the end.
-
-        After each stretch `_ended` says how it ended; the progress is reported and the motion is
-        audited. `earlier` is the time (s) that was spent before.
-        """
+    def _advance(self, engine: Compiled | Implicit, report: Reporter) -> None:
+        """Advance to the end, in stretches; after each, report the progress, and audit."""
         system, callbacks, by = self.packed.system, self.packed.callbacks, self.packed.numbering
-        plan, course, output, engine = self.plan, self.course, self._output, self._engine
-        assert engine is not None
+        plan, course, output = self.plan, self.course, self.output
         memory = scratch(system)
-        recheck = max(1000, -(-plan.steps // RECHECKS))
+        earlier, began = self._resumed(engine), None
         length = 0  # the first call only records the start: it may have to compile
-        began = None
         while True:
             done = int(course.tally.steps)
             clock = time.perf_counter()
-            yield min(length, recheck - done % recheck, self._fits(length))
-            code, hinge = self._ended
+            stretch = self._fits(min(length, self.recheck_after - done % self.recheck_after))
+            code, hinge = engine.advance(output.window, stretch)
             clock = time.perf_counter() - clock
             began = time.perf_counter() if began is None else began
             self.seconds = earlier + time.perf_counter() - began
@@ -260,16 +245,13 @@ class Motion:
                 kind, why = failure(self, code, hinge)
                 self._stop(why, kind)
             step, now = int(course.tally.steps), float(course.tally.time)
-            finished = step == plan.steps if plan.steps else now >= plan.end
             report(Progress(now - plan.start, plan.end - plan.start, step, self.audit()))
-            if finished:
+            if step == plan.steps if plan.steps else now >= plan.end:
                 return
-            if isinstance(engine, Compiled | Implicit):
-                self._keep(engine)
-            watched = plan.steps and not self.force and self.method.growth is not None
-            if watched and step % recheck == 0 and step > done:
+            self._keep(engine)
+            if plan.steps and step % self.recheck_after == 0 and step > done:
                 place(system, course.u, course.v, now, memory)
-                self._recheck(by.outward(memory.displacement))
+                self.recheck(by.outward(memory.displacement))
             growth = REPORT_EVERY / max(clock, 1e-9)
             least = 1 if self.method.implicit else CHUNK
             length = max(least, min(int(length * min(growth, 8.0)), 100_000))
@@ -284,8 +266,8 @@ class Motion:
             return found
         if isinstance(engine, Implicit) and self.stored and self.packed.callbacks.error is None:
             if self._state[3] and engine.continues:
-                found["continued_from"] = self._output.time(0), self._state[3]
-            last = self._output.time(self.stored - 1)
+                found["continued_from"] = self.output.time(0), self._state[3]
+            last = self.output.time(self.stored - 1)
             if float(self.course.tally.time) == last:
                 end = Continuation(self.method.name, engine.continuation())
                 found["continuation"] = last, end
@@ -305,19 +287,19 @@ class Motion:
 
     def _fits(self, length: int) -> int:
         """Steps, at most `length`, for whose samples there is room."""
-        fits = self._output.fits(int(self.course.tally.steps), self.stored)
+        fits = self.output.fits(int(self.course.tally.steps), self.stored)
         if fits is not None and fits < 1 <= length:
-            self._output.flush(self.stored)
-            fits = self._output.fits(int(self.course.tally.steps), self.stored)
+            self.output.flush(self.stored)
+            fits = self.output.fits(int(self.course.tally.steps), self.stored)
         return length if fits is None else max(0, min(length, fits))
 
     def _keep(self, engine: Compiled | Implicit) -> None:
         """Make a checkpoint, if it is time for one."""
         if self._keeping is None or not self._keeping.due:
             return
-        self._output.flush(self.stored)
+        self.output.flush(self.stored)
         standing = {f"engine.{name}": array for name, array in engine.standing().items()}
-        standing |= self._output.standing() | {"seconds": np.array(self.seconds)}
+        standing |= self.output.standing() | {"seconds": np.array(self.seconds)}
         self._keeping.checkpoint(standing, float(self.course.tally.time))
 
     def _resumed(self, engine: Compiled | Implicit) -> float:
@@ -325,18 +307,18 @@ class Motion:
         if self._keeping is None:
             return 0.0
         about = self._identity() | {"threads": engine.threads}
-        kept = self._keeping.begin(about, self._output.rows)
+        kept = self._keeping.begin(about, self.output.rows)
         if kept is None:
             return 0.0
         own = "engine."
         engine.go_on({name[len(own) :]: kept[name] for name in kept if name.startswith(own)})
-        self._output.go_on(kept, self.stored)
+        self.output.go_on(kept, self.stored)
         return float(kept["seconds"])
 
     def _sample(self) -> None:
         """Evaluate what the user samples at the samples that are new."""
         try:
-            self._output.take(self.stored)
+            self.output.take(self.stored)
         except SamplingError as error:
             self._stop(str(error), ComputationError, error)
 
@@ -346,23 +328,24 @@ class Motion:
 
     def audit(self) -> float:
         """Relative energy error so far; raises where the energy has exploded."""
-        balance = self._output.see(self.stored)
+        balance = self.output.see(self.stored)
         if balance.relative > EXPLODED and self._rounding.reveals(balance):
-            bad = self._output.first_off(self.stored, EXPLODED)
-            at = self._output.time(bad)
+            bad = self.output.first_off(self.stored, EXPLODED)
+            at = self.output.time(bad)
             self.course.tally.samples = bad
-            self._output.shorten(bad)
+            self.output.shorten(bad)
             self._stop(
                 f"the motion is unstable: at t = {at:.6g} s the energy balance is "
                 f"off by more than the energies at play; {smaller_step(self)}"
             )
         return balance.relative
 
-    def _recheck(self, u: NDArray) -> None:
+    def recheck(self, u: NDArray) -> None:
         """Stop where the structure has stiffened so much that the step is above its limit."""
         growth, damping = self.method.growth, self.case.rayleigh
+        if self.force or growth is None:
+            return
         rate = damper_rate(self.case, u) + self.packed.system.damping.modal_rate
-        assert growth is not None  # of explicit methods
         for frequency in (frequency_bound, largest_frequency):  # the first costs less
             omega = frequency(self.case, u)
             if np.isfinite(omega) and is_stable(growth, omega, damping, self.plan.dt, rate):
@@ -382,12 +365,12 @@ class Motion:
         few = FEW // max(1, len(getattr(self.case.structure, "triangles", ())))
         looks = max(1, few, int(work / PER_LOOK))
         stride = -(-max(1, self.stored) // looks)
-        return crossings_of(self.case, self._output.displacement(self.stored), stride)
+        return crossings_of(self.case, self.output.displacement(self.stored), stride)
 
     def _dataset(self, crossings: Crossings | None = None) -> xarray.Dataset:
         """Samples stored so far, with the case, the statistics and the panels that cross."""
         crossings = crossings or self._crossings()
-        out, sampled = self._output.first(self.stored)
+        out, sampled = self.output.first(self.stored)
         names = audited(self.case.energy_groups)
         energies: dict[str, NDArray] = dict(zip(names, out.energy.T, strict=True))
         result = trajectory_dataset(
@@ -397,7 +380,7 @@ class Motion:
         )  # fmt: skip
         if self._keeping is not None:
             result.attrs[KEY] = key_of(self._identity())
-        return crossings.recorded(self._output.whole(result, self.stored))
+        return crossings.recorded(self.output.whole(result, self.stored))
 
     def _statistics(self) -> dict[str, Any]:
         plan, tally, engine = self.plan, self.course.tally, self._engine
@@ -407,7 +390,7 @@ class Motion:
             "critical_step": self.critical,
             "wall_seconds": self.seconds,
             "threads": engine.threads if engine else 1,
-            "energy_error": self._output.see(self.stored).relative,
+            "energy_error": self.output.see(self.stored).relative,
             "started_from": self._origin,
         }
         if self.reason:

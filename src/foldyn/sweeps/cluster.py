@@ -58,11 +58,6 @@ class Cluster(Generic[Item, Result]):
                 "scheduler",
             )
 
-    @property
-    def count(self) -> int:
-        """Workers that are there."""
-        return max(1, len(self._client.nthreads()))
-
     def each(
         self,
         items: Iterable[Item],

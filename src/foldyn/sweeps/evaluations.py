@@ -36,8 +36,6 @@ class Evaluation:
         Computing time.
     lasting : bool
         Whether it would be the same again; otherwise it is not kept, as a lack of memory.
-    side_by_side : int
-        How many motions were computed side by side with its own, that included; 1: it alone.
     """
 
     values: Mapping[str, NDArray] = field(default_factory=dict)
@@ -45,7 +43,6 @@ class Evaluation:
     warnings: str = ""
     seconds: float = 0.0
     lasting: bool = True
-    side_by_side: int = 1
 
 
 class Evaluations(Generic[Point]):
@@ -134,8 +131,7 @@ def _read(file: Path) -> tuple[str, Evaluation]:
         if any(array.dtype.kind not in "iuf" for array in values.values()):
             raise ValueError
         failure, warnings = str(kept["failure"]), str(kept["warnings"])
-        numbers = {"seconds": float(kept["seconds"]), "side_by_side": int(kept["side_by_side"])}
-        found = Evaluation(values, failure, warnings, **numbers)
+        found = Evaluation(values, failure, warnings, float(kept["seconds"]))
         return str(kept["stamp"]), found
 
 
@@ -144,8 +140,7 @@ def _write(file: Path, stamp: str, found: Evaluation) -> None:
     values: dict[str, Any] = {f"{_VALUE}{name}": array for name, array in found.values.items()}
     facts: dict[str, Any] = {name: np.array(text) for name, text in texts.items()}
     with whole(file) as part:
-        facts |= {name: np.array(getattr(found, name)) for name in ("seconds", "side_by_side")}
-        np.savez(part, **facts, **values)
+        np.savez(part, seconds=np.array(found.seconds), **facts, **values)
         seal(part)
 
 

@@ -1,4 +1,4 @@
-"""What a sweep computes at points: the case file with other values, its result, its measures."""
+"""What a sweep computes at a point: the case file with other values, its result, its measures."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ import hashlib
 import inspect
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from foldyn.analyses import CaseFile
-from foldyn.analyses.casefile import Computation
 from foldyn.analyses.keys import files_of, replaced
 from foldyn.analyses.reading import case_of_document
 from foldyn.analyses.ties import Tie
@@ -32,7 +31,7 @@ ASIDE = ("sweep", "title")
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """Computes points of a sweep; it can be sent to another process.
+    """Computes a point of a sweep; it can be sent to another process.
 
     Attributes
     ----------
@@ -82,77 +81,34 @@ class Job:
         measures = [[one.name, one.text, code_of(one.measure.function)] for one in self.measures]
         return [self.program, document, files, measures]
 
-    def __call__(self, points: Sequence[Point]) -> list[Evaluation]:
-        """Evaluate points, side by side where that can be: what goes wrong is what is found."""
-        trials = [_Trial(self.path) for _ in points]
-        ready = list[tuple[_Trial, Computation]]()
-        for trial, point in zip(trials, points, strict=True):
-            with trial.watched():
-                if self.program != this_program():
-                    raise RuntimeError("this worker has another version of Foldyn than who asks it")
-                ready.append((trial, self.case_file(point).computation()))
-        if ready:
-            analysis = ready[0][1].case_file.analysis
-            groups = analysis.side_by_side([one.compute for _, one in ready])
-            left = dict(enumerate(ready))
-            ready.clear()  # results live no longer than their group
-            for group in groups:
-                self._measure([left.pop(k) for k in group])
-        return [trial.evaluation() for trial in trials]
+    def __call__(self, point: Point) -> Evaluation:
+        """Evaluate a point: what goes wrong is what is found there."""
+        began, values, failures, lasting = time.perf_counter(), {}, list[str](), True
 
-    def _measure(self, group: Sequence[tuple[_Trial, Computation]]) -> None:
-        """Compute a group, side by side if it is one, and take the measures."""
-        if len(group) > 1:
-            began = time.perf_counter()
-            with suppress(Exception):  # then each is alone, and computes or says why not
-                group[0][1].case_file.analysis.together([one.compute for _, one in group])
-                for trial, _ in group:
-                    trial.side_by_side = len(group)
-            for trial, _ in group:
-                trial.seconds += (time.perf_counter() - began) / len(group)
-        for trial, one in group:
-            with trial.watched():
-                result, case, shared = one.result(), one.case_file.case(), {}
-                for each in self.measures:
-                    with trial.noted():
-                        trial.values[each.name] = each.of(result, case, shared)
+        @contextmanager
+        def noted() -> Iterator[None]:
+            """Note what goes wrong in the block; what else is found is kept."""
+            nonlocal lasting
+            try:
+                yield
+            except (InputError, ComputationError) as error:
+                failures.append(str(error).removeprefix(f"{self.path}: "))
+            except Exception as error:  # of one point; the others are computed all the same
+                failures.append(f"{type(error).__name__}: {error}")
+                lasting = False
 
-
-class _Trial:
-    """A point on its way to its evaluation."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.values: dict[str, Any] = {}
-        self.lasting, self.seconds, self.side_by_side = True, 0.0, 1
-        self.failures: list[str] = []
-        self.told: list[str] = []
-
-    @contextmanager
-    def watched(self) -> Iterator[None]:
-        """Note what goes wrong in the block, what is warned of, and how long it takes."""
-        began = time.perf_counter()
-        with warnings.catch_warnings(record=True) as told, self.noted():
+        with warnings.catch_warnings(record=True) as told, noted():
             warnings.simplefilter("always")
-            yield
-        self.told += [str(one.message) for one in told if issubclass(one.category, FoldynWarning)]
-        self.seconds += time.perf_counter() - began
-
-    @contextmanager
-    def noted(self) -> Iterator[None]:
-        """Note what goes wrong in the block; what else is found is kept."""
-        try:
-            yield
-        except (InputError, ComputationError) as error:
-            self.failures.append(str(error).removeprefix(f"{self.path}: "))
-        except Exception as error:  # of one point; the others are computed all the same
-            self.failures.append(f"{type(error).__name__}: {error}")
-            self.lasting = False
-
-    def evaluation(self) -> Evaluation:
-        """What was found."""
-        failure, said = ("; ".join(dict.fromkeys(texts)) for texts in (self.failures, self.told))
-        return Evaluation(self.values, failure, said, self.seconds, self.lasting, self.side_by_side)
+            if self.program != this_program():
+                raise RuntimeError("this worker has another version of Foldyn than who asks it")
+            case_file = self.case_file(point)
+            result, case, shared = case_file.computation().result(), case_file.case(), {}
+            for each in self.measures:
+                with noted():
+                    values[each.name] = each.of(result, case, shared)
+        said = [str(one.message) for one in told if issubclass(one.category, FoldynWarning)]
+        failure, warned = ("; ".join(dict.fromkeys(texts)) for texts in (failures, said))
+        return Evaluation(values, failure, warned, time.perf_counter() - began, lasting)
 
 
 def this_program() -> str:

@@ -15,11 +15,6 @@ Result = TypeVar("Result")
 class Pool(Protocol[Item, Result]):
     """What computes something for each of many items; a context manager."""
 
-    @property
-    def count(self) -> int:
-        """How many items it computes at a time."""
-        ...
-
     def each(
         self,
         items: Iterable[Item],
@@ -50,8 +45,6 @@ class Pool(Protocol[Item, Result]):
 
 class Here(Generic[Item, Result]):
     """A pool that is this process alone."""
-
-    count = 1
 
     def __init__(self, do: Callable[[Item], Result]) -> None:
         self.do = do

@@ -12,7 +12,6 @@ from typing import Any
 import xarray as xr
 
 from foldyn.errors import InputError
-from foldyn.sweeps.batches import MOST, Batches
 from foldyn.sweeps.evaluations import Evaluation, Evaluations
 from foldyn.sweeps.job import Job
 from foldyn.sweeps.measure import Measure
@@ -25,9 +24,6 @@ from foldyn.workers import processors
 
 MOST_PROCESSES = 1024
 """Processes at a time: more are a slip of the finger."""
-
-AT_ONCE = 0.05
-"""Time (s) in which the points of the first batch come."""
 
 Measures = Sequence[str | Measure | Callable[..., Any]] | Mapping[str, Callable[..., Any]]
 
@@ -105,8 +101,8 @@ def sweep(
     xarray.Dataset
         A variable for each measure. Of a grid over dimensions that have the last words of the keys
         as names, of samples over ``point``; values of the keys are coordinates. `failure` says why
-        a point lacks values (they are nan), `warnings` what was warned of, `seconds` how long it
-        took, and `side_by_side` how many motions were computed at once.
+        a point lacks values (they are nan), `warnings` what was warned of, and `seconds` how long
+        it took.
 
     Raises
     ------
@@ -141,19 +137,11 @@ def swept(
     if count > 1 and scheduler is None:
         _check_sendable(job)
     follow = _Follow(len(set(points)), progress)
-    beside = plan.case_file.analysis.goes_beside
-    with Batches(pool_of(job, count, scheduler), MOST if beside else 1) as pool:
+    with pool_of(job, count, scheduler) as pool:
         evaluations = Evaluations[Point](pool, job.stamp, folder, follow)
-        order = sorted(points, key=_kinds) if beside else points
-        evaluations.at(order, _lost, first=True)
-        found = evaluations.at(points)
+        found = evaluations.at(points, _lost, first=True)
     facts = {"wall_seconds": time.perf_counter() - follow.began, "processes": count}
     return dataset(plan, found, facts)
-
-
-def _kinds(point: Point) -> list[str]:
-    """What makes other topologies of points: kinds and counts, not sizes."""
-    return [repr(value) for value in point if not isinstance(value, float)]
 
 
 def _lost(point: Point, reason: str) -> Evaluation:
@@ -166,7 +154,7 @@ class _Follow:
     def __init__(self, total: int, progress: Callable[[Course], None] | None) -> None:
         self.total, self.progress = total, progress
         self.began = self.first = time.perf_counter()
-        self.done = self.found = self.failed = self.begun = 0
+        self.done = self.found = self.failed = 0
 
     def __call__(self, point: Point, one: Evaluation, found: bool) -> None:
         now = time.perf_counter()
@@ -176,10 +164,7 @@ class _Follow:
         computed = self.done - self.found
         if computed == 1:
             self.first = now  # it compiles kernels, and others wait for it
-        if now - self.first < AT_ONCE:
-            self.begun = computed
-        paced = computed - self.begun
-        pace = (now - self.first) / paced if paced else float("nan")
+        pace = (now - self.first) / (computed - 1) if computed > 1 else float("nan")
         if self.progress is not None:
             left = pace * (self.total - self.done)
             spent = now - self.began

@@ -26,7 +26,6 @@ ABOUT: Mapping[str, str] = {
     "failure": "why the point lacks values",
     "warnings": "what was warned of",
     "seconds": "computing time",
-    "side_by_side": "motions computed side by side, this one included",
 }
 """What every point has."""
 
