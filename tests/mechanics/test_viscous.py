@@ -43,7 +43,7 @@ def scalars(case: fd.Case, q: np.ndarray) -> np.ndarray:
     x = case.structure.nodes + q.reshape(-1, 3)[:n]
     lengths = [np.linalg.norm(x[b] - x[a]) for a, b in case.dashpots[0][1].between]
     work = case.body.workspaces(1)[0]
-    model, moved = Model(case.body, work, limited=False), case.body.in_rows(q)
+    model, moved = Model(case.body, work), case.body.in_rows(q)
     evaluate(model.terms, moved, 0.0 * moved, 0.0 * moved, np.zeros(0))
     hinges = case.body.sheet.fold_hinges()
     angles = work.fold_angle

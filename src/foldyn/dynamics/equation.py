@@ -37,6 +37,8 @@ from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.term import (
     ADDRESS,
     ADVANCE_CLOCK,
+    EVERY,
+    LIMIT,
     NUMBER,
     Model,
     Terms,
@@ -292,7 +294,8 @@ class EquationOfMotion:
         self, packed: Packed, work: Any, s: Scratch, course: Course, slows: bool | None
     ) -> None:
         limited = slows is not None
-        system, mass, model = packed.system, packed.mass, Model(packed.body, work, limited)
+        called = [kind for kind in EVERY if limited or kind != LIMIT]
+        system, mass, model = packed.system, packed.mass, Model(packed.body, work, called)
         self._model, self._course, share = model, course, model.share
         self.setting = Setting(model.terms, system, mass, share, s)
         self._whole = whole = Context(self.setting)

@@ -97,6 +97,8 @@ def _shut(dispatcher: Any) -> None:
 
 
 kernel = _decorator(fastmath=_FUSED)
+# the same, and part of each compiled function that calls it: optimized there alone
+inlined = _decorator(fastmath=_FUSED, inline="always")
 # only called by kernels
 inner = _decorator(fastmath=_FUSED, inner=True)
 # laws and other small formulas: inlined into the kernels that call them

@@ -25,7 +25,7 @@ from foldyn.mechanics.model import ranks
 from foldyn.mechanics.sheet_term import Blocks, SheetTerm, Strains, Unstrained, largest_turn
 from foldyn.mechanics.step_tangent import FLOOR
 from foldyn.mechanics.tangent import Sparsity, block_keys, joined
-from foldyn.mechanics.term import Compiled, Model, Term, evaluate
+from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Model, Term, evaluate
 from foldyn.mechanics.threads import Team
 
 ITERATIONS = 50
@@ -120,7 +120,8 @@ class Assembly:
     @cached_property
     def _evaluated(self) -> Model:
         """The model for evaluations one after the other."""
-        return Model(self, self._work(1, [term.memory for term in self.others])[0], limited=False)
+        work = self._work(1, [term.memory for term in self.others])[0]
+        return Model(self, work, [FORCES])
 
     def _at(self, q: NDArray, energy: NDArray) -> NDArray:
         """Internal forces (m,) at q; with energies by group, to `energy`, if there is room."""
@@ -137,6 +138,7 @@ class Assembly:
 
     def energies(self, q: NDArray) -> NDArray:
         """Strain energies (J) by group."""
+        self._evaluated.call([ENERGIES])
         energy, first = np.empty(len(self.energy_groups)), len(self.sheet.energy_groups)
         self._at(q, energy)
         for term in self.others:

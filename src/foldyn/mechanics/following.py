@@ -145,7 +145,8 @@ def _real(values: NDArray) -> NDArray:
 def following_force(loads: Following, u: NDArray, factor: NDArray) -> NDArray:
     """Forces (m,), N, on all dofs at u (m,) for the factors (h, k) of histories, in column 0."""
     out = np.zeros(u.size)
-    add_following(loads, np.ascontiguousarray(u, float).reshape(-1), factor, out)
+    if loads.acts:
+        add_following(loads, np.ascontiguousarray(u, float).reshape(-1), factor, out)
     return out
 
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
+from foldyn.jit.compiled import inlined, inner, inner_scalar, kernel, scalar
 from foldyn.jit.intrinsics import flat, prefetch_range
 from foldyn.jit.rows import LANES, add_rows, load_rows
 from foldyn.materials import ogden, superlinear
@@ -353,7 +353,7 @@ def finish_edge(force, work, start, end):
             force[3 * i + c] += sums[4 * (i & mask) + c]
 
 
-@inner_scalar
+@inlined
 def strip_force(model, s, u, force, work, keep):
     """Force (n, 3) on the nodes work.strips.finished[s], for each strip s in turn.
 
@@ -369,7 +369,7 @@ def strip_force(model, s, u, force, work, keep):
         finish(flat(force), work, plan.finished[s, 0], plan.finished[s, 1])
 
 
-@scalar
+@inlined
 def internal_force(model, u, force, work, keep=True):
     """Internal force (n, 3), N, at displacement u (n, 3), m.
 

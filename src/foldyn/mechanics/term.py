@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 (
     FORCES, ENERGIES, LIMIT, PLACE_OBSTACLES, ADVANCE_CLOCK, COMMIT, DISSIPATED, BRANCH_STATES
-) = range(8)  # fmt: skip
+) = EVERY = range(8)  # fmt: skip
 ADDRESS, NUMBER = types.int64, types.float64
 
 forces = addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS)
@@ -224,8 +224,8 @@ class Model:
     body : Assembly
     work : Work
         Of the thread, one of `Assembly.workspaces`.
-    limited : bool
-        Whether terms limit the steps; else what does so is not compiled.
+    kinds : sequence of int
+        Kernels that are called: others are not compiled.
 
     Attributes
     ----------
@@ -233,17 +233,21 @@ class Model:
     share : Share
     """
 
-    def __init__(self, body: Any, work: Any, limited: bool) -> None:
+    def __init__(self, body: Any, work: Any, kinds: Sequence[int] = EVERY) -> None:
         self._held = terms = body.compiled(work)
-        kernel = np.zeros((len(terms), 8), np.int64)
-        for row, term in zip(kernel, terms, strict=True):
-            for place, function in term.kernels.items():
-                if limited or place != LIMIT:
-                    row[place] = function.at(term.context)
+        kernel = np.zeros((len(terms), len(EVERY)), np.int64)
         context = np.array([term.context.address for term in terms], np.int64)
         self.terms = Terms(context, kernel, body.sheet.folds, np.zeros(2))
         own = Whole(np.asarray(work.strips.own))
         self.share = Share(work.angle, work.fold_angle, own, work.team)
+        self.call(kinds)
+
+    def call(self, kinds: Sequence[int]) -> None:
+        """Make these kernels ready, too."""
+        for row, term in zip(self.terms.kernel, self._held, strict=True):
+            for kind in kinds:
+                if kind in term.kernels and not row[kind]:
+                    row[kind] = term.kernels[kind].at(term.context)
 
 
 @inner_scalar
