@@ -178,13 +178,6 @@ def test_samples_tell_where_a_sheet_touches():
     assert shown.on == "node" and shown.values.shape == (len(run.time), len(s.nodes))
 
 
-def test_others_refuse_contact():
-    push = fd.Force([4, 5], (0, 0, 1e-3))
-    case = fd.Case(strip(), [fd.Fix([0, 1, 2, 3])], [push], contact=fd.Contact())
-    with pytest.raises(InputError, match=r"contact: modes and responses do not take contact yet"):
-        fd.modes(case)
-
-
 @pytest.mark.thorough  # compiles the loop with contact around laws with memory
 def test_a_relaxing_fold_falls_on_a_plane_and_its_energies_balance():
     """Contact and memory together; `auto` takes a method that both allow."""

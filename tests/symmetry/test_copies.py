@@ -58,7 +58,7 @@ def jumps_late(case: fd.Case) -> bool:
 
 
 def turns_corners(case: fd.Case) -> bool:
-    """Whether supports change their velocity at once: reactions, kinetic energy and work jump there."""
+    """Whether supports change their velocity at once: forces, work and kinetic energy jump."""
     return any(history.knots() for _, history in (*case.imposed_terms, *case.base_terms))
 
 

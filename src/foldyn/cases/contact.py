@@ -204,12 +204,3 @@ def contact_from(table: Any, folder: Path | None = None) -> Contact:
         return Contact(**values, planes=planes)
     except InputError as error:
         raise InputError(error.reason, f".{error.field}") from None
-
-
-def refuse_contact(contact: Contact | None, what: str) -> None:
-    """Refuse contact for what does not take it."""
-    if contact is not None:
-        raise InputError(
-            f": {what} not take contact yet, only motions and paths of equilibria; leave it out",
-            "contact",
-        )

@@ -183,21 +183,17 @@ class Term(NamedTuple):
 def drive_terms(system: Linearized, drive: Drive) -> list[Term]:
     """Load per unit of the drive: forces per N, or what a moving base does.
 
-    The base accelerates masses, and drags at them; springs and dashpots that stand on the ground,
-    which does not move with it, hold back.
+    The base accelerates masses, and drags at them; springs, planes and dashpots that stand on the
+    ground, which does not move with it, hold back.
     """
     if drive.axis is None:
         return [Term(system.projected((drive.vector / drive.value).ravel()), lambda omega: 1.0)]
     axis, damping = AXES.index(drive.axis), system.case.rayleigh
     inertia = system.inertia[:, axis]
     terms = [Term(inertia, lambda omega: omega**2 - 1j * omega * damping.alpha)]
-    held, along = np.zeros(drive.vector.size), np.zeros_like(drive.vector)
-    along[:, axis] = 1.0
-    for term in system.case.terms:  # what stands on the ground resists a motion of the whole
-        held += term.tangent(system.displacement.ravel()) @ along.ravel()
+    held = system.ground[:, axis]
     if held.any():
-        shape = system.projected(held)
-        terms.append(Term(shape, lambda omega: -1.0 - 1j * omega * damping.beta))
+        terms.append(Term(held, lambda omega: -1.0 - 1j * omega * damping.beta))
     dragged = system.drag[:, axis]
     if dragged.any():
         terms.append(Term(dragged, lambda omega: -1j * omega))

@@ -31,16 +31,16 @@ from scipy import sparse
 
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, State
-from foldyn.cases.contact import refuse_contact
 from foldyn.dynamics.dampers import dampers
 from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of, modal_rows, rows_of, soft_slopes
-from foldyn.errors import FoldynWarning
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.hereditary import Branches, branches_of
 from foldyn.linear.internal_modes import Amplitudes, amplitudes, check_internal
 from foldyn.linear.operating_point import operating_point
 from foldyn.materials import Superlinear
 from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.values import brief, number
 
@@ -73,6 +73,9 @@ class Linearized:
     drag : (nf, 3)
         Forces on the free dofs per unit velocity of the whole along x, y, z, but for alpha M: those
         of dashpots to the ground, N s/m.
+    ground : (nf, 3)
+        Forces on the free dofs per unit displacement of the whole along x, y, z: those of springs
+        to the ground and of planes that touch, N/m.
     inertia : (nf, 3)
         Forces on the free dofs per unit acceleration of the whole along x, y, z, kg.
     soft : int
@@ -103,6 +106,7 @@ class Linearized:
     damping: sparse.csc_array
     modal: NDArray
     drag: NDArray
+    ground: NDArray
     inertia: NDArray
     soft: int
     secant: float | None
@@ -165,7 +169,7 @@ def linearize(
     ------
     InputError
         Nothing can move; a free node has no mass; a state of another size; internal amplitudes of
-        a structure without them.
+        a structure without them; contact with friction.
     ComputationError
         No equilibrium is found.
 
@@ -175,7 +179,12 @@ def linearize(
         The state is no equilibrium; loads do not act at rest; hinges have no slope; the stiffness
         of the loads is not symmetric.
     """
-    refuse_contact(case.contact, "modes and responses do")
+    if case.contact is not None and case.contact.rubs:
+        raise InputError(
+            ".friction: what rubs sticks or slides, so that small motions have no linear law; give "
+            "0, here and in the planes",
+            "contact",
+        )
     amplitude = None
     if secant is not None:
         amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
@@ -183,7 +192,7 @@ def linearize(
     check_mass(case.mass, case.constraints.determined)
     check_fill(case.structure.fill, case.body.size)
     point = operating_point(case, state, load_factor)
-    body = point.body
+    body, contact = point.body.parted(ContactTerm)
     inner = amplitudes(case.structure, point.displacement, body.size, internal)
     free = np.concatenate([case.free_dofs, body.hidden, inner.dofs])
     exact = body.tangent(point.dofs)
@@ -204,9 +213,11 @@ def linearize(
     stiffness, mass = inner.stiffened(stiffness), inner.massed(mass_of(case))
     ties, more = case.constraints, inner.behind(dampers(case, True).matrix(point.dofs))
     damping = case.rayleigh.matrix(mass, inner.stiffened(_reference(case, exact)))
+    modal = _modal_rows(case, point.displacement, stiffness, mass, internal)
+    if contact is not None:  # it damps nothing
+        stiffness = sparse.csr_array(stiffness + inner.behind(contact.tangent(point.dofs)))
     whole = np.zeros((len(inner.dofs) + body.size, 3))
     whole[: point.displacement.size] = np.tile(np.eye(3), (len(point.displacement), 1))
-    modal = _modal_rows(case, point.displacement, stiffness, mass, internal)
     return Linearized(
         case=case,
         displacement=point.displacement,
@@ -216,6 +227,7 @@ def linearize(
         damping=_block(ties.matrix(damping + more if more.nnz else damping), free),
         modal=ties.force(modal.T)[free].T,
         drag=ties.force(more @ whole)[free],
+        ground=ties.force(_ground(point.body, point.dofs, whole))[free],
         inertia=_inertia(case, whole, inner)[free],
         soft=soft,
         secant=None if secant is None else float(secant),
@@ -256,6 +268,15 @@ def _slope_change(
     return (body.sheet.soft_tangent(q, change) if change.any() else None), 0
 
 
+def _ground(body: Assembly, q: NDArray, whole: NDArray) -> NDArray:
+    """Forces (m, 3) of what stands on the ground per unit displacement of the whole (m, 3)."""
+    out = np.zeros_like(whole)
+    for term in body.others:
+        if not term.of_hinges:  # which strain nothing when the whole moves
+            out[: body.size] += term.tangent(q) @ whole[: body.size]
+    return out
+
+
 def _inertia(case: Case, whole: NDArray, inner: Amplitudes) -> NDArray:
     """Forces (m, 3) on the unknowns per unit acceleration of the whole (m, 3)."""
     load = whole.copy()
@@ -276,7 +297,7 @@ def _modal_rows(
         modal = modal_rows(case)
         modal.warn()
         return np.pad(modal.rows, ((0, 0), (0, stiffness.shape[0] - modal.rows.shape[1])))
-    body, rest = case.body, np.zeros_like(state)
+    body, rest = case.elastic_body, np.zeros_like(state)
     inner = amplitudes(case.structure, rest, body.size, internal)
     stiffness = inner.stiffened(body.tangent(body.dofs(rest)))
     return rows_of(damping, case, stiffness, inner.massed(mass_of(case)), rest).rows
@@ -286,7 +307,7 @@ def _reference(case: Case, exact: sparse.csr_array) -> sparse.csr_array:
     """K0 of the damping (m, m), N/m: the exact tangent in the state, or that at rest."""
     if case.rayleigh.state != "rest" or case.rayleigh.beta == 0.0:
         return exact
-    body = case.body
+    body = case.elastic_body
     return body.tangent(body.dofs(np.zeros_like(case.structure.nodes)))
 
 

@@ -101,8 +101,8 @@ def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> Opera
     """
     flow = AT_REST if kind == "rest" else REFUSED
     problem = OrigamiProblem(case, (), displacement, flow=flow)
-    body = problem.actuation.body(factor)
-    u, free = problem.dofs(problem.state(displacement, factor)), problem.free
+    reached = problem.state(displacement, factor)
+    body, u, free = problem.body(reached, factor), problem.dofs(reached), problem.free
     residual = problem.projected(body.internal(u) - problem.following_force(u, factor))
     loads = problem.projected(_load_vectors(case, body))
     if kind == "equilibrium":
@@ -110,8 +110,8 @@ def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> Opera
     elif kind == "state" and loads.size:
         factors = np.linalg.lstsq(loads[free], residual[free], rcond=None)[0]
         residual = residual - loads @ factors
-    reached = balance(problem, problem.state(displacement, factor), factor, residual)
-    return OperatingPoint(displacement, problem, factor, body, u, reached, kind)
+    found = balance(problem, reached, factor, residual)
+    return OperatingPoint(displacement, problem, factor, body, u, found, kind)
 
 
 def _load_vectors(case: Case, body: Assembly) -> NDArray:

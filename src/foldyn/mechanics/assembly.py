@@ -81,6 +81,11 @@ class Assembly:
         """The term of a kind, if there is one."""
         return next((term for term in self.others if isinstance(term, kind)), None)
 
+    def parted(self, kind: type[Kind]) -> tuple[Assembly, Kind | None]:
+        """The same without the term of a kind, and that term."""
+        found = self.find(kind)
+        return Assembly(self.sheet, *(term for term in self.others if term is not found)), found
+
     def with_terms(self, *terms: Term) -> Assembly:
         """The same with further terms."""
         return Assembly(self.sheet, *self.others, *terms) if terms else self
