@@ -31,6 +31,7 @@ from scipy import sparse
 
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, State
+from foldyn.cases.touching import check_contact
 from foldyn.dynamics.dampers import dampers
 from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of, modal_rows, rows_of, soft_slopes
@@ -192,6 +193,7 @@ def linearize(
     check_mass(case.mass, case.constraints.determined)
     check_fill(case.structure.fill, case.body.size)
     point = operating_point(case, state, load_factor)
+    check_contact(case, point.displacement, point.planes)
     body, contact = point.body.parted(ContactTerm)
     inner = amplitudes(case.structure, point.displacement, body.size, internal)
     free = np.concatenate([case.free_dofs, body.hidden, inner.dofs])

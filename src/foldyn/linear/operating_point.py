@@ -36,6 +36,11 @@ class OperatingPoint(NamedTuple):
     balance: Balance
     kind: str  # "rest", "equilibrium" or "state"
 
+    @property
+    def planes(self) -> NDArray:
+        """Displacements (p, 3) of the planes of contact, m."""
+        return self.problem.planes(self.problem.state(self.displacement, self.factor))
+
     def load_stiffness(self) -> sparse.csr_array | None:
         """What loads that depend on the displacement add to the stiffness (m, m), N/m."""
         if self.kind == "rest" or not self.problem.following.acts:

@@ -1,0 +1,161 @@
+"""What goes with what: each method with each feature, tried on a small sheet.
+
+python tests/features.py        writes the table of docs/features.md anew
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import foldyn as fd
+from foldyn.dynamics import METHODS
+from foldyn.errors import FoldynWarning, InputError
+
+PAGE = Path(__file__).resolve().parents[1] / "docs/features.md"
+BEGIN, END = "<!-- table -->\n", "<!-- end of the table -->\n"
+COLUMNS = (*METHODS, "newton", "arc_length", "mgdcm", "modes", "frf")
+DURATION = 2e-3  # s
+SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
+PATTERN = fd.patterns.miura(cells=(1, 1))
+FLOOR = fd.Plane((0, 0, -0.05), (0, 0, 1))
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The mass rule of bars and hinges, and whether supports move."""
+
+    mass: str = "mixed_voronoi"
+    moves: bool = False
+
+    def sheet(self, pattern: fd.Pattern = PATTERN, **options: Any) -> fd.Structure:
+        return fd.discretize(pattern, SHEET, mass=self.mass, **options)
+
+    def shell(self) -> fd.Shell:
+        return fd.shell(PATTERN, SHEET, divisions=1)
+
+    def case(self, structure: Any = None, supports=(), loads=(), **parts: Any) -> fd.Case:
+        push = fd.Force([5], (0.0, 0.0, 1e-4), fd.Ramp(DURATION))
+        moved = [fd.Impose([2], "z", 1e-4, fd.Ramp(DURATION))] if self.moves else []
+        held = [fd.Fix([0, 1], "xyz"), fd.Fix([2], "xy" if self.moves else "xyz"), *moved]
+        structure = self.sheet() if structure is None else structure
+        return fd.Case(structure, [*held, *supports], [push, *loads], **parts)
+
+    def law(self, law: Any) -> fd.Case:
+        return self.case(self.sheet(fold_law=law))
+
+
+FEATURES: Mapping[str, Callable[[Setting], fd.Case]] = {
+    "bars and hinges": lambda s: s.case(),
+    "plates (`n5b8e`)": lambda s: s.case(s.sheet(scheme="n5b8e")),
+    "shells": lambda s: s.case(s.shell()),
+    "springs": lambda s: s.case(supports=[fd.Spring(1.0, nodes=[7])]),
+    "clamped edges": lambda s: s.case(s.sheet(clamped=[(0, 1)])),
+    "ties, rigid panels": lambda s: s.case(s.sheet(rigid=[3]), [fd.Link([5, 7], "z")]),
+    "dashpots": lambda s: s.case(supports=[fd.Dashpot(1e-3, nodes=[7])]),
+    "damped creases": lambda s: s.case(damping=fd.CreaseDamping(1e-4)),
+    "stiffness-proportional damping": lambda s: s.case(damping=fd.Rayleigh(0.1, 1e-5)),
+    "modal damping": lambda s: s.case(damping=fd.ModalDamping(0.01)),
+    "damped strains": lambda s: s.case(damping=fd.StrainDamping(1e-5)),
+    "pressure": lambda s: s.case(loads=[fd.Pressure(1e-4)]),
+    "moments of creases": lambda s: s.case(loads=[fd.CreaseMoment([0], 1e-5)]),
+    "actuated creases": lambda s: s.case(loads=[fd.Actuate([0], 119.0, history=fd.Ramp(1.0))]),
+    "temperature": lambda s: s.case(loads=[fd.Temperature(1.0, 1e-6, 1e-3)]),
+    "temperature of `n5b8e`": lambda s: s.case(
+        s.sheet(scheme="n5b8e"), loads=[fd.Temperature(1.0, 1e-6, 1e-3)]
+    ),
+    "contact of panels": lambda s: s.case(contact=fd.Contact()),
+    "contact with planes": lambda s: s.case(contact=fd.Contact(planes=[FLOOR], panels=False)),
+    "contact with friction": lambda s: s.case(contact=fd.Contact(planes=[FLOOR], friction=0.2)),
+    "contact of `n5b8e`": lambda s: s.case(s.sheet(scheme="n5b8e"), contact=fd.Contact()),
+    "contact of shells": lambda s: s.case(s.shell(), contact=fd.Contact()),
+    "contact of thick panels": lambda s: s.case(
+        s.sheet(fd.thicken(fd.patterns.simple_fold(dihedral=90), SHEET.thickness)),
+        contact=fd.Contact(),
+    ),
+    "creases that relax (`prony`)": lambda s: s.law(fd.Prony([0.5], [0.1])),
+    "creases that yield (`plastic`)": lambda s: s.law(fd.Plastic(1e-5, 0.01)),
+    "creases that creep (`eyring`)": lambda s: s.law(fd.Eyring(1e-3, 1e-3)),
+}
+
+
+REASONS: Mapping[str, tuple[str, str]] = {
+    "a": (
+        "rotations of a shell have no mass",
+        "the rotations of a shell have no mass, and the method needs accelerations of all dofs",
+    ),
+    "b": (
+        "what rubs sticks or slides",
+        "what rubs sticks or slides, so that no linear law describes small motions",
+    ),
+    "c": (
+        "which thick panels are hinged",
+        "contact lies between middle surfaces, beside which boards are hinged; not done",
+    ),
+    "d": ("no discrete gradient", "the forces have no discrete gradient; not done"),
+    "e": ("has a memory", "the method takes forces that depend on the state alone; not done"),
+    "f": ("panels that curl", "edges of plates have no angle at rest; not done"),
+    "g": ("creep goes on for ever", "creep goes on, and the steps of a path say nothing of time"),
+}
+"""Why something is refused: what its message holds, and the words of the page."""
+
+
+def tried(column: str, make: Callable[[Setting], fd.Case], setting: Setting) -> str:
+    """What a method says to a case: nothing where it computes it."""
+    try:
+        case = make(setting)
+        if column in METHODS:
+            given = {"dt": DURATION / 4} if METHODS[column].implicit else {}
+            fd.simulate(case, DURATION, column, **given)
+        elif column == "modes":
+            fd.modes(case, 1)
+        elif column == "frf":
+            fd.frf(case, fd.Force([5], (0.0, 0.0, 1.0)), [1.0])
+        else:
+            fd.trace(case, column, steps=2)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def refusals() -> dict[tuple[str, str], str]:
+    """What is refused of each feature by each method, in its words; "" where all goes."""
+    found = {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        for (name, make), column in product(FEATURES.items(), COLUMNS):
+            settings = [Setting()]
+            if column in METHODS:
+                masses, moves = ("mixed_voronoi", "consistent"), (False, True)
+                settings = [Setting(*each) for each in product(masses, moves)]
+            said = [tried(column, make, setting) for setting in settings]
+            found[name, column] = next(filter(None, said), "")
+    return found
+
+
+def reason(said: str) -> str:
+    """The letter of a refusal."""
+    return next(letter for letter, (holds, _) in REASONS.items() if holds in said)
+
+
+def table() -> str:
+    """The table of the page, with the reasons that it has."""
+    said, used = refusals(), set[str]()
+    lines = ["| | " + " | ".join(f"`{name}`" for name in COLUMNS) + " |"]
+    lines.append("|---" * (1 + len(COLUMNS)) + "|")
+    for name in FEATURES:
+        cells = [reason(said[name, one]) if said[name, one] else "yes" for one in COLUMNS]
+        used.update(cells)
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    notes = [f"- **{letter}**: {text}." for letter, (_, text) in REASONS.items() if letter in used]
+    return "\n".join([*lines, "", *notes]) + "\n"
+
+
+if __name__ == "__main__":
+    before, rest = PAGE.read_text("utf-8").split(BEGIN)
+    after = rest.split(END)[1]
+    PAGE.write_text(f"{before}{BEGIN}{table()}{END}{after}", "utf-8")
