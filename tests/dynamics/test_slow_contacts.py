@@ -139,7 +139,7 @@ def test_a_motion_with_slow_contacts_that_is_killed_goes_on_to_the_same_bits(mon
     given = {"duration": 0.04, "method": "dormand_prince", "every": 1e-3}
     once = prepare(case, **given)
     whole = once.run()
-    assert once._engine._equations[0]._slow._value.added.count[0] > 0
+    assert once._engine._equations[0]._slow.value.added.count[0] > 0
 
     def stop(now):
         if now.time > 0.7 * given["duration"]:

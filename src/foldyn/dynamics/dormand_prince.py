@@ -11,7 +11,13 @@ from __future__ import annotations
 import numpy as np
 
 from foldyn.dynamics.course import Outcome, passed_through
-from foldyn.dynamics.equation import acceleration, sample, work_of_offsets
+from foldyn.dynamics.equation import (
+    acceleration,
+    advance_clock,
+    sample,
+    step_error,
+    work_of_offsets,
+)
 from foldyn.dynamics.explicit_contact import (
     gather_slow,
     longest_step,
@@ -20,6 +26,7 @@ from foldyn.dynamics.explicit_contact import (
 )
 from foldyn.dynamics.stability import roots
 from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.context import run_at
 from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics.contact.step_limit import Pace
 
@@ -177,6 +184,7 @@ def advance(equation, course, plan, room, stretch):
             moment = t + C[stage] * h
             if stops and C[stage] == 1.0:  # before what happens there
                 moment = np.nextafter(goal, -np.inf)
+            advance_clock(equation, C[stage] * h)
             powers[0, stage], powers[1, stage] = acceleration(equation, ut, vt, moment, a)
             for i in range(n):
                 speeds[stage, i], accelerations[stage, i] = fvt[i], fa[i]
@@ -185,9 +193,9 @@ def advance(equation, course, plan, room, stretch):
         scale_u = max(tally.farthest, _largest(fut), plan.floor) * plan.tolerance
         scale_v = max(tally.fastest, _largest(fvt), plan.floor / plan.dt) * plan.tolerance
         error_u, error_v = _error(speeds, h), _error(accelerations, h)
-        error = 0.0
+        error = step_error(equation, scale_u / plan.tolerance) / plan.tolerance
         if error_u > 0.0 or error_v > 0.0:
-            error = max(error_u / scale_u, error_v / scale_v)
+            error = max(error, error_u / scale_u, error_v / scale_v)
         if not abs(error) < np.inf:  # too far: try less
             tally.wanted = 0.2 * h
             tally.refused += 1
@@ -209,7 +217,7 @@ def advance(equation, course, plan, room, stretch):
         tally.steps += 1
         tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
         due = plan.start + tally.samples * plan.interval
-        done = work_of_offsets(equation, True)
+        done, first = work_of_offsets(equation, True), tally.samples
         begun = tally.work + done, tally.dissipated
         while plan.every == 0 and tally.samples < room and due <= after + ROUNDING * h:
             _weights(min(1.0, (due - t) / h), weights)
@@ -217,6 +225,7 @@ def advance(equation, course, plan, room, stretch):
             _combine(v, accelerations, weights, h, 7, fvt)
             tally.work = _integral(begun[0], powers[0], h, weights, 7)
             tally.dissipated = _integral(begun[1], powers[1], h, weights, 7)
+            advance_clock(equation, min(due - t, h))
             acceleration(equation, ut, vt, due, a)
             tally.evaluations += 1
             tally.work += work_of_offsets(equation, False)
@@ -230,6 +239,12 @@ def advance(equation, course, plan, room, stretch):
         for i in range(n):
             u[i], v[i] = fut[i], speeds[6, i]
             speeds[0, i] = speeds[6, i]
+        if equation.commit != 0:
+            if tally.samples > first:  # where laws with memory were evaluated last
+                advance_clock(equation, h)
+                acceleration(equation, course.u, course.v, moment, a)
+                tally.evaluations += 1
+            run_at(equation.commit, (equation.setting,))
         for k in range(2):
             powers[k, 0] = powers[k, 6]
         tally.time, tally.error = after, max(error, 1e-4)

@@ -96,6 +96,7 @@ class Equation(NamedTuple):
     contact: ContactParts
     clock: int  # 0 without memory
     commit: int  # 0 without memory
+    step_error: int  # 0 without memory
     offsets: int  # 0 where nothing turns
     sample: int
     balance: int  # contexts
@@ -205,6 +206,17 @@ def advance_clock(equation, since):
 
 
 @inner_scalar
+def step_error(equation, scale):
+    """How wrong these laws are if the step is accepted that ends where they were evaluated last.
+
+    scale : displacement (m) that errors are measured by, if turns cause no larger ones.
+    """
+    if equation.step_error == 0:
+        return 0.0
+    return value_at(equation.step_error, (equation.setting, scale))
+
+
+@inner_scalar
 def work_of_offsets(equation, accepted):
     """Work (J) of offsets since the last step; see `actuation.offset_work`."""
     if equation.offsets == 0:
@@ -307,6 +319,7 @@ class EquationOfMotion:
             contact=contact_parts(whole, limited and system.touches, slow),
             clock=parts.clock.at(whole) if remembers else 0,
             commit=parts.commit.at(whole) if remembers else 0,
+            step_error=parts.step_error.at(whole) if remembers and slows is not None else 0,
             offsets=parts.offsets.at(whole) if system.turns else 0,
             sample=0,
             balance=balance.address,

@@ -61,21 +61,17 @@ def choose(
     conserved = conserved and case.body.has_discrete_gradient and not case.remembering
     implicit = "energy_momentum" if conserved else "generalized_alpha"
     has_mass = not case.structure.massless or case.structure.condensed is not None
-    if case.contact is not None and has_mass and case.remembering:
-        return Choice(suited("rk4", case).name, "explicit: contact, and laws with memory")
     if case.contact is not None and has_mass:
         return Choice(suited(ACCURATE, case).name, "explicit: its error resolves impacts")
     if massless := case.structure.massless:
         return Choice("generalized_alpha", f"implicit: {massless} have no mass")
     if (case.mass.diagonal() <= 0.0)[~case.constraints.determined.all(axis=1)].any():
         return Choice(implicit, "implicit: nodes without mass have no acceleration")
-    if case.remembering and tolerance is not None:
-        return Choice(implicit, "implicit: explicit steps that vary do not take laws with memory")
     omega = frequency(case, u, v, duration)
     lasting = conserved and duration * omega > 2.0 * math.pi * LONG
     explicit, why = "central_difference" if lasting else "rk4", ""
     critical = METHODS[explicit].critical_step(case, u, modal)
-    accurate = None if case.remembering else explicit if lasting else ACCURATE
+    accurate = explicit if lasting else ACCURATE
     if dt is not None and tolerance is None and dt > critical:
         return Choice(implicit, f"implicit: dt is above the critical step of {critical:.2g} s")
     step = DEFAULT_FRACTION * critical if dt is None else float(dt)
@@ -103,7 +99,7 @@ def choose(
     )
     if costs[0] <= costs[1]:
         return Choice(explicit, f"explicit: {estimate}{why}", accurate)
-    within_reach = not case.remembering and costs[0] <= DEARER * costs[1]
+    within_reach = costs[0] <= DEARER * costs[1]
     return Choice(implicit, f"implicit: {estimate}", ACCURATE if within_reach else None)
 
 

@@ -197,7 +197,7 @@ METHODS: Mapping[str, Integrator] = {
     for method in (
         _explicit(rk4, 4, looks=(0.0, 0.5, 1.0)),
         _explicit(central_difference, 1),
-        _explicit(dormand_prince, 6, adaptive=True, remembers=False),
+        _explicit(dormand_prince, 6, adaptive=True),
         _implicit("newmark", generalized_alpha, generalized_alpha.newmark, massless=True),
         _implicit(
             "generalized_alpha", generalized_alpha, generalized_alpha.scheme(), massless=True

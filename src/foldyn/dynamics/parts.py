@@ -17,7 +17,7 @@ from foldyn.jit.compiled import addressed
 from foldyn.jit.context import rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.following import push_following
-from foldyn.mechanics.term import ADDRESS, NUMBER, Share, Terms, clock_to, commit_all
+from foldyn.mechanics.term import ADDRESS, NUMBER, Share, Terms, clock_to, commit_all, step_error_of
 from foldyn.mechanics.threads import wait
 
 
@@ -137,3 +137,9 @@ def clock(m, since):
 def commit(m):
     """Accept the step that ends where terms were evaluated last."""
     commit_all(m.terms)
+
+
+@addressed(NUMBER)
+def step_error(m, scale):
+    """How wrong laws with memory are if the step is accepted; see `mechanics.term`."""
+    return step_error_of(m.terms, scale)

@@ -24,6 +24,7 @@ from foldyn.mechanics.term import (
     DISSIPATED,
     ENERGIES,
     FORCES,
+    STEP_ERROR,
     Compiled,
     advance_clock,
     branch_states,
@@ -31,6 +32,7 @@ from foldyn.mechanics.term import (
     dissipated,
     energies,
     forces,
+    step_error,
 )
 from foldyn.mechanics.viscous import hinge_gradient
 
@@ -52,9 +54,11 @@ class MemoryHinges(NamedTuple):
     first: NDArray  # (h + 1,) int64: a hinge has the branches first[e] to first[e + 1]
     code: NDArray  # (b,) int64
     parameters: NDArray  # (b, 4)
+    arm: NDArray  # (h,) m: turned by 1 rad, a hinge moves its wings by this much
     angle: NDArray  # (h,) at the last accepted step, rad
     state: NDArray  # (b, 2) then
     turned: NDArray  # (h,) at the last evaluation, rad
+    rate: NDArray  # (h, 2) at that step and at that evaluation, rad/s
     reached: NDArray  # (b, 2) then
     moment: NDArray  # (h,) of the branches then, N m
     slope: NDArray  # (h,) its derivative with respect to the angle, N m/rad
@@ -87,15 +91,46 @@ def evaluate_branches(own, offset, e, turn):
 
 
 @inner
-def add_memory_forces(own, offset, u, force):
-    """Add the forces of the branches at u to `force`, both (rows, 3)."""
-    moved, out, g, lost = flat(u), flat(force), own.gradient, 0.0
+def add_memory_forces(own, offset, u, v, force):
+    """Add the forces of the branches at u and v to `force`, all (rows, 3)."""
+    moved, speed, out, g, lost = flat(u), flat(v), flat(force), own.gradient, 0.0
     for e in range(own.rest.size):
-        angle = hinge_gradient(own.corners[e], own.dofs[e], own.hidden_turn[e], moved, g)
+        angle, rate = hinge_gradient(own.corners[e], own.dofs[e], own.hidden_turn[e], moved, g), 0.0
         lost += evaluate_branches(own, offset, e, angle - own.rest[e])
         for c in range(14):
             out[own.dofs[e, c]] += own.moment[e] * g[c]
+            rate += speed[own.dofs[e, c]] * g[c]
+        own.rate[e, 1] = rate
     own.lost[1] = lost
+    if own.elapsed[0] == 0.0:
+        own.rate[:, 0] = own.rate[:, 1]
+
+
+@inner
+def straightness_error(own, scale):
+    """How wrong the last evaluation is because dihedrals do not change at constant rates.
+
+    The other way is a parabola with the rates of both ends, by its middle and where it turns back.
+    """
+    h, wrong = own.elapsed[0], 0.0
+    for e in range(own.rest.size):
+        begin, turn = own.angle[e], own.turned[e] - own.angle[e]
+        scale = max(scale, own.arm[e] * max(abs(begin), abs(own.turned[e])))
+        first, last = h * own.rate[e, 0], h * own.rate[e, 1]
+        back = first / (first - last) if first * last < 0.0 else 0.5
+        moment = 0.0
+        for k in range(own.first[e], own.first[e + 1]):
+            part, before, one, other = 0.0, begin, own.state[k, 0], own.state[k, 1]
+            for to in (min(0.5, back), max(0.5, back), 1.0):
+                after = begin + to * (turn + 0.5 * (1.0 - to) * (first - last))
+                found = update(
+                    own.code[k], own.parameters[k], before, after, (to - part) * h, one, other
+                )
+                part, before, one, other = to, after, found[0], found[1]
+                if to == 1.0:
+                    moment += found[2]
+        wrong = max(wrong, own.arm[e] * abs(moment - own.moment[e] / own.stiffness[e]))
+    return wrong / scale
 
 
 @kernel
@@ -114,6 +149,7 @@ def make_last(own):
     """Make the last evaluation the last accepted step."""
     own.angle[:] = own.turned
     own.state[:] = own.reached
+    own.rate[:, 0] = own.rate[:, 1]
     own.lost[0] += own.lost[1]
     own.lost[1] = 0.0
     own.elapsed[0] = 0.0
@@ -156,7 +192,8 @@ class _Context(NamedTuple):
 
 @forces
 def _forces(term, u, v, t, force, powers):
-    add_memory_forces(term.own, term.offset, rows_at(u, term.rows), rows_at(force, term.rows))
+    moved, speed, out = rows_at(u, term.rows), rows_at(v, term.rows), rows_at(force, term.rows)
+    add_memory_forces(term.own, term.offset, moved, speed, out)
 
 
 @energies
@@ -190,6 +227,11 @@ def _branch_states(term, out):
         to[k] = reached[k]
 
 
+@step_error
+def _step_error(term, scale):
+    return straightness_error(term.own, scale)
+
+
 def memory_kernels(own: MemoryHinges, offset: NDArray, rows: int, groups: int) -> Compiled:
     """What the branches of hinges with memory add, with so many groups of energies."""
     context = Context(_Context(own, offset, rows, groups))
@@ -197,6 +239,6 @@ def memory_kernels(own: MemoryHinges, offset: NDArray, rows: int, groups: int) -
         context,
         {
             FORCES: _forces, ENERGIES: _energies, ADVANCE_CLOCK: _advance_clock, COMMIT: _commit,
-            DISSIPATED: _dissipated, BRANCH_STATES: _branch_states,
+            DISSIPATED: _dissipated, BRANCH_STATES: _branch_states, STEP_ERROR: _step_error,
         },
     )  # fmt: skip

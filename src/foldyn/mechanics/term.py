@@ -24,6 +24,9 @@ are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of 
     commit()                         the step is accepted that ends where it was evaluated last
     dissipated() -> J                what its laws have dissipated up to there
     branch_states(out)               writes the states (b, 2) of its branches there
+    step_error(scale) -> ratio       how wrong they are if the step that ends there is accepted: the
+                                     turn that this makes, over the largest one or the one that
+                                     moves nodes by `scale` (m)
 """
 
 from __future__ import annotations
@@ -45,15 +48,16 @@ if TYPE_CHECKING:
     from foldyn.mechanics.sheet_term import Strains, Unstrained
 
 (
-    FORCES, ENERGIES, LIMIT, PLACE_OBSTACLES, ADVANCE_CLOCK, COMMIT, DISSIPATED, BRANCH_STATES
-) = EVERY = range(8)  # fmt: skip
+    FORCES, ENERGIES, LIMIT, PLACE_OBSTACLES, ADVANCE_CLOCK, COMMIT, DISSIPATED, BRANCH_STATES,
+    STEP_ERROR,
+) = EVERY = range(9)  # fmt: skip
 ADDRESS, NUMBER = types.int64, types.float64
 
 forces = addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS)
 energies = addressed(ADDRESS, ADDRESS)
 limit = addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER, NUMBER, NUMBER, ADDRESS)
 place_obstacles = addressed(ADDRESS)
-advance_clock = addressed(NUMBER)
+advance_clock = step_error = addressed(NUMBER)
 commit = dissipated = addressed()
 branch_states = addressed(ADDRESS)
 
@@ -202,7 +206,7 @@ class Terms(NamedTuple):
     """A model as compiled loops see it: of one type, whatever its terms."""
 
     context: NDArray  # (k,) addresses
-    kernel: NDArray  # (k, 8) addresses, or 0
+    kernel: NDArray  # (k, 9) addresses, or 0
     folds: Folds
     powers: NDArray  # (2,) memory
 
@@ -320,6 +324,16 @@ def states_of(terms, out):
     for k in range(terms.context.size):
         if terms.kernel[k, BRANCH_STATES] != 0:
             run_at(terms.kernel[k, BRANCH_STATES], (terms.context[k], out))
+
+
+@inner_scalar
+def step_error_of(terms, scale):
+    """The largest error of the states of their branches; see `step_error` above."""
+    error = 0.0
+    for k in range(terms.context.size):
+        if terms.kernel[k, STEP_ERROR] != 0:
+            error = max(error, value_at(terms.kernel[k, STEP_ERROR], (terms.context[k], scale)))
+    return error
 
 
 @kernel

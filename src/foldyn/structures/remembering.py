@@ -105,6 +105,7 @@ def memory(parts: tuple[Remembering, ...], body: Assembly) -> HingeMemory:
             "row": hinges.row,
             "stiffness": part.stiffness,
             "group": np.full(n, group),
+            "arm": _arms(hinges.corners),
             "first": count + b * np.arange(n),
             "code": np.tile([branch.code for branch in branches], n),
             "parameters": np.stack([branch.parameters for branch in branches], axis=1),
@@ -119,6 +120,7 @@ def memory(parts: tuple[Remembering, ...], body: Assembly) -> HingeMemory:
         columns[name].append(np.zeros(hinges))
     for name in ("state", "reached"):
         columns[name].append(np.zeros((count, VARIABLES)))
+    columns["rate"].append(np.zeros((hinges, 2)))
     columns["lost"], columns["elapsed"] = [np.zeros(2)], [np.zeros(1)]
     columns["gradient"] = [np.zeros(WIDTH)]
     shapes = {"corners": (-1, 4, 3), "parameters": (-1, PARAMETERS)}
@@ -131,3 +133,10 @@ def memory(parts: tuple[Remembering, ...], body: Assembly) -> HingeMemory:
         for name, parts in columns.items()
     }
     return HingeMemory(MemoryHinges(**arrays), np.concatenate(settles), body.sheet)
+
+
+def _arms(corners: NDArray) -> NDArray:
+    """Distance (h,) of the farther wing from the axis, m; corners as in `MemoryHinges`."""
+    along = corners[:, 1] - corners[:, 0]
+    off = np.cross(corners[:, 2:] - corners[:, :1], along[:, None])
+    return np.linalg.norm(off, axis=2).max(axis=1) / np.linalg.norm(along, axis=1)
