@@ -99,7 +99,11 @@ REASONS: Mapping[str, tuple[str, str]] = {
     "d": ("no discrete gradient", "the forces have no discrete gradient; not done"),
     "e": ("has a memory", "the method takes forces that depend on the state alone; not done"),
     "f": ("panels that curl", "edges of plates have no angle at rest; not done"),
-    "g": ("creep goes on for ever", "creep goes on, and the steps of a path say nothing of time"),
+    "g": (
+        "creep",
+        "load factors that the method finds may turn back, so that no step has a time in which "
+        "creases creep",
+    ),
 }
 """Why something is refused: what its message holds, and the words of the page."""
 
@@ -116,7 +120,8 @@ def tried(column: str, make: Callable[[Setting], fd.Case], setting: Setting) -> 
         elif column == "frf":
             fd.frf(case, fd.Force([5], (0.0, 0.0, 1.0)), [1.0])
         else:
-            fd.trace(case, column, steps=2)
+            timed = {"duration": 1.0} if case.remembering and column == "newton" else {}
+            fd.trace(case, column, steps=2, **timed)
     except InputError as error:
         return str(error)
     return ""
