@@ -92,7 +92,7 @@ def _integral(start, slopes, h, weights, count):
     return start
 
 
-@kernel
+@inner
 def _largest(values):
     out = 0.0
     for i in range(values.size):
@@ -100,7 +100,7 @@ def _largest(values):
     return out
 
 
-@kernel
+@inner
 def _error(slopes, h):
     """Largest entry of h sum of E times slopes (7, n); nan where one is nan."""
     out, wrong = 0.0, 0
@@ -113,7 +113,7 @@ def _error(slopes, h):
     return np.nan if wrong > 0 else h * out
 
 
-@kernel
+@inner
 def _weights(theta, out):
     """Weights (7,) of the slopes at the fraction theta of a step, over the step."""
     for j in range(7):

@@ -12,14 +12,14 @@ from __future__ import annotations
 
 from foldyn.dynamics.damping import drag
 from foldyn.dynamics.inertia import solve_mass, solve_tied
-from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.compiled import inlined, inner
 from foldyn.jit.intrinsics import flat
 
 ACCURATE = 1e-10  # of the contacts' accelerations
 ITERATIONS = 200
 
 
-@inner
+@inlined
 def _solve(mass, r, out, line):
     """M^-1 r to out, both (n, 3)."""
     if mass.lumped:
@@ -55,7 +55,7 @@ def _along(added, k, a):
     return total
 
 
-@kernel
+@inlined
 def slow_down(added, system, mass, w, a, s):
     """Change accelerations a (n, 3) at velocities w to those with the inertia of contacts.
 

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inlined, inner
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.pairs import VERTEX, closest_of, nodes_of, weights_of
@@ -53,7 +53,7 @@ def room_for(tables: Tables, memory: Memory) -> Added:
     return Added(np.zeros(1, np.int64), nodes, gradient, ease, lightness, lines)
 
 
-@kernel
+@inner
 def _slow(added, k, stiffness, dt, beta, lightness):
     """Whether a step does not resolve contact k of some stiffness, which then gets its inertia."""
     light = 0.0
@@ -67,7 +67,7 @@ def _slow(added, k, stiffness, dt, beta, lightness):
     return True
 
 
-@kernel
+@inlined
 def added_inertia(tables, added, u, dt, beta, lightness, memory):
     """Put the contacts at displacement u that a step of dt from there does not resolve in `added`.
 
