@@ -24,6 +24,11 @@ are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of 
     commit()                         the step is accepted that ends where it was evaluated last
     dissipated() -> J                what its laws have dissipated up to there
     branch_states(out)               writes the states (b, 2) of its branches there
+    mean_forces(u0, u1, before, h, t, force)
+                                     adds forces whose work from u0 to u1 is the change of its
+                                     energy, in a step h (s) about the time t, and writes its
+                                     dihedrals at u1; before (nh,) are all those at u0. Of a term
+                                     without it `mechanics.mean_forces` makes some of the others
 """
 
 from __future__ import annotations
@@ -45,8 +50,9 @@ if TYPE_CHECKING:
     from foldyn.mechanics.sheet_term import Strains, Unstrained
 
 (
-    FORCES, ENERGIES, LIMIT, PLACE_OBSTACLES, ADVANCE_CLOCK, COMMIT, DISSIPATED, BRANCH_STATES
-) = range(8)  # fmt: skip
+    FORCES, ENERGIES, LIMIT, PLACE_OBSTACLES, ADVANCE_CLOCK, COMMIT, DISSIPATED, BRANCH_STATES,
+    MEAN_FORCES,
+) = range(9)  # fmt: skip
 ADDRESS, NUMBER = types.int64, types.float64
 
 forces = addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS)
@@ -56,6 +62,7 @@ place_obstacles = addressed(ADDRESS)
 advance_clock = addressed(NUMBER)
 commit = dissipated = addressed()
 branch_states = addressed(ADDRESS)
+mean_forces = addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER, NUMBER, ADDRESS)
 
 
 class Compiled(NamedTuple):
@@ -81,14 +88,11 @@ class Term(ABC):
         Whether its forces are moments of hinges, which are at play even where all is at rest.
     shared : bool
         Whether threads may share a model with it.
-    has_discrete_gradient : bool
-        Whether `dynamics.energy_momentum` takes it.
     """
 
     energy_groups: ClassVar[Mapping[str, str]] = {}
     of_hinges: ClassVar[bool] = False
     shared: ClassVar[bool] = False
-    has_discrete_gradient: ClassVar[bool] = False
 
     # ------------------------------------------------------------------ what is compiled
     @abstractmethod
@@ -238,7 +242,7 @@ class Model:
         kernel = np.zeros((len(terms), 8), np.int64)
         for row, term in zip(kernel, terms, strict=True):
             for place, function in term.kernels.items():
-                if limited or place != LIMIT:
+                if place != MEAN_FORCES and (limited or place != LIMIT):
                     row[place] = function.at(term.context)
         context = np.array([term.context.address for term in terms], np.int64)
         self.terms = Terms(context, kernel, body.sheet.folds, np.zeros(2))
