@@ -139,11 +139,7 @@ WRONG = {
     "an explicit method": (
         [SHELL, (STATICS, f'{MOTION[1]}\nmethod = "rk4"')],
         'analysis.method = "rk4": needs mass everywhere, and the rotations of a shell have none; '
-        "choose one of auto, newmark, generalized_alpha, or leave it out",
-    ),
-    "a method with dofs of nodes alone": (
-        [SHELL, (STATICS, f'{MOTION[1]}\nmethod = "energy_momentum"')],
-        'analysis.method = "energy_momentum": needs mass everywhere',
+        "choose one of auto, newmark, generalized_alpha, energy_momentum, or leave it out",
     ),
     "an explicit integrator": (
         [SHELL, *drive("impulse", 'integrator = "rk4"')],

@@ -94,12 +94,13 @@ def test_supports_loads_and_folds_that_move(method, tmp_path):
 
 
 @pytest.mark.thorough
-def test_rotations_of_a_shell(tmp_path):
+@pytest.mark.parametrize("method", ["generalized_alpha", "energy_momentum"])
+def test_rotations_of_a_shell(method, tmp_path):
     """They have no mass, and where they are is no part of a displacement; 2 minutes, compiling."""
     shell = fd.shell(fd.patterns.simple_fold(1.0, 1.0, dihedral=60), SHEET, 2)
     push = fd.Force([4], (0.0, 0.0, 1.0))
     law = fd.Case(shell, [fd.Fix([0, 1], "xyz")], [push], fd.Rayleigh(0.1, 1e-3))
-    continued(law, "generalized_alpha", tmp_path, 0.1, dt=1e-3, every=20)
+    continued(law, method, tmp_path, 0.1, dt=1e-3, every=20)
 
 
 def test_a_continued_motion_runs_again_from_itself(tmp_path):

@@ -72,7 +72,7 @@ def test_decay_of_bars_and_hinges(method):
     assert error < 1e-3
 
 
-@pytest.mark.parametrize("method", ["newmark", "generalized_alpha"])
+@pytest.mark.parametrize("method", ["newmark", "generalized_alpha", "energy_momentum"])
 def test_decay_of_the_shell(method):
     """The rotations at the crease, without mass, take part in its angle."""
     ratio, error = swing(flap("shell"), method, 200)

@@ -7,7 +7,6 @@ import pytest
 from springs import Net
 
 import foldyn as fd
-from foldyn.errors import InputError
 
 K, MASS, ARM = 50.0, 0.2, 1.0
 HELD = np.array([[ARM, 0.0, 0.0], [-ARM, 0.0, 0.0], [0.0, ARM, 0.0], [0.0, -ARM, 0.0],
@@ -78,8 +77,3 @@ def test_frequency_response():
     w = 2.0 * np.pi
     wanted = 1.0 / (2.0 * K - w**2 * MASS + 1j * w * MASS)
     assert complex(response.receptance[1, 0, 0]) == pytest.approx(wanted, rel=1e-9)
-
-
-def test_methods_that_need_what_it_has_not_are_refused():
-    with pytest.raises(InputError, match=r"energy_momentum.*discrete gradient.*choose one of rk4"):
-        fd.simulate(star(), 1.0, "energy_momentum")

@@ -20,7 +20,7 @@ from foldyn.viewer.fields import fields
 T, G = SHEET.thickness, 9.81
 EXPLICIT, IMPLICIT = (
     ["rk4", "central_difference", "dormand_prince"],
-    ["newmark", "generalized_alpha"],
+    ["newmark", "generalized_alpha", "energy_momentum"],
 )
 
 

@@ -3,13 +3,16 @@
     (q1 - q0)/h = (w0 + w1)/2,   M (w1 - w0)/h + alpha M (w0 + w1)/2 + b = 0,
     b = F + C (u1 - u0)/h - (p0 + p1)/2,
 
-with F the forces of `implicit.discrete_gradient`, and of contact (`implicit.contact_step`), C the
-damping but for alpha M, that of elements that follow the motion at (u0 + u1)/2 (a rigid motion
-dissipates nothing), and p at each end of the step those of all loads, also of those that depend on
-the displacement. Without damping and loads the energy of any structure and the momenta of a free
-one stay what they are, with any step, to the tolerance of the equations and to rounding; with them
-the energy balance closes as exactly. Of order 2 (Simo and Tarnow 1992, Gonzalez 1996). Nothing
-damps the vibrations that a step does not resolve.
+with F the mean forces of the terms (`mechanics.mean_forces`) and of contact
+(`implicit.contact_step`), C the damping but for alpha M, that of elements that follow the motion at
+(u0 + u1)/2 (a rigid motion dissipates nothing), and p at each end of the step those of all loads,
+also of those that depend on the displacement. Without damping and loads the energy of any structure
+and the momenta of a free one stay what they are, with any step, to the tolerance of the equations
+and to rounding; with them the energy balance closes as exactly. Of order 2 (Simo and Tarnow 1992,
+Gonzalez 1996). Nothing damps the vibrations that a step does not resolve.
+
+Dofs without mass obey F = p in the mean of the step: what is left at its end is less what was left
+at its start, but for what a law that is not linear adds. It is small, and part of what is kept.
 """
 
 from __future__ import annotations
@@ -32,7 +35,6 @@ from foldyn.dynamics.damping import (
     has_dampers,
     viscous_work,
 )
-from foldyn.dynamics.implicit import discrete_gradient
 from foldyn.dynamics.implicit.contact_step import StepContact
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Phase, Scheme, add_load_work, copy, norms
@@ -43,13 +45,12 @@ from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, run_at
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics import strain_energies
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.tables import Tables
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import add_following
-from foldyn.mechanics.model import BarsHinges
-from foldyn.mechanics.step_tangent import FLOOR, expected_stress
+from foldyn.mechanics.mean_forces import MeanForces
+from foldyn.mechanics.term import ENERGIES
 
 ORDER = 2
 
@@ -57,8 +58,10 @@ ORDER = 2
 class Step(NamedTuple):
     """What compiled functions of a step work with."""
 
-    model: BarsHinges
     setting: Setting
+    terms: NDArray  # (k,) contexts of all but contact,
+    forces: NDArray  # (k,) their mean forces,
+    powers: NDArray  # (2,) and what these put in and take beside energy, W
     context: int  # of the setting
     histories: int  # evaluates them; 0 where they are constant
     old: Phase
@@ -66,8 +69,7 @@ class Step(NamedTuple):
     mean: NDArray  # (h, 3) factors of the histories
     shift: NDArray
     out: NDArray
-    before: NDArray  # (nh,) dihedrals at the start, rad,
-    after: NDArray  # and at the end
+    before: NDArray  # (nh,) dihedrals at the start, rad
     touch: NDArray  # (n, 3) force of contact, N, or none (0, 3)
 
 
@@ -84,17 +86,16 @@ class EnergyMomentum(Scheme):
         if contact is not None:
             kept = body.kept(self.work, ContactTerm)
             touch = StepContact(contact.tables, kept, packed.system.rows)
-        self._contact, self._model = touch, body.sheet.model
-        equation, model = self.equation, self._model
+        self._contact, equation = touch, self.equation
         balance = equation.balance.value
+        self._terms = terms = MeanForces(body, self.work)
         self._step = Context(
             Step(
-                model, equation.setting, balance.setting, balance.histories, self.old, self.new,
-                np.zeros_like(self.new.factor), self.shift, self.out, course.angle,
-                self.work.angle, np.zeros((0, 3)) if touch is None else touch.force,
+                equation.setting, terms.context, terms.kernel, terms.powers, balance.setting,
+                balance.histories, self.old, self.new, np.zeros_like(self.new.factor), self.shift,
+                self.out, course.angle, np.zeros((0, 3)) if touch is None else touch.force,
             )
         )  # fmt: skip
-        self._stress, self._start = np.zeros((2, len(model.bars)))
         self._before = 0.0  # the last step, s
 
     def begin(self, t: float) -> None:
@@ -130,16 +131,11 @@ class EnergyMomentum(Scheme):
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
         """See `Scheme`."""
-        model, pattern, out = self._model, matrix.pattern, matrix.stiffness
-        u0, u1, slots = self.displacement(), self.moved(), pattern.hinge_slots
-        expected_stress(model, u0, u0, False, self._start)
-        expected_stress(model, u1, before, again, self._stress)
-        stress = 0.5 * (self._start + self._stress)
-        out[:] = 0.0
-        discrete_gradient.add_bar_tangent(model, u0, u1, stress, pattern.bar_slots, out)
-        discrete_gradient.add_hinge_tangent(model, u0, u1, self.course.angle, FLOOR, slots, out)
+        body, pattern, u0, u1 = self.packed.body, matrix.pattern, self.displacement(), self.moved()
+        start = u0, u1, self.course.angle
+        matrix.blocks.put_mean(body, pattern, *start, before, again, matrix.stiffness)
         matrix.add_following(u1, self.new.factor, 0.5)
-        matrix.follow(0.5 * (u0 + u1))
+        matrix.follow(0.5 * (u0 + u1), 1.0)
 
     def contact_tangent(self, tables: Tables, memory: Memory, size: int) -> sparse.csr_array:
         """See `Scheme`."""
@@ -160,6 +156,7 @@ class EnergyMomentum(Scheme):
         """See `Scheme`; exactly those of the step's forces."""
         system = self.packed.system
         done, lost = _works(self._step, h)
+        done, lost = done + h * self._terms.powers[0], lost + h * self._terms.powers[1]
         if system.damping.follows:
             lost += _taken(self._step, h)
         if system.turns:
@@ -174,7 +171,7 @@ class EnergyMomentum(Scheme):
 @kernel
 def residual(step, h, t):
     """Residual of a step into `out`; returns its norm and that of the forces at play, N."""
-    model, old, new, out = step.model, step.old, step.new, step.out
+    old, new, out = step.old, step.new, step.out
     system, mass, s = step.setting.system, step.setting.mass, step.setting.s
     q0, w0, q1, w1, a1 = flat(old.q), flat(old.w), flat(new.q), flat(new.w), flat(new.a)
     d, x, left, bracket = flat(step.shift), flat(s.moving), flat(out), flat(new.force)
@@ -199,10 +196,11 @@ def residual(step, h, t):
     carry(system.moved, old.factor[:, 0], old.q, s.displacement)
     carry(system.moved, new.factor[:, 0], new.q, s.velocity)
     new.force[:] = 0.0
-    discrete_gradient.add_bar_forces(model, s.displacement, s.velocity, new.force)
-    discrete_gradient.add_hinge_forces(
-        model, s.displacement, s.velocity, step.before, step.after, new.force
-    )
+    step.powers[:] = 0.0
+    middle = t - 0.5 * h
+    for k in range(step.terms.size):
+        ends = step.terms[k], s.displacement, s.velocity
+        run_at(step.forces[k], (*ends, step.before, h, middle, new.force))
     touch = flat(step.touch)
     for i in range(touch.size):
         bracket[i] += touch[i]
@@ -289,16 +287,20 @@ def _works(step, h):
 @kernel
 def _actuation(step, u0, u1):
     """Work of the actuators in a step: what turning the rest angles at either end changes."""
-    model, folds, old, new = step.model, step.setting.terms.folds, step.old, step.new
+    terms, old, new = step.setting.terms, step.old, step.new
     done, mean, system, s = 0.0, mean_factors(step), step.setting.system, step.setting.s
-    turn(folds, system.actuators, old.factor)
-    strain_energies(model, u0, s.energy)
-    done -= s.energy.sum()
-    turn(folds, system.actuators, mean)
-    strain_energies(model, u0, s.energy)
-    done += s.energy.sum()
-    strain_energies(model, u1, s.energy)
-    done -= s.energy.sum()
-    turn(folds, system.actuators, new.factor)
-    strain_energies(model, u1, s.energy)
-    return done + s.energy.sum()
+    turn(terms.folds, system.actuators, old.factor)
+    done -= _energy_of_sheet(terms, u0, s.energy)
+    turn(terms.folds, system.actuators, mean)
+    done += _energy_of_sheet(terms, u0, s.energy)
+    done -= _energy_of_sheet(terms, u1, s.energy)
+    turn(terms.folds, system.actuators, new.factor)
+    return done + _energy_of_sheet(terms, u1, s.energy)
+
+
+@inner
+def _energy_of_sheet(terms, u, out):
+    """Strain energy (J) of the first term."""
+    out[:] = 0.0
+    run_at(terms.kernel[0, ENERGIES], (terms.context[0], u, out))
+    return out.sum()

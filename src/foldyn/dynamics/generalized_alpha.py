@@ -127,7 +127,7 @@ class Alpha(Scheme):
         body, u = self.packed.body, self.moved()
         matrix.blocks.put(body, matrix.pattern, u, before, again, matrix.stiffness)
         matrix.add_following(u, self.new.factor, 1.0)
-        matrix.follow(u)
+        matrix.follow(u, 0.5)  # dofs without mass have the mean velocity of the step
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""

@@ -57,8 +57,7 @@ def choose(
     dt, every and tolerance are those of `simulate`, default what implicit methods take without;
     modal is the modal damping of the motion.
     """
-    conserved = not case.damped and not any(histories(case))
-    conserved = conserved and case.body.has_discrete_gradient and not case.remembering
+    conserved = not (case.damped or case.remembering or any(histories(case)))
     implicit = "energy_momentum" if conserved else "generalized_alpha"
     has_mass = not case.structure.massless or case.structure.condensed is not None
     if case.contact is not None and has_mass:

@@ -137,8 +137,6 @@ class Integrator(NamedTuple):
         Whether it takes dofs without mass beside the displacements, as those of a shell.
     remembers : bool
         Whether it takes laws with memory.
-    conserving : bool
-        Whether it needs forces with a discrete gradient, which not every model has.
     looks : tuple of float
         Where in a step, from 0 to 1, it looks at the loads.
     """
@@ -152,7 +150,6 @@ class Integrator(NamedTuple):
     scheme: Callable[..., Any] | None = None
     massless: bool = False
     remembers: bool = True
-    conserving: bool = False
     looks: tuple[float, ...] = (0.0, 1.0)
 
     @property
@@ -206,7 +203,7 @@ METHODS: Mapping[str, Integrator] = {
             "energy_momentum",
             energy_momentum,
             energy_momentum.EnergyMomentum,
-            conserving=True,
+            massless=True,
             remembers=False,
         ),
     )
@@ -243,8 +240,6 @@ def _lacking(method: Integrator, case: Case) -> str:
     structure = case.structure
     if structure.massless and structure.condensed is None and not method.massless:
         return f"{structure.massless} have no mass, which this method needs"
-    if method.conserving and not case.body.has_discrete_gradient:
-        return "the forces of this structure have no discrete gradient, which this method needs"
     if case.remembering and not method.remembers:
         law = case.remembering[0].law.name
         return (

@@ -231,11 +231,6 @@ class Assembly:
         """Threads on which a motion runs fastest."""
         return self.sheet.threads if all(term.shared for term in self.terms) else 1
 
-    @property
-    def has_discrete_gradient(self) -> bool:
-        """Whether `dynamics.energy_momentum` takes it."""
-        return all(term.has_discrete_gradient for term in self.terms)
-
     # ------------------------------------------------------------------ measures
     @property
     def hinges(self) -> NDArray:
@@ -331,6 +326,16 @@ class AssembledBlocks:
         self._sheet.put(of.sheet, pattern, u, before, again, out)
         for slots, term in zip(self._slots_in(pattern), _with_places(of), strict=True):
             np.add.at(out.reshape(-1), slots, term.entries(u, FLOOR))
+
+    def put_mean(
+        self, of: Assembly, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray,
+        before: NDArray, again: bool, out: NDArray,
+    ) -> None:  # fmt: skip
+        """See `Blocks`."""
+        self._sheet.put_mean(of.sheet, pattern, u0, u1, angle, before, again, out)
+        middle = 0.5 * (u0 + u1)
+        for slots, term in zip(self._slots_in(pattern), _with_places(of), strict=True):
+            np.add.at(out.reshape(-1), slots, 0.5 * term.entries(middle, FLOOR))
 
     def filled(self, pattern: Sparsity) -> NDArray:
         """See `Blocks`."""

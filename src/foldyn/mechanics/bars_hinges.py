@@ -5,10 +5,19 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from foldyn.jit.context import Context, numbers_at, rows_at
+from foldyn.mechanics.discrete_gradient import add_bar_forces, add_hinge_forces
 from foldyn.mechanics.energy import strain_energies
 from foldyn.mechanics.force import Workspace, internal_force
 from foldyn.mechanics.model import BarsHinges
-from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, energies, forces
+from foldyn.mechanics.term import (
+    ENERGIES,
+    FORCES,
+    MEAN_FORCES,
+    Compiled,
+    energies,
+    forces,
+    mean_forces,
+)
 
 
 class _Context(NamedTuple):
@@ -29,7 +38,15 @@ def _energies(own, u, out):
     strain_energies(own.model, moved, numbers_at(out, own.groups))
 
 
+@mean_forces
+def _mean_forces(own, u0, u1, before, h, t, force):
+    rows, angle = own.model.rest.shape[0], own.work.angle
+    start, end, out = rows_at(u0, rows), rows_at(u1, rows), rows_at(force, rows)
+    add_bar_forces(own.model, start, end, out)
+    add_hinge_forces(own.model, start, end, numbers_at(before, angle.size), angle, out)
+
+
 def bars_hinges_kernels(model: BarsHinges, work: Workspace, groups: int) -> Compiled:
     """Bars and hinges, whose energies have so many groups."""
     own = Context(_Context(model, work, groups))
-    return Compiled(own, {FORCES: _forces, ENERGIES: _energies})
+    return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})

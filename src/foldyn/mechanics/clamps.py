@@ -18,9 +18,20 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.block_matrix import pairs_within, places_of
 from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient
+from foldyn.mechanics.discrete_gradient import discrete_gradient
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.sheet_term import Strains, Unstrained, unit_rows
-from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Term, energies, forces, nodal
+from foldyn.mechanics.term import (
+    ENERGIES,
+    FORCES,
+    MEAN_FORCES,
+    Compiled,
+    Term,
+    energies,
+    forces,
+    mean_forces,
+    nodal,
+)
 
 RIDES = -1  # in place of the node of a wing that rides
 
@@ -80,6 +91,33 @@ def add_clamp_forces(clamps, u, force, angle):
 
 
 @inner
+def add_mean_clamp_forces(clamps, u0, u1, before, force, angle):
+    """Add forces whose work from u0 to u1 is the change of the clamps' energy.
+
+    Their dihedrals end `before` at u0 and `angle` at u1.
+    """
+    x, dx, points = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
+    plain, gradient, first = np.empty((4, 3)), np.empty((4, 3)), angle.size - clamps.rest.size
+    for e in range(clamps.rest.size):
+        for c in range(3):
+            x[3, c], dx[3, c] = clamps.points[e, 3, c], 0.0
+            for v in range(3):
+                one, other = u0[clamps.nodes[e, v], c], u1[clamps.nodes[e, v], c]
+                x[v, c], dx[v, c] = clamps.points[e, v, c] + 0.5 * (one + other), other - one
+                if v < 2:
+                    x[3, c] += 0.25 * (one + other)
+                    dx[3, c] += 0.5 * (other - one)
+        angle[first + e] = clamp_dihedral(clamps, u1, e)[0]
+        turn = angle[first + e] - before[first + e]
+        discrete_gradient(x, dx, turn, points, plain, gradient)
+        moment = clamps.stiffness[e] * (before[first + e] + 0.5 * turn - clamps.rest[e])
+        for c in range(3):
+            for v in range(3):
+                carried = 0.5 * gradient[3, c] if v < 2 else 0.0
+                force[clamps.nodes[e, v], c] += moment * (gradient[v, c] + carried)
+
+
+@inner
 def clamp_energy(clamps, u):
     """Energy (J) of clamps."""
     energy = 0.0
@@ -136,6 +174,13 @@ def _energies(own, u, out):
     numbers_at(out, group + 1)[group] += clamp_energy(own.clamps, rows_at(u, own.rows))
 
 
+@mean_forces
+def _mean_forces(own, u0, u1, before, h, t, force):
+    start, end, out = rows_at(u0, own.rows), rows_at(u1, own.rows), rows_at(force, own.rows)
+    first = numbers_at(before, own.angle.size)
+    add_mean_clamp_forces(own.clamps, start, end, first, out, own.angle)
+
+
 class ClampsTerm(Term):
     """Clamped edges, whose energy belongs to a group of the sheet.
 
@@ -152,7 +197,7 @@ class ClampsTerm(Term):
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
         """See `Term`; their dihedrals end those of the thread."""
         own = Context(_Context(self.clamps, work.angle, int(work.strips.own[1])))
-        return Compiled(own, {FORCES: _forces, ENERGIES: _energies})
+        return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:

@@ -21,10 +21,25 @@ from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
+from foldyn.mechanics.discrete_gradient import (
+    add_bar_forces,
+    discrete_gradient,
+    mean_moment,
+    put_motion,
+)
 from foldyn.mechanics.energy import strain_energies
 from foldyn.mechanics.force import Workspace, internal_force, workspace
 from foldyn.mechanics.model import BarsHinges
-from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Whole, energies, forces
+from foldyn.mechanics.term import (
+    ENERGIES,
+    FORCES,
+    MEAN_FORCES,
+    Compiled,
+    Whole,
+    energies,
+    forces,
+    mean_forces,
+)
 from foldyn.mechanics.threads import Team, team
 
 
@@ -181,16 +196,59 @@ def turn_moments(model, x, couple, work):
                 couple[rotation] -= model.per_reach * moment
     for p in range(model.start.size - 1):
         turn_plate(model, x, work, p)
-        count = model.start[p + 1] - model.start[p]
-        for k in range(count):
-            moment = 0.0
-            for m in range(count):
-                moment += model.stiffness[model.entry[p] + k * count + m] * work.turn[m]
+        add_plate_moments(model, couple, work, p)
+
+
+@inner
+def add_plate_moments(model, couple, work, p):
+    """Add the moments of plate p at its angles, and its forces on the dofs of rotations."""
+    count = model.start[p + 1] - model.start[p]
+    for k in range(count):
+        moment = 0.0
+        for m in range(count):
+            moment += model.stiffness[model.entry[p] + k * count + m] * work.turn[m]
+        h = model.angle[model.start[p] + k]
+        if h >= 0:
+            work.moment[h] += moment  # of two plates at a weld
+        else:
+            couple[-1 - h] += model.per_reach * moment
+
+
+@kernel
+def add_mean_plates_force(model, u0, x0, u1, x1, before, force, couple, work):
+    """Add forces whose work is the change of the energy; `before` are the dihedrals at u0."""
+    add_bar_forces(model.bars, u0, u1, force)
+    turn_hinges(model, u1, work)
+    turn_folds(model, x1, work)
+    work.moment[:] = 0.0
+    for f in range(model.fold_rest.size):
+        start = before[f]
+        for rotation in model.fold_rotations[f]:
+            start -= model.per_reach * x0[rotation] if rotation >= 0 else 0.0
+        work.moment[f] = model.fold_stiffness[f] * mean_moment(
+            model.code, model.addresses, model.fold_parameters[f], 1.0, model.fold_rest[f], start,
+            work.fold_angle[f] - start,
+        )[0]  # fmt: skip
+        for rotation in model.fold_rotations[f]:
+            if rotation >= 0:
+                couple[rotation] -= model.per_reach * work.moment[f]
+    folds = model.fold_rest.size
+    for p in range(model.start.size - 1):
+        for k in range(model.start[p + 1] - model.start[p]):
             h = model.angle[model.start[p] + k]
             if h >= 0:
-                work.moment[h] += moment  # of two plates at a weld
+                work.turn[k] = 0.5 * (before[h] + work.angle[h]) - model.bend_rest[h - folds]
             else:
-                couple[-1 - h] += model.per_reach * moment
+                work.turn[k] = 0.5 * model.per_reach * (x0[-1 - h] + x1[-1 - h])
+        add_plate_moments(model, couple, work, p)
+    x, dx, points = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
+    plain, gradient = np.empty((4, 3)), np.empty((4, 3))
+    for h in range(model.hinges.shape[0]):
+        put_motion(model.bars.rest, model.hinges, h, u0, u1, x, dx)
+        discrete_gradient(x, dx, work.angle[h] - before[h], points, plain, gradient)
+        for v in range(4):
+            for c in range(3):
+                force[model.hinges[h, v], c] += work.moment[h] * gradient[v, c]
 
 
 class _Context(NamedTuple):
@@ -217,7 +275,17 @@ def _energies(own, u, out):
     plates_energy(model, moved[:n], x, own.work, numbers_at(out, 3))
 
 
+@mean_forces
+def _mean_forces(own, u0, u1, before, h, t, force):
+    model, start, end = own.model, rows_at(u0, own.rows), rows_at(u1, own.rows)
+    out, angle = rows_at(force, own.rows), numbers_at(before, own.work.angle.size)
+    n, r = model.bars.rest.shape[0], model.rotations
+    x0, x1 = flat(start)[3 * n : 3 * n + r], flat(end)[3 * n : 3 * n + r]
+    couple = flat(out)[3 * n : 3 * n + r]
+    add_mean_plates_force(model, start[:n], x0, end[:n], x1, angle, out[:n], couple, own.work)
+
+
 def plates_kernels(model: BarsPlates, work: PlatesWork, rows: int) -> Compiled:
     """Bars, folds and plates, whose dofs fill so many rows."""
     own = Context(_Context(model, work, rows))
-    return Compiled(own, {FORCES: _forces, ENERGIES: _energies})
+    return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})

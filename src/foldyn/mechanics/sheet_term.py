@@ -122,6 +122,16 @@ class Blocks(Protocol):
         """
         ...
 
+    def put_mean(
+        self, of: Any, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray, before: NDArray,
+        again: bool, out: NDArray,
+    ) -> None:  # fmt: skip
+        """Fill it likewise with the derivative of the mean forces from u0 to u1 by u1.
+
+        angle : (nh,) dihedrals at u0.
+        """
+        ...
+
     def filled(self, pattern: Sparsity) -> NDArray:
         """Which entries (nnz, 3, 3) of a pattern that contains this one `put` may fill."""
         ...
@@ -163,6 +173,12 @@ class SheetTerm(Term):
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
         """The matrix that a step of Newton's method takes at q, after one from `before`."""
         return self.tangent(q)
+
+    def mean_tangent(
+        self, q0: NDArray, q1: NDArray, angle: NDArray, before: NDArray, again: bool
+    ) -> sparse.csr_array:
+        """The matrix for its mean forces from q0 to q1; see `Blocks.put_mean`."""
+        return 0.5 * self.step_tangent(0.5 * (q0 + q1))
 
     @abstractmethod
     def blocks(self) -> Blocks:

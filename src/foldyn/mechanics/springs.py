@@ -21,7 +21,17 @@ from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.block_matrix import blocks_of_ends, pairs_of_ends, places_of
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.sheet_term import Unstrained, unit_rows
-from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Term, energies, forces, nodal
+from foldyn.mechanics.term import (
+    ENERGIES,
+    FORCES,
+    MEAN_FORCES,
+    Compiled,
+    Term,
+    energies,
+    forces,
+    mean_forces,
+    nodal,
+)
 
 GROUP = "strain_springs"
 GROUND = -1  # row of a foot that stands still
@@ -87,6 +97,29 @@ def add_spring_forces(springs, u, force):
 
 
 @inner
+def add_mean_spring_forces(springs, u0, u1, force):
+    """Add forces whose work from u0 to u1 is the change of the springs' energy."""
+    for s in range(springs.stiffness.size):
+        a, b = springs.ends[s, 0], springs.ends[s, 1]
+        extension = directed_extension(springs, u0, s) + directed_extension(springs, u1, s)
+        pull = 0.5 * springs.stiffness[s] * extension
+        for c in range(3):
+            force[a, c] += pull * springs.direction[s, c]
+            if b >= 0:
+                force[b, c] -= pull * springs.direction[s, c]
+    for s in range(springs.axial_stiffness.size):
+        a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
+        before, after = axial_extension(springs, u0, s), axial_extension(springs, u1, s)
+        per_length = springs.axial_stiffness[s]
+        if springs.stretch[s] < springs.length[s]:
+            per_length *= (before[0] + after[0]) / (before[1] + after[1])
+        for c in range(3):
+            moved = 0.5 * (u0[b, c] - u0[a, c] + u1[b, c] - u1[a, c])
+            force[b, c] += per_length * (springs.vector[s, c] + moved)
+            force[a, c] -= per_length * (springs.vector[s, c] + moved)
+
+
+@inner
 def spring_energy(springs, u):
     """Energy (J) of springs."""
     energy = 0.0
@@ -136,6 +169,12 @@ def _energies(own, u, out):
     numbers_at(out, own.group + 1)[own.group] = spring_energy(own.springs, rows_at(u, own.rows))
 
 
+@mean_forces
+def _mean_forces(own, u0, u1, before, h, t, force):
+    start, end = rows_at(u0, own.rows), rows_at(u1, own.rows)
+    add_mean_spring_forces(own.springs, start, end, rows_at(force, own.rows))
+
+
 class SpringsTerm(Term):
     """Springs, with a group of energy of their own.
 
@@ -152,7 +191,7 @@ class SpringsTerm(Term):
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
         """See `Term`."""
         own = Context(_Context(self.springs, group, int(work.strips.own[1])))
-        return Compiled(own, {FORCES: _forces, ENERGIES: _energies})
+        return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
 
     @cached_property
     def _ends(self) -> NDArray:

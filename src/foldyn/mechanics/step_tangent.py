@@ -26,6 +26,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from foldyn.jit.compiled import kernel
 from foldyn.materials.switch import bar_slope, bar_stress
+from foldyn.mechanics.discrete_gradient import add_bar_tangent, add_hinge_tangent
 from foldyn.mechanics.energy import bar_extension
 from foldyn.mechanics.model import BarsHinges, node_order, ranks
 from foldyn.mechanics.sheet_term import SheetTerm
@@ -53,6 +54,19 @@ def put_tangent(
     stress = np.empty(len(model.bars))
     expected_stress(model, u, before, again, stress)
     _replace_stress(model, u, stress, pattern.bar_slots, out)
+
+
+def put_mean_tangent(
+    model: BarsHinges, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray,
+    before: NDArray, again: bool, out: NDArray,
+) -> None:  # fmt: skip
+    """Blocks likewise of the mean forces from u0, where the dihedrals are `angle` (nh,), to u1."""
+    start, end = np.empty((2, len(model.bars)))
+    expected_stress(model, u0, u0, False, start)
+    expected_stress(model, u1, before, again, end)
+    out[:] = 0.0
+    add_bar_tangent(model, u0, u1, 0.5 * (start + end), pattern.bar_slots, out)
+    add_hinge_tangent(model, u0, u1, angle, FLOOR, pattern.hinge_slots, out)
 
 
 def add_floored_tangent(model: BarsHinges, pattern: Sparsity, u: NDArray, out: NDArray) -> None:
@@ -119,6 +133,13 @@ class BarsHingesBlocks:
         """See `Blocks`."""
         put_tangent(of.model, pattern, u, before, again, out)
 
+    def put_mean(
+        self, of: SheetTerm, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray,
+        before: NDArray, again: bool, out: NDArray,
+    ) -> None:  # fmt: skip
+        """See `Blocks`."""
+        put_mean_tangent(of.model, pattern, u0, u1, angle, before, again, out)
+
     def filled(self, pattern: Sparsity) -> NDArray:
         """See `Blocks`."""
         return np.ones((len(pattern.indices), 3, 3), bool)
@@ -166,6 +187,15 @@ class SparseBlocks:
         """See `Blocks`."""
         out[:] = 0.0
         matrix = of.step_tangent(u, before if again else None)
+        out.reshape(-1)[self._places(pattern)] = matrix.data
+
+    def put_mean(
+        self, of: SheetTerm, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray,
+        before: NDArray, again: bool, out: NDArray,
+    ) -> None:  # fmt: skip
+        """See `Blocks`."""
+        out[:] = 0.0
+        matrix = of.mean_tangent(u0, u1, angle, before, again)
         out.reshape(-1)[self._places(pattern)] = matrix.data
 
     def filled(self, pattern: Sparsity) -> NDArray:

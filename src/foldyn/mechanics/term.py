@@ -27,6 +27,11 @@ are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of 
     step_error(scale) -> ratio       how wrong they are if the step that ends there is accepted: the
                                      turn that this makes, over the largest one or the one that
                                      moves nodes by `scale` (m)
+    mean_forces(u0, u1, before, h, t, force)
+                                     adds forces whose work from u0 to u1 is the change of its
+                                     energy, in a step h (s) about the time t, and writes its
+                                     dihedrals at u1; before (nh,) are all those at u0. Of a term
+                                     without it `mechanics.mean_forces` makes some of the others
 """
 
 from __future__ import annotations
@@ -51,6 +56,7 @@ if TYPE_CHECKING:
     FORCES, ENERGIES, LIMIT, PLACE_OBSTACLES, ADVANCE_CLOCK, COMMIT, DISSIPATED, BRANCH_STATES,
     STEP_ERROR,
 ) = EVERY = range(9)  # fmt: skip
+MEAN_FORCES = 9  # of `dynamics.energy_momentum` alone
 ADDRESS, NUMBER = types.int64, types.float64
 
 forces = addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS)
@@ -60,6 +66,7 @@ place_obstacles = addressed(ADDRESS)
 advance_clock = step_error = addressed(NUMBER)
 commit = dissipated = addressed()
 branch_states = addressed(ADDRESS)
+mean_forces = addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER, NUMBER, ADDRESS)
 
 
 class Compiled(NamedTuple):
@@ -85,14 +92,11 @@ class Term(ABC):
         Whether its forces are moments of hinges, which are at play even where all is at rest.
     shared : bool
         Whether threads may share a model with it.
-    has_discrete_gradient : bool
-        Whether `dynamics.energy_momentum` takes it.
     """
 
     energy_groups: ClassVar[Mapping[str, str]] = {}
     of_hinges: ClassVar[bool] = False
     shared: ClassVar[bool] = False
-    has_discrete_gradient: ClassVar[bool] = False
 
     # ------------------------------------------------------------------ what is compiled
     @abstractmethod

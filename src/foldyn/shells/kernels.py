@@ -17,7 +17,17 @@ from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
-from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Whole, energies, forces
+from foldyn.mechanics.discrete_gradient import discrete_gradient, mean_moment
+from foldyn.mechanics.term import (
+    ENERGIES,
+    FORCES,
+    MEAN_FORCES,
+    Compiled,
+    Whole,
+    energies,
+    forces,
+    mean_forces,
+)
 from foldyn.mechanics.threads import Team, team
 
 
@@ -116,13 +126,13 @@ def ride(model, u, work):
 
 @inner_scalar
 def wing_points(model, u, e, out):
-    """Points (4, 3) of a hinge with a wing."""
-    j, k = model.hinges[e, 0], model.hinges[e, 1]
+    """Points (4, 3) of a hinge, of which the last may be a wing."""
+    j, k, n = model.hinges[e, 0], model.hinges[e, 1], model.nodes
     for c in range(3):
-        for v in range(3):
+        for v in range(4):
             node = model.hinges[e, v]
-            out[v, c] = model.rest[node, c] + u[node, c]
-        out[3, c] = model.rest[model.hinges[e, 3], c] + 0.5 * (u[j, c] + u[k, c])
+            moved = u[node, c] if node < n else 0.5 * (u[j, c] + u[k, c])
+            out[v, c] = model.rest[node, c] + moved
 
 
 @inner
@@ -229,6 +239,67 @@ def carry(model, force, work):
                 force[model.hinges[h, end], c] += carried
 
 
+@kernel
+def add_mean_shell_force(model, u0, x0, u1, x1, before, force, couple, work):
+    """Add forces whose work is the change of the energy; `before` are the dihedrals at u0.
+
+    Strains are quadratic in the positions, as those of bars: see `mechanics.discrete_gradient`.
+    """
+    fold(model, u1, x1, work)
+    ride(model, u1, work)
+    work.moment[:] = 0.0
+    for h in range(work.turn.size):
+        work.turn[h] = 0.5 * (before[h] + work.angle[h]) - model.hinge_rest[h]
+    e, beta, start, rotated = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for t in range(model.triangles.shape[0]):
+        side_strains(model, u0, t, start)
+        side_strains(model, u1, t, e)
+        side_rotations(model, x0, work.turn, t, rotated)
+        side_rotations(model, x1, work.turn, t, beta)
+        for k in range(3):
+            stress, moment = 0.0, 0.0
+            for m in range(3):
+                stress += 0.5 * model.membrane[t, k, m] * (start[m] + e[m])
+                moment += 0.5 * model.bending[t, k, m] * (rotated[m] + beta[m])
+            stress *= model.per_length2[t, k]
+            a, b = model.triangles[t, k], model.triangles[t, (k + 1) % 3]
+            for c in range(3):
+                moved = 0.5 * (u0[b, c] - u0[a, c] + u1[b, c] - u1[a, c])
+                force[b, c] += stress * (model.side[t, k, c] + moved)
+                force[a, c] -= stress * (model.side[t, k, c] + moved)
+            if model.hinge[t, k] >= 0:
+                work.moment[model.hinge[t, k]] += model.weight[t, k] * moment
+            if model.rotation[t, k] >= 0:
+                couple[model.rotation[t, k]] += model.sign[t, k] * model.per_reach * moment
+    for k in range(model.piece_hinge.size):
+        angle = before[model.piece_hinge[k]]
+        for rotation in model.piece_rotations[k]:
+            angle -= model.per_reach * x0[rotation] if rotation >= 0 else 0.0
+        moment = model.piece_stiffness[k] * mean_moment(
+            model.code, model.addresses, model.piece_parameters[k], 1.0, model.piece_rest[k], angle,
+            work.fold_angle[k] - angle,
+        )[0]  # fmt: skip
+        work.moment[model.piece_hinge[k]] += moment
+        for rotation in model.piece_rotations[k]:
+            if rotation >= 0:
+                couple[rotation] -= model.per_reach * moment
+    x, dx, points = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
+    plain, gradient, end, n = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3)), u0.shape[0]
+    for h in range(model.hinges.shape[0]):
+        wing_points(model, u0, h, x)
+        wing_points(model, u1, h, end)
+        for v in range(4):
+            for c in range(3):
+                dx[v, c], x[v, c] = end[v, c] - x[v, c], 0.5 * (x[v, c] + end[v, c])
+        discrete_gradient(x, dx, work.angle[h] - before[h], points, plain, gradient)
+        for v in range(4):
+            for c in range(3):
+                work.gradient[h, 3 * v + c] = gradient[v, c]
+                if model.hinges[h, v] < n:
+                    force[model.hinges[h, v], c] += work.moment[h] * gradient[v, c]
+    carry(model, force, work)
+
+
 class _Context(NamedTuple):
     model: ShellModel
     work: ShellWork
@@ -253,7 +324,17 @@ def _energies(own, u, out):
     shell_energy(model, moved[:n], x, own.work, numbers_at(out, 3))
 
 
+@mean_forces
+def _mean_forces(own, u0, u1, before, h, t, force):
+    model, start, end = own.model, rows_at(u0, own.rows), rows_at(u1, own.rows)
+    out, angle = rows_at(force, own.rows), numbers_at(before, own.work.angle.size)
+    n, r = model.nodes, model.rotations
+    x0, x1 = flat(start)[3 * n : 3 * n + r], flat(end)[3 * n : 3 * n + r]
+    couple = flat(out)[3 * n : 3 * n + r]
+    add_mean_shell_force(model, start[:n], x0, end[:n], x1, angle, out[:n], couple, own.work)
+
+
 def shell_kernels(model: ShellModel, work: ShellWork) -> Compiled:
     """A shell."""
     own = Context(_Context(model, work, model.rows))
-    return Compiled(own, {FORCES: _forces, ENERGIES: _energies})
+    return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})

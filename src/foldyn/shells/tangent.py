@@ -299,10 +299,31 @@ def add_extrapolated_strain(
 
     u, before : (n, 3) states after and before the last step.
     """
-    old, new = _apart(model, before), _apart(model, u)
     # e(u) - e(u0) - (D0 . d) / L^2 = |d|^2 / (2 L^2)
-    second = 0.5 * np.einsum("tki,tki->tk", new - old, new - old) * model.per_length2
-    excess = -np.einsum("tkl,tl->tk", model.membrane, second) * model.per_length2
+    step = _apart(model, u) - _apart(model, before)
+    _add_strain(model, pattern, -0.5 * _dot(step, step) * model.per_length2, data)
+
+
+def add_mean_strain(
+    model: ShellModel, pattern: ShellPattern, u0: NDArray, u1: NDArray, before: NDArray,
+    again: bool, data: NDArray,
+) -> None:  # fmt: skip
+    """Replace those in a tangent halfway by the mean ones of a step from u0 to u1.
+
+    before, again : from where those at u1 are extrapolated; those at u0 unless `again`.
+    """
+    step = _apart(model, u1 - u0)
+    if again:  # halfway between two states a strain is less than the mean by |d|^2 / (8 L^2)
+        last = _apart(model, u1 - before)
+        more = 0.125 * _dot(step, step) - 0.25 * _dot(last, last)
+    else:
+        more = -0.5 * _dot(model.side + _apart(model, u0), step) - 0.125 * _dot(step, step)
+    _add_strain(model, pattern, more * model.per_length2, data)
+
+
+def _add_strain(model: ShellModel, pattern: ShellPattern, strain: NDArray, data: NDArray) -> None:
+    """Add the geometric stiffness of strains (nt, 3) of the sides to a tangent's entries."""
+    stress = np.einsum("tkl,tl->tk", model.membrane, strain) * model.per_length2
     dof = pattern.triangle_dof[:, :3]
     diagonal = pattern.indptr[dof + 1] - pattern.indptr[dof] + 1  # from (0, 0) to (1, 1) of a block
     slots, values = [], []
@@ -312,10 +333,14 @@ def add_extrapolated_strain(
             for other in ends:
                 for axis in range(3):
                     slots.append(pattern.triangle[:, one, other] + axis * diagonal[:, one])
-                    values.append(excess[:, k] if one == other else -excess[:, k])
+                    values.append(stress[:, k] if one == other else -stress[:, k])
     data += np.bincount(np.concatenate(slots), np.concatenate(values), len(data))
 
 
 def _apart(model: ShellModel, u: NDArray) -> NDArray:
     """Relative displacements (nt, 3, 3) of the ends of the sides."""
     return u[np.roll(model.triangles, -1, axis=1)] - u[model.triangles]
+
+
+def _dot(one: NDArray, other: NDArray) -> NDArray:
+    return np.einsum("tki,tki->tk", one, other)

@@ -35,6 +35,7 @@ from foldyn.shells.kernels import (
 from foldyn.shells.tangent import (
     ShellPattern,
     add_extrapolated_strain,
+    add_mean_strain,
     shell_pattern,
     shell_tangent,
 )
@@ -95,12 +96,25 @@ class ShellTerm(SheetTerm):
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
         """See `SheetTerm`."""
-        own = self.model.code < 0  # slopes of a user's law may fall on purpose
-        matrix = self.tangent(q, -np.inf if own else STEP_FLOOR)
+        matrix = self.tangent(q, self._floor)
         if before is not None:
             u, old = self._split(q)[0], self._split(before)[0]
             add_extrapolated_strain(self.model, self.sparsity, u, old, matrix.data)
         return matrix
+
+    def mean_tangent(
+        self, q0: NDArray, q1: NDArray, angle: NDArray, before: NDArray, again: bool
+    ) -> sparse.csr_array:
+        """See `SheetTerm`."""
+        matrix = self.tangent(0.5 * (q0 + q1), self._floor)
+        u0, u1, old = (self._split(q)[0] for q in (q0, q1, before))
+        add_mean_strain(self.model, self.sparsity, u0, u1, old, again, matrix.data)
+        return 0.5 * matrix
+
+    @property
+    def _floor(self) -> float:
+        """Least slope of the folds in steps; slopes of a user's law may fall on purpose."""
+        return -np.inf if self.model.code < 0 else STEP_FLOOR
 
     def blocks(self) -> SparseBlocks:
         """See `SheetTerm`."""

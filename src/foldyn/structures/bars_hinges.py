@@ -24,7 +24,7 @@ from foldyn.mechanics.sheet_term import (
     Unstrained,
     largest_turn,
 )
-from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_tangent
+from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_mean_tangent, put_tangent
 from foldyn.mechanics.term import Compiled, Folds
 
 GROUPS: Mapping[str, str] = {
@@ -52,7 +52,6 @@ class BarsHingesTerm(SheetTerm):
     """
 
     energy_groups = GROUPS
-    has_discrete_gradient = True
 
     def __init__(
         self, model: BarsHinges, turning: NDArray, laws: tuple[tuple[HingeLaw, int], ...],
@@ -88,6 +87,16 @@ class BarsHingesTerm(SheetTerm):
         pattern, again = self.sparsity, before is not None
         data, old = np.empty((len(pattern.indices), 3, 3)), q if before is None else before
         put_tangent(self.model, pattern, self._nodal(q), self._nodal(old), again, data)
+        shape = (self.size, self.size)
+        return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=shape).tocsr()
+
+    def mean_tangent(
+        self, q0: NDArray, q1: NDArray, angle: NDArray, before: NDArray, again: bool
+    ) -> sparse.csr_array:
+        """See `SheetTerm`."""
+        pattern, ends = self.sparsity, (self._nodal(q0), self._nodal(q1))
+        data = np.empty((len(pattern.indices), 3, 3))
+        put_mean_tangent(self.model, pattern, *ends, angle, self._nodal(before), again, data)
         shape = (self.size, self.size)
         return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=shape).tocsr()
 

@@ -89,9 +89,20 @@ class BarsPlatesTerm(SheetTerm):
         """See `SheetTerm`."""
         q = np.ascontiguousarray(q, float).reshape(-1)
         old = None if before is None else np.reshape(before, -1)[: self._nodal]
-        bars = self._bars.step_tangent(q[: self._nodal], old)
-        own = self.model.code < 0  # slopes of a user's law may fall on purpose
-        return self._assembled(q, bars, -np.inf if own else STEP_FLOOR)
+        return self._assembled(q, self._bars.step_tangent(q[: self._nodal], old), self._floor)
+
+    def mean_tangent(
+        self, q0: NDArray, q1: NDArray, angle: NDArray, before: NDArray, again: bool
+    ) -> sparse.csr_array:
+        """See `SheetTerm`."""
+        u0, u1, old = (self._split(q)[0] for q in (q0, q1, before))
+        bars = self._bars.mean_tangent(u0, u1, np.zeros(0), old, again)
+        return 0.5 * self._assembled(0.5 * (q0 + q1), 2.0 * bars, self._floor)
+
+    @property
+    def _floor(self) -> float:
+        """Least slope of the folds in steps; slopes of a user's law may fall on purpose."""
+        return -np.inf if self.model.code < 0 else STEP_FLOOR
 
     def _assembled(self, q: NDArray, bars: sparse.csr_array, floor: float) -> sparse.csr_array:
         pattern = self.sparsity

@@ -17,7 +17,6 @@ from scipy import sparse
 from foldyn.dynamics.implicit.contact_measure import new_move
 from foldyn.dynamics.implicit.contact_pairs import edges_step, vertex_step
 from foldyn.dynamics.implicit.contact_quotient import quotient
-from foldyn.dynamics.implicit.discrete_gradient import discrete_gradient
 from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
@@ -39,6 +38,7 @@ from foldyn.mechanics.contact.search import list_pairs, place, use_all
 from foldyn.mechanics.contact.tables import FRICTION, NORMAL, Tables
 from foldyn.mechanics.contact.tangent import friction_tangent
 from foldyn.mechanics.dihedral import add_hessian
+from foldyn.mechanics.discrete_gradient import discrete_gradient
 
 
 class StepContact:

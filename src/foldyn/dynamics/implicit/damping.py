@@ -12,10 +12,7 @@ from foldyn.algebra.woodbury import Updated
 from foldyn.mechanics.tangent import block_keys
 from foldyn.mechanics.viscous import WIDTH, Viscous, put_gradients
 
-HIDDEN = (
-    12  # place of an element's dofs without mass among its own, and their factor in the matrix:
-)
-MEAN = 0.5**0.5  # they have the mean velocity of a step, whose change is half that at its end
+HIDDEN = 12  # place of an element's dofs without mass among its own
 
 
 class Weights(NamedTuple):
@@ -66,12 +63,12 @@ class ElementBlocks:
         filled.reshape(-1)[self._slot] = True
         return filled
 
-    def put(self, u: NDArray, out: NDArray) -> None:
-        """Make `out` (nnz, 3, 3) the whole damping at u (n, 3)."""
+    def put(self, u: NDArray, hidden: float, out: NDArray) -> None:
+        """Make `out` (nnz, 3, 3) the whole damping at u (n, 3); see `StepMatrix.follow`."""
         if not len(self._gradient):
             return
         put_gradients(self._elements, np.ascontiguousarray(u), self._gradient)
-        self._gradient[:, HIDDEN:] *= MEAN
+        self._gradient[:, HIDDEN:] *= hidden**0.5
         weighted = self._elements.coefficient[:, None] * self._gradient
         values = (weighted[:, :, None] * self._gradient[:, None, :])[self._pairs]
         out[:] = self._still

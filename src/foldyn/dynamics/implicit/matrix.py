@@ -145,9 +145,12 @@ class StepMatrix:
                     raise
         return self._sparse(weights, self._matrices)
 
-    def follow(self, u: NDArray) -> None:
-        """Make the damping of elements that follow the motion what it is at u (n, 3)."""
-        self._elements.put(u, self._matrices.damping)
+    def follow(self, u: NDArray, hidden: float) -> None:
+        """Make the damping of elements that follow the motion what it is at u (n, 3).
+
+        hidden : change of the velocity of dofs without mass, over that of others.
+        """
+        self._elements.put(u, hidden, self._matrices.damping)
 
     @property
     def changing(self) -> list[NDArray]:

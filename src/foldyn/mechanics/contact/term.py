@@ -54,7 +54,6 @@ class ContactTerm(Term):
 
     energy_groups: ClassVar[Mapping[str, str]] = {GROUP: "energy of contact"}
     shared = True
-    has_discrete_gradient = True  # that of the solver
 
     def __init__(self, sheets: Sheets, guarded: Assembly) -> None:
         self.sheets, self._guarded = sheets, guarded

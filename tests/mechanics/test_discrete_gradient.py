@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 
 import foldyn as fd
 from foldyn.checks import observed_order
-from foldyn.dynamics.implicit.discrete_gradient import (
+from foldyn.mechanics import angles
+from foldyn.mechanics.discrete_gradient import (
     add_bar_forces,
     add_bar_tangent,
     add_hinge_forces,
@@ -17,7 +18,6 @@ from foldyn.dynamics.implicit.discrete_gradient import (
     mean_moment,
     mean_stress,
 )
-from foldyn.mechanics import angles
 from foldyn.mechanics.step_tangent import expected_stress
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)

@@ -185,12 +185,12 @@ def _rotation(r, d):
 
 
 @scalar
-def _gather(model, e, u0, u1, x, dx):
+def put_motion(rest, hinges, e, u0, u1, x, dx):
     """Mean and difference (4, 3) of the positions of a hinge's points."""
     for v in range(4):
-        node = model.hinges[e, v]
+        node = hinges[e, v]
         for c in range(3):
-            x[v, c] = model.rest[node, c] + 0.5 * (u0[node, c] + u1[node, c])
+            x[v, c] = rest[node, c] + 0.5 * (u0[node, c] + u1[node, c])
             dx[v, c] = u1[node, c] - u0[node, c]
 
 
@@ -204,7 +204,7 @@ def add_hinge_forces(model, u0, u1, angle0, angle1, force):
         for e in range(model.hinge_runs[run, 0], model.hinge_runs[run, 1]):
             angle1[e] = hinge_dihedral(model, u1, e)[0]
             turn = angle1[e] - angle0[e]
-            _gather(model, e, u0, u1, x, dx)
+            put_motion(model.rest, model.hinges, e, u0, u1, x, dx)
             discrete_gradient(x, dx, turn, points, plain, gradient)
             moment = _mean_moment(model, e, code, address, angle0[e], turn)[0]
             moment *= model.hinge_stiffness[e]
@@ -258,7 +258,7 @@ def add_hinge_tangent(model, u0, u1, angle0, floor, slots, data):
             for c in range(12):
                 flat[c] = dihedral[1 + c]
             turn = dihedral[0] - angle0[e]
-            _gather(model, e, u0, u1, x, dx)
+            put_motion(model.rest, model.hinges, e, u0, u1, x, dx)
             discrete_gradient(x, dx, turn, points, plain, gradient)
             moment, slope = _mean_moment(model, e, code, address, angle0[e], turn)
             if code >= 0:

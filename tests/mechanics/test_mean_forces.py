@@ -1,0 +1,219 @@
+"""Mean forces of terms in a step: their work, their resultant and moment, their limit."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from springs import Net
+
+import foldyn as fd
+from foldyn.checks import observed_order
+from foldyn.jit.compiled import kernel
+from foldyn.jit.context import Context, numbers_at, rows_at, run_at
+from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.mean_forces import MeanForces
+from foldyn.mechanics.term import FORCES, MEAN_FORCES, Compiled, Term, forces
+
+SHEET = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.3, thickness=0.01)
+FOLD = fd.patterns.simple_fold(a=1.0, b=1.3, dihedral=100)
+MODELS = ("plate", "herkal", "n5b8e", "shell")
+FREE = [
+    fd.Spring(40.0, between=[(0, 2), (1, 3)]),
+    fd.Spring(25.0, between=[(3, 0)], rest_length=0.4),
+    fd.Spring(35.0, between=[(1, 2)], rest_length=0.0),
+]
+GROUNDED = [
+    fd.Spring(300.0, nodes=[0, 2]),
+    fd.Spring(70.0, nodes=[1], direction=(1, 2, -1)),
+    fd.Spring(55.0, between=[(0, 3)], direction="-y"),
+]
+
+
+def structure(model: str, **options: Any) -> Any:
+    if model == "shell":
+        return fd.shell(FOLD, SHEET, 1, **options)
+    return fd.discretize(FOLD, SHEET, preset=model, **options)
+
+
+@kernel
+def _call(function, context, u0, u1, before, h, force):
+    run_at(function, (context, u0, u1, before, h, 0.0, force))
+
+
+def mean_forces(body: Assembly, q0: np.ndarray, q1: np.ndarray, h: float = 1.0) -> np.ndarray:
+    """Mean forces (m,) of all terms from q0 to q1."""
+    work = body.workspaces(1)[0]
+    terms, out = MeanForces(body, work), np.zeros((body.rows, 3))
+    ends = body.in_rows(q0), body.in_rows(q1)
+    for function, context in zip(terms.kernel, terms.context, strict=True):
+        _call(function, context, *ends, body.angles(q0), h, out)
+    np.testing.assert_allclose(work.angle, body.angles(q1), atol=1e-14)
+    return out.ravel()[: body.size]
+
+
+def halfway(body: Assembly) -> Assembly:
+    """The same with a sheet whose mean forces are made of its forces and energies."""
+
+    class Sheet(type(body.sheet)):
+        def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+            own = super().compiled(work, kept, group)
+            kernels = {k: v for k, v in own.kernels.items() if k != MEAN_FORCES}
+            return own._replace(kernels=kernels)
+
+    body.sheet.__class__ = Sheet
+    return body
+
+
+def states(body: Assembly, deform: float, turn: float) -> list[np.ndarray]:
+    """Dofs of a deformed sheet, and of one deformed a little more, turned and shifted."""
+    rng, rest = np.random.default_rng(3), nodes(body)
+    one, more = 0.03 * rng.standard_normal((2, body.size))
+    more = one + deform / 0.03 * more
+    turned = Rotation.from_rotvec(turn * np.array([0.48, -0.6, 0.64])).as_matrix()
+    x = (rest + more[: rest.size].reshape(-1, 3)) @ turned.T + np.array([0.3, -1.0, 2.0])
+    return [one, np.append(x - rest, more[rest.size :])]
+
+
+def nodes(body: Assembly) -> np.ndarray:
+    sheet: Any = body.sheet.model
+    rest = sheet.rest if hasattr(sheet, "rest") else sheet.bars.rest
+    return rest[: (body.size - len(body.hidden)) // 3]
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+@pytest.mark.parametrize("deform", [1e-9, 1e-4, 0.02])
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("supports", [[], FREE, GROUNDED], ids=["sheet", "axial", "directed"])
+def test_work_is_the_change_of_the_energy(model, supports, deform, turn):
+    """However far the step goes; without resultant and moment where nothing holds the sheet."""
+    body = fd.Case(structure(model), supports).body
+    q0, q1 = states(body, deform, turn)
+    force, before = mean_forces(body, q0, q1), body.energies(q0).sum()
+    change = body.energies(q1).sum() - before
+    assert force @ (q1 - q0) == pytest.approx(change, abs=4e-13 * (before + abs(change)))
+    if supports is not GROUNDED:
+        rest, scale = nodes(body), np.abs(force).max()
+        own = force[: rest.size].reshape(-1, 3)
+        middle = rest + 0.5 * (q0 + q1)[: rest.size].reshape(-1, 3)
+        assert np.abs(own.sum(axis=0)).max() < 1e-12 * scale
+        assert np.abs(np.cross(middle, own).sum(axis=0)).max() < 1e-11 * scale
+
+
+@pytest.mark.parametrize("deform", [1e-6, 0.02])
+@pytest.mark.parametrize("model", ["herkal", "shell"])
+def test_clamped_edges_do_the_work_of_their_energy(model, deform):
+    closes(fd.Case(structure(model, clamped=[(0, 1)]), FREE).body, deform)
+
+
+@pytest.mark.parametrize("deform", [1e-6, 0.02])
+@pytest.mark.parametrize("model", MODELS)
+def test_so_does_what_has_no_mean_forces_of_its_own(model, deform):
+    closes(halfway(fd.Case(structure(model)).body), deform)
+
+
+def closes(body: Assembly, deform: float) -> None:
+    """Work and energies of a step that turns and deforms are the same."""
+    q0, q1 = states(body, deform, 0.1)
+    before = body.energies(q0).sum()
+    change = body.energies(q1).sum() - before
+    work = mean_forces(body, q0, q1) @ (q1 - q0)
+    assert work == pytest.approx(change, abs=4e-13 * (before + abs(change)))
+
+
+@pytest.mark.parametrize("own", [True, False], ids=["own", "halfway"])
+@pytest.mark.parametrize("model", MODELS)
+def test_small_steps_give_the_force_in_the_middle(model, own):
+    """The difference falls with the square of the step, and nothing breaks without one."""
+    body = fd.Case(structure(model), FREE + GROUNDED).body
+    body = body if own else halfway(body)
+    rng = np.random.default_rng(5)
+    middle, step = 0.02 * rng.standard_normal(body.size), rng.standard_normal(body.size)
+    sizes, errors = np.array([4e-3, 2e-3, 1e-3]), []
+    for h in sizes:
+        found = mean_forces(body, middle - h * step, middle + h * step)
+        errors.append(np.abs(found - body.internal(middle)).max())
+    assert observed_order(sizes, errors) == pytest.approx(2.0, abs=0.1)
+    still, scale = body.internal(middle), np.abs(body.internal(middle)).max()
+    np.testing.assert_allclose(mean_forces(body, middle, middle), still, atol=1e-12 * scale)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_tangent_is_the_derivative_to_first_order(model):
+    body = fd.Case(structure(model), FREE + GROUNDED).body
+    rng, blocks = np.random.default_rng(7), body.blocks()
+    q0, step, along = rng.standard_normal((3, body.size)) * [[0.02], [1.0], [1.0]]
+    sizes, errors = np.array([4e-3, 2e-3, 1e-3]), []
+    out, pattern = np.zeros((len(blocks.pattern.indices), 3, 3)), blocks.pattern
+    for size in sizes:
+        q1 = q0 + size * step
+        u0, u1 = body.in_rows(q0), body.in_rows(q1)
+        blocks.put_mean(body, pattern, u0, u1, body.angles(q0), u1, True, out)
+        row = np.repeat(np.arange(body.rows), np.diff(pattern.indptr))
+        found, direction = np.zeros((body.rows, 3)), body.in_rows(along)
+        np.add.at(found, row, np.einsum("kij,kj->ki", out, direction[pattern.indices]))
+        ends = [mean_forces(body, q0, q1 + sign * 1e-6 * along) for sign in (1.0, -1.0)]
+        wanted = (ends[0] - ends[1]) / 2e-6
+        error = found.ravel()[: body.size] - wanted
+        errors.append(np.abs(error).max() / np.abs(wanted).max())
+    assert errors[-1] < 1e-2
+    assert observed_order(sizes, errors) > 0.8
+
+
+class DragContext(NamedTuple):
+    coefficient: float  # N s/m
+    rows: int
+
+
+@forces
+def _drag(own, u, v, t, force, powers):
+    speed, out = rows_at(v, own.rows), rows_at(force, own.rows)
+    for c in range(3):
+        out[0, c] += own.coefficient * speed[0, c]
+        numbers_at(powers, 2)[1] += own.coefficient * speed[0, c] ** 2
+
+
+class Drag(Term):
+    """Drag of the first node."""
+
+    def __init__(self, coefficient: float) -> None:
+        self.coefficient = coefficient
+
+    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+        own = DragContext(self.coefficient, int(work.strips.own[1]))
+        return Compiled(Context(own), {FORCES: _drag})
+
+
+class Dragged(Net):
+    """Points on springs, of which the first is slowed down."""
+
+    @cached_property
+    def body(self) -> Assembly:
+        return Assembly(super().body.sheet, Drag(0.3))
+
+
+def thrown(kind: type[Net]) -> Any:
+    """A point on six springs that flies to and fro."""
+    points, ends = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)]), [(0, k) for k in range(1, 7)]
+    net = kind(points, np.array(ends), np.full(6, 50.0), np.full(7, 0.2))
+    case, v = fd.Case(net, [fd.Fix(range(1, 7))]), np.zeros((7, 3))
+    v[0] = 8.0, 3.0, -5.0
+    start = fd.State(velocity=v)
+    return fd.simulate(case, 20.0, "energy_momentum", dt=0.02, every=50, initial=start)
+
+
+def test_a_sheet_of_ones_own_keeps_its_energy():
+    """Springs of another package, with nothing but forces and energies."""
+    motion = thrown(Net)
+    total = (motion.kinetic + motion.strain_springs).to_numpy()
+    assert np.ptp(motion.strain_springs.to_numpy()) > 0.3 * total[0]
+    assert np.ptp(total) < 1e-9 * total[0]
+
+
+def test_the_balance_closes_with_a_term_that_dissipates():
+    motion = thrown(Dragged)
+    assert float(motion.dissipated[-1]) > 0.99 * float(motion.kinetic[0])
+    assert motion.attrs["energy_error"] < 1e-9
