@@ -64,6 +64,7 @@ def test_what_is_left_out_has_its_default(read) -> None:
         "method": "newton",
         "load_factors": None,
         "steps": None,
+        "duration": None,
         "first_step": None,
         "constant": (),
         "until": None,
@@ -85,6 +86,7 @@ def test_everything_that_can_be_said(read) -> None:
         "method": "arc_length",
         "load_factors": [0.0, 0.5],
         "steps": 30,
+        "duration": None,
         "first_step": 0.01,
         "constant": (1,),
         "until": Reached(node=7, axis="x", displacement=0.02),
@@ -145,8 +147,8 @@ BAD = {
         "analysis.load_factor: unknown key; did you mean 'load_factors'? known keys: kind, method",
     ),
     "key of a motion": (
-        [('"statics"', '"statics"\nduration = 1.0')],
-        'analysis.duration: only for analysis.kind = "dynamics" or "frf"; leave it out',
+        [('"statics"', '"statics"\ndt = 1.0')],
+        'analysis.dt: only for analysis.kind = "dynamics" or "frf"; leave it out',
     ),
     "output of a motion": (
         [('"statics"', '"statics"\n[output]\nevery = 0.1')],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -121,6 +123,25 @@ def fold_case(law):
         [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")],
         [fd.Force([0, 1], (1e-3, 0, 0))],
     )
+
+
+@pytest.mark.parametrize("duration", ["0.5", "[0, 0.5, 2]"])
+def test_a_path_with_a_time(tmp_path, duration):
+    law = 'fold_law = { kind = "eyring", barrier_moment = 2e-4, rate = 1e-4 }'
+    path = f'[analysis]\nkind = "statics"\nload_factors = [0, 1, 1, 1]\nduration = {duration}\n'
+    found = fd.read_case(written(tmp_path, FOLD.format(law=law) + path)).run()
+    fd.save(found, tmp_path / "found.nc")
+    stored = fd.load(tmp_path / "found.nc")
+    made = fd.trace(
+        fold_case(fd.Eyring(2e-4, 1e-4)), load_factors=[0, 1, 1, 1], duration=json.loads(duration)
+    )
+    np.testing.assert_array_equal(stored.displacement, made.displacement)
+    np.testing.assert_array_equal(stored.elapsed, made.elapsed)
+    assert float(stored.dissipated[-1]) > 0.0
+    for bad in ('"slow"', "[1, -1, 1]", "-0.5", "true"):
+        text = FOLD.format(law=law) + path.replace(f"duration = {duration}", f"duration = {bad}")
+        with pytest.raises(InputError, match=r"analysis\.duration"):
+            fd.read_case(written(tmp_path, text))
 
 
 def test_equilibria_of_creases_that_creep_are_refused():

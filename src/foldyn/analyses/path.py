@@ -67,6 +67,12 @@ def _load_factors(value: Any) -> list[float]:
     return [number(f"[{i}]", item) for i, item in enumerate(value)]
 
 
+def _durations(value: Any) -> float | list[float]:
+    if isinstance(value, list):
+        return [number(f"[{i}]", item, least=0.0, unit="s") for i, item in enumerate(value)]
+    return number("", value, least=0.0, unit="s")
+
+
 TIMELESS = (
     "a path has no time; leave it out: what loads and moves the structure grows with the load "
     "factor (or is named in analysis.constant)"
@@ -83,6 +89,7 @@ class PathSection(Section):
     method: Annotated[str, one_of(METHODS)] = "newton"
     load_factors: Annotated[list[float] | None, PlainValidator(_load_factors)] = None
     steps: Count | None = None
+    duration: Annotated[float | list[float] | None, PlainValidator(_durations)] = None
     first_step: float | None = None
     constant: Annotated[str | tuple[int, ...], PlainValidator(_constant)] = ()
     until: Annotated[Reached | None, PlainValidator(Reached.of)] = None

@@ -76,6 +76,7 @@ PATH: Mapping[str, Quantity] = {
     "residual": Quantity(text="residual as a fraction of the forces at play"),
     "memory": MEMORY,
     "dissipated": Quantity("J", "energy dissipated by creases and friction since the first point"),
+    "elapsed": Quantity("s", "time since the first point"),
 }
 FOLDING: Mapping[str, Quantity] = {
     "displacement": Quantity("m", "displacement from the pattern as it was", PLACE),

@@ -1,4 +1,4 @@
-"""What the accepted steps of a path change: creases that yield, and friction.
+"""What the accepted steps of a path change: creases that yield or creep, and friction.
 
 Both are functions of the state within a step. Only an accepted step moves what they start from, so
 iterations, steps that are cut and points that are located between others leave no trace.
@@ -25,6 +25,7 @@ class Kept(NamedTuple):
 
     creases: tuple[NDArray, ...] | None
     friction: tuple[NDArray, ...] | None
+    time: float  # s since the path began
 
 
 class Memories:
@@ -36,15 +37,20 @@ class Memories:
     flow : {"refused", "followed", "at rest"}
         What to do with friction and with creases that yield or creep: a path follows those that
         yield; at rest nothing has flowed.
+    timed : bool
+        Whether the steps of the path take time: then all that remembers flows along it.
 
     Attributes
     ----------
     body : Assembly
         With memory of its own, where there is any.
+    timed : bool
+        As given.
     """
 
-    def __init__(self, case: Case, flow: str) -> None:
-        self._case, flows = case, _flows(case, flow)
+    def __init__(self, case: Case, flow: str, timed: bool = False) -> None:
+        self._case, self.timed, self._time, self._step = case, timed, 0.0, 0.0
+        flows = _flows(case, flow, timed)
         body = case.body
         self._creases = self._friction = None
         if _rubs(case, flow):
@@ -57,7 +63,7 @@ class Memories:
 
     def __bool__(self) -> bool:
         """Whether there is any memory."""
-        return self._creases is not None or self._friction is not None
+        return self.timed or self._creases is not None or self._friction is not None
 
     @property
     def rubs(self) -> bool:
@@ -78,19 +84,28 @@ class Memories:
         """Whether anything slips where the body was evaluated last."""
         return self._friction is not None and self._friction.slips()
 
+    def elapse(self, seconds: float) -> None:
+        """Evaluate next so long after the last accepted step."""
+        self._step = seconds
+        if self._creases is not None:
+            self._creases.own.elapsed[0] = seconds
+
     def commit(self) -> Kept:
         """Accept the step that ends where the body was evaluated last."""
+        self._time, self._step = self._time + self._step, 0.0
         own = (self._creases, self._friction)
         for memory in own:
             if memory is not None:
                 memory.commit()
-        return Kept(*(None if memory is None else memory.snapshot() for memory in own))
+        creases, friction = (None if memory is None else memory.snapshot() for memory in own)
+        return Kept(creases, friction, self._time)
 
     def recall(self, kept: Kept | None) -> None:
         """Go back to an accepted step."""
         if kept is None:
             return
-        for memory, snapshot in zip((self._creases, self._friction), kept, strict=True):
+        self._time, self._step = kept.time, 0.0
+        for memory, snapshot in zip((self._creases, self._friction), kept[:2], strict=True):
             if memory is not None and snapshot is not None:
                 memory.recall(snapshot)
 
@@ -99,13 +114,12 @@ class Memories:
         parts = self._case.remembering
         state = np.zeros((sum(part.count for part in parts), VARIABLES))
         if kept is not None and kept.creases is not None:
-            flows = [not part.law.relaxes for part in parts]
-            state[np.repeat(flows, [part.count for part in parts])] = kept.creases[1]
+            state[flowing(self._case, self.timed)] = kept.creases[1]
         return state
 
     def lost(self, kept: Kept | None) -> float:
         """What creases and friction have dissipated there, J."""
-        own = [] if kept is None else [memory for memory in kept if memory is not None]
+        own = [] if kept is None else [memory for memory in kept[:2] if memory is not None]
         return float(sum(memory[2][0] for memory in own))
 
 
@@ -129,23 +143,29 @@ def _rubs(case: Case, flow: str) -> bool:
     return flow == FOLLOWED
 
 
-def _flows(case: Case, flow: str) -> tuple[Remembering, ...]:
-    """Laws with memory whose moments do not relax to those of an elastic law.
+def flowing(case: Case, timed: bool) -> NDArray:
+    """Mask (b,) of the branches that a path moves on; without a time, others are relaxed."""
+    parts = case.remembering
+    return np.repeat([timed or not p.law.relaxes for p in parts], [p.count for p in parts])
+
+
+def _flows(case: Case, flow: str, timed: bool) -> tuple[Remembering, ...]:
+    """Laws with memory that are not taken for their elastic parts, to which some of them relax.
 
     Raises
     ------
     InputError
         There are such, and the solver cannot have them.
     """
-    parts = tuple(part for part in case.remembering if not part.law.relaxes)
+    parts = tuple(part for part in case.remembering if timed or not part.law.relaxes)
     for part in parts:
         name, field = part.law.name, f"{part.kind}_law"
-        if flow == AT_REST or (flow == FOLLOWED and not part.law.rate_dependent):
+        if timed or flow == AT_REST or (flow == FOLLOWED and not part.law.rate_dependent):
             continue
         if part.law.rate_dependent:
             raise InputError(
-                f" = {name!r}: creep goes on for ever, and the steps of a path say nothing of "
-                "time; simulate the motion, or take an elastic law",
+                f" = {name!r}: creep goes on for ever, and load factors say nothing of time; give "
+                "fd.trace a duration, simulate the motion, or take an elastic law",
                 field,
             )
         raise InputError(

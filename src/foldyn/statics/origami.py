@@ -75,6 +75,8 @@ class OrigamiProblem:
         yield; at rest nothing has flowed.
     memory : ndarray of shape (b, 2) or "fresh", optional
         State of the creases where it begins; see `cases.State`.
+    timed : bool
+        Whether steps take time, in which creases relax and creep.
 
     Attributes
     ----------
@@ -95,9 +97,9 @@ class OrigamiProblem:
     def __init__(
         self, case: Case, constant: Sequence[int] = (), rest: NDArray | None = None,
         adaptive_load: AdaptiveLoad | None = None, inertia_relief: bool = False,
-        flow: str = REFUSED, memory: NDArray | str | None = None,
+        flow: str = REFUSED, memory: NDArray | str | None = None, timed: bool = False,
     ) -> None:  # fmt: skip
-        self.memories, self._plates = Memories(case, flow), Plates(case)
+        self.memories, self._plates = Memories(case, flow, timed), Plates(case)
         self.case, structure = case, case.structure
         self.structure, self._adaptive = structure, adaptive_load
         body = self.memories.body
@@ -262,6 +264,10 @@ class OrigamiProblem:
         """Begin at a factor, with friction at rest."""
         self._evaluate(self.start(factor), factor)
         self.memories.tie()
+
+    def elapse(self, seconds: float) -> None:
+        """Seek the next state so long (s) after the last one accepted."""
+        self.memories.elapse(seconds)
 
     def keep(self, u: NDArray, factor: float) -> Any:
         """Accept a state (m,), where creases have yielded and nodes slipped; see `recall`."""

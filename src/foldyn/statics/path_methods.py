@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice, pairwise
 from typing import Any, NamedTuple
 
@@ -52,10 +52,11 @@ class PathPlan(NamedTuple):
     end: float | None  # of a free factor
     steps: int
     first_step: float
+    durations: Sequence[float] = ()  # s, of the ways to `factors`; empty without a time
 
 
 def plan_path(
-    name: str, load_factors: Any, steps: int | None, first_step: float | None
+    name: str, load_factors: Any, steps: int | None, first_step: float | None, duration: Any = None
 ) -> PathPlan:
     """Check the arguments that say where a path leads."""
     method = METHODS[choice("method", name, METHODS)]
@@ -72,7 +73,13 @@ def plan_path(
             f": method {name!r} is driven by load_factors or steps; leave it out", "first_step"
         )
     if method.rule is None:
-        return _driven(method, factors, steps)
+        return _driven(method, factors, steps, duration)
+    if duration is not None:
+        raise InputError(
+            f": method {name!r} finds its load factors on the way, and they may turn back, so that "
+            "no step has a time; take 'newton' or 'displacement'",
+            "duration",
+        )
     if factors is not None and len(factors) != 2:
         raise InputError(
             f": method {name!r} chooses its own; give two numbers, where the "
@@ -93,7 +100,9 @@ def plan_path(
     return PathPlan(method, begin, [], end, int(steps or STEPS_FREE), float(step))
 
 
-def _driven(method: PathMethod, factors: list[float] | None, steps: int | None) -> PathPlan:
+def _driven(
+    method: PathMethod, factors: list[float] | None, steps: int | None, duration: Any
+) -> PathPlan:
     if factors is not None and steps is not None:
         raise InputError(
             " and steps: give one of them; steps counts equal steps from 0 to 1", "load_factors"
@@ -101,10 +110,26 @@ def _driven(method: PathMethod, factors: list[float] | None, steps: int | None) 
     if factors is None:
         count = int(steps or STEPS_DRIVEN)
         factors = [k / count for k in range(count + 1)]
+    durations = [] if duration is None else _durations(duration, len(factors) - 1)
     for i, (one, other) in enumerate(pairwise(factors)):
-        if one == other:
-            raise InputError(f": number {i + 1} repeats the one before, {one:g}", "load_factors")
-    return PathPlan(method, factors[0], factors[1:], None, len(factors) - 1, 0.0)
+        if one == other and not (durations and durations[i] > 0.0):
+            raise InputError(
+                f": number {i + 1} repeats the one before, {one:g}, which takes a duration",
+                "load_factors",
+            )
+    return PathPlan(method, factors[0], factors[1:], None, len(factors) - 1, 0.0, durations)
+
+
+def _durations(given: Any, steps: int) -> list[float]:
+    """Times (s) of so many steps."""
+    array = numbers("duration", given)
+    if array.ndim > 1 or (array.ndim and len(array) != steps) or not (array >= 0.0).all():
+        raise InputError(
+            f" = {show(given)}: give the time (s) of a step, at least 0, or that of each of the "
+            f"{steps} steps",
+            "duration",
+        )
+    return np.broadcast_to(array, steps).tolist()
 
 
 def along(
@@ -114,7 +139,7 @@ def along(
     """Stations of a path after its first one; `direction` as of `continuation.follow`."""
     method = plan.method
     if method.rule is None:
-        way = walk(solver, start, plan.factors, method.between)
+        way = walk(solver, start, plan.factors, method.between, plan.durations)
     else:
         way = islice(follow(solver, start, method.rule, plan.first_step, direction), plan.steps)
     if plan.end is not None:

@@ -104,10 +104,13 @@ def stability_facts(points: Sequence[Point], from_rest: bool) -> dict[str, Any]:
     }
 
 
-def stability_warning(points: Sequence[Point], from_rest: bool, free: bool) -> str:
+def stability_warning(
+    points: Sequence[Point], from_rest: bool, free: bool, timed: bool = False
+) -> str:
     """Warning of where a path loses stability; empty where it does not.
 
     free : whether the method follows a path through limit points, by a free load factor.
+    timed : whether its steps take time.
     """
     losses = [
         change
@@ -121,6 +124,8 @@ def stability_warning(points: Sequence[Point], from_rest: bool, free: bool) -> s
     remedy = "switch_branch follows the path that crosses there"
     if losses[0].before is None:
         remedy = "start from a stable state"
+    elif timed:
+        remedy = "shorter steps tell when, and whether creep has brought it there"
     elif not any(change.critical for change in losses):
         remedy = f"method 'arc_length' locates the point, and {remedy}"
     return (
@@ -190,7 +195,8 @@ def _dataset(
 ) -> xarray.Dataset:  # fmt: skip
     """The points, with the case and the facts about the run."""
     from_rest = facts["started_from"] == "rest"
-    message = stability_warning(points, from_rest, METHODS[facts["method"]].rule is not None)
+    free, timed = METHODS[facts["method"]].rule is not None, problem.memories.timed
+    message = stability_warning(points, from_rest, free, timed)
     if message:
         warnings.warn(message, FoldynWarning, stacklevel=5)
     if message := _asymmetry_warning(points[-1], problem):
@@ -274,6 +280,9 @@ def _memory(problem: OrigamiProblem, points: Sequence[Point]) -> dict[str, Any]:
     if problem.case.remembering or own.rubs:
         lost = np.array([own.lost(point.memory) for point in points])
         out["dissipated"] = lost - lost[0]
+    if own.timed:
+        times = np.array([point.memory.time for point in points])
+        out["elapsed"] = times - times[0]
     return out
 
 

@@ -22,7 +22,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from foldyn.algebra.superlu import Factorization
 from foldyn.statics.newton import Solver, plane
-from foldyn.statics.stepping import Station, arrive, kept, recall
+from foldyn.statics.stepping import Station, arrive, elapse, kept, recall
 
 APART = 1e-6  # share of a step within which crossings count as one multiple point
 SHARP = 1e-13  # share of a step to which a crossing is located
@@ -52,6 +52,8 @@ class Section:
         self.chord = end.point.u - start.point.u
         self.whole = float(self.chord @ self.chord)
         self.ends = Mark(0.0, start), Mark(1.0, end)
+        times = (getattr(station.point.memory, "time", 0.0) for station in (end, start))
+        self.seconds = next(times) - next(times)
 
     def at(self, share: float, low: Mark, high: Mark) -> Mark | None:
         """Station at a share of the step, sought from between two marks; None if not found."""
@@ -61,11 +63,16 @@ class Section:
         u = one.u + weight * (other.u - one.u)
         u[self.solver.problem.held] = self.solver.problem.prescribed(factor)
         rule = plane(self.chord, share * self.whole)
+        elapse(self.solver.problem, share * self.seconds)
         attempt = self.solver.correct(u, factor, rule, origin=self.start.point.u)
         farthest = 2.0 * np.sqrt(self.whole)  # from the start: twice the length of the step
         if attempt.failure or np.linalg.norm(attempt.u - self.start.point.u) > farthest:
             return None
         return Mark(share, arrive(self.solver, attempt))
+
+    def share(self, station: Station) -> float:
+        """The share at which a station on one of them lies."""
+        return float((station.point.u - self.start.point.u) @ self.chord) / self.whole
 
     def zero(
         self, function: Callable[[Mark], float], xtol: float,
@@ -114,6 +121,7 @@ def critical_points(solver: Solver, start: Station, end: Station) -> list[Statio
     section, found = Section(solver, start, end), []
     recall(solver.problem, start)
     for station in _crossings(section, *section.ends):
+        elapse(solver.problem, section.share(station) * section.seconds)
         found.append(kept(solver.problem, station))
         recall(solver.problem, start)
     recall(solver.problem, end)

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import repeat
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ REMEDY_LIMIT = (
     "a limit point may lie ahead: method 'arc_length' follows the path through it "
     "(or take smaller steps)"
 )
+REMEDY_CREEP = "it may give way by creep there (or take shorter steps, with shorter durations)"
 REMEDY_COLLISION = "let the folds lock before panels meet (fold_law 'enhanced')"
 REMEDY_LOCKED = (
     "the folds lock already, but panels are pushed into each other: end the path before, or take "
@@ -115,52 +117,73 @@ def recall(problem: Problem, station: Station) -> None:
         back(station.point.memory)
 
 
-def step_to(solver: Solver, start: Station, factor: float) -> Attempt:
-    """Equilibrium at another load factor, on the path on which `start` lies."""
-    plain = _step(solver, start, factor, False)
+def elapse(problem: Problem, seconds: float) -> None:
+    """Seek the next state so long after the last one accepted."""
+    pass_time = getattr(problem, "elapse", None)  # problems without a time have none
+    if pass_time and seconds > 0.0:
+        pass_time(seconds)
+
+
+def step_to(solver: Solver, start: Station, factor: float, seconds: float = 0.0) -> Attempt:
+    """Equilibrium at another load factor, or later, on the path on which `start` lies."""
+    elapse(solver.problem, seconds)
+    plain = _step(solver, start, factor, seconds, False)
     if not plain.failure or plain.failure == SNAPS:
         return plain
-    searched = _step(solver, start, factor, True)
+    searched = _step(solver, start, factor, seconds, True)
     return plain if searched.failure else searched
 
 
-def _step(solver: Solver, start: Station, factor: float, search: bool) -> Attempt:
+def _step(solver: Solver, start: Station, factor: float, seconds: float, search: bool) -> Attempt:
     """One attempt; it has snapped if it goes much farther than its linear prediction."""
-    attempt = solver.correct(start.point.u, factor, None, start.stiffness, search)
+    problem, u = solver.problem, start.point.u
+    attempt = solver.correct(u, factor, None, start.stiffness, search)
     if attempt.failure:
         return attempt
-    change = abs(factor - start.point.factor)
-    length = float(np.linalg.norm(attempt.u - start.point.u))
+    change = factor - start.point.factor
+    length = float(np.linalg.norm(attempt.u - u))
+    # what has relaxed at the start by the end of the step, N
+    relaxed = problem.residual(u, start.point.factor) if seconds > 0.0 else None
 
-    def snaps(response: NDArray) -> bool:
-        predicted = change * float(np.linalg.norm(response))
-        return length > solver.settings.jump * predicted + NEGLIGIBLE * solver.problem.length
+    def snaps(stiffness: Stiffness, response: NDArray) -> bool:
+        predicted = change * response
+        if relaxed is not None:
+            predicted = predicted - stiffness.solve(relaxed, np.zeros(len(problem.held)))
+        reach = solver.settings.jump * float(np.linalg.norm(predicted))
+        return length > reach + NEGLIGIBLE * problem.length
 
-    if not snaps(start.response):
+    if not snaps(start.stiffness, start.response):
         return attempt
-    # what begins to yield or to slip within the step goes on as it does at its end
-    gives_way = start.point.memory is not None
-    if gives_way and not snaps(solver.stiffness(attempt.u, factor).response(attempt.u, factor)):
-        return attempt
+    if start.point.memory is not None:
+        # what begins to yield or to slip within the step goes on as it does at its end
+        there = solver.stiffness(attempt.u, factor)
+        if not snaps(there, there.response(attempt.u, factor)):
+            return attempt
     return attempt._replace(failure=SNAPS)
 
 
-def walk(solver: Solver, start: Station, factors: Sequence[float], between: bool) -> Walk:
-    """Stations at the given factors, reached in turn, and those in between if `between`."""
+def walk(
+    solver: Solver, start: Station, factors: Sequence[float], between: bool,
+    durations: Sequence[float] = (),
+) -> Walk:  # fmt: skip
+    """Stations at the given factors, reached in turn, and those in between if `between`.
+
+    durations : times (s) to get there, if any; a factor may then be that before it.
+    """
     station = start
     step = abs(factors[0] - start.point.factor) if len(factors) else 0.0
-    for goal in factors:
-        origin = station.point.factor
-        whole = abs(goal - origin)
-        step = min(max(step, 1e-3 * whole), whole)
+    for goal, seconds in zip(factors, durations or repeat(0.0), strict=False):
+        waits = goal == station.point.factor
+        left = whole = 1.0 if waits else abs(goal - station.point.factor)
+        step = whole if waits else min(max(step, 1e-3 * whole), whole)
         shortest = whole * 2.0**-solver.settings.cuts
-        while station.point.factor != goal:
-            left = goal - station.point.factor
+        while left > 0.0:
             # no crumbs: the rest is taken in one or in two equal steps
-            length = abs(left) if abs(left) <= 1.01 * step else min(step, 0.5 * abs(left))
-            end = station.point.factor + math.copysign(length, left)
-            target = goal if length == abs(left) else end
-            attempt = step_to(solver, station, target)
+            length = left if left <= 1.01 * step else min(step, 0.5 * left)
+            last = waits or length == left
+            ahead = math.copysign(length, goal - station.point.factor)
+            target = goal if last else station.point.factor + ahead
+            attempt = step_to(solver, station, target, seconds * (length / whole))
             if attempt.failure:
                 solver.tally.cuts += 1
                 step = 0.5 * length
@@ -170,16 +193,20 @@ def walk(solver: Solver, start: Station, factors: Sequence[float], between: bool
             if attempt.iterations <= 2 * solver.settings.target:
                 step = max(step, min(2.0 * length, whole))
             station = kept(solver.problem, arrive(solver, attempt))
-            if between or target == goal:
+            left = left - length if waits else abs(goal - station.point.factor)
+            if between or left == 0.0:
                 yield station
 
 
 def stopped(station: Station, attempt: Attempt) -> PathStoppedError:
     """The end of a path driven by the load factor."""
+    time = getattr(station.point.memory, "time", 0.0)
+    after = f"after {time:.6g} s " if time else ""
+    remedy = REMEDY_CREEP if time else REMEDY_LIMIT
     return PathStoppedError(
-        f"no equilibrium was found beyond the load factor {station.point.factor:.6g} "
+        f"no equilibrium was found beyond the load factor {station.point.factor:.6g} {after}"
         f"({attempt.failure})",
-        REMEDY_COLLISION if attempt.failure == COLLIDES else REMEDY_LIMIT,
+        REMEDY_COLLISION if attempt.failure == COLLIDES else remedy,
     )
 
 

@@ -17,7 +17,7 @@ from foldyn.errors import InputError
 from foldyn.materials.memory_law import VARIABLES
 from foldyn.memory import check_memory
 from foldyn.statics.mechanism import refuse_mechanisms
-from foldyn.statics.memories import FOLLOWED
+from foldyn.statics.memories import FOLLOWED, flowing
 from foldyn.statics.newton import Settings, Solver, settings_of
 from foldyn.statics.origami import AdaptiveLoad, OrigamiProblem, drives, is_actuated
 from foldyn.statics.path_methods import METHODS, PathPlan, Until, along, plan_path
@@ -40,6 +40,7 @@ def trace(
     load_factors: Sequence[float] | None = None,
     steps: int | None = None,
     *,
+    duration: float | Sequence[float] | None = None,
     constant: str | Sequence[int] = (),
     initial: State | None = None,
     first_step: float | None = None,
@@ -68,6 +69,10 @@ def trace(
     steps : int, optional
         Instead of load_factors: equal steps from 0 to 1 (default 10). For "mgdcm" and
         "arc_length": steps after which the path ends (default 100).
+    duration : float or sequence of float, optional
+        For "newton" and "displacement" the time (s) from each load factor to the next, one for all
+        or one each: the factor changes at a constant rate, or stays where it is repeated. Creases
+        with memory relax and creep meanwhile; without it they have had the time to relax.
     constant : "gravity", int or sequence of int
         Loads, by their numbers in `case.loads`, each once, that act in full at every factor.
     initial : State, optional
@@ -96,9 +101,9 @@ def trace(
         `displacement` (m) with dimensions step, node, axis and the coordinate `load_factor`;
         `reaction` (N) at supported dofs; energies (J) `strain_bars`, `strain_folds`,
         `strain_bends` and `work`; `negative_eigenvalues`, `point` ("regular", "limit",
-        "bifurcation"), `iterations`, `residual`. Attributes hold `status` ("complete" or
-        "stopped", then with `stopped_because` and `remedy`), `unstable_points` (how many) and
-        `stability_changes` (in words), and the facts about the run.
+        "bifurcation"), `iterations`, `residual`; with a duration `elapsed` (s). Attributes hold
+        `status` ("complete" or "stopped", then with `stopped_because` and `remedy`),
+        `unstable_points` (how many) and `stability_changes` (in words), and facts about the run.
 
     Raises
     ------
@@ -130,7 +135,7 @@ def trace(
     choice("method", method, METHODS)
     if steps is not None:
         check_steps(steps, case.structure.nodes.size)
-    plan = plan_path(method, load_factors, steps, first_step)
+    plan, timed = plan_path(method, load_factors, steps, first_step, duration), duration is not None
     steady = _constant_loads(case, constant)
     displacement = None if initial is None else displacement_of(initial, case, "initial")
     _check_case(case, plan, steady, adaptive_load is not None)
@@ -142,7 +147,7 @@ def trace(
     check_fill(case.structure.fill, case.body.size)
     problem = OrigamiProblem(
         case, steady, displacement, adaptive_load, inertia_relief,
-        flow=FOLLOWED, memory=_flowed(case, initial),
+        flow=FOLLOWED, memory=_flowed(case, initial, timed), timed=timed,
     )  # fmt: skip
     begin = 0.0 if initial is None else plan.begin
     _check_start(problem, begin)
@@ -155,6 +160,7 @@ def trace(
         "method": method,
         "steps": plan.steps,
         "load_factors": load_factors,
+        "duration": duration,
         "first_step": plan.first_step if plan.method.rule is not None else None,
         "constant": steady or None,
         "inertia_relief": inertia_relief,
@@ -172,19 +178,18 @@ def trace(
     return record(stations(), progress, solver, problem, facts, adaptive_load is not None)
 
 
-def _flowed(case: Case, initial: State | None) -> NDArray | str | None:
-    """State in which creases that yield begin, of that of all branches (b, 2)."""
+def _flowed(case: Case, initial: State | None, timed: bool) -> NDArray | str | None:
+    """State in which branches begin that the path moves on, of that of all (b, 2)."""
     given = None if initial is None else initial.memory
     if given is None or isinstance(given, str):
         return given
-    state, parts = np.array(given, float), case.remembering
-    count = sum(part.count for part in parts)
-    if state.shape != (count, VARIABLES):
+    state, flows = np.array(given, float), flowing(case, timed)
+    if state.shape != (len(flows), VARIABLES):
         raise InputError(
-            f"initial: memory of shape {state.shape}: the case has {(count, VARIABLES)}, branches "
-            "and variables; take the state of a result of the same case"
+            f"initial: memory of shape {state.shape}: the case has {(len(flows), VARIABLES)}, "
+            "branches and variables; take the state of a result of the same case"
         )
-    return state[np.repeat([not part.law.relaxes for part in parts], [p.count for p in parts])]
+    return state[flows]
 
 
 def on_nodes(
