@@ -278,11 +278,6 @@ def test_moments_on_creases_need_edge_angles():
         fd.simulate(case, duration=0.1, method="rk4")
 
 
-def test_panels_that_curl_are_refused():
-    with pytest.raises(InputError, match=r'scheme = "n5b8e": panels that curl.*"n5b8"'):
-        fd.Case(miura(), [fd.Fix([0, 1, 2])], [fd.Temperature(10.0, curvature=1e-3)])
-
-
 def test_rigid_panels_have_no_edge_angles():
     """Without any, the body of explicit methods is the one of all others."""
     s = edged(fd.patterns.simple_fold(dihedral=100), rigid="all")

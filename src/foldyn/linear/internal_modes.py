@@ -22,11 +22,9 @@ from scipy.linalg import block_diag
 
 from foldyn.errors import InputError
 from foldyn.structures import Structure
-from foldyn.structures.edge_angles import outlines
 from foldyn.structures.mass import condensed_panels
 from foldyn.structures.panel_modes import panel_modes
-from foldyn.structures.panel_plate import TRIANGLE_MASS, Outline
-from foldyn.structures.rigid_plates import rigid_panels
+from foldyn.structures.panel_plate import TRIANGLE_MASS
 from foldyn.values import show, whole
 
 MOST = 6  # the meshes of panels have further shapes, but less and less well
@@ -136,7 +134,7 @@ def amplitudes(structure: Any, displacement: NDArray, size: int, count: int) -> 
     rule, total = condensed_panels(surface), surface.panel_mass
     per_hidden = structure.body.sheet.fold_hinges().per_hidden
     first, stiffness, masses, points, between = size, [np.zeros(0)], [], [np.zeros((0, 3))], []
-    for p, panel in enumerate(_outlines(structure)):
+    for p, panel in enumerate(structure.outlines):
         if panel is None:
             continue
         own, corners = kinds[kind[p]], list(surface.faces[p])
@@ -181,16 +179,6 @@ def _ends(nodes: NDArray, corners: int) -> NDArray:
         return edges
     spokes = np.column_stack([np.eye(corners), np.ones(corners)])
     return np.concatenate([np.pad(edges, ((0, 0), (0, 1))), spokes])
-
-
-def _outlines(structure: Structure) -> list[Outline | None]:
-    """Outlines of its panels; None of rigid ones."""
-    options, pattern = structure.options, structure.pattern
-    assert pattern is not None
-    return outlines(
-        structure.nodes, structure.centers, structure.folds, pattern, structure.sheet,
-        options.straight, rigid_panels(options.rigid, len(pattern.faces)),
-    )  # fmt: skip
 
 
 def _double_area(x: NDArray) -> NDArray:

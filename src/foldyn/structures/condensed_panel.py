@@ -33,17 +33,37 @@ def panel_stiffness(panel: Outline, poissons_ratio: float) -> NDArray:
     """
     coarse, fine = (_condensed(panel, poissons_ratio, n) for n in (COARSE, FINE))
     stiffness = extrapolated(coarse, fine, FINE / COARSE)
-    points, corners = _points(panel), len(panel.corners)
     held = heights_and_slopes(panel)
     stiffness = held.T @ stiffness @ held
-    spokes = _spoke_turns(points, corners) if panel.center else np.zeros((0, len(points)))
-    others = len(stiffness) - len(points)
-    turned = np.zeros((len(stiffness), len(spokes) + others))
-    turned[: len(points), : len(spokes)] = np.linalg.pinv(spokes, rcond=1e-9)
-    turned[len(points) :, len(spokes) :] = np.eye(others)
+    turned = _heights(panel, len(stiffness))
     out = turned.T @ stiffness @ turned
     out = 0.5 * (out + out.T)
     out.setflags(write=False)
+    return out
+
+
+@lru_cache(maxsize=4096)
+def panel_moments(panel: Outline, poissons_ratio: float) -> NDArray:
+    """Moments (q,) of these angles where the panel would have the curvature 1 in both directions.
+
+    Over its bending stiffness. With phi the angles and kappa the curvature, the energy is
+    1/2 phi^T K phi - kappa phi^T m, but for what depends on kappa alone.
+    """
+    coarse, fine = (_curled(panel, poissons_ratio, n) for n in (COARSE, FINE))
+    stiffness, held_back = (
+        extrapolated(a, b, FINE / COARSE) for a, b in zip(coarse, fine, strict=True)
+    )
+    moments = heights_and_slopes(panel).T @ (stiffness @ _paraboloid(panel) - held_back)
+    return _heights(panel, len(moments)).T @ moments
+
+
+def _heights(panel: Outline, size: int) -> NDArray:
+    """Matrix (size, q): the least heights with these turns of spokes, the other angles as are."""
+    points, corners = _points(panel), len(panel.corners)
+    spokes = _spoke_turns(points, corners) if panel.center else np.zeros((0, len(points)))
+    out = np.zeros((size, len(spokes) + size - len(points)))
+    out[: len(points), : len(spokes)] = np.linalg.pinv(spokes, rcond=1e-9)
+    out[len(points) :, len(spokes) :] = np.eye(size - len(points))
     return out
 
 
@@ -97,6 +117,27 @@ def _condensed(panel: Outline, poissons_ratio: float, n: int) -> NDArray:
     """Stiffness of the heights of corners and center, mean outward slopes of creases, and bows."""
     plate = PanelPlate(panel, poissons_ratio, n)
     return plate.solved([*plate.heights, *plate.slopes, *plate.bows])[1]
+
+
+def _paraboloid(panel: Outline) -> NDArray:
+    """The same of the heights r^2 / 2."""
+    corners = np.array(panel.corners)
+    along = np.roll(corners, -1, axis=0) - corners
+    length, middle = np.linalg.norm(along, axis=1), corners + 0.5 * along
+    slopes = (along[:, 1] * middle[:, 0] - along[:, 0] * middle[:, 1]) / length
+    heights = 0.5 * (_points(panel) ** 2).sum(axis=1)
+    creased, bowed = (np.flatnonzero(which) for which in (panel.creased, panel.bowed))
+    return np.concatenate([heights, slopes[creased], -length[bowed] / 12.0])
+
+
+def _curled(panel: Outline, poissons_ratio: float, n: int) -> tuple[NDArray, NDArray]:
+    """`_condensed`, and the forces that lack to hold the paraboloid: where edges stay straight."""
+    plate = PanelPlate(panel, poissons_ratio, n)
+    held = [*plate.heights, *plate.slopes, *plate.bows]
+    shapes, stiffness = plate.solved(held)
+    whole = plate.paraboloid
+    there = [sum(share * whole[k] for k, share in entries.items()) for entries in held]
+    return stiffness, stiffness @ there - shapes.T @ (plate.stiffness @ whole)
 
 
 @lru_cache(maxsize=4096)

@@ -15,7 +15,7 @@ straight they share its bow as well.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +27,7 @@ from foldyn.materials import BarLaw, HingeLaw
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
-from foldyn.structures.condensed_panel import panel_stiffness
+from foldyn.structures.condensed_panel import panel_moments, panel_stiffness
 from foldyn.structures.mesh import Mesh, hinge_angles, lengths
 from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
@@ -113,6 +113,35 @@ def edge_plates(
         entry=np.concatenate([[0], np.cumsum(np.square(sizes))]).astype(np.int64),
         stiffness=np.concatenate([np.zeros(0), *(matrix.ravel() for matrix in matrices)]),
     )
+
+
+def curl_moments(
+    plates: EdgePlates, panels: Sequence[Outline | None], curvature: NDArray, sheet: Sheet,
+    area: NDArray,
+) -> NDArray:  # fmt: skip
+    """Moments (nq,), N m, of the angles of plates that would have these curvatures, 1/m.
+
+    panels : see `outlines`.
+    curvature, area : (np,), 1/m and m2.
+    """
+    kinds, kind = sheet.kinds(len(panels))
+    out, seen = np.zeros(len(plates.angle)), set()
+    for p, panel in enumerate(panels):
+        if panel is None:
+            continue
+        own, size = kinds[kind[p]], np.sqrt(2.0 * area[p])  # an outline's is 1
+        scale, place = own.bending_modulus * curvature[p] * size, plates.start[p]
+        spokes = len(panel.corners) if panel.center else 0
+        for k, moment in enumerate(scale * panel_moments(panel, own.poissons_ratio)):
+            if k < spokes or plates.angle[place] < 0:
+                out[place] = moment
+                place += 1
+                continue
+            shared = plates.angle[place + 1]  # at a weld, see `edge_plates`
+            out[place : place + 2] = 0.5 * moment, -moment if shared in seen else moment
+            seen.add(shared)
+            place += 2
+    return out
 
 
 def outlines(

@@ -77,6 +77,7 @@ class PanelPlate:
         self.points, self.triangles, at, edges = _meshed(x, panel.center, n)
         side, sign, ends = _sides(self.triangles)
         self.stiffness = _plate(self.points, self.triangles, side, sign, poissons_ratio)
+        self._ends = ends
         number = {pair: len(self.points) + k for k, pair in enumerate(map(tuple, ends.tolist()))}
         self.heights = [{node: 1.0} for node in at.tolist()]
         self.slopes, self.bows, self.lines = [], [], []
@@ -122,6 +123,16 @@ class PanelPlate:
         found[others] = pulled @ force
         found[others, :count] -= moved
         return found, found.T @ (self.stiffness @ found)
+
+    @property
+    def paraboloid(self) -> NDArray:
+        """Unknowns of the heights r^2 / 2, which triangles of constant curvature have exactly."""
+        one, other = np.moveaxis(self.points[self._ends], 1, 0)
+        along = other - one
+        across = np.column_stack([along[:, 1], -along[:, 0]])
+        slopes = np.einsum("si,si->s", across, 0.5 * (one + other))
+        slopes /= np.linalg.norm(along, axis=1)
+        return np.concatenate([0.5 * (self.points**2).sum(axis=1), slopes])
 
     @property
     def mass(self) -> sparse.csr_array:

@@ -25,7 +25,7 @@ from foldyn.materials import (
 from foldyn.materials.plate_superlinear import onset_parameters
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.clamps import ClampsTerm
-from foldyn.mechanics.following import joined, moments, tensions
+from foldyn.mechanics.following import Following, joined, moments, pushes, tensions
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm
@@ -34,10 +34,11 @@ from foldyn.structures.clamps import clamps
 from foldyn.structures.condensed_plates import CondensedPlatesTerm, balanced
 from foldyn.structures.creases import PerCrease, per_crease
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
-from foldyn.structures.edge_angles import EdgePlates, plates_model
+from foldyn.structures.edge_angles import EdgePlates, curl_moments, outlines, plates_model
 from foldyn.structures.mass import MASS_RULES, lumped
-from foldyn.structures.mesh import hinge_angles
-from foldyn.structures.rigid_plates import Plate, rigid_plates
+from foldyn.structures.mesh import double_areas, hinge_angles
+from foldyn.structures.panel_plate import Outline
+from foldyn.structures.rigid_plates import Plate, rigid_panels, rigid_plates
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.swelling import Chords, Swelling, chords
 from foldyn.values import choice
@@ -275,23 +276,51 @@ class Structure(Discretized):
 
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """See `Discretized`; a bar between panels takes their mean strain."""
-        if self.edge_plates is not None and np.any(curvature):
-            raise InputError(
-                ' = "n5b8e": panels that curl need edge angles at rest, which it does not have; '
-                'take "n5b8"',
-                "scheme",
-            )
-        of_hinges, of_clamps = self._chords
         stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
         free = _mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
         tension = -stiffness * self.bar_law.stress(1.0 + free)
         parts = [tensions(self.nodes, self.bars, tension)]
+        if self.edge_plates is not None:
+            curled = self._curled(self.edge_plates, curvature) if np.any(curvature) else []
+            turns = np.zeros(len(self.folds) + len(self.bends))
+            return Swelling(turns, joined((part, 0) for part in parts + curled))
+        of_hinges, of_clamps = self._chords
         if len(self.clamps):
             edges = clamps(self.nodes, self.clamps, self.clamp_stiffness, 0)
             turn = of_clamps.turns(curvature)
             rows = np.column_stack([self.clamps, np.full(len(self.clamps), -1)])
             parts.append(moments(edges.points, rows, self.clamp_stiffness * turn))
         return Swelling(of_hinges.turns(curvature), joined((part, 0) for part in parts))
+
+    def _curled(self, plates: EdgePlates, curvature: NDArray) -> list[Following]:
+        """Moments on the angles of plates, whose energies are linear in these curvatures."""
+        if self.without_edge_angles:
+            raise InputError(
+                ': with scheme = "n5b8e" explicit methods do not take panels that curl; choose '
+                '"generalized_alpha"',
+                "method",
+            )
+        area = 0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
+        area = np.bincount(self.triangle_panel, area)
+        moment = curl_moments(plates, self.outlines, curvature, self.sheet, area)
+        hinges, on_hinge = np.concatenate([self.folds, self.bends]), plates.angle >= 0
+        turning = np.bincount(plates.angle[on_hinge], moment[on_hinge], minlength=len(hinges))
+        hidden, term = self.nodes.size - 1 - plates.angle[~on_hinge], self.body.sheet
+        return [
+            moments(self.nodes[hinges], hinges, turning),
+            pushes(hidden, term.per_hidden * moment[~on_hinge]),
+        ]
+
+    @cached_property
+    def outlines(self) -> list[Outline | None]:
+        """Outlines of its panels as plates; None of rigid ones."""
+        pattern, options = self.pattern, self.options
+        assert pattern is not None
+        hinges = np.concatenate([self.folds, self.bends[len(self.bends) - len(pattern.welds) :]])
+        return outlines(
+            self.nodes, self.centers, hinges, pattern, self.sheet, options.straight,
+            rigid_panels(options.rigid, len(pattern.faces)),
+        )  # fmt: skip
 
     @cached_property
     def _chords(self) -> tuple[Chords, Chords]:
