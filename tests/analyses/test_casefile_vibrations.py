@@ -154,7 +154,7 @@ BAD = {
     "no density": ([("density = 1.0\n", "")], "sheet.density: missing; modes need it (kg/m3)"),
     "key of a motion": (
         [('"modes"', '"modes"\nduration = 1.0')],
-        'analysis.duration: only for analysis.kind = "dynamics" or "frf"; leave it out',
+        'analysis.duration: only for analysis.kind = "dynamics", "statics" or "frf"; leave it out',
     ),
     "drive": (
         [("[analysis]", "[[drive]]\nnodes = 7\nforce = [1, 0, 0]\n[analysis]")],

@@ -248,3 +248,21 @@ def test_times_that_mean_nothing_are_refused(arguments, message):
 def test_creep_without_a_time_is_refused():
     with pytest.raises(InputError, match=r"'eyring': creep goes on for ever.*fd.trace a duration"):
         fd.trace(moved(fd.Eyring(1.0, 1.0, law="linear"), 0.3))
+
+
+def test_dampers_of_creases_in_series_with_panels_take_time():
+    """As in a motion of panels so light that nothing else does."""
+    pattern, duration, n = fd.patterns.simple_fold(dihedral=120), 0.5, 50
+    structure = fd.discretize(pattern, SHEET, fold_law="linear")
+    supports, found = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")], []
+    for history in (fd.Constant(), fd.Ramp(duration)):
+        load = fd.Force([0, 1], (2e-3, 0, 0), history)
+        found.append(fd.Case(structure, supports, [load], fd.CreaseDamping(0.01)))
+    path = fd.trace(found[0], steps=n, duration=duration / n)
+    motion = fd.simulate(
+        found[1], duration, "generalized_alpha", dt=duration / n, every=n, spectral_radius=0.0
+    )
+    relaxed = fd.trace(found[0], load_factors=[0.0, 1.0]).displacement.values[-1]
+    end, scale = path.displacement.values[-1], np.abs(relaxed).max()
+    assert np.abs(end - motion.displacement.values[-1]).max() < 2e-3 * scale
+    assert np.abs(end - relaxed).max() > 0.1 * scale
