@@ -4,7 +4,8 @@ A kernel holds the compiled functions and the numbers that it names, and knows t
 named tuples that it names. So it is made from its own text and from the statements that define
 these names, in its file or in those of the package that it imports them from, and so on; nothing
 else counts: neither functions without a decorator, which compiled ones cannot call, nor messages,
-nor lines above. Contents are looked at, never times: a copy, a checkout or a clock may set these as it likes.
+nor lines above. Contents are looked at, never times: a copy, a checkout or a clock may set these as
+it likes.
 
 Statements are told apart by their first column, and names are all words in their text. Words that
 are no names, as in comments, make a kernel depend on more than it is made from, never on less.
