@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from multiprocessing import parent_process
 
-PER_KERNEL = 0.5
-"""Seconds at least: 79 kernels of modes took 22 s of a processor, 142 of a motion with RK4 60 s."""
+PER_KERNEL = 0.14
+"""Seconds at least: 76 kernels of modes took 10 s of a processor, 109 of a motion with RK4 17 s."""
 SHORTEST = 3.0
 """Seconds below which nothing is told."""
 

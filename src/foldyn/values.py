@@ -17,7 +17,7 @@ from numbers import Integral, Real
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError, UnitsWarning
 
@@ -361,6 +361,12 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
         )
     result.flags.writeable = False
     return result
+
+
+def writable(array: ArrayLike) -> NDArray[np.float64]:
+    """Floats in a row that can be written: for others, kernels would be compiled once more."""
+    floats = np.ascontiguousarray(array, float)
+    return floats if floats.flags.writeable else floats.copy()
 
 
 def _as_floats(array: NDArray) -> NDArray:

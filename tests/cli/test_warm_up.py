@@ -1,34 +1,44 @@
-"""`foldyn warm-up`: compiles what is asked for once, and nothing else."""
+"""`foldyn warm-up`: compiles what any run needs, once."""
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from foldyn.dynamics import METHODS, warm_up
-from foldyn.dynamics.warm_up import MODELS, USUAL, together
-from foldyn.errors import InputError
-from foldyn.structures import PRESETS
+from foldyn.cli.first_uses import STAGES, use
 
 ALONE = """
+from foldyn.cli.first_uses import use
 from foldyn.dynamics import METHODS
-from foldyn.dynamics.warm_up import warm_up
-warm_up("rk4", "herkal")
+use("bars and hinges")
 print(*(name for name, method in METHODS.items() if method.loop.overloads))
 """
+OTHERS = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import reference
+from foldyn.jit.counting import counted
+for name, compute in list(reference.cases(""))[::10]:
+    with counted() as compiled:
+        compute()
+    if compiled():
+        print(name, compiled())
+"""
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
-def test_what_is_there_is_not_compiled_again(workplace) -> None:
-    words = ("warm-up", "--methods", "rk4", "--models", "herkal", "plate")
-    workplace.call(*words)
-    told = workplace.call(*words)
+def test_what_is_there_is_not_compiled_again(workplace, monkeypatch) -> None:
+    few = ("bars and hinges", "several motions at once")
+    monkeypatch.setattr("foldyn.cli.first_uses.STAGES", [{name: ()} for name in few])
+    workplace.call("warm-up")
+    told = workplace.call("warm-up")
     assert (told.status, told.err, told.new) == (0, "", [])
-    lines = told.out.splitlines()
-    assert lines[::2] == ["1 of 2: rk4, herkal", "2 of 2: rk4, plate"]
-    assert all(line.startswith("    ready: ") for line in lines[1::2])
-    assert workplace.call(*words, "--quiet").out == ""
+    assert told.out.startswith("all kernels are ready (")
+    assert workplace.call("warm-up", "--quiet").out == ""
 
 
 def test_a_run_compiles_its_own_method_alone() -> None:
@@ -39,24 +49,21 @@ def test_a_run_compiles_its_own_method_alone() -> None:
     assert told.stdout.split() == ["rk4"]
 
 
-def test_only_what_goes_together_is_compiled() -> None:
-    pairs = together(METHODS, MODELS)
-    assert {(method, preset) for method in METHODS for preset in PRESETS} & {*pairs}
-    assert ("rk4", "shell") not in pairs and ("newmark", "shell") in pairs
-    assert {*USUAL["methods"]} <= {*METHODS} and {*USUAL["models"]} <= {*MODELS}
-    with pytest.raises(InputError, match="rk4: do not take shell"):
-        together(["rk4"], ["shell"])
+def test_names_are_unique() -> None:
+    names = [name for stage in STAGES for name in stage]
+    assert len({*names}) == len(names)
+    use(names[0])
+    assert use(names[0]) == 0
 
 
-@pytest.mark.parametrize("words", [("--methods", "rk5"), ("--models", "rk4")])
-def test_unknown_names_are_bad_input(workplace, words) -> None:
-    told = workplace.call("warm-up", *words)
-    assert (told.status, told.out) == (2, "")
-    assert f'foldyn: {words[0]} = "{words[1]}": ' in told.err and "choose one of all" in told.err
+@pytest.mark.thorough
+def test_nothing_is_left_to_compile(tmp_path) -> None:
+    """Neither for a second call nor for computations of other cases."""
+    where = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
 
+    def run(*words: str) -> str:
+        command = [sys.executable, "-W", "ignore", *words]
+        return subprocess.run(command, env=where, capture_output=True, text=True, check=True).stdout
 
-def test_all_means_all(workplace, monkeypatch) -> None:
-    asked = []
-    monkeypatch.setattr(warm_up, "warm_up", lambda *pair: asked.append(pair) or 0)
-    workplace.call("warm-up", "--methods", "all", "--models", "all")
-    assert asked == together(METHODS, MODELS)
+    assert run("-m", "foldyn.cli.main", "warm-up").startswith("compiled ")
+    assert run("-c", OTHERS, str(BENCHMARKS)) == ""

@@ -10,9 +10,13 @@ import foldyn as fd
 from foldyn.dynamics.course import TALLY, Course
 from foldyn.dynamics.equation import EquationOfMotion
 from foldyn.dynamics.system import pack, scratch
-from foldyn.dynamics.warm_up import MODELS
+from foldyn.mechanics.clamps import clamp_blocks
 from foldyn.mechanics.contact.term import ContactTerm
+from foldyn.mechanics.springs import axial_blocks
+from foldyn.mechanics.tangent import _add_bars, _add_hinges
+from foldyn.structures import PRESETS
 
+MODELS = (*PRESETS, "shell")
 FOLD = fd.patterns.simple_fold(a=1.0, b=1.3, dihedral=100)
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=100.0)
 HELD = fd.Fix([0, 1])
@@ -65,3 +69,14 @@ def test_what_touches_has_one_type():
     assert len({typeof(arrays) for arrays in tables}) == 1
     whole = [array for array in tables[0] if isinstance(array, np.ndarray)]
     assert all(array.flags.writeable for array in whole)
+
+
+def test_arrays_that_cannot_be_written_compile_nothing_more():
+    structure = fd.discretize(FOLD, SHEET, clamped=[(0, 1)])
+    body = fd.Case(structure, [SPRING]).body
+    for may in (True, False):
+        q = np.zeros(3 * len(structure.nodes))
+        q.flags.writeable = may
+        body.tangent(q)
+    for kernel in (_add_bars, _add_hinges, axial_blocks, clamp_blocks):
+        assert len(kernel.signatures) == 1

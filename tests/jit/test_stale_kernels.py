@@ -6,12 +6,14 @@ import ast
 import subprocess
 import sys
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 from jit_lab import ask, copy_package, edit, environment
 
 from foldyn.jit import sources
+from foldyn.jit.kept import Kept
 from foldyn.jit.sources import PACKAGE, digest, imports, made_from, read
 
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -64,10 +66,47 @@ def test_what_a_kernel_is_made_from():
     assert "dynamics/rk4.py" not in files_of("mechanics/force.py", "internal_force")
 
 
+def kernels():
+    """All compiled functions of the package: their files and names, and the functions."""
+    for path in FILES:
+        if "@" in (text := path.read_text("utf-8")) and ("jit" in text or "term import" in text):
+            parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+            for value in list(vars(import_module(".".join(parts))).values()):
+                found = getattr(value, "_dispatcher", value)
+                if isinstance(getattr(found, "_cache", None), Kept):
+                    yield found._cache._source, found.py_func
+
+
+def test_a_kernel_is_made_from_all_that_it_names():
+    for source, function in kernels():
+        made = made_from(*source)
+        for name in {*function.__code__.co_names} & function.__globals__.keys():
+            named = function.__globals__[name]
+            named = getattr(named, "_dispatcher", named)
+            if isinstance(getattr(named, "_cache", None), Kept):
+                assert named._cache._source in made, (source, name)
+            elif isinstance(named, type) and named.__module__.startswith("foldyn."):
+                path = Path(sys.modules[named.__module__].__file__).resolve()
+                assert (path, named.__name__) in made or path.parent == PACKAGE / "jit", name
+
+
+def test_no_kernel_is_made_from_what_tells_reads_or_draws():
+    """So changes there compile nothing anew; `jit`, mechanics, laws and methods are left."""
+    parts = set().union(*(made_from(*source) for source, _ in kernels()))
+    places = {path.relative_to(PACKAGE) for path, _ in parts}
+    assert {place.parts[0] for place in places} == {
+        "algebra", "cases", "dynamics", "experiment", "jit", "materials", "mechanics", "shells",
+    }  # fmt: skip
+    assert {place.name for place in places if place.parts[0] in ("algebra", "cases")} == {
+        "banded.py", "waveforms.py",
+    }  # fmt: skip
+
+
 @pytest.fixture
 def package(monkeypatch, tmp_path):
     """A package with a kernel `total`; makes a digest of it after some files were written."""
     monkeypatch.setattr(sources, "PACKAGE", tmp_path)
+    monkeypatch.setattr(sources, "_COMPILING", tmp_path / "jit")
     files = {
         "kernels.py": (
             "from foldyn.jit.compiled import kernel\n"
@@ -107,6 +146,7 @@ def package(monkeypatch, tmp_path):
         ("kernels.py", "3.0 * x", "4.0 * x", False),  # a function that it calls
         ("kernels.py", "A, B = 1.0", "A, B = 5.0", False),
         ("values.py", "FACTOR = 3.0", "FACTOR = 4.0", False),
+        ("values.py", "'said'\n", "'said'\n\n\nif TYPE_CHECKING:\n    import this\n", True),
         ("jit/compiled.py", "return function", "return None", False),
         ("kernels.py", "a message", "another\\n message", True),
         ("kernels.py", "def told", "\n\ndef told", True),  # lines above do not matter

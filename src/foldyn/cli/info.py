@@ -55,7 +55,7 @@ def info() -> str:
         lines.append(f"kernels of {name}: {'ready' if compiled(name) else 'compiled on first use'}")
     ready = sum(map(compiled, METHODS))
     lines += [
-        f"kernels of {ready} of {len(METHODS)} methods ready; foldyn warm-up compiles others",
+        f"kernels of {ready} of {len(METHODS)} methods ready; foldyn warm-up compiles all",
         f"optional parts: ffmpeg for MP4 animations, {video}",
         f"optional part for camera tracking: OpenCV, {camera}",
         f"optional part for pattern files in DXF: {drawings}",

@@ -3,8 +3,9 @@
 A kernel holds the compiled functions and the numbers that it names, and knows the fields of the
 named tuples that it names. So it is made from its own text and from the statements that define
 these names, in its file or in those of the package that it imports them from, and so on; nothing
-else counts: neither functions that run in Python alone, nor messages, nor lines above. Contents
-are looked at, never times: a copy, a checkout or a clock may set these as it likes.
+else counts: neither functions without a decorator, which compiled ones cannot call, nor messages,
+nor lines above. Contents are looked at, never times: a copy, a checkout or a clock may set these as
+it likes.
 
 Statements are told apart by their first column, and names are all words in their text. Words that
 are no names, as in comments, make a kernel depend on more than it is made from, never on less.
@@ -33,12 +34,15 @@ _IMPORT = re.compile(
 )
 _DOCSTRING = re.compile(r'^\s*[rb]?"""[\s\S]*?"""', re.MULTILINE)
 _STATEMENT = re.compile(r"^(?=[@\w])", re.MULTILINE)
-_DEFINES = re.compile(r"(?:def|class) +(\w+)|(\w+)(?: *:[^=\n]*)? *=(?!=)")
+_DEFINES = re.compile(r"(?:def|class) +(\w+)|(\w+(?:, *\w+)*)(?: *:[^=\n]*)? *=(?!=)")
+_DECORATOR = re.compile(r"@(\w+)")
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _NO_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")  # variables that leave the code as it is
 # where kernels are kept leaves their code as it is; the rest of `jit` may change Numba itself
 _KEEPING, _COMPILING = ("kept.py", "sources.py"), PACKAGE / "jit"
-REST = ""  # name of the statements that define no name, such as A, B = 1, 2
+_COMPILERS = ("foldyn.jit.compiled", "foldyn.mechanics.term")  # modules with decorators of kernels
+_NO_CODE_IN = ("from ", "import ", "if TYPE_CHECKING:")  # how statements begin that are no code
+REST = ""  # name of the statements that define no name
 
 Part = tuple[Path, str]  # the statements of a file that define a name
 
@@ -96,7 +100,17 @@ def _needed(path: Path, name: str) -> frozenset[Part]:
             else:  # the word is a module
                 wanted = words & parts.keys() | {REST}
             needed |= {(home, part) for part in wanted}
+    decorator = _DECORATOR.match(own.parts.get(name, ""))
+    if decorator and own.names.get(decorator.group(1), ("", ""))[0] in _COMPILERS:
+        needed = {part for part in needed if not _in_python(*part)}
     return frozenset(needed)
+
+
+def _in_python(path: Path, name: str) -> bool:
+    """Whether a name is that of a function without a decorator, which no compiled one can call."""
+    text = _module(path).parts.get(name, "")
+    alone = text.startswith("def ") and len(_STATEMENT.findall(text)) == 1
+    return alone and path.parent != _COMPILING
 
 
 @cache
@@ -110,9 +124,9 @@ def _module(path: Path) -> Module:
             decorators += statement
             continue
         defined = _DEFINES.match(statement)
-        name = (defined.group(1) or defined.group(2)) if defined else REST
-        if not statement.startswith(("from ", "import ")):
-            parts[name] = parts.get(name, "") + decorators + statement
+        for name in _WORD.findall(defined.group(1) or defined.group(2)) if defined else [REST]:
+            if not statement.startswith(_NO_CODE_IN):
+                parts[name] = parts.get(name, "") + decorators + statement
         decorators = ""
     return Module(parts, names)
 

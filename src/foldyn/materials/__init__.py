@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields
 from typing import Any
 
-import foldyn.jit
-import foldyn.materials.switch  # noqa: F401 - gives laws their functions
 from foldyn.errors import InputError
 from foldyn.materials.custom import CustomBarLaw, CustomHingeLaw
 from foldyn.materials.enhanced_linear import EnhancedLinear
@@ -20,6 +18,7 @@ from foldyn.materials.plastic import Plastic
 from foldyn.materials.plate_superlinear import PlateSuperlinear
 from foldyn.materials.prony import Prony
 from foldyn.materials.superlinear import Superlinear
+from foldyn.materials.switch import bar_table, hinge_table
 
 __all__ = [
     "BAR_LAWS",
@@ -41,6 +40,8 @@ __all__ = [
     "bar_law",
     "hinge_law",
 ]
+
+BarLaw.compiled, HingeLaw.compiled = staticmethod(bar_table), staticmethod(hinge_table)
 
 BAR_LAWS: Mapping[str, type[BarLaw]] = {"ogden": Ogden, "linear": LinearBar}
 HINGE_LAWS: Mapping[str, type[HingeLaw]] = {

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.jit.compiled import inner_scalar, kernel, scalar
 from foldyn.materials.law import PARAMETERS, HingeLaw
-from foldyn.values import choice, number
+from foldyn.values import choice, number, writable
 
 STRESS_FREE, AS_PUBLISHED = 2, 3  # codes
 TWO_PI = 2.0 * math.pi
@@ -146,5 +146,5 @@ class EnhancedLinear(HingeLaw):
         table = np.zeros((len(rest), PARAMETERS))
         table[:, :2] = self.linear_between
         if self.code == STRESS_FREE:
-            _relieve_each(np.ascontiguousarray(rest, float), table)
+            _relieve_each(writable(rest), table)
         return table

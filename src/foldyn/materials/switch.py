@@ -13,7 +13,6 @@ from foldyn.jit.compiled import inner_scalar, kernel, scalar
 from foldyn.jit.intrinsics import call1, call2
 from foldyn.materials import enhanced_linear, linear, ogden, plate_superlinear, superlinear
 from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
-from foldyn.materials.law import BarLaw, HingeLaw
 
 
 @inner_scalar
@@ -140,6 +139,3 @@ def hinge_table(code, theta, rest, p, address):
         out[2, i] = hinge_slope(code, t, r, p[i, 0], p[i, 1], address[2])
         out[3, i] = hinge_rest_slope(code, t, r, p[i, 0], p[i, 1], address[0])
     return out
-
-
-BarLaw.compiled, HingeLaw.compiled = staticmethod(bar_table), staticmethod(hinge_table)

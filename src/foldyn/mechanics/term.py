@@ -48,6 +48,7 @@ from scipy import sparse
 from foldyn.jit.compiled import Addressed, addressed, inner_scalar, kernel
 from foldyn.jit.context import Context, run_at, value_at
 from foldyn.mechanics.threads import Team
+from foldyn.values import writable
 
 if TYPE_CHECKING:
     from foldyn.mechanics.sheet_term import Strains, Unstrained
@@ -188,7 +189,7 @@ class Term(ABC):
 
 def nodal(q: NDArray) -> NDArray:
     """Displacements of the nodes, and whole rows of hidden dofs, of dofs (m,) or (rows, 3)."""
-    flat = np.ascontiguousarray(q, float).reshape(-1)
+    flat = writable(q).reshape(-1)
     return flat[: flat.size // 3 * 3].reshape(-1, 3)
 
 

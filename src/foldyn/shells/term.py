@@ -39,6 +39,7 @@ from foldyn.shells.tangent import (
     shell_pattern,
     shell_tangent,
 )
+from foldyn.values import writable
 
 GROUPS: Mapping[str, str] = {
     "strain_membrane": "strain energy of stretching",
@@ -78,7 +79,7 @@ class ShellTerm(SheetTerm):
 
     def _split(self, q: NDArray) -> tuple[NDArray, NDArray]:
         """Displacements (n, 3) and rotations (r,)."""
-        flat = np.ascontiguousarray(q, float).reshape(-1)
+        flat = writable(q).reshape(-1)
         return flat[: self._nodal].reshape(-1, 3), flat[self._nodal : self.size]
 
     @cached_property

@@ -26,6 +26,7 @@ from foldyn.mechanics.sheet_term import (
 )
 from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_mean_tangent, put_tangent
 from foldyn.mechanics.term import Compiled, Folds
+from foldyn.values import writable
 
 GROUPS: Mapping[str, str] = {
     "strain_bars": "strain energy of the bars",
@@ -66,7 +67,7 @@ class BarsHingesTerm(SheetTerm):
         return BarsHingesTerm(model, self._turning, self._laws, self._softness, self)
 
     def _nodal(self, q: NDArray) -> NDArray:
-        return np.ascontiguousarray(q, float).reshape(self.model.rest.shape)
+        return writable(q).reshape(self.model.rest.shape)
 
     @cached_property
     def sparsity(self) -> mechanics.Sparsity:

@@ -31,6 +31,7 @@ from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
 from foldyn.mechanics.term import Compiled, Folds
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm, stretch
+from foldyn.values import writable
 
 
 class BarsPlatesTerm(SheetTerm):
@@ -65,7 +66,7 @@ class BarsPlatesTerm(SheetTerm):
 
     def _split(self, q: NDArray) -> tuple[NDArray, NDArray]:
         """Displacements (n, 3) and rotations (r,)."""
-        flat = np.ascontiguousarray(q, float).reshape(-1)
+        flat = writable(q).reshape(-1)
         return flat[: self._nodal].reshape(-1, 3), flat[self._nodal : self.size]
 
     @cached_property

@@ -96,7 +96,7 @@ def clamps(x: NDArray, rows: NDArray, stiffness: NDArray, group: int) -> Clamps:
     points = x[rows]
     wings = np.array([mirrored(corners) for corners in points]).reshape(-1, 1, 3)
     return Clamps(
-        nodes=rows,
+        nodes=np.array(rows),
         points=np.ascontiguousarray(np.concatenate([points, wings], axis=1) - x.mean(axis=0)),
         rest=np.full(len(rows), np.pi),
         stiffness=np.array(stiffness),

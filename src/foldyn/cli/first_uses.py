@@ -1,0 +1,190 @@
+"""Small computations that together need every kernel that a run can need.
+
+Each part of a model is a term of its own, compiled once (`mechanics/term.py`), whatever stands
+beside it. So it is enough that each part takes part in something, once with every kind of method.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+import foldyn as fd
+from foldyn.dynamics import METHODS
+from foldyn.errors import FoldynWarning
+from foldyn.experiment.tracking.corners import refine
+from foldyn.jit.counting import counted
+from foldyn.materials.series import in_series
+
+STEPS, SHORT, LONG = 4, 1e-4, 5e-3  # s, steps of explicit and implicit methods
+EXPLICIT = ("rk4", "central_difference", "dormand_prince")
+IMPLICIT = ("newmark", "generalized_alpha")
+CONSERVING = "energy_momentum"
+SHEET = fd.Sheet(1e7, 0.25, 0.02, 1000.0)
+RISE, PULSE = fd.Ramp(0.1, smooth=True), fd.HalfSine(0.05)
+PUSH = fd.Force("xmax", (-200.0, 100.0, -150.0), PULSE)
+SPRINGS = [
+    fd.Spring(2e3, "xmax", direction=(0, 1, 1)),
+    fd.Spring(2e3, between=[(0, 6), (2, 8)], rest_length=1.0),
+]
+TIED = [fd.Link("xmax", "xz")]
+MOVING = [fd.BaseMotion("z", PULSE, 0.05), fd.Impose("xmax", "z", -0.1, RISE)]
+TURNING = [fd.Temperature(20.0, 1e-3, 5e-3, history=RISE), fd.Actuate([0], fraction=0.1)]
+FOLLOWING = [fd.Pressure(500.0, history=RISE), fd.CreaseMoment("all", 20.0, RISE)]
+DAMPED = [fd.Rayleigh(1.0, 1e-5), fd.StrainDamping(1e-5)]
+DASHPOTS = [fd.Dashpot(50.0, "xmax"), fd.Dashpot(50.0, between=[(0, 6), (2, 8)])]
+PRONY, PLASTIC = partial(fd.Prony, [0.5], [0.02]), partial(fd.Plastic, 0.05)
+GROUND = fd.Plane(
+    (0.0, 0.0, -0.012), (0.0, 0.0, 1.0), friction=0.3, motion=(0.01, 0.0, 0.05), history=RISE
+)
+RUBBING, ON_GROUND = fd.Contact(friction=0.3), fd.Contact(planes=[GROUND])
+
+
+def sheets() -> fd.Pattern:
+    """Two flat sheets of two panels face to face, little more than their thickness apart."""
+    grid = np.array([[0.0, i, j] for j in (0, 1) for i in (0, 1, 2)])
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.8, 0.6], [0.0, -0.6, 0.8]])
+    faces = [(0, 1, 4, 3), (1, 2, 5, 4), (6, 7, 10, 9), (7, 8, 11, 10)]
+    return fd.Pattern(np.vstack([grid, grid @ turn.T + [0.021, 0.2, -0.3]]), faces)
+
+
+def case(
+    supports: Sequence[Any] = (), loads: Sequence[Any] = (), damping: Sequence[Any] = (),
+    contact: fd.Contact | None = None, model: str = "plate",
+    pattern: fd.Pattern | None = None, law: Callable[[], Any] | None = None, **options: Any,
+) -> fd.Case:  # fmt: skip
+    """A sheet of four panels of a model, held at one end and pushed at the other."""
+    pattern = pattern or fd.patterns.miura()
+    if law is not None:  # made here, as that compiles something
+        options["fold_law"] = law()
+    if model == "shell":
+        structure: Any = fd.shell(pattern, SHEET, 2, **options)
+    else:
+        options["preset"] = model
+        structure = fd.discretize(pattern, SHEET, **options)
+    held = [fd.Fix("xmin"), *supports]
+    return fd.Case(structure, held, [PUSH, *loads], damping, contact=contact)
+
+
+def moved(
+    *methods: str, start: Sequence[float] = (0.0, 0.0, 0.0), steps: int = STEPS, **parts: Any
+) -> None:
+    """Motions of a few steps."""
+    made = case(**parts)
+    x = made.structure.nodes[:, :1] - made.structure.nodes[:, 0].min()
+    initial = fd.State(velocity=np.where(made.fixed, 0.0, 2.0 * x * start))
+    for name in methods:
+        dt = LONG if METHODS[name].implicit else SHORT
+        given: dict[str, Any] = {} if METHODS[name].adaptive else {"dt": dt}
+        fd.simulate(made, steps * dt, name, initial=initial, **given)
+
+
+def adapted() -> None:
+    """An implicit motion whose steps follow the error."""
+    fd.simulate(case(), STEPS * LONG, IMPLICIT[-1], tolerance=1e-3)
+
+
+def jumped() -> None:
+    """An implicit motion in which a force jumps while the rest angles move."""
+    jump = fd.Force("xmax", (1.0, 0.0, 0.0), fd.Step(1.5 * LONG))
+    fd.simulate(case(loads=[jump, *TURNING]), STEPS * LONG, IMPLICIT[0], dt=LONG)
+
+
+def folded() -> None:
+    """A pattern that is folded, the curve of its law, and a corner in a photograph."""
+    fd.fold(fd.patterns.simple_fold(dihedral=170), 90.0, steps=2)
+    in_series(fd.EnhancedLinear(), 1.0, 3.0, 0.5)
+    refine(np.zeros((40, 40), np.uint8), [[20.0, 20.0]], 8.0, 2.0)
+
+
+def moved_at_once() -> None:
+    """Motions of several cases at once."""
+    made = case(model="herkal", mass="circumcenter")
+    many = [made.altered(masses=[fd.PointMass("xmax", 1.0 + k)]) for k in range(8)]
+    fd.simulate_many(many, STEPS * SHORT, SHORT)
+
+
+def traced(factor: float, **parts: Any) -> None:
+    """Paths of a few equilibria."""
+    made = case(**parts)
+    fd.trace(made, "newton", [factor])
+    fd.trace(made, "arc_length", first_step=0.5 * factor, steps=2)
+
+
+def vibrating(**parts: Any) -> None:
+    """Modes and a frequency response."""
+    made = case(**parts)
+    fd.modes(made, 2)
+    fd.frf(made, fd.Force("xmax", (1.0, 0.0, 0.5)), [0.1, 0.3])
+
+
+Uses = Mapping[str, Sequence[Callable[[], None]]]
+TOUCHING: dict[str, Any] = {"pattern": sheets(), "start": (-0.6, 0.2, -1.0)}
+STAGES: Sequence[Uses] = (
+    {"bars and hinges": [vibrating, partial(moved, "rk4")]},
+    {
+        "contact": [
+            partial(moved, *EXPLICIT, contact=RUBBING, **TOUCHING),
+            partial(moved, *EXPLICIT, contact=ON_GROUND),
+        ],
+        "explicit methods": [
+            partial(moved, *EXPLICIT, supports=[*SPRINGS, *TIED], damping=DAMPED),
+            partial(moved, *EXPLICIT, supports=MOVING, loads=[*TURNING, *FOLLOWING]),
+            partial(moved, *EXPLICIT, mass="consistent", clamped="xmin"),
+        ],
+        "panels as plates": [
+            partial(vibrating, model="n5b8e"),
+            partial(moved, "rk4", "newmark", model="n5b8e"),
+        ],
+        "shells": [partial(vibrating, model="shell"), partial(moved, "newmark", model="shell")],
+        "several motions at once": [moved_at_once],
+        "folding and tracking": [folded],
+    },
+    {
+        "implicit methods": [
+            partial(moved, *IMPLICIT),
+            adapted,
+            jumped,
+            partial(moved, *IMPLICIT, supports=[*SPRINGS, *TIED], damping=DAMPED),
+            partial(moved, *IMPLICIT, supports=MOVING, loads=[*TURNING, *FOLLOWING]),
+            partial(moved, *IMPLICIT, damping=[fd.ModalDamping(0.05, 4)], supports=DASHPOTS),
+        ],
+        "laws with memory": [
+            partial(moved, "rk4", *IMPLICIT, law=PRONY, damping=[fd.CreaseDamping(0.2)]),
+            partial(moved, "rk4", *IMPLICIT, law=PLASTIC, supports=SPRINGS),
+        ],
+        "paths": [partial(traced, 1e-3, supports=SPRINGS, loads=FOLLOWING, clamped="xmin")],
+    },
+    {
+        "energy_momentum": [
+            partial(moved, CONSERVING, fold_law="linear"),
+            partial(moved, CONSERVING, supports=MOVING, loads=[*TURNING, *FOLLOWING]),
+            partial(moved, CONSERVING, damping=[fd.StrainDamping(1e-5)], supports=DASHPOTS),
+        ],
+        "contact in implicit methods and paths": [
+            partial(moved, *IMPLICIT, contact=RUBBING, **TOUCHING),
+            partial(moved, *IMPLICIT, contact=ON_GROUND),
+            partial(traced, 1e-3, contact=ON_GROUND),
+        ],
+        "contact in energy_momentum": [
+            partial(moved, CONSERVING, steps=20, contact=RUBBING, **TOUCHING),
+            partial(moved, CONSERVING, contact=ON_GROUND),
+        ],
+    },
+)
+"""Computations by what they compile, in stages: those of one need little of each other's kernels,
+and all of them those of the stages before."""
+
+
+def use(name: str) -> int:
+    """Compute what has a name among `STAGES`; how many functions had to be compiled."""
+    (uses,) = (stage[name] for stage in STAGES if name in stage)
+    with counted() as compiled, warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        for compute in uses:
+            compute()
+        return compiled()
