@@ -22,6 +22,7 @@ from foldyn.materials.series import in_series
 
 STEPS, SHORT, LONG = 4, 1e-4, 5e-3  # s, steps of explicit and implicit methods
 EXPLICIT = ("rk4", "central_difference", "dormand_prince")
+REMEMBER = ("rk4", "dormand_prince")
 IMPLICIT = ("newmark", "generalized_alpha")
 CONSERVING = "energy_momentum"
 SHEET = fd.Sheet(1e7, 0.25, 0.02, 1000.0)
@@ -115,6 +116,11 @@ def traced(factor: float, **parts: Any) -> None:
     fd.trace(made, "arc_length", first_step=0.5 * factor, steps=2)
 
 
+def waited() -> None:
+    """A path whose step takes time, in which creases relax."""
+    fd.trace(case(law=PRONY), "newton", [1e-3, 1e-3], duration=0.1)
+
+
 def vibrating(**parts: Any) -> None:
     """Modes and a frequency response."""
     made = case(**parts)
@@ -154,14 +160,20 @@ STAGES: Sequence[Uses] = (
             partial(moved, *IMPLICIT, damping=[fd.ModalDamping(0.05, 4)], supports=DASHPOTS),
         ],
         "laws with memory": [
-            partial(moved, "rk4", *IMPLICIT, law=PRONY, damping=[fd.CreaseDamping(0.2)]),
-            partial(moved, "rk4", *IMPLICIT, law=PLASTIC, supports=SPRINGS),
+            partial(moved, *REMEMBER, *IMPLICIT, law=PRONY, damping=[fd.CreaseDamping(0.2)]),
+            partial(moved, *REMEMBER, *IMPLICIT, law=PLASTIC, supports=SPRINGS),
         ],
-        "paths": [partial(traced, 1e-3, supports=SPRINGS, loads=FOLLOWING, clamped="xmin")],
+        "paths": [
+            partial(traced, 1e-3, supports=SPRINGS, loads=FOLLOWING, clamped="xmin"),
+            waited,
+        ],
     },
     {
         "energy_momentum": [
             partial(moved, CONSERVING, fold_law="linear"),
+            partial(moved, CONSERVING, supports=SPRINGS, clamped="xmin"),
+            partial(moved, CONSERVING, model="n5b8e"),
+            partial(moved, CONSERVING, model="shell"),
             partial(moved, CONSERVING, supports=MOVING, loads=[*TURNING, *FOLLOWING]),
             partial(moved, CONSERVING, damping=[fd.StrainDamping(1e-5)], supports=DASHPOTS),
         ],
