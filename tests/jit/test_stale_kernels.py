@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import subprocess
 import sys
 from functools import cache
@@ -86,7 +87,7 @@ def test_a_kernel_is_made_from_all_that_it_names():
             if isinstance(getattr(named, "_cache", None), Kept):
                 assert named._cache._source in made, (source, name)
             elif isinstance(named, type) and named.__module__.startswith("foldyn."):
-                path = Path(sys.modules[named.__module__].__file__).resolve()
+                path = Path(inspect.getfile(named)).resolve()
                 assert (path, named.__name__) in made or path.parent == PACKAGE / "jit", name
 
 
