@@ -30,7 +30,6 @@ MOST_LOOKS = 20_000  # that are looked at; of longer motions, the steps about kn
 MOST_CALLS = 500  # the same for functions of the user's, which are slow
 MOST_PLACES = 100
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
-MOST_CORNERS = 100  # of a support's motion: records of shaking tables have thousands
 MEMORY, IMPLICIT_MEMORY = 200, 20  # steps in which a vibration moves on
 
 
@@ -187,18 +186,11 @@ def knots(case: Case) -> NDArray[np.float64]:
 
 
 def jumps(case: Case) -> tuple[float, ...]:
-    """Times (s) at which loads jump, or may: those that the user names of a function.
-
-    Where velocities are damped, a support whose velocity jumps is a load that does.
-    """
+    """Times (s) at which loads jump, or may: those that the user names of a function."""
     times: set[float] = set()
     for _, history in (*case.load_terms, *case.following_terms):
         called = history.code == CALLED
         times.update((history.knots() or ()) if called else history.jumps())
-    if case.damped or case.remembering:
-        for _, history in (*case.imposed_terms, *case.base_terms):
-            corners = history.knots() or ()
-            times.update(corners if len(corners) <= MOST_CORNERS else ())
     return tuple(sorted(times))
 
 

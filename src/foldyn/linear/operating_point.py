@@ -115,6 +115,7 @@ def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> Opera
     elif kind == "state" and loads.size:
         factors = np.linalg.lstsq(loads[free], residual[free], rcond=None)[0]
         residual = residual - loads @ factors
+    residual = np.pad(residual, (0, len(reached) - len(residual)))  # planes are held
     found = balance(problem, reached, factor, residual)
     return OperatingPoint(displacement, problem, factor, body, u, found, kind)
 
