@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields
 from typing import Any
 
+import foldyn.jit  # noqa: F401 - asks for what Numba needs, before anything imports Numba
 from foldyn.errors import InputError
 from foldyn.materials.custom import CustomBarLaw, CustomHingeLaw
 from foldyn.materials.enhanced_linear import EnhancedLinear
