@@ -96,10 +96,9 @@ REASONS: Mapping[str, tuple[str, str]] = {
         "which thick panels are hinged",
         "contact lies between middle surfaces, beside which boards are hinged; not done",
     ),
-    "d": ("no discrete gradient", "the forces have no discrete gradient; not done"),
-    "e": ("has a memory", "the method takes forces that depend on the state alone; not done"),
-    "f": ("panels that curl", "edges of plates have no angle at rest; not done"),
-    "g": (
+    "d": ("has a memory", "what a law with memory takes in a step has no exact form; not done"),
+    "e": ("panels that curl", "explicit methods have no edge angles, which panels that curl turn"),
+    "f": (
         "creep",
         "load factors that the method finds may turn back, so that no step has a time in which "
         "creases creep",
