@@ -66,7 +66,7 @@ test: $(STAMP)  ## run the tests that a change can plausibly break
 	@$(BIN)/python -m pytest $(WORKERS) $(PYTEST_FLAGS)
 
 test-all: test  ## run these, and then those that are long or one of many of a kind
-	@DRAWS=$(DRAWS) $(BIN)/python -m pytest $(WORKERS) $(PYTEST_FLAGS) -m thorough
+	@DRAWS=$(DRAWS) $(BIN)/python -m pytest $(WORKERS) $(PYTEST_FLAGS) -m "thorough and not slow"
 
 test-oldest: $(BIN)/python  ## run the tests of compiling, laws and results with the oldest versions that pyproject.toml allows
 	@rm -rf $(OLDEST) && $(BIN)/python -m venv $(OLDEST)
