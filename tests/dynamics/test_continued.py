@@ -83,7 +83,7 @@ def driven(**options):
 
 
 @pytest.mark.thorough
-@pytest.mark.filterwarnings("ignore:the energy balance", "ignore:damping: beta resists")
+@pytest.mark.filterwarnings("ignore:the energy balance", "ignore:damping. beta resists")
 @pytest.mark.parametrize("method", ["generalized_alpha", "energy_momentum"])
 def test_supports_loads_and_folds_that_move(method, tmp_path):
     """With exact times, as histories depend on them; 2 minutes, compiling."""
