@@ -201,7 +201,7 @@ def solved(folder: Path) -> Calls:
         }),
         "trace": (fd.trace, {
             "case": case(), "method": "newton", "load_factors": [0.0, 1.0], "steps": None,
-            "constant": (), "initial": None, "first_step": None, "until": None,
+            "duration": 2.0, "constant": (), "initial": None, "first_step": None, "until": None,
             "adaptive_load": None, "inertia_relief": False,
             "settings": {"largest_turn": 5.0, "stability": True, "iterations": 20},
             "progress": None,

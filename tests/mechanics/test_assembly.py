@@ -72,3 +72,15 @@ def test_blocks_of_an_assembly_serve_what_is_left_of_it(whole):
     found = sparse.bsr_array((out, pattern.indices, pattern.indptr), shape=shape).toarray()
     wanted = left.step_tangent(q).toarray()
     np.testing.assert_allclose(found, wanted, atol=1e-12 * np.abs(wanted).max())
+
+
+def test_planes_that_are_elsewhere_share_what_is_compiled(whole):
+    """Each evaluation finds them where they are in its own assembly."""
+    q, there = state(whole), np.array([[0.0, 0.0, 1e-3]])
+    moved = whole.displaced(there)
+    fresh = Assembly(whole.sheet, *(term.displaced(there) for term in whole.others))
+    force = whole.internal(q)
+    assert np.abs(moved.internal(q) - force).max() > 1e-6 * np.abs(force).max()
+    np.testing.assert_array_equal(moved.internal(q), fresh.internal(q))
+    np.testing.assert_array_equal(whole.internal(q), force)
+    assert moved._evaluated is whole._evaluated is not fresh._evaluated

@@ -175,9 +175,7 @@ class Case(Supported, Loaded, Damped):
     @property
     def contact_term(self) -> ContactTerm:
         """What contact adds to `body`, if there is any."""
-        found = self.body.find(ContactTerm)
-        assert found is not None
-        return found
+        return self.body.term(ContactTerm)
 
     @cached_property
     def elastic_body(self) -> Assembly:

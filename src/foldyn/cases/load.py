@@ -49,7 +49,7 @@ class Load(Part):
         return None
 
     def turns(self, structure: Any, place: str) -> NDArray[np.float64] | None:
-        """Changes, rad, of `Assembly.rest_angles`, or of the first of them; None if none.
+        """Changes, rad, of `SheetTerm.rest_angles`, or of the first of them; None if none.
 
         Those of creases by `rest_changes` are apart.
         """

@@ -41,12 +41,6 @@ def energy_scale(energy: NDArray) -> float:
     return float(np.nanmax(np.abs(moving)))
 
 
-def relative_errors(energy: NDArray) -> NDArray:
-    """Energy errors over the energies at play, per sample; 0 where nothing is at play."""
-    scale = energy_scale(energy) if len(energy) else 0.0
-    return np.abs(energy_error(energy)) / scale if scale > 0.0 else np.zeros(len(energy))
-
-
 class Balance:
     """What the samples of a motion, seen piece by piece, say of its energies.
 

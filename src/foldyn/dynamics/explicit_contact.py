@@ -105,9 +105,7 @@ def slow_contacts(packed: Packed, work: Any, s: Scratch) -> Context | None:
     system, body = packed.system, packed.body
     if not system.touches or system.moves or system.presses:
         return None
-    contact = body.find(ContactTerm)
-    assert contact is not None
-    tables, memory = contact.tables, body.kept(work, ContactTerm)
+    tables, memory = body.term(ContactTerm).tables, body.kept(work, ContactTerm)
     added = room_for(tables, memory)
     return Context(SlowContacts(system, packed.mass, s, tables, memory, added))
 

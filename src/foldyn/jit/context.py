@@ -25,8 +25,6 @@ from numba.np.arrayobj import make_array, populate_array
 
 from foldyn.jit.intrinsics import DOUBLE, INT64, data_of, intrinsic
 
-WORD = 2**64 - 1
-
 
 class ContextType(types.Type):
     """Type of the address of a tuple."""
@@ -66,7 +64,7 @@ class Context:
         if looks not in _KINDS:  # Numba takes ms to tell the type of a large tuple
             _KINDS[looks] = ContextType(typeof(value))
         self.value: Any = value
-        self._slots = np.array(slots, np.uint64)
+        self._slots = np.array(slots, np.int64)
         self.kind, self.address = _KINDS[looks], int(self._slots.ctypes.data)
         self._numba_type_ = self.kind
 
@@ -87,16 +85,16 @@ def _fill(value: Any, slots: list[int]) -> tuple:
     if isinstance(value, tuple):
         return type(value), *(_fill(item, slots) for item in value)
     if isinstance(value, np.ndarray):
-        slots += value.ctypes.data, *value.shape, *(stride & WORD for stride in value.strides)
+        slots += value.ctypes.data, *value.shape, *value.strides
         return value.dtype.num, value.ndim, value.flags.num
     if isinstance(value, np.void):
         slots.append(np.frombuffer(value.data, np.uint8).ctypes.data)
         return (value.dtype,)
     if isinstance(value, float):
-        slots.append(int(np.float64(value).view(np.uint64)))
+        slots.append(int(np.float64(value).view(np.int64)))
         return (float,)
     if isinstance(value, bool | np.bool_ | int | np.integer):
-        slots.append(int(value) & WORD)
+        slots.append(int(value))
         return (type(value),)
     raise TypeError(f"{type(value).__name__} has no place in a context")
 

@@ -25,7 +25,7 @@ from foldyn.mechanics.model import ranks
 from foldyn.mechanics.sheet_term import Blocks, SheetTerm, Strains, Unstrained, largest_turn
 from foldyn.mechanics.step_tangent import FLOOR
 from foldyn.mechanics.tangent import Sparsity, block_keys, joined
-from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Model, Term, evaluate
+from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Model, Term, evaluate, in_rows
 from foldyn.mechanics.threads import Team
 
 ITERATIONS = 50
@@ -81,6 +81,12 @@ class Assembly:
         """The term of a kind, if there is one."""
         return next((term for term in self.others if isinstance(term, kind)), None)
 
+    def term(self, kind: type[Kind]) -> Kind:
+        """The term of a kind, which must be there."""
+        found = self.find(kind)
+        assert found is not None
+        return found
+
     def parted(self, kind: type[Kind]) -> tuple[Assembly, Kind | None]:
         """The same without the term of a kind, and that term."""
         found = self.find(kind)
@@ -89,6 +95,15 @@ class Assembly:
     def with_terms(self, *terms: Term) -> Assembly:
         """The same with further terms."""
         return Assembly(self.sheet, *self.others, *terms) if terms else self
+
+    def displaced(self, moved: NDArray) -> Assembly:
+        """The same with the planes of contact displaced by `moved` (p, 3), m.
+
+        What is compiled serves both: a term puts its planes where they are before an evaluation.
+        """
+        body = Assembly(self.sheet, *(term.displaced(moved) for term in self.others))
+        body._evaluated, body._hinges = self._evaluated, self._hinges
+        return body
 
     # ------------------------------------------------------------------ energies and forces
     def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
@@ -138,8 +153,7 @@ class Assembly:
 
     def in_rows(self, q: NDArray) -> NDArray:
         """Dofs (m,) or (rows, 3) as (rows, 3)."""
-        flat = np.ascontiguousarray(q, float).ravel()
-        return np.pad(flat, (0, 3 * self.rows - flat.size)).reshape(-1, 3)
+        return in_rows(q, self.rows)
 
     def energies(self, q: NDArray) -> NDArray:
         """Strain energies (J) by group."""
@@ -193,25 +207,21 @@ class Assembly:
         """The same, with what the terms keep for evaluations or new memory for all."""
         alone = not all(term.shared for term in self.terms)
         works: Sequence[Any] = self.sheet.workspaces(1 if alone else threads)
+        angles = [work.angle for work in works]
         count = sum(len(term.hinges) for term in self.others)
         if count:  # whose dihedrals follow, as bars and hinges alone have them
-            angle = np.empty(len(works[0].angle) + count)
-            own = angle[: len(works[0].angle)]
+            angles = [np.empty(len(angles[0]) + count)]
+            own = angles[0][:-count]
             works = [works[0]._replace(angle=own, fold_angle=own)]
+        if kept is None:
+            columns = [term.memories(works) for term in self.others]
         else:
-            angle = works[0].angle
-        columns = (
-            [term.memories(works) for term in self.others]
-            if kept is None
-            else [[memory] for memory in kept]
-        )
+            columns = [[memory] for memory in kept]
+        rows = zip(*columns, strict=True) if columns else [()] * len(works)
         return [
-            Work(
-                work, angle if count else work.angle, work.fold_angle, work.strips, work.team,
-                tuple(column[k] for column in columns),
-            )
-            for k, work in enumerate(works)
-        ]  # fmt: skip
+            Work(work, angle, work.fold_angle, work.strips, work.team, tuple(row))
+            for work, angle, row in zip(works, angles, rows, strict=True)
+        ]
 
     def compiled(self, work: Work) -> list[Compiled]:
         """The terms for a thread with this memory."""
@@ -324,8 +334,7 @@ class AssembledBlocks:
     ) -> None:  # fmt: skip
         """See `Blocks`."""
         self._sheet.put(of.sheet, pattern, u, before, again, out)
-        for slots, term in zip(self._slots_in(pattern), _with_places(of), strict=True):
-            np.add.at(out.reshape(-1), slots, term.entries(u, FLOOR))
+        self._add(of, pattern, u, 1.0, out)
 
     def put_mean(
         self, of: Assembly, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray,
@@ -333,9 +342,12 @@ class AssembledBlocks:
     ) -> None:  # fmt: skip
         """See `Blocks`."""
         self._sheet.put_mean(of.sheet, pattern, u0, u1, angle, before, again, out)
-        middle = 0.5 * (u0 + u1)
+        self._add(of, pattern, 0.5 * (u0 + u1), 0.5, out)
+
+    def _add(self, of: Assembly, pattern: Sparsity, u: NDArray, share: float, out: NDArray) -> None:
+        """Add a share of what further terms have at u."""
         for slots, term in zip(self._slots_in(pattern), _with_places(of), strict=True):
-            np.add.at(out.reshape(-1), slots, 0.5 * term.entries(middle, FLOOR))
+            np.add.at(out.reshape(-1), slots, share * term.entries(u, FLOOR))
 
     def filled(self, pattern: Sparsity) -> NDArray:
         """See `Blocks`."""

@@ -22,7 +22,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from foldyn.jit.compiled import inner, kernel
 
@@ -213,6 +212,6 @@ def _grid(boxes: Boxes) -> Grid:
         place, along = np.divmod(place, many[which, axis])
         here += step * (lower[which, axis] + along)
         step *= int(shape[axis])
-    held = sparse.csr_array((np.ones(len(here), bool), (here, which)), (step, len(each)))
-    start, members = held.indptr.astype(np.int64), held.indices.astype(np.int64)
-    return Grid(start, members, float(cell), origin, shape)
+    start = np.zeros(step + 1, np.int64)
+    np.cumsum(np.bincount(here, minlength=step), out=start[1:])
+    return Grid(start, which[np.argsort(here, kind="stable")], float(cell), origin, shape)

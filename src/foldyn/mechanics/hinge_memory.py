@@ -19,7 +19,7 @@ from foldyn.mechanics.inelastic import (
     memory_tangents,
 )
 from foldyn.mechanics.sheet_term import SheetTerm
-from foldyn.mechanics.term import Compiled, Term
+from foldyn.mechanics.term import Compiled, Term, in_rows
 from foldyn.mechanics.viscous import WIDTH
 
 
@@ -42,7 +42,7 @@ class HingeMemory(Term):
 
     def start(self, q: NDArray, state: NDArray | str | None = None) -> None:
         """Begin at the dofs q (m,) or (rows, 3) in a state (b, 2), "fresh", or the default."""
-        own, offset, q = self.own, self._offset, self._in_rows(q)
+        own, offset, q = self.own, self._offset, in_rows(q, self._rows)
         for array in (own.angle, own.state, own.elapsed, own.lost):
             array[:] = 0.0
         evaluate_at(own, offset, q)  # turned from rest in no time
@@ -107,16 +107,12 @@ class HingeMemory(Term):
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
         """See `Term`; the elastic part of a hinge has a slope of 1 per unit stiffness."""
-        own, u = self.own, self._in_rows(q)
+        own, u = self.own, in_rows(q, self._rows)
         out = np.empty((len(own.rest), WIDTH, WIDTH))
         evaluate_at(own, self._offset, u)
         np.maximum(own.slope, (floor - 1.0) * own.stiffness, out=own.slope)
         memory_tangents(own, u, out)
         return out[self._pairs]
-
-    def _in_rows(self, q: NDArray) -> NDArray:
-        flat = np.ascontiguousarray(q, float).ravel()
-        return np.pad(flat, (0, 3 * self._rows - flat.size)).reshape(-1, 3)
 
     def on(self, sheet: SheetTerm) -> HingeMemory:
         """See `Term`; the branches measure from the rest angles that they have had."""

@@ -74,16 +74,22 @@ def axial_extension(springs, u, s):
     return longer + springs.stretch[s], now
 
 
+@inner_scalar
+def add_directed(springs, s, pull, force):
+    """Add the pull (N) of a directed spring to the forces of its ends."""
+    a, b = springs.ends[s, 0], springs.ends[s, 1]
+    for c in range(3):
+        force[a, c] += pull * springs.direction[s, c]
+        if b >= 0:
+            force[b, c] -= pull * springs.direction[s, c]
+
+
 @inner
 def add_spring_forces(springs, u, force):
     """Add the forces of springs to those of the nodes."""
     for s in range(springs.stiffness.size):
-        a, b = springs.ends[s, 0], springs.ends[s, 1]
         pull = springs.stiffness[s] * directed_extension(springs, u, s)
-        for c in range(3):
-            force[a, c] += pull * springs.direction[s, c]
-            if b >= 0:
-                force[b, c] -= pull * springs.direction[s, c]
+        add_directed(springs, s, pull, force)
     for s in range(springs.axial_stiffness.size):
         a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
         extension, length = axial_extension(springs, u, s)
@@ -100,13 +106,8 @@ def add_spring_forces(springs, u, force):
 def add_mean_spring_forces(springs, u0, u1, force):
     """Add forces whose work from u0 to u1 is the change of the springs' energy."""
     for s in range(springs.stiffness.size):
-        a, b = springs.ends[s, 0], springs.ends[s, 1]
         extension = directed_extension(springs, u0, s) + directed_extension(springs, u1, s)
-        pull = 0.5 * springs.stiffness[s] * extension
-        for c in range(3):
-            force[a, c] += pull * springs.direction[s, c]
-            if b >= 0:
-                force[b, c] -= pull * springs.direction[s, c]
+        add_directed(springs, s, 0.5 * springs.stiffness[s] * extension, force)
     for s in range(springs.axial_stiffness.size):
         a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
         before, after = axial_extension(springs, u0, s), axial_extension(springs, u1, s)

@@ -122,14 +122,9 @@ class BarsHingesBlocks:
         self.unused = np.zeros(0, np.int64)
 
     def put(
-        self,
-        of: SheetTerm,
-        pattern: Sparsity,
-        u: NDArray,
-        before: NDArray,
-        again: bool,
+        self, of: SheetTerm, pattern: Sparsity, u: NDArray, before: NDArray, again: bool,
         out: NDArray,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """See `Blocks`."""
         put_tangent(of.model, pattern, u, before, again, out)
 
@@ -176,14 +171,9 @@ class SparseBlocks:
         self.order = narrowest(order, position, self._row, self._column)
 
     def put(
-        self,
-        of: SheetTerm,
-        pattern: Sparsity,
-        u: NDArray,
-        before: NDArray,
-        again: bool,
+        self, of: SheetTerm, pattern: Sparsity, u: NDArray, before: NDArray, again: bool,
         out: NDArray,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """See `Blocks`."""
         out[:] = 0.0
         matrix = of.step_tangent(u, before if again else None)

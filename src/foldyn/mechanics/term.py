@@ -47,6 +47,7 @@ from scipy import sparse
 
 from foldyn.jit.compiled import Addressed, addressed, inner_scalar, kernel
 from foldyn.jit.context import Context, run_at, value_at
+from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.threads import Team
 from foldyn.values import writable
 
@@ -178,6 +179,10 @@ class Term(ABC):
         """The same with the nodes in this order (n,) in memory, after the terms of an assembly."""
         return self
 
+    def displaced(self, moved: NDArray) -> Self:
+        """The same, in the same memory, with the planes of contact displaced (p, 3), m."""
+        return self
+
     def on(self, sheet: Any) -> Self:
         """The same on a sheet with other rest angles."""
         return self
@@ -191,6 +196,13 @@ def nodal(q: NDArray) -> NDArray:
     """Displacements of the nodes, and whole rows of hidden dofs, of dofs (m,) or (rows, 3)."""
     flat = writable(q).reshape(-1)
     return flat[: flat.size // 3 * 3].reshape(-1, 3)
+
+
+def in_rows(q: NDArray, rows: int) -> NDArray:
+    """A copy of dofs (m,) or (rows, 3) as (rows, 3)."""
+    out = np.zeros((rows, 3))
+    out.reshape(-1)[: np.size(q)] = np.ravel(q)
+    return out
 
 
 class Whole(NamedTuple):
@@ -260,6 +272,12 @@ class Model:
 
 
 @inner_scalar
+def parted_rows(values, n, r):
+    """Those of n nodes (n, 3), and of the r hidden dofs after them, of rows of three."""
+    return values[:n], flat(values)[3 * n : 3 * n + r]
+
+
+@inner_scalar
 def forces_of(terms, u, v, t, force):
     """Internal forces (rows, 3) at u, v and t; returns the powers in and out, W.
 
@@ -272,11 +290,17 @@ def forces_of(terms, u, v, t, force):
 
 
 @inner_scalar
+def _run_each(terms, kind, given):
+    """Run the kernels of a kind of all terms that have one."""
+    for k in range(terms.context.size):
+        if terms.kernel[k, kind] != 0:
+            run_at(terms.kernel[k, kind], (terms.context[k],) + given)  # noqa: RUF005 - for Numba
+
+
+@inner_scalar
 def energies_of(terms, u, out):
     """Strain energies (J) by group, to `out`; of what keeps that of its last force, that."""
-    for k in range(terms.context.size):
-        if terms.kernel[k, ENERGIES] != 0:
-            run_at(terms.kernel[k, ENERGIES], (terms.context[k], u, out))
+    _run_each(terms, ENERGIES, (u, out))
 
 
 @inner_scalar
@@ -292,25 +316,19 @@ def limit_of(terms, u, v, a, dt, beta, energy, lightness):
 @inner_scalar
 def obstacles_to(terms, factor):
     """Put moving obstacles where the factors (h, 3) of histories and their derivatives say."""
-    for k in range(terms.context.size):
-        if terms.kernel[k, PLACE_OBSTACLES] != 0:
-            run_at(terms.kernel[k, PLACE_OBSTACLES], (terms.context[k], factor))
+    _run_each(terms, PLACE_OBSTACLES, (factor,))
 
 
 @inner_scalar
 def clock_to(terms, since):
     """Tell terms with memory how long (s) after the last accepted step they are evaluated next."""
-    for k in range(terms.context.size):
-        if terms.kernel[k, ADVANCE_CLOCK] != 0:
-            run_at(terms.kernel[k, ADVANCE_CLOCK], (terms.context[k], since))
+    _run_each(terms, ADVANCE_CLOCK, (since,))
 
 
 @inner_scalar
 def commit_all(terms):
     """Tell them that the step has been accepted that ends where they were evaluated last."""
-    for k in range(terms.context.size):
-        if terms.kernel[k, COMMIT] != 0:
-            run_at(terms.kernel[k, COMMIT], (terms.context[k],))
+    _run_each(terms, COMMIT, ())
 
 
 @inner_scalar
@@ -326,9 +344,7 @@ def dissipated_by(terms):
 @inner_scalar
 def states_of(terms, out):
     """Write the states of their branches (b, 2) there to `out`."""
-    for k in range(terms.context.size):
-        if terms.kernel[k, BRANCH_STATES] != 0:
-            run_at(terms.kernel[k, BRANCH_STATES], (terms.context[k], out))
+    _run_each(terms, BRANCH_STATES, (out,))
 
 
 @inner_scalar

@@ -27,6 +27,7 @@ from foldyn.mechanics.term import (
     energies,
     forces,
     mean_forces,
+    parted_rows,
 )
 from foldyn.mechanics.threads import Team, team
 
@@ -312,16 +313,16 @@ def _forces(own, u, v, t, force, powers):
     n, r = model.nodes, model.rotations
     for k in range(3 * n + r, out.size):
         flat(out)[k] = 0.0
-    x, couple = flat(moved)[3 * n : 3 * n + r], flat(out)[3 * n : 3 * n + r]
-    shell_force(model, moved[:n], x, out[:n], couple, own.work)
+    (here, x), (pull, couple) = parted_rows(moved, n, r), parted_rows(out, n, r)
+    shell_force(model, here, x, pull, couple, own.work)
 
 
 @energies
 def _energies(own, u, out):
     model, moved = own.model, rows_at(u, own.rows)
     n, r = model.nodes, model.rotations
-    x = flat(moved)[3 * n : 3 * n + r]
-    shell_energy(model, moved[:n], x, own.work, numbers_at(out, 3))
+    here, x = parted_rows(moved, n, r)
+    shell_energy(model, here, x, own.work, numbers_at(out, 3))
 
 
 @mean_forces
@@ -329,9 +330,9 @@ def _mean_forces(own, u0, u1, before, h, t, force):
     model, start, end = own.model, rows_at(u0, own.rows), rows_at(u1, own.rows)
     out, angle = rows_at(force, own.rows), numbers_at(before, own.work.angle.size)
     n, r = model.nodes, model.rotations
-    x0, x1 = flat(start)[3 * n : 3 * n + r], flat(end)[3 * n : 3 * n + r]
-    couple = flat(out)[3 * n : 3 * n + r]
-    add_mean_shell_force(model, start[:n], x0, end[:n], x1, angle, out[:n], couple, own.work)
+    (one, x0), (other, x1) = parted_rows(start, n, r), parted_rows(end, n, r)
+    pull, couple = parted_rows(out, n, r)
+    add_mean_shell_force(model, one, x0, other, x1, angle, pull, couple, own.work)
 
 
 def shell_kernels(model: ShellModel, work: ShellWork) -> Compiled:

@@ -175,9 +175,7 @@ class OrigamiProblem:
 
     def _contact(self, u: NDArray) -> ContactTerm:
         """Its contact, planes where they are in a state (m,)."""
-        found = self.body(u, 0.0).find(ContactTerm)
-        assert found is not None
-        return found
+        return self.body(u, 0.0).term(ContactTerm)
 
     def prescribed(self, factor: float) -> NDArray:
         """Displacements of held dofs: imposed ones times the factor, others where they stood."""

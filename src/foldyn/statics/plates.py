@@ -61,13 +61,7 @@ class Plates:
 
     def placed(self, body: Assembly, values: NDArray) -> Assembly:
         """A body with its planes where they are in a state."""
-        if not self:
-            return body
-        moved = self.moved(values)
-        return Assembly(
-            body.sheet,
-            *(t.displaced(moved) if isinstance(t, ContactTerm) else t for t in body.others),
-        )
+        return body.displaced(self.moved(values)) if self else body
 
     def force(self, contact: ContactTerm, q: NDArray) -> float:
         """What moves the planes along their motion, N; q (m,) of the body."""

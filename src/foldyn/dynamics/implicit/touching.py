@@ -57,9 +57,8 @@ class TouchingNewton(Newton):
     def __init__(self, scheme: Scheme, matrix: StepMatrix) -> None:
         super().__init__(scheme, matrix)
         body = scheme.packed.body
-        contact = body.find(ContactTerm)
-        assert contact is not None
-        self._tables, self._memory = contact.tables, body.kept(scheme.work, ContactTerm)
+        self._tables = body.term(ContactTerm).tables
+        self._memory = body.kept(scheme.work, ContactTerm)
         self._memory.counts.lagged = 1
         self._size = 3 * scheme.packed.system.rows
         self._free = np.zeros(self._size, bool)

@@ -71,8 +71,10 @@ class ContactTerm(Term):
 
     def _copy(self, **changes: Any) -> ContactTerm:
         """The same but for some attributes, with the same tables and, unless given, lists."""
-        _ = self.tables, self.memory
+        _ = self._contexts  # and with them tables and lists
         other = copy(self)
+        if not changes.keys() & {"tables", "memory"}:
+            other._contexts = self._contexts
         vars(other).update(changes)
         return other
 
