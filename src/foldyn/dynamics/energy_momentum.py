@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.dynamics.actuation import turn
+from foldyn.dynamics.actuation import offset_work, turn
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.damping import (
     add_dampers,
@@ -191,16 +191,18 @@ def residual(step, h, t):
         run_at(step.histories, (step.context, t))
     copy(s.factor, new.factor)
     mean = mean_factors(step)
-    if system.turns:
-        turn(step.setting.terms.folds, system.actuators, mean)
     carry(system.moved, old.factor[:, 0], old.q, s.displacement)
     carry(system.moved, new.factor[:, 0], new.q, s.velocity)
     new.force[:] = 0.0
     step.powers[:] = 0.0
     middle = t - 0.5 * h
     for k in range(step.terms.size):
+        if system.turns:  # what remembers the start of the step needs the end
+            turn(step.setting.terms.folds, system.actuators, mean if k == 0 else new.factor)
         ends = step.terms[k], s.displacement, s.velocity
-        run_at(step.forces[k], (*ends, step.before, h, middle, new.force))
+        run_at(step.forces[k], (*ends, step.before, h, middle, new.force, step.powers))
+    if system.turns:  # for the tangent
+        turn(step.setting.terms.folds, system.actuators, mean)
     touch = flat(step.touch)
     for i in range(touch.size):
         bracket[i] += touch[i]
@@ -287,7 +289,7 @@ def _works(step, h):
 @kernel
 def _actuation(step, u0, u1):
     """Work of the actuators in a step: what turning the rest angles at either end changes."""
-    terms, old, new = step.setting.terms, step.old, step.new
+    terms, share, old, new = step.setting.terms, step.setting.share, step.old, step.new
     done, mean, system, s = 0.0, mean_factors(step), step.setting.system, step.setting.s
     turn(terms.folds, system.actuators, old.factor)
     done -= _energy_of_sheet(terms, u0, s.energy)
@@ -295,7 +297,11 @@ def _actuation(step, u0, u1):
     done += _energy_of_sheet(terms, u0, s.energy)
     done -= _energy_of_sheet(terms, u1, s.energy)
     turn(terms.folds, system.actuators, new.factor)
-    return done + _energy_of_sheet(terms, u1, s.energy)
+    done += _energy_of_sheet(terms, u1, s.energy)
+    offset_work(  # which notes where offsets stand, should they jump next
+        terms.folds, system.actuators, share.fold_angle, 0, system.actuators.hinge.size, True
+    )
+    return done
 
 
 @inner

@@ -45,6 +45,16 @@ def update(before, after, plastic, grown, limit, isotropic, kinematic):
     return plastic, grown, -plastic, slope, energy, lost
 
 
+@scalar
+def mean_moment(before, after, plastic, grown, limit, isotropic, kinematic):
+    """Mean moment over a turn, and its slope: in the last part of it the crease yields."""
+    now = update(before, after, plastic, grown, limit, isotropic, kinematic)
+    whole, part = 1.0 + isotropic + kinematic, 0.0
+    if after != before:
+        part = min(1.0, whole * (now[1] - grown) / abs(after - before))
+    return -(plastic + 0.5 * part * (now[0] - plastic)), 0.5 * part * (part - 2.0) / whole
+
+
 @dataclass(frozen=True)
 class Plastic(MemoryLaw):
     """Elastic and plastic law of creases, independent of rates.

@@ -54,6 +54,18 @@ def update(before, after, dt, spring, share, rate):
     return now, 0.0, share * now, share * mean, 0.5 * share * now * now, share * lost
 
 
+@scalar
+def mean_moment(before, after, dt, spring, share, rate):
+    """Mean moment over such a turn, and its slope: what it does is stored or lost, exactly."""
+    x = rate * dt
+    mean = -math.expm1(-x) / x if x > 0.0 else 1.0
+    if x < FEW:
+        rise = 0.5 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x / 5040))))
+    else:
+        rise = (1.0 - mean) / x
+    return share * (mean * spring + rise * (after - before)), share * rise
+
+
 @dataclass(frozen=True)
 class Prony(MemoryLaw):
     """Viscoelastic law: an elastic law and Maxwell branches beside it.

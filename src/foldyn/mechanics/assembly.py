@@ -334,7 +334,7 @@ class AssembledBlocks:
     ) -> None:  # fmt: skip
         """See `Blocks`."""
         self._sheet.put(of.sheet, pattern, u, before, again, out)
-        self._add(of, pattern, u, 1.0, out)
+        self._add(pattern, [term.entries(u, FLOOR) for term in _with_places(of)], out)
 
     def put_mean(
         self, of: Assembly, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray,
@@ -342,12 +342,12 @@ class AssembledBlocks:
     ) -> None:  # fmt: skip
         """See `Blocks`."""
         self._sheet.put_mean(of.sheet, pattern, u0, u1, angle, before, again, out)
-        self._add(of, pattern, 0.5 * (u0 + u1), 0.5, out)
+        self._add(pattern, [term.mean_entries(u0, u1, FLOOR) for term in _with_places(of)], out)
 
-    def _add(self, of: Assembly, pattern: Sparsity, u: NDArray, share: float, out: NDArray) -> None:
-        """Add a share of what further terms have at u."""
-        for slots, term in zip(self._slots_in(pattern), _with_places(of), strict=True):
-            np.add.at(out.reshape(-1), slots, share * term.entries(u, FLOOR))
+    def _add(self, pattern: Sparsity, entries: Sequence[NDArray], out: NDArray) -> None:
+        """Add the entries of further terms."""
+        for slots, own in zip(self._slots_in(pattern), entries, strict=True):
+            np.add.at(out.reshape(-1), slots, own)
 
     def filled(self, pattern: Sparsity) -> NDArray:
         """See `Blocks`."""

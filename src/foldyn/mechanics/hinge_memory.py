@@ -14,6 +14,7 @@ from foldyn.mechanics.inelastic import (
     MemoryHinges,
     evaluate_at,
     make_last,
+    mean_memory_tangents,
     memory_gradients,
     memory_kernels,
     memory_tangents,
@@ -112,6 +113,13 @@ class HingeMemory(Term):
         evaluate_at(own, self._offset, u)
         np.maximum(own.slope, (floor - 1.0) * own.stiffness, out=own.slope)
         memory_tangents(own, u, out)
+        return out[self._pairs]
+
+    def mean_entries(self, q0: NDArray, q1: NDArray, floor: float = -np.inf) -> NDArray:
+        """See `Term`."""
+        out = np.empty((len(self.own.rest), WIDTH, WIDTH))
+        ends = in_rows(q0, self._rows), in_rows(q1, self._rows)
+        mean_memory_tangents(self.own, 0.5 * (floor - 1.0), *ends, out)
         return out[self._pairs]
 
     def on(self, sheet: SheetTerm) -> HingeMemory:
