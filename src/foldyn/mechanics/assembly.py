@@ -106,10 +106,13 @@ class Assembly:
         return body
 
     # ------------------------------------------------------------------ energies and forces
-    def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
+    def dofs(
+        self, displacement: NDArray, push: NDArray | None = None, memory: Term | None = None
+    ) -> NDArray:
         """Vector (m,) of displacements (n, 3), the hidden dofs in balance, by Newton's method.
 
         push : forces (m,), N, of which those on the hidden dofs count; none by default.
+        memory : what resists beside the sheet.
 
         Raises
         ------
@@ -119,14 +122,15 @@ class Assembly:
         q = np.concatenate([np.asarray(displacement, float).ravel(), np.zeros(len(self.hidden))])
         if not len(self.hidden):
             return q
-        first, body = self.size - len(self.hidden), self._sheet_alone
+        first = self.size - len(self.hidden)
+        body = self._sheet_alone if memory is None else Assembly(self.sheet, memory)
         for _ in range(ITERATIONS):
             couple = body.internal(q)[first:]
             if push is not None:
                 couple -= push[self.hidden]
             if not couple.any():
                 return q
-            stiffness = self.sheet.tangent(q, LEAST_SLOPE)[first:][:, first:]
+            stiffness = body.tangent(q, LEAST_SLOPE)[first:][:, first:]
             step = splu(sparse.csc_array(stiffness)).solve(-couple)
             q[first:] += step
             if self.sheet.per_hidden * np.abs(step).max(initial=0.0) <= BALANCED:

@@ -340,6 +340,8 @@ class Implicit:
             course.tally.work += scheme.settle(max(end, jump))
             scheme.begin(max(end, jump))
             system = self._packed.system
+            if self._memory is not None:  # creases that turn in no time
+                self._memory.commit()
             if system.turns:
                 course.tally.work += jolt(
                     self._packed.body.sheet.folds, system.actuators, scheme.work.fold_angle

@@ -192,8 +192,8 @@ class Scheme(ABC):
         Where nothing damps them they do so at once.
         """
         body, system, s = self.packed.body, self.packed.system, self.scratch
-        damping, hidden = system.damping, body.hidden
-        damped = damping.elements.coefficient.size or body.find(HingeMemory) is not None
+        damping, hidden, memory = system.damping, body.hidden, body.find(HingeMemory)
+        damped = damping.elements.coefficient.size > 0
         if damping.data.size:
             damped = damped or np.diff(damping.indptr)[hidden].any()
         if not len(hidden) or damped:
@@ -201,9 +201,11 @@ class Scheme(ABC):
         place(system, self.old.q, self.old.w, t, s)
         start = np.ravel(s.displacement)
         push = following_force(system.following, start, s.factor)
-        settled = body.dofs(s.displacement[: len(system.order)], push)
+        settled = body.dofs(s.displacement[: len(system.order)], push, memory)
         self.old.q.ravel()[hidden] = settled[hidden]
-        return float((body.energies(settled) - body.energies(start[: body.size])).sum())
+        before = body.energies(start[: body.size])
+        stored = float((body.energies(settled) - before).sum())
+        return stored if memory is None else stored + float(memory.own.lost[1])
 
     def goal(self, h: float) -> Goal:
         """What the residual of a step h (s) is judged by."""
