@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.dynamics.actuation import offset_work, turn
+from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.damping import (
     add_dampers,
@@ -289,7 +289,7 @@ def _works(step, h):
 @kernel
 def _actuation(step, u0, u1):
     """Work of the actuators in a step: what turning the rest angles at either end changes."""
-    terms, share, old, new = step.setting.terms, step.setting.share, step.old, step.new
+    terms, old, new = step.setting.terms, step.old, step.new
     done, mean, system, s = 0.0, mean_factors(step), step.setting.system, step.setting.s
     turn(terms.folds, system.actuators, old.factor)
     done -= _energy_of_sheet(terms, u0, s.energy)
@@ -297,11 +297,7 @@ def _actuation(step, u0, u1):
     done += _energy_of_sheet(terms, u0, s.energy)
     done -= _energy_of_sheet(terms, u1, s.energy)
     turn(terms.folds, system.actuators, new.factor)
-    done += _energy_of_sheet(terms, u1, s.energy)
-    offset_work(  # which notes where offsets stand, should they jump next
-        terms.folds, system.actuators, share.fold_angle, 0, system.actuators.hinge.size, True
-    )
-    return done
+    return done + _energy_of_sheet(terms, u1, s.energy)
 
 
 @inner

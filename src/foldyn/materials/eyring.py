@@ -48,7 +48,7 @@ def update(before, after, dt, spring, barrier, rate):
 def mean_moment(before, after, dt, spring, barrier, rate):
     """Moment halfway between those at the ends, whose work is what is stored or lost, and slope."""
     now, slope = _relaxed(after - before, dt, spring, barrier, rate)
-    return 0.5 * (spring + now - before - after), 0.5 * (slope - 1.0)
+    return 0.5 * (spring + now - before - after), 0.5 * (slope - 1.0), 0.0
 
 
 @inner_scalar

@@ -63,7 +63,7 @@ def mean_moment(before, after, dt, spring, share, rate):
         rise = 0.5 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x / 5040))))
     else:
         rise = (1.0 - mean) / x
-    return share * (mean * spring + rise * (after - before)), share * rise
+    return share * (mean * spring + rise * (after - before)), share * rise, 0.0
 
 
 @dataclass(frozen=True)

@@ -114,9 +114,10 @@ def add_memory_forces(own, offset, u, v, force):
 def add_mean_memory_forces(own, offset, start, end, h, out):
     """Add forces whose work in a step h from `start` to `end` is what branches store and lose.
 
-    All are flat. Offsets are those of the end; returns the work that they do as they change, J.
+    All are flat. Offsets are those of the end; returns the work that they do as they change, and
+    how much less is lost than the laws say, J.
     """
-    work, lost, g = 0.0, 0.0, own.gradient
+    work, lost, lacking, g = 0.0, 0.0, 0.0, own.gradient
     one, other, gradient = np.empty((2, 4, 3)), np.empty((2, 4, 3)), np.empty((4, 3))
     own.elapsed[0] = h
     for e in range(own.rest.size):
@@ -126,12 +127,13 @@ def add_mean_memory_forces(own, offset, start, end, h, out):
         lost += evaluate_branches(own, offset, e, after - own.rest[e])
         own.mean[e] = 0.0
         for k in range(own.first[e], own.first[e + 1]):
-            moment, slope = mean_moment(
+            found = mean_moment(
                 own.code[k], own.parameters[k], own.angle[e], own.turned[e], h, own.state[k, 0],
                 own.state[k, 1],
             )  # fmt: skip
-            own.mean[e, 0] += own.stiffness[e] * moment
-            own.mean[e, 1] += own.stiffness[e] * slope
+            own.mean[e, 0] += own.stiffness[e] * found[0]
+            own.mean[e, 1] += own.stiffness[e] * found[1]
+            lacking += own.stiffness[e] * found[2]
         moment = own.mean[e, 0]
         _mean_gradient(own, e, start, end, after - before, one, other, gradient)
         for c in range(12):
@@ -140,7 +142,7 @@ def add_mean_memory_forces(own, offset, start, end, h, out):
             out[dofs[12 + c]] -= moment * hidden[c]
         work += moment * (own.turned[e] - own.angle[e] - (after - before))
     own.lost[1] = lost
-    return work
+    return work, lacking
 
 
 @inner
@@ -286,8 +288,12 @@ def _energies(term, u, out):
 @mean_forces
 def _mean_forces(term, u0, u1, before, h, t, force, powers):
     start, end, out = rows_at(u0, term.rows), rows_at(u1, term.rows), rows_at(force, term.rows)
-    work = add_mean_memory_forces(term.own, term.offset, flat(start), flat(end), h, flat(out))
-    numbers_at(powers, 2)[0] += work / h
+    work, lacking = add_mean_memory_forces(
+        term.own, term.offset, flat(start), flat(end), h, flat(out)
+    )
+    both = numbers_at(powers, 2)
+    both[0] += work / h
+    both[1] -= lacking / h
 
 
 @advance_clock
