@@ -48,7 +48,8 @@ def test_a_free_sheet_keeps_both_momenta_and_loses_what_creases_take(model, law,
 def test_the_balance_closes_also_where_moments_jump(model, law):
     jump = fd.CreaseMoment([1], 0.5 * MOMENT, fd.Step(0.31))
     case = moved(model, law, jump, damping=[fd.CreaseDamping(1e-4)])
-    for options in ({"dt": 6e-3}, {"tolerance": 1e-4}):
+    steps: list[dict[str, Any]] = [{"dt": 6e-3}, {"tolerance": 1e-4}]
+    for options in steps:
         motion = fd.simulate(case, 0.6, METHOD, **options)
         assert float(motion.dissipated[-1]) > 0.03 * float(motion.work.max())
         assert (np.diff(motion.dissipated) >= 0.0).all()

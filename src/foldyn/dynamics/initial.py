@@ -234,9 +234,8 @@ def begin(
         system.actuators.offset[:, 3] = np.nan  # no moment known yet
     if len(body.hidden):  # they stand where they are in balance
         push = following_force(system.following, inward.ravel(), s.factor)
-        relaxed = memory is None or isinstance(remembered, np.ndarray)
-        relaxed = relaxed or (remembered is None and memory.settles.all())
-        there = body.dofs(by.inward(u)[: len(u)], push, None if relaxed else memory)
+        resists = memory if memory is not None and memory.resists(remembered) else None
+        there = body.dofs(by.inward(u)[: len(u)], push, resists)
         inward.ravel()[body.hidden] = there[body.hidden]
         if continued is not None and len(continued.values) > inward.size:
             inward.ravel()[body.hidden] = continued.values[body.hidden]

@@ -55,6 +55,10 @@ class HingeMemory(Term):
             own.state[self.settles] = 0.0
         evaluate_at(own, offset, q)
 
+    def resists(self, state: NDArray | str | None) -> bool:
+        """Whether it begins in such a state as if turned in no time, and is not relaxed or given."""
+        return isinstance(state, str) or (state is None and not self.settles.all())
+
     def commit(self) -> None:
         """Accept the step that ends where the body was evaluated last."""
         make_last(self.own)
