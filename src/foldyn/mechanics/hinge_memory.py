@@ -56,7 +56,7 @@ class HingeMemory(Term):
         evaluate_at(own, offset, q)
 
     def resists(self, state: NDArray | str | None) -> bool:
-        """Whether it begins in such a state as if turned in no time, and is not relaxed or given."""
+        """Whether it begins in such a state as if turned in no time, not relaxed or given."""
         return isinstance(state, str) or (state is None and not self.settles.all())
 
     def commit(self) -> None:
