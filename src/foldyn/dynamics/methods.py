@@ -197,10 +197,7 @@ METHODS: Mapping[str, Integrator] = {
             "generalized_alpha", generalized_alpha, generalized_alpha.scheme(), massless=True
         ),
         _implicit(
-            "energy_momentum",
-            energy_momentum,
-            energy_momentum.EnergyMomentum,
-            massless=True,
+            "energy_momentum", energy_momentum, energy_momentum.EnergyMomentum, massless=True
         ),
     )
 }

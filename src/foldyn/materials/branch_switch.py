@@ -33,9 +33,9 @@ def update(code, p, before, after, dt, one, other):
 
 @scalar
 def mean_moment(code, p, before, after, dt, one, other):
-    """Mean moment of a branch in a step, its derivative by `after`, and a loss; see `update`.
+    """Mean moment of a branch in a step, its derivative by `after`, and what is not lost.
 
-    Its work along the turn is the change of the energy and the loss of `update` less this one.
+    The work along the turn is the change of the energy and the loss of `update` less the last one.
     """
     if code == prony.CODE:
         return prony.mean_moment(before, after, dt, one, p[0], p[1])

@@ -46,7 +46,7 @@ def update(before, after, dt, spring, barrier, rate):
 
 @scalar
 def mean_moment(before, after, dt, spring, barrier, rate):
-    """Moment halfway between those at the ends, whose work is what is stored or lost, and slope."""
+    """Mean of the moments at the ends, its slope, and 0: its work is what is stored and lost."""
     now, slope = _relaxed(after - before, dt, spring, barrier, rate)
     return 0.5 * (spring + now - before - after), 0.5 * (slope - 1.0), 0.0
 

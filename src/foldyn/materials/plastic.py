@@ -47,11 +47,11 @@ def update(before, after, plastic, grown, limit, isotropic, kinematic):
 
 @scalar
 def mean_moment(before, after, plastic, grown, limit, isotropic, kinematic):
-    """Moment halfway between those at the ends, its slope, and what its work lacks of the loss.
+    """Mean of the moments at the ends, its slope, and what its work lacks of what is lost.
 
-    Where a crease begins to yield within the turn, the work along it is larger: with the mean along
-    it the dofs without mass would ring from step to step. The loss stays above zero: before it
-    yields, the crease turns by twice the yield moment at most.
+    It lacks something where the crease begins to yield within the turn. With the mean along the
+    turn dofs without mass would ring from step to step. What is left of the loss is not negative:
+    before the crease yields, it turns by twice the yield moment over its stiffness at most.
     """
     now = update(before, after, plastic, grown, limit, isotropic, kinematic)
     turn, more, whole = abs(after - before), now[1] - grown, 1.0 + isotropic + kinematic

@@ -56,7 +56,7 @@ def update(before, after, dt, spring, share, rate):
 
 @scalar
 def mean_moment(before, after, dt, spring, share, rate):
-    """Mean moment over such a turn, and its slope: what it does is stored or lost, exactly."""
+    """Mean moment along the turn, its slope, and 0: its work is what is stored and lost."""
     x = rate * dt
     mean = -math.expm1(-x) / x if x > 0.0 else 1.0
     if x < FEW:
