@@ -96,9 +96,8 @@ REASONS: Mapping[str, tuple[str, str]] = {
         "which thick panels are hinged",
         "contact lies between middle surfaces, beside which boards are hinged; not done",
     ),
-    "d": ("has a memory", "what a law with memory takes in a step has no exact form; not done"),
-    "e": ("panels that curl", "explicit methods have no edge angles, which panels that curl turn"),
-    "f": (
+    "d": ("panels that curl", "explicit methods have no edge angles, which panels that curl turn"),
+    "e": (
         "creep",
         "load factors that the method finds may turn back, so that no step has a time in which "
         "creases creep",

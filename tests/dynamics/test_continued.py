@@ -49,13 +49,9 @@ def continued(case, method, folder, duration, start=0.0, state=None, **steps):
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("method", ["newmark", "generalized_alpha"])
+@pytest.mark.parametrize("method", ["newmark", "generalized_alpha", "energy_momentum"])
 def test_laws_with_and_without_memory(law, method, tmp_path):
     continued(pushed(LAWS[law]), method, tmp_path, 0.6, **STEPS)
-
-
-def test_the_conserving_method(tmp_path):
-    continued(pushed(), "energy_momentum", tmp_path, 0.6, **STEPS)
 
 
 @pytest.mark.parametrize("law", ["linear", "prony"])

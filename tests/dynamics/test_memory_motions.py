@@ -17,7 +17,7 @@ LAWS = {
     "eyring": fd.Eyring(2e-5, 1e-5, law="linear"),
 }
 EXPLICIT = ["rk4", pytest.param("central_difference", marks=pytest.mark.thorough)]
-METHODS = [*EXPLICIT, "generalized_alpha"]
+METHODS = [*EXPLICIT, "generalized_alpha", "energy_momentum"]
 
 
 def pushed(law):
@@ -182,18 +182,6 @@ def test_the_critical_step_counts_what_resists_at_once():
     light = [one_hinge(law, hold=False, mass=1e-9) for law in ("linear", PRONY)]
     plain, stiffer = (fd.critical_step(case) for case in light)
     assert plain / stiffer == pytest.approx(np.sqrt(1.7), rel=1e-3)
-
-
-def test_methods_that_cannot_take_memory_refuse_it():
-    message = r"method = 'energy_momentum': the law 'prony' has a memory.*choose one of rk4, cent"
-    with pytest.raises(InputError, match=message):
-        fd.simulate(pushed(PRONY), 1.0, "energy_momentum")
-
-
-@pytest.mark.parametrize("tolerance", [None, 1e-4])
-def test_auto_takes_one_that_can(tolerance):
-    found = fd.dynamics.prepare(pushed(PRONY), 1.0, "auto", tolerance=tolerance)
-    assert found.method.remembers
 
 
 def test_states_of_other_cases_are_refused():

@@ -15,13 +15,14 @@ LAWS = {
 
 
 def histories(law, turns, times, start=0.0):
-    """State, moment, slope, energy and loss (b, m, 6) of each branch of a hinge with k = L = 1.
+    """State, moment, slope, energy and loss of each branch of a hinge with k = L = 1, with what
+    mean moments are: (b, m, 9).
 
     turns : (m,) rad; times : (m,) s between them; start : turn before, at rest.
     """
     out = []
     for branch in law.branches(np.ones(1), np.ones(1)):
-        table = np.empty((len(turns), 6))
+        table = np.empty((len(turns), 9))
         begun = np.array([start, 0.0, 0.0])
         branch_table(
             branch.code, branch.parameters[0], np.asarray(turns, float), np.asarray(times, float),

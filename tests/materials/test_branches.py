@@ -52,6 +52,29 @@ def test_work_is_what_is_stored_and_dissipated(name):
     assert abs(work - stored - lost.sum()) < 2e-6 * lost.sum()
 
 
+@pytest.mark.parametrize("size", [1e-9, 1e-3, 1.0])
+@pytest.mark.parametrize("name", LAWS)
+def test_mean_moments_do_the_work_that_is_stored_and_lost(name, size):
+    """Exactly, in steps of any size; what they lose instead of the law is no less than nothing."""
+    turns, times = 0.1 + size * TURNS.cumsum(), size * TIMES
+    found = histories(LAWS[name], np.append(0.1, turns), np.append(0.0, times))
+    change = np.diff(turns, prepend=0.1)
+    stored, lost = np.diff(found[:, :, 4], axis=1), (found[:, :, 5] - found[:, :, 8])[:, 1:]
+    np.testing.assert_allclose(found[:, 1:, 6] * change, stored + lost, rtol=0, atol=2e-16)
+    assert (lost >= -1e-17).all()
+    middle = 0.5 * (found[:, 1:, 2] + found[:, :-1, 2])
+    np.testing.assert_allclose(found[:, 1:, 6], middle, rtol=0, atol=0.5 * np.abs(change).max())
+
+
+@pytest.mark.parametrize("last", [0.02, 1e-4])
+@pytest.mark.parametrize("name", LAWS)
+def test_their_slope_is_the_derivative_by_the_turn_at_the_end(name, last):
+    h, times = 1e-6, np.append(TIMES[:-1], last)
+    ends = [histories(LAWS[name], [*TURNS[:-1], TURNS[-1] + d], times)[:, -1, 6] for d in (h, -h)]
+    slope = histories(LAWS[name], TURNS, times)[:, -1, 7]
+    np.testing.assert_allclose((ends[0] - ends[1]) / (2 * h), slope, rtol=0, atol=1e-8)
+
+
 @pytest.mark.parametrize("name", LAWS)
 def test_what_does_not_move_in_no_time_stays_bit_by_bit(name):
     found = histories(LAWS[name], np.append(TURNS, TURNS[-1]), np.append(TIMES, 0.0))

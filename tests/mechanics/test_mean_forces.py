@@ -12,13 +12,15 @@ from springs import Net
 
 import foldyn as fd
 from foldyn.checks import observed_order
+from foldyn.dynamics.system import pack
 from foldyn.jit.compiled import kernel
 from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.hinge_memory import HingeMemory
 from foldyn.mechanics.mean_forces import MeanForces
 from foldyn.mechanics.term import FORCES, MEAN_FORCES, Compiled, Term, forces
 
-SHEET = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.3, thickness=0.01)
+SHEET = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.3, thickness=0.01, density=1.0)
 FOLD = fd.patterns.simple_fold(a=1.0, b=1.3, dihedral=100)
 MODELS = ("plate", "herkal", "n5b8e", "shell")
 FREE = [
@@ -31,6 +33,12 @@ GROUNDED = [
     fd.Spring(70.0, nodes=[1], direction=(1, 2, -1)),
     fd.Spring(55.0, between=[(0, 3)], direction="-y"),
 ]
+LAWS = {
+    "prony": fd.Prony([0.5, 0.2], [0.02, 0.3], law="linear"),
+    "plastic": fd.Plastic(0.01, isotropic=0.1, kinematic=0.2, law="linear"),
+    "eyring": fd.Eyring(0.02, 1e-2, law="linear"),
+}
+NO_POWERS = np.zeros(2)
 
 
 def structure(model: str, **options: Any) -> Any:
@@ -40,17 +48,19 @@ def structure(model: str, **options: Any) -> Any:
 
 
 @kernel
-def _call(function, context, u0, u1, before, h, force):
-    run_at(function, (context, u0, u1, before, h, 0.0, force))
+def _call(function, context, u0, u1, before, h, force, powers):
+    run_at(function, (context, u0, u1, before, h, 0.0, force, powers))
 
 
-def mean_forces(body: Assembly, q0: np.ndarray, q1: np.ndarray, h: float = 1.0) -> np.ndarray:
-    """Mean forces (m,) of all terms from q0 to q1."""
+def mean_forces(
+    body: Assembly, q0: np.ndarray, q1: np.ndarray, h: float = 1.0, powers: np.ndarray = NO_POWERS
+) -> np.ndarray:
+    """Mean forces (m,) of all terms from q0 to q1, and their powers."""
     work = body.workspaces(1)[0]
     terms, out = MeanForces(body, work), np.zeros((body.rows, 3))
     ends = body.in_rows(q0), body.in_rows(q1)
     for function, context in zip(terms.kernel, terms.context, strict=True):
-        _call(function, context, *ends, body.angles(q0), h, out)
+        _call(function, context, *ends, body.angles(q0), h, out, powers)
     np.testing.assert_allclose(work.angle, body.angles(q1), atol=1e-14)
     return out.ravel()[: body.size]
 
@@ -141,15 +151,19 @@ def test_small_steps_give_the_force_in_the_middle(model, own):
     np.testing.assert_allclose(mean_forces(body, middle, middle), still, atol=1e-12 * scale)
 
 
+@pytest.mark.parametrize("law", ["elastic", *LAWS])
 @pytest.mark.parametrize("model", MODELS)
-def test_the_tangent_is_the_derivative_to_first_order(model):
-    body = fd.Case(structure(model), FREE + GROUNDED).body
+def test_the_tangent_is_the_derivative_to_first_order(model, law):
+    made = structure(model, fold_law=LAWS[law]) if law in LAWS else structure(model)
+    case = fd.Case(made, FREE + GROUNDED)
+    body = remembering(case) if law in LAWS else case.body
     rng, blocks = np.random.default_rng(7), body.blocks()
     q0, step, along = rng.standard_normal((3, body.size)) * [[0.02], [1.0], [1.0]]
     sizes, errors = np.array([4e-3, 2e-3, 1e-3]), []
     out, pattern = np.zeros((len(blocks.pattern.indices), 3, 3)), blocks.pattern
     for size in sizes:
         q1 = q0 + size * step
+        mean_forces(body, q0, q1)
         u0, u1 = body.in_rows(q0), body.in_rows(q1)
         blocks.put_mean(body, pattern, u0, u1, body.angles(q0), u1, True, out)
         row = np.repeat(np.arange(body.rows), np.diff(pattern.indptr))
@@ -161,6 +175,34 @@ def test_the_tangent_is_the_derivative_to_first_order(model):
         errors.append(np.abs(error).max() / np.abs(wanted).max())
     assert errors[-1] < 1e-2
     assert observed_order(sizes, errors) > 0.8
+
+
+def remembering(case: fd.Case) -> Assembly:
+    """The body of a motion, whose creases remember."""
+    return pack(case, 1.0).body
+
+
+@pytest.mark.parametrize("h", [1e-6, 0.01, 100.0])
+@pytest.mark.parametrize("deform", [1e-9, 1e-4, 0.02])
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("model", MODELS)
+def test_creases_that_remember_do_the_work_that_is_stored_and_lost(model, law, deform, h):
+    """However far and long the step; without resultant and moment."""
+    damping = fd.CreaseDamping(0.01) if model == "plate" else ()
+    body = remembering(fd.Case(structure(model, fold_law=LAWS[law]), FREE, damping=damping))
+    memory, powers = body.term(HingeMemory), np.zeros(2)
+    q0, q1 = states(body, deform, 0.3)
+    memory.start(q0)
+    before = body.energies(q0).sum()
+    force = mean_forces(body, q0, q1, h, powers)
+    lost, change = memory.own.lost[1] + h * powers[1], body.energies(q1).sum() - before
+    assert force @ (q1 - q0) == pytest.approx(change + lost, abs=4e-13 * (before + abs(change)))
+    assert lost > -1e-14 * before
+    rest, scale = nodes(body), np.abs(force).max()
+    own = force[: rest.size].reshape(-1, 3)
+    middle = rest + 0.5 * (q0 + q1)[: rest.size].reshape(-1, 3)
+    assert np.abs(own.sum(axis=0)).max() < 1e-12 * scale
+    assert np.abs(np.cross(middle, own).sum(axis=0)).max() < 1e-11 * scale
 
 
 class DragContext(NamedTuple):

@@ -176,6 +176,7 @@ STAGES: Sequence[Uses] = (
             partial(moved, CONSERVING, model="shell"),
             partial(moved, CONSERVING, supports=MOVING, loads=[*TURNING, *FOLLOWING]),
             partial(moved, CONSERVING, damping=[fd.StrainDamping(1e-5)], supports=DASHPOTS),
+            partial(moved, CONSERVING, law=PRONY),
         ],
         "contact in implicit methods and paths": [
             partial(moved, *IMPLICIT, contact=RUBBING, **TOUCHING),

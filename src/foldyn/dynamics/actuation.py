@@ -127,9 +127,9 @@ def power_of_part(folds, actuators, factor, angle, first, last):
 
 
 @kernel
-def jolt(folds, actuators, angle):
-    """Work (J) of offsets that jump between two steps, at dihedrals `angle` (nh,)."""
-    return offset_work(folds, actuators, angle, 0, actuators.hinge.size, True)
+def note_offsets(folds, actuators, angle):
+    """Note where offsets stand after they have jumped, at dihedrals `angle` (nh,)."""
+    offset_work(folds, actuators, angle, 0, actuators.hinge.size, True)
 
 
 @inner

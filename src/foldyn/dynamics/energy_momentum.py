@@ -191,16 +191,18 @@ def residual(step, h, t):
         run_at(step.histories, (step.context, t))
     copy(s.factor, new.factor)
     mean = mean_factors(step)
-    if system.turns:
-        turn(step.setting.terms.folds, system.actuators, mean)
     carry(system.moved, old.factor[:, 0], old.q, s.displacement)
     carry(system.moved, new.factor[:, 0], new.q, s.velocity)
     new.force[:] = 0.0
     step.powers[:] = 0.0
     middle = t - 0.5 * h
     for k in range(step.terms.size):
+        if system.turns:  # what remembers the start of the step needs the end
+            turn(step.setting.terms.folds, system.actuators, mean if k == 0 else new.factor)
         ends = step.terms[k], s.displacement, s.velocity
-        run_at(step.forces[k], (*ends, step.before, h, middle, new.force))
+        run_at(step.forces[k], (*ends, step.before, h, middle, new.force, step.powers))
+    if system.turns:  # for the tangent
+        turn(step.setting.terms.folds, system.actuators, mean)
     touch = flat(step.touch)
     for i in range(touch.size):
         bracket[i] += touch[i]

@@ -227,17 +227,18 @@ def begin(
     tally.work = -moving_energy(system.moved_mass, s.factor)
     first = min(1.0, FIRST * plan.tolerance**0.2) * plan.dt
     tally.time, tally.wanted, tally.error, tally.shortest = plan.start, first, 1e-4, np.inf
-    inward = by.inward(q)
+    inward, memory = by.inward(q), body.find(HingeMemory)
     if system.turns:
         turn(body.sheet.folds, system.actuators, s.factor)
         system.actuators.offset[:, 2] = system.actuators.offset[:, 0]
         system.actuators.offset[:, 3] = np.nan  # no moment known yet
     if len(body.hidden):  # they stand where they are in balance
         push = following_force(system.following, inward.ravel(), s.factor)
-        inward.ravel()[body.hidden] = body.dofs(by.inward(u)[: len(u)], push)[body.hidden]
+        resists = memory if memory is not None and memory.resists(remembered) else None
+        there = body.dofs(by.inward(u)[: len(u)], push, resists)
+        inward.ravel()[body.hidden] = there[body.hidden]
         if continued is not None and len(continued.values) > inward.size:
             inward.ravel()[body.hidden] = continued.values[body.hidden]
-    memory = body.find(HingeMemory)
     if memory is not None:
         there = by.inward(u)
         there.ravel()[body.hidden] = inward.ravel()[body.hidden]

@@ -135,8 +135,6 @@ class Integrator(NamedTuple):
         Of an implicit method: its `Scheme` from a case and a course.
     massless : bool
         Whether it takes dofs without mass beside the displacements, as those of a shell.
-    remembers : bool
-        Whether it takes laws with memory.
     looks : tuple of float
         Where in a step, from 0 to 1, it looks at the loads.
     """
@@ -149,7 +147,6 @@ class Integrator(NamedTuple):
     adaptive: bool = False
     scheme: Callable[..., Any] | None = None
     massless: bool = False
-    remembers: bool = True
     looks: tuple[float, ...] = (0.0, 1.0)
 
     @property
@@ -200,11 +197,7 @@ METHODS: Mapping[str, Integrator] = {
             "generalized_alpha", generalized_alpha, generalized_alpha.scheme(), massless=True
         ),
         _implicit(
-            "energy_momentum",
-            energy_momentum,
-            energy_momentum.EnergyMomentum,
-            massless=True,
-            remembers=False,
+            "energy_momentum", energy_momentum, energy_momentum.EnergyMomentum, massless=True
         ),
     )
 }
@@ -240,12 +233,6 @@ def _lacking(method: Integrator, case: Case) -> str:
     structure = case.structure
     if structure.massless and structure.condensed is None and not method.massless:
         return f"{structure.massless} have no mass, which this method needs"
-    if case.remembering and not method.remembers:
-        law = case.remembering[0].law.name
-        return (
-            f"the law {law!r} has a memory, and no forces that depend on the state alone, which "
-            "this method needs"
-        )
     return ""
 
 

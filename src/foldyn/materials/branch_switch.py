@@ -31,9 +31,24 @@ def update(code, p, before, after, dt, one, other):
     return np.nan, np.nan, np.nan, np.nan, np.nan, np.nan
 
 
+@scalar
+def mean_moment(code, p, before, after, dt, one, other):
+    """Mean moment of a branch in a step, its derivative by `after`, and what is not lost.
+
+    The work along the turn is the change of the energy and the loss of `update` less the last one.
+    """
+    if code == prony.CODE:
+        return prony.mean_moment(before, after, dt, one, p[0], p[1])
+    if code == plastic.CODE:
+        return plastic.mean_moment(before, after, one, other, p[0], p[1], p[2])
+    if code == eyring.CODE:
+        return eyring.mean_moment(before, after, dt, one, p[0], p[1])
+    return np.nan, np.nan, np.nan
+
+
 @kernel
 def branch_table(code, p, after, dt, start, out):
-    """`update` along a history of turns (m,) with times dt (m,) between them, to `out` (m, 6).
+    """`update` and mean moments along turns (m,) with times dt (m,) between them, to `out` (m, 9).
 
     start : (3,) turn and state before the first.
     """
@@ -42,4 +57,7 @@ def branch_table(code, p, after, dt, start, out):
         found = update(code, p, before, after[i], dt[i], one, other)
         for c in range(6):
             out[i, c] = found[c]
+        mean = mean_moment(code, p, before, after[i], dt[i], one, other)
+        for c in range(3):
+            out[i, 6 + c] = mean[c]
         before, one, other = after[i], found[0], found[1]

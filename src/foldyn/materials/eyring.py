@@ -44,6 +44,13 @@ def update(before, after, dt, spring, barrier, rate):
     return now, 0.0, now - after, slope - 1.0, 0.5 * (now * now - after * after), lost
 
 
+@scalar
+def mean_moment(before, after, dt, spring, barrier, rate):
+    """Mean of the moments at the ends, its slope, and 0: its work is what is stored and lost."""
+    now, slope = _relaxed(after - before, dt, spring, barrier, rate)
+    return 0.5 * (spring + now - before - after), 0.5 * (slope - 1.0), 0.0
+
+
 @inner_scalar
 def _relaxed(turn, dt, spring, barrier, rate):
     """Elastic turn after a step, and its derivative with respect to the turn in it."""

@@ -45,6 +45,20 @@ def update(before, after, plastic, grown, limit, isotropic, kinematic):
     return plastic, grown, -plastic, slope, energy, lost
 
 
+@scalar
+def mean_moment(before, after, plastic, grown, limit, isotropic, kinematic):
+    """Mean of the moments at the ends, its slope, and what its work lacks of what is lost.
+
+    It lacks something where the crease begins to yield within the turn. With the mean along the
+    turn dofs without mass would ring from step to step. What is left of the loss is not negative:
+    before the crease yields, it turns by twice the yield moment over its stiffness at most.
+    """
+    now = update(before, after, plastic, grown, limit, isotropic, kinematic)
+    turn, more, whole = abs(after - before), now[1] - grown, 1.0 + isotropic + kinematic
+    lacking = 0.5 * more * max(turn - whole * more, 0.0)
+    return -0.5 * (plastic + now[0]), 0.5 * now[3], lacking
+
+
 @dataclass(frozen=True)
 class Plastic(MemoryLaw):
     """Elastic and plastic law of creases, independent of rates.

@@ -54,6 +54,18 @@ def update(before, after, dt, spring, share, rate):
     return now, 0.0, share * now, share * mean, 0.5 * share * now * now, share * lost
 
 
+@scalar
+def mean_moment(before, after, dt, spring, share, rate):
+    """Mean moment along the turn, its slope, and 0: its work is what is stored and lost."""
+    x = rate * dt
+    mean = -math.expm1(-x) / x if x > 0.0 else 1.0
+    if x < FEW:
+        rise = 0.5 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x / 5040))))
+    else:
+        rise = (1.0 - mean) / x
+    return share * (mean * spring + rise * (after - before)), share * rise, 0.0
+
+
 @dataclass(frozen=True)
 class Prony(MemoryLaw):
     """Viscoelastic law: an elastic law and Maxwell branches beside it.

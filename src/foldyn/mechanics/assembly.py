@@ -106,10 +106,13 @@ class Assembly:
         return body
 
     # ------------------------------------------------------------------ energies and forces
-    def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
+    def dofs(
+        self, displacement: NDArray, push: NDArray | None = None, memory: Term | None = None
+    ) -> NDArray:
         """Vector (m,) of displacements (n, 3), the hidden dofs in balance, by Newton's method.
 
         push : forces (m,), N, of which those on the hidden dofs count; none by default.
+        memory : what resists beside the sheet.
 
         Raises
         ------
@@ -119,14 +122,15 @@ class Assembly:
         q = np.concatenate([np.asarray(displacement, float).ravel(), np.zeros(len(self.hidden))])
         if not len(self.hidden):
             return q
-        first, body = self.size - len(self.hidden), self._sheet_alone
+        first = self.size - len(self.hidden)
+        body = self._sheet_alone if memory is None else Assembly(self.sheet, memory)
         for _ in range(ITERATIONS):
             couple = body.internal(q)[first:]
             if push is not None:
                 couple -= push[self.hidden]
             if not couple.any():
                 return q
-            stiffness = self.sheet.tangent(q, LEAST_SLOPE)[first:][:, first:]
+            stiffness = body.tangent(q, LEAST_SLOPE)[first:][:, first:]
             step = splu(sparse.csc_array(stiffness)).solve(-couple)
             q[first:] += step
             if self.sheet.per_hidden * np.abs(step).max(initial=0.0) <= BALANCED:
@@ -334,7 +338,7 @@ class AssembledBlocks:
     ) -> None:  # fmt: skip
         """See `Blocks`."""
         self._sheet.put(of.sheet, pattern, u, before, again, out)
-        self._add(of, pattern, u, 1.0, out)
+        self._add(pattern, [term.entries(u, FLOOR) for term in _with_places(of)], out)
 
     def put_mean(
         self, of: Assembly, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray,
@@ -342,12 +346,12 @@ class AssembledBlocks:
     ) -> None:  # fmt: skip
         """See `Blocks`."""
         self._sheet.put_mean(of.sheet, pattern, u0, u1, angle, before, again, out)
-        self._add(of, pattern, 0.5 * (u0 + u1), 0.5, out)
+        self._add(pattern, [term.mean_entries(u0, u1, FLOOR) for term in _with_places(of)], out)
 
-    def _add(self, of: Assembly, pattern: Sparsity, u: NDArray, share: float, out: NDArray) -> None:
-        """Add a share of what further terms have at u."""
-        for slots, term in zip(self._slots_in(pattern), _with_places(of), strict=True):
-            np.add.at(out.reshape(-1), slots, share * term.entries(u, FLOOR))
+    def _add(self, pattern: Sparsity, entries: Sequence[NDArray], out: NDArray) -> None:
+        """Add the entries of further terms."""
+        for slots, own in zip(self._slots_in(pattern), entries, strict=True):
+            np.add.at(out.reshape(-1), slots, own)
 
     def filled(self, pattern: Sparsity) -> NDArray:
         """See `Blocks`."""

@@ -39,7 +39,7 @@ def _energies(own, u, out):
 
 
 @mean_forces
-def _mean_forces(own, u0, u1, before, h, t, force):
+def _mean_forces(own, u0, u1, before, h, t, force, powers):
     rows, angle = own.model.rest.shape[0], own.work.angle
     start, end, out = rows_at(u0, rows), rows_at(u1, rows), rows_at(force, rows)
     add_bar_forces(own.model, start, end, out)

@@ -175,7 +175,7 @@ def _energies(own, u, out):
 
 
 @mean_forces
-def _mean_forces(own, u0, u1, before, h, t, force):
+def _mean_forces(own, u0, u1, before, h, t, force, powers):
     start, end, out = rows_at(u0, own.rows), rows_at(u1, own.rows), rows_at(force, own.rows)
     first = numbers_at(before, own.angle.size)
     add_mean_clamp_forces(own.clamps, start, end, first, out, own.angle)

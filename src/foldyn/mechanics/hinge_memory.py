@@ -14,6 +14,7 @@ from foldyn.mechanics.inelastic import (
     MemoryHinges,
     evaluate_at,
     make_last,
+    mean_memory_tangents,
     memory_gradients,
     memory_kernels,
     memory_tangents,
@@ -53,6 +54,10 @@ class HingeMemory(Term):
         elif state is None:
             own.state[self.settles] = 0.0
         evaluate_at(own, offset, q)
+
+    def resists(self, state: NDArray | str | None) -> bool:
+        """Whether it begins in such a state as if turned in no time, not relaxed or given."""
+        return isinstance(state, str) or (state is None and not self.settles.all())
 
     def commit(self) -> None:
         """Accept the step that ends where the body was evaluated last."""
@@ -112,6 +117,13 @@ class HingeMemory(Term):
         evaluate_at(own, self._offset, u)
         np.maximum(own.slope, (floor - 1.0) * own.stiffness, out=own.slope)
         memory_tangents(own, u, out)
+        return out[self._pairs]
+
+    def mean_entries(self, q0: NDArray, q1: NDArray, floor: float = -np.inf) -> NDArray:
+        """See `Term`."""
+        out = np.empty((len(self.own.rest), WIDTH, WIDTH))
+        ends = in_rows(q0, self._rows), in_rows(q1, self._rows)
+        mean_memory_tangents(self.own, 0.5 * (floor - 1.0), *ends, out)
         return out[self._pairs]
 
     def on(self, sheet: SheetTerm) -> HingeMemory:

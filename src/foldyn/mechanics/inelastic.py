@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
-from foldyn.materials.branch_switch import update
+from foldyn.materials.branch_switch import mean_moment, update
 from foldyn.mechanics.dihedral import add_hessian
+from foldyn.mechanics.discrete_gradient import discrete_gradient
 from foldyn.mechanics.term import (
     ADVANCE_CLOCK,
     BRANCH_STATES,
@@ -24,6 +25,7 @@ from foldyn.mechanics.term import (
     DISSIPATED,
     ENERGIES,
     FORCES,
+    MEAN_FORCES,
     STEP_ERROR,
     Compiled,
     advance_clock,
@@ -32,6 +34,7 @@ from foldyn.mechanics.term import (
     dissipated,
     energies,
     forces,
+    mean_forces,
     step_error,
 )
 from foldyn.mechanics.viscous import hinge_gradient
@@ -62,6 +65,7 @@ class MemoryHinges(NamedTuple):
     reached: NDArray  # (b, 2) then
     moment: NDArray  # (h,) of the branches then, N m
     slope: NDArray  # (h,) its derivative with respect to the angle, N m/rad
+    mean: NDArray  # (h, 2) the same of the mean moment of a step from that one
     stored: NDArray  # (h,) energy of the branches then, J
     lost: NDArray  # (2,) energy dissipated up to the last accepted step, and since then, J
     elapsed: NDArray  # (1,) time since then, s
@@ -104,6 +108,58 @@ def add_memory_forces(own, offset, u, v, force):
     own.lost[1] = lost
     if own.elapsed[0] == 0.0:
         own.rate[:, 0] = own.rate[:, 1]
+
+
+@inner
+def add_mean_memory_forces(own, offset, start, end, h, out):
+    """Add forces whose work in a step h from `start` to `end` is what branches store and lose.
+
+    All are flat. Offsets are those of the end; returns the work that they do as they change, and
+    how much less is lost than the laws say, J.
+    """
+    work, lost, lacking, g = 0.0, 0.0, 0.0, own.gradient
+    one, other, gradient = np.empty((2, 4, 3)), np.empty((2, 4, 3)), np.empty((4, 3))
+    own.elapsed[0] = h
+    for e in range(own.rest.size):
+        x, dofs, hidden = own.corners[e], own.dofs[e], own.hidden_turn[e]
+        before = hinge_gradient(x, dofs, hidden, start, g)
+        after = hinge_gradient(x, dofs, hidden, end, g)
+        lost += evaluate_branches(own, offset, e, after - own.rest[e])
+        own.mean[e] = 0.0
+        for k in range(own.first[e], own.first[e + 1]):
+            found = mean_moment(
+                own.code[k], own.parameters[k], own.angle[e], own.turned[e], h, own.state[k, 0],
+                own.state[k, 1],
+            )  # fmt: skip
+            own.mean[e, 0] += own.stiffness[e] * found[0]
+            own.mean[e, 1] += own.stiffness[e] * found[1]
+            lacking += own.stiffness[e] * found[2]
+        moment = own.mean[e, 0]
+        _mean_gradient(own, e, start, end, after - before, one, other, gradient)
+        for c in range(12):
+            out[dofs[c]] += moment * gradient[c // 3, c % 3]
+        for c in range(2):
+            out[dofs[12 + c]] -= moment * hidden[c]
+        work += moment * (own.turned[e] - own.angle[e] - (after - before))
+    own.lost[1] = lost
+    return work, lacking
+
+
+@inner
+def _mean_gradient(own, e, start, end, turn, motion, points, gradient):
+    """`discrete_gradient` (4, 3) of a hinge that turns so far; motion, points : (2, 4, 3) memory.
+
+    points : get positions A x, and the gradient of the dihedral there.
+    """
+    dofs = own.dofs[e]
+    for v in range(4):
+        for c in range(3):
+            before, after = start[dofs[3 * v + c]], end[dofs[3 * v + c]]
+            motion[0, v, c] = own.corners[e, v, c] + 0.5 * (before + after)
+            motion[1, v, c] = after - before
+    for c in range(2):
+        turn += own.hidden_turn[e, c] * (end[dofs[12 + c]] - start[dofs[12 + c]])
+    discrete_gradient(motion[0], motion[1], turn, points[0], points[1], gradient)
 
 
 @inner
@@ -176,6 +232,32 @@ def memory_tangents(own, u, out):
 
 
 @kernel
+def mean_memory_tangents(own, floor, u0, u1, out):
+    """Derivatives (h, 14, 14) of the mean forces from u0 to u1 by u1, after these.
+
+    floor : least slope of the mean moments per unit stiffness.
+    """
+    motion, points = np.empty((2, 4, 3)), np.empty((2, 4, 3))
+    gradient, block, across = np.empty((4, 3)), np.empty((4, 3, 4, 3)), np.empty(14)
+    start, end, g = flat(u0), flat(u1), own.gradient
+    for e in range(own.rest.size):
+        x, dofs, hidden = own.corners[e], own.dofs[e], own.hidden_turn[e]
+        before = hinge_gradient(x, dofs, hidden, start, g)
+        turn = hinge_gradient(x, dofs, hidden, end, g) - before
+        _mean_gradient(own, e, start, end, turn, motion, points, gradient)
+        for c in range(14):
+            across[c] = gradient[c // 3, c % 3] if c < 12 else -hidden[c - 12]
+        slope = max(own.mean[e, 1], floor * own.stiffness[e])
+        block[:] = 0.0
+        add_hessian(points[0], points[1], 0.5 * own.mean[e, 0], block)
+        for i in range(14):
+            for j in range(14):
+                out[e, i, j] = slope * across[i] * g[j]
+                if i < 12 and j < 12:
+                    out[e, i, j] += block[i // 3, i % 3, j // 3, j % 3]
+
+
+@kernel
 def memory_gradients(own, u, out):
     """Gradients (h, 14) of the angles at u."""
     moved = flat(u)
@@ -201,6 +283,17 @@ def _energies(term, u, out):
     own, energy = term.own, numbers_at(out, term.groups)
     for e in range(own.rest.size):  # as at the last evaluation, which was at u
         energy[own.group[e]] += own.stored[e]
+
+
+@mean_forces
+def _mean_forces(term, u0, u1, before, h, t, force, powers):
+    start, end, out = rows_at(u0, term.rows), rows_at(u1, term.rows), rows_at(force, term.rows)
+    work, lacking = add_mean_memory_forces(
+        term.own, term.offset, flat(start), flat(end), h, flat(out)
+    )
+    both = numbers_at(powers, 2)
+    both[0] += work / h
+    both[1] -= lacking / h
 
 
 @advance_clock
@@ -240,5 +333,6 @@ def memory_kernels(own: MemoryHinges, offset: NDArray, rows: int, groups: int) -
         {
             FORCES: _forces, ENERGIES: _energies, ADVANCE_CLOCK: _advance_clock, COMMIT: _commit,
             DISSIPATED: _dissipated, BRANCH_STATES: _branch_states, STEP_ERROR: _step_error,
+            MEAN_FORCES: _mean_forces,
         },
     )  # fmt: skip

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import Addressed
-from foldyn.jit.context import Context, rows_at, run_at
+from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.assembly import Assembly, Work
 from foldyn.mechanics.contact.term import ContactTerm
@@ -41,11 +41,10 @@ class _Context(NamedTuple):
     speed: NDArray  # (rows, 3)
     energy: NDArray  # (groups,)
     powers: NDArray  # (3, 2) with its forces
-    total: NDArray  # (2,) powers of all terms
 
 
 @mean_forces
-def _mean_forces(own, u0, u1, before, h, t, force):
+def _mean_forces(own, u0, u1, before, h, t, force, powers):
     rows, middle, speed, found = own.middle.shape[0], own.middle, own.speed, own.found
     start, end, out = flat(rows_at(u0, rows)), flat(rows_at(u1, rows)), flat(rows_at(force, rows))
     for i in range(out.size):
@@ -58,8 +57,9 @@ def _mean_forces(own, u0, u1, before, h, t, force):
     for k in own.hidden:
         mean[k] = 0.5 * (flat(found[1])[k] + flat(found[2])[k])
     power_in, power_out = own.powers[0]
-    own.total[0] += power_in
-    own.total[1] += power_out
+    total = numbers_at(powers, 2)
+    total[0] += power_in
+    total[1] += power_out
     if own.energies != 0:
         missed, size, square = h * (power_out - power_in), 0.0, 0.0
         for k in range(2):
@@ -124,6 +124,5 @@ class MeanForces:
             speed=np.zeros((rows, 3)),
             energy=np.zeros(len(self._body.energy_groups)),
             powers=np.zeros((states, 2)),
-            total=self.powers,
         )
         return Context(context), _mean_forces

@@ -27,10 +27,11 @@ are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of 
     step_error(scale) -> ratio       how wrong they are if the step that ends there is accepted: the
                                      turn that this makes, over the largest one or the one that
                                      moves nodes by `scale` (m)
-    mean_forces(u0, u1, before, h, t, force)
+    mean_forces(u0, u1, before, h, t, force, powers)
                                      adds forces whose work from u0 to u1 is the change of its
-                                     energy, in a step h (s) about the time t, and writes its
-                                     dihedrals at u1; before (nh,) are all those at u0. Of a term
+                                     energy and what its laws dissipate, in a step h (s) about the
+                                     time t, and writes its dihedrals at u1; before (nh,) are all
+                                     those at u0. Adds other powers as `forces` does. Of a term
                                      without it `mechanics.mean_forces` makes some of the others
 """
 
@@ -68,7 +69,7 @@ place_obstacles = addressed(ADDRESS)
 advance_clock = step_error = addressed(NUMBER)
 commit = dissipated = addressed()
 branch_states = addressed(ADDRESS)
-mean_forces = addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER, NUMBER, ADDRESS)
+mean_forces = addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER, NUMBER, ADDRESS, ADDRESS)
 
 
 class Compiled(NamedTuple):
@@ -139,6 +140,10 @@ class Term(ABC):
         floor : least slope per unit stiffness of a hinge.
         """
         return np.zeros(0)
+
+    def mean_entries(self, q0: NDArray, q1: NDArray, floor: float = -np.inf) -> NDArray:
+        """Derivative (k,) likewise of its mean forces from q0 to q1, after these, by q1."""
+        return 0.5 * self.entries(0.5 * (q0 + q1), floor)
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
         """The same as a matrix (m, m)."""

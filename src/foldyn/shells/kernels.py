@@ -326,7 +326,7 @@ def _energies(own, u, out):
 
 
 @mean_forces
-def _mean_forces(own, u0, u1, before, h, t, force):
+def _mean_forces(own, u0, u1, before, h, t, force, powers):
     model, start, end = own.model, rows_at(u0, own.rows), rows_at(u1, own.rows)
     out, angle = rows_at(force, own.rows), numbers_at(before, own.work.angle.size)
     n, r = model.nodes, model.rotations

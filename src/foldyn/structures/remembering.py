@@ -120,7 +120,8 @@ def memory(parts: tuple[Remembering, ...], body: Assembly) -> HingeMemory:
         columns[name].append(np.zeros(hinges))
     for name in ("state", "reached"):
         columns[name].append(np.zeros((count, VARIABLES)))
-    columns["rate"].append(np.zeros((hinges, 2)))
+    for name in ("rate", "mean"):
+        columns[name].append(np.zeros((hinges, 2)))
     columns["lost"], columns["elapsed"] = [np.zeros(2)], [np.zeros(1)]
     columns["gradient"] = [np.zeros(WIDTH)]
     shapes = {"corners": (-1, 4, 3), "parameters": (-1, PARAMETERS)}

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.algebra.banded import one_thread
-from foldyn.dynamics.actuation import jolt
+from foldyn.dynamics.actuation import note_offsets
 from foldyn.dynamics.course import Course, Outcome, Samples, StepPlan
 from foldyn.dynamics.equation import accelerate, write
 from foldyn.dynamics.implicit.impulse import impulse_lasts
@@ -340,8 +340,10 @@ class Implicit:
             course.tally.work += scheme.settle(max(end, jump))
             scheme.begin(max(end, jump))
             system = self._packed.system
+            if self._memory is not None:  # creases that turn in no time
+                self._memory.commit()
             if system.turns:
-                course.tally.work += jolt(
+                note_offsets(
                     self._packed.body.sheet.folds, system.actuators, scheme.work.fold_angle
                 )
             if self._touching is not None:

@@ -42,12 +42,12 @@ class Newton:
         """Have everything compiled that a step needs."""
         scheme = self.scheme
         offset = scheme.packed.system.actuators.offset
-        before = offset.copy()
+        before = offset[:, 2:].copy()  # of the last accepted step
         scheme.shift[:] = 0.0
         scheme.residual(h, t)
         scheme.tangent(self.matrix, scheme.displacement(), False)
         scheme.works(h)
-        offset[:] = before
+        offset[:, 2:] = before
 
     def renew(self, h: float) -> bool:
         """Make the matrix of a step h (s) from its start; tells whether it could be factorized."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases.waveforms import unseen
+from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.equation import EquationOfMotion, accelerate
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
@@ -187,23 +188,29 @@ class Scheme(ABC):
         self.folds[:] = self.work.fold_angle
 
     def settle(self, t: float) -> float:
-        """Have dofs without mass follow loads that jump at t (s); returns the work done on them, J.
+        """Have what has no mass follow loads that jump at t (s); returns the work done on it, J.
 
-        Where nothing damps them they do so at once.
+        Offsets do so at once, and dofs where nothing damps them.
         """
         body, system, s = self.packed.body, self.packed.system, self.scratch
-        damping, hidden = system.damping, body.hidden
-        damped = damping.elements.coefficient.size or body.find(HingeMemory) is not None
+        damping, hidden, memory = system.damping, body.hidden, body.find(HingeMemory)
+        damped = damping.elements.coefficient.size > 0
         if damping.data.size:
             damped = damped or np.diff(damping.indptr)[hidden].any()
-        if not len(hidden) or damped:
+        follows = len(hidden) > 0 and not damped
+        if not (follows or system.turns):
             return 0.0
         place(system, self.old.q, self.old.w, t, s)
-        start = np.ravel(s.displacement)
-        push = following_force(system.following, start, s.factor)
-        settled = body.dofs(s.displacement[: len(system.order)], push)
-        self.old.q.ravel()[hidden] = settled[hidden]
-        return float((body.energies(settled) - body.energies(start[: body.size])).sum())
+        start = settled = np.ravel(s.displacement)[: body.size]
+        before = body.energies(start)
+        if system.turns:
+            turn(body.sheet.folds, system.actuators, s.factor)
+        if follows:
+            push = following_force(system.following, start, s.factor)
+            settled = body.dofs(s.displacement[: len(system.order)], push, memory)
+            self.old.q.ravel()[hidden] = settled[hidden]
+        stored = float((body.energies(settled) - before).sum())
+        return stored if memory is None else stored + float(memory.own.lost[1])
 
     def goal(self, h: float) -> Goal:
         """What the residual of a step h (s) is judged by."""
