@@ -15,6 +15,7 @@ PAGE = Path(__file__).with_name("fidelity.md")
 TABLES = {
     "documented": lambda: table(read(RESULTS / "documented.csv")),
     "drawn": lambda: table(read(RESULTS / "drawn.csv")),
+    "sheets": lambda: table(read(RESULTS / "sheets.csv")),
     "documented internal": lambda: first_table(read(RESULTS / "documented_internal.csv")),
     "drawn internal": lambda: first_table(read(RESULTS / "drawn_internal.csv")),
     "motions": lambda: motions.summaries(motions.read()),

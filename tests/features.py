@@ -52,6 +52,8 @@ class Setting:
 FEATURES: Mapping[str, Callable[[Setting], fd.Case]] = {
     "bars and hinges": lambda s: s.case(),
     "plates (`n5b8e`)": lambda s: s.case(s.sheet(scheme="n5b8e")),
+    "panels' membranes": lambda s: s.case(s.sheet(membrane="panel")),
+    "panels' membranes (`n5b8e`)": lambda s: s.case(s.sheet(preset="n5b8e", membrane="panel")),
     "shells": lambda s: s.case(s.shell()),
     "springs": lambda s: s.case(supports=[fd.Spring(1.0, nodes=[7])]),
     "clamped edges": lambda s: s.case(s.sheet(clamped=[(0, 1)])),

@@ -101,7 +101,7 @@ def test_stored_options_of_the_time_before_presets(read):
     assert document.sections["model"] == {
         "scheme": "n5b8", "mass": "mixed_voronoi", "bar_law": "ogden", "bend_law": "superlinear",
         "fold_law": {"kind": "enhanced", "theta1": 45.0, "theta2": 315.0, "rest": "stress_free"},
-        "calibration": "standard",
+        "calibration": "standard", "membrane": "bars",
     }  # fmt: skip
     again = from_document(document.sections, document.arrays).structure
     np.testing.assert_array_equal(again.fold_stiffness, case.structure.fold_stiffness)

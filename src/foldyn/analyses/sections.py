@@ -41,7 +41,7 @@ from foldyn.plots import ANIMATIONS
 from foldyn.structures import PRESETS
 from foldyn.structures.creases import per_crease
 from foldyn.structures.rigid_plates import checked_panels
-from foldyn.structures.structure import CALIBRATIONS, SCHEMES
+from foldyn.structures.structure import CALIBRATIONS, MEMBRANES, SCHEMES
 from foldyn.values import MOST, choice, indices, number_or_list, numbers, show, vector
 
 MOST_SHAPES = 12
@@ -205,6 +205,7 @@ class ModelSection(Section):
     clamped: Edges = None
     rigid: Rigid = None
     straight: Edges = None
+    membrane: Annotated[Any, one_of(MEMBRANES)] = None
 
     @model_validator(mode="after")
     def _fits_the_kind(self) -> Self:

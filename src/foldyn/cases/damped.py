@@ -56,7 +56,8 @@ class Damped:
             with faults.collected():
                 raise InputError(
                     "damping: StrainDamping takes bars and hinges, and the panels of this model "
-                    "bend as plates; take CreaseDamping, or Rayleigh for what hardly turns"
+                    "bend or stretch as plates; take CreaseDamping, or Rayleigh for what hardly "
+                    "turns"
                 )
 
     @cached_property

@@ -145,6 +145,8 @@ STAGES: Sequence[Uses] = (
         "panels as plates": [
             partial(vibrating, model="n5b8e"),
             partial(moved, "rk4", "newmark", model="n5b8e"),
+            partial(vibrating, membrane="panel"),
+            partial(moved, "rk4", "newmark", membrane="panel"),
         ],
         "shells": [partial(vibrating, model="shell"), partial(moved, "newmark", model="shell")],
         "several motions at once": [moved_at_once],
@@ -173,6 +175,7 @@ STAGES: Sequence[Uses] = (
             partial(moved, CONSERVING, fold_law="linear"),
             partial(moved, CONSERVING, supports=SPRINGS, clamped="xmin"),
             partial(moved, CONSERVING, model="n5b8e"),
+            partial(moved, CONSERVING, membrane="panel"),
             partial(moved, CONSERVING, model="shell"),
             partial(moved, CONSERVING, supports=MOVING, loads=[*TURNING, *FOLLOWING]),
             partial(moved, CONSERVING, damping=[fd.StrainDamping(1e-5)], supports=DASHPOTS),

@@ -279,11 +279,10 @@ class Assembly:
         return sum(term.turning_moments() for term in self.terms)
 
     def strains(self) -> Strains | None:
-        """Its bars and hinges; None where panels bend as plates."""
+        """Its bars and hinges; None where panels bend, or stretch, as plates."""
         found = self.sheet.own_strains()
-        if found is not None:
-            for term in self.others:
-                found = term.strains(found)
+        for term in self.others:
+            found = None if found is None else term.strains(found)
         return found
 
     # ------------------------------------------------------------------ other assemblies

@@ -175,8 +175,8 @@ class Term(ABC):
         """Sum of its hinges' moments (N m) for a turn of one."""
         return 0.0
 
-    def strains(self, others: Strains) -> Strains:
-        """Bars and hinges of the terms before it, with its own."""
+    def strains(self, others: Strains) -> Strains | None:
+        """Bars and hinges of the terms before it, with its own; None where it has others."""
         return others
 
     # ------------------------------------------------------------------ other terms

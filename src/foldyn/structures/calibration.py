@@ -101,9 +101,11 @@ def _listed_corners(pattern: Pattern, panel: int) -> list[int]:
 
 
 def bar_areas(
-    mesh: Mesh, pattern: Pattern, sheet: Sheet, merlin2: bool
+    mesh: Mesh, pattern: Pattern, sheet: Sheet, merlin2: bool = False, alike: bool = False
 ) -> tuple[NDArray, dict[tuple[int, int], float]]:
     """Cross-section areas (m2): of the inner bars (nh,), and of the edges by (low, high) pair.
+
+    `alike`: all bars of a panel have the same, in quads with a center too.
 
     Those of panels with a modulus of their own are areas of the transformed section: they count
     with that modulus over the sheet's, so that E A of an edge is the sum of its panels'.
@@ -126,7 +128,7 @@ def bar_areas(
         inside = slice(inner_first[panel], inner_first[panel + 1])
         ends = [edge_of(a, b) for a, b in around(face)]
         length = np.linalg.norm(x[list(face)] - x[[*face[1:], face[0]]], axis=1)
-        if len(face) == 4 and mesh.centers[panel] >= 0:
+        if len(face) == 4 and mesh.centers[panel] >= 0 and not alike:
             if nu <= 0.0:
                 raise InputError(
                     f"sheet: poissons_ratio = {nu}: N5B8 quadrilaterals need it above 0 (the area "

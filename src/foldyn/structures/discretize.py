@@ -19,6 +19,7 @@ from foldyn.structures import calibration as calibrate
 from foldyn.structures.clamps import boundary_edges, clamp_rows, clamp_stiffness
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
+from foldyn.structures.membranes import membranes
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
 from foldyn.structures.plate import panel_plates, weld_stiffness
 from foldyn.structures.plausibility import doubt_units
@@ -47,6 +48,7 @@ def discretize(
     clamped: str | Sequence[Sequence[int]] = (),
     rigid: str | Sequence[int] | None = None,
     straight: str | Sequence[Sequence[int]] = (),
+    membrane: Literal["bars", "panel"] | None = None,
     preset: Literal["plate", "n5b8e", "herkal", "merlin2"] | None = None,
 ) -> Structure:
     """Discretize a pattern as bars and hinges.
@@ -91,7 +93,11 @@ def discretize(
         be flat. Their bars still stretch.
     straight : sequence of (vertex, vertex), or str
         Boundary edges, given likewise, that stay straight, as along a support or a stiff rim
-        (n5b8e); others may bow between their ends.
+        (n5b8e, and in their plane with membrane = "panel"); others may bow between their ends.
+    membrane : {"bars", "panel"}
+        How panels resist in their plane: each bar by itself, right in uniform strain at most; or
+        bars coupled so that the corners feel the panel's membrane, with which large sheets and
+        held ones come out right (see `foldyn.structures.membranes`). Then `bar_law` is "linear".
     preset : {"plate", "n5b8e", "herkal", "merlin2"}, optional
         Model that gives what is left out, one of `foldyn.structures.PRESETS`. Without it "plate",
         but "n5b8e" where its scheme is given or the pattern has welds, and "herkal", the paper's,
@@ -129,7 +135,7 @@ def discretize(
         bar_law=bar_law, fold_law=fold_law, bend_law=bend_law,
         calibration=calibration, crease_stiffness=crease_stiffness, crease_rest=crease_rest,
         clamped=edges, rigid=checked_panels(rigid, len(pattern.faces)),
-        straight=boundary_edges(straight, pattern, "straight"),
+        straight=boundary_edges(straight, pattern, "straight"), membrane=membrane,
     )  # fmt: skip
     check_welds(options.rigid, pattern)
     if len(pattern.welds) and options.scheme != "n5b8e":
@@ -145,7 +151,9 @@ def discretize(
     points = _given_centers({} if centers is None else centers, pattern, options.scheme)
     mesh = n4b5(pattern) if options.scheme == "n4b5" else n5b8(pattern, points)
     merlin2 = options.calibration == "merlin2"
-    inner_area, edge_area = calibrate.bar_areas(mesh, pattern, sheet, merlin2)
+    inner_area, edge_area = calibrate.bar_areas(
+        mesh, pattern, sheet, merlin2, alike=options.membrane == "panel"
+    )
     area = np.concatenate([inner_area, [edge_area[a, b] for a, b in pattern.lines.tolist()]])
 
     folds = fold_stiffness(options.crease_stiffness, pattern, sheet)
@@ -166,6 +174,10 @@ def discretize(
     clamps, clamped_triangle = clamp_rows(edges, mesh.triangles)
     clamped_panel = mesh.triangle_panel[clamped_triangle]
     modulus = sheet.values("bending_modulus", len(pattern.faces))[clamped_panel]
+    coupled = ()
+    if options.membrane == "panel":
+        stiff = rigid_panels(options.rigid, len(pattern.faces))
+        coupled = membranes(mesh, pattern, sheet, [*options.straight, *edges], stiff)
     structure = Structure(
         nodes=x,
         bars=np.concatenate([mesh.inner, pattern.lines]),
@@ -187,6 +199,7 @@ def discretize(
         clamps=clamps,
         clamp_stiffness=clamp_stiffness(x, clamps, modulus),
         edge_plates=plates,
+        membranes=coupled,
     )
     _ = structure.plates  # refuse panels that are not flat
     return structure.marked()

@@ -74,7 +74,7 @@ class PanelPlate:
 
     def __init__(self, panel: Outline, poissons_ratio: float, n: int) -> None:
         x = np.array(panel.corners)
-        self.points, self.triangles, at, edges = _meshed(x, panel.center, n)
+        self.points, self.triangles, at, edges = meshed(x, panel.center, n)
         side, sign, ends = _sides(self.triangles)
         self.stiffness = _plate(self.points, self.triangles, side, sign, poissons_ratio)
         self._ends = ends
@@ -164,7 +164,7 @@ def _parts(points: NDArray, triangles: NDArray) -> NDArray:
     return area / area.sum()
 
 
-def _meshed(
+def meshed(
     x: NDArray, center: tuple[float, float] | None, n: int
 ) -> tuple[NDArray, NDArray, NDArray, list[NDArray]]:
     """Points (p, 2), triangles, those at corners and center, and those along each edge."""

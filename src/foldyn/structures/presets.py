@@ -65,10 +65,18 @@ def resolved(preset: str | None = None, welds: bool = False, **given: Any) -> Mo
     if preset is None and welds and not any(known.get(key) for key in AGAINST_PLATES):
         name = N5B8E
     base = PRESETS[name]
+    if known.get("membrane") == "panel":
+        known.setdefault("bar_law", "linear")
     options = ModelOptions(**{**vars(base), **known})
     choice("mass", options.mass, MASS_RULES)
     bar_law(options.bar_law)
     hinge_law(options.fold_law, "fold_law")
+    if options.membrane == "panel" and bar_law(options.bar_law) != bar_law("linear"):
+        raise InputError(
+            f" = {show(options.bar_law)}: bars that are coupled are linear in Green strain; leave "
+            'it out, or take membrane = "bars"',
+            "bar_law",
+        )
     _check_bends(options)
     _check_edges(options)
     return options
@@ -105,8 +113,11 @@ def _check_bends(options: ModelOptions) -> None:
 def _check_edges(options: ModelOptions) -> None:
     """Refuse what the scheme n5b8e does not go with, and edges that cannot bow."""
     if options.scheme != N5B8E:
-        if options.straight:
-            raise InputError(': edges bow with scheme = "n5b8e" only: leave it out', "straight")
+        if options.straight and options.membrane != "panel":
+            raise InputError(
+                ': edges bow with scheme = "n5b8e" or membrane = "panel" only: leave it out',
+                "straight",
+            )
         return
     needs = 'scheme = "n5b8e" needs'
     if options.calibration != "plate":

@@ -33,8 +33,9 @@ class Stretch(NamedTuple):
 
 
 def resists_stretch(structure: Discretized) -> bool:
-    """Whether bars stand for the panels of a pattern; those of a structure made by hand do not."""
-    return BARS in structure.energy_groups and structure.pattern is not None
+    """Whether single bars stand for the panels of a pattern; those of one made by hand do not."""
+    coupled = getattr(structure, "membranes", ())
+    return BARS in structure.energy_groups and structure.pattern is not None and not coupled
 
 
 def stretch(structure: Discretized, energies: Mapping[str, NDArray]) -> Stretch | None:

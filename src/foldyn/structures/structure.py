@@ -26,6 +26,7 @@ from foldyn.materials.plate_superlinear import onset_parameters
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.clamps import ClampsTerm
 from foldyn.mechanics.following import Following, joined, moments, pushes, tensions
+from foldyn.mechanics.membranes import MembranesTerm
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm
@@ -36,6 +37,7 @@ from foldyn.structures.creases import PerCrease, per_crease
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.edge_angles import EdgePlates, curl_moments, outlines, plates_model
 from foldyn.structures.mass import MASS_RULES, lumped
+from foldyn.structures.membranes import PanelKind, swelling
 from foldyn.structures.mesh import double_areas, hinge_angles
 from foldyn.structures.panel_plate import Outline
 from foldyn.structures.rigid_plates import Plate, rigid_panels, rigid_plates
@@ -48,6 +50,7 @@ FILL = Fill(2700.0, 340, "pattern", "take fewer panels, or an explicit method of
 26 kB a dof with 9,843, 60,603 and 241,203 dofs."""
 SCHEMES = ("n5b8", "n4b5", "n5b8e")
 CALIBRATIONS = ("standard", "merlin2", "plate")
+MEMBRANES = ("bars", "panel")
 
 
 @dataclass(frozen=True)
@@ -65,12 +68,14 @@ class ModelOptions:
     clamped: tuple[Edge, ...] = ()
     rigid: str | tuple[int, ...] | None = None
     straight: tuple[Edge, ...] = ()
+    membrane: Literal["bars", "panel"] = "bars"
 
     def __post_init__(self) -> None:
         for name in ("crease_stiffness", "crease_rest"):
             object.__setattr__(self, name, per_crease(name, getattr(self, name)))
         choice("scheme", self.scheme, SCHEMES)
         choice("calibration", self.calibration, CALIBRATIONS)
+        choice("membrane", self.membrane, MEMBRANES)
 
 
 def _none(width: int, kind: type = np.int64) -> NDArray:
@@ -106,6 +111,8 @@ class Structure(Discretized):
         Triangles at clamped edges, from the edge's first end; stiffness (N m/rad).
     edge_plates : EdgePlates or None
         Panels as plates, of the scheme n5b8e.
+    membranes : tuple of PanelKind
+        What couples the bars of panels, with `membrane = "panel"`.
     without_edge_angles : bool
         Whether its edge angles are no dofs but stay in balance.
     pattern, sheet, options
@@ -133,6 +140,7 @@ class Structure(Discretized):
     clamps: NDArray = field(default_factory=lambda: _none(3))
     clamp_stiffness: NDArray = field(default_factory=lambda: _none(1, float))
     edge_plates: EdgePlates | None = None
+    membranes: tuple[PanelKind, ...] = ()
     without_edge_angles: bool = False
 
     def __repr__(self) -> str:
@@ -186,15 +194,23 @@ class Structure(Discretized):
     def body(self) -> Assembly:
         """What solvers take."""
         if self.edge_plates is not None:
-            return Assembly(self._plates_term(self.edge_plates))
+            return self._coupled(self._plates_term(self.edge_plates))
         rows = [self._rows(group, kind.nodes) for group, kind in enumerate(self.hinge_kinds)]
         laws = tuple((kind.law, len(kind.nodes)) for kind in self.hinge_kinds)
-        body = Assembly(BarsHingesTerm(self.model, np.concatenate(rows), laws, self._softness))
+        body = self._coupled(BarsHingesTerm(self.model, np.concatenate(rows), laws, self._softness))
         if not len(self.clamps):
             return body
         bends = tuple(GROUPS).index("strain_bends")
         return body.with_terms(
             ClampsTerm(clamps(self.nodes, self.clamps, self.clamp_stiffness, bends))
+        )
+
+    def _coupled(self, sheet: BarsHingesTerm | BarsPlatesTerm) -> Assembly:
+        """A sheet with the membranes of its panels, in the place of single bars."""
+        if not self.membranes:
+            return Assembly(sheet)
+        return Assembly(
+            sheet.hinges_alone(), *(MembranesTerm(own, sheet.rows) for _, own in self.membranes)
         )
 
     @property
@@ -276,10 +292,13 @@ class Structure(Discretized):
 
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """See `Discretized`; a bar between panels takes their mean strain."""
-        stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
-        free = _mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
-        tension = -stiffness * self.bar_law.stress(1.0 + free)
-        parts = [tensions(self.nodes, self.bars, tension)]
+        if self.membranes:
+            parts = swelling(self.membranes, self.nodes, strain)
+        else:
+            stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
+            free = _mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
+            tension = -stiffness * self.bar_law.stress(1.0 + free)
+            parts = [tensions(self.nodes, self.bars, tension)]
         if self.edge_plates is not None:
             curled = self._curled(self.edge_plates, curvature) if np.any(curvature) else []
             turns = np.zeros(len(self.folds) + len(self.bends))

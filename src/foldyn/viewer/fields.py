@@ -13,7 +13,7 @@ from foldyn.cases.loaded import SomeLoads
 from foldyn.dynamics.touch import CONTACT_FORCE
 from foldyn.materials.series import in_series
 from foldyn.mechanics import angles
-from foldyn.structures import Structure
+from foldyn.structures import Structure, membranes
 from foldyn.structures.mesh import double_areas
 
 
@@ -58,7 +58,7 @@ def fields(case: Case, result: Any, displacement: NDArray) -> dict[str, Field]:
         turned = in_series(folds.law, angles[:, own], rest[:, own], folds.share)
         moment = structure.fold_stiffness * turned[1]
         out["fold_moment"] = Field("moment of creases", "N m", "crease", moment, True)
-        density = energy_density(structure, strain, angles, rest)
+        density = energy_density(structure, displacement, strain, angles, rest)
         out["energy"] = Field("strain energy per area", "J/m²", "panel", density, False)
     return out
 
@@ -112,16 +112,18 @@ def rest_angles(case: Case, result: Any, samples: int) -> tuple[NDArray, NDArray
 
 
 def energy_density(
-    structure: Structure, strain: NDArray, angles: NDArray, rest: NDArray
+    structure: Structure, displacement: NDArray, strain: NDArray, angles: NDArray, rest: NDArray
 ) -> NDArray:
     """Strain energy over the area of each panel (samples, m), J/m2.
 
     That of a bar or hinge goes in equal parts to the triangles beside it; clamped edges and springs
     are left out.
 
+    displacement : (samples, n, 3), m
     strain, angles, rest : of bars (samples, nb), and of folds and bends (samples, k), rad.
     """
     stiffness = structure.sheet.youngs_modulus * structure.bar_area * structure.bar_length
+    stiffness = stiffness * (not structure.membranes)  # which take the place of bars
     parts, first = [stiffness * structure.bar_law.energy(1.0 + strain)], 0
     for kind in structure.hinge_kinds:
         own = slice(first, first + len(kind.nodes))
@@ -130,7 +132,9 @@ def energy_density(
     pairs = np.vstack([structure.bars, structure.folds[:, :2], structure.bends[:, :2]])
     beside = shares(pairs, structure.triangles, structure.triangle_panel)
     triangle = 0.5 * np.linalg.norm(double_areas(structure.nodes, structure.triangles), axis=1)
-    return np.hstack(parts) @ beside / np.bincount(structure.triangle_panel, triangle)
+    area = np.bincount(structure.triangle_panel, triangle)
+    coupled = membranes.energies(structure.membranes, structure.nodes + displacement, len(area))
+    return (np.hstack(parts) @ beside + coupled) / area
 
 
 def shares(pairs: NDArray, triangles: NDArray, panel: NDArray) -> sparse.csr_array:

@@ -24,6 +24,8 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
     "n5b8e, condensed": {"calibration": "plate", "mass": "condensed", "scheme": "n5b8e"},
     "n5b8e, bubble": {"calibration": "plate", "mass": "bubble", "scheme": "n5b8e"},
     "n5b8e, consistent": {"calibration": "plate", "mass": "consistent", "scheme": "n5b8e"},
+    "plate, consistent, membrane": {"preset": "plate", "membrane": "panel"},
+    "n5b8e, condensed, membrane": {"preset": "n5b8e", "membrane": "panel"},
 }
 """Options of `discretize`; all bends are linear. `circumcenter` is refused on many panels, and is
 `mixed_voronoi` on all others."""
@@ -55,9 +57,9 @@ class Row(NamedTuple):
 
 
 def structure_of(case: FidelityCase, model: str) -> Structure:
-    """Bars and hinges of a case; edges that are held stay straight in the scheme n5b8e."""
+    """Bars and hinges of a case; edges that are held stay straight where edges may bow."""
     options = dict(MODELS[model])
-    if options.get("scheme") == "n5b8e":
+    if "n5b8e" in model or "membrane" in options:
         options["straight"] = case.held.edges
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)

@@ -10,6 +10,7 @@ from foldyn.structures import Sheet
 from foldyn.studies.fidelity.cases import FidelityCase, documented, supports
 
 SEED, COUNT = 20261123, 30  # drawn after the constants of the calibration were fixed
+SEED_SHEETS, COUNT_SHEETS = 20261125, 24  # drawn after the membranes of panels had been derived
 
 
 def drawn(count: int = COUNT, seed: int = SEED) -> list[FidelityCase]:
@@ -24,20 +25,47 @@ def drawn(count: int = COUNT, seed: int = SEED) -> list[FidelityCase]:
     return [_one(rng, kinds) for _ in range(count)]
 
 
+def sheets(count: int = COUNT_SHEETS, seed: int = SEED_SHEETS) -> list[FidelityCase]:
+    """Random sheets of 2 x 2 to 5 x 5 cells, half of them held along an edge or as in case study 2.
+
+    Miura-ori with dihedrals of 20 to 175 degrees and eggboxes, sheets of 1/30 to 1/400 of the
+    smaller side of a panel; all else as in `drawn`, but panels up to 2.5 times as long as wide.
+    """
+    rng, found = np.random.default_rng(seed), []
+    for _ in range(count):
+        kind = str(rng.choice(["miura", "miura", "eggbox"]))
+        a = _spread(rng, 0.02, 2.0)
+        b = a * _spread(rng, 1.0 / 1.6, 2.5)
+        cells = [int(rng.integers(2, 6)), int(rng.integers(2, 6))]
+        angle, dihedral = float(rng.uniform(45.0, 85.0)), float(rng.uniform(20.0, 175.0))
+        if kind == "eggbox":
+            dihedral, angle = float(rng.uniform(40.0, 150.0)), float(rng.uniform(50.0, 80.0))
+        shape = {"cells": cells, "a": a, "b": b, "panel_angle": angle, "dihedral": dihedral}
+        sheet = _sheet(rng, min(a, b), 30.0)
+        support = str(rng.choice(["edge", "edge", "corners", "folding", "free"]))
+        found.append(FidelityCase(kind, shape, support, sheet))
+    return found
+
+
 def _one(rng: np.random.Generator, kinds: list[str]) -> FidelityCase:
     a = _spread(rng, 0.02, 2.0)
     b = a * _spread(rng, 1.0 / 1.6, 1.6)
     kind = str(rng.choice(kinds))
     shape = _shape(rng, kind, a, b)
-    sheet = Sheet(
+    sheet = _sheet(rng, min(a, b), 50.0)
+    support = str(rng.choice(sorted(supports(kind, shape))))
+    return FidelityCase(kind, shape, support, sheet)
+
+
+def _sheet(rng: np.random.Generator, size: float, thickest: float) -> Sheet:
+    """A sheet of 1/400 to 1/thickest of a size."""
+    return Sheet(
         youngs_modulus=_spread(rng, 1e6, 2e11),
         poissons_ratio=float(rng.uniform(0.1, 0.45)),
-        thickness=min(a, b) / _spread(rng, 50.0, 400.0),
+        thickness=size / _spread(rng, thickest, 400.0),
         density=_spread(rng, 100.0, 8000.0),
         length_scale_ratio=_spread(rng, 0.5, 10.0),
     )
-    support = str(rng.choice(sorted(supports(kind, shape))))
-    return FidelityCase(kind, shape, support, sheet)
 
 
 def _shape(rng: np.random.Generator, kind: str, a: float, b: float) -> dict[str, Any]:

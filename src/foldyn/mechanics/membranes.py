@@ -1,0 +1,312 @@
+"""Panels' membranes: panels that resist in their plane as their corners feel it.
+
+The strains of a panel are those of its b bars, E = (stretch^2 - 1)/2, quadratic in the positions.
+Its energy is 1/2 E^T S E with a full matrix S (`structures.membranes`): one bar's strain pulls at
+the others too. Bars by themselves are the same with a diagonal matrix. Turned as a whole, or folded
+along bars, a panel has no strain, however far.
+
+A term has all panels of one kind: with as many nodes, and bars between the same of them.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.jit.context import Context, numbers_at, rows_at
+from foldyn.jit.eights import eight, put
+from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.block_matrix import pairs_within, places_of
+from foldyn.mechanics.lanes import WIDTH, add, take
+from foldyn.mechanics.model import ranks
+from foldyn.mechanics.sheet_term import Strains, Unstrained
+from foldyn.mechanics.term import (
+    ENERGIES,
+    FORCES,
+    MEAN_FORCES,
+    Compiled,
+    Term,
+    energies,
+    forces,
+    mean_forces,
+    nodal,
+)
+from foldyn.mechanics.threads import Team, wait
+
+GROUP = 0  # of the energies: that of the bars, in whose place they are
+
+
+class Membranes(NamedTuple):
+    """Arrays of p panels with c nodes and b bars each."""
+
+    nodes: NDArray  # (p, c)
+    ends: NDArray  # (b, 2) numbers among a panel's nodes
+    vector: NDArray  # (b, 3, p) rest vector from the first end to the second, m
+    per_length2: NDArray  # (b, p) 1 / L^2
+    stiffness: NDArray  # (b, b, p) S, J
+
+
+class Packed(NamedTuple):
+    """The same for the force kernel: flat arrays of groups of eight panels, filled up with 0."""
+
+    count: int  # p
+    corners: int  # c
+    ends: NDArray  # (b, 2)
+    nodes: NDArray  # rows (c, 8) of each group, uint32: others would be tested for wraparound
+    vector: NDArray  # rows (3 b, 8)
+    per_length2: NDArray  # rows (b, 8)
+    stiffness: NDArray  # rows (b b, 8)
+    moved: NDArray  # (24 c,) memory of a group: displacements
+    along: NDArray  # (24 b,) vectors of the bars
+    strain: NDArray  # (8 b,)
+    force: NDArray  # (24 c,)
+    zero: NDArray  # (8,)
+
+
+def packed(membranes: Membranes) -> Packed:
+    """Panels with memory on one thread."""
+    count, corners = membranes.nodes.shape
+    bars = len(membranes.ends)
+
+    def groups(array: NDArray, kind: type = float) -> NDArray:
+        """Of rows (..., p)."""
+        rows = array.reshape(-1, count)
+        filled = np.zeros((len(rows), -(-count // WIDTH) * WIDTH), kind)
+        filled[:, :count] = rows
+        return filled.reshape(len(rows), -1, WIDTH).transpose(1, 0, 2).ravel()
+
+    return Packed(
+        count, corners, membranes.ends, groups(membranes.nodes.T, np.uint32),
+        groups(membranes.vector), groups(membranes.per_length2), groups(membranes.stiffness),
+        *(np.zeros(rows * WIDTH) for rows in (3 * corners, 3 * bars, bars, 3 * corners, 1)),
+    )  # fmt: skip
+
+
+def taken(membranes: Membranes, which: NDArray) -> Membranes:
+    """Some of the panels, or all in another order."""
+    return Membranes(
+        membranes.nodes[which], membranes.ends,
+        *(np.ascontiguousarray(array[..., which]) for array in membranes[2:]),
+    )  # fmt: skip
+
+
+@inner_scalar
+def strain_of(membranes, u, p, i, along):
+    """Strain of bar i of panel p, and its vector (m) to `along` (3,)."""
+    a = membranes.nodes[p, membranes.ends[i, 0]]
+    b = membranes.nodes[p, membranes.ends[i, 1]]
+    excess = 0.0
+    for c in range(3):
+        apart, rest = u[b, c] - u[a, c], membranes.vector[i, c, p]
+        along[c] = rest + apart
+        excess += apart * (2.0 * rest + apart)
+    return 0.5 * membranes.per_length2[i, p] * excess
+
+
+@inner
+def add_membrane_forces(own, u, low, high, force):
+    """Add the forces of all panels on the nodes from low to high; u and force are flat."""
+    bars, nothing = own.ends.shape[0], eight(own.zero, 0)
+    for first in range(0, own.count, WIDTH):
+        m, at = min(WIDTH, own.count - first), own.corners * first
+        for v in range(own.corners):
+            for q in range(m):
+                row = 3 * own.nodes[at + v * WIDTH + q]
+                for c in range(3):
+                    own.moved[(3 * v + c) * WIDTH + q] = u[row + c]
+            put_row(own.force, v, nothing, nothing, nothing)
+        at = bars * (first // WIDTH)
+        for i in range(bars):
+            x1, y1, z1 = take(own.moved, own.ends[i, 0])
+            x2, y2, z2 = take(own.moved, own.ends[i, 1])
+            vx, vy, vz = take(own.vector, at + i)
+            dx, dy, dz = x2 - x1, y2 - y1, z2 - z1
+            excess = dx * (2.0 * vx + dx) + dy * (2.0 * vy + dy) + dz * (2.0 * vz + dz)
+            put(own.strain, i * WIDTH, 0.5 * eight(own.per_length2, (at + i) * WIDTH) * excess)
+            put_row(own.along, i, vx + dx, vy + dy, vz + dz)
+        for i in range(bars):
+            pull, row = nothing, (at + i) * bars
+            for j in range(bars):
+                one = eight(own.stiffness, (row + j) * WIDTH) * eight(own.strain, j * WIDTH)
+                pull = pull + one
+            pull = pull * eight(own.per_length2, (at + i) * WIDTH)
+            x, y, z = take(own.along, i)
+            add(own.force, own.ends[i, 0], -pull * x, -pull * y, -pull * z)
+            add(own.force, own.ends[i, 1], pull * x, pull * y, pull * z)
+        at = own.corners * first
+        for v in range(own.corners):
+            for q in range(m):
+                node = own.nodes[at + v * WIDTH + q]
+                if low <= node < high:
+                    for c in range(3):
+                        force[3 * node + c] += own.force[(3 * v + c) * WIDTH + q]
+
+
+@inner_scalar
+def put_row(array, row, x, y, z):
+    """Write three eights."""
+    at = 3 * WIDTH * row
+    put(array, at, x)
+    put(array, at + WIDTH, y)
+    put(array, at + 2 * WIDTH, z)
+
+
+@inner
+def add_mean_membrane_forces(membranes, u0, u1, force):
+    """Add forces whose work from u0 to u1 is the change of the energy.
+
+    Mean strains and the vectors halfway: strains are quadratic, energies quadratic in strains.
+    """
+    bars, ends = membranes.ends.shape[0], membranes.ends
+    strain, along = np.empty(bars), np.empty((bars, 3))
+    one, other = np.empty(3), np.empty(3)
+    for p in range(membranes.nodes.shape[0]):
+        for i in range(bars):
+            strain[i] = 0.5 * strain_of(membranes, u0, p, i, one)
+            strain[i] += 0.5 * strain_of(membranes, u1, p, i, other)
+            for c in range(3):
+                along[i, c] = 0.5 * (one[c] + other[c])
+        for i in range(bars):
+            pull = 0.0
+            for j in range(bars):
+                pull += membranes.stiffness[i, j, p] * strain[j]
+            pull *= membranes.per_length2[i, p]
+            a, b = membranes.nodes[p, ends[i, 0]], membranes.nodes[p, ends[i, 1]]
+            for c in range(3):
+                force[b, c] += pull * along[i, c]
+                force[a, c] -= pull * along[i, c]
+
+
+@inner
+def membrane_energy(membranes, u):
+    """Energy (J) of all panels."""
+    bars, energy = membranes.ends.shape[0], 0.0
+    strain, along = np.empty(bars), np.empty(3)
+    for p in range(membranes.nodes.shape[0]):
+        for i in range(bars):
+            strain[i] = strain_of(membranes, u, p, i, along)
+        for i in range(bars):
+            for j in range(bars):
+                energy += 0.5 * strain[i] * membranes.stiffness[i, j, p] * strain[j]
+    return energy
+
+
+@kernel
+def membrane_blocks(membranes, u, loose):
+    """Tangent (p, c, c, 3, 3), N/m, of all panels; `loose`: as if the strains at u were none."""
+    count, bars = membranes.nodes.shape[1], membranes.ends.shape[0]
+    out = np.zeros((membranes.nodes.shape[0], count, count, 3, 3))
+    strain, along = np.empty(bars), np.empty((bars, 3))
+    rate, pulled = np.empty((bars, count, 3)), np.empty((bars, count, 3))
+    for p in range(out.shape[0]):
+        rate[:], pulled[:] = 0.0, 0.0
+        for i in range(bars):
+            strain[i] = strain_of(membranes, u, p, i, along[i])
+            a, b = membranes.ends[i, 0], membranes.ends[i, 1]
+            for c in range(3):
+                rate[i, b, c] = membranes.per_length2[i, p] * along[i, c]
+                rate[i, a, c] = -rate[i, b, c]
+        for i in range(bars):
+            a, b, pull = membranes.ends[i, 0], membranes.ends[i, 1], 0.0
+            for j in range(bars):
+                pull += membranes.stiffness[i, j, p] * strain[j]
+                for v in range(count):
+                    for c in range(3):
+                        pulled[i, v, c] += membranes.stiffness[i, j, p] * rate[j, v, c]
+            if not loose:
+                pull *= membranes.per_length2[i, p]
+                for c in range(3):
+                    out[p, a, a, c, c] += pull
+                    out[p, b, b, c, c] += pull
+                    out[p, a, b, c, c] -= pull
+                    out[p, b, a, c, c] -= pull
+            for v in (a, b):
+                for w in range(count):
+                    for c in range(3):
+                        for d in range(3):
+                            out[p, v, w, c, d] += rate[i, v, c] * pulled[i, w, d]
+    return out
+
+
+class _Context(NamedTuple):
+    own: Packed  # with nodes of the thread
+    whole: Membranes
+    low: int  # first and last + 1 of the thread's nodes
+    high: int
+    rows: int
+    team: Team
+
+
+@forces
+def _forces(own, u, v, t, force, powers):
+    moved, out = flat(rows_at(u, own.rows)), flat(rows_at(force, own.rows))
+    add_membrane_forces(own.own, moved, own.low, own.high, out)
+    wait(own.team)  # until all have read what others move next
+
+
+@energies
+def _energies(own, u, out):
+    numbers_at(out, GROUP + 1)[GROUP] += membrane_energy(own.whole, rows_at(u, own.rows))
+
+
+@mean_forces
+def _mean_forces(own, u0, u1, before, h, t, force):
+    start, end = rows_at(u0, own.rows), rows_at(u1, own.rows)
+    add_mean_membrane_forces(own.whole, start, end, rows_at(force, own.rows))
+
+
+class MembranesTerm(Term):
+    """Panels of one kind, whose energy belongs to that of the sheet's bars.
+
+    Parameters
+    ----------
+    membranes : Membranes
+    rows : int
+        Of the arrays that hold the dofs.
+    """
+
+    shared = True
+
+    def __init__(self, membranes: Membranes, rows: int) -> None:
+        self.membranes, self.rows = membranes, rows
+
+    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+        """See `Term`; a thread has the panels that its nodes belong to."""
+        whole, strips = self.membranes, work.strips
+        low, high = (int(end) for end in strips.own)
+        here = np.any((whole.nodes >= low) & (whole.nodes < high), axis=1)
+        own = packed(taken(whole, np.flatnonzero(here)))
+        context = _Context(own, whole, low, high, self.rows, work.team)
+        return Compiled(
+            Context(context), {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
+        )
+
+    @cached_property
+    def places(self) -> tuple[NDArray, NDArray]:
+        """See `Term`."""
+        return places_of(pairs_within(self.membranes.nodes))
+
+    def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
+        """See `Term`."""
+        return membrane_blocks(self.membranes, nodal(q), False).ravel()
+
+    def unstrained(self, q: NDArray) -> Unstrained:
+        """See `Term`."""
+        entries = membrane_blocks(self.membranes, nodal(q), True).ravel()
+        size = (q.size, q.size)
+        tangent = sparse.csr_array(sparse.coo_array((entries, self.places), size))
+        return Unstrained(tangent, sparse.csr_array(size), lambda motion: 0.0)
+
+    def strains(self, others: Strains) -> None:
+        """See `Term`."""
+
+    def placed(self, order: NDArray, before: Any) -> MembranesTerm:
+        """See `Term`."""
+        nodes = ranks(order)[self.membranes.nodes]
+        first = np.argsort(nodes.min(axis=1), kind="stable")  # neighbors stand near each other
+        return MembranesTerm(taken(self.membranes._replace(nodes=nodes), first), self.rows)

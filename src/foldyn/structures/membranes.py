@@ -1,0 +1,177 @@
+"""Panels whose bars are coupled so that their corners feel the panel's membrane.
+
+Bars that are right in uniform strain resist everything else too much: between its corners a panel
+of a folded sheet is three to six times softer (`structures.panel_membrane`). With B the elongations
+of a panel's bars in displacements in its plane, and K that of the membrane, seen from the corners,
+
+    S = B+^T K B+ + N (N^T k^-1 N)^-1 N^T,
+
+B+ the pseudoinverse of B. N spans the elongations that no displacement in the plane gives, which
+come with the curvature of a panel that is no longer flat: there bars of stiffness k resist alone.
+These bars also hold the center, which the membrane leaves free, where the corners would put it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import null_space
+
+from foldyn.mechanics.following import Following, tensions
+from foldyn.mechanics.membranes import Membranes
+from foldyn.patterns import Pattern
+from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
+from foldyn.structures.mesh import Mesh, hinge_angles
+from foldyn.structures.panel_membrane import membrane_stiffness
+from foldyn.structures.panel_plate import Outline, outline
+from foldyn.structures.sheet import Sheet
+
+STRAIGHT = 100.0  # resistance, over E t and the area, from which edges are straight
+
+
+class PanelKind(NamedTuple):
+    """Panels of one kind: which, and their membranes."""
+
+    panels: NDArray  # (p,)
+    membranes: Membranes
+
+
+class Sides(NamedTuple):
+    """How the edges of a panel are held: which are straight, and what resists the others' bows."""
+
+    outline: Outline
+    resistance: tuple[float, ...]
+
+
+def membranes(
+    mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[Edge], rigid: Collection[int]
+) -> tuple[PanelKind, ...]:
+    """Membranes of all panels.
+
+    Parameters
+    ----------
+    mesh, pattern, sheet
+    straight : edges that do not bow; those between panels in one plane do not, either.
+    rigid : panels that do not bend.
+    """
+    kinds: dict[tuple, list[tuple[int, NDArray, NDArray]]] = {}
+    properties, kind = sheet.kinds(len(pattern.faces))
+    first = np.searchsorted(mesh.inner_panel, np.arange(len(pattern.faces) + 1))
+    sides = _sides(mesh, pattern, sheet, straight, rigid)
+    for p, (face, panel) in enumerate(zip(pattern.faces, sides, strict=True)):
+        hub = mesh.centers[p]
+        nodes = np.array([*face, hub] if hub >= 0 else face)
+        inner = mesh.inner[first[p] : first[p + 1]]
+        place = {int(node): k for k, node in enumerate(nodes)}
+        ring = [(k, (k + 1) % len(face)) for k in range(len(face))]
+        ends = (*ring, *((place[a], place[b]) for a, b in inner.tolist()))
+        own = properties[kind[p]]
+        stiffness = own.youngs_modulus * own.thickness * coupling(panel, ends, own.poissons_ratio)
+        kinds.setdefault((len(nodes), ends), []).append((p, nodes, stiffness))
+    return tuple(
+        _packed(mesh.nodes, np.array(ends), *zip(*members, strict=True))
+        for (_, ends), members in kinds.items()
+    )
+
+
+def _sides(
+    mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[Edge], rigid: Collection[int]
+) -> list[Sides]:
+    """Of each panel."""
+    bent = edge_lookup(pattern.creases)
+    welded, stiff = set(edge_lookup(pattern.welds)) | set(straight), set(rigid)
+    turn = np.pi - hinge_angles(mesh.nodes, mesh.folds)
+    modulus, nu, thickness, youngs = (
+        sheet.values(name, len(pattern.faces))
+        for name in ("bending_modulus", "poissons_ratio", "thickness", "youngs_modulus")
+    )
+    edge_modulus = 0.5 * modulus * (1.0 - nu) * (3.0 + nu)
+    found = []
+    for p, face in enumerate(pattern.faces):
+        edges = [edge_of(a, b) for a, b in around(face)]
+        held, resistance = [edge in welded for edge in edges], [0.0] * len(edges)
+        for k, edge in enumerate(edges):
+            if edge not in bent or held[k]:
+                continue
+            crease = bent[edge]
+            other = int(pattern.crease_faces[crease].sum()) - p
+            sine, cosine = np.sin(turn[crease]), np.cos(turn[crease])
+            both = edge_modulus[other] + cosine**2 * edge_modulus[p]
+            area = float(pattern.face_areas[p])
+            both /= youngs[p] * thickness[p] * 2.0 * area  # an outline's area is 1/2
+            held[k] = both > STRAIGHT * sine**2 or not stiff.isdisjoint((p, other))
+            resistance[k] = 0.0 if held[k] else float(f"{both / sine**2:.6g}")
+        x = pattern.vertices[list(face)]
+        center = x.mean(axis=0) if len(face) > 3 else None
+        if mesh.centers[p] >= 0:
+            center = mesh.nodes[mesh.centers[p]]
+        panel = outline(x, center, [False] * len(face), held)
+        found.append(Sides(panel, tuple(resistance)))
+    return found
+
+
+def coupling(sides: Sides, ends: tuple[tuple[int, int], ...], poissons_ratio: float) -> NDArray:
+    """Stiffness (b, b) over E t of the elongations of bars between corners, and center."""
+    panel = sides.outline
+    bars, corners = np.array(ends), 2 * len(panel.corners)
+    x = np.array([*panel.corners, *([panel.center] if panel.center else [])])[: bars.max() + 1]
+    along = x[bars[:, 1]] - x[bars[:, 0]]
+    length = np.linalg.norm(along, axis=1)
+    longer = np.zeros((len(bars), len(x), 2))
+    longer[np.arange(len(bars)), bars[:, 1]] = along / length[:, None]
+    longer[np.arange(len(bars)), bars[:, 0]] = -along / length[:, None]
+    longer = longer.reshape(len(bars), -1)
+    alone = 1.0 / ((1.0 - poissons_ratio) * length.sum() * length)  # an outline's area is 1/2
+    whole = np.zeros((x.size, x.size))
+    whole[:corners, :corners] = membrane_stiffness(panel, poissons_ratio, sides.resistance)
+    held = longer.T @ (alone[:, None] * longer)
+    center = held[corners:, corners:]
+    off = np.column_stack([np.linalg.solve(center, held[corners:, :corners]), np.eye(len(center))])
+    whole += off.T @ center @ off
+    back, curved = np.linalg.pinv(longer), null_space(longer.T)
+    soft = curved.T @ (curved / alone[:, None])
+    return back.T @ whole @ back + curved @ np.linalg.solve(soft, curved.T)
+
+
+def energies(kinds: Sequence[PanelKind], x: NDArray, panels: int) -> NDArray:
+    """Energy (samples, panels), J, of the membranes at positions x (samples, n, 3), m."""
+    out = np.zeros((len(x), panels))
+    for which, own in kinds:
+        start, end = (x[:, own.nodes[:, place]] for place in own.ends.T)
+        square = np.einsum("spbc,spbc->bsp", end - start, end - start)
+        strain = 0.5 * (square * own.per_length2[:, None] - 1.0)
+        out[:, which] = 0.5 * np.einsum("isp,ijp,jsp->sp", strain, own.stiffness, strain)
+    return out
+
+
+def swelling(kinds: Sequence[PanelKind], x: NDArray, strain: NDArray) -> list[Following]:
+    """What panels push with that would, if they were free, stretch by `strain` (np,).
+
+    x : (n, 3) rest positions of the nodes, m.
+    """
+    parts = []
+    for which, own in kinds:
+        free = strain[which] * (1.0 + 0.5 * strain[which])
+        tension = -own.stiffness.sum(axis=1) * free * own.per_length2
+        bars = own.nodes[:, own.ends].transpose(1, 0, 2).reshape(-1, 2)
+        parts.append(tensions(x, bars, tension.ravel()))
+    return parts
+
+
+def _packed(x: NDArray, ends: NDArray, panels: tuple, nodes: tuple, coupled: tuple) -> PanelKind:
+    """Panels of one kind with nodes (c,), and stiffness (b, b), N/m, of elongations."""
+    numbers = np.array(nodes, np.int64)
+    vector = x[numbers[:, ends[:, 1]]] - x[numbers[:, ends[:, 0]]]
+    length = np.linalg.norm(vector, axis=2)
+    stiffness = np.array(coupled) * length[:, :, None] * length[:, None, :]
+    own = Membranes(
+        nodes=numbers,
+        ends=ends,
+        vector=np.ascontiguousarray(vector.transpose(1, 2, 0)),
+        per_length2=np.ascontiguousarray(1.0 / length.T**2),
+        stiffness=np.ascontiguousarray(stiffness.transpose(1, 2, 0)),
+    )
+    return PanelKind(np.array(panels), own)

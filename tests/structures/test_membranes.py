@@ -1,0 +1,285 @@
+"""Panels whose bars are coupled: the membrane as corners feel it, and what sheets make of it."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+from scipy.linalg import eigvalsh, null_space
+
+import foldyn as fd
+from foldyn.errors import FoldynWarning, InputError, StretchWarning
+from foldyn.mechanics import threads
+from foldyn.structures.membranes import Sides, coupling
+from foldyn.structures.panel_membrane import _condensed, membrane_stiffness
+from foldyn.structures.panel_plate import outline
+
+STEEL = fd.Sheet(200e9, 0.3, 3e-4, 7850.0)
+RUBBER = fd.Sheet(1e6, 0.25, 0.01, 1.0)
+
+
+def parallelogram(angle: float, ratio: float = 1.0) -> np.ndarray:
+    side = ratio * np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])
+    return np.array([[0.0, 0.0], [1.0, 0.0], [1.0 + side[0], side[1]], side])
+
+
+def sides(corners: np.ndarray, straight=(), resistance=0.0) -> Sides:
+    """Of a panel in the plane; with four corners or more it has a center."""
+    x = np.column_stack([corners, np.zeros(len(corners))])
+    center = x.mean(axis=0) if len(x) > 3 else None
+    held = [k in straight for k in range(len(x))]
+    return Sides(outline(x, center, [False] * len(x), held), (resistance,) * len(x))
+
+
+def ring(corners: int) -> tuple[tuple[int, int], ...]:
+    """Bars of a panel: its edges, and spokes if it has a center."""
+    edges = [(k, (k + 1) % corners) for k in range(corners)]
+    return (*edges, *((k, corners) for k in range(corners) if corners > 3))
+
+
+def strained(corners: np.ndarray) -> np.ndarray:
+    """Displacements in the plane that are no rigid motion, orthonormal, as columns."""
+    x, y = corners.T
+    rigid = np.zeros((len(x), 2, 3))
+    rigid[:, 0, 0] = rigid[:, 1, 1] = 1.0
+    rigid[:, 0, 2], rigid[:, 1, 2] = -y, x
+    return null_space(rigid.reshape(-1, 3).T)
+
+
+SHAPES = {
+    "square": parallelogram(90), "lozenge": parallelogram(60), "long": parallelogram(60, 2.0),
+    "narrow": parallelogram(10), "triangle": np.array([[0, 0], [1, 0], [0.4, 0.8]]),
+    "sliver": np.array([[0, 0], [1, 0], [np.cos(np.radians(10)), np.sin(np.radians(10))]]),
+    "obtuse": np.array([[0, 0], [1, 0], [-0.5, 0.3]]),
+    "irregular": np.array([[0, 0], [1.2, 0.1], [1.0, 0.9], [-0.1, 0.7]]),
+    "pentagon": np.array([[np.cos(a), np.sin(a)] for a in 0.4 * np.pi * np.arange(5)]),
+    "hexagon": np.array([[np.cos(a), np.sin(a)] for a in np.pi / 3 * np.arange(6)]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_membrane_resists_all_but_rigid_motions(name):
+    own = sides(SHAPES[name])
+    found = membrane_stiffness(own.outline, 0.3, own.resistance)
+    np.testing.assert_array_equal(found, found.T)
+    values = np.linalg.eigvalsh(found)
+    assert np.abs(values[:3]).max() < 1e-10
+    assert values[3] > 1e-4
+
+
+def test_corners_feel_it_softer_than_bars():
+    """Ratios, to two digits, of an independent computation with bilinear elements, 32 an edge."""
+    corners = SHAPES["lozenge"]
+    pattern = fd.Pattern(np.column_stack([corners, np.zeros(4)]), [(0, 1, 2, 3)])
+    bars = fd.discretize(pattern, fd.Sheet(1e9, 0.3, 1e-3))
+    tangent = bars.body.tangent(np.zeros(15)) - bars.body.sheet.hinges_alone().tangent(np.zeros(15))
+    moved, center = [3 * i + c for i in range(4) for c in (0, 1)], [12, 13]
+    whole = tangent.toarray() / 1e6  # E t
+    across = whole[np.ix_(center, moved)]
+    held = np.linalg.solve(whole[np.ix_(center, center)], across)
+    bare = whole[np.ix_(moved, moved)] - across.T @ held
+    own, free = sides(corners), strained(corners)  # an outline's first edge is along x, too
+    found = membrane_stiffness(own.outline, 0.3, own.resistance)
+    ratios = eigvalsh(free.T @ found @ free, free.T @ bare @ free)
+    np.testing.assert_allclose(ratios, (0.15, 0.22, 0.30, 0.31, 0.84), atol=0.008)
+
+
+def test_the_mesh_converges_as_its_elements_do():
+    """A square has no corner that spoils the order."""
+    own, free = sides(SHAPES["square"]), strained(SHAPES["square"])
+    lowest = [
+        np.linalg.eigvalsh(free.T @ _condensed(own.outline, 0.3, own.resistance, n) @ free)[0]
+        for n in (4, 8, 16)
+    ]
+    order = np.log2((lowest[0] - lowest[1]) / (lowest[1] - lowest[2]))
+    assert 1.6 < order < 2.4
+
+
+def test_edges_that_are_held_more_and_more_become_straight():
+    corners, free = SHAPES["lozenge"], strained(SHAPES["lozenge"])
+    found = []
+    for resistance in (0.0, 1e-3, 1e-1, 1e2):
+        own = sides(corners, resistance=resistance)
+        stiffness = membrane_stiffness(own.outline, 0.3, own.resistance)
+        found.append(np.linalg.eigvalsh(free.T @ stiffness @ free))
+    assert (np.diff(found, axis=0) > 0.0).all()
+    straight = sides(corners, straight=range(4))
+    stiffness = membrane_stiffness(straight.outline, 0.3, straight.resistance)
+    limit = np.linalg.eigvalsh(free.T @ stiffness @ free)
+    np.testing.assert_allclose(found[-1], limit, rtol=1e-3)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_coupled_bars_are_the_membrane(name):
+    """Condensed to the corners; no elongation of a bar is free."""
+    corners = SHAPES[name]
+    own, ends = sides(corners), ring(len(corners))
+    found = coupling(own, ends, 0.3)
+    assert np.linalg.eigvalsh(found)[0] > 1e-4 * np.linalg.eigvalsh(found)[-1]
+    x = np.array([*own.outline.corners, *([own.outline.center] if own.outline.center else [])])
+    longer = np.zeros((len(ends), len(x), 2))
+    for k, (a, b) in enumerate(ends):
+        along = (x[b] - x[a]) / np.linalg.norm(x[b] - x[a])
+        longer[k, a], longer[k, b] = -along, along
+    longer = longer.reshape(len(ends), -1)
+    whole, m = longer.T @ found @ longer, 2 * len(corners)
+    across = whole[m:, :m]
+    condensed = whole[:m, :m] - across.T @ np.linalg.solve(whole[m:, m:], across)
+    wanted = membrane_stiffness(own.outline, 0.3, own.resistance)
+    np.testing.assert_allclose(condensed, wanted, atol=1e-9 * np.abs(wanted).max())
+
+
+def test_a_panel_is_the_same_turned_renumbered_and_of_another_size():
+    corners = SHAPES["irregular"]
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
+    plain = coupling(sides(corners), ring(4), 0.3)
+    other = coupling(sides(7.0 * np.roll(corners, -1, axis=0) @ turn.T), ring(4), 0.3)
+    order = [(k + 1) % 4 for k in range(4)]
+    order += [4 + k for k in order]
+    np.testing.assert_allclose(other, plain[np.ix_(order, order)], atol=1e-7 * plain.max())
+
+
+def bent(structure: fd.Structure, seed: int = 1) -> np.ndarray:
+    shift = np.random.default_rng(seed).standard_normal(structure.nodes.shape)
+    return 0.02 * np.ptp(structure.nodes) * shift
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"preset": "n5b8e"}, {"scheme": "n4b5", "preset": "herkal"}]
+)
+@pytest.mark.parametrize("pattern", [fd.patterns.miura(), fd.patterns.resch(cells=(1, 1))])
+def test_forces_and_tangents_are_derivatives_of_the_energy(options, pattern):
+    structure = fd.discretize(pattern, RUBBER, membrane="panel", **options)
+    body, q = structure.body, None
+    q = body.dofs(bent(structure))
+    way = np.random.default_rng(2).standard_normal(q.size) * np.abs(q).max()
+
+    def energy(s: float) -> float:
+        return float(body.energies(q + s * way).sum())
+
+    step = 1e-5
+    slope = (energy(step) - energy(-step)) / (2.0 * step)
+    assert body.internal(q) @ way == pytest.approx(slope, rel=1e-7)
+    change = (body.internal(q + step * way) - body.internal(q - step * way)) / (2.0 * step)
+    wanted = body.tangent(q) @ way
+    np.testing.assert_allclose(wanted, change, atol=1e-7 * np.abs(change).max())
+
+
+def test_turned_as_a_whole_or_folded_along_diagonals_it_has_no_strain():
+    pattern = fd.Pattern(np.column_stack([SHAPES["lozenge"], np.zeros(4)]), [(0, 1, 2, 3)])
+    structure = fd.discretize(pattern, RUBBER, membrane="panel")
+    x = structure.nodes
+    scale = RUBBER.youngs_modulus * RUBBER.thickness * 1.0
+    axis = np.array([1.0, 2.0, -0.5]) / np.linalg.norm([1.0, 2.0, -0.5])
+    spin = np.cross(np.eye(3), axis)
+    turned = x @ (np.eye(3) + np.sin(1.1) * spin + (1.0 - np.cos(1.1)) * spin @ spin)
+    assert structure.energies(turned - x)["strain_bars"] < 1e-25 * scale
+    for start, end, moved in ((0, 2, 3), (1, 3, 0)):
+        along = (x[end] - x[start]) / np.linalg.norm(x[end] - x[start])
+        arm, folded = x[moved] - x[start], x.copy()
+        folded[moved] = x[start] + along * (along @ arm)
+        off = arm - along * (along @ arm)
+        folded[moved] += np.cos(0.7) * off + np.sin(0.7) * np.cross(along, off)
+        assert structure.energies(folded - x)["strain_bars"] < 1e-25 * scale
+
+
+def test_warmth_that_all_panels_share_only_scales_a_sheet():
+    """lambda = 1 + alpha T, without stress; bars by themselves do so in small strains only."""
+    pattern = fd.patterns.miura(cells=(2, 2))
+    structure = fd.discretize(pattern, RUBBER, membrane="panel")
+    case = fd.Case(
+        structure,
+        loads=[fd.Temperature(100.0, expansion=1e-3)],
+    )
+    x = structure.nodes
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        path = fd.trace(case, method="newton", load_factors=[0.0, 1.0], inertia_relief=True)
+    moved = x + path.displacement.values[-1]
+    apart = np.linalg.norm(x[:, None] - x[None], axis=2)
+    now = np.linalg.norm(moved[:, None] - moved[None], axis=2)
+    np.testing.assert_allclose(now, 1.1 * apart, atol=1e-9 * apart.max())
+
+
+def edge(pattern: fd.Pattern) -> list[int]:
+    x = pattern.vertices[:, 0]
+    return np.flatnonzero(np.isclose(x, x.min(), atol=1e-9)).tolist()
+
+
+@pytest.mark.parametrize(
+    ("pattern", "worst"),
+    [
+        ({"panel_angle": 60, "dihedral": 110}, 0.025),
+        ({"panel_angle": 60, "dihedral": 165}, 0.04),
+        ({"panel_angle": 45, "dihedral": 110}, 0.04),
+        ({"panel_angle": 60, "dihedral": 90, "b": 0.08}, 0.03),
+    ],
+)
+def test_held_sheets_vibrate_as_the_shell(pattern, worst):
+    """First three frequencies; bars alone are 7 to 46 % too high."""
+    pattern = fd.patterns.miura(**{"cells": (4, 4), "a": 0.04, "b": 0.04, **pattern})
+    held = [fd.Fix(edge(pattern))]
+    coupled = fd.discretize(pattern, STEEL, membrane="panel")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", StretchWarning)
+        found = fd.modes(fd.Case(coupled, held), count=3).frequency.values
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        shell = fd.Case(fd.shell(pattern, STEEL, divisions=8), held)
+        wanted = fd.modes(shell, count=3).frequency.values
+        alone = fd.modes(fd.Case(fd.discretize(pattern, STEEL), held), count=3).frequency.values
+    assert np.abs(found / wanted - 1.0).max() < worst
+    assert np.abs(alone / wanted - 1.0).max() > 2.0 * worst
+
+
+METHODS = ("rk4", "central_difference", "dormand_prince", "newmark", "generalized_alpha",
+           "energy_momentum")  # fmt: skip
+
+
+@pytest.mark.parametrize("options", [{}, {"preset": "n5b8e"}])
+def test_all_methods_find_the_same_motion(options):
+    pattern = fd.patterns.miura(cells=(1, 2))
+    structure = fd.discretize(
+        pattern, RUBBER, membrane="panel", **({"mass": "mixed_voronoi"} | options)
+    )
+    case = fd.Case(structure, [fd.Fix(edge(pattern))], [fd.Force([14], (0, 0, 2e-3))])
+    ends = {}
+    for method in METHODS:
+        step = {} if method == "dormand_prince" else {"dt": 2e-5, "every": 1000}
+        motion = fd.simulate(case, 0.02, method, **step)
+        ends[method] = motion.displacement.values[-1]
+        if method == "energy_momentum":
+            assert abs(motion.attrs["energy_error"]) < 1e-10
+    size = np.abs(ends["rk4"]).max()
+    for method, end in ends.items():
+        np.testing.assert_allclose(end, ends["rk4"], atol=2e-3 * size, err_msg=method)
+
+
+def test_threads_share_panels(monkeypatch):
+    """The same motion to rounding, whichever thread a panel's nodes belong to."""
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    monkeypatch.setattr(threads, "HINGES_EACH", 500)
+    pattern = fd.patterns.miura(cells=(80, 4))
+    structure = fd.discretize(pattern, RUBBER, membrane="panel", mass="mixed_voronoi")
+    case = fd.Case(structure, [fd.Fix(edge(pattern))], [fd.Gravity((0, 0, -9.81))])
+    motions = []
+    for count in (1, 2, 3):
+        monkeypatch.setattr(threads.config, "NUMBA_NUM_THREADS", count)
+        assert case.body.renumbered()[0].threads == count
+        motions.append(fd.simulate(case, 2e-3, "rk4", dt=1e-4).displacement.values)
+    size = np.abs(motions[0]).max()
+    for motion in motions[1:]:
+        np.testing.assert_allclose(motion, motions[0], atol=1e-12 * size)
+
+
+def test_what_does_not_go_together_is_refused():
+    pattern = fd.patterns.miura()
+    with pytest.raises(InputError, match="coupled are linear in Green strain"):
+        fd.discretize(pattern, RUBBER, membrane="panel", bar_law="ogden")
+    with pytest.raises(InputError, match='membrane = "panels": did you mean'):
+        fd.discretize(pattern, RUBBER, membrane="panels")  # pyright: ignore[reportArgumentType]
+    structure = fd.discretize(pattern, RUBBER, membrane="panel")
+    assert structure.bar_law.name == "linear"
+    with pytest.raises(InputError, match="bend or stretch as plates"):
+        fd.Case(structure, damping=fd.StrainDamping(1e-4))
