@@ -60,7 +60,7 @@ def test_signals_keep_what_was_computed_and_four_at_once_are_one(tmp_path, edite
             four = [other for other in four if other is not one]
     (runs[signal.SIGTERM],) = four
     others[signal.SIGTERM] = "case-results"
-    for number, one in runs.items():
+    for one in runs.values():
         wait_for_line(one, "13 nodes")
     time.sleep(2.0)  # until both motions have begun, on a busy machine too
     for number, one in runs.items():

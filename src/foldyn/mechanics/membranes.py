@@ -255,7 +255,7 @@ def _energies(own, u, out):
 
 
 @mean_forces
-def _mean_forces(own, u0, u1, before, h, t, force):
+def _mean_forces(own, u0, u1, before, h, t, force, powers):
     start, end = rows_at(u0, own.rows), rows_at(u1, own.rows)
     add_mean_membrane_forces(own.whole, start, end, rows_at(force, own.rows))
 
