@@ -14,7 +14,7 @@ from typing import Any
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, PlateSuperlinear, Superlinear, bar_law, hinge_law
 from foldyn.structures.mass import MASS_RULES
-from foldyn.structures.structure import ModelOptions
+from foldyn.structures.structure import MEMBRANES, ModelOptions
 from foldyn.values import choice, show
 
 PLATE, N5B8E, HERKAL, MERLIN2 = "plate", "n5b8e", "herkal", "merlin2"
@@ -65,7 +65,7 @@ def resolved(preset: str | None = None, welds: bool = False, **given: Any) -> Mo
     if preset is None and welds and not any(known.get(key) for key in AGAINST_PLATES):
         name = N5B8E
     base = PRESETS[name]
-    if known.get("membrane") == "panel":
+    if "membrane" in known and choice("membrane", known["membrane"], MEMBRANES) == "panel":
         known.setdefault("bar_law", "linear")
     options = ModelOptions(**{**vars(base), **known})
     choice("mass", options.mass, MASS_RULES)
