@@ -240,6 +240,12 @@ def _lacking(method: Integrator, case: Case) -> str:
     structure = case.structure
     if structure.massless and structure.condensed is None and not method.massless:
         return f"{structure.massless} have no mass, which this method needs"
+    if (
+        structure.massless
+        and not method.massless
+        and (case.crease_damping.any() or case.remembering)
+    ):
+        return f"{structure.massless} are in balance, where creases are neither damped nor remember"
     if case.remembering and not method.remembers:
         law = case.remembering[0].law.name
         return (

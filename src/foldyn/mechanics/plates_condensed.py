@@ -1,9 +1,10 @@
 """Plates whose rotations are in balance at every displacement: for methods that need mass.
 
-The rotations x (r,) of `mechanics.plates` have no forces on them. Newton's method finds them at
-every evaluation, from those of the last one. Their stiffness is that of the plates, which is
-constant, and of the folds, which couple the two rotations beside them; it is factorized as a band
-(Cholesky), once where the law of the folds is linear.
+The rotations x (r,) of `mechanics.plates` balance the forces on them, which curling panels and
+moments of creases exert. Newton's method finds them at every evaluation, from those of the last
+one. Their stiffness is that of the plates, which is constant, and of the folds, which couple the
+two rotations beside them; it is factorized as a band (Cholesky), once where the law of the folds is
+linear.
 """
 
 from __future__ import annotations
@@ -58,6 +59,7 @@ class CondensedPlates(NamedTuple):
     rank: NDArray
     band: NDArray
     factor: NDArray
+    offset: NDArray  # (nf + r, 4) see `SheetTerm.series`
 
 
 class CondensedWork(NamedTuple):
@@ -107,7 +109,8 @@ def condensed_plates(model: BarsPlates, constant: bool) -> CondensedPlates:
     factor = band.copy()
     add_folds(model, rank, np.ones(len(model.fold_rest)), factor)
     factorize_band(factor)
-    return CondensedPlates(model, constant, rank, band, factor)
+    offset = np.zeros((len(model.fold_rest) + r, 4))
+    return CondensedPlates(model, constant, rank, band, factor, offset)
 
 
 def condensed_work(model: CondensedPlates) -> CondensedWork:
@@ -167,7 +170,7 @@ def solve_band(factor, x):
 @kernel
 def balance(model, u, work):
     """Rotations in balance at displacements u, to work.x; nan where there are none."""
-    plates = model.plates
+    plates, push = model.plates, model.offset[model.plates.fold_rest.size :]
     turn_hinges(plates, u, work.plates)
     p, slope = plates.fold_parameters, work.plates.slope
     for _ in range(STEPS):
@@ -186,12 +189,16 @@ def balance(model, u, work):
             factorize_band(work.factor)
         largest = 0.0
         for k in range(work.x.size):
-            work.step[model.rank[k]] = -work.couple[k]
+            work.step[model.rank[k]] = push[k, 0] - work.couple[k]
         solve_band(work.factor, work.step)
         for k in range(work.x.size):
             work.x[k] += work.step[model.rank[k]]
             largest = max(largest, abs(work.step[model.rank[k]]))
         if plates.per_reach * largest <= BALANCED or not largest < np.inf:
+            for k in range(work.x.size):
+                push[k, 1] = work.x[k]
+                if np.isnan(push[k, 3]):  # where a motion begins
+                    push[k, 3] = work.x[k]
             return
     work.x[:] = np.nan
 
