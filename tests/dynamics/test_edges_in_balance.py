@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.errors import FoldynWarning
+from foldyn.dynamics import prepare
+from foldyn.errors import FoldynWarning, InputError
 
 SHEET = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.25, thickness=0.01, density=1.0)
 PATTERN = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=120)
@@ -99,3 +100,22 @@ def test_work_of_forces_that_jump():
     other = fd.simulate(made, 0.4, "generalized_alpha", dt=1e-4, every=0.1)
     assert balance(found) < 1e-8
     assert apart(other, found) < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("law", "damping"),
+    [
+        ("linear", fd.CreaseDamping(1e-3)),
+        (fd.Prony(0.5, 0.1), fd.Rayleigh()),
+        (fd.Plastic(1e-3, 0.01), fd.Rayleigh()),
+        (fd.Eyring(1e-3, 1e-3), fd.Rayleigh()),
+    ],
+)
+def test_edge_angles_that_follow_in_time_need_implicit_methods(law, damping):
+    made = case([moment()], law).altered(damping=damping)
+    for method in EXPLICIT:
+        with pytest.raises(InputError, match=r"edge angles .* in balance; choose .*alpha"):
+            prepare(made, 1e-3, method)
+    for contact in (None, fd.Contact()):
+        found = prepare(made.altered(contact=contact), 1e-3, "auto")
+        assert found.method.name == "generalized_alpha"
