@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.dynamics import prepare
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynWarning
 
 SHEET = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.25, thickness=0.01, density=1.0)
 PATTERN = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=120)
@@ -102,20 +101,79 @@ def test_work_of_forces_that_jump():
     assert apart(other, found) < 1e-5
 
 
-@pytest.mark.parametrize(
-    ("law", "damping"),
-    [
-        ("linear", fd.CreaseDamping(1e-3)),
-        (fd.Prony(0.5, 0.1), fd.Rayleigh()),
-        (fd.Plastic(1e-3, 0.01), fd.Rayleigh()),
-        (fd.Eyring(1e-3, 1e-3), fd.Rayleigh()),
-    ],
-)
-def test_edge_angles_that_follow_in_time_need_implicit_methods(law, damping):
-    made = case([moment()], law).altered(damping=damping)
-    for method in EXPLICIT:
-        with pytest.raises(InputError, match=r"edge angles .* in balance; choose .*alpha"):
-            prepare(made, 1e-3, method)
-    for contact in (None, fd.Contact()):
-        found = prepare(made.altered(contact=contact), 1e-3, "auto")
-        assert found.method.name == "generalized_alpha"
+SMALL = fd.Rayleigh(0.1)
+REMEMBERING = {
+    "prony": (fd.Prony(0.5, 0.1, law="linear"), [SMALL]),
+    "plastic": (fd.Plastic(5e-3, 0.02, law="linear"), [SMALL]),
+    "eyring": (fd.Eyring(1e-2, 1e-1, law="linear"), [SMALL]),
+}
+DAMPED = {
+    "weak": ("linear", [fd.CreaseDamping(1e-4)]),
+    "strong": ("linear", [fd.CreaseDamping(5.0)]),
+    "nonlinear": (CURVED, [fd.CreaseDamping(0.05)]),
+    "prony": (fd.Prony(0.5, 0.1, law="linear"), [fd.CreaseDamping(0.05)]),
+    "eyring": (fd.Eyring(1e-2, 1e-1, law="linear"), [fd.CreaseDamping(0.05)]),
+}
+
+
+@pytest.mark.parametrize("method", EXPLICIT)
+@pytest.mark.parametrize("kind", REMEMBERING)
+def test_creases_with_memory_move_as_with_edge_angles_as_dofs(method, kind):
+    law, damping = REMEMBERING[kind]
+    made = case([moment(SMOOTH), heat(SMOOTH)], law).altered(damping=damping)
+    found = fd.simulate(made, 0.3, method, every=0.05)
+    other = fd.simulate(made, 0.3, "generalized_alpha", dt=1e-4, every=0.05)
+    assert apart(other, found) < 5e-6
+    np.testing.assert_allclose(found.dissipated, other.dissipated, atol=1e-5 * other.dissipated[-1])
+    assert balance(found) < 1e-6
+
+
+@pytest.mark.parametrize("method", EXPLICIT)
+@pytest.mark.parametrize("kind", DAMPED)
+def test_damped_creases_move_as_with_edge_angles_as_dofs(method, kind):
+    """generalized_alpha is of order 1 where dofs without mass are damped: it is extrapolated."""
+    law, damping = DAMPED[kind]
+    made = case([moment(SMOOTH), heat(SMOOTH)], law).altered(damping=damping)
+    found = fd.simulate(made, 0.3, method, every=0.05)
+    one, other = (
+        fd.simulate(made, 0.3, "generalized_alpha", dt=dt, every=0.05) for dt in (1e-4, 5e-5)
+    )
+    for name in ("displacement", "dissipated", "work"):
+        wanted = 2.0 * other[name].values - one[name].values
+        np.testing.assert_allclose(found[name], wanted, atol=2e-5 * np.abs(wanted).max())
+    assert balance(found) < 5e-6
+
+
+@pytest.mark.parametrize("damping", [1e-4, 0.05, 5.0])
+def test_damped_creases_are_of_order_two(damping):
+    """As with all memory, by whatever method; the balance too."""
+    made = case([moment(SMOOTH)]).altered(damping=fd.CreaseDamping(damping))
+    runs = [fd.simulate(made, 0.2, "rk4", dt=dt, every=0.05) for dt in (4e-4, 2e-4, 2.5e-5)]
+    errors = [apart(run, runs[-1]) for run in runs[:-1]]
+    assert np.log2(errors[0] / errors[1]) > 1.7
+    assert balance(runs[1]) < 1e-6
+
+
+@pytest.mark.parametrize("kind", ["strong", "eyring"])
+@pytest.mark.parametrize("method", EXPLICIT)
+def test_a_state_holds_what_damped_creases_remember(method, kind):
+    law, damping = DAMPED[kind]
+    made = case([moment(SMOOTH)], law).altered(damping=damping)
+    whole = fd.simulate(made, 0.2, method, every=0.1)
+    first = fd.simulate(made, 0.1, method, every=0.1)
+    rest = fd.simulate(made, 0.1, method, every=0.1, initial=fd.initial_state(first), start=0.1)
+    end = whole.displacement.values[-1]
+    assert balance(rest) < 1e-5
+    np.testing.assert_allclose(rest.displacement[-1], end, atol=1e-6 * np.abs(end).max())
+
+
+def test_dampers_take_what_jumps():
+    """The moment of a damped crease that jumps turns it at a finite rate."""
+    made = case([moment(fd.Pulse(0.1))]).altered(damping=fd.CreaseDamping(0.5))
+    found = fd.simulate(made, 0.2, "dormand_prince", every=0.05)
+    one, other = (
+        fd.simulate(made, 0.2, "generalized_alpha", dt=dt, every=0.05) for dt in (1e-4, 5e-5)
+    )
+    wanted = 2.0 * other.displacement.values - one.displacement.values
+    np.testing.assert_allclose(found.displacement, wanted, atol=1e-4 * np.abs(wanted).max())
+    assert balance(found) < 1e-3

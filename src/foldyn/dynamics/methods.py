@@ -240,15 +240,6 @@ def lacking(method: Integrator, case: Case) -> str:
     structure = case.structure
     if structure.massless and structure.condensed is None and not method.massless:
         return f"{structure.massless} have no mass, which this method needs"
-    if (
-        structure.massless
-        and not method.massless
-        and (case.crease_damping.any() or case.remembering)
-    ):
-        return (
-            f"{structure.massless} follow creases that are damped or have a memory in time, and "
-            "this method has them in balance"
-        )
     if case.remembering and not method.remembers:
         law = case.remembering[0].law.name
         return (

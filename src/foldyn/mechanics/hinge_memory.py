@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +114,6 @@ class HingeMemory(Term):
         memory_tangents(own, u, out)
         return out[self._pairs]
 
-    def on(self, sheet: SheetTerm) -> HingeMemory:
+    def on(self, sheet: SheetTerm) -> Self:
         """See `Term`; the branches measure from the rest angles that they have had."""
-        return HingeMemory(self.own, self.settles, sheet)
+        return type(self)(self.own, self.settles, sheet)

@@ -68,6 +68,7 @@ class FoldHinges(NamedTuple):
     stiffness: NDArray  # (k,) N m/rad
     softness: NDArray  # (k,) rad/(N m), of the panels beside
     row: NDArray  # (k,) of each in `SheetTerm.series`
+    beside: NDArray | float = np.inf  # (k,) N m/rad, of panels whose edge angles are in balance
 
     @property
     def length(self) -> NDArray:
@@ -79,6 +80,11 @@ class FoldHinges(NamedTuple):
         """Length of each (k,) over that of its whole fold."""
         length = self.length
         return length / np.bincount(self.fold, length)[self.fold]
+
+    @property
+    def remembers(self) -> NDArray:
+        """Whether each turns by other than its crease (k,), so that dampers give it a memory."""
+        return (self.softness > 0.0) | np.isfinite(self.beside)
 
     @property
     def hidden_turn(self) -> NDArray:

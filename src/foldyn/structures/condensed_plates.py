@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any, Self
 
 import numpy as np
@@ -9,8 +10,11 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from foldyn.jit.context import Context
 from foldyn.materials import HingeLaw
 from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.balanced_memory import evaluation
+from foldyn.mechanics.inelastic import MemoryHinges
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.mechanics.plates_condensed import (
     CondensedWork,
@@ -26,6 +30,8 @@ from foldyn.structures.bars_plates import BarsPlatesTerm
 
 class CondensedPlatesTerm(BarsPlatesTerm):
     """Bars, folds and plates by their displacements alone; see `mechanics.sheet_term.SheetTerm`."""
+
+    _held: Context  # of branches of its folds
 
     def __init__(
         self, model: BarsPlates, laws: tuple[HingeLaw, HingeLaw], like: BarsPlatesTerm | None = None
@@ -71,7 +77,20 @@ class CondensedPlatesTerm(BarsPlatesTerm):
     def fold_hinges(self) -> FoldHinges:
         """See `SheetTerm`: without the edge angles, which are no dofs."""
         found = super().fold_hinges()
-        return found._replace(hidden=np.full_like(found.hidden, NO_DOF))
+        plates, turns = self.condensed, self.model.fold_rotations
+        side = plates.band[plates.rank, -1] / self.per_hidden**2
+        there, each = turns >= 0, np.full(turns.shape, np.inf)
+        each[there] = side[turns[there]]
+        give = (1.0 / each).sum(axis=1)
+        beside = np.divide(1.0, give, out=np.full(len(give), np.inf), where=give > 0.0)
+        return found._replace(hidden=np.full_like(found.hidden, NO_DOF), beside=beside)
+
+    def remembering(self, own: MemoryHinges) -> Self:
+        """The same sheet, in whose balance the branches of its folds are evaluated."""
+        other, folds = copy(self), len(self.model.fold_rest)
+        other._held, memory = evaluation(own, self.condensed.offset, folds)
+        other.condensed = self.condensed._replace(memory=memory)
+        return other
 
     # ------------------------------------------------------------------ forces on edge angles
     @property
