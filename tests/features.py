@@ -113,11 +113,6 @@ REASONS: Mapping[str, tuple[str, str]] = {
     ),
     "d": ("has a memory", "what a law with memory takes in a step has no exact form; not done"),
     "e": (
-        "edge angles",
-        "explicit methods have edge angles in balance at every instant; those beside creases that "
-        "are damped or have a memory follow in time; not done",
-    ),
-    "f": (
         "creep",
         "load factors that the method finds may turn back, so that no step has a time in which "
         "creases creep",
