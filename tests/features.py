@@ -45,8 +45,8 @@ class Setting:
         structure = self.sheet() if structure is None else structure
         return fd.Case(structure, [*held, *supports], [push, *loads], **parts)
 
-    def law(self, law: Any) -> fd.Case:
-        return self.case(self.sheet(fold_law=law))
+    def law(self, law: Any, **options: Any) -> fd.Case:
+        return self.case(self.sheet(fold_law=law, **options))
 
 
 FEATURES: Mapping[str, Callable[[Setting], fd.Case]] = {
@@ -60,11 +60,17 @@ FEATURES: Mapping[str, Callable[[Setting], fd.Case]] = {
     "ties, rigid panels": lambda s: s.case(s.sheet(rigid=[3]), [fd.Link([5, 7], "z")]),
     "dashpots": lambda s: s.case(supports=[fd.Dashpot(1e-3, nodes=[7])]),
     "damped creases": lambda s: s.case(damping=fd.CreaseDamping(1e-4)),
+    "damped creases of `n5b8e`": lambda s: s.case(
+        s.sheet(scheme="n5b8e"), damping=fd.CreaseDamping(1e-4)
+    ),
     "stiffness-proportional damping": lambda s: s.case(damping=fd.Rayleigh(0.1, 1e-5)),
     "modal damping": lambda s: s.case(damping=fd.ModalDamping(0.01)),
     "damped strains": lambda s: s.case(damping=fd.StrainDamping(1e-5)),
     "pressure": lambda s: s.case(loads=[fd.Pressure(1e-4)]),
     "moments of creases": lambda s: s.case(loads=[fd.CreaseMoment([0], 1e-5)]),
+    "moments of creases of `n5b8e`": lambda s: s.case(
+        s.sheet(scheme="n5b8e"), loads=[fd.CreaseMoment([0], 1e-5)]
+    ),
     "actuated creases": lambda s: s.case(loads=[fd.Actuate([0], 119.0, history=fd.Ramp(1.0))]),
     "temperature": lambda s: s.case(loads=[fd.Temperature(1.0, 1e-6, 1e-3)]),
     "temperature of `n5b8e`": lambda s: s.case(
@@ -82,6 +88,15 @@ FEATURES: Mapping[str, Callable[[Setting], fd.Case]] = {
     "creases that relax (`prony`)": lambda s: s.law(fd.Prony([0.5], [0.1])),
     "creases that yield (`plastic`)": lambda s: s.law(fd.Plastic(1e-5, 0.01)),
     "creases that creep (`eyring`)": lambda s: s.law(fd.Eyring(1e-3, 1e-3)),
+    "creases of `n5b8e` that relax (`prony`)": lambda s: s.law(
+        fd.Prony([0.5], [0.1]), scheme="n5b8e"
+    ),
+    "creases of `n5b8e` that yield (`plastic`)": lambda s: s.law(
+        fd.Plastic(1e-5, 0.01), scheme="n5b8e"
+    ),
+    "creases of `n5b8e` that creep (`eyring`)": lambda s: s.law(
+        fd.Eyring(1e-3, 1e-3), scheme="n5b8e"
+    ),
 }
 
 
@@ -98,8 +113,7 @@ REASONS: Mapping[str, tuple[str, str]] = {
         "which thick panels are hinged",
         "contact lies between middle surfaces, beside which boards are hinged; not done",
     ),
-    "d": ("panels that curl", "explicit methods have no edge angles, which panels that curl turn"),
-    "e": (
+    "d": (
         "creep",
         "load factors that the method finds may turn back, so that no step has a time in which "
         "creases creep",

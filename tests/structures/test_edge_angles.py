@@ -272,12 +272,6 @@ def test_explicit_methods_balance_the_edges(law, method):
     np.testing.assert_allclose(ends[0], ends[1], atol=2e-3 * np.abs(ends[0]).max())
 
 
-def test_moments_on_creases_need_edge_angles():
-    case = fd.Case(miura(), [fd.Fix([0, 1, 2], "xyz")], [fd.CreaseMoment([0], 1e-3)])
-    with pytest.raises(InputError, match=r"method.*n5b8e.*moments on creases"):
-        fd.simulate(case, duration=0.1, method="rk4")
-
-
 def test_rigid_panels_have_no_edge_angles():
     """Without any, the body of explicit methods is the one of all others."""
     s = edged(fd.patterns.simple_fold(dihedral=100), rigid="all")

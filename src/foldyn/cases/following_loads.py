@@ -126,15 +126,14 @@ class CreaseMoment(Load):
 
     def turns(self, structure: Any, place: str) -> NDArray | None:
         """See `Load`: the panels beside a crease give way to all of its moment."""
-        body = structure.body
-        if not body.sheet.offsets:
+        sheet = structure.body.sheet
+        if not sheet.offsets:
             return None
         creases, moment = self.of_creases(structure, place)
-        out = np.zeros(len(body.sheet.rest_angles))
-        out[len(out) - body.sheet.offsets + creases] = (
-            moment * body.sheet.fold_hinges().softness[creases]
-        )
-        return out
+        each = np.zeros(len(structure.folds))
+        each[creases] = moment
+        angles = np.zeros(len(sheet.rest_angles) - sheet.offsets)
+        return np.append(angles, sheet.offsets_under(each))
 
     def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse moments of creases between panels that are held."""

@@ -164,6 +164,7 @@ STAGES: Sequence[Uses] = (
         "laws with memory": [
             partial(moved, *REMEMBER, *IMPLICIT, law=PRONY, damping=[fd.CreaseDamping(0.2)]),
             partial(moved, *REMEMBER, *IMPLICIT, law=PLASTIC, supports=SPRINGS),
+            partial(moved, *REMEMBER, law=PRONY, damping=[fd.CreaseDamping(0.2)], model="n5b8e"),
         ],
         "paths": [
             partial(traced, 1e-3, supports=SPRINGS, loads=FOLLOWING, clamped="xmin"),

@@ -4,6 +4,7 @@ What turns one is the sum of all that acts on it, each with its own history. The
 k (dW/d rest) d rest/dt, W the energy of its law per unit stiffness: what the energy audit needs.
 Offsets, by which moments of creases alone turn the panels beside them (`materials.series`), may
 jump as the moments do: their work is the mean moment of a step times the change of the offset.
+Forces on dofs in balance may jump as well, and the dofs with them.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ class Actuators(NamedTuple):
     the factor of history row, rad.
     """
 
-    hinge: NDArray  # (a,) row of `Folds`
+    hinge: NDArray  # (a,) row of `Folds`, or of offsets after those
     lowest: NDArray  # (a,) lowest node of the hinge, in increasing order
     is_offset: NDArray  # (a,) bool
     start: NDArray  # (a,)
@@ -60,11 +61,13 @@ def actuators(
     address = np.array([law.addresses or (0, 0, 0) for law in laws], np.int64).reshape(-1, 3)
     share, offset = body.sheet.series()
     is_offset = (turned >= len(body.sheet.rest_angles) - body.sheet.offsets)[which]
+    start = offset[hinge, 0]
+    start[~is_offset] = body.sheet.turned()[0][hinge[~is_offset]]
     return body, Actuators(
         hinge=hinge,
         lowest=lowest,
         is_offset=is_offset,
-        start=np.where(is_offset, offset[hinge, 0], body.sheet.turned()[0][hinge]),
+        start=start,
         part=np.stack([first, first + count], axis=1)[which].astype(np.int64),
         code=code[which],
         address=address[which],
@@ -144,6 +147,11 @@ def offset_work(folds, actuators, angle, first, last, accepted):
         if not actuators.is_offset[k]:
             continue
         e = actuators.hinge[k]
+        if e >= rest_angle.size:  # the force on a dof in balance
+            work += 0.5 * (offset[e, 2] + offset[e, 0]) * (offset[e, 1] - offset[e, 3])
+            if accepted:
+                offset[e, 2], offset[e, 3] = offset[e, 0], offset[e, 1]
+            continue
         moment = offset[e, 1] + stiffness[e] * series_moment(
             actuators.code[k], angle[e] + offset[e, 0], rest_angle[e],
             p[e, 0], p[e, 1], p[e, 2], p[e, 3], actuators.share[e], actuators.address[k],

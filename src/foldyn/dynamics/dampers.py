@@ -88,7 +88,7 @@ def _elements(
         raise InputError(f"damping: this structure cannot damp crease {unknown[0]}: leave it out")
     coefficient = damping[hinges.fold] * hinges.length
     share = 1.0 - hinges.softness * hinges.stiffness
-    coefficient = coefficient * np.where(hinges.softness > 0.0, share**2 * quasi_static, 1.0)
+    coefficient = coefficient * np.where(hinges.remembers, share**2 * quasi_static, 1.0)
     damped = coefficient > 0.0
     axial, along = np.concatenate(strength), nodes[pairs[:, 1]] - nodes[pairs[:, 0]]
     rows, corners, hidden = hinges.nodes[damped], hinges.corners[damped], hinges.hidden[damped]

@@ -13,7 +13,9 @@ from foldyn.dynamics.dampers import placed
 from foldyn.errors import InputError
 from foldyn.materials.memory_law import VARIABLES
 from foldyn.mechanics.assembly import Assembly, Numbering
+from foldyn.mechanics.balanced_memory import BalancedMemory
 from foldyn.mechanics.hinge_memory import HingeMemory
+from foldyn.structures.condensed_plates import CondensedPlatesTerm
 from foldyn.structures.remembering import memory
 from foldyn.values import show
 
@@ -34,6 +36,9 @@ def with_memory(case: Case, body: Assembly, by: Numbering) -> Assembly:
     hinges = {"fold": body.sheet.fold_hinges, "bend": body.sheet.bend_hinges}
     row = np.concatenate([hinges[part.kind]().row for part in parts])
     own = state.own._replace(dofs=placed(state.own.dofs, by), row=row)
+    if isinstance(body.sheet, CondensedPlatesTerm):
+        body = body.on(body.sheet.remembering(own))
+        return body.with_terms(BalancedMemory(own, state.settles, body.sheet))
     return body.with_terms(HingeMemory(own, state.settles, body.sheet))
 
 

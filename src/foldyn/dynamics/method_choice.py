@@ -20,7 +20,7 @@ from foldyn.algebra.superlu import SingularTangentError
 from foldyn.cases import Case
 from foldyn.dynamics.doubts import INACCURATE
 from foldyn.dynamics.inertia import is_lumped
-from foldyn.dynamics.methods import METHODS, suited
+from foldyn.dynamics.methods import METHODS, lacking
 from foldyn.dynamics.modal_damping import ModalRows
 from foldyn.dynamics.timing import DEFAULT_FRACTION, histories
 from foldyn.mechanics.following import following_force
@@ -59,9 +59,8 @@ def choose(
     """
     conserved = not (case.damped or case.remembering or any(histories(case)))
     implicit = "energy_momentum" if conserved else "generalized_alpha"
-    has_mass = not case.structure.massless or case.structure.condensed is not None
-    if case.contact is not None and has_mass:
-        return Choice(suited(ACCURATE, case).name, "explicit: its error resolves impacts")
+    if case.contact is not None and not lacking(METHODS[ACCURATE], case):
+        return Choice(ACCURATE, "explicit: its error resolves impacts")
     if massless := case.structure.massless:
         return Choice("generalized_alpha", f"implicit: {massless} have no mass")
     if (case.mass.diagonal() <= 0.0)[~case.constraints.determined.all(axis=1)].any():

@@ -213,10 +213,10 @@ def method_of(name: str) -> Integrator:
 def suited(name: str, case: Case) -> Integrator:
     """Integrator by its name, for a case."""
     method = method_of(name)
-    if lacking := _lacking(method, case):
-        fit = ", ".join(other.name for other in METHODS.values() if not _lacking(other, case))
+    if lack := lacking(method, case):
+        fit = ", ".join(other.name for other in METHODS.values() if not lacking(other, case))
         raise InputError(
-            f" = {name!r}: {lacking}; choose {f'one of {fit}' if fit else 'another model'}",
+            f" = {name!r}: {lack}; choose {f'one of {fit}' if fit else 'another model'}",
             "method",
         )
     return method
@@ -228,7 +228,7 @@ def with_mass(method: Integrator, case: Case) -> Case:
     return case if other is None else case.altered(structure=other)
 
 
-def _lacking(method: Integrator, case: Case) -> str:
+def lacking(method: Integrator, case: Case) -> str:
     """What a method needs and a case lacks, in words; empty where nothing."""
     structure = case.structure
     if structure.massless and structure.condensed is None and not method.massless:

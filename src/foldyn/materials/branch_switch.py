@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from foldyn.jit.compiled import kernel, scalar
-from foldyn.materials import eyring, plastic, prony
+from foldyn.materials import crease_damper, eyring, plastic, prony
 
 
 @scalar
@@ -28,6 +28,8 @@ def update(code, p, before, after, dt, one, other):
         return plastic.update(before, after, one, other, p[0], p[1], p[2])
     if code == eyring.CODE:
         return eyring.update(before, after, dt, one, p[0], p[1])
+    if code == crease_damper.CODE:
+        return crease_damper.update(before, after, dt, one, p[0], p[1])
     return np.nan, np.nan, np.nan, np.nan, np.nan, np.nan
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,6 +126,6 @@ class HingeMemory(Term):
         mean_memory_tangents(self.own, 0.5 * (floor - 1.0), *ends, out)
         return out[self._pairs]
 
-    def on(self, sheet: SheetTerm) -> HingeMemory:
+    def on(self, sheet: SheetTerm) -> Self:
         """See `Term`; the branches measure from the rest angles that they have had."""
-        return HingeMemory(self.own, self.settles, sheet)
+        return type(self)(self.own, self.settles, sheet)

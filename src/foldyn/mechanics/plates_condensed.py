@@ -1,9 +1,10 @@
 """Plates whose rotations are in balance at every displacement: for methods that need mass.
 
-The rotations x (r,) of `mechanics.plates` have no forces on them. Newton's method finds them at
-every evaluation, from those of the last one. Their stiffness is that of the plates, which is
-constant, and of the folds, which couple the two rotations beside them; it is factorized as a band
-(Cholesky), once where the law of the folds is linear.
+The rotations x (r,) of `mechanics.plates` balance the forces on them, which curling panels and
+moments of creases exert. Newton's method finds them at every evaluation, from those of the last
+one. Their stiffness is that of the plates, which is constant, and of the folds, which couple the
+two rotations beside them; it is factorized as a band (Cholesky), once where the law of the folds is
+linear.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from foldyn.jit.compiled import inner, kernel
-from foldyn.jit.context import Context, numbers_at, rows_at
+from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_slope
 from foldyn.mechanics.model import ranks
@@ -58,6 +59,8 @@ class CondensedPlates(NamedTuple):
     rank: NDArray
     band: NDArray
     factor: NDArray
+    offset: NDArray  # (nf + r, 4) see `SheetTerm.series`
+    memory: NDArray  # (2,) address of what evaluates branches of folds, and of its context; or 0
 
 
 class CondensedWork(NamedTuple):
@@ -68,6 +71,7 @@ class CondensedWork(NamedTuple):
     couple: NDArray  # (r,) N
     step: NDArray  # (r,) in the order of the band
     factor: NDArray  # (r, w + 1)
+    branches: NDArray  # (nf, 2) moments, N m, and slopes, N m/rad, of branches of folds
     angle: NDArray  # those of `plates`
     fold_angle: NDArray
     strips: Whole
@@ -105,26 +109,29 @@ def condensed_plates(model: BarsPlates, constant: bool) -> CondensedPlates:
     lower = i >= j
     np.add.at(band, (i[lower], width + j[lower] - i[lower]), at.data[lower])
     factor = band.copy()
-    add_folds(model, rank, np.ones(len(model.fold_rest)), factor)
+    add_folds(model, rank, model.fold_stiffness, factor)
     factorize_band(factor)
-    return CondensedPlates(model, constant, rank, band, factor)
+    offset = np.zeros((len(model.fold_rest) + r, 4))
+    memory = np.zeros(2, np.int64)
+    return CondensedPlates(model, constant, rank, band, factor, offset, memory)
 
 
 def condensed_work(model: CondensedPlates) -> CondensedWork:
     """Memory for `model`."""
     r, plates = model.plates.rotations, plates_work(model.plates)
     return CondensedWork(
-        plates, np.zeros(r), np.zeros(r), np.zeros(r), model.factor.copy(), plates.angle,
-        plates.fold_angle, Whole(np.array([0, model.plates.nodes])), plates.team,
+        plates, np.zeros(r), np.zeros(r), np.zeros(r), model.factor.copy(),
+        np.zeros((len(plates.fold_angle), 2)), plates.angle, plates.fold_angle,
+        Whole(np.array([0, model.plates.nodes])), plates.team,
     )  # fmt: skip
 
 
 @kernel
 def add_folds(plates, rank, slope, band):
-    """Add folds with slopes per unit stiffness to the stiffness of the rotations."""
+    """Add folds with these slopes (nf,), N m/rad, to the stiffness of the rotations."""
     width = band.shape[1] - 1
     for f in range(plates.fold_rest.size):
-        stiff = plates.fold_stiffness[f] * slope[f] * plates.per_reach * plates.per_reach
+        stiff = slope[f] * plates.per_reach * plates.per_reach
         one, other = plates.fold_rotations[f]
         if one >= 0:
             band[rank[one], width] += stiff
@@ -164,21 +171,36 @@ def solve_band(factor, x):
             x[k] -= factor[i, width + k - i] * x[i]
 
 
+@inner
+def add_branches(model, work):
+    """Evaluate the branches of folds at their angles; their moments act on rotations too."""
+    if model.memory[0] == 0:
+        return
+    run_at(model.memory[0], (model.memory[1], work.plates.fold_angle, work.branches))
+    for f in range(work.branches.shape[0]):
+        for rotation in model.plates.fold_rotations[f]:
+            if rotation >= 0:
+                work.couple[rotation] -= model.plates.per_reach * work.branches[f, 0]
+
+
 @kernel
 def balance(model, u, work):
     """Rotations in balance at displacements u, to work.x; nan where there are none."""
-    plates = model.plates
+    plates, push = model.plates, model.offset[model.plates.fold_rest.size :]
     turn_hinges(plates, u, work.plates)
     p, slope = plates.fold_parameters, work.plates.slope
+    again = model.memory[0] != 0  # rates of creases are differences of turns
     for _ in range(STEPS):
         turn_moments(plates, work.x, work.couple, work.plates)
-        if not model.constant:
+        add_branches(model, work)
+        if not model.constant or model.memory[0] != 0:
             for f in range(plates.fold_rest.size):
                 found = hinge_slope(
                     plates.code, work.plates.fold_angle[f], plates.fold_rest[f], p[f, 0], p[f, 1],
                     plates.addresses[2],
                 )  # fmt: skip
-                slope[f] = max(found, LEAST)
+                stiff = plates.fold_stiffness[f]
+                slope[f] = max(stiff * found + work.branches[f, 1], stiff * LEAST)
             factor, band = flat(work.factor), flat(model.band)
             for k in range(band.size):  # an assignment of slices takes seconds to compile
                 factor[k] = band[k]
@@ -186,12 +208,17 @@ def balance(model, u, work):
             factorize_band(work.factor)
         largest = 0.0
         for k in range(work.x.size):
-            work.step[model.rank[k]] = -work.couple[k]
+            work.step[model.rank[k]] = push[k, 0] - work.couple[k]
         solve_band(work.factor, work.step)
         for k in range(work.x.size):
             work.x[k] += work.step[model.rank[k]]
             largest = max(largest, abs(work.step[model.rank[k]]))
-        if plates.per_reach * largest <= BALANCED or not largest < np.inf:
+        close, again = plates.per_reach * largest <= BALANCED and not again, False
+        if close or not largest < np.inf:
+            for k in range(work.x.size):
+                push[k, 1] = work.x[k]
+                if np.isnan(push[k, 3]):  # where a motion begins
+                    push[k, 3] = work.x[k]
             return
     work.x[:] = np.nan
 

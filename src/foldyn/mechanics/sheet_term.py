@@ -68,6 +68,7 @@ class FoldHinges(NamedTuple):
     stiffness: NDArray  # (k,) N m/rad
     softness: NDArray  # (k,) rad/(N m), of the panels beside
     row: NDArray  # (k,) of each in `SheetTerm.series`
+    beside: NDArray | float = np.inf  # (k,) N m/rad, of panels whose edge angles are in balance
 
     @property
     def length(self) -> NDArray:
@@ -79,6 +80,11 @@ class FoldHinges(NamedTuple):
         """Length of each (k,) over that of its whole fold."""
         length = self.length
         return length / np.bincount(self.fold, length)[self.fold]
+
+    @property
+    def remembers(self) -> NDArray:
+        """Whether each turns by other than its crease (k,), so that dampers give it a memory."""
+        return (self.softness > 0.0) | np.isfinite(self.beside)
 
     @property
     def hidden_turn(self) -> NDArray:
@@ -154,7 +160,7 @@ class SheetTerm(Term):
     per_hidden : float
         Turn that a hidden dof of 1 m stands for, rad/m.
     offsets : int
-        Folds whose panels give way to moments of the crease alone: nf, or none.
+        Folds whose panels give way to moments of the crease alone, nf, or dofs in balance; or none.
     """
 
     model: Any
@@ -232,7 +238,8 @@ class SheetTerm(Term):
     def rest_angles(self) -> NDArray:
         """Rest angles (nr,), rad, that loads may change: of the folds first.
 
-        The last `offsets` are no rest angles, but what the laws of folds see beside the dihedral.
+        The last `offsets` are no rest angles, but what the laws of folds see beside the dihedral,
+        or forces on dofs in balance, N.
         """
         return np.zeros(0)
 
@@ -267,11 +274,16 @@ class SheetTerm(Term):
         """Of all that actuators turn: the share of the crease in a small turn, and offsets.
 
         Offsets (., 4) are what the laws see beside the dihedrals (rad), the moment of branches of
-        laws with memory (N m), and both offset and whole moment at the last accepted step. In a
-        sheet from `actuated` they are changed in place.
+        laws with memory (N m), and both offset and whole moment at the last accepted step. Dofs in
+        balance have their rows after those: force (N), dof (m), and both at that step. In a sheet
+        from `actuated` they are changed in place.
         """
         count = len(self.turned()[0])
         return np.ones(count), np.zeros((count, 4))
+
+    def offsets_under(self, moments: NDArray) -> NDArray:
+        """The last `rest_angles` where moments (nf,), N m, act on creases alone."""
+        return np.zeros(0)
 
     def lowest_nodes(self, turned: NDArray) -> NDArray:
         """Lowest node of what turns in these rows (k,): whose thread it is, where there are any."""

@@ -256,6 +256,10 @@ class BarsHingesTerm(SheetTerm):
         """See `SheetTerm`."""
         return self.model.hinge_share, self.model.hinge_offset
 
+    def offsets_under(self, moments: NDArray) -> NDArray:
+        """See `SheetTerm`: turns to which the panels beside a crease give way."""
+        return moments * self._softness
+
     def lowest_nodes(self, turned: NDArray) -> NDArray:
         """See `SheetTerm`."""
         return self.model.hinges[turned].min(axis=1)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from copy import copy
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from foldyn.errors import InputError
+from foldyn.jit.context import Context
 from foldyn.materials import HingeLaw
 from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.balanced_memory import evaluation
+from foldyn.mechanics.inelastic import MemoryHinges
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.mechanics.plates_condensed import (
     CondensedWork,
@@ -19,7 +22,7 @@ from foldyn.mechanics.plates_condensed import (
     condensed_plates,
     condensed_work,
 )
-from foldyn.mechanics.sheet_term import FoldHinges, Unstrained
+from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges, Unstrained
 from foldyn.mechanics.step_tangent import SparseBlocks
 from foldyn.mechanics.term import Compiled
 from foldyn.structures.bars_plates import BarsPlatesTerm
@@ -28,6 +31,8 @@ from foldyn.structures.bars_plates import BarsPlatesTerm
 class CondensedPlatesTerm(BarsPlatesTerm):
     """Bars, folds and plates by their displacements alone; see `mechanics.sheet_term.SheetTerm`."""
 
+    _held: Context  # of branches of its folds
+
     def __init__(
         self, model: BarsPlates, laws: tuple[HingeLaw, HingeLaw], like: BarsPlatesTerm | None = None
     ) -> None:
@@ -35,10 +40,18 @@ class CondensedPlatesTerm(BarsPlatesTerm):
         self._full = BarsPlatesTerm(model, laws, like)  # the same with edge angles
         self.condensed = condensed_plates(model, self.linear_folds)
         self.size, self.rows, self.hidden = self._nodal, model.nodes, np.zeros(0, np.int64)
+        self.offsets = model.rotations
+
+    def _with(self, model: BarsPlates) -> Self:
+        """See `BarsPlatesTerm`; with the same forces on edge angles."""
+        other = super()._with(model)
+        other.condensed.offset[:] = self.condensed.offset
+        return other
 
     def _whole(self, q: NDArray) -> NDArray:
         """All dofs at displacements q, with edge angles in balance."""
-        return Assembly(self._full).dofs(np.ravel(q)[: self.size])
+        push = np.append(np.zeros(self.size), self._push)
+        return Assembly(self._full).dofs(np.ravel(q)[: self.size], push)
 
     def compiled(self, work: Any, kept: CondensedWork, group: int) -> Compiled:
         """See `Term`."""
@@ -62,13 +75,58 @@ class CondensedPlatesTerm(BarsPlatesTerm):
         return SparseBlocks(full, self.rows, np.repeat(self.model.bars.rest, 3, axis=0))
 
     def fold_hinges(self) -> FoldHinges:
-        """See `SheetTerm`: moments of creases act on edge angles, which are not there."""
-        raise InputError(
-            ': with scheme = "n5b8e" explicit methods take neither moments on creases nor their '
-            'damping; choose "generalized_alpha"',
-            "method",
-        )
+        """See `SheetTerm`: without the edge angles, which are no dofs."""
+        found = super().fold_hinges()
+        plates, turns = self.condensed, self.model.fold_rotations
+        side = plates.band[plates.rank, -1] / self.per_hidden**2
+        there, each = turns >= 0, np.full(turns.shape, np.inf)
+        each[there] = side[turns[there]]
+        give = (1.0 / each).sum(axis=1)
+        beside = np.divide(1.0, give, out=np.full(len(give), np.inf), where=give > 0.0)
+        return found._replace(hidden=np.full_like(found.hidden, NO_DOF), beside=beside)
 
+    def remembering(self, own: MemoryHinges) -> Self:
+        """The same sheet, in whose balance the branches of its folds are evaluated."""
+        other, folds = copy(self), len(self.model.fold_rest)
+        other._held, memory = evaluation(own, self.condensed.offset, folds)
+        other.condensed = self.condensed._replace(memory=memory)
+        return other
+
+    # ------------------------------------------------------------------ forces on edge angles
+    @property
+    def _push(self) -> NDArray:
+        """Those forces (r,), N."""
+        return self.condensed.offset[len(self.model.fold_rest) :, 0]
+
+    @property
+    def rest_angles(self) -> NDArray:
+        """See `SheetTerm`: those of folds and bends, and forces on edge angles."""
+        return np.append(super().rest_angles, self._push)
+
+    def offsets_under(self, moments: NDArray) -> NDArray:
+        """See `SheetTerm`: the moment of a crease acts on the edge angles beside it."""
+        beside = self.model.fold_rotations
+        there, both = beside >= 0, np.repeat(moments[:, None], 2, axis=1)
+        return -self.per_hidden * np.bincount(beside[there], both[there], minlength=self.offsets)
+
+    def folded(self, rest: NDArray) -> Self:
+        """See `SheetTerm`."""
+        angles, push = np.split(rest, [len(rest) - self.offsets])
+        other = super().folded(angles)
+        other._push[:] = push
+        return other
+
+    def actuated(self, numbers: NDArray) -> tuple[Self, NDArray, NDArray]:
+        """See `SheetTerm`."""
+        folds, bends = len(self.model.fold_rest), len(self.model.bend_rest)
+        sheet, _, which = super().actuated(numbers)
+        return sheet, np.where(numbers < folds, numbers, numbers - bends), which
+
+    def series(self) -> tuple[NDArray, NDArray]:
+        """See `SheetTerm`."""
+        return np.ones(len(self.condensed.offset)), self.condensed.offset
+
+    # ------------------------------------------------------------------ other bodies
     def unstrained(self, q: NDArray) -> Unstrained:
         """See `SheetTerm`."""
         found, hidden = self._full.unstrained(self._whole(q)), self._full.hidden

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.materials.crease_damper import damper_branch
 from foldyn.materials.law import PARAMETERS
 from foldyn.materials.memory_law import VARIABLES, Branch, MemoryLaw, memory_of
 from foldyn.materials.prony import CODE as MAXWELL
@@ -39,9 +40,17 @@ class Remembering(NamedTuple):
     @property
     def stiffness(self) -> NDArray:
         """Stiffness (k,), N m/rad, that parameters of the branches refer to."""
+        if self._alone:
+            return np.where(np.isfinite(self.hinges.beside), self.hinges.beside, 0.0)
         stiffness, softness = self.hinges.stiffness, self.hinges.softness
         least = np.divide(LEAST, softness, out=np.zeros_like(softness), where=softness > 0.0)
         return np.maximum(stiffness, least)
+
+    @property
+    def _alone(self) -> bool:
+        """Whether it is dampers beside edge angles in balance, which know no stiffness."""
+        alone = isinstance(self.law, CreaseDampers)
+        return alone and bool(np.isfinite(self.hinges.beside).any())
 
     @property
     def branches(self) -> tuple[Branch, ...]:
@@ -50,6 +59,8 @@ class Remembering(NamedTuple):
         What yields or creeps is in series with its crease, and so with the panels. What relaxes is
         beside the crease: of the panels it knows a part.
         """
+        if self._alone:
+            return (damper_branch(self.stiffness, self.damping),)
         stiffness = self.stiffness
         own = self.law.branches(stiffness, self.hinges.length)
         share = 1.0 - self.hinges.softness * stiffness
@@ -81,10 +92,11 @@ def remembering(
         hinges = sheet.fold_hinges() if kind == "fold" else sheet.bend_hinges()
         dampers = np.zeros(len(hinges.rest))
         if damping is not None and kind == "fold":
-            dampers = np.where(hinges.softness > 0.0, damping[hinges.fold] * hinges.length, 0.0)
+            dampers = np.where(hinges.remembers, damping[hinges.fold] * hinges.length, 0.0)
         if law is not None:
-            out.append(Remembering(kind, law, hinges, dampers if law.relaxes else 0.0 * dampers))
-        if dampers.any() and (law is None or not law.relaxes):
+            within = law.relaxes and not np.isfinite(hinges.beside).any()
+            out.append(Remembering(kind, law, hinges, dampers if within else 0.0 * dampers))
+        if dampers.any() and (law is None or not within):
             out.append(Remembering(kind, CreaseDampers(), hinges, dampers))
     return tuple(out)
 

@@ -13,7 +13,6 @@ from scipy import sparse
 
 from foldyn import mechanics
 from foldyn.algebra.solvers import Fill
-from foldyn.errors import InputError
 from foldyn.materials import (
     BarLaw,
     EnhancedLinear,
@@ -300,9 +299,16 @@ class Structure(Discretized):
             tension = -stiffness * self.bar_law.stress(1.0 + free)
             parts = [tensions(self.nodes, self.bars, tension)]
         if self.edge_plates is not None:
-            curled = self._curled(self.edge_plates, curvature) if np.any(curvature) else []
-            turns = np.zeros(len(self.folds) + len(self.bends))
-            return Swelling(turns, joined((part, 0) for part in parts + curled))
+            sheet = self.body.sheet
+            turns = np.zeros(len(sheet.rest_angles))
+            if np.any(curvature):
+                moment, push = self._curled(self.edge_plates, curvature)
+                parts.append(moment)
+                if self.without_edge_angles:
+                    turns[len(turns) - sheet.offsets :] = push
+                else:
+                    parts.append(pushes(sheet.hidden, push))
+            return Swelling(turns, joined((part, 0) for part in parts))
         of_hinges, of_clamps = self._chords
         if len(self.clamps):
             edges = clamps(self.nodes, self.clamps, self.clamp_stiffness, 0)
@@ -311,24 +317,21 @@ class Structure(Discretized):
             parts.append(moments(edges.points, rows, self.clamp_stiffness * turn))
         return Swelling(of_hinges.turns(curvature), joined((part, 0) for part in parts))
 
-    def _curled(self, plates: EdgePlates, curvature: NDArray) -> list[Following]:
-        """Moments on the angles of plates, whose energies are linear in these curvatures."""
-        if self.without_edge_angles:
-            raise InputError(
-                ': with scheme = "n5b8e" explicit methods do not take panels that curl; choose '
-                '"generalized_alpha"',
-                "method",
-            )
+    def _curled(self, plates: EdgePlates, curvature: NDArray) -> tuple[Following, NDArray]:
+        """Moments on the hinges of plates, and forces (r,), N, on the dofs of their edge angles.
+
+        The energies of the plates are linear in these curvatures.
+        """
         area = 0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
         area = np.bincount(self.triangle_panel, area)
         moment = curl_moments(plates, self.outlines, curvature, self.sheet, area)
         hinges, on_hinge = np.concatenate([self.folds, self.bends]), plates.angle >= 0
         turning = np.bincount(plates.angle[on_hinge], moment[on_hinge], minlength=len(hinges))
-        hidden, term = self.nodes.size - 1 - plates.angle[~on_hinge], self.body.sheet
-        return [
+        push, count = self.body.sheet.per_hidden * moment[~on_hinge], len(plates.rotation_hinge)
+        return (
             moments(self.nodes[hinges], hinges, turning),
-            pushes(hidden, term.per_hidden * moment[~on_hinge]),
-        ]
+            np.bincount(-1 - plates.angle[~on_hinge], push, minlength=count),
+        )
 
     @cached_property
     def outlines(self) -> list[Outline | None]:

@@ -1,0 +1,51 @@
+"""A damper beside a crease whose turn is found with edge angles in balance: a branch of a law.
+
+Its moment is c times the rate r of the turn d, or r / q per unit of the stiffness of the panels
+beside the crease, with q the rate at which they would bring it back. In a step of h the rate goes
+from r0 to r1 as a + b exp(-q t):
+
+    d = h ((1 - w) r0 + w r1),    w = 1 / (1 - exp(-q h)) - 1 / (q h),
+
+which is the trapezoidal rule where steps are short, and the backward one where they are long (W.
+Liniger and R. A. Willoughby, SIAM J. Numer. Anal. 7, 1970).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.jit.compiled import scalar
+from foldyn.materials.memory_law import Branch, columns
+
+CODE = 3  # among branches
+FEW = 1e-3  # of q h: below, series stand for what cancels
+NO_TIME = 1e-6  # of 1 / q, in which loads that jump would turn a crease
+
+
+@scalar
+def update(before, after, dt, rate, time, pace):
+    """Rate, turn, moment, slope, 0 and loss per k, after a turn in a time dt."""
+    if dt == 0.0:
+        now = rate + (after - before) * pace / NO_TIME
+        return now, after, time * now, time * pace / NO_TIME, 0.0, 0.0
+    x = pace * dt
+    left = -math.expm1(-x)
+    if x < FEW:
+        w, square = 0.5 + x / 12.0, 1.0 / 3.0 - x / 12.0
+    else:
+        w, rest = 1.0 / left - 1.0 / x, 1.0 - left
+        square = (0.5 * (1.0 + rest) - 2.0 * rest) / (x * left) + rest * rest / (left * left)
+    now = ((after - before) / dt - (1.0 - w) * rate) / w
+    change = rate - now
+    lost = dt * (now * now + 2.0 * (1.0 - w) * now * change + square * change * change)
+    return now, after, time * now, time / (w * dt), 0.0, time * lost
+
+
+def damper_branch(panels: NDArray, damping: NDArray) -> Branch:
+    """Dampers (n,), N m s/rad, on creases between panels of these stiffnesses (n,), N m/rad."""
+    there = damping > 0.0
+    pace = np.divide(panels, damping, out=np.ones(len(there)), where=there)
+    return Branch(CODE, columns(len(pace), there / pace, pace), 0.0, there * 1.0, pace)
