@@ -54,7 +54,7 @@ def test_a_motion_beside_the_shell(workplace) -> None:
     names = ("fidelity.png", "laws.png", "report.html", "result.nc", "structure.png")
     assert done.new == [folder, *(f"{folder}/{name}" for name in names)]
     found = fd.Fidelity(fd.load(f"{folder}/result.nc"))
-    models = ("own", "own (consistent)", "plate", "n5b8e")  # "standard" is its own
+    models = ("own", "own (consistent)", "plate", "membrane")  # "standard" is its own
     assert found.models == models
     assert found.result.attrs["divisions"].tolist() == [3, 6]
     assert "deflection" in found.result  # the load acts in full

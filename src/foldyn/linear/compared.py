@@ -165,6 +165,7 @@ def _columns(found: Fidelity, models: tuple[str, ...]) -> str:
     wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for first, *others in rows:
-        cells = [text.rjust(n) for text, n in zip(others, wide[1:], strict=True)]
-        lines.append("  ".join([first.ljust(wide[0]), *cells]).rstrip())
+        shell, *cells = (text.rjust(n) for text, n in zip(others, wide[1:], strict=True))
+        pairs = map(" ".join, zip(cells[::2], cells[1::2], strict=True))
+        lines.append("  ".join([first.ljust(wide[0]), shell, *pairs]).rstrip())
     return "\n".join(lines)

@@ -33,17 +33,24 @@ from foldyn.values import brief, choice, listed, number, show, whole
 MODELS: Mapping[str, Mapping[str, Any]] = {
     "standard": {
         "scheme": "n5b8", "calibration": "standard", "mass": "mixed_voronoi", "bend_law": "linear",
-        "straight": (),
+        "straight": (), "membrane": "bars",
     },
     "plate": {
         "scheme": "n5b8", "calibration": "plate", "mass": "consistent", "bend_law": "linear",
-        "straight": (),
+        "straight": (), "membrane": "bars",
     },
     "n5b8e": {
         "scheme": "n5b8e", "calibration": "plate", "mass": "condensed", "bend_law": "linear",
+        "membrane": "bars",
+    },
+    "membrane": {
+        "scheme": "n5b8e", "calibration": "plate", "mass": "condensed", "bend_law": "linear",
+        "membrane": "panel", "bar_law": "linear",
     },
 }  # fmt: skip
 """Models that stand beside the case's own: arguments of `discretize` in place of its own."""
+BESIDE = ("standard", "plate", "membrane")
+"""Those that do so unless others are named: "membrane" is "n5b8e" with coupled bars."""
 SHOWN = ("calibration", "mass", "bend_law")
 """Options by which models are told apart."""
 BEYOND = 2  # modes of the shell that are computed, but not compared
@@ -80,8 +87,8 @@ def fidelity(
         many panels that the shell would be large; a warning then says so.
     models : sequence of str, or mapping of str to mapping, optional
         What stands beside the case's own model: names of `foldyn.linear.fidelity.MODELS`, by
-        default those of them that take its other options, or arguments of `discretize` in place
-        of the case's own, by name.
+        default "standard", "plate" and "membrane" as far as they take its other options, or
+        arguments of `discretize` in place of the case's own, by name.
     secant : float, optional
         Amplitude (degrees) of the turns of superlinear hinges, which have no stiffness at rest; as
         of `modes`.
@@ -260,11 +267,11 @@ def _compared(case: Case, models: Any) -> dict[str, Case]:
 def named(models: Any, structure: Structure) -> Mapping[str, Mapping[str, Any]]:
     """Arguments of `discretize` by the name of the model.
 
-    By default all models of `MODELS` that take the other options of the structure.
+    By default those of `BESIDE` that take the other options of the structure.
     """
     if models is None:
         refused = structure.options.clamped or isinstance(structure.fold_law, Superlinear)
-        return {name: MODELS[name] for name in MODELS if name != "n5b8e" or not refused}
+        return {name: MODELS[name] for name in BESIDE if name != "membrane" or not refused}
     if isinstance(models, Mapping):
         for name, changes in models.items():
             if not isinstance(name, str) or name == OWN or not isinstance(changes, Mapping):

@@ -20,8 +20,9 @@ MOST = 0.05  # of the strain energy: above, it is told
 LEAST = 1e-9  # mean strain of the bars, below which rounding may be all there is
 FELT = 1e-3  # of the kinetic energy: less strain energy does not matter to a motion
 REMEDY = (
-    "panels stretch in their plane there, which bars resist too much. Compare with the shell "
-    "(foldyn fidelity, fd.fidelity), or compute it (--model shell, fd.shell)"
+    "panels stretch in their plane there, which bars resist too much. Couple those of each panel "
+    '(membrane = "panel"), compare with the shell (foldyn fidelity, fd.fidelity), or compute it '
+    "(--model shell, fd.shell)"
 )
 
 
