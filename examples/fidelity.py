@@ -26,7 +26,7 @@ def compute() -> tuple[fd.Case, fd.Fidelity]:
 
 
 def check(result: fd.Fidelity) -> None:
-    """Plates follow the shell to 0.6 of the plate frequency, with edges that give way best, the standard not."""
+    """Plates follow the shell to 0.6 of the plate frequency, the standard does not."""
     plate, standard, edges = (result.table(model)[:BELOW] for model in result.models)
     assert result.models == ("own", "standard", "membrane")  # one's own is "plate"
     assert [mode.below for mode in result.table()] == [True] * BELOW + [False] * 4

@@ -64,7 +64,7 @@ def test_a_motion_beside_the_shell(workplace) -> None:
     page = (workplace.folder / folder / "report.html").read_text()
     assert "Which model" in page and "foldyn fidelity case.toml --count 3" in page
     for model in found.models:
-        start = "scheme" if model == "n5b8e" else "calibration"
+        start = "scheme" if model == "membrane" else "calibration"
         (row,) = [part for part in page.split("<tr>") if f"<td>{model}</td><td>{start}" in part]
         worst = max(abs(mode.error) for mode in found.table(model) if mode.below)
         assert f"{100 * worst:.3g}" in row

@@ -117,7 +117,8 @@ def parser() -> argparse.ArgumentParser:
         "--models",
         nargs="+",
         metavar="NAME",
-        help="what stands beside the model of the file (default: standard plate)",
+        help="what stands beside the model of the file: standard, plate, n5b8e, membrane "
+        "(default: all but n5b8e)",
     )
     _add_secant(fidelity)
 
