@@ -254,6 +254,7 @@ def structure_of(model: str, pattern: fd.Pattern, rng, extra: str) -> Any:
         "rigid": lambda: "all" if rng.random() < 0.3 else scene.some(len(pattern.faces)),
         "clamped": lambda: scene.pairs(pattern.boundary),
         "straight": lambda: scene.pairs(pattern.boundary),
+        "membrane": lambda: str(rng.choice(["bars", "panel"])),
     }
     if model == "n5b8e":  # which a scheme stands for
         del options["scheme"]

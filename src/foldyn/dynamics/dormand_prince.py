@@ -255,6 +255,8 @@ def advance(equation, course, plan, room, stretch):
             powers[0, 0], powers[1, 0] = acceleration(equation, course.u, course.v, after, a)
             tally.evaluations += 1
             tally.work += work_of_offsets(equation, True)
+            if equation.commit != 0:  # what jumped there took no time
+                run_at(equation.commit, (equation.setting,))
             for i in range(n):
                 raw[i] = fa[i]
         tally.wanted = min(tally.wanted, longest)

@@ -45,7 +45,7 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
     },
     "membrane": {
         "scheme": "n5b8e", "calibration": "plate", "mass": "condensed", "bend_law": "linear",
-        "membrane": "panel", "bar_law": "linear",
+        "membrane": "panel",
     },
 }  # fmt: skip
 """Models that stand beside the case's own: arguments of `discretize` in place of its own."""
@@ -254,7 +254,8 @@ def _compared(case: Case, models: Any) -> dict[str, Case]:
     compared = {OWN: with_structure(case, structure)}
     _ = structure.mass  # its rule may refuse this pattern: say so before anything runs
     for name, changes in named(models, structure).items():
-        options = {**vars(structure.options), **changes}
+        law = {"bar_law": "linear"} if changes.get("membrane") == "panel" else {}
+        options = {**vars(structure.options), **law, **changes}
         if options == vars(structure.options):
             continue
         with within(f"models: {name}: "):
@@ -292,7 +293,8 @@ def _told(case: Case, own: Case) -> str:
     options, others = vars(case.structure.options), vars(own.structure.options)
     usual = options["scheme"] == others["scheme"] == MODELS["plate"]["scheme"]
     further = (key for key in options if options[key] != others[key])
-    keys = dict.fromkeys([*(() if usual else ("scheme",)), *SHOWN, *further])
+    coupled = () if options["membrane"] == "bars" else ("membrane",)
+    keys = dict.fromkeys([*(() if usual else ("scheme",)), *SHOWN, *coupled, *further])
     return ", ".join(f"{key} = {_written(options[key])}" for key in keys)
 
 

@@ -10,6 +10,7 @@ A term has all panels of one kind: with as many nodes, and bars between the same
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -75,7 +76,7 @@ def packed(membranes: Membranes) -> Packed:
 
     def groups(array: NDArray, kind: type = float) -> NDArray:
         """Of rows (..., p)."""
-        rows = array.reshape(-1, count)
+        rows = array.reshape(math.prod(array.shape[:-1]), count)
         filled = np.zeros((len(rows), -(-count // WIDTH) * WIDTH), kind)
         filled[:, :count] = rows
         return filled.reshape(len(rows), -1, WIDTH).transpose(1, 0, 2).ravel()
@@ -197,39 +198,42 @@ def membrane_energy(membranes, u):
 
 
 @kernel
-def membrane_blocks(membranes, u, loose):
-    """Tangent (p, c, c, 3, 3), N/m, of all panels; `loose`: as if the strains at u were none."""
+def membrane_blocks(membranes, u0, u1, loose):
+    """Tangent (p, c, c, 3, 3), N/m, of all panels at u0 = u1; `loose`: as if strains were none.
+
+    From u0 to another u1 it is twice the derivative of their mean forces by u1.
+    """
     count, bars = membranes.nodes.shape[1], membranes.ends.shape[0]
     out = np.zeros((membranes.nodes.shape[0], count, count, 3, 3))
-    strain, along = np.empty(bars), np.empty((bars, 3))
-    rate, pulled = np.empty((bars, count, 3)), np.empty((bars, count, 3))
+    strain, first, last = np.empty(bars), np.empty((bars, 3)), np.empty((bars, 3))
+    rate, pulled = np.empty((bars, 2, 3)), np.empty((bars, count, 3))
     for p in range(out.shape[0]):
-        rate[:], pulled[:] = 0.0, 0.0
+        pulled[:] = 0.0
         for i in range(bars):
-            strain[i] = strain_of(membranes, u, p, i, along[i])
-            a, b = membranes.ends[i, 0], membranes.ends[i, 1]
+            strain[i] = 0.5 * strain_of(membranes, u0, p, i, first[i])
+            strain[i] += 0.5 * strain_of(membranes, u1, p, i, last[i])
             for c in range(3):
-                rate[i, b, c] = membranes.per_length2[i, p] * along[i, c]
-                rate[i, a, c] = -rate[i, b, c]
+                middle = 0.5 * (first[i, c] + last[i, c])
+                rate[i, 1, c] = membranes.per_length2[i, p] * middle
+                rate[i, 0, c] = -rate[i, 1, c]
         for i in range(bars):
-            a, b, pull = membranes.ends[i, 0], membranes.ends[i, 1], 0.0
+            pull = 0.0
             for j in range(bars):
-                pull += membranes.stiffness[i, j, p] * strain[j]
-                for v in range(count):
-                    for c in range(3):
-                        pulled[i, v, c] += membranes.stiffness[i, j, p] * rate[j, v, c]
-            if not loose:
-                pull *= membranes.per_length2[i, p]
+                stiff = membranes.stiffness[i, j, p]
+                pull += stiff * strain[j]
                 for c in range(3):
-                    out[p, a, a, c, c] += pull
-                    out[p, b, b, c, c] += pull
-                    out[p, a, b, c, c] -= pull
-                    out[p, b, a, c, c] -= pull
-            for v in (a, b):
-                for w in range(count):
-                    for c in range(3):
+                    along = stiff * membranes.per_length2[j, p] * last[j, c]
+                    pulled[i, membranes.ends[j, 1], c] += along
+                    pulled[i, membranes.ends[j, 0], c] -= along
+            pull *= 0.0 if loose else membranes.per_length2[i, p]
+            for end in range(2):
+                v, w = membranes.ends[i, end], membranes.ends[i, 1 - end]
+                for c in range(3):
+                    out[p, v, v, c, c] += pull
+                    out[p, v, w, c, c] -= pull
+                    for k in range(count):
                         for d in range(3):
-                            out[p, v, w, c, d] += rate[i, v, c] * pulled[i, w, d]
+                            out[p, v, k, c, d] += rate[i, end, c] * pulled[i, k, d]
     return out
 
 
@@ -293,13 +297,20 @@ class MembranesTerm(Term):
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
         """See `Term`."""
-        return membrane_blocks(self.membranes, nodal(q), False).ravel()
+        return self._entries(q, q, False)
+
+    def mean_entries(self, q0: NDArray, q1: NDArray, floor: float = -np.inf) -> NDArray:
+        """See `Term`."""
+        return 0.5 * self._entries(q0, q1, False)
+
+    def _entries(self, q0: NDArray, q1: NDArray, loose: bool) -> NDArray:
+        return membrane_blocks(self.membranes, nodal(q0), nodal(q1), loose).ravel()
 
     def unstrained(self, q: NDArray) -> Unstrained:
         """See `Term`."""
-        entries = membrane_blocks(self.membranes, nodal(q), True).ravel()
         size = (q.size, q.size)
-        tangent = sparse.csr_array(sparse.coo_array((entries, self.places), size))
+        entries = (self._entries(q, q, True), self.places)
+        tangent = sparse.csr_array(sparse.coo_array(entries, size))
         return Unstrained(tangent, sparse.csr_array(size), lambda motion: 0.0)
 
     def strains(self, others: Strains) -> None:

@@ -1,7 +1,7 @@
 """Panels whose bars are coupled so that their corners feel the panel's membrane.
 
 Bars that are right in uniform strain resist everything else too much: between its corners a panel
-of a folded sheet is three to six times softer (`structures.panel_membrane`). With B the elongations
+of a folded sheet is up to six times softer (`structures.panel_membrane`). With B the elongations
 of a panel's bars in displacements in its plane, and K that of the membrane, seen from the corners,
 
     S = B+^T K B+ + N (N^T k^-1 N)^-1 N^T,
@@ -20,11 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
+from foldyn.errors import InputError
 from foldyn.mechanics.following import Following, tensions
 from foldyn.mechanics.membranes import Membranes
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
-from foldyn.structures.mesh import Mesh, hinge_angles
+from foldyn.structures.mesh import CUT, Mesh, hinge_angles
 from foldyn.structures.panel_membrane import membrane_stiffness
 from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
@@ -109,6 +110,14 @@ def _sides(
         if mesh.centers[p] >= 0:
             center = mesh.nodes[mesh.centers[p]]
         panel = outline(x, center, [False] * len(face), held)
+        corners = np.array(panel.corners)
+        spokes = corners - (panel.center or corners.mean(axis=0))
+        if np.linalg.det(np.stack([spokes, np.roll(spokes, -1, axis=0)], axis=1)).min() <= 0.0:
+            raise InputError(
+                f": its membrane takes convex panels, and panel {p} is not; {CUT}, or take "
+                'membrane = "bars"',
+                "membrane",
+            )
         found.append(Sides(panel, tuple(resistance)))
     return found
 

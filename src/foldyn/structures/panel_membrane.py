@@ -136,7 +136,7 @@ def _stretching(x: NDArray, elements: NDArray, poissons_ratio: float) -> sparse.
     elastic = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, 0.5 * (1 - nu)]]) / (1 - nu**2)
     corners = x[elements[:, :3]]
     spans = corners[:, 1:] - corners[:, :1]
-    inverse, part = np.linalg.inv(spans), np.abs(np.linalg.det(spans)) / 6.0
+    inverse, part = np.linalg.inv(spans), np.linalg.det(spans) / 6.0
     gradient = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)
     following, block = np.roll(gradient, -1, axis=2), 0.0
     for place in MIDDLES:

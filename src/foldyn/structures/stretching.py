@@ -21,8 +21,9 @@ LEAST = 1e-9  # mean strain of the bars, below which rounding may be all there i
 FELT = 1e-3  # of the kinetic energy: less strain energy does not matter to a motion
 REMEDY = (
     "panels stretch in their plane there, which bars resist too much. Couple those of each panel "
-    '(membrane = "panel"), compare with the shell (foldyn fidelity, fd.fidelity), or compute it '
-    "(--model shell, fd.shell)"
+    '(membrane = "panel"; edges that are held or loaded along their length belong in straight), '
+    "compare with the shell (foldyn fidelity, fd.fidelity), or compute it (--model shell, "
+    "fd.shell), as towers of triangles need"
 )
 
 
@@ -34,9 +35,14 @@ class Stretch(NamedTuple):
 
 
 def resists_stretch(structure: Discretized) -> bool:
-    """Whether single bars stand for the panels of a pattern; those of one made by hand do not."""
+    """Whether bars that are too stiff stand for the panels of a pattern.
+
+    Not those of a structure made by hand, nor coupled ones, but in towers of triangles.
+    """
+    if BARS not in structure.energy_groups or structure.pattern is None:
+        return False
     coupled = getattr(structure, "membranes", ())
-    return BARS in structure.energy_groups and structure.pattern is not None and not coupled
+    return not coupled or all(len(face) == 3 for face in structure.pattern.faces)
 
 
 def stretch(structure: Discretized, energies: Mapping[str, NDArray]) -> Stretch | None:

@@ -28,17 +28,19 @@ def drawn(count: int = COUNT, seed: int = SEED) -> list[FidelityCase]:
 def sheets(count: int = COUNT_SHEETS, seed: int = SEED_SHEETS) -> list[FidelityCase]:
     """Random sheets of 2 x 2 to 5 x 5 cells, half of them held along an edge or as in case study 2.
 
-    Miura-ori with dihedrals of 20 to 175 degrees and eggboxes, sheets of 1/30 to 1/400 of the
-    smaller side of a panel; all else as in `drawn`, but panels up to 2.5 times as long as wide.
+    Two of three are Miura-ori, with dihedrals of 20 to 175 degrees, the others fold both ways.
+    Sheets of 1/30 to 1/400 of the smaller side of a panel; all else as in `drawn`, but panels up to
+    2.5 times as long as wide.
     """
     rng, found = np.random.default_rng(seed), []
+    other, flat_foldable = sorted({c.kind for c in documented() if "cells" in c.shape})
     for _ in range(count):
-        kind = str(rng.choice(["miura", "miura", "eggbox"]))
+        kind = str(rng.choice([flat_foldable, flat_foldable, other]))
         a = _spread(rng, 0.02, 2.0)
         b = a * _spread(rng, 1.0 / 1.6, 2.5)
         cells = [int(rng.integers(2, 6)), int(rng.integers(2, 6))]
         angle, dihedral = float(rng.uniform(45.0, 85.0)), float(rng.uniform(20.0, 175.0))
-        if kind == "eggbox":
+        if kind == other:
             dihedral, angle = float(rng.uniform(40.0, 150.0)), float(rng.uniform(50.0, 80.0))
         shape = {"cells": cells, "a": a, "b": b, "panel_angle": angle, "dihedral": dihedral}
         sheet = _sheet(rng, min(a, b), 30.0)
