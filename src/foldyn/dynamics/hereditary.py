@@ -62,7 +62,8 @@ def check_state(case: Case, given: Any) -> NDArray | str | None:
     if array.shape != (count, VARIABLES):
         raise InputError(
             f"initial: memory of shape {show(array.shape)}: the case has {(count, VARIABLES)}, "
-            "branches and variables; take the state of a result of the same case"
+            "branches and variables; take the state of a result of the same case, or one without "
+            "memory (damped creases of n5b8e have branches in explicit methods alone)"
         )
     return array
 

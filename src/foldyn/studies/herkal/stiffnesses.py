@@ -25,6 +25,8 @@ COMPUTING = (
 """Files that the results depend on, besides the solvers."""
 OWN = "own"
 """The model of the specimen's case file."""
+BESIDE = ("standard", "plate", "n5b8e")
+"""Those beside it of which modes are computed."""
 PEAKED = (OWN, "plate", "n5b8e")
 SPECIMEN = ("specimen-modes", "specimen-frf")
 MODES = 5
@@ -111,7 +113,7 @@ def specimen_modes(divisions: tuple[int, int] = MESHES, **changes: Any) -> Rows:
     """
     file = vibration.specimen("modes", changes={f"model.{k}": v for k, v in changes.items()})
     secant = file.analysis.arguments["secant"]
-    found = fidelity(file.case(file.masses[0]), MODES, divisions, secant=secant)
+    found = fidelity(file.case(file.masses[0]), MODES, divisions, BESIDE, secant)
     return [
         {
             "model": model,
