@@ -11,6 +11,7 @@ A term has all panels of one kind: with as many nodes, and bars between the same
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -66,7 +67,6 @@ class Packed(NamedTuple):
     along: NDArray  # (24 b,) vectors of the bars
     strain: NDArray  # (8 b,)
     force: NDArray  # (24 c,)
-    zero: NDArray  # (8,)
 
 
 def packed(membranes: Membranes) -> Packed:
@@ -84,7 +84,7 @@ def packed(membranes: Membranes) -> Packed:
     return Packed(
         count, corners, membranes.ends, groups(membranes.nodes.T, np.uint32),
         groups(membranes.vector), groups(membranes.per_length2), groups(membranes.stiffness),
-        *(np.zeros(rows * WIDTH) for rows in (3 * corners, 3 * bars, bars, 3 * corners, 1)),
+        *(np.zeros(rows * WIDTH) for rows in (3 * corners, 3 * bars, bars, 3 * corners)),
     )  # fmt: skip
 
 
@@ -112,7 +112,7 @@ def strain_of(membranes, u, p, i, along):
 @inner
 def add_membrane_forces(own, u, low, high, force):
     """Add the forces of all panels on the nodes from low to high; u and force are flat."""
-    bars, nothing = own.ends.shape[0], eight(own.zero, 0)
+    bars = own.ends.shape[0]
     for first in range(0, own.count, WIDTH):
         m, at = min(WIDTH, own.count - first), own.corners * first
         for v in range(own.corners):
@@ -120,7 +120,7 @@ def add_membrane_forces(own, u, low, high, force):
                 row = 3 * own.nodes[at + v * WIDTH + q]
                 for c in range(3):
                     own.moved[(3 * v + c) * WIDTH + q] = u[row + c]
-            put_row(own.force, v, nothing, nothing, nothing)
+        own.force[:] = 0.0
         at = bars * (first // WIDTH)
         for i in range(bars):
             x1, y1, z1 = take(own.moved, own.ends[i, 0])
@@ -129,10 +129,13 @@ def add_membrane_forces(own, u, low, high, force):
             dx, dy, dz = x2 - x1, y2 - y1, z2 - z1
             excess = dx * (2.0 * vx + dx) + dy * (2.0 * vy + dy) + dz * (2.0 * vz + dz)
             put(own.strain, i * WIDTH, 0.5 * eight(own.per_length2, (at + i) * WIDTH) * excess)
-            put_row(own.along, i, vx + dx, vy + dy, vz + dz)
+            put(own.along, 3 * i * WIDTH, vx + dx)
+            put(own.along, (3 * i + 1) * WIDTH, vy + dy)
+            put(own.along, (3 * i + 2) * WIDTH, vz + dz)
         for i in range(bars):
-            pull, row = nothing, (at + i) * bars
-            for j in range(bars):
+            row = (at + i) * bars
+            pull = eight(own.stiffness, row * WIDTH) * eight(own.strain, 0)
+            for j in range(1, bars):
                 one = eight(own.stiffness, (row + j) * WIDTH) * eight(own.strain, j * WIDTH)
                 pull = pull + one
             pull = pull * eight(own.per_length2, (at + i) * WIDTH)
@@ -146,15 +149,6 @@ def add_membrane_forces(own, u, low, high, force):
                 if low <= node < high:
                     for c in range(3):
                         force[3 * node + c] += own.force[(3 * v + c) * WIDTH + q]
-
-
-@inner_scalar
-def put_row(array, row, x, y, z):
-    """Write three eights."""
-    at = 3 * WIDTH * row
-    put(array, at, x)
-    put(array, at + WIDTH, y)
-    put(array, at + 2 * WIDTH, z)
 
 
 @inner
@@ -279,13 +273,21 @@ class MembranesTerm(Term):
     def __init__(self, membranes: Membranes, rows: int) -> None:
         self.membranes, self.rows = membranes, rows
 
-    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
-        """See `Term`; a thread has the panels that its nodes belong to."""
-        whole, strips = self.membranes, work.strips
-        low, high = (int(end) for end in strips.own)
-        here = np.any((whole.nodes >= low) & (whole.nodes < high), axis=1)
-        own = packed(taken(whole, np.flatnonzero(here)))
-        context = _Context(own, whole, low, high, self.rows, work.team)
+    def memories(self, works: Sequence[Any]) -> list[Packed]:
+        """See `Term`: each thread has the panels that its nodes belong to."""
+        nodes, ends = self.membranes.nodes, [work.strips.own for work in works]
+        here = [np.any((nodes >= low) & (nodes < high), axis=1) for low, high in ends]
+        return [packed(taken(self.membranes, np.flatnonzero(own))) for own in here]
+
+    @cached_property
+    def memory(self) -> Packed:
+        """See `Term`."""
+        return packed(self.membranes)
+
+    def compiled(self, work: Any, kept: Packed, group: int) -> Compiled:
+        """See `Term`."""
+        low, high = (int(end) for end in work.strips.own)
+        context = _Context(kept, self.membranes, low, high, self.rows, work.team)
         return Compiled(
             Context(context), {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
         )
