@@ -117,8 +117,8 @@ def parser() -> argparse.ArgumentParser:
         "--models",
         nargs="+",
         metavar="NAME",
-        help="what stands beside the model of the file: standard, plate, n5b8e, membrane "
-        "(default: all but n5b8e)",
+        help="what stands beside the model of the file: standard, plate, n5b8e, bars "
+        "(default: all but bars)",
     )
     _add_secant(fidelity)
 

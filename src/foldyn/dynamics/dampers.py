@@ -16,8 +16,10 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.block_matrix import assembled, blocks_of_ends, pairs_of_ends
+from foldyn.mechanics.membranes import Membranes
 from foldyn.mechanics.sheet_term import NO_DOF, no_fold_hinges
 from foldyn.mechanics.viscous import Viscous, viscous, viscous_matrix
+from foldyn.mechanics.viscous_panels import viscous_panels
 
 
 class Dampers(NamedTuple):
@@ -29,13 +31,17 @@ class Dampers(NamedTuple):
     def matrix(self, q: NDArray) -> sparse.csr_array:
         """Matrix (m, m), N s/m, at the dofs q (m,)."""
         size = self.constant.shape[0]
-        if not len(self.elements.coefficient):
+        if not self.elements.present:
             return self.constant
         return sparse.csr_array(self.constant + viscous_matrix(self.elements, q, size))
 
     def placed(self, by: Numbering) -> Viscous:
         """Elements as they stand in memory while a motion is computed."""
-        return self.elements._replace(dofs=placed(self.elements.dofs, by))
+        panels = self.elements.panels
+        return self.elements._replace(
+            dofs=placed(self.elements.dofs, by),
+            panels=panels._replace(nodes=by.rank[panels.nodes].astype(np.int64)),
+        )
 
 
 def placed(dofs: NDArray, by: Numbering) -> NDArray:
@@ -93,17 +99,23 @@ def _elements(
     axial, along = np.concatenate(strength), nodes[pairs[:, 1]] - nodes[pairs[:, 0]]
     rows, corners, hidden = hinges.nodes[damped], hinges.corners[damped], hinges.hidden[damped]
     hidden_turn, turning = hinges.hidden_turn[damped], coefficient[damped]
+    membranes: tuple[Membranes, ...] = ()
     if beta := case.strain_damping:
         strains = body.strains()
         assert strains is not None  # or the case would have refused it
         stiff = strains.hinge_stiffness > 0.0
         none = np.full((int(stiff.sum()), 2), NO_DOF)
-        pairs = np.concatenate([pairs, strains.bars])
-        along = np.concatenate([along, strains.vector])
-        axial = np.concatenate([axial, beta * strains.bar_stiffness])
+        alone = strains.bar_stiffness > 0.0
+        pairs = np.concatenate([pairs, strains.bars[alone]])
+        along = np.concatenate([along, strains.vector[alone]])
+        axial = np.concatenate([axial, beta * strains.bar_stiffness[alone]])
         rows = np.concatenate([rows, strains.hinges[stiff]])
         corners = np.concatenate([corners, strains.corners[stiff]])
         hidden = np.concatenate([hidden, none])
         hidden_turn = np.concatenate([hidden_turn, np.zeros(none.shape)])
         turning = np.concatenate([turning, beta * strains.hinge_stiffness[stiff]])
-    return viscous(pairs, along, axial, rows, corners, hidden, hidden_turn, turning)
+        membranes = strains.membranes
+    return viscous(
+        pairs, along, axial, rows, corners, hidden, hidden_turn, turning,
+        viscous_panels(membranes, beta),
+    )  # fmt: skip

@@ -42,7 +42,7 @@ class Damping(NamedTuple):
     @property
     def follows(self) -> bool:
         """Whether there are dampers, which keep a motion on one thread."""
-        return len(self.modal) > 0 or len(self.elements.coefficient) > 0
+        return len(self.modal) > 0 or self.elements.present
 
     def viscous(self, size: int) -> sparse.csr_array:
         """The constant sparse part as a matrix of so many dofs."""
@@ -146,7 +146,11 @@ def viscous_work(damping, velocity, shift):
 @inner_scalar
 def has_dampers(damping):
     """Whether there are any."""
-    return damping.modal.shape[0] > 0 or damping.elements.coefficient.size > 0
+    return (
+        damping.modal.shape[0] > 0
+        or damping.elements.coefficient.size > 0
+        or damping.elements.panels.nodes.size > 0
+    )
 
 
 @inner

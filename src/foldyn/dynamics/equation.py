@@ -350,7 +350,6 @@ def _balance(setting: Setting, whole: Context) -> Balance:
     """What accelerations need of a case; `whole` is the context of the setting."""
     terms, system, mass, share, s = setting
     damping = system.damping
-    damped = len(damping.modal) or len(damping.elements.coefficient)
     solve = parts.solve_constrained if len(mass.ties.slave) else parts.solve
     return Balance(
         terms=terms,
@@ -361,7 +360,7 @@ def _balance(setting: Setting, whole: Context) -> Balance:
         presses=system.presses,
         follow=parts.follow.at(whole) if system.follows else 0,
         viscous=parts.viscous.at(whole) if damping.data.size else 0,
-        dampers=parts.dampers.at(whole) if damped else 0,
+        dampers=parts.dampers.at(whole) if damping.follows else 0,
         solve=0 if mass.lumped else solve.at(whole),
         kinetic=0 if mass.lumped or not damping.alpha else parts.kinetic.at(whole),
         moving_power=parts.moving_power.at(whole) if system.moves else 0,

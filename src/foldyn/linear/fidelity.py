@@ -33,24 +33,26 @@ from foldyn.values import brief, choice, listed, number, show, whole
 MODELS: Mapping[str, Mapping[str, Any]] = {
     "standard": {
         "scheme": "n5b8", "calibration": "standard", "mass": "mixed_voronoi", "bend_law": "linear",
-        "straight": (), "membrane": "bars",
+        "straight": (), "membrane": "bars", "bar_law": "ogden",
     },
     "plate": {
         "scheme": "n5b8", "calibration": "plate", "mass": "consistent", "bend_law": "linear",
-        "straight": (), "membrane": "bars",
+        "membrane": "panel", "bar_law": "linear",
     },
     "n5b8e": {
         "scheme": "n5b8e", "calibration": "plate", "mass": "condensed", "bend_law": "linear",
+        "membrane": "panel", "bar_law": "linear",
+    },
+    "bars": {
+        "scheme": "n5b8e", "calibration": "plate", "mass": "condensed", "bend_law": "linear",
         "membrane": "bars",
     },
-    "membrane": {
-        "scheme": "n5b8e", "calibration": "plate", "mass": "condensed", "bend_law": "linear",
-        "membrane": "panel",
-    },
 }  # fmt: skip
-"""Models that stand beside the case's own: arguments of `discretize` in place of its own."""
-BESIDE = ("standard", "plate", "membrane")
-"""Those that do so unless others are named: "membrane" is "n5b8e" with coupled bars."""
+"""Models that stand beside the case's own: arguments of `discretize` in place of its own.
+
+"bars" is "n5b8e" with bars that resist alone."""
+BESIDE = ("standard", "plate", "n5b8e")
+"""Those that do so unless others are named."""
 SHOWN = ("calibration", "mass", "bend_law")
 """Options by which models are told apart."""
 BEYOND = 2  # modes of the shell that are computed, but not compared
@@ -87,7 +89,7 @@ def fidelity(
         many panels that the shell would be large; a warning then says so.
     models : sequence of str, or mapping of str to mapping, optional
         What stands beside the case's own model: names of `foldyn.linear.fidelity.MODELS`, by
-        default "standard", "plate" and "membrane" as far as they take its other options, or
+        default "standard", "plate" and "n5b8e" as far as they take its other options, or
         arguments of `discretize` in place of the case's own, by name.
     secant : float, optional
         Amplitude (degrees) of the turns of superlinear hinges, which have no stiffness at rest; as
@@ -254,8 +256,7 @@ def _compared(case: Case, models: Any) -> dict[str, Case]:
     compared = {OWN: with_structure(case, structure)}
     _ = structure.mass  # its rule may refuse this pattern: say so before anything runs
     for name, changes in named(models, structure).items():
-        law = {"bar_law": "linear"} if changes.get("membrane") == "panel" else {}
-        options = {**vars(structure.options), **law, **changes}
+        options = {**vars(structure.options), **changes}
         if options == vars(structure.options):
             continue
         with within(f"models: {name}: "):
@@ -272,7 +273,7 @@ def named(models: Any, structure: Structure) -> Mapping[str, Mapping[str, Any]]:
     """
     if models is None:
         refused = structure.options.clamped or isinstance(structure.fold_law, Superlinear)
-        return {name: MODELS[name] for name in BESIDE if name != "membrane" or not refused}
+        return {name: MODELS[name] for name in BESIDE if name != "n5b8e" or not refused}
     if isinstance(models, Mapping):
         for name, changes in models.items():
             if not isinstance(name, str) or name == OWN or not isinstance(changes, Mapping):

@@ -315,8 +315,9 @@ class MembranesTerm(Term):
         tangent = sparse.csr_array(sparse.coo_array(entries, size))
         return Unstrained(tangent, sparse.csr_array(size), lambda motion: 0.0)
 
-    def strains(self, others: Strains) -> None:
+    def strains(self, others: Strains) -> Strains:
         """See `Term`."""
+        return others._replace(membranes=(*others.membranes, self.membranes))
 
     def placed(self, order: NDArray, before: Any) -> MembranesTerm:
         """See `Term`."""

@@ -39,7 +39,7 @@ class Unstrained(NamedTuple):
 
 
 class Strains(NamedTuple):
-    """Bars, p of them, and hinges, h, with their stiffness at rest."""
+    """Bars, p of them, hinges, h, and panels with membranes, with their stiffness at rest."""
 
     bars: NDArray  # (p, 2) nodes
     vector: NDArray  # (p, 3) from the first to the second at rest, m
@@ -47,6 +47,7 @@ class Strains(NamedTuple):
     hinges: NDArray  # (h, 4) nodes: axis j, k, wings i, l
     corners: NDArray  # (h, 4, 3) where they are at rest, m
     hinge_stiffness: NDArray  # (h,) N m/rad
+    membranes: tuple[Any, ...] = ()  # `membranes.Membranes`, of panels of one kind each
 
 
 class FoldHinges(NamedTuple):

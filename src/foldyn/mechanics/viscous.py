@@ -19,8 +19,16 @@ from scipy import sparse
 
 from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.sheet_term import NO_DOF
+from foldyn.mechanics.term import nodal
+from foldyn.mechanics.viscous_panels import (
+    ViscousPanels,
+    add_viscous_panels,
+    panel_blocks,
+    viscous_panels_work,
+)
 
 WIDTH = 14  # dofs of an element at most: four nodes, and two beside displacements
 
@@ -34,6 +42,12 @@ class Viscous(NamedTuple):
     hidden_turn: NDArray  # (h, 2) what a unit of the last two dofs takes from the dihedral, rad/m
     coefficient: NDArray  # (p + h,) N s/m, N m s/rad
     gradient: NDArray  # (14,) memory of one element
+    panels: ViscousPanels
+
+    @property
+    def present(self) -> bool:
+        """Whether there are any."""
+        return len(self.coefficient) > 0 or len(self.panels.nodes) > 0
 
 
 def viscous(
@@ -45,6 +59,7 @@ def viscous(
     hidden: NDArray,
     hidden_turn: NDArray,
     hinge_coefficient: NDArray,
+    panels: ViscousPanels,
 ) -> Viscous:
     """Pack elements.
 
@@ -60,6 +75,7 @@ def viscous(
         Dofs beside displacements, or NO_DOF, and what a unit of each turns, rad/m.
     hinge_coefficient : (h,)
         N m s/rad.
+    panels : those that resist the rates of their strains.
     """
     p, h = len(pairs), len(hinges)
     dofs = np.zeros((p + h, WIDTH), np.int64)
@@ -72,6 +88,7 @@ def viscous(
         hidden_turn=np.array(hidden_turn, float).reshape(h, 2),
         coefficient=np.concatenate([axial_coefficient, hinge_coefficient]).astype(float),
         gradient=np.zeros(WIDTH),
+        panels=panels,
     )
 
 
@@ -146,7 +163,7 @@ def add_viscous_elements(elements, u, v, force):
         for c in range(14):
             out[elements.dofs[e, c]] += resist * g[c]
         power += resist * rate
-    return power
+    return power + add_viscous_panels(elements.panels, u, v, force)
 
 
 @kernel
@@ -160,7 +177,7 @@ def viscous_elements_work(elements, u, v, shift):
             rate += g[c] * speed[elements.dofs[e, c]]
             change += g[c] * along[elements.dofs[e, c]]
         work += elements.coefficient[e] * rate * change
-    return work
+    return work + viscous_panels_work(elements.panels, u, v, shift)
 
 
 @kernel
@@ -172,11 +189,15 @@ def put_gradients(elements, u, out):
 
 
 def viscous_matrix(elements: Viscous, q: NDArray, size: int) -> sparse.csr_array:
-    """Sum of c grad s grad s' at the dofs q (m,), as a matrix (size, size), N s/m."""
+    """Sum of c grad s grad s' and of panels at the dofs q (m,), a matrix (size, size), N s/m."""
     gradients = np.zeros((len(elements.coefficient), WIDTH))
     put_gradients(elements, np.ascontiguousarray(q, float), gradients)
     row = np.repeat(np.arange(len(gradients)), WIDTH)
     entries = (gradients.ravel(), (row, elements.dofs.ravel()))
     rates = sparse.csr_array(entries, (len(gradients), size))
     rates.eliminate_zeros()
-    return sparse.csr_array(rates.T @ (sparse.diags_array(elements.coefficient) @ rates))
+    matrix = sparse.csr_array(rates.T @ (sparse.diags_array(elements.coefficient) @ rates))
+    if len(elements.panels.nodes):
+        blocks = panel_blocks(elements.panels, nodal(q))
+        matrix = matrix + assembled(pairs_within(elements.panels.nodes), blocks, size)
+    return sparse.csr_array(matrix)

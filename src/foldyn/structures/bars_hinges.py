@@ -209,7 +209,7 @@ class BarsHingesTerm(SheetTerm):
         """See `SheetTerm`."""
         model, angle = self.model, self.angles(np.zeros(self.size))
         bars, hinges = model.bars.astype(np.int64), model.hinges.astype(np.int64)
-        slope, turn = np.empty(len(bars)), np.empty(len(hinges))
+        slope, turn = np.zeros(len(bars)), np.zeros(len(hinges))
         for start, end, code, row in model.bar_runs.tolist():
             slope[start:end] = BarLaw.compiled(code, np.zeros(1), model.addresses[row])[2]
         for start, end, code, row in model.hinge_runs.tolist():

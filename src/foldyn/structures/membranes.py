@@ -20,12 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from foldyn.errors import InputError
 from foldyn.mechanics.following import Following, tensions
 from foldyn.mechanics.membranes import Membranes
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
-from foldyn.structures.mesh import CUT, Mesh, hinge_angles
+from foldyn.structures.mesh import Mesh, hinge_angles
 from foldyn.structures.panel_membrane import membrane_stiffness
 from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
@@ -45,6 +44,7 @@ class Sides(NamedTuple):
 
     outline: Outline
     resistance: tuple[float, ...]
+    convex: bool = True  # others have bars by themselves
 
 
 def membranes(
@@ -112,13 +112,8 @@ def _sides(
         panel = outline(x, center, [False] * len(face), held)
         corners = np.array(panel.corners)
         spokes = corners - (panel.center or corners.mean(axis=0))
-        if np.linalg.det(np.stack([spokes, np.roll(spokes, -1, axis=0)], axis=1)).min() <= 0.0:
-            raise InputError(
-                f": its membrane takes convex panels, and panel {p} is not; {CUT}, or take "
-                'membrane = "bars"',
-                "membrane",
-            )
-        found.append(Sides(panel, tuple(resistance)))
+        turns = np.linalg.det(np.stack([spokes, np.roll(spokes, -1, axis=0)], axis=1))
+        found.append(Sides(panel, tuple(resistance), bool(turns.min() > 0.0)))
     return found
 
 
@@ -134,6 +129,8 @@ def coupling(sides: Sides, ends: tuple[tuple[int, int], ...], poissons_ratio: fl
     longer[np.arange(len(bars)), bars[:, 0]] = -along / length[:, None]
     longer = longer.reshape(len(bars), -1)
     alone = 1.0 / ((1.0 - poissons_ratio) * length.sum() * length)  # an outline's area is 1/2
+    if not sides.convex:
+        return np.diag(alone)
     whole = np.zeros((x.size, x.size))
     whole[:corners, :corners] = membrane_stiffness(panel, poissons_ratio, sides.resistance)
     held = longer.T @ (alone[:, None] * longer)

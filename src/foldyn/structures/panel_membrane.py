@@ -28,7 +28,7 @@ from scipy.sparse.linalg import splu
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.structures.panel_plate import Outline, meshed
 
-COARSE, FINE = 8, 16  # pieces of each edge in the two meshes
+COARSE, FINE = 4, 8  # pieces of each edge in the two meshes; twice as many in triangles
 MIDDLES = 0.5 * (np.ones((3, 3)) - np.eye(3))  # of the sides: three points integrate exactly
 
 
@@ -47,7 +47,8 @@ def membrane_stiffness(
         What q^3 is multiplied by above, over E t, of both panels at each other edge: in the unit
         of length of the outline, squared.
     """
-    coarse, fine = (_condensed(panel, poissons_ratio, resistance, n) for n in (COARSE, FINE))
+    more = 1 if panel.center else 2
+    coarse, fine = (_condensed(panel, poissons_ratio, resistance, more * n) for n in (COARSE, FINE))
     stiffness = extrapolated(coarse, fine, FINE / COARSE)
     stiffness = 0.5 * (stiffness + stiffness.T)
     stiffness.setflags(write=False)

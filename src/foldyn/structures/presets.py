@@ -22,8 +22,8 @@ AGAINST_PLATES = ("scheme", "calibration", "bend_law", "clamped")
 """Options that say how a weld is to bend, or that panels as plates do not take."""
 
 PRESETS: Mapping[str, ModelOptions] = {
-    PLATE: ModelOptions(),
-    N5B8E: ModelOptions(scheme="n5b8e", mass="condensed"),
+    PLATE: ModelOptions(membrane="panel", bar_law="linear"),
+    N5B8E: ModelOptions(scheme="n5b8e", mass="condensed", membrane="panel", bar_law="linear"),
     HERKAL: ModelOptions(
         mass="mixed_voronoi", bend_law="superlinear", calibration="standard"
     ),
@@ -34,8 +34,8 @@ PRESETS: Mapping[str, ModelOptions] = {
 }  # fmt: skip
 """Options by name of the preset.
 
-- "plate": panels that bend and twist as thin plates; right about the shell's frequencies and small
-  displacements (docs/fidelity.md);
+- "plate": panels that bend and twist as thin plates, and whose corners feel their membrane; right
+  about the shell's frequencies and small displacements (docs/fidelity.md);
 - "n5b8e": the same with panels that give way at their creases, twice as near to the shell;
 - "herkal": the model of Herkal et al., Int. J. Solids Struct. 309, 2025;
 - "merlin2": MERLIN2 as published (Liu and Paulino, 2018), in its order and with moments at rest; it
@@ -65,8 +65,12 @@ def resolved(preset: str | None = None, welds: bool = False, **given: Any) -> Mo
     if preset is None and welds and not any(known.get(key) for key in AGAINST_PLATES):
         name = N5B8E
     base = PRESETS[name]
-    if "membrane" in known and choice("membrane", known["membrane"], MEMBRANES) == "panel":
-        known.setdefault("bar_law", "linear")
+    law = known.get("bar_law")
+    if law is not None and bar_law(law) != bar_law("linear"):
+        known.setdefault("membrane", "bars")
+    if "membrane" in known:
+        coupled = choice("membrane", known["membrane"], MEMBRANES) == "panel"
+        known.setdefault("bar_law", "linear" if coupled else "ogden")
     options = ModelOptions(**{**vars(base), **known})
     choice("mass", options.mass, MASS_RULES)
     bar_law(options.bar_law)

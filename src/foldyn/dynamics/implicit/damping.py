@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.algebra.woodbury import Updated
+from foldyn.mechanics.block_matrix import pairs_within, places_of
 from foldyn.mechanics.tangent import block_keys
 from foldyn.mechanics.viscous import WIDTH, Viscous, put_gradients
+from foldyn.mechanics.viscous_panels import panel_blocks
 
 HIDDEN = 12  # place of an element's dofs without mass among its own
 
@@ -40,8 +42,11 @@ class ElementBlocks:
         self._own[len(elements.axial) :, 12:] = elements.hidden_turn > 0.0
         pairs = self._own[:, :, None] & self._own[:, None, :]
         shape = (*self._own.shape, WIDTH)
-        self._row = np.broadcast_to(elements.dofs[:, :, None], shape)[pairs]
-        self._column = np.broadcast_to(elements.dofs[:, None, :], shape)[pairs]
+        within = places_of(pairs_within(elements.panels.nodes))
+        row = np.broadcast_to(elements.dofs[:, :, None], shape)[pairs]
+        column = np.broadcast_to(elements.dofs[:, None, :], shape)[pairs]
+        self._row = np.concatenate([row, within[0]])
+        self._column = np.concatenate([column, within[1]])
         self._pairs = pairs
         ones = np.ones(len(self._row), np.int8)
         there = sparse.csr_array((ones, (self._row, self._column)), (3 * rows, 3 * rows))
@@ -65,12 +70,14 @@ class ElementBlocks:
 
     def put(self, u: NDArray, hidden: float, out: NDArray) -> None:
         """Make `out` (nnz, 3, 3) the whole damping at u (n, 3); see `StepMatrix.follow`."""
-        if not len(self._gradient):
+        if not self._elements.present:
             return
-        put_gradients(self._elements, np.ascontiguousarray(u), self._gradient)
+        place = np.ascontiguousarray(u)
+        put_gradients(self._elements, place, self._gradient)
         self._gradient[:, HIDDEN:] *= hidden**0.5
         weighted = self._elements.coefficient[:, None] * self._gradient
         values = (weighted[:, :, None] * self._gradient[:, None, :])[self._pairs]
+        values = np.append(values, panel_blocks(self._elements.panels, place))
         out[:] = self._still
         out.reshape(-1)[:] += np.bincount(self._slot, values, out.size)
 

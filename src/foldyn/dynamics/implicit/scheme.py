@@ -194,7 +194,7 @@ class Scheme(ABC):
         """
         body, system, s = self.packed.body, self.packed.system, self.scratch
         damping, hidden, memory = system.damping, body.hidden, body.find(HingeMemory)
-        damped = damping.elements.coefficient.size > 0
+        damped = damping.elements.present
         if damping.data.size:
             damped = damped or np.diff(damping.indptr)[hidden].any()
         follows = len(hidden) > 0 and not damped

@@ -11,6 +11,7 @@ from foldyn.linear.matched import SPARE, matched
 from foldyn.linear.reference import Reference, modes_at_rest
 from foldyn.structures import Structure, discretize
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
+from foldyn.structures.presets import resolved
 from foldyn.studies.fidelity.cases import FidelityCase
 
 MODELS: Mapping[str, Mapping[str, Any]] = {
@@ -24,8 +25,8 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
     "n5b8e, condensed": {"calibration": "plate", "mass": "condensed", "scheme": "n5b8e"},
     "n5b8e, bubble": {"calibration": "plate", "mass": "bubble", "scheme": "n5b8e"},
     "n5b8e, consistent": {"calibration": "plate", "mass": "consistent", "scheme": "n5b8e"},
-    "plate, consistent, membrane": {"preset": "plate", "membrane": "panel"},
-    "n5b8e, condensed, membrane": {"preset": "n5b8e", "membrane": "panel"},
+    "plate, consistent, bars": {"preset": "plate", "membrane": "bars"},
+    "n5b8e, condensed, bars": {"preset": "n5b8e", "membrane": "bars"},
 }
 """Options of `discretize`; all bends are linear. `circumcenter` is refused on many panels, and is
 `mixed_voronoi` on all others."""
@@ -58,12 +59,13 @@ class Row(NamedTuple):
 
 def structure_of(case: FidelityCase, model: str) -> Structure:
     """Bars and hinges of a case; edges that are held stay straight where edges may bow."""
-    options = dict(MODELS[model])
-    if "n5b8e" in model or "membrane" in options:
+    options = {"bend_law": "linear", **MODELS[model]}
+    whole = resolved(**options)
+    if whole.scheme == "n5b8e" or whole.membrane == "panel":
         options["straight"] = case.held.edges
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
-        return discretize(case.pattern(), case.sheet, bend_law="linear", **options)
+        return discretize(case.pattern(), case.sheet, **options)
 
 
 def compare(case: FidelityCase, true: Reference, model: str) -> list[Row]:
