@@ -16,7 +16,9 @@ def strip(panels: int = 3) -> fd.Structure:
     """A flat strip of paper, panels 40 mm long and 50 mm wide."""
     nodes = [[0.04 * i, 0.05 * j, 0.0] for i in range(panels + 1) for j in (0, 1)]
     faces = [(2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1) for i in range(panels)]
-    return fd.discretize(fd.Pattern(nodes, faces, name="strip"), SHEET, fold_law="linear")
+    return fd.discretize(
+        fd.Pattern(nodes, faces, name="strip"), SHEET, fold_law="linear", membrane="bars"
+    )
 
 
 def on_a_panel(shift=(0.0, 0.0), turn: float = 0.0) -> tuple[fd.Structure, list[int]]:
@@ -31,7 +33,7 @@ def on_a_panel(shift=(0.0, 0.0), turn: float = 0.0) -> tuple[fd.Structure, list[
     strip = strip @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + [*shift, z]
     faces = [(0, 1, 2, 3), (4, 6, 7, 5), (6, 8, 9, 7)]
     pattern = fd.Pattern(np.vstack([ground, strip]), faces, name="strip on a panel")
-    made = fd.discretize(pattern, SHEET, fold_law="linear")
+    made = fd.discretize(pattern, SHEET, fold_law="linear", membrane="bars")
     return made, [*range(4, 10), *made.centers[1:].tolist()]
 
 

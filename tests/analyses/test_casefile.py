@@ -14,7 +14,7 @@ from foldyn.errors import InputError
 from foldyn.formats import write_pattern
 from foldyn.materials import EnhancedLinear
 from foldyn.patterns import miura
-from foldyn.structures import MASS_RULES, PRESETS, ModelOptions, Sheet
+from foldyn.structures import MASS_RULES, PRESETS, Sheet
 
 
 def test_the_example_of_the_design(read, example, tmp_path) -> None:
@@ -52,9 +52,9 @@ def test_the_example_of_the_design(read, example, tmp_path) -> None:
 def test_what_is_left_out_has_its_default(read, short) -> None:
     found = read(short)
     assert found.title == ""
-    assert found.masses == [ModelOptions().mass]
+    assert found.masses == [PRESETS["plate"].mass]
     case = found.case()
-    assert case.structure.options == ModelOptions()
+    assert case.structure.options == PRESETS["plate"]
     assert case.damping == Rayleigh()
     assert case.load_terms[0][1] == Constant()
     np.testing.assert_array_equal(found.output.nodes, [6, 7])  # the loaded ones

@@ -24,8 +24,8 @@ def strip(count: int = COUNT) -> fd.Pattern:
     return fd.Pattern(vertices, [[2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1] for i in range(count)])
 
 
-def models(pattern: fd.Pattern, **options):
-    bars = {"bend_law": "linear", "fold_law": "linear"}
+def models(pattern: fd.Pattern, straight=(), **options):
+    bars = {"bend_law": "linear", "fold_law": "linear", "straight": straight}
     yield fd.discretize(pattern, SHEET, **bars, **options)
     yield fd.discretize(pattern, SHEET, scheme="n4b5", **bars, **options)
     yield fd.shell(pattern, SHEET, divisions=4, fold_law="linear", **options)
@@ -82,17 +82,24 @@ def test_a_clamped_bilayer_bends_by_half_kappa_length_squared() -> None:
 
 
 def test_a_held_strip_pushes() -> None:
-    """E A alpha T of a strip whose sides are free; the shell is held at its corners alone."""
+    """E A alpha T of a strip whose sides are free and whose ends are held along their length.
+
+    The shell is held at its corners alone, and so are panels whose ends may bow.
+    """
     ends = [0, 1, 2 * COUNT, 2 * COUNT + 1]
     supports = [fd.Fix(ends, "x"), fd.Fix([0, 2 * COUNT], "yz"), fd.Fix([1], "z")]
     force = SHEET.youngs_modulus * SHEET.thickness * WIDTH * 1e-7  # ten times that buckles it
     found = [
         float(path["reaction"][-1].values[np.isin(path["support_node"], [0, 1])
               & (path["support_axis"].values == "x")].sum())
-        for _, path in paths(fd.Temperature(0.01, expansion=1e-5), supports, (0.0, 1.0))
+        for straight in ([(0, 1), (2 * COUNT, 2 * COUNT + 1)], ())
+        for _, path in paths(
+            fd.Temperature(0.01, expansion=1e-5), supports, (0.0, 1.0), straight=straight
+        )
     ]  # fmt: skip
-    np.testing.assert_allclose(found[0], force, rtol=1e-4)
+    np.testing.assert_allclose(found[:2], force, rtol=1e-4)
     assert 0.7 * force < found[2] < force
+    np.testing.assert_allclose(found[3:5], 0.7 * force, rtol=0.05)
 
 
 def test_one_warm_panel_of_two_bends_the_strip_nowhere_else() -> None:

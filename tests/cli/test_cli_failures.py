@@ -26,7 +26,7 @@ def check_partial(file: str, duration: float) -> None:
 
 @pytest.mark.parametrize("factor", [1.2, 1.5, 10.0])
 def test_a_forced_step_far_above_the_critical_one(workplace, edited, factor) -> None:
-    dt = factor * 7.43e-4  # critical: 7.43e-4 s
+    dt = factor * 8.73e-4  # critical: 8.73e-4 s
     text = edited(
         ("duration = 0.1", f"duration = 5.0\ndt = {dt}\nforce = true"),
         ("every = 0.01", "every = 1"),

@@ -54,7 +54,7 @@ def test_a_motion_beside_the_shell(workplace) -> None:
     names = ("fidelity.png", "laws.png", "report.html", "result.nc", "structure.png")
     assert done.new == [folder, *(f"{folder}/{name}" for name in names)]
     found = fd.Fidelity(fd.load(f"{folder}/result.nc"))
-    models = ("own", "own (consistent)", "plate", "membrane")  # "standard" is its own
+    models = ("own", "own (consistent)", "plate", "n5b8e")  # "standard" is its own
     assert found.models == models
     assert found.result.attrs["divisions"].tolist() == [3, 6]
     assert "deflection" in found.result  # the load acts in full
@@ -64,7 +64,7 @@ def test_a_motion_beside_the_shell(workplace) -> None:
     page = (workplace.folder / folder / "report.html").read_text()
     assert "Which model" in page and "foldyn fidelity case.toml --count 3" in page
     for model in found.models:
-        start = "scheme" if model == "membrane" else "calibration"
+        start = "scheme" if model == "n5b8e" else "calibration"
         (row,) = [part for part in page.split("<tr>") if f"<td>{model}</td><td>{start}" in part]
         worst = max(abs(mode.error) for mode in found.table(model) if mode.below)
         assert f"{100 * worst:.3g}" in row

@@ -54,6 +54,8 @@ height = 0.06
 youngs_modulus = 1.2e9
 poissons_ratio = 0.2
 thickness = 0.24e-3
+[model]
+membrane = "bars"
 [[supports]]
 nodes = "zmin"
 [[loads]]

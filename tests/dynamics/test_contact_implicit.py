@@ -161,7 +161,7 @@ def test_a_sheet_sticks_below_the_angle_of_friction(options):
     case = on_slope(15.0, 0.3, alpha=200.0)
     run = fd.simulate(case, 0.2, method="generalized_alpha", every=2e-3, **options)
     along = run.displacement.values[:, :, 0].mean(axis=1)
-    assert abs(along[-1] - along[60]) < 1e-12
+    assert abs(along[-1] - along[60]) < 5e-12
     assert along[-1] < 1e-3 and run.attrs["energy_error"] < 1e-2
 
 

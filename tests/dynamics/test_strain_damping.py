@@ -8,9 +8,11 @@ from oscillators import MASS, equal_steps, linear_law, oscillator, released
 
 import foldyn as fd
 from foldyn.dynamics import METHODS
+from foldyn.dynamics.dampers import dampers
 from foldyn.dynamics.system import pack
 from foldyn.dynamics.turned import turned
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.mechanics.viscous import add_viscous_elements, viscous_elements_work
 from foldyn.signals import log_decrement
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
@@ -24,8 +26,13 @@ def miura(**options) -> fd.Structure:
 
 @pytest.mark.parametrize(
     "options",
-    [{}, {"preset": "herkal", "bend_law": "linear"}, {"fold_law": "enhanced"}],
-    ids=["plate", "herkal", "locking folds"],
+    [
+        {},
+        {"membrane": "bars"},
+        {"preset": "herkal", "bend_law": "linear"},
+        {"fold_law": "enhanced"},
+    ],
+    ids=["plate", "single bars", "herkal", "locking folds"],
 )
 def test_about_rest_it_is_beta_times_the_stiffness(options):
     supports = [fd.Fix("xmin", "xz"), fd.Fix([1], "y"), fd.Spring(2.0, nodes=[7])]
@@ -37,6 +44,29 @@ def test_about_rest_it_is_beta_times_the_stiffness(options):
     ]
     np.testing.assert_allclose(ratios[0], ratios[2], rtol=1e-9)
     assert (ratios[3] < ratios[1]).any()  # springs are not part of it
+
+
+def test_panels_of_several_kinds_are_damped_anywhere():
+    """A triangle, a quad and a pentagon, moved far: the forces are those of the matrix."""
+    vertices = [
+        (0, 0, 0), (1, 0, 0), (1.2, 0.8, 0), (0.5, 1.3, 0), (-0.2, 0.8, 0), (0.5, -0.8, 0.4),
+        (1.9, 0, 0.5), (2.1, 0.8, 0.5),
+    ]  # fmt: skip
+    pattern = fd.Pattern(vertices, [(0, 1, 2, 3, 4), (1, 0, 5), (2, 1, 6, 7)])
+    case = fd.Case(fd.discretize(pattern, SHEET), damping=fd.StrainDamping(BETA))
+    rng, body = np.random.default_rng(4), case.elastic_body
+    u, v = 0.1 * rng.standard_normal((2, *case.structure.nodes.shape))
+    found, force = dampers(case), np.zeros_like(v)
+    power = add_viscous_elements(found.elements, u, v, force)
+    np.testing.assert_allclose(force.ravel(), found.matrix(body.dofs(u)) @ v.ravel(), rtol=1e-9)
+    assert power == pytest.approx(float(np.vdot(force, v)), rel=1e-12)
+    assert power > 0.0
+    work = viscous_elements_work(found.elements, u, v, u)
+    assert work == pytest.approx(float(np.vdot(force, u)), rel=1e-11)
+    rest = dampers(case).matrix(np.zeros(body.size)).toarray()
+    np.testing.assert_allclose(
+        rest, BETA * body.tangent(np.zeros(body.size)).toarray(), atol=1e-9 * np.abs(rest).max()
+    )
 
 
 @pytest.mark.parametrize("nodes", [[0, 1, 2], [3, 4, 6]], ids=["held", "free"])

@@ -19,7 +19,7 @@ KINDS = ["axial", "bending along y", "bending along z", "torsion", "distortion"]
 def tall():
     """A Kresling column of many storeys along z."""
     pattern = fd.patterns.kresling(sides=8, radius=1, height=0.5, twist=20, storeys=12)
-    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), **STRAIGHT)
+    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), membrane="bars", **STRAIGHT)
 
 
 def given(s, shapes):

@@ -63,7 +63,7 @@ def test_errors_are_those_of_the_study(support, miura):
         assert found.result.attrs["rigid"] == 6
     compared = {
         "own": "standard, mixed_voronoi", "plate": "plate, consistent",
-        "membrane": "n5b8e, condensed, membrane",
+        "n5b8e": "n5b8e, condensed",
     }  # fmt: skip
     for model, kept in compared.items():
         rows = [mode for mode in found.table(model) if mode.below]
@@ -90,7 +90,7 @@ def test_the_models_of_case_study_2(miura):
     Edges that bow, as n5b8e's do, have shapes of plates, too, above the limit.
     """
     case, found = miura
-    assert found.models == ("own", "plate", "membrane")
+    assert found.models == ("own", "plate", "n5b8e")
     own, plate, edges = (found.table(model) for model in found.models)
     assert max(abs(m.error) for m in edges if m.below) < 0.02
     assert max(abs(m.error) for m in plate if m.below) < 0.06
@@ -99,10 +99,10 @@ def test_the_models_of_case_study_2(miura):
     assert all(m.mac > 0.9 and 0.0 < m.error < 0.2 for m in edges[3:7])
     assert any(math.isinf(m.error) and m.mac < 0.5 for m in plate)  # a plate's mode, lost
     assert found.result["cost_ratio"].min() > 10.0
-    assert 'The model "membrane" (scheme = "n5b8e", calibration = "plate"' in found.advice
+    assert 'The model "n5b8e" (scheme = "n5b8e", calibration = "plate"' in found.advice
     assert "within 1.5 % of the shell up to 3.835 Hz, 0.6 of the plate frequency" in found.advice
     assert found.advice.endswith(SCOPE)
-    assert repr(found) == "<Fidelity of own, plate, membrane: 8 modes, 3 below 3.835 Hz>"
+    assert repr(found) == "<Fidelity of own, plate, n5b8e: 8 modes, 3 below 3.835 Hz>"
     assert fd.case_of(found.result).loads == case.loads
 
 
@@ -124,7 +124,7 @@ def test_numbers_stand_beside_their_units(quick):
 
 def test_a_case_with_the_right_model_keeps_it():
     found = fd.fidelity(fd.Case(fold(**PLATE), [fd.Fix([0, 1, 2, 3])]), 2, (4, 8))
-    assert found.models == ("own", "standard", "membrane")
+    assert found.models == ("own", "standard", "n5b8e")
     assert found.advice.startswith('The case\'s own model (calibration = "plate"')
     assert "use it" not in found.advice
     assert "Displacements" not in found.advice  # there are no loads
@@ -141,10 +141,10 @@ def test_a_free_sheet_has_no_displacement_under_its_weight():
 
 def test_superlinear_bends_have_no_stiffness(quick):
     case, found = quick
-    assert found.models == ("own", "standard", "plate", "membrane")
+    assert found.models == ("own", "standard", "plate", "n5b8e")
     assert int(found.result["soft_hinges"].sel(model="own")) == 8
     assert np.isinf(found.result["deflection_error"].sel(model="own"))
-    errors = found.result["deflection_error"].sel(model=["plate", "membrane"])
+    errors = found.result["deflection_error"].sel(model=["plate", "n5b8e"])
     np.testing.assert_allclose(errors, 0.0, atol=0.01)
     assert "8 of its hinges are superlinear and have no stiffness at rest" in found.advice
     assert "no stiffness at all (own)" in found.advice
@@ -282,7 +282,7 @@ def test_models_of_ones_own(quick):
     ]
     cut = comparison(held(scheme="n4b5", **STANDARD), 2, (2, 4), ["plate"])
     assert cut.compared["plate"].structure.options.scheme == "n5b8"
-    assert set(MODELS) == {"standard", "plate", "n5b8e", "membrane"}
+    assert set(MODELS) == {"standard", "plate", "n5b8e", "bars"}
 
 
 def test_what_n5b8e_does_not_take_leaves_it_out():

@@ -48,6 +48,8 @@ MODELS = {
     "kresling": (fd.patterns.kresling, {"fold_law": "linear"}),
     "hexagon": (hexagon_and_friends, {"fold_law": ENHANCED}),
     "l shape": (l_shape, {"scheme": "n4b5"}),
+    "miura, coupled": (lambda: fd.patterns.miura(dihedral=60), {"membrane": "panel"}),
+    "hexagon, coupled": (hexagon_and_friends, {"membrane": "panel"}),
 }
 _made: dict[str, fd.Structure] = {}
 
@@ -55,7 +57,7 @@ _made: dict[str, fd.Structure] = {}
 def structure(name: str) -> fd.Structure:
     if name not in _made:
         make, options = MODELS[name]
-        _made[name] = fd.discretize(make(), SHEET, **options)
+        _made[name] = fd.discretize(make(), SHEET, **{"membrane": "bars", **options})
     return _made[name]
 
 

@@ -19,7 +19,10 @@ MU, WEIGHT, WAY = 0.4, 0.06, 5e-5  # N, m
 def strip(supports, loads=(), **plane):
     """A flat strip that its weight, the load 0, presses onto a rough plane."""
     s = fd.discretize(
-        fd.patterns.simple_fold(a=0.04, b=0.05, dihedral=180), SHEET, fold_law="linear"
+        fd.patterns.simple_fold(a=0.04, b=0.05, dihedral=180),
+        SHEET,
+        fold_law="linear",
+        membrane="bars",
     )
     ground = fd.Plane((0, 0, -0.495 * T), (0, 0, 1), friction=MU, **plane)
     n = len(s.nodes)

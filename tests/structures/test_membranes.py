@@ -72,7 +72,7 @@ def test_corners_feel_it_softer_than_bars():
     """Ratios, to two digits, of an independent computation with bilinear elements, 32 an edge."""
     corners = SHAPES["lozenge"]
     pattern = fd.Pattern(np.column_stack([corners, np.zeros(4)]), [(0, 1, 2, 3)])
-    bars = fd.discretize(pattern, fd.Sheet(1e9, 0.3, 1e-3))
+    bars = fd.discretize(pattern, fd.Sheet(1e9, 0.3, 1e-3), membrane="bars")
     tangent = bars.body.tangent(np.zeros(15)) - bars.body.sheet.hinges_alone().tangent(np.zeros(15))
     moved, center = [3 * i + c for i in range(4) for c in (0, 1)], [12, 13]
     whole = tangent.toarray() / 1e6  # E t
@@ -228,7 +228,9 @@ def test_held_sheets_vibrate_as_the_shell(pattern, worst):
         warnings.simplefilter("ignore", FoldynWarning)
         shell = fd.Case(fd.shell(pattern, STEEL, divisions=8), held)
         wanted = fd.modes(shell, count=3).frequency.values
-        alone = fd.modes(fd.Case(fd.discretize(pattern, STEEL), held), count=3).frequency.values
+        alone = fd.modes(
+            fd.Case(fd.discretize(pattern, STEEL, membrane="bars"), held), count=3
+        ).frequency.values
     assert np.abs(found / wanted - 1.0).max() < worst
     assert np.abs(alone / wanted - 1.0).max() > 2.0 * worst
 
@@ -259,7 +261,10 @@ def test_all_methods_find_the_same_motion(options):
 def test_a_turning_sheet_takes_few_iterations():
     """The tangent of the mean forces is their derivative; that halfway takes ten times as many."""
     iterations = {}
-    for name, options in {"bars": {"bar_law": "linear"}, "panel": {"membrane": "panel"}}.items():
+    for name, options in {
+        "bars": {"bar_law": "linear", "membrane": "bars"},
+        "panel": {"membrane": "panel"},
+    }.items():
         structure = fd.discretize(fd.patterns.miura(cells=(1, 1)), RUBBER, **options)
         arm = structure.nodes - structure.nodes.mean(axis=0)
         start = fd.State(velocity=np.cross([0.0, 0.0, 5.0], arm))
@@ -294,10 +299,21 @@ def test_what_does_not_go_together_is_refused():
         fd.discretize(pattern, RUBBER, membrane="panel", bar_law="ogden")
     with pytest.raises(InputError, match='membrane = "panels": did you mean'):
         fd.discretize(pattern, RUBBER, membrane="panels")  # pyright: ignore[reportArgumentType]
+
+
+def test_panels_that_are_not_convex_have_single_bars():
     dart = fd.Pattern([(0, 0), (1, 0), (0.3, 0.3), (0, 1)], [(0, 1, 2, 3)])
-    with pytest.raises(InputError, match="takes convex panels, and panel 0 is not"):
-        fd.discretize(dart, RUBBER, scheme="n4b5", membrane="panel")
-    structure = fd.discretize(pattern, RUBBER, membrane="panel")
-    assert structure.bar_law.name == "linear"
-    with pytest.raises(InputError, match="bend or stretch as plates"):
-        fd.Case(structure, damping=fd.StrainDamping(1e-4))
+    own, alone = (
+        fd.discretize(dart, RUBBER, scheme="n4b5", membrane=m, bar_law="linear")
+        for m in ("panel", "bars")
+    )
+    u = 0.05 * np.random.default_rng(2).standard_normal(own.nodes.shape)
+    np.testing.assert_allclose(own.internal_force(u), alone.internal_force(u), rtol=1e-6)
+
+
+def test_a_law_of_single_bars_has_single_bars():
+    pattern = fd.patterns.miura()
+    assert fd.discretize(pattern, RUBBER).options.membrane == "panel"
+    assert fd.discretize(pattern, RUBBER, bar_law="ogden").options.membrane == "bars"
+    assert fd.discretize(pattern, RUBBER, membrane="bars").bar_law.name == "ogden"
+    assert fd.discretize(pattern, RUBBER, bar_law="linear").options.membrane == "panel"

@@ -34,7 +34,7 @@ def told(found) -> dict:
 
 def test_the_default_is_plates_with_consistent_mass_and_linear_bends():
     assert told(options()) == PAPER | {
-        "mass": "consistent", "bend_law": "linear", "calibration": "plate",
+        "mass": "consistent", "bend_law": "linear", "calibration": "plate", "bar_law": "linear",
     }  # fmt: skip
     assert options() == options(preset="plate") == PRESETS["plate"]
 

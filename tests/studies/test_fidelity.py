@@ -50,10 +50,10 @@ def test_large_sheets_have_membranes():
     assert {m.case for m in results} <= {c.name for c in sheets()}
     assert len(results) == 24
     found = {model: summary(results, model) for model in MODELS}
-    assert found["n5b8e, condensed, membrane"].near >= 0.95
-    assert found["plate, consistent, membrane"].near > 0.89
+    assert found["n5b8e, condensed"].near >= 0.95
+    assert found["plate, consistent"].near > 0.89
     for model in ("n5b8e, condensed", "plate, consistent"):
-        assert found[model].near < found[f"{model}, membrane"].near - 0.02
+        assert found[f"{model}, bars"].near < found[model].near - 0.02
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -107,7 +107,7 @@ def test_stored_results_are_what_the_code_gives(number):
     case = documented()[number]
     (stored,) = [m for m in read(RESULTS / "documented.csv") if m.case == case.name]
     true = reference(case)
-    for model in ("standard, consistent", "plate, consistent", "n5b8e, condensed, membrane"):
+    for model in ("standard, consistent", "plate, consistent", "n5b8e, condensed, bars"):
         rows = compare(case, true, model)
         assert len(rows) == len(stored.rows[model])
         for row, kept in zip(rows, stored.rows[model], strict=True):

@@ -49,7 +49,7 @@ def test_energy_lies_where_the_fold_is():
 def test_rest_angles_follow_what_folds_them_on_a_path(constant):
     s = structure(fold_law="linear", bend_law="linear")
     loads = [
-        fd.Actuate("all", fraction=0.6),
+        fd.Actuate("all", fraction=0.4),
         fd.Force([s.pattern.faces[-1][2]], (0.0, 0.0, 0.02)),
     ]
     path = fd.trace(fd.Case(s, SUPPORTS, loads), load_factors=[0.5, 1.0], constant=constant)

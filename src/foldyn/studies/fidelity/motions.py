@@ -152,7 +152,7 @@ def structures(
         }
         for law, own in LAWS.items():
             given: dict[str, Any] = {**own, **creases}
-            if own["preset"] == "n5b8e":
+            if own["preset"] != "herkal":
                 given["straight"] = edges
             made[law] = discretize(pattern, sheet, **given)
     return made
