@@ -187,7 +187,7 @@ def test_large_loads():
     panel = twisted(60.0, 1.0, (1.0, 8.0))
     assert panel["plate, linear"] == pytest.approx([0.02, 0.20], abs=0.02)
     assert panel["standard, superlinear"] == pytest.approx([-0.13, 1.16], abs=0.02)
-    assert panel["plate, plate_superlinear"] == pytest.approx([0.07, 1.17], abs=0.02)
+    assert panel["plate, plate_superlinear"] == pytest.approx([0.07, 1.15], abs=0.02)
 
 
 def test_displacement_of_a_spring():

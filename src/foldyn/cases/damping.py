@@ -217,10 +217,11 @@ class StrainDamping(Part):
     """Damping of the rates at which bars stretch and hinges turn, each by beta times its stiffness.
 
     That of a Kelvin-Voigt material: the force of each bar and hinge is that of its elongation or
-    turn plus beta times the rate of it, along its direction now. So it is right for motions of any
-    size, and takes nothing from rigid rotations. For small motions about rest it is beta K0 (see
-    `Rayleigh`): a vibration of angular frequency w is damped with the ratio beta w / 2. Hinges
-    count with the slope of their law at rest, and springs, which have dashpots, not at all.
+    turn plus beta times the rate of it, along its direction now; bars of panels with membranes are
+    coupled in their rates as in their strains. So it is right for motions of any size, and takes
+    nothing from rigid rotations. For small motions about rest it is beta K0 (see `Rayleigh`): a
+    vibration of angular frequency w is damped with the ratio beta w / 2. Hinges count with the
+    slope of their law at rest, and springs, which have dashpots, not at all.
 
     Parameters
     ----------

@@ -294,8 +294,7 @@ def _told(case: Case, own: Case) -> str:
     options, others = vars(case.structure.options), vars(own.structure.options)
     usual = options["scheme"] == others["scheme"] == MODELS["plate"]["scheme"]
     further = (key for key in options if options[key] != others[key])
-    coupled = () if options["membrane"] == "bars" else ("membrane",)
-    keys = dict.fromkeys([*(() if usual else ("scheme",)), *SHOWN, *coupled, *further])
+    keys = dict.fromkeys([*(() if usual else ("scheme",)), *SHOWN, *further])
     return ", ".join(f"{key} = {_written(options[key])}" for key in keys)
 
 

@@ -97,7 +97,8 @@ def discretize(
     membrane : {"bars", "panel"}
         How panels resist in their plane: each bar by itself, right in uniform strain at most; or
         bars coupled so that the corners feel the panel's membrane, with which large sheets and
-        held ones come out right (see `foldyn.structures.membranes`). Then `bar_law` is "linear".
+        held ones come out right (see `foldyn.structures.membranes`). Then `bar_law` is "linear";
+        another one, where no membrane is given, stands for single bars.
     preset : {"plate", "n5b8e", "herkal", "merlin2"}, optional
         Model that gives what is left out, one of `foldyn.structures.PRESETS`. Without it "plate",
         but "n5b8e" where its scheme is given or the pattern has welds, and "herkal", the paper's,

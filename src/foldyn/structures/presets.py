@@ -2,8 +2,9 @@
 
 A preset gives what is left out. Without one it is "plate", unless an option is given that stands
 for another: the scheme n5b8e; or for the model of the paper, a calibration other than "plate" or
-superlinear bends without a calibration. A pattern with welds has "n5b8e" in the place of "plate",
-but with clamped edges: a hinge on a weld cannot bend as a plate does.
+superlinear bends without a calibration. A bar law other than "linear" stands for single bars. A
+pattern with welds has "n5b8e" in the place of "plate", but with clamped edges: a hinge on a weld
+cannot bend as a plate does.
 """
 
 from __future__ import annotations

@@ -111,7 +111,7 @@ class Structure(Discretized):
     edge_plates : EdgePlates or None
         Panels as plates, of the scheme n5b8e.
     membranes : tuple of PanelKind
-        What couples the bars of panels, with `membrane = "panel"`.
+        What couples the bars of panels, with `membrane = "panel"`: `bar_area` does not resist then.
     without_edge_angles : bool
         Whether its edge angles are no dofs but stay in balance.
     pattern, sheet, options
