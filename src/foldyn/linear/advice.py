@@ -12,6 +12,7 @@ OWN = "own"
 """Name of the case's own model."""
 GOOD, LARGEST = 0.02, 0.10  # errors: of a model that is left as it is, and of one that can be used
 MESH = 0.02  # error of the mesh that is told
+SHELL = " (--model shell on the command line, fd.shell)"
 SCOPE = (
     "Only small vibrations about rest and small loads were compared: motions and loads that turn "
     "creases far are not covered."
@@ -63,7 +64,7 @@ def _sentences(result: xarray.Dataset) -> Iterator[str]:
         yield (
             f"The lowest mode of the shell, {frequency[0]:.4g} Hz, lies above {limit:.4g} Hz, 0.6 "
             "of the plate frequency: panels vibrate as plates there, which bars and hinges do not. "
-            "Take the shell."
+            f"Take the shell{SHELL}."
         )
     if "deflection" in result:
         yield _statics(result, best)
@@ -76,7 +77,7 @@ def _vibrations(result: xarray.Dataset, below: int, best: Reach) -> Iterator[str
     if not best.count:
         yield (
             f"No model has the lowest mode, {frequency[0]:.4g} Hz, within {size(LARGEST)} of the "
-            "shell: take the shell."
+            f"shell: take the shell{SHELL}."
         )
     else:
         top, whole = float(frequency[best.count - 1]), best.count == below
@@ -93,7 +94,7 @@ def _vibrations(result: xarray.Dataset, below: int, best: Reach) -> Iterator[str
         if not whole:
             yield (
                 f"The next mode, {frequency[best.count]:.4g} Hz, {_missed(result, best)}: take the "
-                "shell from there."
+                f"shell from there{SHELL}."
             )
     if best.model != OWN:
         yield from _own(result, below)
