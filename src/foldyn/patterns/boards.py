@@ -61,6 +61,11 @@ class Boards:
         return self._vectors / self.areas[:, None]
 
     @cached_property
+    def centers(self) -> NDArray[np.float64]:
+        """Means of the corners of each board's middle surface (np, 3), m."""
+        return np.array([self.of(panel).mean(axis=0) for panel in range(len(self.thickness))])
+
+    @cached_property
     def _vectors(self) -> NDArray[np.float64]:
         """Newell's normals (np, 3), as long as the areas."""
         vectors = np.empty((len(self.thickness), 3))
