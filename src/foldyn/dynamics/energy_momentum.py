@@ -84,7 +84,7 @@ class EnergyMomentum(Scheme):
         contact = body.find(ContactTerm)
         if contact is not None:
             kept = body.kept(self.work, ContactTerm)
-            touch = StepContact(contact.tables, kept, packed.system.rows)
+            touch = StepContact(contact, kept, packed.system.rows)
         self._contact, equation = touch, self.equation
         balance = equation.balance.value
         self._terms = terms = MeanForces(body, self.work)

@@ -24,6 +24,7 @@ from foldyn.mechanics.contact.ride import (
     jacobian,
     largest_turn,
     put_points,
+    step_jacobian,
 )
 from foldyn.mechanics.contact.tables import Tables
 from foldyn.mechanics.contact.term import ContactTerm, contact_tangent
@@ -76,11 +77,29 @@ class BoardContactTerm(ContactTerm):
         """See `ContactTerm`."""
         return self._riding[2]
 
+    def size(self, dofs: int) -> int:
+        """See `ContactTerm`."""
+        return self.ride.rest.size
+
     def on_nodes(self, q: NDArray, force: NDArray) -> NDArray:
         """See `ContactTerm`."""
         out = np.zeros_like(self.ride.x)
         add_back(Context(self.ride), nodal(q), force, out)
         return out
+
+    def step_back(self, u0: NDArray, u1: NDArray, force: NDArray) -> NDArray:
+        """See `ContactTerm`."""
+        motion = step_jacobian(self.ride, u0, u1, self.ride.x.size)
+        return (motion.T @ force.ravel()).reshape(-1, 3)
+
+    def step_tangent(
+        self, u0: NDArray, u1: NDArray, force: NDArray, inner: sparse.csr_array
+    ) -> sparse.csr_array:
+        """See `ContactTerm`; that of the motion of points is of the first order in the step."""
+        ride, size = self.ride, u0.size
+        motion, ahead = step_jacobian(ride, u0, u1, size), jacobian(ride, u1, size)
+        bent = curvature(ride, 0.5 * (u0 + u1), force, size)
+        return sparse.csr_array(motion.T @ inner @ ahead + 0.5 * bent)
 
     def tangent_at(self, q: NDArray, kept: Memory) -> sparse.csr_array:
         """See `ContactTerm`."""

@@ -28,6 +28,7 @@ from scipy import sparse
 from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.mechanics.contact.distances import cross, dot, minus, point
 
+NOISE = 16.0 * float(np.finfo(float).eps)  # of a normal: less is rounding
 LEVI_CIVITA = np.zeros((3, 3, 3))
 LEVI_CIVITA[[0, 1, 2], [1, 2, 0], [2, 0, 1]] = 1.0
 LEVI_CIVITA[[0, 2, 1], [2, 1, 0], [1, 0, 2]] = -1.0
@@ -209,17 +210,49 @@ def _crossing(e: NDArray) -> NDArray:
 def jacobian(ride: Ride, u: NDArray, size: int) -> sparse.csr_array:
     """dy/dx (3 m, size) at displacements u (rows, 3)."""
     turn, _, area, across = _frames(ride, u)
-    lever = ride.heights / area[:, None]
-    blocks = np.einsum("tc,tab,tibd->tciad", lever, across, turn)
+    return _motion(ride, across[:, None] @ turn / area[:, None, None, None], size)
+
+
+def _motion(ride: Ride, turned: NDArray, size: int) -> sparse.csr_array:
+    """dy/dx (3 m, size) of the change `turned` (t, 3, 3, 3) of normals by each of the nodes."""
+    blocks = ride.heights[:, :, None, None, None] * turned[:, None]
     blocks += ride.weights[:, :, :, None, None] * np.eye(3)
-    axis = np.arange(3)
+    axis, n, first = np.arange(3), ride.x.size, ride.rest.size - ride.x.size
     rows = 3 * ride.points[:, :, None, None, None] + axis[:, None] + np.zeros_like(blocks, int)
     columns = 3 * ride.nodes[:, None, :, None, None] + axis + np.zeros_like(blocks, int)
-    n, first = 3 * len(ride.x), 3 * (len(ride.rest) - len(ride.x))
     same = np.arange(n)
     entries = np.concatenate([blocks.ravel(), np.ones(n)])
     places = [np.concatenate([rows.ravel(), first + same]), np.concatenate([columns.ravel(), same])]
     return sparse.csr_array(sparse.coo_array((entries, places), shape=(first + n, size)))
+
+
+def step_jacobian(ride: Ride, u0: NDArray, u1: NDArray, size: int) -> sparse.csr_array:
+    """A matrix G (3 m, size) with y1 - y0 = G (u1 - u0) that moves points rigidly with the mesh.
+
+    In the middle of the step, that is: for a turn w about it G gives w x (y0 + y1) / 2. With the
+    normal m and its derivative A in the middle, the mean normal and the turn W z that is nearest to
+    nodal motions z, A + [(m - mean) x] W does that; what it misses of the change is made up along
+    the part of u1 - u0 that is no rigid motion (Gonzalez, J. Nonlinear Sci. 6, 1996).
+    """
+    n = len(ride.x)
+    turn, normal, area, across = _frames(ride, 0.5 * (u0 + u1))
+    before, after = _frames(ride, u0)[1], _frames(ride, u1)[1]
+    arm, step = ((x - x.mean(axis=1, keepdims=True)) for x in (
+        (ride.x + 0.5 * (u0 + u1)[:n])[ride.nodes], (u1 - u0)[ride.nodes]
+    ))  # fmt: skip
+    moment = _crossing(arm)
+    inertia = moment.swapaxes(2, 3) @ moment
+    nearest = np.linalg.solve(inertia.sum(axis=1)[:, None], moment)
+    turned = across[:, None] @ turn / area[:, None, None, None]
+    turned = turned + _crossing(normal - 0.5 * (before + after))[:, None] @ nearest
+    spin = np.einsum("tiab,tib->ta", nearest, step)
+    deform = step - np.cross(spin[:, None], arm)
+    missed = after - before - np.einsum("tiab,tib->ta", turned, step)
+    square = (deform**2).sum(axis=(1, 2))
+    acts = (np.abs(missed).max(axis=1, initial=0.0) > NOISE) & (square > 0.0)
+    missed[acts] /= square[acts, None]
+    missed[~acts] = 0.0
+    return _motion(ride, turned + missed[:, None, :, None] * deform[:, :, None, :], size)
 
 
 def curvature(ride: Ride, u: NDArray, push: NDArray, size: int) -> sparse.csr_array:

@@ -177,9 +177,23 @@ class ContactTerm(Term):
         """Nodes (m,) that each moves with."""
         return np.arange(len(self.tables.rest))
 
+    def size(self, dofs: int) -> int:
+        """Size of the tangent of what touches, for one of so many dofs."""
+        return dofs
+
     def on_nodes(self, q: NDArray, force: NDArray) -> NDArray:
         """Forces (n, 3) on the nodes of forces (m, 3) on what touches, N."""
         return force
+
+    def step_back(self, u0: NDArray, u1: NDArray, force: NDArray) -> NDArray:
+        """The same in a step: they do the work of those on what touches."""
+        return force
+
+    def step_tangent(
+        self, u0: NDArray, u1: NDArray, force: NDArray, inner: sparse.csr_array
+    ) -> sparse.csr_array:
+        """Their derivative by the end of the step; `inner` is that of what touches, both N/m."""
+        return inner
 
     # ------------------------------------------------------------------ forces
     def contact(self, q: NDArray) -> tuple[float, NDArray]:
