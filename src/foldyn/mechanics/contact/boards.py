@@ -36,7 +36,7 @@ from foldyn.mechanics.contact.tables import (
 )
 
 JUST = 1.0 - 1e-9  # of d0: what just touches at rest does not push
-LEAST = 0.1  # of the angle at which sheets are guarded: least angle of a guard
+LEAST = 0.02  # of the angle at which sheets are guarded: least angle of a guard
 
 
 @dataclass(frozen=True, eq=False)
