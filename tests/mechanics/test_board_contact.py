@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from strips import strip
 
 import foldyn as fd
 from foldyn.checks import gradient_error, tangent_error
@@ -19,6 +18,7 @@ from foldyn.mechanics.contact.ride import (
     ride_on,
     step_jacobian,
 )
+from strips import strip
 
 T = 0.1
 SHEET = fd.Sheet(1e8, 0.3, T, 500.0)
@@ -53,9 +53,7 @@ def test_points_are_those_of_each_panel_and_the_nodes():
 def test_points_move_rigidly_with_the_mesh():
     turn = Rotation.from_rotvec([0.3, 0.5, 1.0]).as_matrix()
     moved = points(NODES @ turn.T + [1.0, 2.0, 3.0] - NODES)
-    np.testing.assert_allclose(
-        RIDE.rest + moved, RIDE.rest @ turn.T + [1.0, 2.0, 3.0], atol=1e-14
-    )
+    np.testing.assert_allclose(RIDE.rest + moved, RIDE.rest @ turn.T + [1.0, 2.0, 3.0], atol=1e-14)
 
 
 def test_derivatives_of_points_are_those_of_differences():
@@ -192,7 +190,7 @@ def test_a_straight_step_is_cut_where_a_curved_path_meets():
     """The free board turns by 175 degrees of the 180 of a step that crosses the other one."""
     case = case_of(fd.thicken(strip(2, fold_angle=90.0), T))
     contact, x = case.contact_term, case.structure.nodes
-    arm = np.flatnonzero((x[:, 2] > 0.5 * T + 1e-9))
+    arm = np.flatnonzero(x[:, 2] > 0.5 * T + 1e-9)
     step = np.zeros_like(x)
     step[arm] = np.array([-2.5, 0.0, -2.5]) * (x[arm, 2:] - 0.5 * T)
     none = np.zeros((0, 3))

@@ -118,37 +118,38 @@ def check_driven(case: Case, states: Iterable[tuple[str, NDArray, NDArray]]) -> 
         A node of which supports decide how far it is from a plane comes behind it; or panels of
         which supports move all nodes cross.
     """
-    contact, structure = case.contact, case.structure
-    assert contact is not None
-    panels, triangles = structure.triangle_panel, structure.triangles
+    assert case.contact is not None
+    contact, tables = case.contact_term, case.contact_term.tables
     decided = np.all([_decided(case, axis) for axis in np.eye(3)], axis=0)
     centers, mean = _followers(case, decided)
     decided[centers] = True
-    held = decided[triangles].all(axis=1)
-    look = contact.panels and bool(case.imposed_terms) and len(np.unique(panels[held])) > 1
-    planes, still = [], case.still.all(axis=1)  # planes leave these alone
-    for plane in contact.planes:
-        normal = np.array(plane.normal) / np.linalg.norm(plane.normal)
-        meeting = _decided(case, normal) & ~still
-        nodes = np.intersect1d(triangles, np.flatnonzero(meeting))
-        planes.append((np.array(plane.point), normal, nodes))
+    held = decided[case.structure.triangles].all(axis=1)
+    triangles, panels = tables.triangles[held], tables.panel[held]
+    look = case.contact.panels and bool(case.imposed_terms) and len(np.unique(panels)) > 1
+    planes = []
+    for plane in tables.planes:
+        point, normal = plane[POINT : POINT + 3], plane[NORMAL : NORMAL + 3]
+        nodes = tables.meeting[contact.carried(_decided(case, normal))[tables.meeting]]
+        planes.append((point, normal, nodes))
     before, crossed = [], np.zeros((0, 2), np.int64)
     for k, (when, u, moved) in enumerate(states):
-        x = structure.nodes + u
+        x = tables.rest + contact.points(u)
         for i, (point, normal, nodes) in enumerate(planes):
             height = (x[nodes] - point - moved[i]) @ normal
             before += [height > 0.0] if k == 0 else []
             behind = np.flatnonzero(before[i] & (height <= 0.0))
             if behind.size:
+                node = contact.nodes[nodes[behind[0]]]
                 raise InputError(
-                    f": at {when} it has reached node {nodes[behind[0]]}, whose distance from it "
+                    f": at {when} it has reached node {node}, whose distance from it "
                     "supports decide: neither gives way. Stop the plane or the support before, or "
                     "let the node move along the plane's normal",
                     f"contact.planes[{i}]",
                 )
         if look and k % STRIDE == 0:
-            x[centers] = structure.nodes[centers] + mean @ u
-            pairs = crossing_panels(x, triangles[held], panels[held])
+            followed = u.copy()
+            followed[centers] = mean @ u
+            pairs = crossing_panels(tables.rest + contact.points(followed), triangles, panels)
             crossed = pairs if k == 0 else crossed
             new = [pair for pair in pairs.tolist() if pair not in crossed.tolist()]
             if new:

@@ -66,7 +66,8 @@ class StepContact:
 
     def __init__(self, contact: ContactTerm, memory: Memory, rows: int) -> None:
         self._contact, self._tables, self._memory = contact, contact.tables, memory
-        self._ends, self._on_points = (np.zeros((rows, 3)),) * 2, np.zeros_like(memory.x)
+        self._ends = np.zeros((rows, 3)), np.zeros((rows, 3))
+        self._on_points = np.zeros_like(memory.x)
         tables = contact.tables
         self.force, self.push = np.zeros((rows, 3)), np.zeros_like(memory.friction)
         self.rub = np.zeros_like(memory.x)
@@ -84,15 +85,13 @@ class StepContact:
         for moved, factor in zip(self._moved, (factor0, factor1), strict=True):
             move_planes(self._tables, factor, kept)
             moved[:] = kept.moved[:, :3]
-        self._ends, force = (u0.copy(), u1.copy()), self._on_points
+        self._ends, force = (u0.copy(), u1.copy()), self._on_points  # arrays that change in place
         p0, p1 = self._contact.points(u0), self._contact.points(u1)
         force[:] = 0.0
         self._counts = _find(self._tables, p0, p1, self._start, self._middle, kept, self._pairs)
         kept.facts.energy = self._steps(False, force)[2]
         if self._tables.friction > 0.0:
-            _add_rubs(
-                self._tables, self._middle, kept, self._pairs, *self._counts, self.rub, force
-            )
+            _add_rubs(self._tables, self._middle, kept, self._pairs, *self._counts, self.rub, force)
         _add_others(
             self._tables, self._start, self._middle, self._moved, kept, self._move, self.push,
             force,

@@ -20,6 +20,7 @@ from foldyn.mechanics.contact.memory import Memory, memory
 from foldyn.mechanics.contact.ride import (
     Ride,
     add_back,
+    carried,
     curvature,
     jacobian,
     largest_turn,
@@ -76,6 +77,10 @@ class BoardContactTerm(ContactTerm):
     def nodes(self) -> NDArray:
         """See `ContactTerm`."""
         return self._riding[2]
+
+    def carried(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """See `ContactTerm`."""
+        return carried(self.ride, chosen)
 
     def size(self, dofs: int) -> int:
         """See `ContactTerm`."""

@@ -110,9 +110,7 @@ def _board_limit(own, u, v, a, dt, beta, energy, lightness):
     put_rates(own.ride, at, rows_at(a, own.rows), own.change)
     put_lightness(own.ride, numbers_at(lightness, own.rows), own.lightness)
     pace, light, memory = Pace(beta, energy), own.lightness, own.memory
-    return limited(
-        own.tables, own.moved, own.speed, own.change, own.angle, dt, pace, light, memory
-    )
+    return limited(own.tables, own.moved, own.speed, own.change, own.angle, dt, pace, light, memory)
 
 
 def board_kernels(

@@ -1,6 +1,6 @@
 """Points that ride on the triangles of a mesh, beside it, as the corners of boards do.
 
-A point that rides on a triangle of the nodes x_i, with N = (x_b - x_a) x (x_c - x_a), n = N / |N|, is
+A point that rides on a triangle of nodes x_i, with N = (x_b - x_a) x (x_c - x_a), n = N / |N|, is
 
     y = sum w_i x_i + h n,    sum w_i = 1;
 
@@ -9,8 +9,8 @@ to node i, dN/dx_i = [e_i x], so that
 
     dy/dx_i = w_i I + h P [e_i x] / |N|,    P = I - n n'.
 
-A rigid motion moves points as it moves the mesh, so forces f on points, which go to the nodes by the
-transpose, keep their resultant and their moment. The second derivative of f.y has the terms of h:
+A rigid motion moves points as it moves the mesh, so forces f on points, which go to the nodes by
+the transpose, keep their resultant and their moment. The second derivative of f.y has terms of h,
 
     [e_i x]' H [e_j x] and, of N itself, -+[g x],    H = -(p n' + n p' + f.n P) h / |N|^2,
 
@@ -43,7 +43,9 @@ class Ride(NamedTuple):
     points: NDArray  # (t, 3) points at the corners
     weights: NDArray  # (t, 3, 3) w of each point's share, over the nodes
     heights: NDArray  # (t, 3) h, m
-    reach: NDArray  # (t, 3, 3) square of how far a node moves a point, at most, in parts that add up
+    reach: (
+        NDArray  # (t, 3, 3) square of how far a node moves a point, at most, in parts that add up
+    )
 
 
 def ride_on(
@@ -87,6 +89,14 @@ def ride_on(
         np.concatenate([key // n, np.full(n, -1)]).astype(np.int64),
         np.concatenate([key % n, np.arange(n)]).astype(np.int64),
     )
+
+
+def carried(ride: Ride, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which points (m,) chosen nodes (n,) alone move."""
+    out = np.concatenate([np.ones(len(ride.rest) - len(ride.x), bool), chosen])
+    for corner in range(3):
+        np.logical_and.at(out, ride.points[:, corner], chosen[ride.nodes].all(axis=1))
+    return out
 
 
 @inner_scalar

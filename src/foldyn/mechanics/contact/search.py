@@ -34,7 +34,7 @@ def panel_d0(ranges, v, panel):
 
 @inner
 def edge_d0(ranges, edges, nodes, panels, i, j):
-    """d0 (m) of two edges (e, 2) of some panels (e, 2); 0 if they share a panel or a node (e, 2)."""
+    """d0 (m) of two edges (e, 2) of some panels (e, 2); 0 if they share one, or a node (e, 2)."""
     a, b, c, d = nodes[i, 0], nodes[i, 1], nodes[j, 0], nodes[j, 1]
     if a in (c, d) or b in (c, d):
         return 0.0

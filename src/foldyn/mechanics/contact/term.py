@@ -177,6 +177,10 @@ class ContactTerm(Term):
         """Nodes (m,) that each moves with."""
         return np.arange(len(self.tables.rest))
 
+    def carried(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which of them (m,) chosen nodes (n,) alone move."""
+        return chosen
+
     def size(self, dofs: int) -> int:
         """Size of the tangent of what touches, for one of so many dofs."""
         return dofs
