@@ -28,7 +28,7 @@ def stack() -> fd.Pattern:
     n = BOARDS + 1
     faces = [(k, k + 1, n + k + 1, n + k) for k in range(BOARDS)]
     letters = {(k, n + k): "V" if k % 2 else "M" for k in range(1, BOARDS)}
-    thin = fd.Pattern(np.vstack([low, low + [0.0, LENGTH, 0.0]]), faces, letters, "stack")
+    thin = fd.Pattern(np.vstack([low, low + np.array([0.0, LENGTH, 0.0])]), faces, letters, "stack")
     return fd.thicken(thin, THICKNESS)
 
 
