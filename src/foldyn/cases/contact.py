@@ -32,8 +32,8 @@ from foldyn.values import brief, flag, length, number, show, vector
 class Plane(Part):
     """A plane that the sheet cannot pass: the ground, the plate of a press; fixed or moving.
 
-    It meets the nodes of the sheet, at half the sheet's thickness from their middle surface; nodes
-    that are held along all three axes are left alone.
+    It meets the nodes of the sheet, or the corners of thick panels' middle surfaces, at half the
+    thickness; nodes that are held along all three axes are left alone.
 
     Parameters
     ----------

@@ -30,6 +30,8 @@ class Boards:
         Areas of the middle surfaces (m2).
     normals : ndarray, shape (np, 3)
         Unit normals of the boards towards the front.
+    centers : ndarray, shape (np, 3)
+        Means of the corners of their middle surfaces (m).
     """
 
     offsets: NDArray[np.int64]
