@@ -139,7 +139,7 @@ class EnergyMomentum(Scheme):
     def contact_tangent(self, contact: ContactTerm, memory: Memory) -> sparse.csr_array:
         """See `Scheme`."""
         assert self._contact is not None
-        return self._contact.tangent(self.shift.size)
+        return self._contact.tangent()
 
     def plane_push(self, before: NDArray, after: NDArray) -> NDArray:
         """See `Scheme`."""

@@ -112,8 +112,8 @@ class StepContact:
         )  # fmt: skip
         return nodes, blocks, energy
 
-    def tangent(self, size: int) -> sparse.csr_array:
-        """Derivative (size, size), N/m, of the force of the last step with respect to its end."""
+    def tangent(self) -> sparse.csr_array:
+        """Derivative (m, m), N/m, of the force of the last step with respect to its end."""
         own, kept = self._tables, self._memory
         nodes, blocks, _ = self._steps(True, np.zeros_like(self._on_points))
         guards = np.zeros((len(own.hinge_limit), 4, 3, 4, 3))
@@ -127,7 +127,8 @@ class StepContact:
             met = np.flatnonzero(at_planes.any(axis=(1, 2)))
             pairs.append(np.column_stack([met, met]))
             entries.append(at_planes[met])
-        inner = assembled(np.concatenate(pairs), np.concatenate(entries), self._contact.size(size))
+        size = self._on_points.size
+        inner = assembled(np.concatenate(pairs), np.concatenate(entries), size)
         return self._contact.step_tangent(*self._ends, self._on_points, inner)
 
 

@@ -82,10 +82,6 @@ class BoardContactTerm(ContactTerm):
         """See `ContactTerm`."""
         return carried(self.ride, chosen)
 
-    def size(self, dofs: int) -> int:
-        """See `ContactTerm`."""
-        return self.ride.rest.size
-
     def on_nodes(self, q: NDArray, force: NDArray) -> NDArray:
         """See `ContactTerm`."""
         out = np.zeros_like(self.ride.x)

@@ -83,7 +83,7 @@ def board_tables(
         hinge_limit=base.hinge_limit * _guarded(base, closed),
         hinge_reach=base.hinge_reach,
         hinge_stiffness=base.hinge_stiffness,
-        farthest=max(own.farthest, *d0, 0.0),
+        farthest=max([own.farthest, *d0]) if sheets.panels else 0.0,
     )
 
 

@@ -181,10 +181,6 @@ class ContactTerm(Term):
         """Which of them (m,) chosen nodes (n,) alone move."""
         return chosen
 
-    def size(self, dofs: int) -> int:
-        """Size of the tangent of what touches, for one of so many dofs."""
-        return dofs
-
     def on_nodes(self, q: NDArray, force: NDArray) -> NDArray:
         """Forces (n, 3) on the nodes of forces (m, 3) on what touches, N."""
         return force
@@ -196,7 +192,8 @@ class ContactTerm(Term):
     def step_tangent(
         self, u0: NDArray, u1: NDArray, force: NDArray, inner: sparse.csr_array
     ) -> sparse.csr_array:
-        """Their derivative by the end of the step; `inner` is that of what touches, both N/m."""
+        """Their derivative (m, m) by the end of the step, N/m; `inner` that of what touches."""
+        inner.resize((u0.size, u0.size))
         return inner
 
     # ------------------------------------------------------------------ forces
