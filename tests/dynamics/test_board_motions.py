@@ -7,7 +7,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.mechanics.contact.term import ContactTerm
-from strips import strip
+from strips import overlap, section, strip
 
 T = 0.1
 SOFT = fd.Sheet(1e6, 0.3, T, 2.0)
@@ -29,6 +29,15 @@ def nearest(case: fd.Case, motion) -> float:
     contact: ContactTerm = case.contact_term
     states = motion.displacement.to_numpy()
     return min(contact.nearest(case.body.dofs(u))[1] for u in states)
+
+
+def deepest(case: fd.Case, motion) -> float:
+    """How deep (m) the sections of two boards reach into each other, at most."""
+    pattern, x = case.structure.pattern, case.structure.nodes
+    return max(
+        overlap(*(section(pattern, k, x + u) for k in (0, 1)))
+        for u in motion.displacement.to_numpy()
+    )
 
 
 def momenta(case: fd.Case, motion) -> list[float]:
@@ -56,10 +65,18 @@ def test_boards_rebound_and_keep_energy_and_momenta(method, dt, balance, turn):
     motion = fd.simulate(case, 0.4, method, dt, every=0.01, initial=initial)
     assert float(motion.contact.max()) > 0.0
     assert 0.9 < nearest(case, motion) < 1.0
+    assert deepest(case, motion) < 0.06 * T
     assert motion.attrs["energy_error"] < balance
     linear, angular = momenta(case, motion)
     assert linear < 1e-12
     assert angular < turn
+
+
+def test_without_contact_boards_pass_through_each_other():
+    case, initial = slammed()
+    case = case.altered(contact=None)
+    motion = fd.simulate(case, 0.4, "dormand_prince", every=0.01, initial=initial)
+    assert deepest(case, motion) > 0.3 * T
 
 
 def test_a_thick_miura_bounces_between_planes():
