@@ -72,6 +72,17 @@ def test_boards_rebound_and_keep_energy_and_momenta(method, dt, balance, turn):
     assert angular < turn
 
 
+def test_nothing_is_lost_but_by_friction_while_a_plane_lifts_boards():
+    """Work of the plane and of friction, of the boards on each other and on it, balance exactly."""
+    case, initial = slammed()
+    up = fd.Plane((0, 0, -1.1 * T), (0, 0, 1), motion=(0, 0, 0.2 * T), history=fd.Ramp(0.2))
+    case = case.altered(contact=fd.Contact(friction=0.3, planes=[up]))
+    motion = fd.simulate(case, 0.36, "energy_momentum", 1e-3, every=0.01, initial=initial)
+    assert float(motion.dissipated[-1]) > 0.0
+    assert float(motion.work[-1]) > 0.0
+    assert motion.attrs["energy_error"] < 1e-10
+
+
 def test_without_contact_boards_pass_through_each_other():
     case, initial = slammed()
     case = case.altered(contact=None)
