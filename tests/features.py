@@ -110,10 +110,6 @@ REASONS: Mapping[str, tuple[str, str]] = {
         "what rubs sticks or slides, so that no linear law describes small motions",
     ),
     "c": (
-        "which thick panels are hinged",
-        "contact lies between middle surfaces, beside which boards are hinged; not done",
-    ),
-    "d": (
         "creep",
         "load factors that the method finds may turn back, so that no step has a time in which "
         "creases creep",

@@ -11,8 +11,8 @@ from contact_cases import G, folded_from_both_ends, on_slope, tower, two_sheets
 import foldyn as fd
 from contact_sheets import crossing, strip
 from foldyn.checks import observed_order
-from foldyn.dynamics.implicit import touching
 from foldyn.errors import ComputationError, FoldynWarning
+from foldyn.mechanics.contact import term
 
 METHODS = ["newmark", "generalized_alpha"]
 
@@ -114,7 +114,7 @@ def test_no_step_is_too_long_to_see_what_is_in_its_way(monkeypatch):
     """In a step of 2 ms a sheet flies by more than its distance from another one."""
     facts, speed = met(2e-3)
     assert speed > 0.5 and facts["halved_steps"] > 0
-    monkeypatch.setattr(touching, "clear_share", lambda *given: 1.0)
+    monkeypatch.setattr(term, "clear_share", lambda *given: 1.0)
     facts, speed = met(2e-3)
     assert speed == 0.0 and facts["energy_error"] < 1e-9  # through it, without a trace
 

@@ -160,13 +160,6 @@ def test_a_start_behind_a_plane_or_inside_each_other_is_refused():
         fd.simulate(case, 1e-4)
 
 
-def test_thick_panels_are_refused():
-    thick = fd.thicken(fd.patterns.simple_fold(a=0.02, b=0.02, dihedral=90), SHEET.thickness)
-    case = fd.Case(fd.discretize(thick, SHEET), contact=fd.Contact())
-    with pytest.raises(InputError, match="contact: is between the middle surfaces"):
-        fd.simulate(case, 0.01)
-
-
 def test_samples_tell_where_a_sheet_touches():
     s, run = collided("dormand_prince")
     force = run.contact_force

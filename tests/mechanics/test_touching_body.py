@@ -30,7 +30,7 @@ def every_pair(tables, x, skin):
             first += d0 > 0.0 and vertex_gap(x, tables.triangles, v, t) <= d0 + skin
     for i in range(len(tables.edges)):
         for j in range(i + 1, len(tables.edges)):
-            d0 = edge_d0(tables.ranges, tables.edges, tables.edge_panels, i, j)
+            d0 = edge_d0(tables.ranges, tables.edges, tables.edge_nodes, tables.edge_panels, i, j)
             second += d0 > 0.0 and edge_gap(x, tables.edges, i, j) <= d0 + skin
     return first, second
 

@@ -6,10 +6,10 @@ import warnings
 
 import numpy as np
 import pytest
-from strips import overlap, section, strip
 
 import foldyn as fd
 from foldyn.errors import InputError
+from strips import overlap, section, strip
 
 T, W = 0.1, 1.0
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from strips import section, strip
 
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.structures.mass import rotational_inertia
+from strips import section, strip
 
 T, W, B, RHO = 0.1, 1.0, 0.6, 500.0  # m, m, m, kg/m3
 SHEET = fd.Sheet(1e8, 0.3, T, RHO)

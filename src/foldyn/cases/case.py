@@ -23,6 +23,8 @@ from foldyn.cases.supported import Supported
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
 from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.contact.board_term import BoardContactTerm
+from foldyn.mechanics.contact.boards import BoardSheets
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.patterns.picture import picture
 from foldyn.structures.discretized import read_only
@@ -169,8 +171,9 @@ class Case(Supported, Loaded, Damped):
         body = self.elastic_body
         if self.contact is None:
             return body
-        still = np.all(self.still, axis=1)
-        return body.with_terms(ContactTerm(self.contact.sheets(self.structure, still), body))
+        sheets = self.contact.sheets(self.structure, np.all(self.still, axis=1))
+        kind = BoardContactTerm if isinstance(sheets, BoardSheets) else ContactTerm
+        return body.with_terms(kind(sheets, body))
 
     @property
     def contact_term(self) -> ContactTerm:

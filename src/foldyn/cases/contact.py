@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from foldyn.cases.decode import Part, check_keys
 from foldyn.cases.history import History, as_history
 from foldyn.errors import InputError, within
+from foldyn.mechanics.contact.boards import BoardSheets
 from foldyn.mechanics.contact.potential import STIFFNESS
 from foldyn.mechanics.contact.tables import (
     FRICTION,
@@ -31,8 +32,8 @@ from foldyn.values import brief, flag, length, number, show, vector
 class Plane(Part):
     """A plane that the sheet cannot pass: the ground, the plate of a press; fixed or moving.
 
-    It meets the nodes of the sheet, at half the sheet's thickness from their middle surface; nodes
-    that are held along all three axes are left alone.
+    It meets the nodes of the sheet, or the corners of thick panels' middle surfaces, at half the
+    thickness; nodes that are held along all three axes are left alone.
 
     Parameters
     ----------
@@ -151,7 +152,7 @@ class Contact(Part):
         if stiffness is None:
             stiffness = STIFFNESS * float((moduli * own).min())
         origin = structure.nodes.mean(axis=0)  # far from the origin digits are lost
-        return Sheets(
+        sheets = Sheets(
             nodes=structure.nodes - origin,
             triangles=np.array(structure.triangles),
             panel=panel,
@@ -162,6 +163,13 @@ class Contact(Part):
             planes=self._table(origin),
             held=held,
         )
+        pattern = structure.pattern
+        if pattern is None or pattern.boards is None:
+            return sheets
+        x, normal = sheets.nodes[sheets.triangles], pattern.boards.normals[panel]
+        away = x - (pattern.boards.centers[panel] - origin)[:, None]
+        height = np.einsum("tci,ti->tc", away, normal)
+        return BoardSheets(**vars(sheets), middle=x - height[:, :, None] * normal[:, None])
 
     def friction_on(self, plane: Plane) -> float:
         """Coefficient of friction on a plane: its own, or else that of all."""

@@ -12,6 +12,7 @@ from scipy import sparse
 from foldyn.cases.case import Case
 from foldyn.cases.constraints import AGREES
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.mechanics.contact.tables import NORMAL, POINT
 from foldyn.mechanics.crossings import crossing_panels, pairs_text
 
 STRIDE = 5  # at every so manieth state panels that cross are looked for
@@ -35,7 +36,7 @@ def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
     Raises
     ------
     InputError
-        The structure takes no contact; a node is behind a plane, or in it; panels cross or meet.
+        A node is behind a plane, or in it; panels cross or meet.
 
     Warns
     -----
@@ -44,7 +45,6 @@ def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
     """
     if case.contact is None:
         return
-    _check_structure(case)
     _check_planes(case, u, moved)
     if case.contact.panels:
         _check_panels(case, u)
@@ -53,15 +53,14 @@ def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
 def _check_planes(case: Case, u: NDArray, moved: NDArray) -> None:
     """Refuse nodes that are behind a plane, or in it."""
     assert case.contact is not None
-    surface = np.unique(case.structure.triangles)
-    surface = surface[~case.still[surface].all(axis=1)]  # what stays where it is is left alone
-    if not len(surface):
+    contact, tables = case.contact_term, case.contact_term.tables
+    met = tables.meeting
+    if not len(met):
         return
-    tables = case.contact_term.tables
-    x, half = case.structure.nodes[surface] + u[surface], 0.5 * tables.node_thickness[surface]
-    for i, plane in enumerate(case.contact.planes):
-        point, normal = np.array(plane.point) + moved[i], np.array(plane.normal)
-        height = (x - point) @ normal / np.linalg.norm(normal)
+    x = (tables.rest + contact.points(u))[met]
+    surface, half = contact.nodes[met], 0.5 * tables.node_thickness[met]
+    for i, plane in enumerate(tables.planes):
+        height = (x - plane[POINT : POINT + 3] - moved[i]) @ plane[NORMAL : NORMAL + 3]
         if (height > NEAREST * half).all():
             continue
         worst = int(np.argmin(height / half))
@@ -77,15 +76,17 @@ def _check_planes(case: Case, u: NDArray, moved: NDArray) -> None:
 
 def _check_panels(case: Case, u: NDArray) -> None:
     """Refuse panels that cross or meet; warn where they overlap at rest."""
-    structure = case.structure
-    pairs = crossing_panels(structure.nodes + u, structure.triangles, structure.triangle_panel)
+    contact = case.contact_term
+    tables = contact.tables
+    x = tables.rest + contact.points(u)
+    pairs = crossing_panels(x, tables.triangles, tables.panel)
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]  # what a panel does to itself is no contact
     if len(pairs):
         raise InputError(
             f": at the start panels pass through each other: {pairs_text(pairs)}; {APART}",
             "contact",
         )
-    energy, share, panels = case.contact_term.nearest(case.body.dofs(u))
+    energy, share, panels = contact.nearest(case.body.dofs(u))
     most = f" ({pairs_text(panels)})" if len(panels) else ""
     if not (np.isfinite(energy) and share > NEAREST):
         raise InputError(
@@ -117,37 +118,38 @@ def check_driven(case: Case, states: Iterable[tuple[str, NDArray, NDArray]]) -> 
         A node of which supports decide how far it is from a plane comes behind it; or panels of
         which supports move all nodes cross.
     """
-    contact, structure = case.contact, case.structure
-    assert contact is not None
-    panels, triangles = structure.triangle_panel, structure.triangles
+    assert case.contact is not None
+    contact, tables = case.contact_term, case.contact_term.tables
     decided = np.all([_decided(case, axis) for axis in np.eye(3)], axis=0)
     centers, mean = _followers(case, decided)
     decided[centers] = True
-    held = decided[triangles].all(axis=1)
-    look = contact.panels and bool(case.imposed_terms) and len(np.unique(panels[held])) > 1
-    planes, still = [], case.still.all(axis=1)  # planes leave these alone
-    for plane in contact.planes:
-        normal = np.array(plane.normal) / np.linalg.norm(plane.normal)
-        meeting = _decided(case, normal) & ~still
-        nodes = np.intersect1d(triangles, np.flatnonzero(meeting))
-        planes.append((np.array(plane.point), normal, nodes))
+    held = decided[case.structure.triangles].all(axis=1)
+    triangles, panels = tables.triangles[held], tables.panel[held]
+    look = case.contact.panels and bool(case.imposed_terms) and len(np.unique(panels)) > 1
+    planes = []
+    for plane in tables.planes:
+        point, normal = plane[POINT : POINT + 3], plane[NORMAL : NORMAL + 3]
+        nodes = tables.meeting[contact.carried(_decided(case, normal))[tables.meeting]]
+        planes.append((point, normal, nodes))
     before, crossed = [], np.zeros((0, 2), np.int64)
     for k, (when, u, moved) in enumerate(states):
-        x = structure.nodes + u
+        x = tables.rest + contact.points(u)
         for i, (point, normal, nodes) in enumerate(planes):
             height = (x[nodes] - point - moved[i]) @ normal
             before += [height > 0.0] if k == 0 else []
             behind = np.flatnonzero(before[i] & (height <= 0.0))
             if behind.size:
+                node = contact.nodes[nodes[behind[0]]]
                 raise InputError(
-                    f": at {when} it has reached node {nodes[behind[0]]}, whose distance from it "
+                    f": at {when} it has reached node {node}, whose distance from it "
                     "supports decide: neither gives way. Stop the plane or the support before, or "
                     "let the node move along the plane's normal",
                     f"contact.planes[{i}]",
                 )
         if look and k % STRIDE == 0:
-            x[centers] = structure.nodes[centers] + mean @ u
-            pairs = crossing_panels(x, triangles[held], panels[held])
+            followed = u.copy()
+            followed[centers] = mean @ u
+            pairs = crossing_panels(tables.rest + contact.points(followed), triangles, panels)
             crossed = pairs if k == 0 else crossed
             new = [pair for pair in pairs.tolist() if pair not in crossed.tolist()]
             if new:
@@ -182,14 +184,3 @@ def _followers(case: Case, decided: NDArray) -> tuple[NDArray, sparse.csr_array]
     centers = centers[~decided[centers] & (beside[centers] @ ~decided == 0)]
     mean = sparse.csr_array(beside[centers] / beside[centers].sum(axis=1)[:, None])
     return centers, mean
-
-
-def _check_structure(case: Case) -> None:
-    """Refuse structures whose surface is not that of their panels."""
-    pattern = case.structure.pattern
-    if pattern is not None and pattern.boards is not None:
-        raise InputError(
-            ": is between the middle surfaces of a sheet, beside which thick panels are hinged; "
-            "leave out contact, or hinge_offset",
-            "contact",
-        )

@@ -46,7 +46,6 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, run_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.contact.memory import Memory
-from foldyn.mechanics.contact.tables import Tables
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import add_following
 from foldyn.mechanics.mean_forces import MeanForces
@@ -85,7 +84,7 @@ class EnergyMomentum(Scheme):
         contact = body.find(ContactTerm)
         if contact is not None:
             kept = body.kept(self.work, ContactTerm)
-            touch = StepContact(contact.tables, kept, packed.system.rows)
+            touch = StepContact(contact, kept, packed.system.rows)
         self._contact, equation = touch, self.equation
         balance = equation.balance.value
         self._terms = terms = MeanForces(body, self.work)
@@ -137,10 +136,10 @@ class EnergyMomentum(Scheme):
         matrix.add_following(u1, self.new.factor, 0.5)
         matrix.follow(0.5 * (u0 + u1), 1.0)
 
-    def contact_tangent(self, tables: Tables, memory: Memory, size: int) -> sparse.csr_array:
+    def contact_tangent(self, contact: ContactTerm, memory: Memory) -> sparse.csr_array:
         """See `Scheme`."""
         assert self._contact is not None
-        return self._contact.tangent(size)
+        return self._contact.tangent()
 
     def plane_push(self, before: NDArray, after: NDArray) -> NDArray:
         """See `Scheme`."""

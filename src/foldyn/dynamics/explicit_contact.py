@@ -101,11 +101,14 @@ def slow_contacts_down(equation, w, a):
 
 
 def slow_contacts(packed: Packed, work: Any, s: Scratch) -> Context | None:
-    """Context of slow contacts; none where their inertia would resist supports or planes."""
-    system, body = packed.system, packed.body
-    if not system.touches or system.moves or system.presses:
+    """Context of slow contacts; none where their inertia would resist supports or planes.
+
+    Nor have boards any, whose contacts reach more nodes.
+    """
+    system, body, contact = packed.system, packed.body, packed.body.find(ContactTerm)
+    if contact is None or not contact.eased or system.moves or system.presses:
         return None
-    tables, memory = body.term(ContactTerm).tables, body.kept(work, ContactTerm)
+    tables, memory = contact.tables, body.kept(work, ContactTerm)
     added = room_for(tables, memory)
     return Context(SlowContacts(system, packed.mass, s, tables, memory, added))
 

@@ -30,6 +30,8 @@ class Boards:
         Areas of the middle surfaces (m2).
     normals : ndarray, shape (np, 3)
         Unit normals of the boards towards the front.
+    centers : ndarray, shape (np, 3)
+        Means of the corners of their middle surfaces (m).
     """
 
     offsets: NDArray[np.int64]
@@ -59,6 +61,11 @@ class Boards:
     def normals(self) -> NDArray[np.float64]:
         """Unit normals of the boards (np, 3) towards the front."""
         return self._vectors / self.areas[:, None]
+
+    @cached_property
+    def centers(self) -> NDArray[np.float64]:
+        """Means of the corners of each board's middle surface (np, 3), m."""
+        return np.array([self.of(panel).mean(axis=0) for panel in range(len(self.thickness))])
 
     @cached_property
     def _vectors(self) -> NDArray[np.float64]:

@@ -75,11 +75,6 @@ class Plates:
 
         project : makes of forces on the body's dofs those on states.
         """
-        blocks = contact.plane_tangents(q)
-        nodal = blocks.shape[1] * 3
-        column, row = np.zeros((2, q.size))
-        column[:nodal] = -np.einsum("pnab,pb->na", blocks, self._motion).ravel()
-        row[:nodal] = -np.einsum("pnab,pa->nb", blocks, self._motion).ravel()
-        own = np.einsum("pnab,pa,pb->", blocks, self._motion, self._motion)
+        column, row, own = contact.plane_borders(q, self._motion)
         right, below = project(column)[:, None], project(row)[None, :]
         return sparse.csr_array(sparse.block_array([[matrix, right], [below, [[own]]]]))

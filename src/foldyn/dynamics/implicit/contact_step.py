@@ -35,8 +35,9 @@ from foldyn.mechanics.contact.potential import barrier
 from foldyn.mechanics.contact.rubbing import add_rub
 from foldyn.mechanics.contact.rubbing_tangent import add_rub_tangent
 from foldyn.mechanics.contact.search import list_pairs, place, use_all
-from foldyn.mechanics.contact.tables import FRICTION, NORMAL, Tables
+from foldyn.mechanics.contact.tables import FRICTION, NORMAL
 from foldyn.mechanics.contact.tangent import friction_tangent
+from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.dihedral import add_hessian
 from foldyn.mechanics.discrete_gradient import discrete_gradient
 
@@ -46,7 +47,7 @@ class StepContact:
 
     Parameters
     ----------
-    tables : Tables
+    contact : ContactTerm
     memory : Memory
         Its positions, planes and energy become those at the end of a step.
     rows : int
@@ -56,14 +57,18 @@ class StepContact:
     ----------
     force : ndarray, shape (rows, 3)
         Mean gradient (N) of the potential in a step, and friction.
-    push : ndarray, shape (q, n, 4)
-        Mean gradient (N) of friction of each plane at each node, and the normal force.
-    rub : ndarray, shape (n, 3)
+    push : ndarray, shape (q, m, 4)
+        Mean gradient (N) of friction of each plane at each point that touches, and the normal
+        force.
+    rub : ndarray, shape (m, 3)
         Mean gradient (N) of friction of panels on each other.
     """
 
-    def __init__(self, tables: Tables, memory: Memory, rows: int) -> None:
-        self._tables, self._memory = tables, memory
+    def __init__(self, contact: ContactTerm, memory: Memory, rows: int) -> None:
+        self._contact, self._tables, self._memory = contact, contact.tables, memory
+        self._ends = np.zeros((rows, 3)), np.zeros((rows, 3))
+        self._on_points = np.zeros_like(memory.x)
+        tables = contact.tables
         self.force, self.push = np.zeros((rows, 3)), np.zeros_like(memory.friction)
         self.rub = np.zeros_like(memory.x)
         self._start, self._middle = np.zeros((2, *memory.x.shape))
@@ -80,17 +85,19 @@ class StepContact:
         for moved, factor in zip(self._moved, (factor0, factor1), strict=True):
             move_planes(self._tables, factor, kept)
             moved[:] = kept.moved[:, :3]
-        self.force[:] = 0.0
-        self._counts = _find(self._tables, u0, u1, self._start, self._middle, kept, self._pairs)
-        kept.facts.energy = self._steps(False, self.force)[2]
+        self._ends, force = (u0.copy(), u1.copy()), self._on_points  # arrays that change in place
+        p0, p1 = self._contact.points(u0), self._contact.points(u1)
+        force[:] = 0.0
+        self._counts = _find(self._tables, p0, p1, self._start, self._middle, kept, self._pairs)
+        kept.facts.energy = self._steps(False, force)[2]
         if self._tables.friction > 0.0:
-            _add_rubs(
-                self._tables, self._middle, kept, self._pairs, *self._counts, self.rub, self.force
-            )
+            _add_rubs(self._tables, self._middle, kept, self._pairs, *self._counts, self.rub, force)
         _add_others(
             self._tables, self._start, self._middle, self._moved, kept, self._move, self.push,
-            self.force,
+            force,
         )  # fmt: skip
+        back = self._contact.step_back(*self._ends, force)
+        self.force[: len(back)] = back
 
     def _steps(self, tangent: bool, force: NDArray) -> tuple[NDArray, NDArray, float]:
         """Add the forces of the pairs that touch; nodes (k, 4), tangents (k, 12, 12), energy (J).
@@ -105,10 +112,10 @@ class StepContact:
         )  # fmt: skip
         return nodes, blocks, energy
 
-    def tangent(self, size: int) -> sparse.csr_array:
-        """Derivative (size, size), N/m, of the force of the last step with respect to its end."""
+    def tangent(self) -> sparse.csr_array:
+        """Derivative (m, m), N/m, of the force of the last step with respect to its end."""
         own, kept = self._tables, self._memory
-        nodes, blocks, _ = self._steps(True, np.zeros_like(self.force))
+        nodes, blocks, _ = self._steps(True, np.zeros_like(self._on_points))
         guards = np.zeros((len(own.hinge_limit), 4, 3, 4, 3))
         acts = _guard_tangents(own, self._start, kept.x, self._move, guards)
         nodes = np.concatenate([nodes, own.hinges[acts]])
@@ -120,7 +127,9 @@ class StepContact:
             met = np.flatnonzero(at_planes.any(axis=(1, 2)))
             pairs.append(np.column_stack([met, met]))
             entries.append(at_planes[met])
-        return assembled(np.concatenate(pairs), np.concatenate(entries), size)
+        size = self._on_points.size
+        inner = assembled(np.concatenate(pairs), np.concatenate(entries), size)
+        return self._contact.step_tangent(*self._ends, self._on_points, inner)
 
 
 @kernel

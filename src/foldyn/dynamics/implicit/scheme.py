@@ -20,8 +20,7 @@ from foldyn.dynamics.ties import hand_over
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.contact.memory import Memory
-from foldyn.mechanics.contact.tables import Tables
-from foldyn.mechanics.contact.term import contact_tangent
+from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import following_force
 from foldyn.mechanics.hinge_memory import HingeMemory
 
@@ -143,9 +142,9 @@ class Scheme(ABC):
     def change(self, h: float) -> NDArray:
         """Estimate of h^2/12 times the change of the acceleration in the step (n, 3), m."""
 
-    def contact_tangent(self, tables: Tables, memory: Memory, size: int) -> sparse.csr_array:
-        """Derivative (size, size), N/m, of the force of contact where it was evaluated last."""
-        return contact_tangent(tables, memory, size)
+    def contact_tangent(self, contact: ContactTerm, memory: Memory) -> sparse.csr_array:
+        """Derivative (m, m), N/m, of the force of contact where it was evaluated last."""
+        return contact.tangent_at(self.moved(), memory)
 
     def plane_push(self, before: NDArray, after: NDArray) -> NDArray:
         """Gradient of friction and normal force, both N, that do the work of planes in a step.

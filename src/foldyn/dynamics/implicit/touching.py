@@ -36,7 +36,7 @@ from foldyn.dynamics.implicit.scheme import (
     Scheme,
 )
 from foldyn.dynamics.system import place
-from foldyn.mechanics.contact.approach import KEEP, clear_share
+from foldyn.mechanics.contact.approach import KEEP
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import move_planes, slip
 from foldyn.mechanics.contact.rubbing import add_rubs, slip_pairs
@@ -57,11 +57,11 @@ class TouchingNewton(Newton):
     def __init__(self, scheme: Scheme, matrix: StepMatrix) -> None:
         super().__init__(scheme, matrix)
         body = scheme.packed.body
-        self._tables = body.term(ContactTerm).tables
+        self._contact = body.term(ContactTerm)
+        self._tables = self._contact.tables
         self._memory = body.kept(scheme.work, ContactTerm)
         self._memory.counts.lagged = 1
-        self._size = 3 * scheme.packed.system.rows
-        self._free = np.zeros(self._size, bool)
+        self._free = np.zeros(3 * scheme.packed.system.rows, bool)
         self._free[matrix.free] = True
         self._moved = np.zeros((len(self._tables.planes), 3))  # of planes at the start of the step
         self._pushed = self._memory.friction.copy()  # and what they did to nodes there
@@ -86,7 +86,8 @@ class TouchingNewton(Newton):
     def works(self) -> tuple[float, float]:
         """Work (J) of planes that move in a step that has been solved, and what friction took."""
         kept, scheme, done, lost = self._memory, self.scheme, 0.0, 0.0
-        motion = (scheme.moved() - scheme.displacement())[: len(kept.x)]
+        points = self._contact.points
+        motion = points(scheme.moved()) - points(scheme.displacement())
         if len(self._moved):
             push = scheme.plane_push(self._pushed, kept.friction)
             along = (kept.moved[:, :3] - self._moved)[:, None, :]
@@ -142,7 +143,7 @@ class TouchingNewton(Newton):
             end, moved = scheme.moved().copy(), kept.moved.copy()
             share = self._start(start, end - start, moved[:, :3] - self._moved)
             kept.moved[:] = moved
-            put_at(self._tables, end, kept)
+            put_at(self._tables, self._contact.points(end), kept)
             if share == 1.0:
                 return True
         scheme.shift[:] = predicted
@@ -154,7 +155,7 @@ class TouchingNewton(Newton):
 
     def _tangent(self) -> sparse.csr_array | None:
         """That of contact where forces were evaluated last; None where nothing touches."""
-        tangent = self.scheme.contact_tangent(self._tables, self._memory, self._size)
+        tangent = self.scheme.contact_tangent(self._contact, self._memory)
         return tangent if tangent.nnz else None
 
     def _along(self, h: float, t: float, step: NDArray) -> tuple[float, float]:
@@ -173,7 +174,7 @@ class TouchingNewton(Newton):
 
     def _clear(self, u: NDArray, step: NDArray, moves: NDArray, keep: float = KEEP) -> float:
         """Share of a step from u, both (rows, 3), that crosses nothing, as planes move (q, 3)."""
-        return clear_share(self._tables, self._memory, u, step, moves, keep)
+        return self._contact.clear_with(self._memory, u, step, moves, keep)
 
     def _predict(self, t: float) -> bool:
         """Cut the predicted motion to where nothing crosses; tells whether there is such a one.
@@ -212,14 +213,16 @@ class TouchingNewton(Newton):
     def _give_way(self, u: NDArray, moves: NDArray) -> None:
         """Push nodes before planes that would overtake them at u (rows, 3)."""
         own, met = self._tables, self._tables.meeting
-        start, d0 = self.scheme.displacement(), 0.5 * own.node_thickness[met]
-        free = self._free.reshape(-1, 3)[met]
+        points, nodes = self._contact.points, self._contact.nodes[met]
+        start, ahead = points(self.scheme.displacement()), points(u)
+        d0, free = 0.5 * own.node_thickness[met], self._free.reshape(-1, 3)
         for p in np.flatnonzero(moves.any(axis=1)):
             point, normal = own.planes[p, POINT : POINT + 3], own.planes[p, NORMAL : NORMAL + 3]
             gap = (own.rest[met] + start[met] - point - self._moved[p]) @ normal
-            now = (own.rest[met] + u[met] - point - self._moved[p] - moves[p]) @ normal
-            short = np.maximum(0.5 * np.minimum(gap, d0) - now, 0.0)
-            self.scheme.shift[met] += np.where(free, short[:, None] * normal, 0.0)
+            now = (own.rest[met] + ahead[met] - point - self._moved[p] - moves[p]) @ normal
+            short = np.zeros(len(free))
+            np.maximum.at(short, nodes, 0.5 * np.minimum(gap, d0) - now)
+            self.scheme.shift += np.where(free, short[:, None] * normal, 0.0)
 
 
 def _solved(goal: Goal, norm: float, reference: float, last: float) -> bool:

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import move_planes, plane_powers
+from foldyn.mechanics.contact.ride import (
+    Ride,
+    add_back,
+    put_lightness,
+    put_points,
+    put_rates,
+)
 from foldyn.mechanics.contact.rubbing import rub_power
 from foldyn.mechanics.contact.share import energy_of_all
 from foldyn.mechanics.contact.step_limit import Pace, limited
@@ -62,6 +70,64 @@ def _limit(own, u, v, a, dt, beta, energy, lightness):
     pace, light = Pace(beta, energy), numbers_at(lightness, own.rows)
     moved, speed, change = rows_at(u, own.rows), rows_at(v, own.rows), rows_at(a, own.rows)
     return limited(own.tables, moved, speed, change, own.angle, dt, pace, light, own.memory)
+
+
+class _Riding(NamedTuple):
+    ride: Ride
+    tables: Tables
+    memory: Memory
+    angle: NDArray
+    moved: NDArray  # (m, 3) of the points, as of nodes elsewhere,
+    speed: NDArray
+    change: NDArray
+    push: NDArray
+    lightness: NDArray  # (m,)
+    group: int
+    rows: int
+    histories: int
+
+
+@forces
+def _board_forces(own, u, v, t, force, powers):
+    at, both = rows_at(u, own.rows), numbers_at(powers, 2)
+    put_points(own.ride, at, own.moved)
+    put_rates(own.ride, at, rows_at(v, own.rows), own.speed)
+    own.push[:] = 0.0
+    add_contact(own.tables, own.moved, own.angle, own.push, own.memory)
+    given, taken = plane_powers(own.tables, own.speed, own.memory)
+    if own.tables.friction > 0.0:
+        taken += rub_power(own.tables, own.speed, own.memory)
+    both[0] += given
+    both[1] += taken
+    add_back(own.ride, at, own.push, rows_at(force, own.rows))
+
+
+@limit
+def _board_limit(own, u, v, a, dt, beta, energy, lightness):
+    at = rows_at(u, own.rows)
+    put_points(own.ride, at, own.moved)
+    put_rates(own.ride, at, rows_at(v, own.rows), own.speed)
+    put_rates(own.ride, at, rows_at(a, own.rows), own.change)
+    put_lightness(own.ride, numbers_at(lightness, own.rows), own.lightness)
+    pace, light, memory = Pace(beta, energy), own.lightness, own.memory
+    return limited(own.tables, own.moved, own.speed, own.change, own.angle, dt, pace, light, memory)
+
+
+def board_kernels(
+    ride: Ride, tables: Tables, memory: Memory, angle: NDArray, group: int
+) -> Compiled:
+    """The same of points that ride on a mesh."""
+    histories = 1 + int(tables.planes[:, HISTORY].max(initial=-1.0))
+    shape = ride.rest.shape
+    moved, speed, change, push = (np.zeros(shape) for _ in range(4))
+    own = Context(
+        _Riding(
+            ride, tables, memory, angle, moved, speed, change, push, np.zeros(shape[0]), group,
+            len(ride.x), histories,
+        )
+    )  # fmt: skip
+    kernels = {FORCES: _board_forces, ENERGIES: _energies, LIMIT: _board_limit}
+    return Compiled(own, kernels | ({PLACE_OBSTACLES: _place} if histories else {}))
 
 
 def contact_kernels(tables: Tables, memory: Memory, angle: NDArray, group: int) -> Compiled:

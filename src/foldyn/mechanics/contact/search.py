@@ -33,15 +33,16 @@ def panel_d0(ranges, v, panel):
 
 
 @inner
-def edge_d0(ranges, edges, panels, i, j):
-    """d0 (m) of two edges (e, 2) of some panels (e, 2); 0 if they share a panel or a node."""
-    a, b, c, d = edges[i, 0], edges[i, 1], edges[j, 0], edges[j, 1]
+def edge_d0(ranges, edges, nodes, panels, i, j):
+    """d0 (m) of two edges (e, 2) of some panels (e, 2); 0 if they share one, or a node (e, 2)."""
+    a, b, c, d = nodes[i, 0], nodes[i, 1], nodes[j, 0], nodes[j, 1]
     if a in (c, d) or b in (c, d):
         return 0.0
     if panels[i, 0] == panels[j, 0] or panels[i, 0] == panels[j, 1]:
         return 0.0
     if panels[i, 1] >= 0 and (panels[i, 1] == panels[j, 0] or panels[i, 1] == panels[j, 1]):
         return 0.0
+    a, b, c, d = edges[i, 0], edges[i, 1], edges[j, 0], edges[j, 1]
     best = math.inf
     for side in range(2):
         p, q = panels[i, side], panels[j, side]
@@ -133,6 +134,7 @@ def _pairs(tables, x, kind, far, skin, low, size, counts, half, start, items, me
     below, above = np.empty(3), np.empty(3)
     # taken out of their tuples, whose arrays would be counted for each pair
     surface, panels, edge_panels = tables.surface, tables.panel, tables.edge_panels
+    edge_nodes = tables.edge_nodes
     ranges, pairs = tables.ranges, memory.pairs[kind]
     ds, gaps = memory.d0[kind], memory.gap[kind]
     found, room = 0, len(ds)
@@ -158,7 +160,7 @@ def _pairs(tables, x, kind, far, skin, low, size, counts, half, start, items, me
                     elif other > e and _beside(x, elements, other, below, above):
                         gap = edge_gap(x, elements, e, other)
                         if gap <= far:
-                            d0 = edge_d0(ranges, elements, edge_panels, e, other)
+                            d0 = edge_d0(ranges, elements, edge_nodes, edge_panels, e, other)
                     if d0 == 0.0 or gap - d0 > skin:
                         continue
                     if found < room:

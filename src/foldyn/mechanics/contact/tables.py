@@ -86,6 +86,7 @@ class Tables(NamedTuple):
     rest: NDArray  # (n, 3) m
     triangles: NDArray  # (t, 3)
     edges: NDArray  # (e, 2)
+    edge_nodes: NDArray  # (e, 2) nodes of the mesh at its ends; edges that share one do not touch
     edge_square: NDArray  # (e,) squared lengths at rest, m2
     shared_side: NDArray  # (t, 3) 1/2 where a side is that of two triangles, else 0
     shared_corner: NDArray  # (n,) 1/n where n triangles close around a node, else 0
@@ -140,6 +141,7 @@ def tables(sheets: Sheets, hinges: NDArray) -> Tables:
         rest=nodes,
         triangles=triangles,
         edges=edges,
+        edge_nodes=edges,
         edge_square=square,
         shared_side=np.where(uses[side] == 2, 0.5, 0.0),
         shared_corner=np.where(closed, 1.0 / np.maximum(around, 1), 0.0),
@@ -149,9 +151,9 @@ def tables(sheets: Sheets, hinges: NDArray) -> Tables:
         ranges=Ranges(
             node_thickness=thickest,
             panel_thickness=np.ascontiguousarray(sheets.thickness, float),
-            own_start=_starts(own),
+            own_start=starts(own),
             own=_whole([panel for of in own for panel in of]),
-            near_start=_starts(near),
+            near_start=starts(near),
             near=_whole([panel for of in near for panel in sorted(of)]),
             near_d0=np.array(d0, float),
         ),
@@ -208,13 +210,8 @@ def near_panels(
     """Of each node, d0 (m) against the panels that share nodes with a panel of its own."""
     near: list[dict[int, float]] = [{} for _ in own]
     for panel, corners in enumerate(members):
-        shared: dict[int, list[int]] = {}
-        for node in corners.tolist():
-            for other in own[node]:
-                if other != panel:
-                    shared.setdefault(other, []).append(node)
-        for other, common in shared.items():
-            away = _distances(nodes, corners, common)
+        for other, common in shared_nodes(panel, corners, own).items():
+            away = distances(nodes, corners, common)
             most = ACROSS_CORNER if len(common) == 1 else ACROSS_CREASE
             t = 0.5 * (thickness[panel] + thickness[other])
             d0 = t * np.minimum(most, 2.0 * away / away.max())
@@ -224,7 +221,17 @@ def near_panels(
     return near
 
 
-def _distances(nodes: NDArray, corners: NDArray, common: list[int]) -> NDArray:
+def shared_nodes(panel: int, corners: NDArray, own: list[list[int]]) -> dict[int, list[int]]:
+    """Other panels of the corners of a panel, and which corners they share."""
+    shared: dict[int, list[int]] = {}
+    for node in corners.tolist():
+        for other in own[node]:
+            if other != panel:
+                shared.setdefault(other, []).append(node)
+    return shared
+
+
+def distances(nodes: NDArray, corners: NDArray, common: list[int]) -> NDArray:
     """Distances (k,) of nodes from a node, or from the line along several of them."""
     away = nodes[corners] - nodes[common[0]]
     if len(common) == 1:
@@ -291,7 +298,8 @@ def hinge_guards(
     return whole, limit, reach, strength
 
 
-def _starts(lists: list) -> NDArray:
+def starts(lists: list) -> NDArray:
+    """Where each of several lists begins if one follows the other."""
     return np.concatenate([[0], np.cumsum([len(of) for of in lists])]).astype(np.int64)
 
 

@@ -50,10 +50,16 @@ class ContactTerm(Term):
         What may touch.
     guarded : Assembly
         The terms before it, whose hinges it guards.
+
+    Attributes
+    ----------
+    eased : bool
+        Whether slow contacts may be given inertia.
     """
 
     energy_groups: ClassVar[Mapping[str, str]] = {GROUP: "energy of contact"}
     shared = True
+    eased: ClassVar[bool] = True
 
     def __init__(self, sheets: Sheets, guarded: Assembly) -> None:
         self.sheets, self._guarded = sheets, guarded
@@ -101,7 +107,7 @@ class ContactTerm(Term):
         planes = self.sheets.planes.copy()
         for plane, row in rows.items():
             planes[plane, HISTORY] = row
-        return ContactTerm(replace(self.sheets, planes=planes), self._guarded)
+        return type(self)(replace(self.sheets, planes=planes), self._guarded)
 
     # ------------------------------------------------------------------ as a term
     def compiled(self, work: Any, kept: Memory, group: int) -> Compiled:
@@ -126,20 +132,28 @@ class ContactTerm(Term):
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
         """See `Term`."""
         self.contact(q)
-        return contact_tangent(self.tables, self.memory, q.size)
+        return self.tangent_at(q, self.memory)
+
+    def tangent_at(self, q: NDArray, kept: Memory) -> sparse.csr_array:
+        """The same at q (m,) or (rows, 3), where contact was evaluated last with this memory."""
+        return contact_tangent(self.tables, kept, q.size)
 
     def placed(self, order: NDArray, before: Assembly) -> ContactTerm:
         """See `Term`."""
-        return ContactTerm(self.sheets.placed(order), before)
+        return type(self)(self.sheets.placed(order), before)
 
     def nominal(self, q: NDArray) -> None:
         """See `Term`: none."""
 
     def holds(self, q: NDArray) -> sparse.csr_array:
         """See `Term`: planes hold nodes that touch them, panels each other, friction all axes."""
+        return self.held(q, q.size)
+
+    def held(self, q: NDArray, size: int) -> sparse.csr_array:
+        """The same rows (s, size) of the motions of the points that touch."""
         self.contact(q)
-        on_planes = held_by_planes(self.tables, self.memory, q.size)
-        on_panels = held_by_panels(self.tables, self.memory, q.size)
+        on_planes = held_by_planes(self.tables, self.memory, size)
+        on_panels = held_by_panels(self.tables, self.memory, size)
         return sparse.csr_array(sparse.vstack([on_planes, on_panels]))
 
     def unstrained(self, q: NDArray) -> Unstrained | None:
@@ -153,10 +167,44 @@ class ContactTerm(Term):
             lambda motion: float(np.abs(held @ motion).max() / np.abs(motion).max()),
         )
 
+    # ------------------------------------------------------------------ points that touch
+    def points(self, q: NDArray) -> NDArray:
+        """Displacements (m, 3) of what touches, m: the nodes."""
+        return nodal(q)[: len(self.tables.rest)]
+
+    @property
+    def nodes(self) -> NDArray:
+        """Nodes (m,) that each moves with."""
+        return np.arange(len(self.tables.rest))
+
+    def carried(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which of them (m,) chosen nodes (n,) alone move."""
+        return chosen
+
+    def on_nodes(self, q: NDArray, force: NDArray) -> NDArray:
+        """Forces (n, 3) on the nodes of forces (m, 3) on what touches, N."""
+        return force
+
+    def step_back(self, u0: NDArray, u1: NDArray, force: NDArray) -> NDArray:
+        """The same in a step: they do the work of those on what touches."""
+        return force
+
+    def step_tangent(
+        self, u0: NDArray, u1: NDArray, force: NDArray, inner: sparse.csr_array
+    ) -> sparse.csr_array:
+        """Their derivative (m, m) by the end of the step, N/m; `inner` that of what touches."""
+        inner.resize((u0.size, u0.size))
+        return inner
+
     # ------------------------------------------------------------------ forces
     def contact(self, q: NDArray) -> tuple[float, NDArray]:
         """Energy (J) of contact alone and the force (n, 3), N, against it, friction included."""
-        u = nodal(q)[: len(self.tables.rest)]
+        energy, force = self.touching(q)
+        return energy, self.on_nodes(q, force)
+
+    def touching(self, q: NDArray) -> tuple[float, NDArray]:
+        """The same with the force (m, 3) on the points that touch."""
+        u = self.points(q)
         force = np.zeros_like(u)
         self.prepare()
         tables, kept = self._contexts
@@ -188,17 +236,23 @@ class ContactTerm(Term):
 
     def touch(self, q: NDArray) -> NDArray:
         """Size (n,), N, of the force of contact on each node, without friction."""
-        force, kept = self.contact(q)[1], self.memory
+        force, kept = self.touching(q)[1], self.memory
         rub = np.zeros_like(force)
         if self.tables.friction > 0.0:
             add_rubs(self.tables, kept, rub)
-        return np.linalg.norm(force - rub - kept.friction[:, :, :3].sum(axis=0), axis=1)
+        force = force - rub - kept.friction[:, :, :3].sum(axis=0)
+        return np.linalg.norm(self.on_nodes(q, force), axis=1)
 
     def clear(self, q: NDArray, step: NDArray, moves: NDArray, keep: float = KEEP) -> float:
         """Share of a step (m,) from q in which nothing crosses, while planes move (p, 3), m."""
         self.prepare()
-        u, motion = (nodal(one)[: len(self.tables.rest)] for one in (q, step))
-        return clear_share(self.tables, self.memory, u, motion, moves, keep)
+        return self.clear_with(self.memory, q, step, moves, keep)
+
+    def clear_with(
+        self, kept: Memory, q: NDArray, step: NDArray, moves: NDArray, keep: float
+    ) -> float:
+        """The same with some memory, where its planes are."""
+        return clear_share(self.tables, kept, self.points(q), self.points(step), moves, keep)
 
     def plane_forces(self, q: NDArray) -> NDArray:
         """Force (p, 3), N, of each plane on the nodes, without friction."""
@@ -211,10 +265,24 @@ class ContactTerm(Term):
         self.contact(q)
         return -self.memory.friction[:, :, :3].sum(axis=1)
 
-    def plane_tangents(self, q: NDArray) -> NDArray:
-        """Derivatives (p, n, 3, 3), N/m, of the forces against each plane."""
+    def plane_borders(self, q: NDArray, motion: NDArray) -> tuple[NDArray, NDArray, float]:
+        """Derivatives, N/m, of forces by a way of all planes along their motions (p, 3).
+
+        That of the force on the dofs (m,), that of what moves the planes by the dofs (m,), and that
+        of this by the way.
+        """
         self.contact(q)
-        return plane_tangents(self.tables, self.memory.x, self.memory)
+        blocks = plane_tangents(self.tables, self.memory.x, self.memory)
+        column = -np.einsum("pnab,pb->na", blocks, motion)
+        row = -np.einsum("pnab,pa->nb", blocks, motion)
+        own = float(np.einsum("pnab,pa,pb->", blocks, motion, motion))
+        return self._on_dofs(q, column), self._on_dofs(q, row), own
+
+    def _on_dofs(self, q: NDArray, force: NDArray) -> NDArray:
+        """Forces (m,) on the dofs of those on what touches."""
+        out, nodes = np.zeros(q.size), self.on_nodes(q, force)
+        out[: nodes.size] = nodes.ravel()
+        return out
 
 
 def contact_tangent(own: Tables, kept: Memory, size: int) -> sparse.csr_array:

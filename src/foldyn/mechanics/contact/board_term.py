@@ -1,0 +1,140 @@
+"""Contact of boards, as solvers see it: that of points that ride on the mesh."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.jit.context import Context
+from foldyn.mechanics.contact.approach import clear_share
+from foldyn.mechanics.contact.boards import BoardSheets, board_tables
+from foldyn.mechanics.contact.forces import add_contact
+from foldyn.mechanics.contact.kernels import board_kernels
+from foldyn.mechanics.contact.memory import Memory, memory
+from foldyn.mechanics.contact.ride import (
+    Ride,
+    add_back,
+    carried,
+    curvature,
+    jacobian,
+    largest_turn,
+    put_points,
+    step_jacobian,
+)
+from foldyn.mechanics.contact.tables import Tables
+from foldyn.mechanics.contact.term import ContactTerm, contact_tangent
+from foldyn.mechanics.term import Compiled, nodal
+
+STRAIGHT = 0.1  # rad: in turns up to that points go as if along straight lines
+MOST = 64  # such pieces of a step
+
+
+class BoardContactTerm(ContactTerm):
+    """Contact of points y(x) that ride on the mesh; see `ContactTerm`.
+
+    Kernels of contact take y for nodes. Forces come back by the transpose of dy/dx, tangents with
+    the second derivative of y.
+    """
+
+    sheets: BoardSheets
+    shared = eased = False
+
+    @cached_property
+    def _riding(self) -> tuple[Ride, NDArray, NDArray]:
+        return self.sheets.riding()
+
+    @property
+    def ride(self) -> Ride:
+        """The points."""
+        return self._riding[0]
+
+    @cached_property
+    def tables(self) -> Tables:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """See `ContactTerm`."""
+        return board_tables(self.sheets, *self._riding, self._guarded.hinges)
+
+    def compiled(self, work: Any, kept: Memory, group: int) -> Compiled:
+        """See `Term`."""
+        return board_kernels(self.ride, self.tables, kept, work.angle, group)
+
+    def memories(self, works: Sequence[Any]) -> list[Memory]:
+        """See `Term`."""
+        return [memory(self.tables, self.sheets.panels)]
+
+    def points(self, q: NDArray) -> NDArray:
+        """See `ContactTerm`: those that ride, and the nodes."""
+        out = np.empty_like(self.ride.rest)
+        put_points(Context(self.ride), nodal(q), out)
+        return out
+
+    @property
+    def nodes(self) -> NDArray:
+        """See `ContactTerm`."""
+        return self._riding[2]
+
+    def carried(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """See `ContactTerm`."""
+        return carried(self.ride, chosen)
+
+    def on_nodes(self, q: NDArray, force: NDArray) -> NDArray:
+        """See `ContactTerm`."""
+        out = np.zeros_like(self.ride.x)
+        add_back(Context(self.ride), nodal(q), force, out)
+        return out
+
+    def step_back(self, u0: NDArray, u1: NDArray, force: NDArray) -> NDArray:
+        """See `ContactTerm`."""
+        motion = step_jacobian(self.ride, u0, u1, self.ride.x.size)
+        return (motion.T @ force.ravel()).reshape(-1, 3)
+
+    def step_tangent(
+        self, u0: NDArray, u1: NDArray, force: NDArray, inner: sparse.csr_array
+    ) -> sparse.csr_array:
+        """See `ContactTerm`; that of the motion of points is of the first order in the step."""
+        ride, size = self.ride, u0.size
+        motion, ahead = step_jacobian(ride, u0, u1, size), jacobian(ride, u1, size)
+        bent = curvature(ride, 0.5 * (u0 + u1), force, size)
+        return sparse.csr_array(motion.T @ inner @ ahead + 0.5 * bent)
+
+    def tangent_at(self, q: NDArray, kept: Memory) -> sparse.csr_array:
+        """See `ContactTerm`."""
+        tables, push = self.tables, np.zeros_like(kept.x)
+        add_contact(
+            Context(tables), kept.x - tables.rest, self._guarded.angles(q), push, Context(kept)
+        )
+        motion = jacobian(self.ride, nodal(q), q.size)
+        inner = contact_tangent(tables, kept, push.size)
+        bent = curvature(self.ride, nodal(q), push, q.size)
+        return sparse.csr_array(motion.T @ inner @ motion + bent)
+
+    def holds(self, q: NDArray) -> sparse.csr_array:
+        """See `Term`."""
+        rows = self.held(q, self.ride.rest.size) @ jacobian(self.ride, nodal(q), q.size)
+        size = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel())
+        return sparse.csr_array(sparse.diags_array(1.0 / size) @ rows)
+
+    def clear_with(
+        self, kept: Memory, q: NDArray, step: NDArray, moves: NDArray, keep: float
+    ) -> float:
+        """See `ContactTerm`: along pieces of a straight step, in which points hardly turn."""
+        u, motion = nodal(q), nodal(step)
+        turn = largest_turn(self.ride, u, motion)
+        if not turn < math.inf:
+            return 0.0
+        pieces = max(1, math.ceil(turn / STRAIGHT))
+        planes, before, done = kept.moved[:, :3].copy(), self.points(u), 0.0
+        for k in range(min(pieces, MOST)):
+            after = self.points(u + (k + 1) / pieces * motion)
+            kept.moved[:, :3] = planes + k / pieces * moves
+            share = clear_share(self.tables, kept, before, after - before, moves / pieces, keep)
+            before, done = after, (k + share) / pieces
+            if share < 1.0:
+                break
+        kept.moved[:, :3] = planes
+        return done
