@@ -118,7 +118,10 @@ def test_creases_cannot_be_held_straight_in_bars_and_hinges():
     ("support", "text"),
     [
         (lambda: fd.Fix([0, 8], along=True), r"along: no edge .* nodes = \[0, 8\]; name them"),
-        (lambda: fd.Fix([0, 1], along="yes"), 'along = "yes": must be True or False'),
+        (
+            lambda: fd.Fix([0, 1], along="yes"),  # pyright: ignore[reportArgumentType]
+            'along = "yes": must be True or False',
+        ),
     ],
 )
 def test_refusals(support, text):
