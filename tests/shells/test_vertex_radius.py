@@ -44,7 +44,7 @@ def at_vertices(mesh, pattern):
 # ------------------------------------------------------------------ mesh
 
 
-@pytest.mark.parametrize("divisions", [4, 6, 9])
+@pytest.mark.parametrize("divisions", [4, 8])
 def test_triangles_fit_together(pattern, divisions):
     mesh = mesh_of(pattern, divisions)
     assert np.array_equal(mesh.nodes[: len(pattern.vertices)], pattern.vertices)
@@ -93,7 +93,7 @@ def test_rays_and_arcs_get_finer_alike():
     counts = [grading(SQUARE, n, 0.01) for n in (4, 8, 16)]
     assert [each.rays for each in counts] == [1, 2, 4]
     steps = [each.arcs - 1 for each in counts]
-    assert steps == pytest.approx(steps[0] * np.array([1, 2, 4]), abs=3)
+    assert steps == [steps[0], 2 * steps[0], 4 * steps[0]]
 
 
 def test_without_a_radius_nothing_changes():
@@ -234,7 +234,7 @@ def test_a_clamped_edge_that_is_moved_stays_straight():
         ({"vertex_radius": 0.3}, "vertex_radius = 0.3: an edge .* take at most a quarter .*0.25"),
         ({"vertex_radius": -1.0}, "vertex_radius = -1.0"),
         ({"vertex_radius": "t"}, "vertex_radius"),
-        ({"divisions": 3}, "divisions = 3: must be a whole number, at least 4"),
+        ({"divisions": 6}, "divisions = 6: with a vertex_radius it is a multiple of 4; take 8"),
     ],
 )
 def test_refusals(changes, text):

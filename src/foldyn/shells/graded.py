@@ -93,8 +93,15 @@ def grading(pattern: Pattern, divisions: int, radius: float) -> Grading:
     Raises
     ------
     InputError
-        An edge is shorter than four radii.
+        The divisions are no multiple of 4, with which rays and arcs grow alike; an edge is shorter
+        than four radii.
     """
+    if divisions % 4:
+        raise InputError(
+            f" = {divisions}: with a vertex_radius it is a multiple of 4; take "
+            f"{4 * math.ceil(divisions / 4)}",
+            "divisions",
+        )
     ends = pattern.vertices[pattern.lines]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     if length.min() < 2.0 * ROOM * radius:
@@ -103,5 +110,6 @@ def grading(pattern: Pattern, divisions: int, radius: float) -> Grading:
             f"quarter of that, {0.5 * length.min() / ROOM:.3g}",
             "vertex_radius",
         )
-    arcs = 1 + math.ceil(divisions / PER_LOG * math.log(0.5 * length.max() / radius))
-    return Grading(radius, arcs, -(-divisions // 4))
+    rays = divisions // 4
+    arcs = 1 + rays * math.ceil(4.0 / PER_LOG * math.log(0.5 * length.max() / radius))
+    return Grading(radius, arcs, rays)

@@ -41,7 +41,6 @@ from foldyn.values import choice, length, show, whole
 
 MASSES = {"lumped": "centroid", "consistent": "consistent"}  # and the rules they are
 STIFF = 1e3  # times the stiffness in the plane: corners about vertices that count as rigid
-LEAST_GRADED = 4  # divisions, where even one has a ray to the middle of each edge and between
 PER_NODE = 16_000.0
 """Bytes a node with its tangent: 14,200 and 16,000 measured with 3,721 and 14,641 nodes."""
 PER_DOUBLING, LEAST = 5900.0, 1450
@@ -358,7 +357,7 @@ def shell(
     vertex_radius : float, optional
         Distance from every vertex (m), about the thickness of the sheet, within which panels do not
         stretch. The mesh gets finer toward vertices, down to it; away from them it is about as fine
-        as an even one, and `divisions` (at least 4) says how fine. Without it forces in the plane
+        as an even one of so many `divisions`, a multiple of 4. Without it forces in the plane
         meet at points, and frequencies of large sheets and towers fall with every mesh.
 
     Returns
@@ -381,7 +380,7 @@ def shell(
     pattern, sheet = checked_kinds(pattern, sheet)
     doubt_units(pattern, sheet)
     radius = None if vertex_radius is None else length("vertex_radius", vertex_radius)
-    divisions = whole("divisions", divisions, least=1 if radius is None else LEAST_GRADED)
+    divisions = whole("divisions", divisions, least=1)
     choice("mass", mass, MASSES)
     hinge_law(fold_law, "fold_law")
     edges = boundary_edges(clamped, pattern, "clamped")
