@@ -47,8 +47,10 @@ DATA: Calls = {
         "density": 1000.0,
     }),
     "Laminate": (fd.Laminate, {"layers": [(0.5, 1e9, 0.125), (0.25, 2e9, 0.25)]}),
-    "Fix": (fd.Fix, {"nodes": [0, 1], "axes": "xy"}),
-    "Impose": (fd.Impose, {"nodes": [0, 1], "axis": "x", "value": [0.5, 0.25]}),
+    "Fix": (fd.Fix, {"nodes": [0, 1], "axes": "xy", "along": False}),
+    "Impose": (fd.Impose, {
+        "nodes": [0, 1], "axis": "x", "value": [0.5, 0.25], "along": False,
+    }),
     "BaseMotion": (fd.BaseMotion, {"axis": "x", "value": 0.5, "history": fd.Ramp(1.0)}),
     "Spring": (fd.Spring, {
         "stiffness": 2.0, "between": [(0, 1)], "rest_length": 0.5,
@@ -120,9 +122,9 @@ DATA: Calls = {
         "clamped": [], "rigid": None, "straight": [], "membrane": "bars", "preset": "plate",
     }),
     "shell": (fd.shell, {
-        "pattern": pattern(), "sheet": sheet(), "divisions": 2, "mass": "lumped",
+        "pattern": pattern(), "sheet": sheet(), "divisions": 4, "mass": "lumped",
         "fold_law": "enhanced", "crease_stiffness": 0.5, "crease_rest": 90.0,
-        "clamped": [(0, 1)], "rigid": [0],
+        "clamped": [(0, 1)], "rigid": [0], "vertex_radius": 0.05,
     }),
 }  # fmt: skip
 

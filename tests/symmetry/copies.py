@@ -248,7 +248,7 @@ FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     # what no symmetry changes
     **dict.fromkeys(("history", "value", "axes", "axis", "name", "rest", "state"), Copy.same),
     **dict.fromkeys(("count", "scheme", "mass", "bar_law", "calibration", "divisions"), Copy.same),
-    "membrane": Copy.same,
+    **dict.fromkeys(("membrane", "vertex_radius", "along"), Copy.same),
     **dict.fromkeys(("youngs_modulus", "poissons_ratio", "thickness", "density"), Copy.same),
     **dict.fromkeys(("length_scale_ratio", "fraction", "change", "expansion"), Copy.same),
     **dict.fromkeys(("stiffness", "rest_length", "coefficient", "alpha", "beta"), Copy.same),

@@ -111,6 +111,7 @@ FIELDS: Mapping[str, Callable[[Scene, dict], Any]] = {
     "acceleration": lambda s, _: s.vector(s.force / s.mass),
     "direction": lambda s, _: s.vector(1.0) if s.rng.random() < 0.8 else "-z",
     "axes": lambda s, _: _axes(s),
+    "along": lambda s, _: bool(s.rng.random() < 0.5),
     "axis": lambda s, _: str(s.rng.choice([*"xyz"])),
     "pressure": lambda s, _: s.about(s.force / s.pattern.face_areas.mean()),
     "moment": lambda s, given: s.each(s.moment, given["creases"]),
@@ -255,6 +256,7 @@ def structure_of(model: str, pattern: fd.Pattern, rng, extra: str) -> Any:
         "clamped": lambda: scene.pairs(pattern.boundary),
         "straight": lambda: scene.pairs(pattern.boundary),
         "membrane": lambda: str(rng.choice(["bars", "panel"])),
+        "vertex_radius": lambda: scene.size * rng.uniform(0.01, 0.03),
     }
     if model == "n5b8e":  # which a scheme stands for
         del options["scheme"]
@@ -263,6 +265,7 @@ def structure_of(model: str, pattern: fd.Pattern, rng, extra: str) -> Any:
     for name in (name for name in options if name in known):
         for _ in range(TRIES if rng.random() < 0.4 or (name == "fold_law" and memory) else 0):
             more = {**make, name: options[name]()}
+            more |= {"divisions": 4} if name == "vertex_radius" else {}
             try:
                 tried = build(pattern, sheet, **more)
                 _ = tried.mass  # some rules refuse some shapes

@@ -102,7 +102,8 @@ def _supports(
             bases.append((i, support))
         elif "axis" in support and atrest:
             left.append(f"the displacement of supports[{i}]")
-            kept.append({"nodes": support["nodes"], "axes": support["axis"]})
+            own = {key: support[key] for key in ("nodes", "along") if key in support}
+            kept.append({**own, "axes": support["axis"]})
         else:
             kept.append(_without(support, "history"))
     return kept, bases

@@ -20,6 +20,7 @@ from foldyn.analyses.registry import ANALYSES, schema_of
 from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
+from foldyn.cases.straight import straightened
 from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.input_files import from_toml, path_of, read_text
 from foldyn.patterns import GENERATORS, Pattern, convex, thicken, welded
@@ -127,7 +128,7 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
     kind, faults = ANALYSES[schema.analysis.kind], Faults()
     pattern: Any = None
     sheet: Any = None
-    default = ""
+    resolved: Any = None
     with faults.collected():
         pattern = _pattern(schema.pattern, path.parent)
     with faults.collected():
@@ -140,9 +141,12 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
     with within("", path):
         with faults.collected(), within("model: "):
             welds = bool(len(getattr(pattern, "welds", ())))  # no pattern where it is at fault
-            default = model.options(welds=welds, **schema.model.options).mass
+            resolved = model.options(welds=welds, **schema.model.options)
         faults.tell()
-        masses = list(schema.model.mass or [default])[: None if kind.by_mass else 1]
+        with within("model: "):
+            straight = straightened(resolved, pattern, schema.supports)
+        options = {**schema.model.options, **straight}
+        masses = list(schema.model.mass or [resolved.mass])[: None if kind.by_mass else 1]
         if schema.model.kind == SHELL:
             _check_vertices(schema, len(pattern.vertices))
         with within("damping"):
@@ -151,7 +155,7 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
     def make(mass: str) -> Case:
         """Make the case with one mass rule."""
         with within("model: ", path):
-            structure = model.make(pattern, sheet, mass=mass, **schema.model.options)
+            structure = model.make(pattern, sheet, mass=mass, **options)
             if sheet.density is not None:
                 _ = structure.mass  # a rule may refuse this pattern: say so before anything runs
         with within("", path):

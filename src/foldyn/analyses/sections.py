@@ -204,6 +204,7 @@ class ModelSection(Section):
     crease_rest: PerCrease = None
     clamped: Edges = None
     rigid: Rigid = None
+    vertex_radius: Positive | None = None
     straight: Edges = None
     membrane: Annotated[Any, one_of(MEMBRANES)] = None
 

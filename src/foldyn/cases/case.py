@@ -19,6 +19,7 @@ from foldyn.cases.history import History, as_history
 from foldyn.cases.loaded import Loaded
 from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
+from foldyn.cases.straight import supported_points
 from foldyn.cases.supported import Supported
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
 from foldyn.errors import Faults, FoldynWarning, InputError, within
@@ -145,7 +146,7 @@ class Case(Supported, Loaded, Damped):
         faults = Faults()
         for place, support in self._supports(Fix, Impose, Link):
             with faults.collected():
-                self._nodes_of(place, support)
+                supported_points(self.structure, support, place)
         self._check_damping(faults)
         for name in ("terms", "point_masses"):
             with faults.collected():

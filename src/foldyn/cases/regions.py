@@ -48,16 +48,15 @@ def resolve_edges(structure: Any, edges: Any, name: str) -> NDArray[np.int64]:
         raise InputError(
             f"{name} = {show(edges)}: this structure has no pattern with edges; give nodes"
         )
-    along = structure.edge_nodes
-    ends = along[:, [0, -1]]
     if isinstance(edges, str):
-        chosen = np.isin(ends, resolve_nodes(structure, edges, name)).all(axis=1)
-        if not chosen.any():
+        found = edges_between(structure, resolve_nodes(structure, edges, name))
+        if not len(found):
             raise InputError(
                 f' = "{edges}": selects no edge, which needs both of its ends; give {PAIRS}', name
             )
-        return along[chosen]
-    rows = edge_lookup(ends)
+        return found
+    along = structure.edge_nodes
+    rows = edge_lookup(along[:, [0, -1]])
     for pair in edges:
         if pair not in rows:
             raise InputError(
@@ -65,6 +64,12 @@ def resolve_edges(structure: Any, edges: Any, name: str) -> NDArray[np.int64]:
                 name,
             )
     return along[[rows[pair] for pair in edges]]
+
+
+def edges_between(structure: Any, nodes: NDArray) -> NDArray[np.int64]:
+    """Nodes (k, p) along each of the edges of which both ends are among some nodes."""
+    along = structure.edge_nodes
+    return along[np.isin(along[:, [0, -1]], nodes).all(axis=1)]
 
 
 def check_panels(name: str, panels: Any) -> str | tuple[int, ...]:

@@ -1,11 +1,108 @@
-"""Clamped edges stay straight: supports of both ends support the points between them."""
+"""Edges that are supported along their whole length, and the points of a mesh on them.
+
+Supports with `along` do so, and those of both ends of a clamped edge, which stays straight: points
+between move as the line between the ends.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from foldyn.cases.regions import edges_between
+from foldyn.cases.selection import resolve_nodes
+from foldyn.errors import InputError
+from foldyn.patterns import Pattern
+from foldyn.patterns.selection import select
+from foldyn.patterns.topology import Edge, edge_of
+from foldyn.structures.clamps import boundary_edges
+from foldyn.values import show
+
+
+def supported_points(
+    structure: Any, support: Any, place: str
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Nodes (k,) of a Fix, an Impose or a Link, and the values (k,) of an Impose there, m.
+
+    Raises
+    ------
+    InputError
+        `along` names no edge, or one that may bow.
+    """
+    named = resolve_nodes(structure, support.nodes, f"{place}.nodes")
+    value = np.broadcast_to(getattr(support, "value", 0.0), named.shape)
+    if not getattr(support, "along", False):
+        return named, value
+    edges = _edges(structure, support, named, place)
+    stated = np.zeros(len(structure.nodes))
+    stated[named] = value
+    inner = edges[:, 1:-1].ravel()
+    between = _between(structure, edges, stated[:, None])
+    return np.concatenate([named, inner]), np.concatenate([value, between.ravel()])
+
+
+def _edges(structure: Any, support: Any, named: NDArray, place: str) -> NDArray[np.int64]:
+    """Nodes (k, p) along the edges between those that a support names."""
+    if structure.pattern is None:
+        raise InputError(
+            ": this structure has no pattern with edges; leave it out", f"{place}.along"
+        )
+    edges = edges_between(structure, named)
+    if not len(edges):
+        raise InputError(
+            f": no edge of the pattern has both of its ends among nodes = {show(support.nodes)}; "
+            "name them, or leave it out",
+            f"{place}.along",
+        )
+    loose = [edge_of(*edge) for edge in edges[:, [0, -1]].tolist()]
+    loose = [edge for edge in loose if edge in structure.bowed_edges]
+    inside = sorted(set(loose) - _boundary(structure.pattern))
+    if inside:
+        raise InputError(
+            f": the crease {inside[0]} would have to be straight, which bars and hinges cannot say "
+            "of creases; hold its vertices by themselves, or take a shell",
+            f"{place}.along",
+        )
+    if loose:
+        given = support.nodes if isinstance(support.nodes, str) else list(map(list, loose))
+        raise InputError(
+            f": the edge {loose[0]} may bow between its ends; make the structure with straight = "
+            f"{show(given)}",
+            f"{place}.along",
+        )
+    return edges
+
+
+def _boundary(pattern: Pattern) -> set[Edge]:
+    return {edge_of(*edge) for edge in pattern.boundary.tolist()}
+
+
+def straightened(options: Any, pattern: Pattern, supports: Iterable[Any]) -> dict[str, Any]:
+    """What makes a structure with these options fit for supports along edges, where these may bow.
+
+    That is the option `straight`, with the edges of the boundary that are held along; or nothing.
+    """
+    if not getattr(options, "bowed", False):
+        return {}
+    straight = dict.fromkeys(boundary_edges(options.straight, pattern, "straight"))
+    for support in supports:
+        if getattr(support, "along", False):
+            named = support.nodes
+            nodes = set(select(pattern, named).tolist() if isinstance(named, str) else named)
+            held = (edge for edge in _boundary(pattern) if nodes.issuperset(edge))
+            straight |= dict.fromkeys(sorted(held))
+    return {"straight": tuple(straight)}
+
+
+def _between(structure: Any, edges: NDArray, vector: NDArray) -> NDArray[np.float64]:
+    """Values (k, p - 2, ...) at the inner points of edges (k, p), linear between their ends."""
+    x = structure.nodes[edges]
+    share = np.linalg.norm(x - x[:, :1], axis=2)
+    share = (share / share[:, -1:])[:, 1:-1, None]
+    return (1.0 - share) * vector[edges[:, :1]] + share * vector[edges[:, -1:]]
 
 
 class Straight:
@@ -19,19 +116,19 @@ class Straight:
     """
 
     def __init__(self, structure: Any, stated: NDArray[np.bool_]) -> None:
-        self._edges, self._stated = structure.clamped_nodes, stated
+        self._structure, self._stated = structure, stated
 
     def held(self) -> NDArray[np.bool_]:
         """Dofs (n, 3) that are supported in all."""
         held = self._stated.copy()
-        for nodes in self._edges:
+        for nodes in self._structure.clamped_nodes:
             held[nodes[1:-1]] |= held[nodes[0]] & held[nodes[-1]]
         return held
 
     def moved(self, imposed: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Those of a mask (n, 3), and points between ends of which one is among them."""
         both, moved = self.held(), imposed.copy()
-        for nodes in self._edges:
+        for nodes in self._structure.clamped_nodes:
             inner = nodes[1:-1]
             moved[inner] |= (
                 both[inner] & ~self._stated[inner] & (moved[nodes[0]] | moved[nodes[-1]])
@@ -41,8 +138,7 @@ class Straight:
     def carried(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
         """Displacements (n, 3), linear between the ends."""
         out, both = vector.copy(), self.held()
-        for nodes in self._edges:
-            inner, share = nodes[1:-1], np.linspace(0.0, 1.0, len(nodes))[1:-1, None]
-            between = (1.0 - share) * vector[nodes[0]] + share * vector[nodes[-1]]
+        for nodes in self._structure.clamped_nodes:
+            inner, between = nodes[1:-1], _between(self._structure, nodes[None], vector)[0]
             out[inner] = np.where(both[inner] & ~self._stated[inner], between, vector[inner])
         return out

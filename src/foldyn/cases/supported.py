@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases.constraints import Constraints
 from foldyn.cases.directions import AXES, unit_vector
-from foldyn.cases.selection import resolve_nodes
-from foldyn.cases.straight import Straight
+from foldyn.cases.straight import Straight, supported_points
 from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
 from foldyn.cases.terms import Summands, Terms, summed
 from foldyn.cases.ties import equations_of, values_of
@@ -48,7 +47,8 @@ class Supported:
         for place, support in self._supports(Impose):
             if support.axis is None:
                 continue
-            nodes, axis = self._nodes_of(place, support), AXES.index(support.axis)
+            nodes, _ = supported_points(self.structure, support, place)
+            axis = AXES.index(support.axis)
             for taken, both in ((self._held, "held and imposed"), (mask, "imposed twice")):
                 twice = nodes[taken[nodes, axis]]
                 if twice.size:
@@ -64,13 +64,10 @@ class Supported:
         """Whether a Fix holds each node along each axis, shape (n, 3)."""
         mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
         for place, support in self._supports(Fix):
-            nodes = self._nodes_of(place, support)
+            nodes, _ = supported_points(self.structure, support, place)
             for axis in support.axes or "":
                 mask[nodes, AXES.index(axis)] = True
         return mask
-
-    def _nodes_of(self, place: str, support: Any) -> NDArray[np.int64]:
-        return resolve_nodes(self.structure, support.nodes, f"{place}.nodes")
 
     @cached_property
     def constraints(self) -> Constraints:
@@ -113,9 +110,10 @@ class Supported:
 
     def _imposed(self) -> Summands:
         for place, support in self._supports(Impose):
-            vector, along = np.zeros((len(self.structure.nodes), 3)), {place: support.value}
+            nodes, value = supported_points(self.structure, support, place)
+            vector, along = np.zeros((len(self.structure.nodes), 3)), {place: value}
             if support.axis is not None:
-                vector[self._nodes_of(place, support), AXES.index(support.axis)] = support.value
+                vector[nodes, AXES.index(support.axis)] = value
                 along = {}
             yield self._tied(self._straight.carried(vector), place, along), support.history
 
@@ -127,8 +125,8 @@ class Supported:
     def _prescribed(self) -> Summands:
         for place, support in self._supports(Impose):
             vector = np.zeros((len(self.structure.nodes), 3))
-            along = np.multiply.outer(support.value, unit_vector(support.direction or support.axis))
-            vector[self._nodes_of(place, support)] = along
+            nodes, value = supported_points(self.structure, support, place)
+            vector[nodes] = np.multiply.outer(value, unit_vector(support.direction or support.axis))
             yield vector, support.history
 
     def _tied(self, shape: NDArray, place: str, values: Mapping[str, Any]) -> NDArray:

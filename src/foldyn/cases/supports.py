@@ -14,7 +14,7 @@ from foldyn.cases.history import History, as_history
 from foldyn.cases.selection import check_nodes
 from foldyn.cases.springs import Spring
 from foldyn.errors import InputError
-from foldyn.values import brief, indices, number, number_or_list, show
+from foldyn.values import brief, flag, indices, number, number_or_list, show
 
 
 @brief
@@ -31,17 +31,22 @@ class Fix(Part):
     direction : sequence of float, shape (3,), or str, optional
         Instead of axes: the displacement along this vector of any length, or along "x" to "-z", is
         held; across it the nodes slide, as on rollers on a plane with this normal.
+    along : bool
+        Whether the edges between these nodes are held too, along their whole length. Bars and
+        hinges whose edges may bow need those edges among the `straight` ones of `discretize`.
     """
 
     nodes: int | str | Sequence[int]
     axes: str | None = None
     direction: Sequence[float] | str | None = None
+    along: bool = False
 
-    keys = {"nodes": "nodes", "axes": "axes", "direction": "direction"}
+    keys = {"nodes": "nodes", "axes": "axes", "direction": "direction", "along": "along"}
 
     def __post_init__(self) -> None:
         """Check the arguments."""
         object.__setattr__(self, "nodes", check_nodes(self.nodes))
+        object.__setattr__(self, "along", flag("along", self.along))
         if self.direction is None:
             axes = "xyz" if self.axes is None else self.axes
             object.__setattr__(self, "axes", check_axes("axes", axes))
@@ -76,6 +81,9 @@ class Impose(Part):
         Factor of time; constant by default.
     direction : sequence of float, shape (3,), or str, optional
         Instead of the axis: a vector of any length, or "x" to "-z".
+    along : bool
+        Whether the edges between these nodes are moved too, each as the line between its ends; see
+        `Fix`.
     """
 
     nodes: int | str | Sequence[int]
@@ -83,8 +91,12 @@ class Impose(Part):
     value: float | Sequence[float] | None = None
     history: History | Callable[[Any], Any] | None = None
     direction: Sequence[float] | str | None = None
+    along: bool = False
 
-    keys = {"nodes": "nodes", "axis": "axis", "direction": "direction", "displacement": "value"}
+    keys = {
+        "nodes": "nodes", "axis": "axis", "direction": "direction", "displacement": "value",
+        "along": "along",
+    }  # fmt: skip
     missing = {
         "displacement": "give it (m), or write axes instead of axis to hold nodes",
     }
@@ -92,6 +104,7 @@ class Impose(Part):
     def __post_init__(self) -> None:
         """Check the arguments."""
         object.__setattr__(self, "nodes", check_nodes(self.nodes))
+        object.__setattr__(self, "along", flag("along", self.along))
         if (self.axis is None) == (self.direction is None):
             raise InputError(
                 ': give the axis of the displacement, as in axis = "x", or its direction, as in '

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from foldyn.cases.constraints import AGREES, STRUCTURE, Equation
 from foldyn.cases.directions import AXES, unit_vector
 from foldyn.cases.selection import resolve_nodes
+from foldyn.cases.straight import supported_points
 from foldyn.cases.supports import Fix, Impose, Link
 from foldyn.errors import InputError
 from foldyn.structures.rigid_plates import OFF_PLANE, on_plate
@@ -26,7 +27,7 @@ def equations_of(structure: Any, supports: Iterable[tuple[str, Any]]) -> list[Eq
     directions: list[Equation] = []
     links: list[Equation] = []
     for place, support in supports:
-        nodes = resolve_nodes(structure, support.nodes, f"{place}.nodes")
+        nodes, _ = supported_points(structure, support, place)
         if isinstance(support, Link):
             links += _link(structure, support, place, nodes)
         elif support.direction is not None:

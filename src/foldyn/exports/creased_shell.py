@@ -271,6 +271,11 @@ def _check(case: Case) -> None:
     wrong = (
         (structure.sheet.density is None, "sheet.density", "is missing; give it (kg/m3)"),
         (structure.pattern.boards is not None, "pattern", "has thick panels; give the thin one"),
+        (
+            structure.options.vertex_radius is not None,
+            "vertex_radius",
+            "panels do not stretch about vertices; leave it out",
+        ),
         (structure.options.rigid is not None, "rigid", "panels are rigid; let them bend"),
         (
             structure.options.crease_rest is not None,

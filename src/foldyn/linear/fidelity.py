@@ -14,6 +14,7 @@ import xarray
 
 from foldyn.algebra.extrapolation import convergence, extrapolated
 from foldyn.cases import Case
+from foldyn.cases.straight import straightened
 from foldyn.errors import FoldynWarning, InputError, within
 from foldyn.linear.compared import OWN, Fidelity
 from foldyn.linear.matched import SPARE, matched
@@ -26,7 +27,7 @@ from foldyn.materials import Superlinear
 from foldyn.materials.law import Law
 from foldyn.results import fidelity_dataset
 from foldyn.statics.tracing import check_movable
-from foldyn.structures import Structure, discretize
+from foldyn.structures import ModelOptions, Structure, discretize
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
 from foldyn.values import brief, choice, listed, number, show, whole
 
@@ -256,10 +257,12 @@ def _compared(case: Case, models: Any) -> dict[str, Case]:
     compared = {OWN: with_structure(case, structure)}
     _ = structure.mass  # its rule may refuse this pattern: say so before anything runs
     for name, changes in named(models, structure).items():
-        options = {**vars(structure.options), **changes}
-        if options == vars(structure.options):
-            continue
+        law = {"bar_law": None} if "membrane" in changes else {}  # that of the membrane
+        options = {**vars(structure.options), **law, **changes}
         with within(f"models: {name}: "):
+            options |= straightened(ModelOptions(**options), structure.pattern, case.supports)
+            if options == vars(structure.options):
+                continue
             other = discretize(structure.pattern, structure.sheet, **options)
             _ = other.mass
         compared[name] = with_structure(case, other)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around
+from foldyn.shells.graded import Grading
 from foldyn.structures.mesh import CUT, Triangle, check_triangles
 
 EQUAL = 1e-6  # relative difference of diagonals that counts as none
@@ -44,30 +47,36 @@ class _Points:
         self.all.append(point)
         return len(self.all) - 1
 
-    def line(self, a: int, b: int, divisions: int) -> list[int]:
-        """Nodes from a to b, both included, with new ones between them."""
+    def line(self, a: int, b: int, places: Iterable[float]) -> list[int]:
+        """Nodes from a to b, both included, with new ones at places of (0, 1) between them."""
         x, y = self.all[a], self.all[b]
-        inner = [self.add(x + (y - x) * (step / divisions)) for step in range(1, divisions)]
-        return [a, *inner, b]
+        return [a, *(self.add(x + (y - x) * place) for place in places), b]
 
 
-def shell_mesh(pattern: Pattern, divisions: int) -> ShellMesh:
+def shell_mesh(pattern: Pattern, divisions: int, graded: Grading | None = None) -> ShellMesh:
     """Cut every edge of a pattern into `divisions` pieces and its panels into triangles.
 
     Quadrilaterals get a grid whose cells are cut in two, triangles are divided evenly, and other
-    polygons are first cut into triangles about the mean of their corners.
+    polygons are first cut into triangles about the mean of their corners. Where they are `graded`,
+    that says how all are cut.
     """
     points = _Points(pattern.vertices)
-    edges = {(low, high): points.line(low, high, divisions) for low, high in pattern.lines.tolist()}
+    even = [step / divisions for step in range(1, divisions)]
+    edges = {}
+    for low, high in pattern.lines.tolist():
+        length = float(np.linalg.norm(pattern.vertices[high] - pattern.vertices[low]))
+        edges[low, high] = points.line(low, high, graded.places(length) if graded else even)
     triangles, panels = [], []
     for number, face in enumerate(pattern.faces):
         sides = [_side(edges, a, b) for a, b in around(face)]
-        if len(face) == 3:
+        if graded:
+            pieces = _graded(points, sides, graded)
+        elif len(face) == 3:
             pieces = _divided(points, sides)
         elif len(face) == 4:
             pieces = _grid(points, sides)
         else:
-            pieces = _fan(points, sides, divisions)
+            pieces = _fan(points, sides, even)
         triangles += pieces
         panels += [number] * len(pieces)
     nodes, rows, panel = np.array(points.all), np.array(triangles, np.int64), np.array(panels)
@@ -131,12 +140,31 @@ def _divided(points: _Points, sides: list[list[int]]) -> list[Triangle]:
     return out
 
 
-def _fan(points: _Points, sides: list[list[int]], divisions: int) -> list[Triangle]:
+def _fan(points: _Points, sides: list[list[int]], even: list[float]) -> list[Triangle]:
     """Triangles of a polygon, cut along spokes from its corners to their mean."""
     corners = [side[0] for side in sides]
     center = points.add(np.mean([points.all[k] for k in corners], axis=0))
-    spokes = [points.line(k, center, divisions) for k in corners]
+    spokes = [points.line(k, center, even) for k in corners]
     out = []
     for k, side in enumerate(sides):
         out += _divided(points, [side, spokes[(k + 1) % len(sides)], spokes[k][::-1]])
+    return out
+
+
+def _graded(points: _Points, sides: list[list[int]], graded: Grading) -> list[Triangle]:
+    """Triangles of a polygon, graded toward its corners."""
+    center = points.add(np.mean([points.all[side[0]] for side in sides], axis=0))
+    cuts = [points.line(side[graded.arcs], center, graded.steps) for side in sides]
+    out = []
+    for k, side in enumerate(sides):
+        before = sides[k - 1][::-1]
+        patch = [side[0], cuts[k][0], center, cuts[k - 1][0]]
+        x = graded.points(np.array([points.all[corner] for corner in patch]))
+        node = np.empty(x.shape[:2], np.int64)
+        node[:, 0], node[:, -1] = side[1 : graded.arcs + 1], before[1 : graded.arcs + 1]
+        node[-1] = [*cuts[k], *cuts[k - 1][-2::-1]]
+        for i, j in np.ndindex(len(x) - 1, x.shape[1] - 2):
+            node[i, j + 1] = points.add(x[i, j + 1])
+        out += [(side[0], *pair) for pair in pairwise(node[0].tolist())]
+        out += _halves(node, np.array([points.all[k] for k in node.ravel()]).reshape(x.shape))
     return out

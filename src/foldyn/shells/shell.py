@@ -21,6 +21,7 @@ from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned
 from foldyn.patterns.topology import Edge
+from foldyn.shells.graded import Grading, grading
 from foldyn.shells.kernels import ShellModel
 from foldyn.shells.mesh import shell_mesh
 from foldyn.shells.sides import Sides, sides, stiffness, without_free_sides
@@ -36,9 +37,10 @@ from foldyn.structures.mesh import lengths
 from foldyn.structures.plausibility import doubt_units
 from foldyn.structures.rigid_plates import Plate, check_welds, checked_panels, rigid_plates
 from foldyn.structures.swelling import Swelling, chord_turns
-from foldyn.values import choice, show, whole
+from foldyn.values import choice, length, show, whole
 
 MASSES = {"lumped": "centroid", "consistent": "consistent"}  # and the rules they are
+STIFF = 1e3  # times the stiffness in the plane: corners about vertices that count as rigid
 PER_NODE = 16_000.0
 """Bytes a node with its tangent: 14,200 and 16,000 measured with 3,721 and 14,641 nodes."""
 PER_DOUBLING, LEAST = 5900.0, 1450
@@ -56,6 +58,7 @@ class ShellOptions:
     crease_rest: PerCrease = None
     clamped: tuple[Edge, ...] = ()
     rigid: str | tuple[int, ...] | None = None
+    vertex_radius: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("crease_stiffness", "crease_rest"):
@@ -80,6 +83,8 @@ class Shell(Discretized):
         Rest dihedral of each piece of a crease, in the order of `sides`, rad.
     pattern, sheet, options
         What it was made from.
+    graded : Grading or None
+        How its mesh is cut about the vertices.
     """
 
     nodes: NDArray
@@ -91,6 +96,7 @@ class Shell(Discretized):
     pattern: Pattern
     sheet: Sheet
     options: ShellOptions
+    graded: Grading | None = None
 
     def __repr__(self) -> str:
         """One line with the counts."""
@@ -188,9 +194,9 @@ class Shell(Discretized):
 
     @cached_property
     def edge_nodes(self) -> NDArray:
-        """See `Discretized`; p is divisions + 1."""
+        """See `Discretized`; p is divisions + 1, or more in a graded mesh."""
         ends = self.pattern.lines
-        count = self.options.divisions - 1
+        count = (self.graded.edge_pieces if self.graded else self.options.divisions) - 1
         inner = len(self.pattern.vertices) + np.arange(len(ends) * count).reshape(len(ends), count)
         return read_only(np.concatenate([ends[:, :1], inner, ends[:, 1:]], axis=1))
 
@@ -223,6 +229,8 @@ class Shell(Discretized):
         corners, ends, law = self.nodes[self.triangles], self.sides, self.fold_law
         side = np.roll(corners, -1, axis=1) - corners
         membrane, bending = stiffness(corners, self.triangle_panel, self.sheet)
+        if self.graded:
+            membrane[(self.triangles < len(self.pattern.vertices)).any(axis=1)] *= STIFF
         rest = np.concatenate([self.nodes, ends.wings]) - self.nodes.mean(axis=0)
         hinge_rest = mechanics.angles(rest, ends.hinges.astype(np.uint32))
         length = lengths(self.nodes, ends.hinges[ends.piece_hinge])
@@ -321,6 +329,7 @@ def shell(
     crease_rest: PerCrease = None,
     clamped: str | Sequence[Sequence[int]] = (),
     rigid: str | Sequence[int] | None = None,
+    vertex_radius: float | None = None,
 ) -> Shell:
     """Discretize a pattern as a thin shell of triangles with exact creases.
 
@@ -345,6 +354,11 @@ def shell(
         has both ends.
     rigid : "all" or sequence of int, optional
         As in `discretize`: panels that cannot bend, exactly. Their mesh has no rotations.
+    vertex_radius : float, optional
+        Distance from every vertex (m), about the thickness of the sheet, within which panels do not
+        stretch. The mesh gets finer toward vertices, down to it; away from them it is about as fine
+        as an even one of so many `divisions`, a multiple of 4. Without it forces in the plane
+        meet at points, and frequencies of large sheets and towers fall with every mesh.
 
     Returns
     -------
@@ -365,20 +379,27 @@ def shell(
     """
     pattern, sheet = checked_kinds(pattern, sheet)
     doubt_units(pattern, sheet)
+    radius = None if vertex_radius is None else length("vertex_radius", vertex_radius)
     divisions = whole("divisions", divisions, least=1)
     choice("mass", mass, MASSES)
     hinge_law(fold_law, "fold_law")
     edges = boundary_edges(clamped, pattern, "clamped")
     plates = checked_panels(rigid, len(pattern.faces))
     check_welds(plates, pattern)
-    options = ShellOptions(divisions, mass, fold_law, crease_stiffness, crease_rest, edges, plates)
-    nodes = sum(divisions**2 * (1 if len(face) == 4 else len(face) / 2) for face in pattern.faces)
+    options = ShellOptions(
+        divisions, mass, fold_law, crease_stiffness, crease_rest, edges, plates, radius
+    )
+    graded = None if radius is None else grading(pattern, divisions, radius)
+    if graded:
+        nodes = graded.nodes(pattern)
+    else:
+        nodes = divisions**2 * sum(1 if len(face) == 4 else len(face) / 2 for face in pattern.faces)
     check_memory(
         f"divisions = {show(divisions)}", f"a shell of about {float(nodes):.3g} nodes",
         PER_NODE * nodes, "take fewer",
     )  # fmt: skip
     check_sheet(sheet, pattern)
-    mesh = shell_mesh(pattern, divisions)
+    mesh = shell_mesh(pattern, divisions, graded)
     chosen = range(len(pattern.faces)) if isinstance(plates, str) else plates or ()
     ends = sides(mesh, pattern, edges, chosen)
     pieces = ends.hinges[ends.piece_hinge]
@@ -392,6 +413,7 @@ def shell(
         pattern=pattern,
         sheet=sheet,
         options=options,
+        graded=graded,
     )
     _ = made.plates  # refuse panels that are not flat
     return made.marked()

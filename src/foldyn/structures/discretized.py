@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self, cast
@@ -18,6 +18,7 @@ from foldyn.materials.memory_law import memory_of
 from foldyn.materials.series import in_series
 from foldyn.mechanics.assembly import Assembly
 from foldyn.patterns.picture import picture
+from foldyn.patterns.topology import Edge
 from foldyn.structures.mass import Surface, center_of_mass, inertia_tensor, row_sums
 from foldyn.structures.mesh import double_areas, lengths
 from foldyn.structures.rigid_plates import Plate
@@ -104,6 +105,8 @@ class Discretized:
         Memory of the factors of its tangent.
     clamped_nodes : sequence of (k,)
         Nodes along each clamped edge of a mesh, from one end to the other.
+    bowed_edges : collection of (low, high)
+        Edges of the pattern that may bow between their ends, though these are the only nodes there.
     as_made : bool
         Whether `discretize`, or the function of its model, made it and would make it again from
         pattern, sheet and options. `dataclasses.replace` does not pass it on.
@@ -126,6 +129,7 @@ class Discretized:
     kind: ClassVar[str]
     massless: ClassVar[str] = ""
     clamped_nodes: Sequence[NDArray] = ()
+    bowed_edges: Collection[Edge] = ()
     as_made: bool = False
     plates: tuple[Plate, ...] = ()
 

@@ -118,7 +118,7 @@ def _check_bends(options: ModelOptions) -> None:
 def _check_edges(options: ModelOptions) -> None:
     """Refuse what the scheme n5b8e does not go with, and edges that cannot bow."""
     if options.scheme != N5B8E:
-        if options.straight and options.membrane != "panel":
+        if options.straight and not options.bowed:
             raise InputError(
                 ': edges bow with scheme = "n5b8e" or membrane = "panel" only: leave it out',
                 "straight",

@@ -76,6 +76,11 @@ class ModelOptions:
         choice("calibration", self.calibration, CALIBRATIONS)
         choice("membrane", self.membrane, MEMBRANES)
 
+    @property
+    def bowed(self) -> bool:
+        """Whether edges bow between their ends, but for those that are `straight`."""
+        return self.scheme == "n5b8e" or self.membrane == "panel"
+
 
 def _none(width: int, kind: type = np.int64) -> NDArray:
     return np.zeros((0, width), kind) if width > 1 else np.zeros(0, kind)
@@ -152,6 +157,14 @@ class Structure(Discretized):
     kind: ClassVar[str] = "bars_and_hinges"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
     fill: ClassVar[Fill] = FILL
+
+    @cached_property
+    def bowed_edges(self) -> frozenset[Edge]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """See `Discretized`."""
+        if self.pattern is None or not self.options.bowed:
+            return frozenset()
+        edges = map(tuple, np.sort(self.pattern.lines, axis=1).tolist())
+        return frozenset(edges) - {*self.options.straight, *self.options.clamped}
 
     @property
     def _softness(self) -> NDArray:

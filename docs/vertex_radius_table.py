@@ -1,0 +1,108 @@
+"""The table of towers and large sheets with a radius at their vertices in shells.md, computed.
+
+`python docs/vertex_radius_table.py` prints it, or some of its rows by number; all take half an
+hour and 10 GB.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import foldyn as fd
+from foldyn.algebra.extrapolation import convergence
+from foldyn.errors import FoldynWarning
+from foldyn.linear.pairing import pairs
+from foldyn.linear.reference import MeshModes, mesh_modes, same_modes
+from foldyn.patterns import Pattern
+
+MESHES = (8, 12, 16)
+MODES = 6
+MODELS: dict[str, dict[str, Any]] = {
+    "bars": {"preset": "plate", "membrane": "bars"},
+    "plate": {"preset": "plate", "membrane": "panel", "bar_law": "linear"},
+    "n5b8e": {"preset": "n5b8e", "membrane": "panel", "bar_law": "linear"},
+}
+
+
+def tower() -> tuple[Pattern, str]:
+    return fd.patterns.kresling(sides=6, radius=0.04, height=0.03, twist=30, storeys=4), "zmin"
+
+
+def miura(cells: int, held: str) -> tuple[Pattern, str]:
+    pattern = fd.patterns.miura((cells, cells), a=0.04, b=0.04, panel_angle=60, dihedral=110)
+    return pattern, held
+
+
+ENDS = "xmin or xmax"
+ROWS = (
+    ("tower", *tower(), 1e-3),
+    ("tower", *tower(), 3e-4),
+    ("3 x 3, both ends", *miura(3, ENDS), 1e-3),
+    ("3 x 3, both ends", *miura(3, ENDS), 3e-4),
+    ("5 x 5, one end", *miura(5, "xmin"), 3e-4),
+    ("6 x 6, both ends", *miura(6, ENDS), 3e-4),
+)
+
+
+def shell_modes(pattern: Pattern, held: str, sheet: fd.Sheet, *mesh: Any) -> MeshModes:
+    """Modes of a shell of some divisions and radius."""
+    divisions, radius = mesh
+    made = fd.shell(pattern, sheet, divisions, "consistent", vertex_radius=radius)
+    return mesh_modes(fd.Case(made, [fd.Fix(held, along=True)]), MODES)
+
+
+def errors(model: dict[str, Any], held: str, true: MeshModes, limit: NDArray) -> NDArray:
+    """Relative errors of a model's frequencies."""
+    pattern, sheet = true.structure.pattern, true.structure.sheet
+    edges: dict[str, Any] = {"straight": held} if model["membrane"] == "panel" else {}
+    made = fd.discretize(pattern, sheet, **model, **edges)
+    found, count = (
+        mesh_modes(fd.Case(made, [fd.Fix(held, along=True)]), MODES),
+        len(pattern.vertices),
+    )
+    same = pairs(
+        limit, true.shape[:MODES, :count], found.frequency, found.shape[:, :count], np.ones(count)
+    )
+    return np.array([found.frequency[pair.second] / limit[pair.first] - 1.0 for pair in same])
+
+
+def row(name: str, pattern: Pattern, held: str, thickness: float) -> str:
+    sheet = fd.Sheet(2e11, 0.3, thickness, density=7850.0)
+    even = [shell_modes(pattern, held, sheet, n, None).frequency[0] for n in MESHES]
+    graded = [shell_modes(pattern, held, sheet, n, thickness) for n in MESHES]
+    values = same_modes(graded[-1], graded, MODES)
+    found = convergence(values, MESHES)
+    limit = np.where(np.isnan(found.limit), values[-1], found.limit)
+    rank = np.argsort(limit, kind="stable")
+    true = graded[-1]._replace(shape=graded[-1].shape[rank])
+    radii = [
+        shell_modes(pattern, held, sheet, 8, part * thickness).frequency[0] for part in (0.5, 2.0)
+    ]
+    cells = [
+        f"{name}, {1e3 * thickness:g} mm",
+        ", ".join(f"{each:.4g}" for each in even),
+        ", ".join(f"{each.frequency[0]:.4g}" for each in graded),
+        f"{found.limit[0]:.4g} ({found.order[0]:.1f})",
+        ", ".join(f"{100 * (each / graded[0].frequency[0] - 1):+.1f}" for each in radii),
+    ]
+    for model in MODELS.values():
+        off = 100 * errors(model, held, true, limit[rank])
+        cells.append(f"{off.min():+.0f} to {off.max():+.0f}")
+    return f"| {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Print the rows."""
+    warnings.simplefilter("ignore", FoldynWarning)
+    chosen = [int(number) for number in sys.argv[1:]] or range(len(ROWS))
+    for number in chosen:
+        print(row(*ROWS[number]), flush=True)
+
+
+if __name__ == "__main__":
+    main()

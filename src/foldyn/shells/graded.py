@@ -1,0 +1,115 @@
+"""Panels whose triangles get smaller toward the vertices, down to a radius about them.
+
+A panel is cut from the middle of each edge to the mean of its corners, into one piece for each
+corner. A piece is a fan about its corner: rays to the cuts, and arcs about the corner at distances
+
+    r (s / r)^(k / m),    k = 0 ... m,
+
+with r the radius, s the length of the ray and m the same for all edges of a pattern. Triangles so
+are as large against their distance from the vertex everywhere, down to the first arc. Those within
+it are the corner, which is rigid in its plane (`shells.shell`).
+
+Forces in the plane meet at vertices, and each octave of distance from one takes about as much
+energy as the next: without a radius, and where panels are not graded, frequencies fall with every
+mesh.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.patterns import Pattern
+
+PER_LOG = 3.0  # divisions for one arc in each factor e of distance: triangles as wide as long
+ROOM = 2.0  # of the radius: the least length of a ray
+
+
+class Grading(NamedTuple):
+    """How panels are cut about their corners."""
+
+    radius: float  # m
+    arcs: int  # m + 1
+    rays: int  # pieces of a cut: half of those of the arcs about a corner
+
+    @property
+    def edge_pieces(self) -> int:
+        """Pieces of every edge."""
+        return 2 * self.arcs
+
+    def nodes(self, pattern: Pattern) -> int:
+        """About how many nodes a mesh has."""
+        return 2 * self.rays * self.arcs * sum(map(len, pattern.faces))
+
+    def distances(self, reach: NDArray | float) -> NDArray[np.float64]:
+        """Distances of the arcs (arcs, ...) from a corner, as parts of the lengths of rays."""
+        return np.geomspace(self.radius / np.asarray(reach), 1.0, self.arcs)
+
+    def places(self, length: float) -> NDArray[np.float64]:
+        """Places in (0, 1) of the points between the ends of an edge."""
+        half = 0.5 * self.distances(0.5 * length)
+        return np.concatenate([half, 1.0 - half[-2::-1]])
+
+    def points(self, corners: NDArray) -> NDArray[np.float64]:
+        """Points (arcs, 2 rays + 1, 3) of a piece, a bilinear patch.
+
+        corners : (4, 3) the panel's corner, the middle of the edge that leaves it, the mean of the
+            panel's corners, and the middle of the edge that ends in it.
+        """
+        corner, one, center, other = corners
+        x, y = self.ends
+        along = np.stack([one - corner, other - corner])
+        reach = np.linalg.norm(np.stack([x, y], axis=1) @ along, axis=1)
+        if reach.min() < ROOM * self.radius:
+            raise InputError(
+                f" = {self.radius:g}: is more than half of the {reach.min():.3g} m from a corner "
+                "of a panel to the lines between the middles of its edges and its own; take at "
+                f"most {reach.min() / ROOM:.3g}",
+                "vertex_radius",
+            )
+        share = self.distances(reach)
+        x, y = (share * x)[..., None], (share * y)[..., None]
+        return corner + x * along[0] + y * along[1] + x * y * (center - one - other + corner)
+
+    @property
+    def steps(self) -> NDArray[np.float64]:
+        """Places in (0, 1) of the points of a cut between the middle of an edge and its end."""
+        return np.arange(1, self.rays) / self.rays
+
+    @property
+    def ends(self) -> tuple[NDArray, NDArray]:
+        """Where the rays end in a patch (2 rays + 1,), toward the one edge and the other."""
+        rising, full = np.append(0.0, self.steps), np.ones(self.rays + 1)
+        return np.append(full, rising[::-1]), np.append(rising, full)
+
+
+def grading(pattern: Pattern, divisions: int, radius: float) -> Grading:
+    """What makes triangles about as large as an even mesh of so many divisions, away from vertices.
+
+    Raises
+    ------
+    InputError
+        The divisions are no multiple of 4, with which rays and arcs grow alike; an edge is shorter
+        than four radii.
+    """
+    if divisions % 4:
+        raise InputError(
+            f" = {divisions}: with a vertex_radius it is a multiple of 4; take "
+            f"{4 * math.ceil(divisions / 4)}",
+            "divisions",
+        )
+    ends = pattern.vertices[pattern.lines]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    if length.min() < 2.0 * ROOM * radius:
+        raise InputError(
+            f" = {radius:g}: an edge of the pattern is {length.min():.3g} m long; take at most a "
+            f"quarter of that, {0.5 * length.min() / ROOM:.3g}",
+            "vertex_radius",
+        )
+    rays = divisions // 4
+    arcs = 1 + rays * math.ceil(4.0 / PER_LOG * math.log(0.5 * length.max() / radius))
+    return Grading(radius, arcs, rays)

@@ -1,0 +1,195 @@
+"""Supports along edges: the same words hold a shell and bars and hinges."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from case_texts import MIURA_TEXT
+from foldyn.analyses import read_case
+from foldyn.errors import InputError
+from foldyn.results.contents import case_of
+
+SHEET = fd.Sheet(2e11, 0.3, 1e-3, density=7850.0)
+MIURA = fd.patterns.miura(cells=(2, 2), a=0.04, b=0.04, panel_angle=60, dihedral=110)
+FOLD = fd.patterns.simple_fold(a=0.05, b=0.05, dihedral=120)
+ALONG = fd.Fix("xmin", along=True)
+
+
+def frequencies(structure, *supports, count=3):
+    return fd.modes(fd.Case(structure, supports), count).frequency.values
+
+
+def on_edges(shell, nodes):
+    """Nodes of a shell on the edges between some vertices."""
+    rows = shell.edge_nodes[np.isin(shell.edge_nodes[:, [0, -1]], nodes).all(axis=1)]
+    return np.unique(rows)
+
+
+@pytest.fixture(params=[None, 1e-3])
+def shell(request):
+    return fd.shell(MIURA, SHEET, 4, vertex_radius=request.param)
+
+
+def test_a_shell_is_held_on_the_whole_edge(shell):
+    case = fd.Case(shell, [ALONG])
+    held = on_edges(shell, np.flatnonzero(fd.Case(shell, [fd.Fix("xmin")]).fixed.all(axis=1)))
+    assert len(held) > 10
+    assert np.array_equal(np.flatnonzero(case.fixed.all(axis=1)), held)
+    by_number = frequencies(shell, fd.Fix(held.tolist()))
+    assert frequencies(shell, ALONG) == pytest.approx(by_number, rel=1e-9)
+    assert (frequencies(shell, ALONG) > 1.001 * frequencies(shell, fd.Fix("xmin"))).all()
+
+
+def test_axes_and_directions_say_the_same(shell):
+    one = frequencies(shell, fd.Fix("xmin", "z", along=True), fd.Fix("xmin", "xy", along=True))
+    assert one == pytest.approx(frequencies(shell, ALONG), rel=1e-9)
+    other = frequencies(
+        shell, *(fd.Fix("xmin", direction=axis, along=True) for axis in ("x", "y", "z"))
+    )
+    assert other == pytest.approx(one, rel=1e-6)
+
+
+@pytest.mark.parametrize("options", [{"direction": "z"}, {"axis": "z"}])
+def test_a_moved_edge_is_linear_between_its_ends(options):
+    s = fd.shell(FOLD, SHEET, 4, vertex_radius=1e-3)
+    low, high = sorted(np.flatnonzero(s.nodes[: len(FOLD.vertices), 0] < 1e-9).tolist())
+    moved = fd.Impose([low, high], value=[0.0, 1e-4], along=True, **options)
+    far = np.flatnonzero(np.isclose(s.nodes[: len(FOLD.vertices), 0], s.nodes[:, 0].max()))
+    case = fd.Case(s, [moved, fd.Fix([low, high], "xy", along=True), fd.Fix(far.tolist(), "z")])
+    u = fd.trace(case).displacement.values[-1]
+    (row,) = s.edge_nodes[(s.edge_nodes[:, 0] == low) & (s.edge_nodes[:, -1] == high)]
+    x = np.linalg.norm(s.nodes[row] - s.nodes[row[0]], axis=1)
+    assert u[row, 2] == pytest.approx(1e-4 * x / x[-1], rel=1e-9, abs=1e-15)
+    assert np.abs(u[row, :2]).max() < 1e-15
+
+
+def test_a_base_shakes_the_whole_edge(shell):
+    case = fd.Case(shell, [ALONG, fd.BaseMotion("z", fd.Harmonic(10.0))])
+    ((moved, _),) = case.base_terms
+    held = case.fixed.all(axis=1)
+    assert held.sum() > 10
+    assert np.array_equal(moved[:, 2], held.astype(float))
+
+
+MODELS: dict[str, Any] = {
+    "membrane": {"preset": "plate", "membrane": "panel", "bar_law": "linear"},
+    "n5b8e": {"preset": "n5b8e", "membrane": "bars"},
+    "both": {"preset": "n5b8e", "membrane": "panel", "bar_law": "linear"},
+}
+
+
+@pytest.mark.parametrize("name", sorted(MODELS))
+def test_edges_of_bars_and_hinges_must_be_straight(name):
+    with pytest.raises(InputError, match=r"supports\[0\].along: the edge \(0, 1\) may bow .* "
+                       'make the structure with straight = "xmin"'):  # fmt: skip
+        fd.Case(fd.discretize(MIURA, SHEET, **MODELS[name]), [ALONG])
+    structure = fd.discretize(MIURA, SHEET, **MODELS[name], straight="xmin")
+    bowed = fd.discretize(MIURA, SHEET, **MODELS[name])
+    held = frequencies(structure, ALONG)
+    assert np.array_equal(held, frequencies(structure, fd.Fix("xmin")))
+    assert (held >= frequencies(bowed, fd.Fix("xmin"))).all()
+
+
+def test_other_bars_and_hinges_are_straight():
+    structure = fd.discretize(MIURA, SHEET, preset="herkal")
+    case = fd.Case(structure, [ALONG])
+    assert np.array_equal(case.fixed, fd.Case(structure, [fd.Fix("xmin")]).fixed)
+
+
+def test_a_shell_and_bars_and_hinges_agree():
+    shell = fd.shell(MIURA, SHEET, 8, "consistent", vertex_radius=1e-3)
+    reduced = fd.discretize(MIURA, SHEET, **MODELS["both"], straight="xmin")
+    assert frequencies(reduced, ALONG) == pytest.approx(frequencies(shell, ALONG), rel=0.05)
+
+
+def test_creases_cannot_be_held_straight_in_bars_and_hinges():
+    crease = FOLD.creases[0].tolist()
+    structure = fd.discretize(FOLD, SHEET, **MODELS["both"])
+    with pytest.raises(InputError, match=r"the crease \(\d, \d\) .* take a shell"):
+        fd.Case(structure, [fd.Fix(crease, along=True)])
+    assert fd.Case(fd.shell(FOLD, SHEET, 4), [fd.Fix(crease, along=True)]).fixed.sum() == 15
+
+
+@pytest.mark.parametrize(
+    ("support", "text"),
+    [
+        (lambda: fd.Fix([0, 8], along=True), r"along: no edge .* nodes = \[0, 8\]; name them"),
+        (
+            lambda: fd.Fix([0, 1], along="yes"),  # pyright: ignore[reportArgumentType]
+            'along = "yes": must be True or False',
+        ),
+    ],
+)
+def test_refusals(support, text):
+    with pytest.raises(InputError, match=text):
+        fd.Case(fd.shell(MIURA, SHEET, 4), [support()])
+
+
+def test_a_structure_without_a_pattern_has_no_edges():
+    made = fd.discretize(FOLD, SHEET)
+    bare = fd.Structure(made.nodes, made.bars, made.bar_area, SHEET)
+    with pytest.raises(InputError, match="along: this structure has no pattern with edges"):
+        fd.Case(bare, [fd.Fix([0, 1], along=True)])
+
+
+# ------------------------------------------------------------------ case files and comparisons
+
+TEXT = f"""{MIURA_TEXT}[model]
+MODEL
+[[supports]]
+nodes = "xmin"
+along = true
+[analysis]
+kind = "modes"
+count = 2
+"""
+
+
+def read(folder, text, kind=None, divisions=None):
+    (folder / "case.toml").write_text(TEXT.replace("MODEL", text))
+    return read_case(folder / "case.toml", kind, divisions)
+
+
+@pytest.mark.parametrize("model", ['preset = "n5b8e"', 'membrane = "panel"', 'preset = "herkal"'])
+def test_case_files_make_held_edges_straight(tmp_path, model):
+    case = read(tmp_path, model).case()
+    bowed = "herkal" not in model
+    assert case.structure.options.straight == (((0, 1), (1, 2)) if bowed else ())
+    assert not {(0, 1), (1, 2)} & set(case.structure.bowed_edges)
+    shell = read(tmp_path, model, "shell", 4).case()
+    assert len(np.flatnonzero(shell.fixed.all(axis=1))) == 9
+    assert shell.supports == case.supports
+
+
+def test_edges_that_the_file_names_stay(tmp_path):
+    case = read(tmp_path, 'preset = "n5b8e"\nstraight = [[0, 3]]').case()
+    straight = case.structure.options.straight
+    assert straight == ((0, 3), (0, 1), (1, 2))
+
+
+def test_a_radius_in_a_case_file(tmp_path):
+    case = read(tmp_path, 'kind = "shell"\ndivisions = 4\nvertex_radius = 0.01').case()
+    assert case.structure.options.vertex_radius == 0.01
+    assert case.structure.graded.radius == 0.01
+    other = read(tmp_path, 'kind = "shell"\ndivisions = 4\nvertex_radius = 0.01',
+                 kind="bars_and_hinges")  # fmt: skip
+    assert not hasattr(other.case().structure.options, "vertex_radius")
+
+
+def test_stored_cases_keep_it(tmp_path):
+    shell = fd.shell(FOLD, SHEET, 4, vertex_radius=1e-3)
+    fd.save(fd.modes(fd.Case(shell, [ALONG]), 2), tmp_path / "modes.nc")
+    again = case_of(fd.load(tmp_path / "modes.nc"))
+    assert again.supports == (ALONG,)
+    assert again.structure.options.vertex_radius == 1e-3
+
+
+@pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
+def test_models_that_stand_beside_the_own_one_hold_it_too():
+    case = fd.Case(fd.discretize(FOLD, SHEET, preset="plate", membrane="bars"), [ALONG])
+    result = fd.fidelity(case, count=2, divisions=(2, 4), models=["n5b8e", "membrane"])
+    assert np.abs(result.result["error"].values).max() < 0.2
