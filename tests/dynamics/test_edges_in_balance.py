@@ -177,3 +177,22 @@ def test_dampers_take_what_jumps():
     wanted = 2.0 * other.displacement.values - one.displacement.values
     np.testing.assert_allclose(found.displacement, wanted, atol=1e-4 * np.abs(wanted).max())
     assert balance(found) < 1e-3
+
+
+JUMPS = (
+    fd.CreaseMoment([0, 1], 0.02, fd.Pulse(0.1)),
+    fd.Temperature(1.0, curvature=2e-2, history=fd.Pulse(0.1)),
+)
+
+
+@pytest.mark.parametrize("jump", JUMPS)
+@pytest.mark.parametrize("method", ["generalized_alpha", "energy_momentum"])
+def test_edge_angles_jump_beside_damped_creases(method, jump):
+    """But for the turn of these; if they did not, they would ring from step to step."""
+    sheet = fd.discretize(fd.patterns.miura(), SHEET, preset="n5b8e", crease_stiffness=K)
+    held = fd.Fix(list(sheet.pattern.faces[0]))
+    made = fd.Case(sheet, [held], [jump], damping=fd.CreaseDamping(0.5, [2, 3]))
+    found = fd.simulate(made, 0.2, method, dt=2e-4, every=0.05)
+    other = fd.simulate(made, 0.2, "dormand_prince", every=0.05, tolerance=1e-7)
+    assert apart(other, found) < {"energy_momentum": 1e-3}.get(method, 1e-2)
+    assert balance(found) < 1e-3
