@@ -125,3 +125,25 @@ def test_a_step_ends_where_a_pulse_ends():
 def test_bad_arguments(spring, options, message):
     with pytest.raises(fd.errors.InputError, match=message):
         fd.simulate(spring, 2.0, **options)
+
+
+@pytest.mark.parametrize("law", ["superlinear", fd.Plastic(2e-3, 0.01)], ids=["", "yields"])
+@pytest.mark.parametrize("preset", ["plate", "n5b8e"])
+def test_moments_that_jump_do_the_work_that_is_stored_and_lost(preset, law):
+    """Also in a sample at the jump."""
+    sheet = fd.Sheet(1e6, 0.25, 0.01, 1.0)
+    fold = fd.patterns.simple_fold(1, 1, dihedral=120)
+    made = fd.discretize(fold, sheet, preset=preset, crease_stiffness=0.2, fold_law=law)
+    jump = fd.CreaseMoment("all", 0.05, fd.Pulse(0.1))
+    case = fd.Case(made, [fd.Fix([0, 1, 2, 3])], [jump], damping=fd.Rayleigh(0.1))
+    motion = fd.simulate(case, 0.2, "dormand_prince", every=0.05, tolerance=1e-7)
+    assert motion.attrs["energy_error"] < 3e-6
+
+
+def test_the_work_of_an_angle_that_stops_turning_where_the_motion_ends():
+    sheet = fd.Sheet(1e6, 0.25, 0.01, 1.0)
+    made = fd.discretize(fd.patterns.simple_fold(1, 1, dihedral=120), sheet, crease_stiffness=0.2)
+    turn = fd.Actuate("all", 115.0, fd.Ramp(0.1))
+    case = fd.Case(made, [fd.Fix([0, 1, 2, 3])], [turn])
+    motion = fd.simulate(case, 0.1, "dormand_prince")
+    assert motion.attrs["energy_error"] < 1e-6

@@ -171,6 +171,21 @@ def test_refused_steps_leave_no_trace():
     assert opened(chosen)[-1] == pytest.approx(opened(fine)[-1], rel=1e-4)
 
 
+@pytest.mark.parametrize("method", ["dormand_prince", "generalized_alpha"])
+@pytest.mark.parametrize("name", LAWS)
+def test_a_structure_that_has_moved_does_the_same_work(name, method):
+    """Branches know nothing of their moments in other motions."""
+    pattern, sheet = fd.patterns.simple_fold(1, 1, dihedral=120), fd.Sheet(1e6, 0.25, 0.01, 1.0)
+    structure = fd.discretize(pattern, sheet, crease_stiffness=0.2, fold_law=LAWS[name])
+    fix = fd.Fix([0, 1, 2, 3])
+    pushed = fd.Case(structure, [fix], [fd.Force([4, 5], (0.0, 0.0, 0.01))])
+    turned = fd.Case(structure, [fix], [fd.CreaseMoment("all", 0.02, fd.Ramp(0.4))])
+    first = fd.simulate(turned, 0.2, method)
+    fd.simulate(pushed, 0.2, method)
+    again = fd.simulate(turned, 0.2, method)
+    np.testing.assert_array_equal(again.work, first.work)
+
+
 def test_a_law_without_branches_that_matter_is_its_elastic_part():
     weak = fd.simulate(pushed(fd.Prony(1e-12, 1.0, law="linear")), 1.0, "rk4", dt=2.0**-9)
     plain = fd.simulate(pushed("linear"), 1.0, "rk4", dt=2.0**-9)

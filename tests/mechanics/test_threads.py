@@ -133,16 +133,6 @@ def test_evaluations_in_a_compiled_loop_do_not_overtake_each_other():
     assert relative(ends[3] - u, ends[0] - u) < 1e-11
 
 
-@pytest.mark.parametrize("laws", LAWS)
-def test_dihedrals_are_kept_on_demand(laws):
-    model, u = sheet((60, 2), laws)
-    work, out = mechanics.workspace(model), np.empty_like(u)
-    work.angle[:] = 7.0
-    mechanics.internal_force(model, u, out, work, False)
-    assert (work.angle == 7.0).all()
-    np.testing.assert_array_equal(out, alone(model, u)[0])
-
-
 def test_every_element_and_node_belongs_to_one_strip(monkeypatch):
     model, _ = sheet((60, 2))
     n = len(model.rest)

@@ -15,6 +15,7 @@ from foldyn.dynamics.equation import (
     acceleration,
     advance_clock,
     sample,
+    spent,
     step_error,
     work_of_offsets,
 )
@@ -219,7 +220,8 @@ def advance(equation, course, plan, room, stretch):
         due = plan.start + tally.samples * plan.interval
         done, first = work_of_offsets(equation, True), tally.samples
         begun = tally.work + done, tally.dissipated
-        while plan.every == 0 and tally.samples < room and due <= after + ROUNDING * h:
+        near = after - ROUNDING * h if stops else after + ROUNDING * h  # after what happens there
+        while plan.every == 0 and tally.samples < room and due <= near:
             _weights(min(1.0, (due - t) / h), weights)
             _combine(u, speeds, weights, h, 7, fut)
             _combine(v, accelerations, weights, h, 7, fvt)
@@ -239,11 +241,12 @@ def advance(equation, course, plan, room, stretch):
         for i in range(n):
             u[i], v[i] = fut[i], speeds[6, i]
             speeds[0, i] = speeds[6, i]
+        jumps = stops and equation.spent != 0
+        if tally.samples > first and (equation.commit != 0 or jumps):  # terms were evaluated there
+            advance_clock(equation, h)
+            acceleration(equation, course.u, course.v, moment, a)
+            tally.evaluations += 1
         if equation.commit != 0:
-            if tally.samples > first:  # where laws with memory were evaluated last
-                advance_clock(equation, h)
-                acceleration(equation, course.u, course.v, moment, a)
-                tally.evaluations += 1
             run_at(equation.commit, (equation.setting,))
         for k in range(2):
             powers[k, 0] = powers[k, 6]
@@ -252,13 +255,19 @@ def advance(equation, course, plan, room, stretch):
         tally.wanted = min(plan.dt, h * max(0.2, min(factor, 5.0)))
         if stops:
             tally.wanted = max(tally.wanted, min(wanted, plan.dt))
+            tally.work -= spent(equation, course.u)
             powers[0, 0], powers[1, 0] = acceleration(equation, course.u, course.v, after, a)
             tally.evaluations += 1
-            tally.work += work_of_offsets(equation, True)
-            if equation.commit != 0:  # what jumped there took no time
-                run_at(equation.commit, (equation.setting,))
+            tally.work += spent(equation, course.u)  # by offsets that have jumped, of any law
+            work_of_offsets(equation, True)
             for i in range(n):
                 raw[i] = fa[i]
+            if plan.every == 0 and tally.samples < room and due <= after + ROUNDING * h:
+                outcome = sample(equation, course.u, course.v, a, due)
+                if outcome != Outcome.DONE:
+                    return outcome, -1
+            if equation.commit != 0:  # what jumped there took no time
+                run_at(equation.commit, (equation.setting,))
         tally.wanted = min(tally.wanted, longest)
         if plan.every > 0 and tally.steps % plan.every == 0:
             acceleration(equation, course.u, course.v, after, a)

@@ -97,7 +97,8 @@ class Equation(NamedTuple):
     clock: int  # 0 without memory
     commit: int  # 0 without memory
     step_error: int  # 0 without memory
-    offsets: int  # 0 where nothing turns
+    offsets: int  # 0 where nothing turns,
+    spent: int  # and in methods whose steps end at jumps alone
     sample: int
     balance: int  # contexts
     setting: int
@@ -225,6 +226,12 @@ def work_of_offsets(equation, accepted):
 
 
 @inner_scalar
+def spent(equation, q):
+    """Energy (J) that terms store, and have dissipated, after `acceleration` at q."""
+    return value_at(equation.spent, (equation.setting, q)) if equation.spent != 0 else 0.0
+
+
+@inner_scalar
 def sample(equation, u, v, a, t):
     """Write the next sample, after `acceleration` at u, v and t; returns an outcome."""
     return int(value_at(equation.sample, (equation.recording, u, v, a, t)))
@@ -321,6 +328,7 @@ class EquationOfMotion:
             commit=parts.commit.at(whole) if remembers else 0,
             step_error=parts.step_error.at(whole) if remembers and slows is not None else 0,
             offsets=parts.offsets.at(whole) if system.turns else 0,
+            spent=parts.spent.at(whole) if system.turns and slows else 0,
             sample=0,
             balance=balance.address,
             setting=whole.address,

@@ -17,7 +17,17 @@ from foldyn.jit.compiled import addressed
 from foldyn.jit.context import rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.following import push_following
-from foldyn.mechanics.term import ADDRESS, NUMBER, Share, Terms, clock_to, commit_all, step_error_of
+from foldyn.mechanics.term import (
+    ADDRESS,
+    NUMBER,
+    Share,
+    Terms,
+    clock_to,
+    commit_all,
+    dissipated_by,
+    energies_of,
+    step_error_of,
+)
 from foldyn.mechanics.threads import wait
 
 
@@ -125,6 +135,14 @@ def offsets(m, accepted):
         m.terms.folds, m.system.actuators, m.share.fold_angle, m.s.turned[0], m.s.turned[1],
         accepted > 0.0,
     )  # fmt: skip
+
+
+@addressed(ADDRESS)
+def spent(m, q):
+    """Energy (J) that terms store, and have dissipated, where they were evaluated last, at q."""
+    u = m.s.displacement if m.system.moves else rows_at(q, m.s.force.shape[0])
+    energies_of(m.terms, u, m.s.energy)
+    return m.s.energy.sum() + dissipated_by(m.terms)
 
 
 @addressed(NUMBER)

@@ -82,7 +82,7 @@ def variable_steps(
     _check_count(duration, dt)
     interval = float(every) if in_seconds else 0.0
     end = start + duration
-    within = np.sort(knots[(knots > start) & (knots < end)])
+    within = np.sort(knots[(knots > start) & (knots <= end)])
     apart = np.diff(within, prepend=start) > SAME_TIME * max(abs(start), abs(end))
     per_sample = 0 if in_seconds else int(every)
     return StepPlan(start, end, dt, 0, per_sample, interval, tolerance, floor, within[apart])

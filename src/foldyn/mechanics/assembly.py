@@ -107,22 +107,25 @@ class Assembly:
 
     # ------------------------------------------------------------------ energies and forces
     def dofs(
-        self, displacement: NDArray, push: NDArray | None = None, memory: Term | None = None
-    ) -> NDArray:
+        self, displacement: NDArray, push: NDArray | None = None, memory: Term | None = None,
+        held: tuple[NDArray, sparse.csr_array] | None = None,
+    ) -> NDArray:  # fmt: skip
         """Vector (m,) of displacements (n, 3), the hidden dofs in balance, by Newton's method.
 
         push : forces (m,), N, of which those on the hidden dofs count; none by default.
         memory : what resists beside the sheet.
+        held : where the hidden dofs begin (r,), and rows (k, r) along which they stay there.
 
         Raises
         ------
         ComputationError
-            There are none near zero.
+            There are none near where they begin, zero by default.
         """
-        q = np.concatenate([np.asarray(displacement, float).ravel(), np.zeros(len(self.hidden))])
+        begin, rows = held or (np.zeros(len(self.hidden)), sparse.csr_array((0, len(self.hidden))))
+        q = np.concatenate([np.asarray(displacement, float).ravel(), begin])
         if not len(self.hidden):
             return q
-        first = self.size - len(self.hidden)
+        first, held_forces = self.size - len(self.hidden), np.zeros(rows.shape[0])
         body = self._sheet_alone if memory is None else Assembly(self.sheet, memory)
         for _ in range(ITERATIONS):
             couple = body.internal(q)[first:]
@@ -131,7 +134,10 @@ class Assembly:
             if not couple.any():
                 return q
             stiffness = body.tangent(q, LEAST_SLOPE)[first:][:, first:]
-            step = splu(sparse.csc_array(stiffness)).solve(-couple)
+            if rows.shape[0]:
+                stiffness = sparse.block_array([[stiffness, rows.T], [rows, None]])
+            step = splu(sparse.csc_array(stiffness)).solve(-np.append(couple, held_forces))
+            step = step[: len(couple)]
             q[first:] += step
             if self.sheet.per_hidden * np.abs(step).max(initial=0.0) <= BALANCED:
                 return q

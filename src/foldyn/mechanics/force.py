@@ -249,10 +249,10 @@ def hinge_moments(code, address, stiffness, rest, p, share, offset, first, m, an
 
 
 @kernel
-def add_hinge_forces(model, low, high, work, keep):
+def add_hinge_forces(model, low, high, work):
     """Add the forces of the hinges with lowest nodes from low to high to work.sums.
 
-    keep : whether the dihedrals go to work.angle.
+    Their dihedrals go to work.angle.
     """
     x, g, value, mask = work.points, work.gradient, work.value, work.strips.mask
     position, sums, hinges = flat(work.position), flat(work.sums), flat(model.hinges)
@@ -286,9 +286,8 @@ def add_hinge_forces(model, low, high, work, keep):
                     x[6 * BLOCK + q], x[7 * BLOCK + q], x[8 * BLOCK + q],
                     x[9 * BLOCK + q], x[10 * BLOCK + q], x[11 * BLOCK + q],
                 )  # fmt: skip
-            if keep:
-                for q in range(m):
-                    kept[first + q] = angle[q]
+            for q in range(m):
+                kept[first + q] = angle[q]
             if code == LINEAR:
                 linear_moments(stiffness, rest, offset, first, m, angle, value)
             elif (code == superlinear.CODE) and not gives_way(share, first, m):
@@ -354,7 +353,7 @@ def finish_edge(force, work, start, end):
 
 
 @inlined
-def strip_force(model, s, u, force, work, keep):
+def strip_force(model, s, u, force, work):
     """Force (n, 3) on the nodes work.strips.finished[s], for each strip s in turn.
 
     Members of a team must `wait` for each other before strip work.strips.edge.
@@ -362,7 +361,7 @@ def strip_force(model, s, u, force, work, keep):
     plan = work.strips
     place(flat(model.rest), flat(u), work, plan.fresh[s, 0], plan.fresh[s, 1])
     add_bar_forces(model, plan.lowest[s, 0], plan.lowest[s, 1], work)
-    add_hinge_forces(model, plan.lowest[s, 0], plan.lowest[s, 1], work, keep)
+    add_hinge_forces(model, plan.lowest[s, 0], plan.lowest[s, 1], work)
     if plan.adds[s]:
         finish_edge(flat(force), work, plan.finished[s, 0], plan.finished[s, 1])
     else:
@@ -370,15 +369,13 @@ def strip_force(model, s, u, force, work, keep):
 
 
 @inlined
-def internal_force(model, u, force, work, keep=True):
-    """Internal force (n, 3), N, at displacement u (n, 3), m.
+def internal_force(model, u, force, work):
+    """Internal force (n, 3), N, at displacement u (n, 3), m; dihedrals go to work.angle.
 
     A member of a team gets the force on its own nodes, work.strips.own; u must be complete before
     any of them starts, and may be changed on its own nodes when it is done.
-
-    keep : whether the dihedrals go to work.angle.
     """
     for s in range(work.strips.lowest.shape[0]):
         if s == work.strips.edge:
             wait(work.team)
-        strip_force(model, s, u, force, work, keep)
+        strip_force(model, s, u, force, work)

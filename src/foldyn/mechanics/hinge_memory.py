@@ -44,8 +44,9 @@ class HingeMemory(Term):
     def start(self, q: NDArray, state: NDArray | str | None = None) -> None:
         """Begin at the dofs q (m,) or (rows, 3) in a state (b, 2), "fresh", or the default."""
         own, offset, q = self.own, self._offset, in_rows(q, self._rows)
-        for array in (own.angle, own.state, own.elapsed, own.lost):
+        for array in (own.angle, own.state, own.moment, own.elapsed, own.lost):
             array[:] = 0.0
+        offset[own.row, 1] = 0.0  # other motions of the sheet have left theirs there
         evaluate_at(own, offset, q)  # turned from rest in no time
         make_last(own)
         own.lost[:] = 0.0

@@ -172,7 +172,7 @@ def plates_energy(model, u, x, work, out):
 @kernel
 def plates_force(model, u, x, force, couple, work):
     """Internal force (n, 3), N, and that of the dofs of rotations (r,), N."""
-    internal_force(model.bars, u, force, work.bars, False)
+    internal_force(model.bars, u, force, work.bars)
     turn_hinges(model, u, work)
     turn_moments(model, x, couple, work)
     for h in range(model.hinges.shape[0]):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_slope
@@ -34,9 +34,10 @@ from foldyn.mechanics.plates import (
 from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Whole, energies, forces
 from foldyn.mechanics.threads import Team
 
-STEPS = 50  # of Newton's method, at most
-BALANCED = 1e-12  # rad, of the last one
-LEAST = 1e-3  # slope per unit stiffness of a fold in these steps
+STEPS = 100  # of Newton's method, at most
+BEYOND = 0.5  # of the work that a step began with, against it where it ends: it was too long
+BALANCED = 1e-12  # rad, of the last one,
+ROUNDED = 1e-9  # or where creases are so much stiffer than panels that rounding leaves more
 
 
 class CondensedPlates(NamedTuple):
@@ -183,6 +184,15 @@ def add_branches(model, work):
                 work.couple[rotation] -= model.plates.per_reach * work.branches[f, 0]
 
 
+@inner_scalar
+def along_step(model, push, work):
+    """Work of the forces on rotations along a step."""
+    total = 0.0
+    for k in range(work.x.size):
+        total += work.step[model.rank[k]] * (push[k, 0] - work.couple[k])
+    return total
+
+
 @kernel
 def balance(model, u, work):
     """Rotations in balance at displacements u, to work.x; nan where there are none."""
@@ -190,9 +200,22 @@ def balance(model, u, work):
     turn_hinges(plates, u, work.plates)
     p, slope = plates.fold_parameters, work.plates.slope
     again = model.memory[0] != 0  # rates of creases are differences of turns
-    for _ in range(STEPS):
+    begun = 0.0  # forces along the last step, where it began
+    for k in range(work.x.size):
+        if np.isnan(work.x[k]):  # there were none at the last displacements
+            work.x[k] = 0.0
+    for i in range(STEPS):
         turn_moments(plates, work.x, work.couple, work.plates)
         add_branches(model, work)
+        along = along_step(model, push, work)
+        if 0.0 < begun < -along / BEYOND:  # a crease began or ceased to yield: to where they vanish
+            share = begun / (begun - along)
+            for k in range(work.x.size):
+                work.x[k] -= (1.0 - share) * work.step[model.rank[k]]
+            for k in range(work.x.size):
+                work.step[k] *= share
+            begun *= share
+            continue
         if not model.constant or model.memory[0] != 0:
             for f in range(plates.fold_rest.size):
                 found = hinge_slope(
@@ -200,7 +223,7 @@ def balance(model, u, work):
                     plates.addresses[2],
                 )  # fmt: skip
                 stiff = plates.fold_stiffness[f]
-                slope[f] = max(stiff * found + work.branches[f, 1], stiff * LEAST)
+                slope[f] = max(stiff * found + work.branches[f, 1], 0.0)
             factor, band = flat(work.factor), flat(model.band)
             for k in range(band.size):  # an assignment of slices takes seconds to compile
                 factor[k] = band[k]
@@ -210,10 +233,14 @@ def balance(model, u, work):
         for k in range(work.x.size):
             work.step[model.rank[k]] = push[k, 0] - work.couple[k]
         solve_band(work.factor, work.step)
+        begun = along_step(model, push, work)
         for k in range(work.x.size):
             work.x[k] += work.step[model.rank[k]]
             largest = max(largest, abs(work.step[model.rank[k]]))
-        close, again = plates.per_reach * largest <= BALANCED and not again, False
+        small = plates.per_reach * largest <= (BALANCED if i < STEPS // 2 else ROUNDED)
+        if small:
+            begun = 0.0
+        close, again = small and not again, False
         if close or not largest < np.inf:
             for k in range(work.x.size):
                 push[k, 1] = work.x[k]

@@ -103,6 +103,16 @@ def hinge_dofs(hinges: NDArray, hidden: NDArray) -> NDArray:
     return dofs
 
 
+def turns(elements: Viscous, hidden: NDArray) -> sparse.csr_array:
+    """Rows (k, r) of how hidden dofs (r,) turn those hinges that have some, over the largest."""
+    turn, dofs = elements.hidden_turn, elements.dofs[len(elements.axial) :, 12:]
+    some = turn.any(axis=1)
+    row, end = np.nonzero(turn[some])
+    values = turn[some][row, end] / turn[some].max(axis=1)[row]
+    entries = (values, (row, np.searchsorted(hidden, dofs[some][row, end])))
+    return sparse.csr_array(sparse.coo_array(entries, shape=(int(some.sum()), len(hidden))))
+
+
 @inner_scalar
 def hinge_gradient(x, dofs, hidden_turn, moved, out):
     """Angle (rad) of a hinge at flat displacements, and its gradient to `out` (14,).

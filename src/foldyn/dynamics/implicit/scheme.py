@@ -23,6 +23,7 @@ from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import following_force
 from foldyn.mechanics.hinge_memory import HingeMemory
+from foldyn.mechanics.viscous import turns
 
 EPS = float(np.finfo(float).eps)
 FAST = 0.3  # share of the residual that an iteration leaves, below which its matrix is kept
@@ -189,14 +190,14 @@ class Scheme(ABC):
     def settle(self, t: float) -> float:
         """Have what has no mass follow loads that jump at t (s); returns the work done on it, J.
 
-        Offsets do so at once, and dofs where nothing damps them.
+        Offsets do so at once, and dofs but for turns of damped creases; those of a matrix of
+        damping do not.
         """
         body, system, s = self.packed.body, self.packed.system, self.scratch
         damping, hidden, memory = system.damping, body.hidden, body.find(HingeMemory)
-        damped = damping.elements.present
+        follows = len(hidden) > 0
         if damping.data.size:
-            damped = damped or np.diff(damping.indptr)[hidden].any()
-        follows = len(hidden) > 0 and not damped
+            follows = follows and not np.diff(damping.indptr)[hidden].any()
         if not (follows or system.turns):
             return 0.0
         place(system, self.old.q, self.old.w, t, s)
@@ -206,7 +207,8 @@ class Scheme(ABC):
             turn(body.sheet.folds, system.actuators, s.factor)
         if follows:
             push = following_force(system.following, start, s.factor)
-            settled = body.dofs(s.displacement[: len(system.order)], push, memory)
+            held = start[hidden], turns(damping.elements, hidden)
+            settled = body.dofs(s.displacement[: len(system.order)], push, memory, held)
             self.old.q.ravel()[hidden] = settled[hidden]
         stored = float((body.energies(settled) - before).sum())
         return stored if memory is None else stored + float(memory.own.lost[1])
