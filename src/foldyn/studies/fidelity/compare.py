@@ -60,8 +60,7 @@ class Row(NamedTuple):
 def structure_of(case: FidelityCase, model: str) -> Structure:
     """Bars and hinges of a case; edges that are held stay straight where edges may bow."""
     options = {"bend_law": "linear", **MODELS[model]}
-    whole = resolved(**options)
-    if whole.scheme == "n5b8e" or whole.membrane == "panel":
+    if resolved(**options).bowed:
         options["straight"] = case.held.edges
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
