@@ -92,7 +92,8 @@ def row(name: str, pattern: Pattern, held: str, thickness: float) -> str:
     ]
     for model in MODELS.values():
         off = 100 * errors(model, held, true, limit[rank])
-        cells.append(f"{off.min():+.0f} to {off.max():+.0f}")
+        low, high = (round(each) + 0 for each in (off.min(), off.max()))
+        cells.append(f"{low:+d} to {high:+d}")
     return f"| {' | '.join(cells)} |"
 
 

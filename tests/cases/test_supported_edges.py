@@ -10,7 +10,8 @@ import pytest
 import foldyn as fd
 from case_texts import MIURA_TEXT
 from foldyn.analyses import read_case
-from foldyn.errors import InputError
+from foldyn.analyses.reading import read_as
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.results.contents import case_of
 
 SHEET = fd.Sheet(2e11, 0.3, 1e-3, density=7850.0)
@@ -178,6 +179,22 @@ def test_a_radius_in_a_case_file(tmp_path):
     other = read(tmp_path, 'kind = "shell"\ndivisions = 4\nvertex_radius = 0.01',
                  kind="bars_and_hinges")  # fmt: skip
     assert not hasattr(other.case().structure.options, "vertex_radius")
+
+
+def test_files_read_as_small_vibrations_keep_it(tmp_path):
+    moved = """[[supports]]
+nodes = "xmax"
+axis = "x"
+displacement = 1e-3
+along = true
+[analysis]
+kind = "statics"
+"""
+    text = TEXT.replace("MODEL", 'kind = "shell"\ndivisions = 4')
+    (tmp_path / "case.toml").write_text(text[: text.index("[analysis]")] + moved)
+    with pytest.warns(FoldynWarning, match=r"the displacement of supports\[1\]"):
+        case = read_as(tmp_path / "case.toml", "modes", {"state": "rest"}).case()
+    assert case.supports == (ALONG, fd.Fix("xmax", "x", along=True))
 
 
 def test_stored_cases_keep_it(tmp_path):

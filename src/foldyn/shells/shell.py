@@ -40,7 +40,7 @@ from foldyn.structures.swelling import Swelling, chord_turns
 from foldyn.values import choice, length, show, whole
 
 MASSES = {"lumped": "centroid", "consistent": "consistent"}  # and the rules they are
-STIFF = 1e3  # times the stiffness in the plane: corners about vertices that count as rigid
+STIFF = 100.0  # times the stiffness in the plane: corners about vertices that count as rigid
 PER_NODE = 16_000.0
 """Bytes a node with its tangent: 14,200 and 16,000 measured with 3,721 and 14,641 nodes."""
 PER_DOUBLING, LEAST = 5900.0, 1450
