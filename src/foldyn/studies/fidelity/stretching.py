@@ -34,7 +34,7 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
     "n5b8e": {"preset": "n5b8e"},
 }
 STEEL = Sheet(2e11, 0.3, 1e-3, density=7850.0)
-SMALL = 1e-7  # m
+SMALL = 1e-6  # m
 PRESSED, STEPS = 8e-3, 16  # m, beyond the largest force
 ENDS = {"x": "compressed", "y": "sheared", "z": "moved across"}
 
