@@ -57,16 +57,6 @@ PATTERNS = {**FLAT_PANELS, "twisted": twisted}
 DIVISIONS = [1, 2, 3, 6]
 
 
-@pytest.fixture(params=sorted(PATTERNS))
-def pattern(request):
-    return PATTERNS[request.param]()
-
-
-@pytest.fixture(params=sorted(FLAT_PANELS))
-def flat(request):
-    return FLAT_PANELS[request.param]()
-
-
 def test_the_polygons_are_flat_and_folded():
     pattern = polygons()
     assert sorted(map(len, pattern.faces)) == [3, 4, 5, 6]

@@ -22,16 +22,6 @@ RADIUS = 0.02
 STEEL = {t: fd.Sheet(2e11, 0.3, t, density=7850.0) for t in (3e-4, 1e-3)}
 
 
-@pytest.fixture(params=sorted(PATTERNS))
-def pattern(request):
-    return PATTERNS[request.param]()
-
-
-@pytest.fixture(params=sorted(FLAT_PANELS))
-def flat(request):
-    return FLAT_PANELS[request.param]()
-
-
 def mesh_of(pattern, divisions=4, radius=RADIUS):
     return shell_mesh(pattern, divisions, grading(pattern, divisions, radius))
 

@@ -56,8 +56,7 @@ class Damped:
             with faults.collected():
                 raise InputError(
                     "damping: StrainDamping takes bars and hinges, and the panels of this model "
-                    "bend as plates; take CreaseDamping, or Rayleigh for what hardly "
-                    "turns"
+                    "bend as plates; take CreaseDamping, or Rayleigh for what hardly turns"
                 )
 
     @cached_property

@@ -17,7 +17,7 @@ from foldyn.cases.selection import resolve_nodes
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.patterns.selection import select
-from foldyn.patterns.topology import Edge, edge_of
+from foldyn.patterns.topology import edge_lookup, edge_of
 from foldyn.structures.clamps import boundary_edges
 from foldyn.values import show
 
@@ -59,7 +59,7 @@ def _edges(structure: Any, support: Any, named: NDArray, place: str) -> NDArray[
         )
     loose = [edge_of(*edge) for edge in edges[:, [0, -1]].tolist()]
     loose = [edge for edge in loose if edge in structure.bowed_edges]
-    inside = sorted(set(loose) - _boundary(structure.pattern))
+    inside = sorted(set(loose) - edge_lookup(structure.pattern.boundary).keys())
     if inside:
         raise InputError(
             f": the crease {inside[0]} would have to be straight, which bars and hinges cannot say "
@@ -76,10 +76,6 @@ def _edges(structure: Any, support: Any, named: NDArray, place: str) -> NDArray[
     return edges
 
 
-def _boundary(pattern: Pattern) -> set[Edge]:
-    return {edge_of(*edge) for edge in pattern.boundary.tolist()}
-
-
 def straightened(options: Any, pattern: Pattern, supports: Iterable[Any]) -> dict[str, Any]:
     """What makes a structure with these options fit for supports along edges, where these may bow.
 
@@ -92,7 +88,7 @@ def straightened(options: Any, pattern: Pattern, supports: Iterable[Any]) -> dic
         if getattr(support, "along", False):
             named = support.nodes
             nodes = set(select(pattern, named).tolist() if isinstance(named, str) else named)
-            held = (edge for edge in _boundary(pattern) if nodes.issuperset(edge))
+            held = (edge for edge in edge_lookup(pattern.boundary) if nodes.issuperset(edge))
             straight |= dict.fromkeys(sorted(held))
     return {"straight": tuple(straight)}
 

@@ -74,6 +74,14 @@ def _rate(panels, p, i, v):
 
 
 @inner_scalar
+def _rates(panels, p, u, v):
+    """Those of all its bars to `rate`, and their vectors at u to `along`."""
+    _vectors(panels, p, u)
+    for i in range(panels.rate.size):
+        panels.rate[i] = _rate(panels, p, i, v)
+
+
+@inner_scalar
 def _stress(panels, p, i):
     """Stress (J) of its bar i at the rates of all."""
     stress = 0.0
@@ -87,9 +95,7 @@ def add_viscous_panels(panels, u, v, force):
     """Add their forces at u and v to `force`, all (rows, 3); returns the power taken, W."""
     power, bars = 0.0, panels.rate.size
     for p in range(panels.nodes.shape[0]):
-        _vectors(panels, p, u)
-        for i in range(bars):
-            panels.rate[i] = _rate(panels, p, i, v)
+        _rates(panels, p, u, v)
         for i in range(bars):
             stress = _stress(panels, p, i)
             power += stress * panels.rate[i]
@@ -106,9 +112,7 @@ def viscous_panels_work(panels, u, v, shift):
     """Work (J) of their forces at u and v along a shift, all (rows, 3)."""
     work, bars = 0.0, panels.rate.size
     for p in range(panels.nodes.shape[0]):
-        _vectors(panels, p, u)
-        for i in range(bars):
-            panels.rate[i] = _rate(panels, p, i, v)
+        _rates(panels, p, u, v)
         for i in range(bars):
             work += _stress(panels, p, i) * _rate(panels, p, i, shift)
     return work

@@ -27,7 +27,7 @@ from foldyn.mechanics.clamps import ClampsTerm
 from foldyn.mechanics.following import Following, joined, moments, pushes, tensions
 from foldyn.mechanics.membranes import MembranesTerm
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import Edge
+from foldyn.patterns.topology import Edge, edge_lookup
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm
 from foldyn.structures.bars_plates import BarsPlatesTerm
 from foldyn.structures.clamps import clamps
@@ -163,8 +163,10 @@ class Structure(Discretized):
         """See `Discretized`."""
         if self.pattern is None or not self.options.bowed:
             return frozenset()
-        edges = map(tuple, np.sort(self.pattern.lines, axis=1).tolist())
-        return frozenset(edges) - {*self.options.straight, *self.options.clamped}
+        return frozenset(edge_lookup(self.pattern.lines)) - {
+            *self.options.straight,
+            *self.options.clamped,
+        }
 
     @property
     def _softness(self) -> NDArray:

@@ -85,7 +85,9 @@ class StepContact:
         for moved, factor in zip(self._moved, (factor0, factor1), strict=True):
             move_planes(self._tables, factor, kept)
             moved[:] = kept.moved[:, :3]
-        self._ends, force = (u0.copy(), u1.copy()), self._on_points  # arrays that change in place
+        for end, u in zip(self._ends, (u0, u1), strict=True):
+            end[:] = u  # which change in place
+        force = self._on_points
         p0, p1 = self._contact.points(u0), self._contact.points(u1)
         force[:] = 0.0
         self._counts = _find(self._tables, p0, p1, self._start, self._middle, kept, self._pairs)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.jit.compiled import inner_scalar
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.memory import Memory
@@ -44,15 +45,22 @@ class _Context(NamedTuple):
     histories: int  # as far as planes move with them
 
 
-@forces
-def _forces(own, u, v, t, force, powers):
-    speed, both = rows_at(v, own.rows), numbers_at(powers, 2)
-    add_contact(own.tables, rows_at(u, own.rows), own.angle, rows_at(force, own.rows), own.memory)
+@inner_scalar
+def _add_powers(own, speed, powers):
+    """Add the powers (W) that planes put in and friction takes."""
+    both = numbers_at(powers, 2)
     given, taken = plane_powers(own.tables, speed, own.memory)
     if own.tables.friction > 0.0:
         taken += rub_power(own.tables, speed, own.memory)
     both[0] += given
     both[1] += taken
+
+
+@forces
+def _forces(own, u, v, t, force, powers):
+    speed = rows_at(v, own.rows)
+    add_contact(own.tables, rows_at(u, own.rows), own.angle, rows_at(force, own.rows), own.memory)
+    _add_powers(own, speed, powers)
 
 
 @energies
@@ -89,16 +97,12 @@ class _Riding(NamedTuple):
 
 @forces
 def _board_forces(own, u, v, t, force, powers):
-    at, both = rows_at(u, own.rows), numbers_at(powers, 2)
+    at = rows_at(u, own.rows)
     put_points(own.ride, at, own.moved)
     put_rates(own.ride, at, rows_at(v, own.rows), own.speed)
     own.push[:] = 0.0
     add_contact(own.tables, own.moved, own.angle, own.push, own.memory)
-    given, taken = plane_powers(own.tables, own.speed, own.memory)
-    if own.tables.friction > 0.0:
-        taken += rub_power(own.tables, own.speed, own.memory)
-    both[0] += given
-    both[1] += taken
+    _add_powers(own, own.speed, powers)
     add_back(own.ride, at, own.push, rows_at(force, own.rows))
 
 

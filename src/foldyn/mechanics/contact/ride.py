@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.compiled import inner_scalar, kernel
+from foldyn.mechanics.block_matrix import assembled, pairs_within, places_of
 from foldyn.mechanics.contact.distances import cross, dot, minus, point
 
 NOISE = 16.0 * float(np.finfo(float).eps)  # of a normal: less is rounding
@@ -227,12 +228,12 @@ def _motion(ride: Ride, turned: NDArray, size: int) -> sparse.csr_array:
     """dy/dx (3 m, size) of the change `turned` (t, 3, 3, 3) of normals by each of the nodes."""
     blocks = ride.heights[:, :, None, None, None] * turned[:, None]
     blocks += ride.weights[:, :, :, None, None] * np.eye(3)
-    axis, n, first = np.arange(3), ride.x.size, ride.rest.size - ride.x.size
-    rows = 3 * ride.points[:, :, None, None, None] + axis[:, None] + np.zeros_like(blocks, int)
-    columns = 3 * ride.nodes[:, None, :, None, None] + axis + np.zeros_like(blocks, int)
+    n, first = ride.x.size, ride.rest.size - ride.x.size
+    pairs = np.broadcast_arrays(ride.points[:, :, None], ride.nodes[:, None, :])
+    rows, columns = places_of(np.stack(pairs, axis=-1).reshape(-1, 2))
     same = np.arange(n)
     entries = np.concatenate([blocks.ravel(), np.ones(n)])
-    places = [np.concatenate([rows.ravel(), first + same]), np.concatenate([columns.ravel(), same])]
+    places = [np.concatenate([rows, first + same]), np.concatenate([columns, same])]
     return sparse.csr_array(sparse.coo_array((entries, places), shape=(first + n, size)))
 
 
@@ -281,11 +282,7 @@ def curvature(ride: Ride, u: NDArray, push: NDArray, size: int) -> sparse.csr_ar
     for i, j in ((0, 1), (1, 2), (2, 0)):
         blocks[:, i, j] -= spin
         blocks[:, j, i] += spin
-    axis = np.arange(3)
-    rows = 3 * ride.nodes[:, :, None, None, None] + axis[:, None] + np.zeros_like(blocks, int)
-    columns = 3 * ride.nodes[:, None, :, None, None] + axis + np.zeros_like(blocks, int)
-    entries = (blocks.ravel(), [rows.ravel(), columns.ravel()])
-    return sparse.csr_array(sparse.coo_array(entries, shape=(size, size)))
+    return assembled(pairs_within(ride.nodes), blocks, size)
 
 
 def largest_turn(ride: Ride, u: NDArray, step: NDArray) -> float:

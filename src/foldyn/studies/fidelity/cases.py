@@ -45,11 +45,8 @@ class Held:
         fixed = [Fix(list(nodes), axes) for axes, nodes in self.points.items()]
         if not self.edges:
             return fixed
-        nodes: Any = self.edges
-        if isinstance(structure, Shell):
-            along = {(int(row[0]), int(row[-1])): row for row in structure.edge_nodes}
-            nodes = [along[min(edge), max(edge)] for edge in self.edges]
-        return [*fixed, Fix(np.unique(np.concatenate(nodes)).tolist(), "xyz")]
+        along = isinstance(structure, Shell)  # bars and hinges have no other nodes there
+        return [*fixed, Fix(np.unique(self.edges).tolist(), "xyz", along=along)]
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge
 from foldyn.shells import Shell, shell
 from foldyn.structures import discretize
+from foldyn.structures.presets import resolved
 from foldyn.studies import find_case
 from foldyn.studies.fidelity.cases import FidelityCase, documented
 from foldyn.studies.fidelity.cycles import Cycles, NoCyclesError, cycles
@@ -152,7 +153,7 @@ def structures(
         }
         for law, own in LAWS.items():
             given: dict[str, Any] = {**own, **creases}
-            if own["preset"] != "herkal":
+            if resolved(**own).bowed:
                 given["straight"] = edges
             made[law] = discretize(pattern, sheet, **given)
     return made

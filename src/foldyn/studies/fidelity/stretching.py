@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.cases import Case, Fix, Impose
+from foldyn.cases.straight import straightened
 from foldyn.errors import FoldynWarning
 from foldyn.patterns import Pattern, kresling, miura
 from foldyn.shells import shell
@@ -75,14 +76,11 @@ def moved(held: Held, structure: Discretized, axis: str, way: float) -> Case:
 
 def structures(held: Held) -> dict[str, Discretized]:
     """All models of a sheet."""
-    rims = [set(rim) for rim in held.rims]
-    straight = [
-        (a, b) for a, b in held.pattern.boundary.tolist() if any({a, b} <= rim for rim in rims)
-    ]
+    rims = [Fix(list(rim), along=True) for rim in held.rims]
     made: dict[str, Discretized] = {}
     for name, own in MODELS.items():
-        options = {**own, "straight": straight} if resolved(**own).bowed else own
-        made[name] = discretize(held.pattern, held.sheet, **options)
+        straight = straightened(resolved(**own), held.pattern, rims)
+        made[name] = discretize(held.pattern, held.sheet, **own, **straight)
     return made
 
 
