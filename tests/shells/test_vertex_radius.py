@@ -13,7 +13,7 @@ import foldyn as fd
 from foldyn.algebra.extrapolation import convergence
 from foldyn.errors import InputError
 from foldyn.shells import shell
-from foldyn.shells.graded import grading
+from foldyn.structures.graded import grading
 from foldyn.shells.mesh import shell_mesh
 from foldyn.shells.shell import STIFF
 

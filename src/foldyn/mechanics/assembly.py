@@ -126,7 +126,7 @@ class Assembly:
         if not len(self.hidden):
             return q
         first, held_forces = self.size - len(self.hidden), np.zeros(rows.shape[0])
-        body = self._sheet_alone if memory is None else Assembly(self.sheet, memory)
+        body = self._of_hidden if memory is None else self._of_hidden.with_terms(memory)
         for _ in range(ITERATIONS):
             couple = body.internal(q)[first:]
             if push is not None:
@@ -144,8 +144,10 @@ class Assembly:
         raise ComputationError("the rotations of the panels do not balance at this displacement")
 
     @cached_property
-    def _sheet_alone(self) -> Assembly:
-        return Assembly(self.sheet) if self.others else self
+    def _of_hidden(self) -> Assembly:
+        """The sheet, and the others that own hidden dofs."""
+        own = [term for term in self.others if term.owns_hidden]
+        return self if len(own) == len(self.others) else Assembly(self.sheet, *own)
 
     @cached_property
     def _evaluated(self) -> Model:

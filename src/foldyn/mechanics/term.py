@@ -95,11 +95,14 @@ class Term(ABC):
         Whether its forces are moments of hinges, which are at play even where all is at rest.
     shared : bool
         Whether threads may share a model with it.
+    owns_hidden : bool
+        Whether some of the hidden dofs are its own.
     """
 
     energy_groups: ClassVar[Mapping[str, str]] = {}
     of_hinges: ClassVar[bool] = False
     shared: ClassVar[bool] = False
+    owns_hidden: ClassVar[bool] = False
 
     # ------------------------------------------------------------------ what is compiled
     @abstractmethod

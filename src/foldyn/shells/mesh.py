@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around
-from foldyn.shells.graded import Grading
+from foldyn.structures.graded import Grading
 from foldyn.structures.mesh import CUT, Triangle, check_triangles
 
 EQUAL = 1e-6  # relative difference of diagonals that counts as none

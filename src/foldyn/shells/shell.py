@@ -21,7 +21,7 @@ from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned
 from foldyn.patterns.topology import Edge
-from foldyn.shells.graded import Grading, grading
+from foldyn.structures.graded import Grading, grading
 from foldyn.shells.kernels import ShellModel
 from foldyn.shells.mesh import shell_mesh
 from foldyn.shells.sides import Sides, sides, stiffness, without_free_sides

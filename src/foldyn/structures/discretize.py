@@ -175,10 +175,11 @@ def discretize(
     clamps, clamped_triangle = clamp_rows(edges, mesh.triangles)
     clamped_panel = mesh.triangle_panel[clamped_triangle]
     modulus = sheet.values("bending_modulus", len(pattern.faces))[clamped_panel]
-    coupled = ()
+    coupled, gives = (), None
     if options.membrane == "panel":
         stiff = rigid_panels(options.rigid, len(pattern.faces))
-        coupled = membranes(mesh, pattern, sheet, [*options.straight, *edges], stiff)
+        held = [*options.straight, *edges]
+        coupled, gives = membranes(mesh, pattern, sheet, held, stiff, options.scheme == "n5b8e")
     structure = Structure(
         nodes=x,
         bars=np.concatenate([mesh.inner, pattern.lines]),
@@ -201,6 +202,7 @@ def discretize(
         clamp_stiffness=clamp_stiffness(x, clamps, modulus),
         edge_plates=plates,
         membranes=coupled,
+        edge_gives=gives,
     )
     _ = structure.plates  # refuse panels that are not flat
     return structure.marked()

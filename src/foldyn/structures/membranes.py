@@ -9,6 +9,14 @@ of a panel's bars in displacements in its plane, and K that of the membrane, see
 B+ the pseudoinverse of B. N spans the elongations that no displacement in the plane gives, which
 come with the curvature of a panel that is no longer flat: there bars of stiffness k resist alone.
 These bars also hold the center, which the membrane leaves free, where the corners would put it.
+
+Corners give way along edges, by a logarithm of length over thickness: with `giving` panels, near
+either end of an edge of length L displacements gain
+
+    g [1 - s/L - log(2 s/L) / log(2 t/L)],
+
+s the distance from that end, from the thickness t to L/2: stresses about a force at a corner fall
+with 1/s. Panels share the amplitudes g of the edge between them (`mechanics.edge_gives`).
 """
 
 from __future__ import annotations
@@ -20,12 +28,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
+from foldyn.mechanics.edge_gives import EdgeGives
 from foldyn.mechanics.following import Following, tensions
 from foldyn.mechanics.membranes import Membranes
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
 from foldyn.structures.mesh import Mesh, hinge_angles
-from foldyn.structures.panel_membrane import membrane_stiffness
+from foldyn.structures.panel_membrane import giving_stiffness, membrane_stiffness
 from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
 
@@ -48,20 +57,24 @@ class Sides(NamedTuple):
 
 
 def membranes(
-    mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[Edge], rigid: Collection[int]
-) -> tuple[PanelKind, ...]:
-    """Membranes of all panels.
+    mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[Edge], rigid: Collection[int],
+    giving: bool = False,
+) -> tuple[tuple[PanelKind, ...], EdgeGives | None]:  # fmt: skip
+    """Membranes of all panels, and how edges give way near their ends.
 
     Parameters
     ----------
     mesh, pattern, sheet
-    straight : edges that do not bow; those between panels in one plane do not, either.
+    straight : edges that do not bow or give way; those between panels in one plane do not bow.
     rigid : panels that do not bend.
+    giving : whether the others give way.
     """
     kinds: dict[tuple, list[tuple[int, NDArray, NDArray]]] = {}
+    sides = _sides(mesh, pattern, sheet, straight, rigid)
+    numbers = _numbers(pattern, sides, straight) if giving else {}
+    parts: list[tuple] = []
     properties, kind = sheet.kinds(len(pattern.faces))
     first = np.searchsorted(mesh.inner_panel, np.arange(len(pattern.faces) + 1))
-    sides = _sides(mesh, pattern, sheet, straight, rigid)
     for p, (face, panel) in enumerate(zip(pattern.faces, sides, strict=True)):
         hub = mesh.centers[p]
         nodes = np.array([*face, hub] if hub >= 0 else face)
@@ -69,13 +82,58 @@ def membranes(
         place = {int(node): k for k, node in enumerate(nodes)}
         ring = [(k, (k + 1) % len(face)) for k in range(len(face))]
         ends = (*ring, *((place[a], place[b]) for a, b in inner.tolist()))
-        own = properties[kind[p]]
-        stiffness = own.youngs_modulus * own.thickness * coupling(panel, ends, own.poissons_ratio)
-        kinds.setdefault((len(nodes), ends), []).append((p, nodes, stiffness))
+        own, radius = properties[kind[p]], None
+        number = [-1] * (2 * len(face))
+        if giving and panel.convex:
+            radius = own.thickness / float(np.sqrt(2.0 * pattern.face_areas[p]))
+            pairs = [((edge_of(a, b), a), (edge_of(a, b), b)) for a, b in around(face)]
+            number = [numbers.get(end, -1) for pair in pairs for end in pair]
+        shared = np.array(number) >= 0
+        part = coupling(panel, ends, own.poissons_ratio, radius, shared)
+        part *= own.youngs_modulus * own.thickness
+        bars = len(ends)
+        kinds.setdefault((len(nodes), ends), []).append((p, nodes, part[:bars, :bars]))
+        if shared.any():
+            parts.append((p, nodes, ends, np.array(number)[shared], part[:, bars:]))
     return tuple(
         _packed(mesh.nodes, np.array(ends), *zip(*members, strict=True))
         for (_, ends), members in kinds.items()
-    )
+    ), _gives(mesh.nodes, parts, [edge for edge, _ in numbers]) if parts else None
+
+
+def _numbers(
+    pattern: Pattern, sides: Sequence[Sides], straight: Collection[Edge]
+) -> dict[tuple[Edge, int], int]:
+    """Numbers of the gives of edges between two panels, by edge and vertex."""
+    beside: dict[Edge, int] = {}
+    for face, own in zip(pattern.faces, sides, strict=True):
+        for edge in (edge_of(a, b) for a, b in around(face)):
+            beside[edge] = beside.get(edge, 0) + own.convex
+    edges = [edge for edge, count in beside.items() if count == 2 and edge not in set(straight)]
+    return {(edge, end): 2 * k + j for k, edge in enumerate(edges) for j, end in enumerate(edge)}
+
+
+def _gives(x: NDArray, parts: list[tuple], edges: list[Edge]) -> EdgeGives:
+    """Panels with nodes (c,), bars (b, 2), numbers (k,) of gives, and columns (b + k, k), N/m."""
+    panel, size = np.array([p for p, *_ in parts]), len(parts)
+    corners, bars, most = (max(len(part[k]) for part in parts) for k in (1, 2, 3))
+    out = EdgeGives(
+        len(edges), np.array(edges), panel, np.zeros((size, corners), np.int64), np.zeros((size, bars, 2), np.int64),
+        np.zeros((size, bars, 3)), np.zeros((size, bars)), np.zeros((size, most), np.int64),
+        np.zeros((size, bars, most)), np.zeros((size, most, most)), np.zeros(bars),
+        np.zeros((bars, 3)),
+    )  # fmt: skip
+    for p, (_, nodes, ends, number, columns) in enumerate(parts):
+        b, k = len(ends), len(number)
+        out.nodes[p], out.nodes[p, : len(nodes)] = nodes[0], nodes
+        out.ends[p, :b], out.number[p], out.number[p, :k] = ends, number[0], number
+        rows = nodes[np.array(ends)]
+        out.vector[p, :b] = x[rows[:, 1]] - x[rows[:, 0]]
+        length = np.linalg.norm(out.vector[p, :b], axis=1)
+        out.per_length2[p, :b] = 1.0 / length**2
+        out.across[p, :b, :k] = columns[:b] * length[:, None]
+        out.stiffness[p, :k, :k] = columns[b:]
+    return out.narrow()
 
 
 def _sides(
@@ -117,8 +175,15 @@ def _sides(
     return found
 
 
-def coupling(sides: Sides, ends: tuple[tuple[int, int], ...], poissons_ratio: float) -> NDArray:
-    """Stiffness (b, b) over E t of the elongations of bars between corners, and center."""
+def coupling(
+    sides: Sides, ends: tuple[tuple[int, int], ...], poissons_ratio: float, radius: float | None,
+    shared: NDArray,
+) -> NDArray:  # fmt: skip
+    """Stiffness over E t of the elongations of bars (b,) between corners and center, and of gives.
+
+    radius : of the corners, over the outline's unit of length; None where they do not give way.
+    shared : (2m,) gives that stay, k: the others follow. The result is (b + k, b + k).
+    """
     panel = sides.outline
     bars, corners = np.array(ends), 2 * len(panel.corners)
     x = np.array([*panel.corners, *([panel.center] if panel.center else [])])[: bars.max() + 1]
@@ -131,39 +196,70 @@ def coupling(sides: Sides, ends: tuple[tuple[int, int], ...], poissons_ratio: fl
     alone = 1.0 / ((1.0 - poissons_ratio) * length.sum() * length)  # an outline's area is 1/2
     if not sides.convex:
         return np.diag(alone)
+    if radius is None:
+        stiff = membrane_stiffness(panel, poissons_ratio, sides.resistance)
+    else:
+        stiff = giving_stiffness(panel, poissons_ratio, sides.resistance, radius)
+        free = corners + np.flatnonzero(~shared)
+        kept = np.setdiff1d(np.arange(len(stiff)), free)
+        across = stiff[free][:, kept]
+        stiff = stiff[np.ix_(kept, kept)] - across.T @ np.linalg.solve(
+            stiff[np.ix_(free, free)], across
+        )
     whole = np.zeros((x.size, x.size))
-    whole[:corners, :corners] = membrane_stiffness(panel, poissons_ratio, sides.resistance)
+    whole[:corners, :corners] = stiff[:corners, :corners]
     held = longer.T @ (alone[:, None] * longer)
     center = held[corners:, corners:]
     off = np.column_stack([np.linalg.solve(center, held[corners:, :corners]), np.eye(len(center))])
     whole += off.T @ center @ off
     back, curved = np.linalg.pinv(longer), null_space(longer.T)
     soft = curved.T @ (curved / alone[:, None])
-    return back.T @ whole @ back + curved @ np.linalg.solve(soft, curved.T)
+    across = back[:corners].T @ stiff[:corners, corners:]
+    between = back.T @ whole @ back + curved @ np.linalg.solve(soft, curved.T)
+    return np.block([[between, across], [across.T, stiff[corners:, corners:]]])
 
 
-def energies(kinds: Sequence[PanelKind], x: NDArray, panels: int) -> NDArray:
-    """Energy (samples, panels), J, of the membranes at positions x (samples, n, 3), m."""
-    out = np.zeros((len(x), panels))
+def energies(
+    kinds: Sequence[PanelKind], gives: EdgeGives | None, rest: NDArray, u: NDArray, panels: int
+) -> NDArray:
+    """Energy (samples, panels), J, of the membranes at displacements u (samples, n, 3), m."""
+    x, out = rest + u, np.zeros((len(u), panels))
     for which, own in kinds:
         start, end = (x[:, own.nodes[:, place]] for place in own.ends.T)
         square = np.einsum("spbc,spbc->bsp", end - start, end - start)
         strain = 0.5 * (square * own.per_length2[:, None] - 1.0)
         out[:, which] = 0.5 * np.einsum("isp,ijp,jsp->sp", strain, own.stiffness, strain)
+    for sample, here in enumerate(u if gives else ()):
+        assert gives is not None
+        strain = gives.strains(here)
+        g = gives.balanced(strain)[gives.number]
+        pull = np.einsum("pb,pbk->pk", strain, gives.across)
+        pull += 0.5 * np.einsum("pj,pjk->pk", g, gives.stiffness)
+        out[sample, gives.panel] += (pull * g).sum(axis=1)
     return out
 
 
-def swelling(kinds: Sequence[PanelKind], x: NDArray, strain: NDArray) -> list[Following]:
+def swelling(
+    kinds: Sequence[PanelKind], gives: EdgeGives | None, x: NDArray, strain: NDArray
+) -> list[Following]:
     """What panels push with that would, if they were free, stretch by `strain` (np,).
+
+    Gives count from where the swelling has put them.
 
     x : (n, 3) rest positions of the nodes, m.
     """
-    parts = []
+    parts, free = [], strain * (1.0 + 0.5 * strain)
     for which, own in kinds:
-        free = strain[which] * (1.0 + 0.5 * strain[which])
-        tension = -own.stiffness.sum(axis=1) * free * own.per_length2
+        tension = -own.stiffness.sum(axis=1) * free[which] * own.per_length2
         bars = own.nodes[:, own.ends].transpose(1, 0, 2).reshape(-1, 2)
         parts.append(tensions(x, bars, tension.ravel()))
+    if gives:
+        ends = np.take_along_axis(gives.nodes[:, :, None], gives.ends, axis=1)
+        alike = np.repeat(free[gives.panel][:, None], ends.shape[1], axis=1)
+        g = gives.balanced(alike)[gives.number]
+        tension = -np.einsum("pbk,pk->pb", gives.across, g) * gives.per_length2
+        there = gives.per_length2 > 0.0
+        parts.append(tensions(x, ends[there], tension[there]))
     return parts
 
 

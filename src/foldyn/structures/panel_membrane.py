@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +27,13 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from foldyn.algebra.extrapolation import extrapolated
+from foldyn.structures.graded import ROOM, Grading, graded
 from foldyn.structures.panel_plate import Outline, meshed
 
 COARSE, FINE = 4, 8  # pieces of each edge in the two meshes; twice as many in triangles
+RAYS = 2  # of a graded mesh, in half a corner
+STIFF = 1e3  # times as stiff as the rest: rigid corners
+WAVES = 2.0  # in a bow of an edge, for each of its radii
 MIDDLES = 0.5 * (np.ones((3, 3)) - np.eye(3))  # of the sides: three points integrate exactly
 
 
@@ -48,34 +53,109 @@ def membrane_stiffness(
         of length of the outline, squared.
     """
     more = 1 if panel.center else 2
-    coarse, fine = (_condensed(panel, poissons_ratio, resistance, more * n) for n in (COARSE, FINE))
-    stiffness = extrapolated(coarse, fine, FINE / COARSE)
+    coarse, fine = (
+        _condensed(panel, poissons_ratio, resistance, _even(panel, more * n))
+        for n in (COARSE, FINE)
+    )
+    return _symmetric(extrapolated(coarse, fine, FINE / COARSE))
+
+
+@lru_cache(maxsize=4096)
+def giving_stiffness(
+    panel: Outline, poissons_ratio: float, resistance: tuple[float, ...], radius: float
+) -> NDArray:
+    """The same (4m, 4m) of corners that give way along their edges, rigid within a radius.
+
+    After the displacements of the corners come the gives: of each edge in turn, at its first and
+    at its last corner, how far the points near it slide along the edge, away from the corner.
+    """
+    return _symmetric(_condensed(panel, poissons_ratio, resistance, _graded(panel, radius)))
+
+
+def _symmetric(stiffness: NDArray) -> NDArray:
     stiffness = 0.5 * (stiffness + stiffness.T)
     stiffness.setflags(write=False)
     return stiffness
 
 
-def _condensed(
-    panel: Outline, poissons_ratio: float, resistance: tuple[float, ...], n: int
-) -> NDArray:
+class PanelMesh(NamedTuple):
+    """Quadratic triangles of a panel."""
+
+    x: NDArray  # (n, 2) corners and middles of the triangles
+    elements: NDArray  # (nt, 6) corners, and the middles of the sides from each to the next
+    at: NDArray  # (m,) the panel's corners
+    along: list[NDArray]  # points on each edge, in order, without its ends
+    radius: float | None = None  # within which corners are rigid, where they give way
+
+
+def _even(panel: Outline, n: int) -> PanelMesh:
+    """A mesh with n pieces of each edge."""
     points, triangles, at, edges = meshed(np.array(panel.corners), panel.center, n)
-    at = at[: len(edges)]  # of the corners
+    return _quadratic(points, triangles, at[: len(edges)], edges)
+
+
+def _graded(panel: Outline, radius: float) -> PanelMesh:
+    """A mesh that is graded toward corners, down to a radius or to what a short edge has room for.
+
+    As that of a shell (`structures.graded`).
+    """
+    corners = np.array(panel.corners)
+    middles, mean = 0.5 * (corners + np.roll(corners, -1, axis=0)), corners.mean(axis=0)
+    pieces = [
+        np.stack([corner, middles[k], mean, middles[k - 1]]) for k, corner in enumerate(corners)
+    ]
+    length = 2.0 * np.linalg.norm(middles - corners, axis=1)
+    room = min(Grading(radius, 2, RAYS).reach(piece).min() for piece in pieces)
+    radius = min(radius, 0.999 * room / ROOM, 0.5 * length.min() / ROOM)
+    cut = graded(length, RAYS, radius)
+    x = np.stack([cut.points(piece) for piece in pieces])  # (m, arcs, 2 RAYS + 1, 2)
+    node = np.arange(x[..., 0].size).reshape(x.shape[:3])
+    node[:, -1, RAYS] = node[0, -1, RAYS]  # the mean; cuts belong to two pieces
+    node[:, -1, : RAYS : -1] = np.roll(node[:, -1, :RAYS], 1, axis=0)
+    at = x[..., 0].size + np.arange(len(pieces))
+    a, b, c, d = node[:, :-1, :-1], node[:, 1:, :-1], node[:, 1:, 1:], node[:, :-1, 1:]
+    halves = [np.stack(half, axis=-1).reshape(-1, 3) for half in ((a, b, d), (b, c, d))]
+    tips = np.stack(np.broadcast_arrays(at[:, None], node[:, 0, :-1], node[:, 0, 1:]), axis=-1)
+    triangles = np.concatenate([tips.reshape(-1, 3), *halves])
+    following = np.roll(np.arange(len(pieces)), -1)
+    edges = [
+        np.array([at[k], *node[k, :, 0], *node[j, -2::-1, -1], at[j]])
+        for k, j in enumerate(following)
+    ]
+    used, triangles = np.unique(triangles, return_inverse=True)
+    points = np.empty((at[-1] + 1, 2))
+    points[: x[..., 0].size], points[at] = x.reshape(-1, 2), corners
+    edges = [np.searchsorted(used, edge) for edge in edges]
+    mesh = _quadratic(points[used], triangles.reshape(-1, 3), np.searchsorted(used, at), edges)
+    return mesh._replace(radius=radius)
+
+
+def _quadratic(
+    points: NDArray, triangles: NDArray, at: NDArray, edges: list[NDArray]
+) -> PanelMesh:
+    """Triangles with the middles of their sides; `edges` with their ends."""
     sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
     ends, side = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
     middle = {pair: len(points) + k for k, pair in enumerate(map(tuple, ends.tolist()))}
     elements = np.concatenate([triangles, len(points) + side.reshape(-1, 3)], axis=1)
-    x = np.concatenate([points, points[ends].mean(axis=1)])
-    along = []  # points on each edge, in order, without its ends
+    along = []
     for edge in (edge.tolist() for edge in edges):
         halves = [(middle[min(pair), max(pair)], pair[1]) for pair in pairwise(edge)]
         along.append(np.array([point for both in halves for point in both][:-1]))
-    moves = _moves(panel, x, at, along)
-    whole = moves.T @ _stretching(x, elements, poissons_ratio) @ moves
-    m = 2 * len(at)
-    lengths = np.linalg.norm(x[np.roll(at, -1)] - x[at], axis=1)
+    return PanelMesh(np.concatenate([points, points[ends].mean(axis=1)]), elements, at, along)
+
+
+def _condensed(
+    panel: Outline, poissons_ratio: float, resistance: tuple[float, ...], mesh: PanelMesh
+) -> NDArray:
+    moves, m = _moves(panel, mesh)
+    rigid = np.zeros(len(mesh.elements), bool)
+    if mesh.radius is not None:
+        rigid = np.isin(mesh.elements[:, :3], mesh.at).any(axis=1)
+    whole = moves.T @ _stretching(mesh, poissons_ratio, 1.0 + (STIFF - 1.0) * rigid) @ moves
     bows = [
-        _bowing(length, 2 * n, factor)
-        for length, factor, straight in zip(lengths, resistance, panel.straight, strict=True)
+        _bowing(mesh, k, factor)
+        for k, (factor, straight) in enumerate(zip(resistance, panel.straight, strict=True))
         if not straight
     ]
     free = whole.shape[0] - m - sum(len(bow) for bow in bows)
@@ -86,17 +166,31 @@ def _condensed(
     return whole[:m, :m].toarray() - across.T @ factor.solve(across)
 
 
-def _bowing(length: float, pieces: int, resistance: float) -> NDArray:
-    """Stiffness (pieces - 1, ...) of the bows of an edge at its points."""
-    wave = np.arange(1, pieces)
-    shapes = np.sin(np.pi / pieces * np.outer(wave, wave))
-    per_wave = resistance * (np.pi * wave / length) ** 3 * 0.5 * length
-    return (2.0 / pieces) ** 2 * (shapes * per_wave) @ shapes
+def _bowing(mesh: PanelMesh, edge: int, resistance: float) -> NDArray:
+    """Stiffness (points, ...) of the bows of an edge at its points, waves of sines."""
+    points = mesh.along[edge]
+    start, end = mesh.x[mesh.at[edge]], mesh.x[mesh.at[(edge + 1) % len(mesh.at)]]
+    length = float(np.linalg.norm(end - start))
+    place = np.linalg.norm(mesh.x[points] - start, axis=1)
+    if mesh.radius is None:
+        wave = np.pi / length * np.arange(1, len(points) + 1)
+        shapes = 2.0 / (len(points) + 1) * np.sin(np.outer(wave, place))
+    else:  # of bows that are linear between the points
+        wave = np.pi / length * np.arange(1, int(WAVES * length / mesh.radius))
+        at = np.concatenate([[0.0], place, [length]])
+        slopes = np.diff(np.sin(np.outer(wave, at)), axis=1) / np.diff(at)
+        shapes = -2.0 / length * np.diff(slopes, axis=1) / wave[:, None] ** 2
+    return (shapes.T * (resistance * wave**3 * 0.5 * length)) @ shapes
 
 
-def _moves(panel: Outline, x: NDArray, at: NDArray, along: list[NDArray]) -> sparse.csr_array:
-    """Displacements of all points x by those of the corners, and by what is free."""
-    rows, columns, values, count = [], [], [], 2 * len(at)
+def _moves(panel: Outline, mesh: PanelMesh) -> tuple[sparse.csr_array, int]:
+    """Displacements of all points by those of the corners, gives, and what is free.
+
+    The number of the first two as well.
+    """
+    x, at, along = mesh.x, mesh.at, mesh.along
+    rows, columns, values = [], [], []
+    kept = count = (2 if mesh.radius is None else 4) * len(at)
 
     def put(points: NDArray, column: NDArray, value: NDArray) -> None:
         """By one column each: both components of the displacements of some points."""
@@ -114,10 +208,17 @@ def _moves(panel: Outline, x: NDArray, at: NDArray, along: list[NDArray]) -> spa
         length = np.linalg.norm(edge)
         tangent = edge / length
         normal, place = np.array([-tangent[1], tangent[0]]), (x[points] - x[at[k]]) @ tangent
-        for end, share in zip(ends, (1.0 - place / length, place / length), strict=True):
+        for side, far in enumerate((place, length - place)):
+            share = 1.0 - far / length
             for axis in range(2):
-                column = np.full(len(points), 2 * end + axis)
+                column = np.full(len(points), 2 * ends[side] + axis)
                 put(points, column, share[:, None] * np.eye(2)[axis])
+            if mesh.radius is not None:
+                half = 0.5 * length
+                held = np.log(np.maximum(far, mesh.radius) / half) / np.log(mesh.radius / half)
+                slid = (share - np.maximum(held, 0.0)) * (1 - 2 * side)
+                column = np.full(len(points), 2 * (len(at) + k) + side)
+                put(points, column, slid[:, None] * tangent)
         if not panel.straight[k]:
             put(points, count + np.arange(len(points)), np.tile(normal, (len(points), 1)))
             count += len(points)
@@ -125,19 +226,16 @@ def _moves(panel: Outline, x: NDArray, at: NDArray, along: list[NDArray]) -> spa
         put(inside, count + np.arange(len(inside)), np.tile(np.eye(2)[axis], (len(inside), 1)))
         count += len(inside)
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sparse.csr_array(sparse.coo_array(entries, shape=(2 * len(x), count)))
+    return sparse.csr_array(sparse.coo_array(entries, shape=(2 * len(x), count))), kept
 
 
-def _stretching(x: NDArray, elements: NDArray, poissons_ratio: float) -> sparse.csr_array:
-    """Stiffness of the displacements of points x (n, 2) in plane stress, E t = 1.
-
-    elements : (nt, 6) corners, and the middles of the sides from each to the next.
-    """
-    nu = poissons_ratio
+def _stretching(mesh: PanelMesh, poissons_ratio: float, stiffness: NDArray) -> sparse.csr_array:
+    """Stiffness of the displacements of all points in plane stress, E t = `stiffness` (nt,)."""
+    nu, x, elements = poissons_ratio, mesh.x, mesh.elements
     elastic = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, 0.5 * (1 - nu)]]) / (1 - nu**2)
     corners = x[elements[:, :3]]
     spans = corners[:, 1:] - corners[:, :1]
-    inverse, part = np.linalg.inv(spans), np.linalg.det(spans) / 6.0
+    inverse, part = np.linalg.inv(spans), stiffness * np.linalg.det(spans) / 6.0
     gradient = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)
     following, block = np.roll(gradient, -1, axis=2), 0.0
     for place in MIDDLES:

@@ -25,6 +25,7 @@ from foldyn.materials.plate_superlinear import onset_parameters
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.clamps import ClampsTerm
 from foldyn.mechanics.following import Following, joined, moments, pushes, tensions
+from foldyn.mechanics.edge_gives import BalancedGivesTerm, EdgeGives, EdgeGivesTerm
 from foldyn.mechanics.membranes import MembranesTerm
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, edge_lookup
@@ -117,8 +118,10 @@ class Structure(Discretized):
         Panels as plates, of the scheme n5b8e.
     membranes : tuple of PanelKind
         What couples the bars of panels, with `membrane = "panel"`: `bar_area` does not resist then.
+    edge_gives : EdgeGives or None
+        How edges give way near their ends, in the plane of panels; of the scheme n5b8e.
     without_edge_angles : bool
-        Whether its edge angles are no dofs but stay in balance.
+        Whether its edge angles, and the gives of its edges, are no dofs but stay in balance.
     pattern, sheet, options
         What it was made from.
     """
@@ -145,6 +148,7 @@ class Structure(Discretized):
     clamp_stiffness: NDArray = field(default_factory=lambda: _none(1, float))
     edge_plates: EdgePlates | None = None
     membranes: tuple[PanelKind, ...] = ()
+    edge_gives: EdgeGives | None = None
     without_edge_angles: bool = False
 
     def __repr__(self) -> str:
@@ -223,9 +227,15 @@ class Structure(Discretized):
         """A sheet with the membranes of its panels, in the place of single bars."""
         if not self.membranes:
             return Assembly(sheet)
-        return Assembly(
+        body = Assembly(
             sheet.hinges_alone(), *(MembranesTerm(own, sheet.rows) for _, own in self.membranes)
         )
+        if self.edge_gives is None:
+            return body
+        kind = BalancedGivesTerm if self.without_edge_angles else EdgeGivesTerm
+        plates = self.edge_plates
+        first = self.nodes.size + (0 if plates is None else len(plates.rotation_hinge))
+        return body.with_terms(kind(self.edge_gives, sheet.rows, first))
 
     @property
     def massless(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -233,8 +243,17 @@ class Structure(Discretized):
         there = self.edge_plates is not None and not self.without_edge_angles
         return "the edge angles of the scheme n5b8e" if there else ""
 
+    @property
+    def _axes(self) -> list[list[int]]:
+        """Nodes on the axes of its hinges, folds first."""
+        return np.concatenate([self.folds, self.bends])[:, :2].tolist()
+
     def _plates_term(self, plates: EdgePlates) -> BarsPlatesTerm:
         stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
+        if self.edge_gives is not None and not self.without_edge_angles:  # dofs of no plate
+            hinge = {frozenset(axis): k for k, axis in enumerate(self._axes)}
+            gives = [hinge[frozenset(edge)] for edge in self.edge_gives.edge.tolist()]
+            plates = plates._replace(rotation_hinge=np.append(plates.rotation_hinge, gives))
         model = plates_model(
             self.nodes, self.bars, stiffness, self.bar_law, self.folds, self.fold_stiffness,
             self.fold_rest, self.fold_law, self.bends, self.bend_rest, plates,
@@ -307,7 +326,7 @@ class Structure(Discretized):
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """See `Discretized`; a bar between panels takes their mean strain."""
         if self.membranes:
-            parts = swelling(self.membranes, self.nodes, strain)
+            parts = swelling(self.membranes, self.edge_gives, self.nodes, strain)
         else:
             stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
             free = _mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
@@ -322,7 +341,7 @@ class Structure(Discretized):
                 if self.without_edge_angles:
                     turns[len(turns) - sheet.offsets :] = push
                 else:
-                    parts.append(pushes(sheet.hidden, push))
+                    parts.append(pushes(sheet.hidden[: len(push)], push))
             return Swelling(turns, joined((part, 0) for part in parts))
         of_hinges, of_clamps = self._chords
         if len(self.clamps):

@@ -133,7 +133,9 @@ def energy_density(
     beside = shares(pairs, structure.triangles, structure.triangle_panel)
     triangle = 0.5 * np.linalg.norm(double_areas(structure.nodes, structure.triangles), axis=1)
     area = np.bincount(structure.triangle_panel, triangle)
-    coupled = membranes.energies(structure.membranes, structure.nodes + displacement, len(area))
+    coupled = membranes.energies(
+        structure.membranes, structure.edge_gives, structure.nodes, displacement, len(area)
+    )
     return (np.hstack(parts) @ beside + coupled) / area
 
 

@@ -55,15 +55,15 @@ class Grading(NamedTuple):
         return np.concatenate([half, 1.0 - half[-2::-1]])
 
     def points(self, corners: NDArray) -> NDArray[np.float64]:
-        """Points (arcs, 2 rays + 1, 3) of a piece, a bilinear patch.
+        """Points (arcs, 2 rays + 1, dimensions) of a piece, a bilinear patch.
 
-        corners : (4, 3) the panel's corner, the middle of the edge that leaves it, the mean of the
-            panel's corners, and the middle of the edge that ends in it.
+        corners : (4, dimensions) the panel's corner, the middle of the edge that leaves it, the
+            mean of the panel's corners, and the middle of the edge that ends in it.
         """
         corner, one, center, other = corners
         x, y = self.ends
         along = np.stack([one - corner, other - corner])
-        reach = np.linalg.norm(np.stack([x, y], axis=1) @ along, axis=1)
+        reach = self.reach(corners)
         if reach.min() < ROOM * self.radius:
             raise InputError(
                 f" = {self.radius:g}: is more than half of the {reach.min():.3g} m from a corner "
@@ -74,6 +74,11 @@ class Grading(NamedTuple):
         share = self.distances(reach)
         x, y = (share * x)[..., None], (share * y)[..., None]
         return corner + x * along[0] + y * along[1] + x * y * (center - one - other + corner)
+
+    def reach(self, corners: NDArray) -> NDArray[np.float64]:
+        """Lengths (2 rays + 1,) of the rays of a piece."""
+        along = np.stack([corners[1] - corners[0], corners[3] - corners[0]])
+        return np.linalg.norm(np.stack(self.ends, axis=1) @ along, axis=1)
 
     @property
     def steps(self) -> NDArray[np.float64]:
@@ -110,6 +115,10 @@ def grading(pattern: Pattern, divisions: int, radius: float) -> Grading:
             f"quarter of that, {0.5 * length.min() / ROOM:.3g}",
             "vertex_radius",
         )
-    rays = divisions // 4
+    return graded(length, divisions // 4, radius)
+
+
+def graded(length: NDArray, rays: int, radius: float) -> Grading:
+    """The same with edges of these lengths, m, and rays in half a corner."""
     arcs = 1 + rays * math.ceil(4.0 / PER_LOG * math.log(0.5 * length.max() / radius))
     return Grading(radius, arcs, rays)

@@ -1,0 +1,371 @@
+"""Edges that give way near their ends: forces in the plane of panels meet at vertices.
+
+Near either end of an edge its points slide along it by an amplitude g, which the panels beside it
+share (`structures.membranes`). With E the strains of a panel's bars, they add to its energy
+
+    E^T A g + 1/2 g^T K g.
+
+Amplitudes do not turn with the sheet. They have no mass: they are dofs beside displacements, or,
+for methods that need mass, in balance, K g = -A^T E, with K factorized once as a band.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+from scipy.sparse.linalg import splu
+
+from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.context import Context, numbers_at, rows_at
+from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.membranes import GROUP
+from foldyn.mechanics.model import ranks
+from foldyn.mechanics.plates_condensed import factorize_band, solve_band
+from foldyn.mechanics.sheet_term import Unstrained
+from foldyn.mechanics.term import (
+    ENERGIES,
+    FORCES,
+    MEAN_FORCES,
+    Compiled,
+    Term,
+    energies,
+    forces,
+    mean_forces,
+    nodal,
+)
+
+
+class EdgeGives(NamedTuple):
+    """Arrays of p panels with up to c nodes, b bars and k gives; those with fewer have zeros."""
+
+    count: int  # g, of all gives
+    edge: NDArray  # (g, 2) its vertices
+    panel: NDArray  # (p,) numbers
+    nodes: NDArray  # (p, c)
+    ends: NDArray  # (p, b, 2) numbers among a panel's nodes
+    vector: NDArray  # (p, b, 3) rest vector from the first end to the second, m
+    per_length2: NDArray  # (p, b) 1 / L^2, or 0
+    number: NDArray  # (p, k) of the gives
+    across: NDArray  # (p, b, k) A, J/m
+    stiffness: NDArray  # (p, k, k) K, N/m
+    strain: NDArray  # (b,) memory of one panel
+    along: NDArray  # (b, 3) vectors of its bars, m
+
+    @property
+    def matrix(self) -> sparse.csc_array:
+        """Stiffness (g, g) of them all, N/m."""
+        k = self.number.shape[1]
+        places = (np.repeat(self.number, k, axis=1).ravel(), np.tile(self.number, (1, k)).ravel())
+        entries = (self.stiffness.ravel(), places)
+        return sparse.csc_array(sparse.coo_array(entries, shape=(self.count, self.count)))
+
+    def vectors(self, u: NDArray) -> NDArray:
+        """Vectors (p, b, 3) of the bars at displacements u (n, 3), m."""
+        ends = np.take_along_axis(self.nodes[:, :, None], self.ends, axis=1)
+        return self.vector + u[ends[..., 1]] - u[ends[..., 0]]
+
+    def strains(self, u: NDArray) -> NDArray:
+        """Strains (p, b) of the bars at displacements u (n, 3), m."""
+        vector = self.vectors(u)
+        square = ((vector - self.vector) * (vector + self.vector)).sum(axis=2)
+        return 0.5 * self.per_length2 * square
+
+    def balanced(self, strain: NDArray) -> NDArray:
+        """Gives (g,), m, in balance with strains (p, b)."""
+        pull = np.einsum("pbk,pb->pk", self.across, strain).ravel()
+        pull = np.bincount(self.number.ravel(), pull, minlength=self.count)
+        return -splu(self.matrix).solve(pull)
+
+    def narrow(self) -> EdgeGives:
+        """The same with numbers that make its matrix a narrow band."""
+        order = reverse_cuthill_mckee(sparse.csr_array(self.matrix), symmetric_mode=True)
+        return self._replace(
+            edge=self.edge[order], number=ranks(order.astype(np.int64))[self.number]
+        )
+
+    def factor(self) -> NDArray:
+        """The matrix, factorized; see `plates_condensed.factorize_band`."""
+        found = sparse.coo_array(self.matrix)
+        i, j = found.coords
+        width, lower = int(np.abs(i - j).max()), i >= j
+        band = np.zeros((self.count, width + 1))
+        band[i[lower], width + j[lower] - i[lower]] = found.data[lower]
+        factorize_band(band)
+        return band
+
+
+@inner
+def strain_panel(gives, u, p):
+    """Strains and vectors of the bars of panel p, to its memory."""
+    for i in range(gives.strain.size):
+        a, b = gives.nodes[p, gives.ends[p, i, 0]], gives.nodes[p, gives.ends[p, i, 1]]
+        excess = 0.0
+        for c in range(3):
+            apart, rest = u[b, c] - u[a, c], gives.vector[p, i, c]
+            gives.along[i, c] = rest + apart
+            excess += apart * (2.0 * rest + apart)
+        gives.strain[i] = 0.5 * gives.per_length2[p, i] * excess
+
+
+@inner
+def add_pulls(gives, p, g, share, force):
+    """Add a share of the forces on the nodes of panel p, along the vectors in its memory."""
+    for i in range(gives.strain.size):
+        pull = 0.0
+        for k in range(gives.number.shape[1]):
+            pull += gives.across[p, i, k] * g[gives.number[p, k]]
+        pull *= share * gives.per_length2[p, i]
+        a, b = gives.nodes[p, gives.ends[p, i, 0]], gives.nodes[p, gives.ends[p, i, 1]]
+        for c in range(3):
+            force[b, c] += pull * gives.along[i, c]
+            force[a, c] -= pull * gives.along[i, c]
+
+
+@inner
+def add_strained(gives, p, share, out):
+    """Add a share of the forces (g,), N, of the strains in the memory of panel p on its gives."""
+    for k in range(gives.number.shape[1]):
+        for i in range(gives.strain.size):
+            out[gives.number[p, k]] += share * gives.across[p, i, k] * gives.strain[i]
+
+
+@inner
+def add_given(gives, p, g, share, out):
+    """Add a share of the forces (g,), N, of the gives of panel p on themselves."""
+    for k in range(gives.number.shape[1]):
+        for j in range(gives.number.shape[1]):
+            out[gives.number[p, k]] += share * gives.stiffness[p, k, j] * g[gives.number[p, j]]
+
+
+@kernel
+def add_gives(gives, u, g, force, pull):
+    """Add the forces on nodes (n, 3), and on gives (g,)."""
+    for p in range(gives.nodes.shape[0]):
+        strain_panel(gives, u, p)
+        add_pulls(gives, p, g, 1.0, force)
+        add_strained(gives, p, 1.0, pull)
+        add_given(gives, p, g, 1.0, pull)
+
+
+@kernel
+def strained_gives(gives, u, pull):
+    """Forces (g,), N, of the strains at u on the gives."""
+    pull[:] = 0.0
+    for p in range(gives.nodes.shape[0]):
+        strain_panel(gives, u, p)
+        add_strained(gives, p, 1.0, pull)
+
+
+class _Context(NamedTuple):
+    gives: EdgeGives
+    rows: int
+    first: int  # dof of the first give
+    memory: NDArray  # (2, g)
+    factor: NDArray
+
+
+@forces
+def _forces(own, u, v, t, force, powers):
+    moved, out = rows_at(u, own.rows), rows_at(force, own.rows)
+    first, end = own.first, own.first + own.gives.count
+    add_gives(own.gives, moved, flat(moved)[first:end], out, flat(out)[first:end])
+
+
+@energies
+def _energies(own, u, out):
+    moved = rows_at(u, own.rows)
+    g, (strained, given) = flat(moved)[own.first : own.first + own.gives.count], own.memory
+    strained_gives(own.gives, moved, strained)
+    given[:] = 0.0
+    for p in range(own.gives.nodes.shape[0]):
+        add_given(own.gives, p, g, 0.5, given)
+    for k in range(g.size):
+        numbers_at(out, GROUP + 1)[GROUP] += (strained[k] + given[k]) * g[k]
+
+
+@mean_forces
+def _mean_forces(own, u0, u1, before, h, t, force, powers):
+    out, first, end = rows_at(force, own.rows), own.first, own.first + own.gives.count
+    pull = flat(out)[first:end]
+    for one, other in ((u0, u1), (u1, u0)):
+        here, there = rows_at(one, own.rows), rows_at(other, own.rows)
+        g, after = flat(here)[first:end], flat(there)[first:end]
+        for p in range(own.gives.nodes.shape[0]):
+            strain_panel(own.gives, here, p)
+            add_pulls(own.gives, p, g, 0.25, out)
+            add_pulls(own.gives, p, after, 0.25, out)
+            add_strained(own.gives, p, 0.5, pull)
+            add_given(own.gives, p, g, 0.5, pull)
+
+
+@forces
+def _balanced_forces(own, u, v, t, force, powers):
+    moved, out, (pull, g) = rows_at(u, own.rows), rows_at(force, own.rows), own.memory
+    strained_gives(own.gives, moved, pull)
+    for k in range(g.size):
+        g[k] = -pull[k]
+    solve_band(own.factor, g)
+    for p in range(own.gives.nodes.shape[0]):
+        strain_panel(own.gives, moved, p)
+        add_pulls(own.gives, p, g, 1.0, out)
+
+
+@energies
+def _balanced_energies(own, u, out):
+    pull, g = own.memory
+    strained_gives(own.gives, rows_at(u, own.rows), pull)
+    for k in range(g.size):
+        g[k] = -pull[k]
+    solve_band(own.factor, g)
+    for k in range(g.size):
+        numbers_at(out, GROUP + 1)[GROUP] += 0.5 * pull[k] * g[k]
+
+
+class EdgeGivesTerm(Term):
+    """Gives as dofs beside displacements; their energy belongs to that of the sheet's bars.
+
+    Parameters
+    ----------
+    gives : EdgeGives
+    rows : int
+        Of the arrays that hold the dofs.
+    first : int
+        Dof of the first give.
+    """
+
+    owns_hidden: ClassVar[bool] = True
+
+    def __init__(self, gives: EdgeGives, rows: int, first: int) -> None:
+        self.gives, self.rows, self.first = gives, rows, first
+
+    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+        """See `Term`."""
+        memory = np.zeros((2, self.gives.count))
+        context = _Context(self.gives, self.rows, self.first, memory, np.zeros((0, 1)))
+        return Compiled(
+            Context(context), {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
+        )
+
+    @cached_property
+    def _dofs(self) -> NDArray:
+        """Those of each panel (p, 3c + k): of its nodes, then its gives."""
+        nodal = 3 * self.gives.nodes[:, :, None] + np.arange(3)
+        return np.concatenate(
+            [nodal.reshape(len(nodal), -1), self.first + self.gives.number], axis=1
+        )
+
+    @cached_property
+    def places(self) -> tuple[NDArray, NDArray]:
+        """See `Term`."""
+        dofs, count = self._dofs, self._dofs.shape[1]
+        return np.repeat(dofs, count, axis=1).ravel(), np.tile(dofs, (1, count)).ravel()
+
+    def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
+        """See `Term`."""
+        return panel_tangents(self.gives, nodal(q), nodal(q), self._gives(q)).ravel()
+
+    def mean_entries(self, q0: NDArray, q1: NDArray, floor: float = -np.inf) -> NDArray:
+        """See `Term`."""
+        mean = 0.5 * (self._gives(q0) + self._gives(q1))
+        return 0.5 * panel_tangents(self.gives, nodal(q0), nodal(q1), mean).ravel()
+
+    def _gives(self, q: NDArray) -> NDArray:
+        return np.ravel(q)[self.first : self.first + self.gives.count]
+
+    def unstrained(self, q: NDArray) -> Unstrained:
+        """See `Term`."""
+        size = (q.size, q.size)
+        loose = panel_tangents(self.gives, nodal(q), nodal(q), np.zeros(self.gives.count))
+        tangent = sparse.csr_array(sparse.coo_array((loose.ravel(), self.places), size))
+        own = sparse.coo_array(self.gives.matrix)
+        places = tuple(place + self.first for place in own.coords)
+        alone = sparse.csr_array(sparse.coo_array((own.data, places), size))
+        return Unstrained(tangent, alone, lambda motion: 0.0)
+
+    def placed(self, order: NDArray, before: Any) -> EdgeGivesTerm:
+        """See `Term`."""
+        gives = self.gives._replace(nodes=ranks(order)[self.gives.nodes])
+        return type(self)(gives, self.rows, self.first)
+
+
+class BalancedGivesTerm(EdgeGivesTerm):
+    """Gives that are in balance at every displacement: for methods that need mass."""
+
+    owns_hidden: ClassVar[bool] = False
+
+    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+        """See `Term`."""
+        memory = np.zeros((2, self.gives.count))
+        context = _Context(self.gives, self.rows, self.first, memory, self.gives.factor())
+        return Compiled(Context(context), {FORCES: _balanced_forces, ENERGIES: _balanced_energies})
+
+    @cached_property
+    def places(self) -> tuple[NDArray, NDArray]:
+        """See `Term`: all are coupled."""
+        size = 3 * self.rows
+        return np.repeat(np.arange(size), size), np.tile(np.arange(size), size)
+
+    def _gives(self, q: NDArray) -> NDArray:
+        return self.gives.balanced(self.gives.strains(nodal(q)))
+
+    def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
+        """See `Term`."""
+        return self._condensed(q, self._gives(q)).ravel()
+
+    def mean_entries(self, q0: NDArray, q1: NDArray, floor: float = -np.inf) -> NDArray:
+        """See `Term`."""
+        return Term.mean_entries(self, q0, q1, floor)
+
+    def _condensed(self, q: NDArray, g: NDArray) -> NDArray:
+        """Tangent of displacements, the gives g giving way with them."""
+        full = EdgeGivesTerm(self.gives, self.rows, self.first)
+        u, size = nodal(q), 3 * self.rows
+        entries = (panel_tangents(self.gives, u, u, g).ravel(), full.places)
+        whole = sparse.csc_array(
+            sparse.coo_array(entries, shape=(self.first + self.gives.count,) * 2)
+        )
+        across = whole[self.first :, :size]
+        given = splu(whole[self.first :, self.first :]).solve(across.toarray())
+        return whole[:size, :size].toarray() - across.T @ given
+
+    def unstrained(self, q: NDArray) -> Unstrained:
+        """See `Term`."""
+        loose = self._condensed(q, np.zeros(self.gives.count))
+        return Unstrained(
+            sparse.csr_array(loose), sparse.csr_array(loose.shape), lambda motion: 0.0
+        )
+
+
+def panel_tangents(gives: EdgeGives, u0: NDArray, u1: NDArray, g: NDArray) -> NDArray:
+    """Tangents (p, 3c + k, 3c + k), N/m, of all panels at u0 = u1 and gives g (g,).
+
+    From u0 to another u1, with g the mean of the gives, it is twice the derivative of the mean
+    forces by u1 and the gives there.
+    """
+    (panels, corners), (bars, given) = gives.nodes.shape, gives.across.shape[1:]
+    end = 3 * corners
+    out = np.zeros((panels, end + given, end + given))
+    turn = np.zeros((panels, bars, corners))  # of the bars' ends, over L^2
+    at = np.arange(panels)[:, None], np.arange(bars)
+    np.add.at(turn, (*at, gives.ends[:, :, 0]), -gives.per_length2)
+    np.add.at(turn, (*at, gives.ends[:, :, 1]), gives.per_length2)
+    last, first = gives.vectors(u1), gives.vectors(u0)
+    middle = np.einsum("pbc,pbx->pbcx", turn, 0.5 * (first + last)).reshape(panels, bars, end)
+    later = np.einsum("pbc,pbx->pbcx", turn, last).reshape(panels, bars, end)
+    out[:, :end, end:] = np.einsum("pbd,pbk->pdk", middle, gives.across)
+    out[:, end:, :end] = np.einsum("pbd,pbk->pkd", later, gives.across)
+    out[:, end:, end:] = gives.stiffness
+    length2 = np.divide(1.0, gives.per_length2, where=gives.per_length2 > 0.0,
+                        out=np.zeros_like(gives.per_length2))  # fmt: skip
+    pull = np.einsum("pbk,pk->pb", gives.across, g[gives.number]) * length2
+    stressed = np.einsum("pb,pbc,pbd->pcd", pull, turn, turn)
+    blocks = out[:, :end, :end].reshape(panels, corners, 3, corners, 3)
+    for axis in range(3):
+        blocks[:, :, axis, :, axis] += stressed
+    out[:, :end, :end] = blocks.reshape(panels, end, end)
+    return out
