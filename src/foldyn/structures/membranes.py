@@ -65,13 +65,15 @@ def membranes(
     Parameters
     ----------
     mesh, pattern, sheet
-    straight : edges that do not bow or give way; those between panels in one plane do not bow.
+    straight : boundary edges that neither bow nor give way; those between panels in one plane do
+        not bow.
     rigid : panels that do not bend.
     giving : whether the others give way.
     """
     kinds: dict[tuple, list[tuple[int, NDArray, NDArray]]] = {}
     sides = _sides(mesh, pattern, sheet, straight, rigid)
-    numbers = _numbers(pattern, sides, straight) if giving else {}
+    numbers = _numbers(pattern, sides) if giving else {}
+    loose = {edge_of(a, b) for a, b in pattern.boundary.tolist()} - set(straight)
     parts: list[tuple] = []
     properties, kind = sheet.kinds(len(pattern.faces))
     first = np.searchsorted(mesh.inner_panel, np.arange(len(pattern.faces) + 1))
@@ -83,33 +85,30 @@ def membranes(
         ring = [(k, (k + 1) % len(face)) for k in range(len(face))]
         ends = (*ring, *((place[a], place[b]) for a, b in inner.tolist()))
         own, radius = properties[kind[p]], None
-        number = [-1] * (2 * len(face))
+        gives = [(edge_of(a, b), end) for a, b in around(face) for end in (a, b)]
+        number = np.array([numbers.get(give, -1) for give in gives])
         if giving and panel.convex:
             radius = own.thickness / float(np.sqrt(2.0 * pattern.face_areas[p]))
-            pairs = [((edge_of(a, b), a), (edge_of(a, b), b)) for a, b in around(face)]
-            number = [numbers.get(end, -1) for pair in pairs for end in pair]
-        shared = np.array(number) >= 0
-        part = coupling(panel, ends, own.poissons_ratio, radius, shared)
+        shared, free = number >= 0, np.array([edge in loose for edge, _ in gives])
+        part = coupling(panel, ends, own.poissons_ratio, radius, shared, free)
         part *= own.youngs_modulus * own.thickness
         bars = len(ends)
         kinds.setdefault((len(nodes), ends), []).append((p, nodes, part[:bars, :bars]))
         if shared.any():
-            parts.append((p, nodes, ends, np.array(number)[shared], part[:, bars:]))
+            parts.append((p, nodes, ends, number[shared], part[:, bars:]))
     return tuple(
         _packed(mesh.nodes, np.array(ends), *zip(*members, strict=True))
         for (_, ends), members in kinds.items()
     ), _gives(mesh.nodes, parts, [edge for edge, _ in numbers]) if parts else None
 
 
-def _numbers(
-    pattern: Pattern, sides: Sequence[Sides], straight: Collection[Edge]
-) -> dict[tuple[Edge, int], int]:
+def _numbers(pattern: Pattern, sides: Sequence[Sides]) -> dict[tuple[Edge, int], int]:
     """Numbers of the gives of edges between two panels, by edge and vertex."""
     beside: dict[Edge, int] = {}
     for face, own in zip(pattern.faces, sides, strict=True):
         for edge in (edge_of(a, b) for a, b in around(face)):
             beside[edge] = beside.get(edge, 0) + own.convex
-    edges = [edge for edge, count in beside.items() if count == 2 and edge not in set(straight)]
+    edges = [edge for edge, count in beside.items() if count == 2]
     return {(edge, end): 2 * k + j for k, edge in enumerate(edges) for j, end in enumerate(edge)}
 
 
@@ -177,12 +176,13 @@ def _sides(
 
 def coupling(
     sides: Sides, ends: tuple[tuple[int, int], ...], poissons_ratio: float, radius: float | None,
-    shared: NDArray,
+    shared: NDArray, free: NDArray,
 ) -> NDArray:  # fmt: skip
     """Stiffness over E t of the elongations of bars (b,) between corners and center, and of gives.
 
     radius : of the corners, over the outline's unit of length; None where they do not give way.
-    shared : (2m,) gives that stay, k: the others follow. The result is (b + k, b + k).
+    shared, free : (2m,) gives that stay, k, and that follow; there are no others. The result is
+        (b + k, b + k).
     """
     panel = sides.outline
     bars, corners = np.array(ends), 2 * len(panel.corners)
@@ -200,12 +200,10 @@ def coupling(
         stiff = membrane_stiffness(panel, poissons_ratio, sides.resistance)
     else:
         stiff = giving_stiffness(panel, poissons_ratio, sides.resistance, radius)
-        free = corners + np.flatnonzero(~shared)
-        kept = np.setdiff1d(np.arange(len(stiff)), free)
-        across = stiff[free][:, kept]
-        stiff = stiff[np.ix_(kept, kept)] - across.T @ np.linalg.solve(
-            stiff[np.ix_(free, free)], across
-        )
+        kept = np.concatenate([np.arange(corners), corners + np.flatnonzero(shared)])
+        follow = corners + np.flatnonzero(free)
+        across, own = stiff[np.ix_(follow, kept)], stiff[np.ix_(follow, follow)]
+        stiff = stiff[np.ix_(kept, kept)] - across.T @ np.linalg.solve(own, across)
     whole = np.zeros((x.size, x.size))
     whole[:corners, :corners] = stiff[:corners, :corners]
     held = longer.T @ (alone[:, None] * longer)

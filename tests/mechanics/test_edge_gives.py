@@ -1,0 +1,142 @@
+"""Edges that give way near their ends: gradients, balance, rigid turns, work of mean forces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import foldyn as fd
+from foldyn.mechanics.edge_gives import EdgeGivesTerm
+from foldyn.mechanics.following import following_force
+from foldyn.structures.membranes import energies
+
+
+@pytest.fixture(scope="module")
+def sheet() -> fd.Sheet:
+    return fd.Sheet(2e11, 0.3, 3e-4, density=7850.0)
+
+
+@pytest.fixture(scope="module", params=["miura", "kresling", "mixed"])
+def structure(request, sheet):
+    if request.param == "miura":
+        pattern = fd.patterns.miura(cells=(1, 2), a=0.04, b=0.05, panel_angle=60, dihedral=110)
+    elif request.param == "kresling":
+        pattern = fd.patterns.kresling(sides=5, radius=0.04, height=0.03, twist=30)
+    else:  # panels with three corners beside those with four
+        x = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.3], [0, 1, 0.3], [0.5, -0.8, 0.4]]) * 0.05
+        pattern = fd.Pattern(x, [[0, 1, 2, 3], [1, 0, 4]])
+    return fd.discretize(pattern, sheet, preset="n5b8e")
+
+
+@pytest.fixture(scope="module")
+def state(structure):
+    """Dofs of a state with strains about as large as turns."""
+    rng = np.random.default_rng(3)
+    q = 1e-3 * rng.standard_normal(structure.body.size)
+    q[structure.nodes.size :] *= 0.1
+    return q
+
+
+def term_of(structure) -> EdgeGivesTerm:
+    return structure.body.term(EdgeGivesTerm)
+
+
+def test_every_edge_between_two_panels_gives_way_at_both_ends(structure) -> None:
+    creases = {tuple(sorted(edge)) for edge in structure.folds[:, :2].tolist()}
+    edges = [tuple(edge) for edge in term_of(structure).gives.edge.tolist()]
+    assert {edge: edges.count(edge) for edge in set(edges)} == dict.fromkeys(creases, 2)
+
+
+def test_forces_are_the_gradient_and_the_tangent_that_of_forces(structure, state) -> None:
+    body, step = structure.body, 1e-7
+    direction = np.random.default_rng(5).standard_normal(len(state))
+    direction[structure.nodes.size :] *= 0.1
+    ahead, behind = state + step * direction, state - step * direction
+    slope = sum(body.energies(ahead)) - sum(body.energies(behind))
+    assert_allclose(body.internal(state) @ direction, slope / (2 * step), rtol=1e-6)
+    tangent = body.tangent(state)
+    change = (body.internal(ahead) - body.internal(behind)) / (2 * step)
+    assert_allclose(tangent @ direction, change, rtol=1e-6, atol=1e-7 * np.abs(change).max())
+    assert abs(tangent - tangent.T).max() < 1e-12 * abs(tangent).max()
+
+
+def test_a_turned_sheet_keeps_its_energy_and_its_gives(structure, state) -> None:
+    u = state[: structure.nodes.size].reshape(-1, 3)
+    c, s = np.cos(2.0), np.sin(2.0)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    turned = (structure.nodes + u) @ turn.T - structure.nodes
+    body, first = structure.body, term_of(structure).first
+    here, there = body.dofs(u), body.dofs(turned)
+    assert_allclose(there[first:], here[first:], rtol=1e-9, atol=1e-15)
+    assert_allclose(body.energies(there), body.energies(here), rtol=1e-9)
+    rigid = structure.nodes @ turn.T - structure.nodes
+    assert sum(structure.energies(rigid).values()) < 1e-20 * sum(body.energies(here))
+
+
+def test_gives_in_balance_are_those_without_force(structure, state) -> None:
+    u = state[: structure.nodes.size].reshape(-1, 3)
+    q, term = structure.body.dofs(u), term_of(structure)
+    assert_allclose(
+        q[term.first :], term.gives.balanced(term.gives.strains(u)), rtol=1e-9, atol=1e-18
+    )
+    condensed = structure.condensed.body
+    forces = structure.body.internal(q)
+    size = np.abs(forces).max()
+    assert np.abs(forces[structure.nodes.size :]).max() < 1e-9 * size
+    assert_allclose(condensed.internal(u.ravel()), forces[: u.size], atol=1e-9 * size)
+    assert_allclose(condensed.energies(u.ravel()), structure.body.energies(q), rtol=1e-9)
+    tangent = condensed.tangent(u.ravel())
+    assert_allclose(
+        tangent.toarray(), structure.tangent(u).toarray(), atol=1e-9 * abs(tangent).max()
+    )
+
+
+def test_mean_forces_do_the_work_of_the_energy(structure, state) -> None:
+    start = fd.State(velocity=100.0 * state[: structure.nodes.size].reshape(-1, 3))
+    case = fd.Case(structure)
+    motion = fd.simulate(case, 2e-4, "energy_momentum", dt=1e-5, initial=start)
+    strain = sum(motion[name].to_numpy() for name in case.energy_groups)
+    total = motion.kinetic.to_numpy() + strain
+    assert np.ptp(strain) > 1e-3 * total[0]
+    assert_allclose(total, total[0], rtol=1e-9)
+
+
+def test_stiffness_with_gives_is_positive_definite(structure) -> None:
+    """And softer than with edges whose displacements are linear."""
+    u = np.zeros(structure.nodes.size)
+    stiff = np.linalg.eigvalsh(structure.tangent(u.reshape(-1, 3)).toarray())
+    assert stiff[0] > -1e-9 * stiff[-1]
+    assert (stiff > 1e-9 * stiff[-1]).sum() == len(u) - 6
+    gives = np.linalg.eigvalsh(term_of(structure).gives.matrix.toarray())
+    assert gives[0] > 0.0
+
+
+def test_energies_of_panels_add_up(structure, state) -> None:
+    u = state[: structure.nodes.size].reshape(1, -1, 3)
+    panels = energies(
+        structure.membranes, structure.edge_gives, structure.nodes, u, len(structure.pattern.faces)
+    )
+    assert_allclose(panels.sum(), structure.energies(u[0])["strain_bars"], rtol=1e-9)
+
+
+def test_a_sheet_that_swells_evenly_has_no_stress(structure) -> None:
+    """The loads of a uniform strain are in balance where all lengths have grown alike."""
+    growth = 1e-4
+    force = structure.internal_force(growth * structure.nodes).ravel()
+    swollen = structure.swollen(
+        np.full(len(structure.pattern.faces), growth), np.zeros(len(structure.pattern.faces))
+    )
+    load = following_force(swollen.forces, growth * structure.nodes.ravel(), np.ones((1, 1)))
+    assert_allclose(load[: force.size], force, atol=1e-6 * np.abs(force).max())
+
+
+def test_edges_that_are_held_do_not_give(sheet) -> None:
+    """A boundary edge that is straight stiffens the sheet further than one that does not bow."""
+    pattern = fd.patterns.miura(cells=(1, 1), a=0.04, b=0.05, panel_angle=60, dihedral=110)
+    held = fd.discretize(pattern, sheet, preset="n5b8e", straight="xmin")
+    loose = fd.discretize(pattern, sheet, preset="n5b8e")
+    u = np.zeros_like(pattern.vertices, shape=(len(loose.nodes), 3))
+    difference = (held.tangent(u) - loose.tangent(u)).toarray()
+    values = np.linalg.eigvalsh(difference)
+    assert values[0] > -1e-6 * values[-1] and values[-1] > 1.0
