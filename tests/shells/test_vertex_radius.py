@@ -13,9 +13,9 @@ import foldyn as fd
 from foldyn.algebra.extrapolation import convergence
 from foldyn.errors import InputError
 from foldyn.shells import shell
-from foldyn.structures.graded import grading
 from foldyn.shells.mesh import shell_mesh
 from foldyn.shells.shell import STIFF
+from foldyn.structures.graded import grading
 
 SHEET = fd.Sheet(1e6, 0.25, 0.02, density=3.0)
 RADIUS = 0.02

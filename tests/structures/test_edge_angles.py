@@ -124,7 +124,7 @@ def test_polygons_and_triangles():
     body = edged(pattern).body
     q = displaced(edged(pattern), size=0.01)
     assert tangent_error(body.internal, body.tangent, q) < 1e-7
-    assert len(body.hidden) == 2 * len(pattern.creases)
+    assert len(body.hidden) == 4 * len(pattern.creases)  # angles, and gives at both ends
 
 
 def test_rigid_motions_cost_nothing():

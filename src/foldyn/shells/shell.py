@@ -21,7 +21,6 @@ from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned
 from foldyn.patterns.topology import Edge
-from foldyn.structures.graded import Grading, grading
 from foldyn.shells.kernels import ShellModel
 from foldyn.shells.mesh import shell_mesh
 from foldyn.shells.sides import Sides, sides, stiffness, without_free_sides
@@ -32,6 +31,7 @@ from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness, per_crease
 from foldyn.structures.discretize import checked_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
+from foldyn.structures.graded import Grading, grading
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import lengths
 from foldyn.structures.plausibility import doubt_units

@@ -38,6 +38,7 @@ from foldyn.structures.panel_membrane import giving_stiffness, membrane_stiffnes
 from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
 
+NONE = np.zeros(0, bool)
 STRAIGHT = 100.0  # resistance, over E t and the area, from which edges are straight
 
 
@@ -68,11 +69,12 @@ def membranes(
     straight : boundary edges that neither bow nor give way; those between panels in one plane do
         not bow.
     rigid : panels that do not bend.
-    giving : whether the others give way.
+    giving : whether the others give way; where they do not bend, or are not convex, none.
     """
     kinds: dict[tuple, list[tuple[int, NDArray, NDArray]]] = {}
-    sides = _sides(mesh, pattern, sheet, straight, rigid)
-    numbers = _numbers(pattern, sides) if giving else {}
+    sides, stiff = _sides(mesh, pattern, sheet, straight, rigid), set(rigid)
+    gives = [giving and own.convex and p not in stiff for p, own in enumerate(sides)]
+    numbers = _numbers(pattern, gives)
     loose = {edge_of(a, b) for a, b in pattern.boundary.tolist()} - set(straight)
     parts: list[tuple] = []
     properties, kind = sheet.kinds(len(pattern.faces))
@@ -85,11 +87,11 @@ def membranes(
         ring = [(k, (k + 1) % len(face)) for k in range(len(face))]
         ends = (*ring, *((place[a], place[b]) for a, b in inner.tolist()))
         own, radius = properties[kind[p]], None
-        gives = [(edge_of(a, b), end) for a, b in around(face) for end in (a, b)]
-        number = np.array([numbers.get(give, -1) for give in gives])
-        if giving and panel.convex:
+        own_ends = [(edge_of(a, b), end) for a, b in around(face) for end in (a, b)]
+        number = np.array([numbers.get(end, -1) for end in own_ends])
+        if gives[p]:
             radius = own.thickness / float(np.sqrt(2.0 * pattern.face_areas[p]))
-        shared, free = number >= 0, np.array([edge in loose for edge, _ in gives])
+        shared, free = number >= 0, np.array([edge in loose for edge, _ in own_ends])
         part = coupling(panel, ends, own.poissons_ratio, radius, shared, free)
         part *= own.youngs_modulus * own.thickness
         bars = len(ends)
@@ -102,12 +104,12 @@ def membranes(
     ), _gives(mesh.nodes, parts, [edge for edge, _ in numbers]) if parts else None
 
 
-def _numbers(pattern: Pattern, sides: Sequence[Sides]) -> dict[tuple[Edge, int], int]:
+def _numbers(pattern: Pattern, gives: Sequence[bool]) -> dict[tuple[Edge, int], int]:
     """Numbers of the gives of edges between two panels, by edge and vertex."""
     beside: dict[Edge, int] = {}
-    for face, own in zip(pattern.faces, sides, strict=True):
+    for face, own in zip(pattern.faces, gives, strict=True):
         for edge in (edge_of(a, b) for a, b in around(face)):
-            beside[edge] = beside.get(edge, 0) + own.convex
+            beside[edge] = beside.get(edge, 0) + own
     edges = [edge for edge, count in beside.items() if count == 2]
     return {(edge, end): 2 * k + j for k, edge in enumerate(edges) for j, end in enumerate(edge)}
 
@@ -175,8 +177,8 @@ def _sides(
 
 
 def coupling(
-    sides: Sides, ends: tuple[tuple[int, int], ...], poissons_ratio: float, radius: float | None,
-    shared: NDArray, free: NDArray,
+    sides: Sides, ends: tuple[tuple[int, int], ...], poissons_ratio: float,
+    radius: float | None = None, shared: NDArray = NONE, free: NDArray = NONE,
 ) -> NDArray:  # fmt: skip
     """Stiffness over E t of the elongations of bars (b,) between corners and center, and of gives.
 

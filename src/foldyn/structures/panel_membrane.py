@@ -111,7 +111,7 @@ def _graded(panel: Outline, radius: float) -> PanelMesh:
     x = np.stack([cut.points(piece) for piece in pieces])  # (m, arcs, 2 RAYS + 1, 2)
     node = np.arange(x[..., 0].size).reshape(x.shape[:3])
     node[:, -1, RAYS] = node[0, -1, RAYS]  # the mean; cuts belong to two pieces
-    node[:, -1, : RAYS : -1] = np.roll(node[:, -1, :RAYS], 1, axis=0)
+    node[:, -1, :RAYS:-1] = np.roll(node[:, -1, :RAYS], 1, axis=0)
     at = x[..., 0].size + np.arange(len(pieces))
     a, b, c, d = node[:, :-1, :-1], node[:, 1:, :-1], node[:, 1:, 1:], node[:, :-1, 1:]
     halves = [np.stack(half, axis=-1).reshape(-1, 3) for half in ((a, b, d), (b, c, d))]
@@ -130,9 +130,7 @@ def _graded(panel: Outline, radius: float) -> PanelMesh:
     return mesh._replace(radius=radius)
 
 
-def _quadratic(
-    points: NDArray, triangles: NDArray, at: NDArray, edges: list[NDArray]
-) -> PanelMesh:
+def _quadratic(points: NDArray, triangles: NDArray, at: NDArray, edges: list[NDArray]) -> PanelMesh:
     """Triangles with the middles of their sides; `edges` with their ends."""
     sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
     ends, side = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
@@ -149,10 +147,10 @@ def _condensed(
     panel: Outline, poissons_ratio: float, resistance: tuple[float, ...], mesh: PanelMesh
 ) -> NDArray:
     moves, m = _moves(panel, mesh)
-    rigid = np.zeros(len(mesh.elements), bool)
+    stiffness = np.ones(len(mesh.elements))
     if mesh.radius is not None:
-        rigid = np.isin(mesh.elements[:, :3], mesh.at).any(axis=1)
-    whole = moves.T @ _stretching(mesh, poissons_ratio, 1.0 + (STIFF - 1.0) * rigid) @ moves
+        stiffness[np.isin(mesh.elements[:, :3], mesh.at).any(axis=1)] = STIFF
+    whole = moves.T @ _stretching(mesh, poissons_ratio, stiffness) @ moves
     bows = [
         _bowing(mesh, k, factor)
         for k, (factor, straight) in enumerate(zip(resistance, panel.straight, strict=True))
