@@ -21,9 +21,9 @@ LEAST = 1e-9  # mean strain of the bars, below which rounding may be all there i
 FELT = 1e-3  # of the kinetic energy: less strain energy does not matter to a motion
 REMEDY = (
     "panels stretch in their plane there, which bars resist too much. Couple those of each panel "
-    '(membrane = "panel"; edges that are held or loaded along their length belong in straight), '
-    "compare with the shell (foldyn fidelity, fd.fidelity), or compute it (--model shell, "
-    "fd.shell), as towers of triangles need"
+    '(membrane = "panel", and preset = "n5b8e" for towers of triangles; edges that are held or '
+    "loaded along their length belong in straight), compare with the shell (foldyn fidelity, "
+    "fd.fidelity), or compute it (--model shell, fd.shell)"
 )
 
 
@@ -37,11 +37,14 @@ class Stretch(NamedTuple):
 def resists_stretch(structure: Discretized) -> bool:
     """Whether bars that are too stiff stand for the panels of a pattern.
 
-    Not those of a structure made by hand, nor coupled ones, but in towers of triangles.
+    Not those of a structure made by hand, nor coupled ones, but in towers of triangles whose
+    corners do not give way.
     """
     if BARS not in structure.energy_groups or structure.pattern is None:
         return False
     coupled = getattr(structure, "membranes", ())
+    if getattr(structure, "edge_gives", None) is not None:
+        return False
     return not coupled or all(len(face) == 3 for face in structure.pattern.faces)
 
 
