@@ -17,7 +17,6 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 from foldyn.jit.compiled import inner, kernel
@@ -25,7 +24,6 @@ from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.membranes import GROUP
 from foldyn.mechanics.model import ranks
-from foldyn.mechanics.plates_condensed import factorize_band, solve_band
 from foldyn.mechanics.sheet_term import Unstrained
 from foldyn.mechanics.term import (
     ENERGIES,
@@ -81,22 +79,49 @@ class EdgeGives(NamedTuple):
         pull = np.bincount(self.number.ravel(), pull, minlength=self.count)
         return -splu(self.matrix).solve(pull)
 
-    def narrow(self) -> EdgeGives:
-        """The same with numbers that make its matrix a narrow band."""
-        order = reverse_cuthill_mckee(sparse.csr_array(self.matrix), symmetric_mode=True)
-        return self._replace(
-            edge=self.edge[order], number=ranks(order.astype(np.int64))[self.number]
-        )
+    def ordered(self) -> EdgeGives:
+        """The same with numbers by which the factor of its matrix has few entries."""
+        rank = _factorized(self.matrix, "MMD_AT_PLUS_A").perm_c
+        edge = np.empty_like(self.edge)
+        edge[rank] = self.edge
+        return self._replace(edge=edge, number=rank[self.number].astype(np.int64))
 
-    def factor(self) -> NDArray:
-        """The matrix, factorized; see `plates_condensed.factorize_band`."""
-        found = sparse.coo_array(self.matrix)
-        i, j = found.coords
-        width, lower = int(np.abs(i - j).max()), i >= j
-        band = np.zeros((self.count, width + 1))
-        band[i[lower], width + j[lower] - i[lower]] = found.data[lower]
-        factorize_band(band)
-        return band
+    def factor(self) -> Factor:
+        """The matrix, factorized; of numbers that are `ordered`."""
+        found = _factorized(self.matrix, "NATURAL")
+        assert np.array_equal(found.perm_c, np.arange(self.count))
+        lower = sparse.csc_array(sparse.tril(found.L, -1))
+        entries = lower.indptr.astype(np.int64), lower.indices.astype(np.int64), lower.data
+        return Factor(*entries, 1.0 / found.U.diagonal())
+
+
+class Factor(NamedTuple):
+    """A symmetric matrix L D L^T: columns of L below its diagonal of ones, and 1 / D."""
+
+    start: NDArray  # (g + 1,)
+    row: NDArray
+    value: NDArray
+    per_pivot: NDArray  # (g,)
+
+
+NO_FACTOR = Factor(np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
+
+
+def _factorized(matrix: sparse.csc_array, order: str) -> Any:
+    return splu(matrix, order, 0.0, options={"SymmetricMode": True})
+
+
+@inner
+def solve_factor(factor, x):
+    """Solve with a factor, in place."""
+    for j in range(x.size):
+        for k in range(factor.start[j], factor.start[j + 1]):
+            x[factor.row[k]] -= factor.value[k] * x[j]
+    for j in range(x.size - 1, -1, -1):
+        total = factor.per_pivot[j] * x[j]
+        for k in range(factor.start[j], factor.start[j + 1]):
+            total -= factor.value[k] * x[factor.row[k]]
+        x[j] = total
 
 
 @inner
@@ -166,7 +191,7 @@ class _Context(NamedTuple):
     rows: int
     first: int  # dof of the first give
     memory: NDArray  # (2, g)
-    factor: NDArray
+    factor: Factor
 
 
 @forces
@@ -209,7 +234,7 @@ def _balanced_forces(own, u, v, t, force, powers):
     strained_gives(own.gives, moved, pull)
     for k in range(g.size):
         g[k] = -pull[k]
-    solve_band(own.factor, g)
+    solve_factor(own.factor, g)
     for p in range(own.gives.nodes.shape[0]):
         strain_panel(own.gives, moved, p)
         add_pulls(own.gives, p, g, 1.0, out)
@@ -221,7 +246,7 @@ def _balanced_energies(own, u, out):
     strained_gives(own.gives, rows_at(u, own.rows), pull)
     for k in range(g.size):
         g[k] = -pull[k]
-    solve_band(own.factor, g)
+    solve_factor(own.factor, g)
     for k in range(g.size):
         numbers_at(out, GROUP + 1)[GROUP] += 0.5 * pull[k] * g[k]
 
@@ -246,7 +271,7 @@ class EdgeGivesTerm(Term):
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
         """See `Term`."""
         memory = np.zeros((2, self.gives.count))
-        context = _Context(self.gives, self.rows, self.first, memory, np.zeros((0, 1)))
+        context = _Context(self.gives, self.rows, self.first, memory, NO_FACTOR)
         return Compiled(
             Context(context), {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
         )
@@ -329,9 +354,8 @@ class BalancedGivesTerm(EdgeGivesTerm):
         whole = sparse.csc_array(
             sparse.coo_array(entries, shape=(self.first + self.gives.count,) * 2)
         )
-        across = whole[self.first :, :size]
-        given = splu(whole[self.first :, self.first :]).solve(across.toarray())
-        return whole[:size, :size].toarray() - across.T @ given
+        across, own = (part.toarray() for part in (whole[self.first :, :size], self.gives.matrix))
+        return whole[:size, :size].toarray() - across.T @ np.linalg.solve(own, across)
 
     def unstrained(self, q: NDArray) -> Unstrained:
         """See `Term`."""
