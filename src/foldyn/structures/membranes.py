@@ -120,7 +120,8 @@ def _gives(x: NDArray, parts: list[tuple], edges: list[Edge]) -> EdgeGives:
     corners, bars, most = (max(len(part[k]) for part in parts) for k in (1, 2, 3))
     out = EdgeGives(
         len(edges), np.array(edges), panel, np.zeros((size, corners), np.int64),
-        np.zeros((size, bars, 2), np.int64), np.zeros((size, bars, 3)), np.zeros((size, bars)), np.zeros((size, most), np.int64),
+        np.zeros((size, bars, 2), np.int64), np.zeros((size, bars, 3)), np.zeros((size, bars)),
+        np.zeros((size, most), np.int64),
         np.zeros((size, bars, most)), np.zeros((size, most, most)), np.zeros(bars),
         np.zeros((bars, 3)),
     )  # fmt: skip
