@@ -17,14 +17,15 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.patterns import GENERATORS, Pattern, miura
 from foldyn.shells.graded import grading
-from foldyn.studies.fidelity.cases import FidelityCase, Held
+from foldyn.studies.fidelity.cases import FidelityCase, Held, documented
 from foldyn.studies.fidelity.drawn import random_sheet, spread
 
 SETS = {"mixed_1": (20261201, 34), "mixed_2": (20261202, 33), "mixed_3": (20261203, 33)}
 """Seed and number of cases of each set."""
-KINDS = ("miura", "eggbox", "kresling", "waterbomb", "resch", "quads")
+PARALLELOGRAMS = sorted({case.kind for case in documented() if "cells" in case.shape}, reverse=True)
+KINDS = (*PARALLELOGRAMS, "kresling", "waterbomb", "resch", "quads")
 SUPPORTS = ("free", "one edge", "two edges", "corners")
-GRIDS = ("miura", "eggbox", "quads")  # numbered along y first
+GRIDS = (*PARALLELOGRAMS, "quads")  # numbered along y first
 CELLS = 8  # at most, along either direction
 FINE, USUAL = (8, 12, 16), (4, 8, 12)  # divisions of small and of large cases
 SMALL, LARGE = 60_000, 180_000  # triangles of the finest mesh: of 16 divisions, and of all
