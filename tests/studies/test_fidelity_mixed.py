@@ -69,7 +69,7 @@ def test_models_need_no_shell(sets):
     case = sets["mixed_1"][0]
     true = stored(case, read_references("mixed_1")[case.name])
     assert true.shape.shape[1:] == points_of(case.pattern()).shape
-    assert mixed_models.certain(true)
+    assert mixed_models.certain(case, true)
     rows = mixed_models.compared(case, true).rows
     assert min(row.mac for row in rows["n5b8e"][:3]) > 0.9
     assert np.median([abs(row.error) for row in rows["n5b8e"]]) < 0.1

@@ -73,15 +73,15 @@ def doubt(values: ArrayLike, divisions: Sequence[int]) -> NDArray[np.float64]:
     """About how far limits by the observed order are off, relative (k,).
 
     The distance to the limit by the order of the elements, or a quarter of what the finest mesh is
-    off (Roache's factor of safety 1.25), whichever is larger. Where the meshes have not converged,
-    all that they differ by.
+    off (Roache's factor of safety 1.25), whichever is larger, and a thousandth at least: changes as
+    small as that show no order. Where the meshes have not converged, all that they differ by.
     """
     values = np.asarray(values, float)
     limit = limits(values, divisions, observed=True)
     known = limits(values, divisions, observed=False)
     found = np.maximum(np.abs(limit - known), 0.25 * np.abs(values[2] - limit))
     lost = np.isnan(convergence(values, divisions).order)
-    return np.where(lost, np.ptp(values, axis=0), found) / np.abs(limit)
+    return np.maximum(np.where(lost, np.ptp(values, axis=0), found) / np.abs(limit), SETTLED)
 
 
 def _observed(early: float, late: float, divisions: Sequence[int]) -> float:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from foldyn.structures.plate_frequency import BELOW
+from foldyn.structures.plate_frequency import BELOW, plate_frequency
 from foldyn.studies.fidelity.compare import FIRST, Row, all_rows
 from foldyn.studies.fidelity.mixed import SETS, SUPPORTS, MixedCase, mixed
 from foldyn.studies.fidelity.references import CERTAIN, Stored, read_references, stored
@@ -40,9 +40,11 @@ def compared(case: MixedCase, true: Stored) -> Modes:
     return Modes(case.name, {name: all_rows(case, true, model) for name, model in BESIDE.items()})
 
 
-def certain(true: Stored) -> bool:
-    """Whether all first modes of a case are known to 1.5 %."""
-    return bool((true.doubt <= CERTAIN).all())  # nan is not
+def certain(case: MixedCase, true: Stored) -> bool:
+    """Whether all modes of a case that count are known to 1.5 %: the first, and low ones."""
+    low = true.frequency < BELOW * plate_frequency(case.pattern(), case.sheet)
+    counts = low | (np.arange(len(low)) < FIRST)
+    return bool((true.doubt[counts] <= CERTAIN).all())  # nan is not
 
 
 def mixed_table(found: Sequence[tuple[MixedCase, Modes]]) -> str:
@@ -82,8 +84,8 @@ def main(arguments: list[str] | None = None) -> int:
         own = [(case, true, compared(case, true)) for case, true in known]
         if own:
             write(given.out / f"{name}.csv", [modes for *_, modes in own])
-        found += [(case, modes) for case, true, modes in own if certain(true)]
-        doubtful += [(case, true) for case, true, _ in own if not certain(true)]
+        found += [(case, modes) for case, true, modes in own if certain(case, true)]
+        doubtful += [(case, true) for case, true, _ in own if not certain(case, true)]
     print(f"{len(found)} cases, {len(doubtful)} known less well than {CERTAIN:.1%}, "
           f"{missing} not computed\n\n{mixed_table(found)}\n")  # fmt: skip
     for case, true in doubtful:
