@@ -41,6 +41,8 @@ def test_held_edges_are_rims(sets):
         assert all(tuple(sorted(edge)) in rim for edge in held.edges)
         assert bool(held.edges) == (case.support in ("one edge", "two edges"))
         assert bool(held.points) == (case.support == "corners")
+        points = held.points.get("xyz", ())
+        assert len(set(points)) == len(points)
         if case.kind in ("miura", "eggbox", "quads") and held.edges:
             ends = 1 + (case.support == "two edges")
             assert len(held.edges) == ends * 2 * case.shape["cells"][1]
