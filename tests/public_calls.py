@@ -253,6 +253,7 @@ def solved(folder: Path) -> Calls:
         }),
         "fidelity": (fd.fidelity, {  # refused: such models are not known
             "case": case(), "count": 2, "divisions": [2, 3], "models": ["none"], "secant": 2.0,
+            "vertex_radius": 1e-3,
             "progress": print,
         }),
     }  # fmt: skip

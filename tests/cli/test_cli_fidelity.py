@@ -90,7 +90,13 @@ def test_a_case_file_of_this_kind(workplace) -> None:
 def test_flags_stand_in_for_the_file(workplace) -> None:
     workplace.write(KIND)
     read = read_as(workplace.folder / "case.toml", "fidelity", {"count": 5, "models": ["plate"]})
-    given = {"count": 5, "divisions": (2, 4), "models": ["plate"], "secant": None}
+    given = {
+        "count": 5,
+        "divisions": (2, 4),
+        "models": ["plate"],
+        "secant": None,
+        "vertex_radius": None,
+    }
     assert read.analysis.arguments == given
     assert read.masses == ["mixed_voronoi"]
 

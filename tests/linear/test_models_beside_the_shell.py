@@ -437,3 +437,28 @@ def test_only_comparisons_are_shown(quick):
         fd.Fidelity(found)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="model = \"plates\": did you mean 'plate'"):
         found.table("plates")
+
+
+def test_graded_shells_agree_with_even_ones():
+    """A free sheet has the same limits, within what both say they are off."""
+    pattern = fd.patterns.miura(cells=(1, 1), a=0.05, b=0.05, panel_angle=60, dihedral=90)
+    sheet = fd.Sheet(2e9, 0.3, 1e-3, density=700.0)
+    case = fd.Case(fd.discretize(pattern, sheet))
+    even = fd.fidelity(case, 5, models=["n5b8e"])
+    graded = fd.fidelity(case, 5, models=["n5b8e"], vertex_radius=1e-3)
+    assert list(graded.result.attrs["divisions"]) == [8, 12]
+    assert "shell: graded toward vertices, within 0.001 m" in str(graded)
+    assert "graded" not in str(even)
+    for one, other in zip(even.table(), graded.table(), strict=True):
+        off = abs(one.mesh_error) + abs(other.mesh_error)
+        assert other.shell == pytest.approx(one.shell, rel=off)
+        assert off < 0.03
+
+
+def test_divisions_of_graded_shells():
+    case = held()
+    for given in ((4, 8), (8, 10)):
+        with pytest.raises(InputError, match="with a vertex_radius the first is a multiple of 8"):
+            fd.fidelity(case, divisions=given, vertex_radius=0.01)
+    with pytest.raises(InputError, match=r"shell: vertex_radius = 0.4: "):
+        fd.fidelity(case, vertex_radius=0.4)

@@ -9,7 +9,7 @@ import pytest
 from xarray import Dataset
 
 import foldyn as fd
-from foldyn.algebra.extrapolation import convergence, extrapolated
+from foldyn.algebra.extrapolation import SETTLED, convergence, doubt, extrapolated, limits
 from foldyn.analyses.provenance import mesh_error
 from foldyn.linear import refinement
 from foldyn.linear.reference import MeshModes, same_modes
@@ -143,3 +143,23 @@ load_factors = [1.0]
         "this mesh has not converged: with 1, 2 and 4 pieces of every edge one of the lowest "
         "frequencies changes by +71 % and then by -27 %"
     )
+
+
+@pytest.mark.parametrize(
+    "frequencies",
+    [  # Hz, with 4, 8, 12, 16 and 24 divisions, graded toward vertices
+        (0.0710836, 0.0723806, 0.0726157, 0.0726971, 0.0727570),  # free irregular quads
+        (0.305125, 0.314968, 0.316331, 0.316967, 0.317298),
+        (0.418916, 0.424208, 0.425279, 0.425662, 0.425938),  # waterbomb held along an edge
+        (5.89898, 6.31198, 6.39974, 6.43056, 6.45312),
+        (2.09918, 2.01307, 1.98643, 1.97567, 1.96725),  # waterbomb held at its corners
+    ],
+)
+def test_doubt_is_about_what_finer_meshes_show(frequencies):
+    divisions, values = [4, 8, 12, 16, 24], np.array(frequencies)[:, None]
+    finest = limits(values[2:], divisions[2:], observed=True)
+    for first in (0, 1):
+        meshes, own = divisions[first : first + 3], values[first : first + 3]
+        off = np.abs(finest / limits(own, meshes, observed=True) - 1.0)
+        assert SETTLED <= doubt(own, meshes) < 0.03
+        assert off <= doubt(own, meshes) + SETTLED  # order 1.2 of the second overshoots by 0.07 %

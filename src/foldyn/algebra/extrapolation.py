@@ -58,6 +58,32 @@ def convergence(values: ArrayLike, divisions: Sequence[int]) -> Convergence:
     return Convergence(order, extrapolated(second, third, ratio, np.minimum(order, ORDER)))
 
 
+def limits(values: ArrayLike, divisions: Sequence[int], *, observed: bool) -> NDArray[np.float64]:
+    """What values (3, k) tend to by the order of the elements, or by that which they show, if any.
+
+    Elements have their order on even meshes where nothing is singular.
+    """
+    _, second, third = np.asarray(values, float)
+    limit = extrapolated(second, third, divisions[2] / divisions[1])
+    shown = convergence(values, divisions).limit
+    return np.where(observed & ~np.isnan(shown), shown, limit)
+
+
+def doubt(values: ArrayLike, divisions: Sequence[int]) -> NDArray[np.float64]:
+    """About how far limits by the observed order are off, relative (k,).
+
+    The distance to the limit by the order of the elements, or a quarter of what the finest mesh is
+    off (Roache's factor of safety 1.25), whichever is larger, and a thousandth at least: changes as
+    small as that show no order. Where the meshes have not converged, all that they differ by.
+    """
+    values = np.asarray(values, float)
+    limit = limits(values, divisions, observed=True)
+    known = limits(values, divisions, observed=False)
+    found = np.maximum(np.abs(limit - known), 0.25 * np.abs(values[2] - limit))
+    lost = np.isnan(convergence(values, divisions).order)
+    return np.maximum(np.where(lost, np.ptp(values, axis=0), found) / np.abs(limit), SETTLED)
+
+
 def _observed(early: float, late: float, divisions: Sequence[int]) -> float:
     """Order that two changes show; nan where it is not near that of the elements."""
 

@@ -12,7 +12,7 @@ from pydantic import Field, PlainValidator, model_validator
 from foldyn import plots
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of
-from foldyn.analyses.sections import CaseSchema, Count, Section
+from foldyn.analyses.sections import CaseSchema, Count, Positive, Section
 from foldyn.analyses.vibration import Secant
 from foldyn.cases import Case
 from foldyn.cases.models import SHELL
@@ -42,6 +42,7 @@ class FidelitySection(Section):
     divisions: Annotated[Any, PlainValidator(lambda value: checked_divisions(value, ""))] = None
     models: Annotated[list[str] | None, PlainValidator(_names)] = None
     secant: Secant = None
+    vertex_radius: Positive | None = None
 
 
 class FidelityOutput(Section):
@@ -194,11 +195,23 @@ def _told(error: float, otherwise: str) -> str:
 def _notes(found: Fidelity) -> str:
     facts = found.result.attrs
     coarse, fine = (int(n) for n in facts["divisions"])
+    if "vertex_radius" in facts:
+        how = (
+            f"of {coarse // 2}, {coarse} and {fine} divisions, graded toward vertices, within "
+            f"{facts['vertex_radius']:g} m of which panels do not stretch "
+            f"({facts['triangles']} triangles), and consistent mass; frequencies are extrapolated, "
+            "and their errors estimated, with the order that these meshes show."
+        )
+    else:
+        how = (
+            f"of {coarse} and {fine} divisions of every edge ({facts['triangles']} triangles) and "
+            "consistent mass; frequencies are extrapolated with the square of the mesh size, and "
+            "their errors estimated with the order that these meshes show together with one of "
+            f"{coarse // 2}."
+        )
     notes = [
-        f"The shell has the same pattern, sheet, creases, supports and masses, meshes of {coarse} "
-        f"and {fine} divisions of every edge ({facts['triangles']} triangles) and consistent mass; "
-        "frequencies are extrapolated with the square of the mesh size, and their errors estimated "
-        f"with the order that these meshes show together with one of {coarse // 2}. Modes are "
+        "The shell has the same pattern, sheet, creases, supports and masses, meshes "
+        f"{how} Modes are "
         "paired by their MAC at the nodes that both have, modes of nearly equal frequency as a "
         "space. Supports hold the same vertices in both."
     ]

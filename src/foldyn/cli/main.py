@@ -111,7 +111,8 @@ def parser() -> argparse.ArgumentParser:
         type=integer,
         nargs=2,
         metavar=("COARSE", "FINE"),
-        help="pieces of every edge of the two shells (default: 6 12, less for large patterns)",
+        help="pieces of every edge of the two shells (default: 6 12, less for large patterns; 8 12 "
+        "with a vertex radius)",
     )
     fidelity.add_argument(
         "--models",
@@ -119,6 +120,12 @@ def parser() -> argparse.ArgumentParser:
         metavar="NAME",
         help="what stands beside the model of the file: standard, plate, n5b8e, bars "
         "(default: all but bars)",
+    )
+    fidelity.add_argument(
+        "--vertex-radius",
+        type=number,
+        metavar="M",
+        help="take shells graded toward vertices, down to this radius (m, about the thickness)",
     )
     _add_secant(fidelity)
 

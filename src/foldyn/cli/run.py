@@ -123,7 +123,8 @@ def _keep(task: list[Computation], folder: Path, given: Namespace) -> None:
 def _read(path: Path, given: Namespace) -> CaseFile:
     """Read a case file, for commands that are no `run` as one of their kind."""
     if given.command == "fidelity":
-        keys = {key: getattr(given, key) for key in ("count", "divisions", "models", "secant")}
+        names = ("count", "divisions", "models", "secant", "vertex_radius")
+        keys = {key: getattr(given, key) for key in names}
         return read_as(path, given.command, keys)
     model = given.model, given.divisions
     if given.command == "run":

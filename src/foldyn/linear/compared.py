@@ -140,6 +140,9 @@ def legend(found: Fidelity) -> list[str]:
         lines.append("soft: the model at rest has no stiffness against these loads")
     if any(not mode.below for mode in found.table()):
         lines.append(f"* above 0.6 of the plate frequency, {found.limit:.4g} Hz")
+    if "vertex_radius" in found.result.attrs:
+        radius = found.result.attrs["vertex_radius"]
+        lines.append(f"shell: graded toward vertices, within {radius:g} m of which it is stiff")
     return lines
 
 

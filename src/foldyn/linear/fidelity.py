@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray
 
-from foldyn.algebra.extrapolation import convergence, extrapolated
+from foldyn.algebra.extrapolation import convergence, limits
 from foldyn.cases import Case
 from foldyn.cases.straight import straightened
 from foldyn.errors import FoldynWarning, InputError, within
@@ -20,8 +20,8 @@ from foldyn.linear.compared import OWN, Fidelity
 from foldyn.linear.matched import SPARE, matched
 from foldyn.linear.modes import modes
 from foldyn.linear.operating_point import BALANCED
-from foldyn.linear.reference import Reference, modes_at_rest, reference_modes
-from foldyn.linear.shell_of import check_reduced, meshes, shell_of, with_structure
+from foldyn.linear.reference import Reference, is_graded, modes_at_rest, reference_modes
+from foldyn.linear.shell_of import check_reduced, graded_meshes, meshes, shell_of, with_structure
 from foldyn.linear.small_loads import forces_alone, rest_forces, small_loads
 from foldyn.materials import Superlinear
 from foldyn.materials.law import Law
@@ -67,6 +67,7 @@ def fidelity(
     models: Sequence[str] | Mapping[str, Mapping[str, Any]] | None = None,
     secant: float | None = None,
     *,
+    vertex_radius: float | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Fidelity:
     """Compare models of bars and hinges with the shell, for one's own case.
@@ -95,6 +96,11 @@ def fidelity(
     secant : float, optional
         Amplitude (degrees) of the turns of superlinear hinges, which have no stiffness at rest; as
         of `modes`.
+    vertex_radius : float, optional
+        Radius (m) within which corners of the shell are rigid in their plane, as of `shell`; the
+        thickness is a good one. The shells then have meshes graded toward vertices, by default of
+        4, 8 and 12 divisions, and frequencies are extrapolated with the order that these show.
+        Large sheets that are held, and towers, have no other limit.
     progress : callable
         Is told the steps, one by one.
 
@@ -124,7 +130,8 @@ def fidelity(
     >>> [f"{100 * mode.error:+.1f} %" for mode in result.table("n5b8e")]
     ['...', ...]
     """
-    return comparison(case, count, divisions, models, secant).run(progress)
+    checked = comparison(case, count, divisions, models, secant, vertex_radius)
+    return checked.run(progress)
 
 
 @brief
@@ -188,6 +195,7 @@ class Comparison:
             "limit": BELOW * limit,
             "plate_frequency": limit,
             "divisions": divisions[1:],
+            "vertex_radius": self.shells[-1].structure.options.vertex_radius,
             "triangles": len(true.case.structure.triangles),
             "rigid": int((true.found["eigenvalue"] <= 0.0).sum()),
             "secant": self.secant,
@@ -211,7 +219,8 @@ class Comparison:
         """
         divisions = [one.structure.options.divisions for one in self.shells]
         works = np.array([small_loads(case).work for case in self.shells])
-        true = extrapolated(works[1], works[2], divisions[2] / divisions[1])
+        observed = is_graded(self.shells[-1])
+        true = limits(works[:, None], divisions, observed=observed).item()
         limit = convergence(works[:, None], divisions).limit.item()
         own = np.array([
             small_loads(case, self.secant).work if name in held else np.inf
@@ -230,6 +239,7 @@ def comparison(
     divisions: Sequence[int] | None = None,
     models: Sequence[str] | Mapping[str, Mapping[str, Any]] | None = None,
     secant: float | None = None,
+    vertex_radius: float | None = None,
 ) -> Comparison:
     """Check a comparison and make its structures; arguments as of `fidelity`."""
     count = whole("count", count, least=1)
@@ -241,9 +251,14 @@ def comparison(
     for name, held in compared.items():
         with within("" if name == OWN else f"models: {name}: "):
             check_movable(held)
-    coarse, fine = meshes(case.structure.pattern, divisions)
-    shells = shell_of(forces, coarse // 2), shell_of(forces, coarse), shell_of(forces, fine)
-    return Comparison(case, count, shells, compared, tuple(others), secant)
+    if vertex_radius is None:
+        coarse, fine = meshes(case.structure.pattern, divisions)
+    else:
+        coarse, fine = graded_meshes(divisions)
+    first, second, third = (
+        shell_of(forces, pieces, vertex_radius) for pieces in (coarse // 2, coarse, fine)
+    )
+    return Comparison(case, count, (first, second, third), compared, tuple(others), secant)
 
 
 def _held(found: xarray.Dataset) -> bool:

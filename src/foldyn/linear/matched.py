@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import xarray
@@ -11,11 +11,24 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.linear.pairing import pairs
-from foldyn.linear.reference import Reference, elastic
+from foldyn.linear.reference import elastic
 from foldyn.linear.shell_of import with_structure
 
 LEAST = 0.5  # MAC of a partner
 SPARE = 10  # modes of a model, beyond those that are compared, among which partners are sought
+
+
+class Shown(Protocol):
+    """Modes of a shell."""
+
+    @property
+    def frequency(self) -> NDArray:
+        """Increasing, Hz."""
+        ...
+
+    def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
+        """Which of points (m, 3) have shapes (j,), and these (k, j, 3)."""
+        ...
 
 
 class Matched(NamedTuple):
@@ -36,12 +49,13 @@ class Matched(NamedTuple):
     mac: NDArray
 
 
-def matched(true: Reference, count: int, case: Case, found: xarray.Dataset) -> Matched:
+def matched(true: Shown, count: int, case: Case, found: xarray.Dataset) -> Matched:
     """Pair the first modes of a shell with those of a model.
 
     Parameters
     ----------
-    true : Reference
+    true : Shown
+        Such as a `Reference`.
     count : int
         How many modes of the shell.
     case, found : Case, xarray.Dataset

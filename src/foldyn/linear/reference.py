@@ -11,7 +11,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from foldyn.algebra.extrapolation import convergence, extrapolated
+from foldyn.algebra.extrapolation import convergence, limits
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning
 from foldyn.linear.modes import modes
@@ -86,10 +86,12 @@ class Reference:
     Attributes
     ----------
     frequency : (k,)
-        Frequencies extrapolated from two meshes, Hz.
+        Frequencies extrapolated from the meshes, Hz.
     mesh_error : (k,)
         Relative errors of the finer mesh by the order that it shows with two coarser ones; nan
         where the meshes have not converged.
+    mesh_frequency : (3, k)
+        Of the same modes on each mesh, Hz; nan of those that a coarse one does not have.
     shape : (k, n, 3)
         Shapes of the fine mesh.
     case : Case
@@ -100,6 +102,7 @@ class Reference:
 
     frequency: NDArray
     mesh_error: NDArray
+    mesh_frequency: NDArray
     shape: NDArray
     case: Case
     found: xarray.Dataset
@@ -142,14 +145,22 @@ def reference_modes(cases: Sequence[Case], count: int) -> Reference:
     Parameters
     ----------
     cases : (Case, Case, Case)
-        Shells of increasing `divisions`. The last two give the frequencies, all three their error.
+        Shells of increasing `divisions`. The last two give the frequencies, all three their error;
+        with a vertex radius all three give both, for such meshes have an order below 2.
     count : int
         How many modes, if those two have as many.
     """
     _, coarse, fine = meshes = [mesh_modes(case, count) for case in cases]
     values = same_modes(fine, meshes, min(count, len(coarse.frequency)))
     divisions = [case.structure.options.divisions for case in cases]
-    limit = extrapolated(values[1], values[2], divisions[2] / divisions[1])
+    limit = limits(values, divisions, observed=is_graded(cases[-1]))
     error = values[2] / convergence(values, divisions).limit - 1.0
     rank = np.argsort(limit, kind="stable")  # which close modes of a coarse mesh may change
-    return Reference(limit[rank], error[rank], fine.shape[rank], cases[-1], fine.found)
+    return Reference(
+        limit[rank], error[rank], values[:, rank], fine.shape[rank], cases[-1], fine.found
+    )
+
+
+def is_graded(case: Case) -> bool:
+    """Whether the mesh of a case's shell has a vertex radius."""
+    return case.structure.options.vertex_radius is not None

@@ -18,7 +18,9 @@ from foldyn.values import of_kind, show, whole
 
 MOST_TRIANGLES = 15_000
 """Of a shell that nobody asked for: its modes take ten to twenty seconds."""
-MESH = {"divisions", "mass"}
+GRADED = (8, 12)
+"""Divisions of the two finer meshes with a vertex radius; that of 4 stands beside them."""
+MESH = {"divisions", "mass", "vertex_radius"}
 """Options of a shell that a case of bars and hinges does not have."""
 
 
@@ -75,7 +77,7 @@ def _numbered(case: Case) -> Iterator[tuple[str, list[int]]]:
                     yield f"{name}[{i}].{key}", np.ravel(given).tolist()
 
 
-def shell_of(case: Case, divisions: int) -> Case:
+def shell_of(case: Case, divisions: int, vertex_radius: float | None = None) -> Case:
     """The case with a shell of the same pattern, sheet, creases and panels; without damping.
 
     Its first nodes are the vertices, so supports, loads and masses hold for both.
@@ -89,8 +91,9 @@ def shell_of(case: Case, divisions: int) -> Case:
     }
     with within("shell: "):
         mesh = shell(
-            structure.pattern, structure.sheet, divisions=divisions, mass="consistent", **shared
-        )
+            structure.pattern, structure.sheet, divisions=divisions, mass="consistent",
+            vertex_radius=vertex_radius, **shared,
+        )  # fmt: skip
     return with_structure(case, mesh)
 
 
@@ -141,6 +144,24 @@ def meshes(pattern: Pattern, given: Sequence[int] | None) -> tuple[int, int]:
         "the time that takes",
         "divisions",
     )
+
+
+def graded_meshes(given: Sequence[int] | None) -> tuple[int, int]:
+    """Divisions of the two finer shells with a vertex radius, the third half as fine as the first.
+
+    Raises
+    ------
+    InputError
+        Not two increasing numbers, or no multiples of which graded meshes are made.
+    """
+    coarse, fine = checked_divisions(GRADED if given is None else given)
+    if coarse % 8 or fine % 4:
+        raise InputError(
+            f" = {show(given)}: with a vertex_radius the first is a multiple of 8, for a mesh half "
+            f"as fine stands beside it, and the second one of 4, as in {GRADED}",
+            "divisions",
+        )
+    return coarse, fine
 
 
 def checked_divisions(given: Any, name: str = "divisions") -> tuple[int, int]:

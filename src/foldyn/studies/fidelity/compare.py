@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from foldyn.errors import FoldynWarning
-from foldyn.linear.matched import SPARE, matched
+from foldyn.linear.matched import SPARE, Shown, matched
 from foldyn.linear.reference import Reference, modes_at_rest
 from foldyn.structures import Structure, discretize
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
@@ -69,16 +69,19 @@ def structure_of(case: FidelityCase, model: str) -> Structure:
 
 def compare(case: FidelityCase, true: Reference, model: str) -> list[Row]:
     """Modes of a case below the limit, by a model beside the shell."""
-    rows = _rows(case, true, model, COMPARED, 0)
+    rows = all_rows(case, true, model)
     return [row for row in rows if row.over_plate < BELOW]
 
 
 def first_modes(case: FidelityCase, true: Reference, internal: int) -> list[Row]:
     """The first modes of a case, by n5b8e with internal amplitudes beside the shell."""
-    return _rows(case, true, "n5b8e, condensed", FIRST, internal)
+    return all_rows(case, true, "n5b8e, condensed", FIRST, internal)
 
 
-def _rows(case: FidelityCase, true: Reference, model: str, count: int, internal: int) -> list[Row]:
+def all_rows(
+    case: FidelityCase, true: Shown, model: str, count: int = COMPARED, internal: int = 0
+) -> list[Row]:
+    """The first modes of a case, by a model beside the shell."""
     held = case.case(structure_of(case, model))
     found = matched(true, count, held, modes_at_rest(held, count + SPARE, internal=internal))
     limit = plate_frequency(case.pattern(), case.sheet)

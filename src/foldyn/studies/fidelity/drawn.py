@@ -36,37 +36,37 @@ def sheets(count: int = COUNT_SHEETS, seed: int = SEED_SHEETS) -> list[FidelityC
     other, flat_foldable = sorted({c.kind for c in documented() if "cells" in c.shape})
     for _ in range(count):
         kind = str(rng.choice([flat_foldable, flat_foldable, other]))
-        a = _spread(rng, 0.02, 2.0)
-        b = a * _spread(rng, 1.0 / 1.6, 2.5)
+        a = spread(rng, 0.02, 2.0)
+        b = a * spread(rng, 1.0 / 1.6, 2.5)
         cells = [int(rng.integers(2, 6)), int(rng.integers(2, 6))]
         angle, dihedral = float(rng.uniform(45.0, 85.0)), float(rng.uniform(20.0, 175.0))
         if kind == other:
             dihedral, angle = float(rng.uniform(40.0, 150.0)), float(rng.uniform(50.0, 80.0))
         shape = {"cells": cells, "a": a, "b": b, "panel_angle": angle, "dihedral": dihedral}
-        sheet = _sheet(rng, min(a, b), 30.0)
+        sheet = random_sheet(rng, min(a, b), 30.0)
         support = str(rng.choice(["edge", "edge", "corners", "folding", "free"]))
         found.append(FidelityCase(kind, shape, support, sheet))
     return found
 
 
 def _one(rng: np.random.Generator, kinds: list[str]) -> FidelityCase:
-    a = _spread(rng, 0.02, 2.0)
-    b = a * _spread(rng, 1.0 / 1.6, 1.6)
+    a = spread(rng, 0.02, 2.0)
+    b = a * spread(rng, 1.0 / 1.6, 1.6)
     kind = str(rng.choice(kinds))
     shape = _shape(rng, kind, a, b)
-    sheet = _sheet(rng, min(a, b), 50.0)
+    sheet = random_sheet(rng, min(a, b), 50.0)
     support = str(rng.choice(sorted(supports(kind, shape))))
     return FidelityCase(kind, shape, support, sheet)
 
 
-def _sheet(rng: np.random.Generator, size: float, thickest: float) -> Sheet:
+def random_sheet(rng: np.random.Generator, size: float, thickest: float) -> Sheet:
     """A sheet of 1/400 to 1/thickest of a size."""
     return Sheet(
-        youngs_modulus=_spread(rng, 1e6, 2e11),
+        youngs_modulus=spread(rng, 1e6, 2e11),
         poissons_ratio=float(rng.uniform(0.1, 0.45)),
-        thickness=size / _spread(rng, thickest, 400.0),
-        density=_spread(rng, 100.0, 8000.0),
-        length_scale_ratio=_spread(rng, 0.5, 10.0),
+        thickness=size / spread(rng, thickest, 400.0),
+        density=spread(rng, 100.0, 8000.0),
+        length_scale_ratio=spread(rng, 0.5, 10.0),
     )
 
 
@@ -83,6 +83,6 @@ def _shape(rng: np.random.Generator, kind: str, a: float, b: float) -> dict[str,
     return {"cells": cells, "a": a, "b": b, "panel_angle": angle, "dihedral": dihedral}
 
 
-def _spread(rng: np.random.Generator, low: float, high: float) -> float:
+def spread(rng: np.random.Generator, low: float, high: float) -> float:
     """A number whose logarithm is uniform."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))

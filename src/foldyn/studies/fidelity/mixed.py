@@ -1,0 +1,192 @@
+"""Three random sets of all patterns, sizes, supports and thicknesses, drawn from stored seeds.
+
+Patterns and supports come in turn, in an order that is drawn anew for each turn, so that the first
+cases of a set are a sample of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.patterns import GENERATORS, Pattern, miura
+from foldyn.shells.graded import grading
+from foldyn.studies.fidelity.cases import FidelityCase, Held, documented
+from foldyn.studies.fidelity.drawn import random_sheet, spread
+
+SETS = {"mixed_1": (20261201, 34), "mixed_2": (20261202, 33), "mixed_3": (20261203, 33)}
+"""Seed and number of cases of each set."""
+PARALLELOGRAMS = sorted({case.kind for case in documented() if "cells" in case.shape}, reverse=True)
+KINDS = (*PARALLELOGRAMS, "kresling", "waterbomb", "resch", "quads")
+SUPPORTS = ("free", "one edge", "two edges", "corners")
+GRIDS = (*PARALLELOGRAMS, "quads")  # numbered along y first
+CELLS = 8  # at most, along either direction
+FINE, USUAL = (8, 12, 16), (4, 8, 12)  # divisions of small and of large cases
+SMALL, LARGE = 60_000, 180_000  # triangles of the finest mesh: of 16 divisions, and of all
+FLAT = 179.0  # degrees
+NARROW = 1.0 / 3.0  # least width of a panel over the shortest edge
+
+
+@dataclass(frozen=True)
+class MixedCase(FidelityCase):
+    """A case whose rims are found from the outline of the flat pattern."""
+
+    def pattern(self) -> Pattern:
+        """See `FidelityCase`."""
+        return _pattern(self.kind, self.shape)
+
+    @property
+    def held(self) -> Held:
+        """See `FidelityCase`."""
+        if self.support == "free":
+            return Held()
+        rings, corners = self._rims()
+        if self.support == "corners":
+            return Held({"xyz": tuple(dict.fromkeys(corners))})  # a small Resch sheet has three
+        chosen = rings[:1] if self.support == "one edge" else rings
+        return Held(edges=tuple(edge for ring in chosen for edge in pairwise(ring)))
+
+    def _rims(self) -> tuple[list[list[int]], tuple[int, ...]]:
+        """Vertices along both ends, one after another, and the corners; of towers those below."""
+        if self.kind == "kresling":
+            sides = int(self.shape["sides"])
+            top = sides * int(self.shape["storeys"])
+            return [[*range(n, n + sides), n] for n in (0, top)], tuple(range(sides))
+        if self.kind in GRIDS:
+            columns, rows = (2 * n for n in self.shape["cells"])
+            ends = [list(range(n, n + rows + 1)) for n in (0, columns * (rows + 1))]
+            return ends, tuple(end[k] for end in ends for k in (0, -1))
+        return _outline(_pattern(self.kind, {**self.shape, "dihedral": FLAT}))
+
+    @property
+    def divisions(self) -> tuple[int, int, int]:
+        """Of its three meshes."""
+        return FINE if self.triangles(FINE[-1]) <= SMALL else USUAL
+
+    def triangles(self, divisions: int) -> int:
+        """How many triangles a graded mesh has."""
+        pattern = self.pattern()
+        mesh = grading(pattern, divisions, self.sheet.thickness)
+        return 4 * mesh.rays * (mesh.arcs - 1) * sum(map(len, pattern.faces))
+
+
+def mixed(name: str) -> list[MixedCase]:
+    """Cases of a set.
+
+    Sheets of 1 x 1 to 8 x 8 cells (small numbers as likely as large ones on a logarithmic scale;
+    towers of 4 to 8 sides and 1 to 8 storeys), dihedrals of 20 to 179 degrees, sheets of 1/30 to
+    1/400 of the shortest edge. Drawn again: what generators refuse, such as sheets that roll up by
+    more than a turn, panels narrower than a third of the shortest edge, and cases too large.
+    """
+    seed, count = SETS[name]
+    rng = np.random.default_rng(seed)
+    turns = zip(_turns(rng, KINDS), _turns(rng, SUPPORTS), strict=True)
+    return [_one(rng, *next(turns)) for _ in range(count)]
+
+
+def _turns(rng: np.random.Generator, names: Sequence[str]) -> Iterator[str]:
+    while True:
+        yield from map(str, rng.permutation(names))
+
+
+def _one(rng: np.random.Generator, kind: str, support: str) -> MixedCase:
+    while True:
+        shape = _shape(rng, kind)
+        sheet = random_sheet(rng, 1.0, 30.0)
+        try:
+            edge, width = _sizes(_pattern(kind, shape))
+        except InputError:
+            continue
+        sheet = replace(sheet, thickness=edge * sheet.thickness)
+        case = MixedCase(kind, shape, support, sheet)
+        if width >= NARROW * edge and case.triangles(USUAL[-1]) <= LARGE:
+            return case
+
+
+def _shape(rng: np.random.Generator, kind: str) -> dict[str, Any]:
+    a = spread(rng, 0.02, 2.0)
+    b = a * spread(rng, 1.0 / 1.6, 1.6)
+    cells = [int(spread(rng, 1.0, CELLS + 1.0)) for _ in range(2)]
+    dihedral, angle = float(rng.uniform(20.0, 179.0)), float(rng.uniform(45.0, 85.0))
+    if kind == "kresling":
+        sides, twist = int(rng.integers(4, 9)), float(rng.uniform(10.0, 40.0))
+        return {"sides": sides, "radius": a, "height": b, "twist": twist, "storeys": cells[1]}
+    shape: dict[str, Any] = {"cells": cells, "a": a, "dihedral": dihedral}
+    if kind == "resch":
+        return shape
+    if kind == "waterbomb":
+        return {**shape, "b": b}
+    shape |= {"b": b, "panel_angle": angle}
+    return {**shape, "seed": int(rng.integers(1 << 16))} if kind == "quads" else shape
+
+
+def _pattern(kind: str, shape: Mapping[str, Any]) -> Pattern:
+    return quads(**shape) if kind == "quads" else GENERATORS[kind](**shape)
+
+
+def quads(seed: int, **shape: Any) -> Pattern:
+    """A Miura-ori whose rows and columns differ, seen in perspective: planar irregular panels.
+
+    Parameters
+    ----------
+    seed : int
+        Of the widths, which differ by up to a third, and of the perspective.
+    **shape
+        Arguments of `miura`.
+    """
+    rng, even = np.random.default_rng(seed), miura(**shape)
+    columns = 2 * shape["cells"][0] + 1
+    grid = even.vertices.reshape(columns, -1, 3)
+    along, across = (_uneven(rng, line) for line in (grid[:, 0], grid[0]))
+    vertices = (along[:, None] + across[None]).reshape(-1, 3)
+    place = (vertices - vertices.mean(axis=0)) / np.ptp(vertices, axis=0).max()
+    scale = 1.0 + place @ rng.uniform(-0.4, 0.4, 3)
+    return Pattern(vertices / scale[:, None], even.faces, name="quads")
+
+
+def _uneven(rng: np.random.Generator, line: NDArray) -> NDArray[np.float64]:
+    """A polyline from the origin with segments of other lengths."""
+    steps = np.diff(line, axis=0) * rng.uniform(0.75, 4.0 / 3.0, (len(line) - 1, 1))
+    return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+
+
+def _sizes(pattern: Pattern) -> tuple[float, float]:
+    """The shortest edge and the least width of a panel, m."""
+    edges, widths = [], []
+    for face in pattern.faces:
+        corners = pattern.vertices[list(face)]
+        side = np.roll(corners, -1, axis=0) - corners
+        length = np.linalg.norm(side, axis=1)
+        apart = np.cross(side[:, None] / length[:, None, None], corners - corners[:, None])
+        edges.append(length.min())
+        widths.append(np.linalg.norm(apart, axis=2).max(axis=1).min())
+    return float(min(edges)), float(min(widths))
+
+
+def _outline(flat: Pattern) -> tuple[list[list[int]], tuple[int, ...]]:
+    """Vertices along the two ends of a sheet in x, one after another, and its four corners."""
+    sides = {(a, b) for face in flat.faces for a, b in pairwise((*face, face[0]))}
+    after = {a: b for a, b in sides if (b, a) not in sides}
+    ring = np.array(sorted(after))
+    place = flat.vertices[ring, :2]
+    place = (place - place.mean(axis=0)) / np.ptp(place, axis=0)
+    toward = ((-1, -1), (-1, 1), (1, -1), (1, 1))
+    corners = tuple(int(ring[np.argmax(place @ way)]) for way in toward)
+    return [_path(after, corners[:2], corners), _path(after, corners[2:], corners)], corners
+
+
+def _path(after: Mapping[int, int], ends: Sequence[int], corners: Sequence[int]) -> list[int]:
+    """Boundary between two neighbors among the corners."""
+    for first, last in (ends, ends[::-1]):
+        path = [first]
+        while path[-1] == first or path[-1] not in corners:
+            path.append(after[path[-1]])
+        if path[-1] == last:
+            return path
+    raise ValueError("corners are not next to each other")
