@@ -44,7 +44,7 @@ def balance(result):
 @pytest.mark.parametrize("rigid", [None, "all", [0]])
 @pytest.mark.parametrize("kind", PRESETS)
 def test_a_moment_opens_a_crease_by_its_own_stiffness(kind, rigid, turned):
-    for k in (0.02, 0.2, 4.0):
+    for k in (6e-4, 0.06, 6.0):
         structure = model(kind, k, rigid=rigid, turned=turned)
         load = fd.CreaseMoment("all", np.radians(1.146) * k)
         case = fd.Case(structure, supports=[fd.Fix([0, 1, 2], "xyz")], loads=[load])
@@ -63,22 +63,6 @@ def test_a_moment_and_a_rest_angle_that_balance_it_hold_still(kind):
     ]
     case = fd.Case(structure, supports=[fd.Fix([0, 1, 2], "xyz")], loads=loads)
     assert abs(opened(structure, fd.trace(case, steps=1))).max() < 1e-9
-
-
-@pytest.mark.parametrize("rigid", [None, "all"])
-@pytest.mark.parametrize("k", [0.02, 0.2, 2.0])
-def test_creases_are_damped_as_those_of_a_shell(k, rigid):
-    """Damping ratio of the first mode; what panels give way is known to a few per cent."""
-    ratio = {}
-    for kind in ("shell", "plate", "n5b8e"):
-        structure = model(kind, k, rigid=rigid, divisions=16)
-        damping = fd.CreaseDamping(1e-3 * k)
-        case = fd.Case(structure, supports=[fd.Fix([0, 1, 2, 3], "xyz")], damping=damping)
-        ratio[kind] = float(fd.modes(case, count=1).damping_ratio[0])
-    # 0.3 % of the mass of a shell's panel is elsewhere; soft panels are 2 % off in frequency
-    within = 0.005 if rigid else 0.01 if k < 0.1 else 0.05
-    assert ratio["plate"] == pytest.approx(ratio["shell"], rel=within)
-    assert ratio["n5b8e"] == pytest.approx(ratio["shell"], rel=max(within, 0.025 * (not rigid)))
 
 
 @pytest.mark.parametrize("strong", [0.01, 1.0, 100.0])

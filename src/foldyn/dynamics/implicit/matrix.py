@@ -11,6 +11,7 @@ factorized by Woodbury's formula.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +28,8 @@ from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.following import following_places, put_following
 from foldyn.mechanics.tangent import Sparsity, block_keys, joined
+
+FULL = 200  # dofs up to which a full matrix takes what is added sooner than a sparse one
 
 
 class Matrices(NamedTuple):
@@ -91,6 +94,7 @@ class StepMatrix:
         self._ties = system.ties
         self.added: sparse.csr_array | None = None
         self._onto = _onto(self.free, self._ties, 3 * nodes) if system.touches else None
+        self._across = sparse.csr_array(self._onto.T) if self._onto is not None else None
         filled = self.blocks.filled(self.pattern) | (masses != 0.0) | (viscous != 0.0)
         filled |= self._elements.filled(shape)
         filled.reshape(-1)[self._follow] = True
@@ -98,7 +102,9 @@ class StepMatrix:
         size = len(self.free)
         width = int(np.abs(entries.row - entries.column).max(initial=0))
         self._sparse = _Sparse(entries, size, symmetric)
-        self._band = None
+        self._band = self._full = None
+        if self._onto is not None and size <= FULL:
+            self._full = _Band(entries, size, size - 1, False)
         if takes_band(size, width, symmetric):
             self._band = _Band(entries, size, width, symmetric)
         self.solver = "banded" if self._band else self._sparse.solver
@@ -134,8 +140,11 @@ class StepMatrix:
 
     def _factorized(self, weights: Weights) -> Any:
         """Factors of the matrix without modal damping."""
+        if self.added is not None and self._full is not None:
+            added = (self._across @ (self._across @ self.added.toarray()).T).T
+            return self._full(weights, self._matrices, weights.stiffness * added)
         if self.added is not None and self._onto is not None:
-            added = self._onto.T @ self.added @ self._onto
+            added = self._across @ self.added @ self._onto
             return self._sparse(weights, self._matrices, weights.stiffness * added)
         if self._band is not None:
             try:
@@ -211,14 +220,24 @@ class _Band:
         rows, diagonal = (width + 1, width) if symmetric else (3 * width + 1, 2 * width)
         self._put = (diagonal + row - column) + rows * column
         self._memory = np.zeros((size, rows)).T
+        self._diagonal = diagonal
 
-    def __call__(self, weights: Weights, matrices: Matrices) -> Any:
+    @cached_property
+    def _everywhere(self) -> NDArray:
+        """Places (n, n) of all entries of a full matrix, by columns."""
+        size, rows = self._memory.T.shape
+        number = np.arange(size)
+        return (rows - 1) * number[:, None] + number + self._diagonal
+
+    def __call__(self, weights: Weights, matrices: Matrices, added: NDArray | None = None) -> Any:
         flat = self._memory.T.reshape(-1)
         flat[:] = 0.0
         if len(self._value):
             _gather_tied(weights, matrices, self._take, self._value, self._put, flat)
         else:
             _gather(weights, matrices, self._take, self._put, flat)
+        if added is not None:
+            flat[self._everywhere] += added.T
         return self._make(self._memory)
 
 

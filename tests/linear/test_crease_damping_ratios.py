@@ -1,0 +1,91 @@
+"""Damping ratios of modes with damped creases beside the shell's, over four decades of stiffness.
+
+With tau = c / k a mode of omega has the ratio s tau omega / 2, s the share of the creases in its
+strain energy.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.algebra.extrapolation import convergence
+
+SHEET = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.25, thickness=0.01, density=1.0)
+PATTERNS = {
+    "fold": fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=120),
+    "cell": fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=120),
+}
+CALIBRATED = 0.0639  # N m/rad per m, of creases of this sheet
+TAU = 1e-3  # s
+MESHES = 4, 8, 16
+
+
+def first_mode(kind, pattern, k, held=True, rigid=None, internal=0, **options):
+    """Damping ratio of the first elastic mode, and the share of the creases in its energy.
+
+    kind : preset, or the divisions of a shell.
+    """
+    options = {"crease_stiffness": k, "fold_law": "linear", "rigid": rigid, **options}
+    if isinstance(kind, int):
+        s = fd.shell(PATTERNS[pattern], SHEET, divisions=kind, mass="consistent", **options)
+    else:
+        s = fd.discretize(PATTERNS[pattern], SHEET, preset=kind, **options)
+    supports = [fd.Fix(list(s.pattern.faces[0]))] if held else []
+    case = fd.Case(s, supports, damping=fd.CreaseDamping(TAU * k))
+    modes = fd.modes(case, count=1 if held else 7, internal=internal)
+    ratio, frequency = float(modes.damping_ratio[-1]), float(modes.frequency[-1])
+    return ratio, ratio / (TAU * np.pi * frequency)
+
+
+@cache
+def of_shell(*arguments):
+    """The same of a shell, as its meshes converge."""
+    return convergence([first_mode(n, *arguments) for n in MESHES], MESHES).limit
+
+
+@pytest.mark.parametrize("times", [0.01, 1.0, 100.0])
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_between_rigid_panels(pattern, times):
+    """Any stiffness: the creases have all of the energy; herkal's mass is another one."""
+    k = times * CALIBRATED
+    wanted, _ = of_shell(pattern, k, True, "all")
+    for kind in ("plate", "n5b8e"):
+        ratio, share = first_mode(kind, pattern, k, rigid="all")
+        assert share == pytest.approx(1.0, abs=2e-3)
+        assert ratio == pytest.approx(wanted, rel=1e-3)
+    _, share = first_mode("herkal", pattern, k, rigid="all", bend_law="linear")
+    assert share == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("times", [0.01, 0.1])
+@pytest.mark.parametrize("held", [True, False], ids=["held", "free"])
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_where_creases_have_most_of_the_energy(pattern, held, times):
+    wanted, share = of_shell(pattern, times * CALIBRATED, held)
+    assert share > 0.945
+    for kind in ("plate", "n5b8e"):
+        ratio, _ = first_mode(kind, pattern, times * CALIBRATED, held)
+        assert ratio == pytest.approx(wanted, rel=0.01)
+
+
+@pytest.mark.parametrize("times", [0.1, 1.0, 10.0])
+@pytest.mark.parametrize("held", [True, False], ids=["held", "free"])
+def test_with_the_inertia_of_panels_that_bend(held, times):
+    """A fold turns alike along its crease, so that internal amplitudes are all that is missing."""
+    wanted, share = of_shell("fold", times * CALIBRATED, held)
+    assert (share < 0.19) == (times == 10.0)
+    ratio, _ = first_mode("n5b8e", "fold", times * CALIBRATED, held, internal=3)
+    assert ratio == pytest.approx(wanted, rel=1e-3 if times <= 1.0 else 6e-3)
+
+
+@pytest.mark.parametrize("times", [1.0, 10.0, 100.0])
+@pytest.mark.parametrize("held", [True, False], ids=["held", "free"])
+@pytest.mark.parametrize(("kind", "most"), [("plate", 0.1), ("n5b8e", 0.24)])
+def test_what_panels_miss_counts_by_their_share(kind, most, held, times):
+    wanted, share = of_shell("fold", times * CALIBRATED, held)
+    ratio, _ = first_mode(kind, "fold", times * CALIBRATED, held)
+    assert abs(ratio / wanted - 1.0) < most * (1.0 - share)
