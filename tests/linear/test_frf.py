@@ -16,6 +16,7 @@ from frf_structures import (
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import convert, frf, peaks_of
+from foldyn.plots import plot_frf
 
 F = np.arange(0.1, 5.01, 0.1)
 PUSH = fd.Force([1], (2.0, 0, 0))
@@ -77,6 +78,14 @@ def test_peaks_from_a_noisy_response_lie_within_their_errors():
             assert abs(peak.damping_ratio / z - 1) < 0.1
     assert np.abs(misses).max() < 5
     assert 0.7 < np.sqrt(np.mean(np.square(misses))) < 1.5
+
+
+def test_peaks_without_damping():
+    """The response is real there, and negative beyond a resonance."""
+    found = frf(chain(), PUSH, np.arange(0.5, 5, 0.0201))
+    peaks = peaks_of(found, 1, "x")
+    assert [peak.frequency for peak in peaks] == pytest.approx(chain_modes()[0], abs=0.0201)
+    assert len(plot_frf(found, 1, "x").axes) == 2
 
 
 def test_a_node_at_rest_has_no_peaks():

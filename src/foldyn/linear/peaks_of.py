@@ -146,10 +146,10 @@ def resonances(
     shown : what it shows; a transmissibility has the peaks of a receptance.
     scatters : whether the curve is an estimate from random records, where low peaks mean nothing.
     """
-    kind = kind_of(shown)
+    kind, size = kind_of(shown), np.abs(curve)  # without damping a response is real, of either sign
     if prominence is not None:
-        return find_peaks(f, curve, prominence, count, kind)
-    return find_peaks(f, curve, PROMINENT, count, kind, rise=None if scatters else HALF_POWER)
+        return find_peaks(f, size, prominence, count, kind)
+    return find_peaks(f, size, PROMINENT, count, kind, rise=None if scatters else HALF_POWER)
 
 
 def kind_of(shown: str) -> str:
@@ -164,7 +164,7 @@ def _with_half_power(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)  # the asymmetry is stored
         try:
-            points = half_power(f, curve, peak.frequency, kind)
+            points = half_power(f, np.abs(curve), peak.frequency, kind)
         except InputError as error:
             return replace(peak, note=f"half power: {error}"), math.inf
     ratio = points.damping_ratio
