@@ -12,8 +12,12 @@ from scipy.sparse import csr_array
 import foldyn as fd
 from contact_sheets import SHEET, crossing, on_a_panel
 from foldyn.dynamics import motion, prepare
+from foldyn.dynamics.course import TALLY, Course
+from foldyn.dynamics.equation import EquationOfMotion
+from foldyn.dynamics.explicit_contact import slow_contacts
 from foldyn.dynamics.slow_contacts import slow_down
 from foldyn.dynamics.system import pack, scratch
+from foldyn.jit.context import Context
 from foldyn.mechanics.contact.inertia import added_inertia, room_for
 from foldyn.mechanics.contact.step_limit import Pace, limited
 from foldyn.mechanics.contact.term import ContactTerm
@@ -70,7 +74,12 @@ def test_accelerations_are_those_of_the_mass_with_the_inertia_of_contacts(mass):
     rng = np.random.default_rng(0)
     before, w = rng.standard_normal((2, *u.shape))
     a = before.copy()
-    slow_down(added, system, packed.mass, w, a, scratch(system))
+    course = Course(u, np.zeros_like(u), np.zeros_like(u), np.zeros(1, TALLY)[0], np.zeros(0))
+    work, own = body.workspaces(1)[0], scratch(system)
+    equation = EquationOfMotion(packed, work, own, course, True)
+    slow = slow_contacts(packed, work, own, equation.balance.value)
+    assert slow is not None
+    slow_down(Context(slow.value._replace(added=added)), w, a)
     nodal = packed.mass
     m = np.kron(csr_array((nodal.data, nodal.indices, nodal.indptr)).toarray(), np.eye(3))
     whole = m + rows.T @ (rows / added.ease[:count, None])

@@ -205,9 +205,10 @@ def test_names_that_a_package_passes_on_lead_to_their_files(monkeypatch, tmp_pat
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text, "utf-8")
     monkeypatch.setattr(sources, "PACKAGE", tmp_path)
-    for cached in (sources.read, sources._imported, sources._home):
-        monkeypatch.setattr(sources, cached.__name__, cached.__wrapped__)
-    found = {path.relative_to(tmp_path).as_posix() for path in read(tmp_path / "kernels.py")}
+    monkeypatch.setattr(sources, "_home", sources._home.__wrapped__)
+    monkeypatch.setattr(sources, "_READ", set())
+    read(tmp_path / "kernels.py")
+    found = {path.relative_to(tmp_path).as_posix() for path in sources._READ}
     wanted = {"kernels.py", "laws/one.py", "values.py", "tools/__init__.py", "tools/deep/more.py"}
     assert found == wanted
 

@@ -161,12 +161,13 @@ def advance(equation, course, plan, room, stretch):
         powers[0, 0], powers[1, 0] = tally.power_in, tally.power_out
     for i in range(n):
         speeds[0, i] = v[i]
-    last = tally.steps + stretch
+    last, stop = tally.steps + stretch, 0
     while tally.steps < last and tally.time < plan.end:
         if plan.every > 0 and tally.samples == room:
             break
         t, wanted = tally.time, tally.wanted
-        stop = np.searchsorted(plan.stops, t, side="right")
+        while stop < plan.stops.size and plan.stops[stop] <= t:
+            stop += 1
         stops = stop < plan.stops.size
         goal = plan.stops[stop] if stops else plan.end
         h = min(wanted, goal - t)

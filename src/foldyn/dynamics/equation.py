@@ -319,7 +319,7 @@ class EquationOfMotion:
         self.setting = Setting(model.terms, system, mass, share, s)
         self._whole = whole = Context(self.setting)
         self.balance = balance = Context(_balance(self.setting, whole))
-        self._slow = slow = slow_contacts(packed, work, s) if slows else None
+        self._slow = slow = slow_contacts(packed, work, s, balance.value) if slows else None
         remembers = model.terms.kernel[:, ADVANCE_CLOCK].any()
         equation = Equation(
             acceleration=_acceleration.at(balance),

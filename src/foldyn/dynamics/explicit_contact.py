@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from foldyn.dynamics.inertia import Inertia
+from numpy.typing import NDArray
+
 from foldyn.dynamics.parts import kinetic
 from foldyn.dynamics.slow_contacts import slow_down
 from foldyn.dynamics.system import Packed, Scratch, System
@@ -24,7 +25,9 @@ class SlowContacts(NamedTuple):
     """A case on one thread, and the contacts that have inertia in a step."""
 
     system: System
-    mass: Inertia
+    setting: int  # context of the parts of the equation,
+    solve: int  # of which this is M^-1, unless M is diagonal
+    inverse: NDArray
     s: Scratch
     tables: Tables
     memory: Memory
@@ -58,7 +61,7 @@ def _gather(m, u, dt, beta):
 @addressed(ADDRESS, ADDRESS)
 def _slow_down(m, w, a):
     rows = m.s.force.shape[0]
-    slow_down(m.added, m.system, m.mass, rows_at(w, rows), rows_at(a, rows), m.s)
+    slow_down(m, rows_at(w, rows), rows_at(a, rows))
 
 
 @inner_scalar
@@ -100,7 +103,7 @@ def slow_contacts_down(equation, w, a):
         run_at(equation.contact.slow_down, (equation.contact.slow, w, a))
 
 
-def slow_contacts(packed: Packed, work: Any, s: Scratch) -> Context | None:
+def slow_contacts(packed: Packed, work: Any, s: Scratch, balance: Any) -> Context | None:
     """Context of slow contacts; none where their inertia would resist supports or planes.
 
     Nor have boards any, whose contacts reach more nodes.
@@ -109,8 +112,8 @@ def slow_contacts(packed: Packed, work: Any, s: Scratch) -> Context | None:
     if contact is None or not contact.eased or system.moves or system.presses:
         return None
     tables, memory = contact.tables, body.kept(work, ContactTerm)
-    added = room_for(tables, memory)
-    return Context(SlowContacts(system, packed.mass, s, tables, memory, added))
+    parts = balance.setting, balance.solve, balance.inverse
+    return Context(SlowContacts(system, *parts, s, tables, memory, room_for(tables, memory)))
 
 
 def contact_parts(whole: Context, limited: bool, slow: Context | None) -> ContactParts:

@@ -11,30 +11,18 @@ That inertia is dragged as all mass is: else what vibrates in it would not come 
 from __future__ import annotations
 
 from foldyn.dynamics.damping import drag
-from foldyn.dynamics.inertia import solve_mass, solve_tied
 from foldyn.jit.compiled import inlined, inner
+from foldyn.jit.context import run_at
 from foldyn.jit.intrinsics import flat
 
 ACCURATE = 1e-10  # of the contacts' accelerations
 ITERATIONS = 200
 
 
-@inlined
-def _solve(mass, r, out, line):
-    """M^-1 r to out, both (n, 3)."""
-    if mass.lumped:
-        values, given, inverse = flat(out), flat(r), flat(mass.inverse)
-        for i in range(values.size):
-            values[i] = inverse[i] * given[i]
-    elif mass.ties.slave.size > 0:
-        solve_tied(mass, flat(r), flat(out), line)
-    else:
-        solve_mass(mass, r, out, line, 0, 1)
-
-
 @inner
-def _pushed(added, mass, y, r, out, line):
-    """M^-1 G' y to out (n, 3)."""
+def _pushed(m, y, out):
+    """M^-1 G' y to out (n, 3), by way of the forces."""
+    added, r = m.added, m.s.force
     for i in range(len(r)):
         for c in range(3):
             r[i, c] = 0.0
@@ -42,7 +30,12 @@ def _pushed(added, mass, y, r, out, line):
         for i in range(4):
             for c in range(3):
                 r[added.nodes[k, i], c] += added.gradient[k, i, c] * y[k]
-    _solve(mass, r, out, line)
+    if m.solve != 0:
+        run_at(m.solve, (m.setting, out))
+    else:
+        values, given, inverse = flat(out), flat(r), flat(m.inverse)
+        for i in range(values.size):
+            values[i] = inverse[i] * given[i]
 
 
 @inner
@@ -56,26 +49,27 @@ def _along(added, k, a):
 
 
 @inlined
-def slow_down(added, system, mass, w, a, s):
+def slow_down(m, w, a):
     """Change accelerations a (n, 3) at velocities w to those with the inertia of contacts.
 
-    added : see `added_inertia`; s : memory.
+    m : see `explicit_contact.SlowContacts`.
     """
-    size, r, out, line = added.count[0], s.stage[0], s.stage[1], s.line
+    added, damping, out = m.added, m.system.damping, m.s.stage[0]
+    size = added.count[0]
     if size == 0:
         return
     ease, lightness = added.ease, added.lightness
     y, left, p, q = added.lines[0], added.lines[1], added.lines[2], added.lines[3]
     before = 0.0
     for k in range(size):
-        y[k], left[k] = 0.0, _along(added, k, a) + drag(system.damping, _along(added, k, w))
+        y[k], left[k] = 0.0, _along(added, k, a) + drag(damping, _along(added, k, w))
         p[k] = left[k] / (ease[k] + lightness[k])
         before += left[k] * p[k]
     goal = before * ACCURATE * ACCURATE
     for _ in range(ITERATIONS):
         if not before > goal:
             break
-        _pushed(added, mass, p, r, out, line)
+        _pushed(m, p, out)
         along, now = 0.0, 0.0
         for k in range(size):
             q[k] = ease[k] * p[k] + _along(added, k, out)
@@ -87,7 +81,7 @@ def slow_down(added, system, mass, w, a, s):
         for k in range(size):
             p[k] = left[k] / (ease[k] + lightness[k]) + now / before * p[k]
         before = now
-    _pushed(added, mass, y, r, out, line)
+    _pushed(m, y, out)
     for i in range(len(a)):
         for c in range(3):
             a[i, c] -= out[i, c]

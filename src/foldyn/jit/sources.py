@@ -42,6 +42,7 @@ _NO_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")  # variables that leave the 
 _KEEPING, _COMPILING = ("kept.py", "sources.py"), PACKAGE / "jit"
 _COMPILERS = ("foldyn.jit.compiled", "foldyn.mechanics.term")  # modules with decorators of kernels
 _NO_CODE_IN = ("from ", "import ", "if TYPE_CHECKING:")  # how statements begin that are no code
+_READ: set[Path] = set()
 REST = ""  # name of the statements that define no name
 
 Part = tuple[Path, str]  # the statements of a file that define a name
@@ -106,6 +107,7 @@ def _needed(path: Path, name: str) -> frozenset[Part]:
     return frozenset(needed)
 
 
+@cache
 def _in_python(path: Path, name: str) -> bool:
     """Whether a name is that of a function without a decorator, which no compiled one can call."""
     text = _module(path).parts.get(name, "")
@@ -162,18 +164,16 @@ def _home(module: str, name: str) -> frozenset[Path]:
     return frozenset(place.rglob("*.py"))  # the folder as a whole, or nobody knows which file
 
 
-@cache
-def read(source: Path) -> frozenset[Path]:
-    """Read a file and those that it needs while they are as they were imported; returns them."""
-    files, ahead = {source}, [source]
+def read(source: Path) -> None:
+    """Read a file and those that it needs while they are as they were imported."""
+    ahead = [source]
     while ahead:
-        new = _imported(ahead.pop()) - files
-        files |= new
-        ahead += new
-    return frozenset(files)
+        path = ahead.pop()
+        if path not in _READ:
+            _READ.add(path)
+            ahead += _imported(path)
 
 
-@cache
 def _imported(source: Path) -> frozenset[Path]:
     """Files of the package that a file imports from."""
     found = imports(_text(source))
