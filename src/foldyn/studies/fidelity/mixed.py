@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.patterns import GENERATORS, Pattern, miura
-from foldyn.shells.graded import grading
+from foldyn.structures.graded import grading
 from foldyn.studies.fidelity.cases import FidelityCase, Held, documented
 from foldyn.studies.fidelity.drawn import random_sheet, spread
 
