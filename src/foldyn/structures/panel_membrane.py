@@ -206,17 +206,20 @@ def _moves(panel: Outline, mesh: PanelMesh) -> tuple[sparse.csr_array, int]:
         length = np.linalg.norm(edge)
         tangent = edge / length
         normal, place = np.array([-tangent[1], tangent[0]]), (x[points] - x[at[k]]) @ tangent
+        radius = mesh.radius or 0.0
         for side, far in enumerate((place, length - place)):
             share = 1.0 - far / length
-            for axis in range(2):
+            slid = 1.0 - np.clip((far - radius) / (length - 2.0 * radius), 0.0, 1.0)
+            for axis, unit in enumerate(np.eye(2)):
                 column = np.full(len(points), 2 * ends[side] + axis)
-                put(points, column, share[:, None] * np.eye(2)[axis])
-            if mesh.radius is not None:
+                along_it = np.outer(slid, (unit @ tangent) * tangent)
+                put(points, column, along_it + np.outer(share, (unit @ normal) * normal))
+            if radius:
                 half = 0.5 * length
-                held = np.log(np.maximum(far, mesh.radius) / half) / np.log(mesh.radius / half)
-                slid = (share - np.maximum(held, 0.0)) * (1 - 2 * side)
+                held = np.log(np.maximum(far, radius) / half) / np.log(radius / half)
+                gives = (slid - np.maximum(held, 0.0)) * (1 - 2 * side)
                 column = np.full(len(points), 2 * (len(at) + k) + side)
-                put(points, column, slid[:, None] * tangent)
+                put(points, column, np.outer(gives, tangent))
         if not panel.straight[k]:
             put(points, count + np.arange(len(points)), np.tile(normal, (len(points), 1)))
             count += len(points)
