@@ -16,7 +16,8 @@ either end of an edge of length L displacements gain
     g [1 - s/L - log(2 s/L) / log(2 t/L)],
 
 s the distance from that end, between the thickness t and L/2; within t they are constant. Stresses
-about a force at a corner fall with 1/s. Panels share the amplitudes g of the edge between them (`mechanics.edge_gives`).
+about a force at a corner fall with 1/s. Panels share the amplitudes g of the edge between them
+(`mechanics.edge_gives`).
 """
 
 from __future__ import annotations
