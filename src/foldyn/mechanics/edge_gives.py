@@ -342,6 +342,10 @@ class BalancedGivesTerm(EdgeGivesTerm):
         """See `Term`."""
         return self._condensed(q, self._gives(q)).ravel()
 
+    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
+        """See `Term`: without the places, which would take more room than the matrix."""
+        return sparse.csr_array(self._condensed(q, self._gives(q)))
+
     def mean_entries(self, q0: NDArray, q1: NDArray, floor: float = -np.inf) -> NDArray:
         """See `Term`."""
         return Term.mean_entries(self, q0, q1, floor)
