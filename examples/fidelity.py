@@ -37,7 +37,7 @@ def check(result: fd.Fidelity) -> None:
     assert max(abs(mode.mesh_error) for mode in plate) < 0.02
     softness = dict(zip(result.models, result.result["deflection_error"].values, strict=True))
     np.testing.assert_allclose(softness["own"], 0.06, atol=0.02)
-    np.testing.assert_allclose(softness["n5b8e"], 0.03, atol=0.01)
+    np.testing.assert_allclose(softness["n5b8e"], 0.05, atol=0.01)
     assert softness["standard"] < -0.6
     assert "use it" in result.advice
 

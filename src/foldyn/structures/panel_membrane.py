@@ -114,7 +114,11 @@ def _graded(panel: Outline, radius: float) -> PanelMesh:
     node[:, -1, :RAYS:-1] = np.roll(node[:, -1, :RAYS], 1, axis=0)
     at = x[..., 0].size + np.arange(len(pieces))
     a, b, c, d = node[:, :-1, :-1], node[:, 1:, :-1], node[:, 1:, 1:], node[:, :-1, 1:]
-    halves = [np.stack(half, axis=-1).reshape(-1, 3) for half in ((a, b, d), (b, c, d))]
+    halves = [  # cut alike on both sides of the middle ray
+        np.where((np.arange(2 * RAYS) < RAYS)[:, None], np.stack(one, -1), np.stack(other, -1))
+        for one, other in (((a, b, d), (a, b, c)), ((b, c, d), (a, c, d)))
+    ]
+    halves = [half.reshape(-1, 3) for half in halves]
     tips = np.stack(np.broadcast_arrays(at[:, None], node[:, 0, :-1], node[:, 0, 1:]), axis=-1)
     triangles = np.concatenate([tips.reshape(-1, 3), *halves])
     following = np.roll(np.arange(len(pieces)), -1)
