@@ -62,9 +62,14 @@ class EdgeGives(NamedTuple):
         entries = (self.stiffness.ravel(), places)
         return sparse.csc_array(sparse.coo_array(entries, shape=(self.count, self.count)))
 
+    @property
+    def bars(self) -> NDArray:
+        """Nodes (p, b, 2) at the ends of the bars."""
+        return np.take_along_axis(self.nodes[:, :, None], self.ends, axis=1)
+
     def vectors(self, u: NDArray) -> NDArray:
         """Vectors (p, b, 3) of the bars at displacements u (n, 3), m."""
-        ends = np.take_along_axis(self.nodes[:, :, None], self.ends, axis=1)
+        ends = self.bars
         return self.vector + u[ends[..., 1]] - u[ends[..., 0]]
 
     def strains(self, u: NDArray) -> NDArray:
@@ -228,13 +233,20 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
             add_given(own.gives, p, g, 0.5, pull)
 
 
-@forces
-def _balanced_forces(own, u, v, t, force, powers):
-    moved, out, (pull, g) = rows_at(u, own.rows), rows_at(force, own.rows), own.memory
-    strained_gives(own.gives, moved, pull)
+@inner
+def balance_gives(own, u):
+    """Forces of the strains at u on the gives, and gives in balance with them, to its memory."""
+    pull, g = own.memory
+    strained_gives(own.gives, u, pull)
     for k in range(g.size):
         g[k] = -pull[k]
     solve_factor(own.factor, g)
+
+
+@forces
+def _balanced_forces(own, u, v, t, force, powers):
+    moved, out, g = rows_at(u, own.rows), rows_at(force, own.rows), own.memory[1]
+    balance_gives(own, moved)
     for p in range(own.gives.nodes.shape[0]):
         strain_panel(own.gives, moved, p)
         add_pulls(own.gives, p, g, 1.0, out)
@@ -243,10 +255,7 @@ def _balanced_forces(own, u, v, t, force, powers):
 @energies
 def _balanced_energies(own, u, out):
     pull, g = own.memory
-    strained_gives(own.gives, rows_at(u, own.rows), pull)
-    for k in range(g.size):
-        g[k] = -pull[k]
-    solve_factor(own.factor, g)
+    balance_gives(own, rows_at(u, own.rows))
     for k in range(g.size):
         numbers_at(out, GROUP + 1)[GROUP] += 0.5 * pull[k] * g[k]
 
@@ -378,20 +387,19 @@ def panel_tangents(gives: EdgeGives, u0: NDArray, u1: NDArray, g: NDArray) -> ND
     (panels, corners), (bars, given) = gives.nodes.shape, gives.across.shape[1:]
     end = 3 * corners
     out = np.zeros((panels, end + given, end + given))
-    turn = np.zeros((panels, bars, corners))  # of the bars' ends, over L^2
+    way = np.zeros((panels, bars, corners))  # -1 and 1 at the ends of the bars
     at = np.arange(panels)[:, None], np.arange(bars)
-    np.add.at(turn, (*at, gives.ends[:, :, 0]), -gives.per_length2)
-    np.add.at(turn, (*at, gives.ends[:, :, 1]), gives.per_length2)
+    np.add.at(way, (*at, gives.ends[:, :, 0]), -1.0)
+    np.add.at(way, (*at, gives.ends[:, :, 1]), 1.0)
+    turn = gives.per_length2[:, :, None] * way
     last, first = gives.vectors(u1), gives.vectors(u0)
     middle = np.einsum("pbc,pbx->pbcx", turn, 0.5 * (first + last)).reshape(panels, bars, end)
     later = np.einsum("pbc,pbx->pbcx", turn, last).reshape(panels, bars, end)
     out[:, :end, end:] = np.einsum("pbd,pbk->pdk", middle, gives.across)
     out[:, end:, :end] = np.einsum("pbd,pbk->pkd", later, gives.across)
     out[:, end:, end:] = gives.stiffness
-    length2 = np.divide(1.0, gives.per_length2, where=gives.per_length2 > 0.0,
-                        out=np.zeros_like(gives.per_length2))  # fmt: skip
-    pull = np.einsum("pbk,pk->pb", gives.across, g[gives.number]) * length2
-    stressed = np.einsum("pb,pbc,pbd->pcd", pull, turn, turn)
+    pull = np.einsum("pbk,pk->pb", gives.across, g[gives.number])
+    stressed = np.einsum("pb,pbc,pbd->pcd", pull, turn, way)
     blocks = out[:, :end, :end].reshape(panels, corners, 3, corners, 3)
     for axis in range(3):
         blocks[:, :, axis, :, axis] += stressed

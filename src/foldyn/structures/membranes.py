@@ -256,7 +256,7 @@ def swelling(
         bars = own.nodes[:, own.ends].transpose(1, 0, 2).reshape(-1, 2)
         parts.append(tensions(x, bars, tension.ravel()))
     if gives:
-        ends = np.take_along_axis(gives.nodes[:, :, None], gives.ends, axis=1)
+        ends = gives.bars
         alike = np.repeat(free[gives.panel][:, None], ends.shape[1], axis=1)
         g = gives.balanced(alike)[gives.number]
         tension = -np.einsum("pbk,pk->pb", gives.across, g) * gives.per_length2
