@@ -89,6 +89,11 @@ class FidelityCase:
         """Its supports."""
         return supports(self.kind, self.shape)[self.support]
 
+    @property
+    def options(self) -> Mapping[str, Any]:
+        """What `discretize` and `shell` are told of its supports."""
+        return {}
+
 
 def _short(value: Any) -> str:
     return "x".join(map(str, value)) if isinstance(value, list | tuple) else f"{value:.3g}"

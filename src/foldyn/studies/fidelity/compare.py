@@ -59,7 +59,7 @@ class Row(NamedTuple):
 
 def structure_of(case: FidelityCase, model: str) -> Structure:
     """Bars and hinges of a case; edges that are held stay straight where edges may bow."""
-    options = {"bend_law": "linear", **MODELS[model]}
+    options = {"bend_law": "linear", **case.options, **MODELS[model]}
     if resolved(**options).bowed:
         options["straight"] = case.held.edges
     with warnings.catch_warnings():

@@ -3,7 +3,7 @@
     python -m foldyn.studies.fidelity.mixed_models [--out FOLDER]
 
 compares models with what `references` has stored, computes no shell, writes a table for each set
-and prints what they say.
+and prints what they say (a few minutes).
 """
 
 from __future__ import annotations
@@ -17,27 +17,38 @@ import numpy as np
 
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
 from foldyn.studies.fidelity.compare import FIRST, Row, all_rows
-from foldyn.studies.fidelity.mixed import SETS, SUPPORTS, MixedCase, mixed
-from foldyn.studies.fidelity.references import CERTAIN, Stored, read_references, stored
-from foldyn.studies.fidelity.stored import RESULTS, Modes, columns, summary_of, write
+from foldyn.studies.fidelity.mixed import SETS, SUPPORTS, MixedCase
+from foldyn.studies.fidelity.references import (
+    CERTAIN,
+    Stored,
+    case_sets,
+    read_references,
+    stored,
+)
+from foldyn.studies.fidelity.stored import RESULTS, Modes, columns, read, summary_of, write
 
 BESIDE = {
-    "plate": "plate, consistent",
-    "n5b8e": "n5b8e, condensed",
-    "bars": "n5b8e, condensed, bars",
+    "plate": ("plate, consistent", 0),
+    "n5b8e": ("n5b8e, condensed", 0),
+    "n5b8e, internal": ("n5b8e, condensed", 3),
+    "n5b8e, bars": ("n5b8e, condensed, bars", 0),
 }
-"""Models that are compared, by their name in the table."""
+"""Models that are compared and their internal amplitudes, by their name in the table."""
 
 
 def references(name: str, folder: Path = RESULTS) -> list[tuple[MixedCase, Stored]]:
     """Cases of a set that are stored, with their modes."""
-    lines = read_references(name, folder)
-    return [(case, stored(case, lines[case.name])) for case in mixed(name) if case.name in lines]
+    lines, cases = read_references(name, folder), case_sets()[name]
+    return [(case, stored(case, lines[case.name])) for case in cases if case.name in lines]
 
 
 def compared(case: MixedCase, true: Stored) -> Modes:
     """The first modes of a case by every model."""
-    return Modes(case.name, {name: all_rows(case, true, model) for name, model in BESIDE.items()})
+    rows = {
+        name: all_rows(case, true, model, internal=internal)
+        for name, (model, internal) in BESIDE.items()
+    }
+    return Modes(case.name, rows)
 
 
 def certain(case: MixedCase, true: Stored) -> bool:
@@ -68,29 +79,54 @@ def mixed_table(found: Sequence[tuple[MixedCase, Modes]]) -> str:
     return "\n".join(lines)
 
 
+def gap_table(found: Sequence[Modes]) -> str:
+    """Errors of each case in Markdown: of low modes, and of the first five."""
+    models = list(BESIDE)[:3]
+    heads = [*(f"{name}, below 0.6" for name in models[:2]), *(f"{name}, f1-f5" for name in models)]
+    lines = [f"| | {' | '.join(heads)} |", "|---|" + "---|" * len(heads)]
+    for modes in found:
+        cells = [_span(modes.rows[name], low=True) for name in models[:2]]
+        cells += [_span(modes.rows[name], low=False) for name in models]
+        lines.append(f"| {modes.case} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _span(rows: Sequence[Row], low: bool) -> str:
+    """Least and largest error."""
+    error = np.array([row.error for row in rows if _counts(row, low)])
+    paired = 100.0 * error[~np.isnan(error)]
+    lost = f"{len(error) - len(paired)} lost" if len(paired) < len(error) else ""
+    span = f"{paired.min():+.1f} to {paired.max():+.1f} %" if len(paired) else ""
+    return ", ".join(filter(None, (span, lost))) or "none"
+
+
 def _counts(row: Row, low: bool) -> bool:
     return row.over_plate < BELOW if low else row.mode <= FIRST
 
 
+def counted(folder: Path = RESULTS) -> list[tuple[MixedCase, Modes]]:
+    """Stored results of the mixed sets, of cases that are known well enough."""
+    found = []
+    for name in SETS:
+        modes = {one.case: one for one in read(folder / f"{name}.csv")}
+        known = references(name, folder)
+        found += [(case, modes[case.name]) for case, true in known if certain(case, true)]
+    return found
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run what the command line says."""
-    parser = argparse.ArgumentParser(description="Models beside the stored mixed sets.")
+    parser = argparse.ArgumentParser(description="Models beside the stored shells.")
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the files")
     given = parser.parse_args(arguments)
-    found, doubtful, missing = [], [], 0
-    for name, (_, count) in SETS.items():
+    for name, cases in case_sets().items():
         known = references(name, given.out)
-        missing += count - len(known)
-        own = [(case, true, compared(case, true)) for case, true in known]
-        if own:
-            write(given.out / f"{name}.csv", [modes for *_, modes in own])
-        found += [(case, modes) for case, true, modes in own if certain(case, true)]
-        doubtful += [(case, true) for case, true, _ in own if not certain(case, true)]
-    print(f"{len(found)} cases, {len(doubtful)} known less well than {CERTAIN:.1%}, "
-          f"{missing} not computed\n\n{mixed_table(found)}\n")  # fmt: skip
-    for case, true in doubtful:
-        modes = ", ".join(f"{100 * doubt:.1f}" for doubt in np.atleast_1d(true.doubt))
-        print(f"not counted: {case.name}: {modes} %")
+        print(f"{name}: {len(known)} of {len(cases)} cases are stored", flush=True)
+        write(given.out / f"{name}.csv", [compared(case, true) for case, true in known])
+        for case, true in known:
+            if not certain(case, true):
+                print(f"known to {100 * np.max(true.doubt):.1f} % only: {case.name}", flush=True)
+    print(f"\n{mixed_table(counted(given.out))}\n\n{gap_table(read(given.out / 'gaps.csv'))}")
     return 0
 
 

@@ -1,19 +1,22 @@
-"""Modes of the shell for the mixed sets, stored so that models can be compared without it.
+"""Modes of the shell for the mixed sets and known gaps, to compare models without it.
 
     python -m foldyn.studies.fidelity.references [--out FOLDER] [--until HH:MM]
 
 computes what is not stored yet, in turn from all sets, and appends it case by case. Meshes are
 graded toward vertices, down to the thickness; a line of a file has the frequencies of three of
-them, and shapes at the vertices and the means of panels' corners, in thousandths of the largest.
+them, and shapes at the vertices, in the middles of edges and of panels: bytes in base64, of which
+127 is the largest component.
 """
 
 from __future__ import annotations
 
 import argparse
+import base64
 import json
 import sys
 import time
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
@@ -28,10 +31,11 @@ from foldyn.linear.reference import SAME_PLACE, reference_modes
 from foldyn.patterns import Pattern
 from foldyn.shells import shell
 from foldyn.studies.fidelity.compare import COMPARED
+from foldyn.studies.fidelity.gaps import gaps
 from foldyn.studies.fidelity.mixed import SETS, MixedCase, mixed
 from foldyn.studies.fidelity.stored import RESULTS
 
-STEPS = 1000  # of a shape's largest component
+STEPS = 127  # of a shape's largest component: what a byte takes
 CERTAIN = 0.015  # estimated error of a reference, at most
 
 
@@ -46,9 +50,9 @@ class Stored:
     mesh_frequency : (3, k)
         Hz.
     shape : (k, p, 3)
-        At the points, in thousandths.
+        At the points, with a largest component of 127.
     points : (p, 3)
-        Vertices, then the means of panels' corners, m.
+        Vertices, means of panels' corners and middles of edges, m.
     size : float
         Of the pattern, m.
     """
@@ -78,10 +82,15 @@ class Stored:
         return seen, self.shape[:, place[seen]]
 
 
+def case_sets() -> dict[str, Sequence[MixedCase]]:
+    """Cases whose shells are stored, by the name of the file."""
+    return {**{name: mixed(name) for name in SETS}, "gaps": gaps()}
+
+
 def points_of(pattern: Pattern) -> NDArray[np.float64]:
     """Where shapes are stored (p, 3)."""
     middles = [pattern.vertices[list(face)].mean(axis=0) for face in pattern.faces]
-    return np.concatenate([pattern.vertices, middles])
+    return np.concatenate([pattern.vertices, middles, pattern.vertices[pattern.edges].mean(axis=1)])
 
 
 def computed(case: MixedCase) -> dict[str, Any]:
@@ -91,7 +100,9 @@ def computed(case: MixedCase) -> dict[str, Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
         meshes = [
-            case.case(shell(pattern, case.sheet, n, "consistent", vertex_radius=radius))
+            case.case(
+                shell(pattern, case.sheet, n, "consistent", vertex_radius=radius, **case.options)
+            )
             for n in case.divisions
         ]
         true = reference_modes(meshes, COMPARED)
@@ -102,7 +113,7 @@ def computed(case: MixedCase) -> dict[str, Any]:
         "divisions": case.divisions,
         "seconds": round(time.perf_counter() - began, 1),
         "mesh_frequency": [[float(f"{f:.8g}") for f in row] for row in true.mesh_frequency],
-        "shape": np.rint(scale * shape).astype(int).reshape(len(shape), -1).tolist(),
+        "shape": base64.b64encode(np.rint(scale * shape).astype(np.int8).tobytes()).decode(),
     }
 
 
@@ -116,10 +127,11 @@ def read_references(name: str, folder: Path = RESULTS) -> dict[str, dict[str, An
 def stored(case: MixedCase, line: dict[str, Any]) -> Stored:
     """Modes of a case from its line."""
     pattern = case.pattern()
-    shape = np.array(line["shape"], float).reshape(len(line["shape"]), -1, 3)
-    frequency = np.array(line["mesh_frequency"], float)
+    frequency, points = np.array(line["mesh_frequency"], float), points_of(pattern)
+    shape = np.frombuffer(base64.b64decode(line["shape"]), np.int8).astype(float)
     first, second, third = line["divisions"]
-    return Stored((first, second, third), frequency, shape, points_of(pattern), pattern.size)
+    shapes = shape.reshape(frequency.shape[1], len(points), 3)
+    return Stored((first, second, third), frequency, shapes, points, pattern.size)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -128,8 +140,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the files")
     parser.add_argument("--until", help="time of day (HH:MM) after which no case is begun")
     given = parser.parse_args(arguments)
-    sets = {name: mixed(name) for name in SETS}
-    known = {name: read_references(name, given.out) for name in SETS}
+    sets = case_sets()
+    known = {name: read_references(name, given.out) for name in sets}
     for turn in zip_longest(*sets.values()):
         for name, case in zip(sets, turn, strict=True):
             if case is None or case.name in known[name]:
