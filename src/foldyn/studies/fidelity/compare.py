@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from math import nan
 from typing import Any, NamedTuple
 
 from foldyn.errors import FoldynWarning
@@ -83,8 +84,10 @@ def all_rows(
 ) -> list[Row]:
     """The first modes of a case, by a model beside the shell."""
     held = case.case(structure_of(case, model))
-    found = matched(true, count, held, modes_at_rest(held, count + SPARE, internal=internal))
     limit = plate_frequency(case.pattern(), case.sheet)
+    if not len(held.free_dofs):  # triangles between edges that are held
+        return [Row(k, f, f / limit, nan, 0.0) for k, f in enumerate(true.frequency[:count], 1)]
+    found = matched(true, count, held, modes_at_rest(held, count + SPARE, internal=internal))
     rows = zip(true.frequency, found.error, found.mac, strict=False)
     return [
         Row(k, float(shell), float(shell / limit), float(error), float(mac))

@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from foldyn.structures.plate_frequency import BELOW, plate_frequency
+from foldyn.structures.plate_frequency import BELOW
 from foldyn.studies.fidelity.compare import FIRST, Row, all_rows
 from foldyn.studies.fidelity.mixed import SETS, SUPPORTS, MixedCase
 from foldyn.studies.fidelity.references import (
-    CERTAIN,
     Stored,
     case_sets,
+    certain,
     read_references,
     stored,
 )
@@ -51,13 +51,6 @@ def compared(case: MixedCase, true: Stored) -> Modes:
     return Modes(case.name, rows)
 
 
-def certain(case: MixedCase, true: Stored) -> bool:
-    """Whether all modes of a case that count are known to 1.5 %: the first, and low ones."""
-    low = true.frequency < BELOW * plate_frequency(case.pattern(), case.sheet)
-    counts = low | (np.arange(len(low)) < FIRST)
-    return bool((true.doubt[counts] <= CERTAIN).all())  # nan is not
-
-
 def mixed_table(found: Sequence[tuple[MixedCase, Modes]]) -> str:
     """Errors by support in Markdown, towers apart."""
     lines = [
@@ -73,7 +66,7 @@ def mixed_table(found: Sequence[tuple[MixedCase, Modes]]) -> str:
     }
     for title, (group, low) in groups.items():
         for name in BESIDE:
-            rows = [row for modes in group for row in modes.rows[name] if _counts(row, low)]
+            rows = [row for modes in group for row in modes.rows[name] if counts(row, low)]
             if rows:
                 lines.append(f"| {title} | {len(rows)} | `{name}` | {columns(summary_of(rows))} |")
     return "\n".join(lines)
@@ -93,14 +86,15 @@ def gap_table(found: Sequence[Modes]) -> str:
 
 def _span(rows: Sequence[Row], low: bool) -> str:
     """Least and largest error."""
-    error = np.array([row.error for row in rows if _counts(row, low)])
+    error = np.array([row.error for row in rows if counts(row, low)])
     paired = 100.0 * error[~np.isnan(error)]
     lost = f"{len(error) - len(paired)} lost" if len(paired) < len(error) else ""
     span = f"{paired.min():+.1f} to {paired.max():+.1f} %" if len(paired) else ""
     return ", ".join(filter(None, (span, lost))) or "none"
 
 
-def _counts(row: Row, low: bool) -> bool:
+def counts(row: Row, low: bool) -> bool:
+    """Whether a mode is a low one, or one of the first five."""
     return row.over_plate < BELOW if low else row.mode <= FIRST
 
 

@@ -30,9 +30,10 @@ from foldyn.errors import FoldynWarning
 from foldyn.linear.reference import SAME_PLACE, reference_modes
 from foldyn.patterns import Pattern
 from foldyn.shells import shell
-from foldyn.studies.fidelity.compare import COMPARED
+from foldyn.structures.plate_frequency import BELOW, plate_frequency
+from foldyn.studies.fidelity.compare import COMPARED, FIRST
 from foldyn.studies.fidelity.gaps import gaps
-from foldyn.studies.fidelity.mixed import SETS, MixedCase, mixed
+from foldyn.studies.fidelity.mixed import FINE, SETS, MixedCase, mixed
 from foldyn.studies.fidelity.stored import RESULTS
 
 STEPS = 127  # of a shape's largest component: what a byte takes
@@ -93,7 +94,14 @@ def points_of(pattern: Pattern) -> NDArray[np.float64]:
     return np.concatenate([pattern.vertices, middles, pattern.vertices[pattern.edges].mean(axis=1)])
 
 
-def computed(case: MixedCase) -> dict[str, Any]:
+def certain(case: MixedCase, true: Stored) -> bool:
+    """Whether all modes of a case that count are known to 1.5 %: the first, and low ones."""
+    low = true.frequency < BELOW * plate_frequency(case.pattern(), case.sheet)
+    counts = low | (np.arange(len(low)) < FIRST)
+    return bool((true.doubt[counts] <= CERTAIN).all())  # nan is not
+
+
+def computed(case: MixedCase, divisions: tuple[int, int, int]) -> dict[str, Any]:
     """What a line of a file has."""
     began = time.perf_counter()
     pattern, radius = case.pattern(), case.sheet.thickness
@@ -103,14 +111,14 @@ def computed(case: MixedCase) -> dict[str, Any]:
             case.case(
                 shell(pattern, case.sheet, n, "consistent", vertex_radius=radius, **case.options)
             )
-            for n in case.divisions
+            for n in divisions
         ]
         true = reference_modes(meshes, COMPARED)
     _, shape = true.at(points_of(pattern))
     scale = STEPS / np.abs(shape).max(axis=(1, 2), keepdims=True)
     return {
         "case": case.name,
-        "divisions": case.divisions,
+        "divisions": divisions,
         "seconds": round(time.perf_counter() - began, 1),
         "mesh_frequency": [[float(f"{f:.8g}") for f in row] for row in true.mesh_frequency],
         "shape": base64.b64encode(np.rint(scale * shape).astype(np.int8).tobytes()).decode(),
@@ -148,7 +156,9 @@ def main(arguments: list[str] | None = None) -> int:
                 continue
             if given.until and time.strftime("%H:%M") >= given.until:
                 return 0
-            line = computed(case)
+            line = computed(case, case.divisions)
+            if not certain(case, stored(case, line)) and case.divisions != FINE:
+                line = computed(case, FINE)
             with (given.out / f"{name}.jsonl").open("a", encoding="utf-8") as file:
                 file.write(json.dumps(line, separators=(",", ":")) + "\n")
             found = stored(case, line)
