@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import runpy
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from pydantic import BaseModel
 import foldyn as fd
 from foldyn.analyses import ANALYSES, read_case
 from foldyn.cases import LOADS, SUPPORTS, BaseMotion, Force, Table
+from foldyn.cases.decode import law_from
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
@@ -92,11 +94,26 @@ def test_the_patterns_page_shows_families_that_can_be_used():
 
 def test_the_loads_page_shows_a_case_that_can_be_made():
     names: dict = {}
-    (block,) = blocks("loads.md", "python")
+    block, *_ = blocks("loads.md", "python")
     exec(compile(block, "loads.md", "exec"), names)
     assert len(names["case"].following_terms) == 2
     listed = (DOCS / "loads.md").read_text("utf-8")
     assert all(f"`fd.{kind.__name__}(" in listed for kind in LOADS)
+
+
+def test_the_loads_page_shows_creases_that_are_actuated():
+    names: dict = {}
+    block, actuated, *_ = blocks("loads.md", "python")
+    exec(compile(block + actuated, "loads.md", "exec"), names)
+    assert names["path"].attrs["status"] == "complete"
+
+
+def test_the_laws_page_shows_one_model_in_python_and_in_a_case_file():
+    names: dict = {}
+    (block,), (toml,) = blocks("laws.md", "python"), blocks("laws.md", "toml")
+    exec(compile(block, "laws.md", "exec"), names)
+    law = law_from(tomllib.loads(toml)["model"]["fold_law"], fd.materials.HINGE_LAWS)
+    assert law == names["law"]
 
 
 def test_the_path_of_the_case_file_page_can_be_followed(tmp_path):
@@ -152,8 +169,8 @@ def test_the_tables_of_the_quasi_static_page_are_what_the_example_computes():
     assert f"{script['frequency'](results['motion']):.1f} Hz" in page
 
 
-def test_the_histories_page_shows_a_table_that_can_be_read(tmp_path):
-    (text,), (toml,) = blocks("histories.md", "text"), blocks("histories.md", "toml")
+def test_the_loads_page_shows_a_table_that_can_be_read(tmp_path):
+    (text,), (_, toml) = blocks("loads.md", "text"), blocks("loads.md", "toml")
     (tmp_path / "pulse.csv").write_text(text, "utf-8")
     page, *_ = blocks("case-file.md", "toml")
     old = 'history = { kind = "pulse", duration = 1.0 }\n'
@@ -190,7 +207,7 @@ def test_sections_are_found():
 
 def test_inertia_table_is_what_the_code_gives():
     script = runpy.run_path(str(DOCS / "inertia_table.py"))
-    page = (DOCS / "mass-rules.md").read_text("utf-8")
+    page = (DOCS / "mass.md").read_text("utf-8")
     assert script["with_table"](page) == page
     assert script["table"]() in page
 
@@ -206,7 +223,7 @@ def test_inertia_table_knows_the_rhombus():
 
 def test_what_a_swinging_panel_and_a_twisting_one_make_of_a_rule():
     """A square panel on a hinge, by `modes`; the twist by hand: integral of (x y)^2 is 1/9."""
-    page = (DOCS / "mass-rules.md").read_text("utf-8")
+    page = (DOCS / "mass.md").read_text("utf-8")
     square = fd.Pattern(
         [[0, -1, 0], [0, 0, 0], [-1, 0, 0], [-1, -1, 0], [1, 0, 0], [1, -1, 0]],
         [[0, 1, 2, 3], [0, 5, 4, 1]],
