@@ -124,10 +124,10 @@ def test_the_response_of_the_case_file_page_can_be_computed(tmp_path):
     assert case_file.output.quantity == "mobility"
 
 
-def test_compress_release_vibrate_of_the_quasi_static_page():
-    (block,) = blocks("quasi-static.md", "python")
+def test_compress_release_vibrate_of_the_statics_page():
+    block = blocks("statics.md", "python")[-1]
     names: dict = {}
-    exec(compile(block, "quasi-static.md", "exec"), names)
+    exec(compile(block, "statics.md", "exec"), names)
     path, motion = names["path"], names["motion"]
     np.testing.assert_array_equal(motion.displacement[0], path.displacement[5])
     top = motion.displacement.sel(node=3, axis="x").values
@@ -143,13 +143,17 @@ def test_the_folding_page_folds_a_pattern_and_computes_its_modes():
     assert (names["modes"].frequency > 0.0).all()
 
 
-def test_the_tables_of_the_quasi_static_page_are_what_the_example_computes():
+def test_the_numbers_of_the_statics_page_are_what_the_example_computes():
     script = runpy.run_path(str(DOCS.parent / "examples" / "quasi_static.py"))
-    page = (DOCS / "quasi-static.md").read_text("utf-8")
+    page = (DOCS / "statics.md").read_text("utf-8")
     _, results = script["compute"]()
-    for table in script["tables"](results).split("\n\n"):
-        assert table in page
+    script["check"](results)
+    assert script["deflection_table"](results) in page
     assert f"{script['frequency'](results['motion']):.1f} Hz" in page
+    folds = 100 * results["shares"][2, "superlinear"][[1, -1], 2]
+    bends = 100 * results["shares"][3, "superlinear"][[1, -1], 1]
+    assert f"folds hold {folds[0]:.0f} % of the energy at a ratio of 1 and {folds[1]:.0f} %" in page
+    assert f"bends hold {bends[0]:.0f} % and {bends[1]:.0f} %" in page
 
 
 def test_the_histories_page_shows_a_table_that_can_be_read(tmp_path):
