@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import re
 import runpy
+import shutil
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +16,7 @@ from pydantic import BaseModel
 import foldyn as fd
 from foldyn.analyses import ANALYSES, read_case
 from foldyn.cases import LOADS, SUPPORTS, BaseMotion, Force, Table
+from foldyn.cli.main import main
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
@@ -22,13 +26,46 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", text, re.M | re.S)
 
 
-def test_quickstart_runs(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(scope="module")
+def tutorial(tmp_path_factory):
+    """The names that the tutorial makes, what it prints, and its folder."""
+    folder = tmp_path_factory.mktemp("tutorial")
+    shutil.copy(DOCS.parent / "examples" / "patterns" / "miura.fold", folder)
     names: dict = {}
-    for block in blocks("quickstart.md", "python"):
-        exec(compile(block, "quickstart.md", "exec"), names)
-    assert float(abs(names["trajectory"].displacement).max()) > 1e-3
-    assert (tmp_path / "miura.nc").exists()
+    printed = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(printed):
+        patch.chdir(folder)
+        for block in blocks("tutorial.md", "python"):
+            exec(compile(block, "tutorial.md", "exec"), names)
+    return names, printed.getvalue(), folder
+
+
+def test_the_tutorial_prints_what_it_shows(tutorial):
+    _, printed, folder = tutorial
+    page = (DOCS / "tutorial.md").read_text("utf-8")
+    for line in printed.splitlines():
+        assert f"```\n{line}\n```" in page
+    assert all((folder / f"{name}.pdf").stat().st_size > 1000 for name in ("modes", "tip"))
+
+
+def test_the_case_file_of_the_tutorial_is_its_python_case(tutorial):
+    names, _, folder = tutorial
+    (block,) = blocks("tutorial.md", "toml")
+    (folder / "sheet.toml").write_text(block, "utf-8")
+    assert main(["run", str(folder / "sheet.toml"), "--out", str(folder / "out")]) == 0
+    found = fd.load(folder / "out" / "result.nc")
+    np.testing.assert_array_equal(found.time, names["motion"].time)
+    size = float(abs(names["motion"].displacement).max())
+    np.testing.assert_allclose(
+        found.displacement, names["motion"].displacement, rtol=0, atol=1e-12 * size
+    )
+
+
+@pytest.mark.thorough
+def test_the_error_that_the_tutorial_states(tutorial):
+    worst = float(abs(fd.fidelity(tutorial[0]["case"], count=4).result.error[:, 0]).max())
+    page = (DOCS / "tutorial.md").read_text("utf-8")
+    assert f"within {100 * worst:.1f} % in all four modes" in page
 
 
 def test_the_quantities_of_the_results_page_can_be_sampled():
