@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import re
 import runpy
+import shutil
 import tomllib
+from contextlib import redirect_stdout
 from inspect import signature
 from pathlib import Path
 
@@ -16,6 +19,7 @@ import foldyn as fd
 from foldyn.analyses import ANALYSES, read_case
 from foldyn.cases import LOADS, SUPPORTS, BaseMotion, Force, Table
 from foldyn.cases.decode import law_from
+from foldyn.cli.main import main
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
@@ -25,13 +29,46 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", text, re.M | re.S)
 
 
-def test_quickstart_runs(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(scope="module")
+def tutorial(tmp_path_factory):
+    """The names that the tutorial makes, what it prints, and its folder."""
+    folder = tmp_path_factory.mktemp("tutorial")
+    shutil.copy(DOCS.parent / "examples" / "patterns" / "miura.fold", folder)
     names: dict = {}
-    for block in blocks("quickstart.md", "python"):
-        exec(compile(block, "quickstart.md", "exec"), names)
-    assert float(abs(names["trajectory"].displacement).max()) > 1e-3
-    assert (tmp_path / "miura.nc").exists()
+    printed = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(printed):
+        patch.chdir(folder)
+        for block in blocks("tutorial.md", "python"):
+            exec(compile(block, "tutorial.md", "exec"), names)
+    return names, printed.getvalue(), folder
+
+
+def test_the_tutorial_prints_what_it_shows(tutorial):
+    _, printed, folder = tutorial
+    page = (DOCS / "tutorial.md").read_text("utf-8")
+    for line in printed.splitlines():
+        assert f"```\n{line}\n```" in page
+    assert all((folder / f"{name}.pdf").stat().st_size > 1000 for name in ("modes", "tip"))
+
+
+def test_the_case_file_of_the_tutorial_is_its_python_case(tutorial):
+    names, _, folder = tutorial
+    (block,) = blocks("tutorial.md", "toml")
+    (folder / "sheet.toml").write_text(block, "utf-8")
+    assert main(["run", str(folder / "sheet.toml"), "--out", str(folder / "out")]) == 0
+    found = fd.load(folder / "out" / "result.nc")
+    np.testing.assert_array_equal(found.time, names["motion"].time)
+    size = float(abs(names["motion"].displacement).max())
+    np.testing.assert_allclose(
+        found.displacement, names["motion"].displacement, rtol=0, atol=1e-12 * size
+    )
+
+
+@pytest.mark.thorough
+def test_the_error_that_the_tutorial_states(tutorial):
+    worst = float(abs(fd.fidelity(tutorial[0]["case"], count=4).result.error[:, 0]).max())
+    page = (DOCS / "tutorial.md").read_text("utf-8")
+    assert f"within {100 * worst:.1f} % in all four modes" in page
 
 
 def test_the_quantities_of_the_results_page_can_be_sampled():
@@ -138,10 +175,10 @@ def test_the_response_of_the_case_file_page_can_be_computed(tmp_path):
     assert case_file.output.quantity == "mobility"
 
 
-def test_compress_release_vibrate_of_the_quasi_static_page():
-    (block,) = blocks("quasi-static.md", "python")
+def test_compress_release_vibrate_of_the_statics_page():
+    block = blocks("statics.md", "python")[-1]
     names: dict = {}
-    exec(compile(block, "quasi-static.md", "exec"), names)
+    exec(compile(block, "statics.md", "exec"), names)
     path, motion = names["path"], names["motion"]
     np.testing.assert_array_equal(motion.displacement[0], path.displacement[5])
     top = motion.displacement.sel(node=3, axis="x").values
@@ -157,13 +194,17 @@ def test_the_folding_page_folds_a_pattern_and_computes_its_modes():
     assert (names["modes"].frequency > 0.0).all()
 
 
-def test_the_tables_of_the_quasi_static_page_are_what_the_example_computes():
+def test_the_numbers_of_the_statics_page_are_what_the_example_computes():
     script = runpy.run_path(str(DOCS.parent / "examples" / "quasi_static.py"))
-    page = (DOCS / "quasi-static.md").read_text("utf-8")
+    page = (DOCS / "statics.md").read_text("utf-8")
     _, results = script["compute"]()
-    for table in script["tables"](results).split("\n\n"):
-        assert table in page
+    script["check"](results)
+    assert script["deflection_table"](results) in page
     assert f"{script['frequency'](results['motion']):.1f} Hz" in page
+    folds = 100 * results["shares"][2, "superlinear"][[1, -1], 2]
+    bends = 100 * results["shares"][3, "superlinear"][[1, -1], 1]
+    assert f"folds hold {folds[0]:.0f} % of the energy at a ratio of 1 and {folds[1]:.0f} %" in page
+    assert f"bends hold {bends[0]:.0f} % and {bends[1]:.0f} %" in page
 
 
 def test_the_loads_page_shows_a_table_that_can_be_read(tmp_path):
