@@ -87,7 +87,7 @@ def discretize(
     clamped : sequence of (vertex, vertex), or str
         Boundary edges along which panels keep their rest tangent in space, wherever they are moved;
         their nodes need a support of their own. A selection ("xmin") means those of which it has
-        both ends. See `foldyn.structures.clamps`.
+        both ends. See `foldyn.structures.clamps`, and `edge_angles` for "n5b8e".
     rigid : "all" or sequence of int, optional
         Panels that cannot bend, exactly: all their nodes ride on three of their corners. They must
         be flat. Their bars still stretch.
