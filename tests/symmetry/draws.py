@@ -260,7 +260,7 @@ def structure_of(model: str, pattern: fd.Pattern, rng, extra: str) -> Any:
     }
     if model == "n5b8e":  # which a scheme stands for
         del options["scheme"]
-    if extra != "springs":  # of which clamps are some
+    if extra != "springs" and model != "n5b8e":  # whose plates have clamps; others are springs
         del options["clamped"]
     for name in (name for name in options if name in known):
         for _ in range(TRIES if rng.random() < 0.4 or (name == "fold_law" and memory) else 0):
