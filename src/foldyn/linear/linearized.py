@@ -24,11 +24,13 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from foldyn.algebra.complex_symmetric import Gram
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, State
 from foldyn.cases.touching import check_contact
@@ -117,6 +119,11 @@ class Linearized:
     inner: Amplitudes = field(repr=False)
     branches: Branches | None = field(default=None, repr=False)
     responding: Branches | None = field(default=None, repr=False)
+
+    @cached_property
+    def gram(self) -> Gram:
+        """What modal damping adds to `damping`, G'G."""
+        return Gram(self.modal)
 
     def expanded(self, motions: NDArray) -> NDArray:
         """Displacements (3n, k) of all nodes in motions (nf, k) of the free dofs."""
