@@ -358,9 +358,12 @@ class _Search:
 def _width(finer: Finer, doubt: float) -> str:
     """What an interval of a coarse model is worth."""
     if not doubt:
-        return "The interval is wide enough for both"
+        where = (
+            "" if finer.proof is not finer.problem else f", if its error has order {finer.order}"
+        )
+        return f"The interval is wide enough for both{where}"
     return (
-        f"A still finer {finer.what} disagrees with that by {doubt:.2g}: the interval is wider by "
+        f"A finer {finer.what} disagrees with that by {doubt:.2g}: the interval is wider by "
         "as much on both sides, and may still miss the truth"
     )
 
