@@ -301,15 +301,16 @@ def _modal_rows(
     """Rows (r, m) of the modal damping: of the modes in the state (n, 3), or of those at rest."""
     damping = case.modal_damping
     if damping is not None and damping.state == "start":
-        return rows_of(damping, case, stiffness, mass, state).rows
-    if damping is None or not internal:
+        modal = rows_of(damping, case, stiffness, mass, state)
+    elif damping is None or not internal:
         modal = modal_rows(case)
-        modal.warn()
-        return np.pad(modal.rows, ((0, 0), (0, stiffness.shape[0] - modal.rows.shape[1])))
-    body, rest = case.elastic_body, np.zeros_like(state)
-    inner = amplitudes(case.structure, rest, body.size, internal)
-    stiffness = inner.stiffened(body.tangent(body.dofs(rest)))
-    return rows_of(damping, case, stiffness, inner.massed(mass_of(case)), rest).rows
+    else:
+        body, rest = case.elastic_body, np.zeros_like(state)
+        inner = amplitudes(case.structure, rest, body.size, internal)
+        stiffness = inner.stiffened(body.tangent(body.dofs(rest)))
+        modal = rows_of(damping, case, stiffness, inner.massed(mass_of(case)), rest)
+    modal.warn()
+    return np.pad(modal.rows, ((0, 0), (0, stiffness.shape[0] - modal.rows.shape[1])))
 
 
 def _reference(case: Case, exact: sparse.csr_array) -> sparse.csr_array:
