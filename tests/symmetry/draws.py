@@ -362,7 +362,7 @@ def _draw(rng, chosen: Combination) -> Draw:
     for name, (kinds, most) in {**lists, "masses": ([fd.PointMass], 1)}.items():
         for _ in range(rng.integers(name == "loads", most + 1)):
             case = _with_one_more(case, name, kinds, scene, taken)
-    if springs:
+    if extra in ("springs", "all"):
         case = _with_one_more(case, "supports", [fd.Spring], scene, taken)
     initial = None
     if analysis != STATIC and rng.random() < 0.5:
