@@ -1,4 +1,4 @@
-"""The table of rotational inertia errors in mass-rules.md, computed.
+"""The table of rotational inertia errors in mass.md, computed.
 
 `python docs/inertia_table.py` writes it anew; a test compares it with what the page shows.
 """
@@ -14,7 +14,7 @@ from foldyn.patterns import Pattern
 from foldyn.structures import MASS_RULES, Sheet, discretize
 from foldyn.structures.mass import rotational_inertia
 
-PAGE = Path(__file__).with_name("mass-rules.md")
+PAGE = Path(__file__).with_name("mass.md")
 SHEET = Sheet(youngs_modulus=1e6, poissons_ratio=0.3, thickness=0.01, density=1000.0)
 
 

@@ -1,6 +1,6 @@
 """A gripper of two bonded plastics: warmed, its four arms curl up, in both models.
 
-Run it to draw the picture of docs/temperature.md:
+Run it to draw the picture of docs/loads.md:
 python examples/bilayer.py docs/images
 """
 

@@ -1,6 +1,6 @@
 """Case study 2 of Herkal et al.: a Miura-ori unit cell, with every mass rule of the case file.
 
-Run it to draw the pictures of the README:  python examples/case_study_2.py docs/images
+Run it to draw them:  python examples/case_study_2.py FOLDER
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Crease patterns, folded from flat by their mountains and valleys.
 
-Run it to print the table and draw the picture of docs/folding.md:
+Run it to print how well each folds and draw the pictures of docs/folding.md:
 python examples/folding.py docs/images
 """
 

@@ -57,6 +57,7 @@ FEATURES: Mapping[str, Callable[[Setting], fd.Case]] = {
     "shells": lambda s: s.case(s.shell()),
     "springs": lambda s: s.case(supports=[fd.Spring(1.0, nodes=[7])]),
     "clamped edges": lambda s: s.case(s.sheet(clamped=[(0, 1)])),
+    "clamped edges of `n5b8e`": lambda s: s.case(s.sheet(scheme="n5b8e", clamped=[(0, 1)])),
     "ties, rigid panels": lambda s: s.case(s.sheet(rigid=[3]), [fd.Link([5, 7], "z")]),
     "dashpots": lambda s: s.case(supports=[fd.Dashpot(1e-3, nodes=[7])]),
     "damped creases": lambda s: s.case(damping=fd.CreaseDamping(1e-4)),

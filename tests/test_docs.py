@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import re
 import runpy
+import shutil
+import tomllib
+from contextlib import redirect_stdout
+from inspect import signature
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +18,8 @@ from pydantic import BaseModel
 import foldyn as fd
 from foldyn.analyses import ANALYSES, read_case
 from foldyn.cases import LOADS, SUPPORTS, BaseMotion, Force, Table
+from foldyn.cases.decode import law_from
+from foldyn.cli.main import main
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
@@ -22,13 +29,46 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", text, re.M | re.S)
 
 
-def test_quickstart_runs(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(scope="module")
+def tutorial(tmp_path_factory):
+    """The names that the tutorial makes, what it prints, and its folder."""
+    folder = tmp_path_factory.mktemp("tutorial")
+    shutil.copy(DOCS.parent / "examples" / "patterns" / "miura.fold", folder)
     names: dict = {}
-    for block in blocks("quickstart.md", "python"):
-        exec(compile(block, "quickstart.md", "exec"), names)
-    assert float(abs(names["trajectory"].displacement).max()) > 1e-3
-    assert (tmp_path / "miura.nc").exists()
+    printed = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(printed):
+        patch.chdir(folder)
+        for block in blocks("tutorial.md", "python"):
+            exec(compile(block, "tutorial.md", "exec"), names)
+    return names, printed.getvalue(), folder
+
+
+def test_the_tutorial_prints_what_it_shows(tutorial):
+    _, printed, folder = tutorial
+    page = (DOCS / "tutorial.md").read_text("utf-8")
+    for line in printed.splitlines():
+        assert f"```\n{line}\n```" in page
+    assert all((folder / f"{name}.pdf").stat().st_size > 1000 for name in ("modes", "tip"))
+
+
+def test_the_case_file_of_the_tutorial_is_its_python_case(tutorial):
+    names, _, folder = tutorial
+    (block,) = blocks("tutorial.md", "toml")
+    (folder / "sheet.toml").write_text(block, "utf-8")
+    assert main(["run", str(folder / "sheet.toml"), "--out", str(folder / "out")]) == 0
+    found = fd.load(folder / "out" / "result.nc")
+    np.testing.assert_array_equal(found.time, names["motion"].time)
+    size = float(abs(names["motion"].displacement).max())
+    np.testing.assert_allclose(
+        found.displacement, names["motion"].displacement, rtol=0, atol=1e-12 * size
+    )
+
+
+@pytest.mark.thorough
+def test_the_error_that_the_tutorial_states(tutorial):
+    worst = float(abs(fd.fidelity(tutorial[0]["case"], count=4).result.error[:, 0]).max())
+    page = (DOCS / "tutorial.md").read_text("utf-8")
+    assert f"within {100 * worst:.1f} % in all four modes" in page
 
 
 def test_the_quantities_of_the_results_page_can_be_sampled():
@@ -63,40 +103,51 @@ def test_the_supports_and_loads_of_the_case_file_page_can_be_read(tmp_path):
     assert len(case.actuated_creases) == len(case.structure.folds)
 
 
-def test_the_gallery_of_patterns_shows_every_generator_by_calls_that_run():
-    page = (DOCS / "patterns-gallery.md").read_text("utf-8")
-    calls = "".join(blocks("patterns-gallery.md", "python"))
+def test_the_patterns_page_shows_every_generator_by_calls_that_run():
+    page = (DOCS / "patterns.md").read_text("utf-8")
+    calls = "".join(blocks("patterns.md", "python"))
     for kind in fd.patterns.GENERATORS:
         assert f"fd.patterns.{kind}(" in calls
         picture = f"images/pattern-{kind.replace('_', '-')}.png"
         assert f"({picture})" in page
         assert (DOCS / picture).stat().st_size < 150_000
-    names = {"fd": fd}
-    exec(calls, names)
+    names: dict = {}
+    exec(compile(calls, "patterns.md", "exec"), names)
     assert len(names["links"]) == 14
-    for family in re.findall(r'^`"(\w+)"`', page, re.M):
-        assert any(family in make().families for make in fd.patterns.GENERATORS.values())
+    assert names["structure"].options.crease_stiffness == {"zigzag": 0.1, "straight": 0.3}
 
 
-def test_the_patterns_page_shows_families_that_can_be_used():
-    block, _ = blocks("patterns.md", "python")
-    pattern = fd.patterns.miura((2, 2), dihedral=100)
-    corners, panels = [(x, y) for y in (0, 1) for x in range(3)], [(0, 1, 4, 3), (1, 2, 5, 4)]
-    strip = fd.Pattern(corners, panels, families={"straight": [(1, 4)]})
-    sheet = fd.Sheet(1e9, 0.3, 1e-3, 700.0)
-    *lines, thick = block.strip().splitlines()
-    for line in lines:
-        exec(line, {"fd": fd, "pattern": pattern, "sheet": sheet})
-    exec(thick, {"fd": fd, "pattern": strip})
+def test_the_patterns_page_names_the_arguments_and_families_of_every_generator():
+    page = (DOCS / "patterns.md").read_text("utf-8")
+    for kind, make in fd.patterns.GENERATORS.items():
+        ((arguments, families),) = re.findall(rf"^\| `{kind}` \| (.*) \| (.*) \|$", page, re.M)
+        assert re.findall(r"`(\w+)`", arguments) == list(signature(make).parameters)
+        pattern = make(storeys=2) if kind == "kresling" else make()
+        assert set(re.findall(r'"(\w+)"', families)) <= set(pattern.families)
 
 
 def test_the_loads_page_shows_a_case_that_can_be_made():
     names: dict = {}
-    (block,) = blocks("loads.md", "python")
+    block, *_ = blocks("loads.md", "python")
     exec(compile(block, "loads.md", "exec"), names)
     assert len(names["case"].following_terms) == 2
     listed = (DOCS / "loads.md").read_text("utf-8")
     assert all(f"`fd.{kind.__name__}(" in listed for kind in LOADS)
+
+
+def test_the_loads_page_shows_creases_that_are_actuated():
+    names: dict = {}
+    block, actuated, *_ = blocks("loads.md", "python")
+    exec(compile(block + actuated, "loads.md", "exec"), names)
+    assert names["path"].attrs["status"] == "complete"
+
+
+def test_the_laws_page_shows_one_model_in_python_and_in_a_case_file():
+    names: dict = {}
+    (block,), (toml,) = blocks("laws.md", "python"), blocks("laws.md", "toml")
+    exec(compile(block, "laws.md", "exec"), names)
+    law = law_from(tomllib.loads(toml)["model"]["fold_law"], fd.materials.HINGE_LAWS)
+    assert law == names["law"]
 
 
 def test_the_path_of_the_case_file_page_can_be_followed(tmp_path):
@@ -124,10 +175,10 @@ def test_the_response_of_the_case_file_page_can_be_computed(tmp_path):
     assert case_file.output.quantity == "mobility"
 
 
-def test_compress_release_vibrate_of_the_quasi_static_page():
-    (block,) = blocks("quasi-static.md", "python")
+def test_compress_release_vibrate_of_the_statics_page():
+    block = blocks("statics.md", "python")[-1]
     names: dict = {}
-    exec(compile(block, "quasi-static.md", "exec"), names)
+    exec(compile(block, "statics.md", "exec"), names)
     path, motion = names["path"], names["motion"]
     np.testing.assert_array_equal(motion.displacement[0], path.displacement[5])
     top = motion.displacement.sel(node=3, axis="x").values
@@ -143,17 +194,21 @@ def test_the_folding_page_folds_a_pattern_and_computes_its_modes():
     assert (names["modes"].frequency > 0.0).all()
 
 
-def test_the_tables_of_the_quasi_static_page_are_what_the_example_computes():
+def test_the_numbers_of_the_statics_page_are_what_the_example_computes():
     script = runpy.run_path(str(DOCS.parent / "examples" / "quasi_static.py"))
-    page = (DOCS / "quasi-static.md").read_text("utf-8")
+    page = (DOCS / "statics.md").read_text("utf-8")
     _, results = script["compute"]()
-    for table in script["tables"](results).split("\n\n"):
-        assert table in page
+    script["check"](results)
+    assert script["deflection_table"](results) in page
     assert f"{script['frequency'](results['motion']):.1f} Hz" in page
+    folds = 100 * results["shares"][2, "superlinear"][[1, -1], 2]
+    bends = 100 * results["shares"][3, "superlinear"][[1, -1], 1]
+    assert f"folds hold {folds[0]:.0f} % of the energy at a ratio of 1 and {folds[1]:.0f} %" in page
+    assert f"bends hold {bends[0]:.0f} % and {bends[1]:.0f} %" in page
 
 
-def test_the_histories_page_shows_a_table_that_can_be_read(tmp_path):
-    (text,), (toml,) = blocks("histories.md", "text"), blocks("histories.md", "toml")
+def test_the_loads_page_shows_a_table_that_can_be_read(tmp_path):
+    (text,), (_, toml) = blocks("loads.md", "text"), blocks("loads.md", "toml")
     (tmp_path / "pulse.csv").write_text(text, "utf-8")
     page, *_ = blocks("case-file.md", "toml")
     old = 'history = { kind = "pulse", duration = 1.0 }\n'
@@ -190,7 +245,7 @@ def test_sections_are_found():
 
 def test_inertia_table_is_what_the_code_gives():
     script = runpy.run_path(str(DOCS / "inertia_table.py"))
-    page = (DOCS / "mass-rules.md").read_text("utf-8")
+    page = (DOCS / "mass.md").read_text("utf-8")
     assert script["with_table"](page) == page
     assert script["table"]() in page
 
@@ -206,7 +261,7 @@ def test_inertia_table_knows_the_rhombus():
 
 def test_what_a_swinging_panel_and_a_twisting_one_make_of_a_rule():
     """A square panel on a hinge, by `modes`; the twist by hand: integral of (x y)^2 is 1/9."""
-    page = (DOCS / "mass-rules.md").read_text("utf-8")
+    page = (DOCS / "mass.md").read_text("utf-8")
     square = fd.Pattern(
         [[0, -1, 0], [0, 0, 0], [-1, 0, 0], [-1, -1, 0], [1, 0, 0], [1, -1, 0]],
         [[0, 1, 2, 3], [0, 5, 4, 1]],

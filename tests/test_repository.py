@@ -80,12 +80,12 @@ def test_shipped_cases_are_in_the_package():
         ("patterns.md", "patterns.GENERATORS"),
         ("laws.md", "materials.BAR_LAWS"),
         ("laws.md", "materials.HINGE_LAWS"),
-        ("mass-rules.md", "structures.MASS_RULES"),
+        ("mass.md", "structures.MASS_RULES"),
         ("integrators.md", "dynamics.METHODS"),
         ("statics.md", "statics.METHODS"),
         ("statics.md", "statics.SOLVERS"),
         ("pattern-files.md", "formats.FORMATS"),
-        ("histories.md", "cases.HISTORIES"),
+        ("loads.md", "cases.HISTORIES"),
     ],
 )
 def test_every_registry_row_has_a_docs_row(page, registry):

@@ -13,8 +13,10 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from multiprocessing import parent_process
 
+import numpy as np
+
 PER_KERNEL = 0.14
-"""Seconds at least: 76 kernels of modes took 10 s of a processor, 109 of a motion with RK4 17 s."""
+"""Seconds of a processor at least: 76 of modes took 10 s, 109 of a motion with RK4 17 s."""
 SHORTEST = 3.0
 """Seconds below which nothing is told."""
 
@@ -36,17 +38,20 @@ class Notice:
         Is given each message.
     clock : callable
         Time (s).
+    worked : callable
+        Time (s) that the processor has worked for this process: less where others have it, too.
     """
 
     def __init__(
         self,
         tell: Callable[[str], None] = on_terminal,
         clock: Callable[[], float] = time.perf_counter,
+        worked: Callable[[], float] = time.process_time,
     ) -> None:
-        self.tell, self._clock = tell, clock
+        self.tell, self._now = tell, lambda: np.array([clock(), worked()])
         self._known: set[object] = set()
-        self._told, self._count, self._spent = False, 0, 0.0
-        self._since = self._latest = 0.0
+        self._told, self._count, self._spent = False, 0, np.zeros(2)
+        self._since = self._latest = np.zeros(2)
 
     def begin(self, kernel: object, missing: Callable[[], Iterable[object]]) -> None:
         """Note that a kernel is compiled now.
@@ -60,9 +65,11 @@ class Notice:
         new = {kernel, *missing()} - self._known
         self._known |= new
         self._spent += self._latest - self._since
-        self._since = self._latest = self._clock()
+        self._since = self._latest = self._now()
         done = self._count - 1
-        seconds = len(new) * max(PER_KERNEL, self._spent / done if done else 0.0)
+        whole, own = self._spent
+        each = max(PER_KERNEL, own / done if done else 0.0)
+        seconds = len(new) * each * (max(1.0, whole / own) if own > 0.0 else 1.0)
         if seconds < SHORTEST:
             return
         if self._told:
@@ -76,7 +83,7 @@ class Notice:
 
     def end(self) -> None:
         """Note that a kernel is compiled."""
-        self._latest = self._clock()
+        self._latest = self._now()
 
     @contextmanager
     def telling(self, tell: Callable[[str], None]) -> Iterator[None]:

@@ -1,4 +1,4 @@
-"""Small structures of both models for tests of springs, clamps and point masses."""
+"""Small structures of all models for tests of springs, clamps and point masses."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ FOLD = fd.patterns.simple_fold(a=1.0, b=1.3, dihedral=100)
 MODELS = {
     "bars and hinges": lambda pattern, sheet, **options: fd.discretize(
         pattern, sheet, **{"bend_law": "linear", "fold_law": "linear", **options}
+    ),
+    "n5b8e": lambda pattern, sheet, **options: fd.discretize(
+        pattern, sheet, **{"preset": "n5b8e", "fold_law": "linear", **options}
     ),
     "shell": lambda pattern, sheet, **options: fd.shell(
         pattern, sheet, **{"divisions": 1, "fold_law": "linear", **options}

@@ -11,7 +11,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
-@pytest.mark.parametrize("page", ["supports.md", "masses.md"])
+@pytest.mark.parametrize("page", ["supports.md", "mass.md"])
 def test_the_code_of_the_page_runs(page, capsys):
     text = (DOCS / page).read_text("utf-8")
     names: dict = {}

@@ -177,10 +177,10 @@ def test_wrong_temperatures_are_named(arguments, message) -> None:
 
 
 def test_the_code_of_the_page_runs() -> None:
-    page = Path(__file__).resolve().parents[2] / "docs" / "temperature.md"
-    (block,) = re.findall(r"^```python\n(.*?)^```$", page.read_text("utf-8"), re.M | re.S)
+    page = Path(__file__).resolve().parents[2] / "docs" / "loads.md"
+    first, _, block = re.findall(r"^```python\n(.*?)^```$", page.read_text("utf-8"), re.M | re.S)
     names: dict = {}
-    exec(compile(block, "temperature.md", "exec"), names)
+    exec(compile(first + block, "loads.md", "exec"), names)
     end = fd.trace(names["case"], "newton", load_factors=[0.0, 1.0])["displacement"][-1].values
     assert np.abs(end).max() > 1e-4
     table = re.search(r"^```toml\n(.*?)^```$", page.read_text("utf-8"), re.M | re.S)

@@ -341,7 +341,7 @@ def test_a_path_goes_on_from_a_stored_one(workplace, edited, slow) -> None:
     assert (done.status, done.err) == (0, "")
     path = fd.load("case-results/result.nc")
     height = 0.06 + path.displacement.sel(node=6, axis="z").values
-    # the height at which all edges have their lengths again: docs/quasi-static.md
+    # the height at which all edges have their lengths again: docs/statics.md
     assert height[0] == pytest.approx(0.02879, abs=1e-4)
     assert path.negative_eigenvalues.values.tolist() == [0]
 

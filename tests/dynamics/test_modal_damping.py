@@ -105,6 +105,17 @@ def test_ratios_of_rayleigh(model):
     assert float(both[0].dissipated[-1]) == pytest.approx(float(both[1].dissipated[-1]), rel=2e-3)
 
 
+@pytest.mark.parametrize("damping", [fd.ModalDamping([0.1, 0.04]), fd.ModalDamping(0.07, 1)])
+def test_modes_of_one_frequency_share_their_ratios(damping):
+    """Which of the sums of two bending modes of a tower is the first one, rounding decides."""
+    tower = fd.patterns.kresling(sides=5, height=1.0, twist=30.0)
+    s = fd.discretize(tower, fd.Sheet(1e6, 0.3, 0.03, 1000.0), fold_law="linear")
+    with pytest.warns(fd.errors.FoldynWarning, match="2 modes have frequencies in common"):
+        ratio = fd.modes(fd.Case(s, damping=damping), 9).damping_ratio.values
+    mean = 0.07 if isinstance(damping.ratios, tuple) else 0.035
+    np.testing.assert_allclose(ratio[6:], [mean, mean, 0.0], atol=1e-6)
+
+
 def test_all_modes_by_one_number():
     case = sheet("bars", damping=fd.ModalDamping(0.03))
     ratios = fd.modes(case, 30).damping_ratio.values

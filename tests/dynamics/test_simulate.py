@@ -285,7 +285,7 @@ def test_settles_in_the_static_equilibrium(bend_law, expected):
     """Case study 1 under a slow load with strong damping comes to rest where forces balance.
 
     The displacements of the loaded edge are those of an independent static solution
-    (docs/theory.md: 0.0312 m with superlinear bends, 0.0248 m with linear ones).
+    (0.0312 m with superlinear bends, 0.0248 m with linear ones).
     """
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
     s = fd.discretize(pattern, SHEET, mass="circumcenter", bend_law=bend_law, preset="herkal")

@@ -57,6 +57,52 @@ def test_an_interval_reaches_the_truth_though_the_step_is_coarse(swung, seen) ->
     assert found.summary()["parameters"][0]["discretization"] == alpha.discretization
 
 
+EGGBOX = """
+[pattern]
+kind = "eggbox"
+cells = [2, 1]
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.3
+thickness = 0.02
+density = 3.0
+[model]
+crease_stiffness = 0.2
+mass = "panel"
+[[supports]]
+nodes = "xmin"
+[damping]
+alpha = 0.25
+[[loads]]
+nodes = "xmax"
+force = [0, 0, 0.0005]
+[analysis]
+kind = "dynamics"
+method = "newmark"
+duration = 20.64
+[output]
+every = 0.129
+"""
+
+
+def test_steps_too_coarse_for_their_order_widen_the_interval_further(tmp_path) -> None:
+    """27 steps a period: half of them tell too little, and the interval ended before the truth."""
+    case_file = fd.read_case(fit_cases.write(tmp_path, EGGBOX))
+    node = int(case_file.case().loaded_nodes[-1])
+    true = case_file.run(dt=0.00215).displacement.sel(node=node, axis="z")
+    noise = 1e-3 * float(abs(true).max())
+    scatter = noise * np.random.default_rng(1).standard_normal(len(true))
+    values = (true.values + scatter)[:, None]
+    seen = TimeHistory(nodes=[node], axis="z", time=true.time.values, values=values, sigma=noise)
+    stiffness = Parameter("model.crease_stiffness", 0.19, 0.05, 0.6)
+    with pytest.warns(FoldynWarning, match=r"finer time step disagrees with that by .* miss"):
+        found = fd.fit(case_file.path, [seen], [stiffness, Parameter("damping.alpha", 0.2)])
+    for one, truth in zip(found.estimates, (0.2, 0.25), strict=True):
+        assert one.lower < truth < one.upper
+    one = found.estimates[0]
+    assert one.value + one.discretization - 2.0 * one.standard_error > 0.2  # without the doubt
+
+
 def test_fine_steps_leave_the_interval_to_the_noise(swung, seen) -> None:
     fine = refined(swung, every="every = 0.004")
     with warnings.catch_warnings():
@@ -98,7 +144,9 @@ def test_an_interval_reaches_the_truth_though_the_mesh_is_coarse(tmp_path) -> No
         for noise in (-0.006, 0.003, 0.004, -0.002)
     ]
     modulus = Parameter("sheet.youngs_modulus", 1.2e6, 1e5, 1e7)
-    with pytest.warns(FoldynWarning, match=r"the mesh is too coarse.*model\.divisions = 8"):
+    with pytest.warns(
+        FoldynWarning, match=r"mesh is too coarse.*A finer mesh disagrees.*divisions = 8"
+    ):
         found = fd.fit(coarse, seen, [modulus])
     (one,) = found.estimates
     noise = one.upper - one.value

@@ -14,9 +14,9 @@ from foldyn.notice import NOTICE, PER_KERNEL, Notice, on_terminal
 class Compiler:
     """Kernels that each take some seconds to compile, on a clock of their own."""
 
-    def __init__(self, seconds):
+    def __init__(self, seconds, share=1.0):
         self.told, self.now, self.seconds = [], 0.0, seconds
-        self.notice = Notice(self.told.append, lambda: self.now)
+        self.notice = Notice(self.told.append, lambda: self.now, lambda: share * self.now)
 
     def compile(self, kernels):
         """Compile the last of some kernels, which needs all others of them."""
@@ -41,6 +41,14 @@ def test_each_part_of_the_work_is_told_once_with_what_is_missing():
         "compiling 10 more kernels, about 20 s",  # at the pace of those before
     ]
     assert pytest.approx(21.0) == 150 * PER_KERNEL
+
+
+def test_on_a_busy_machine_kernels_take_longer():
+    """The first ones may be small; others have the processor for three quarters of the time."""
+    slow = Compiler(0.1, share=0.25)
+    slow.compile(range(30))
+    slow.compile(range(30, 80))
+    assert [text.partition("about")[2].partition(";")[0] for text in slow.told] == [" 5 s", " 30 s"]
 
 
 def test_short_waits_are_not_worth_a_word():

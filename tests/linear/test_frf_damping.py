@@ -12,6 +12,7 @@ from scipy.linalg import eigh
 
 import foldyn as fd
 from foldyn.algebra import complex_symmetric, superlu
+from foldyn.algebra.complex_symmetric import Gram
 from foldyn.linear.linearized import linearize
 from foldyn.signals import half_power
 
@@ -85,20 +86,23 @@ def test_at_a_resonance_that_only_modal_damping_limits():
             assert complex(found.receptance[k, 1, 0]) == pytest.approx(own + other, rel=1e-9)
 
 
+@pytest.mark.parametrize("full", [False, True])
 @pytest.mark.parametrize("size", [1, 2, 30])
-def test_a_matrix_that_only_modal_damping_makes_regular(size):
+def test_a_matrix_that_only_modal_damping_makes_regular(size, full, monkeypatch):
     """A = sum of (k - 1) v_k v_k', singular along v_1, which alone is damped."""
+    monkeypatch.setattr(Gram, "fills", lambda self, matrix: full)
     axes = np.linalg.qr(np.random.default_rng(1).standard_normal((size, size)))[0]
     axes = axes if size > 2 else np.eye(size)  # no rounding: a pivot is exactly zero
     values = np.arange(size, dtype=float)
     matrix = sparse.csc_array((axes * values) @ axes.T).astype(complex)
     load = axes @ np.ones(size)
-    found = complex_symmetric.solve(matrix, load, axes[:, :1].T, 0.1j)
+    found = complex_symmetric.solve(matrix, load, Gram(axes[:, :1].T), 0.1j)
     exact = axes @ (1.0 / np.where(values > 0.0, values, 0.1j))
     assert largest_error(found, exact) < 1e-12
     assert np.isnan(complex_symmetric.solve(matrix, load)).all()
     if size > 1:  # what is damped is another direction
-        assert np.isnan(complex_symmetric.solve(matrix, load, axes[:, 1:2].T, 0.1j)).all()
+        other = complex_symmetric.solve(matrix, load, Gram(axes[:, 1:2].T), 0.1j)
+        assert np.isnan(other).all()
 
 
 def test_half_power_of_the_peaks():
@@ -187,11 +191,13 @@ def test_stepped_sine_refuses_modes_of_the_start():
 
 
 @pytest.mark.parametrize("method", ["direct", "harmonic"])
-def test_all_modes_damped_leave_the_matrix_sparse(method, monkeypatch):
-    """Its factors are those of the undamped matrix, and the response is that of the full one."""
-    case = replace(miura_case(), damping=fd.ModalDamping(0.02))
+@pytest.mark.parametrize("count", [3, None])
+def test_modal_damping_fills_the_matrix_where_that_is_cheaper(count, method, monkeypatch):
+    """Few damped modes leave the factorized matrix sparse, all of them are a full one."""
+    pattern = fd.patterns.miura(cells=(3, 3))
+    s = fd.discretize(pattern, fd.Sheet(1e6, 0.3, 0.05, 100.0))
+    case = fd.Case(s, [fd.Fix([0, 1, 2])], damping=fd.ModalDamping(0.02, count))
     system = linearize(case)
-    assert len(system.modal) == len(system.free)
     there = abs(system.stiffness) + abs(system.mass)
     sizes = []
 
@@ -203,10 +209,23 @@ def test_all_modes_damped_leave_the_matrix_sparse(method, monkeypatch):
     f = fd.modes(case, 3).frequency.values
     drive = fd.Force([case.free_dofs[-1] // 3], (0, 0, 1))
     found = fd.frf(case, drive, f, method=method)
-    assert set(sizes) == {(there.shape, there.nnz)}
+    assert set(sizes) == ({(there.shape, there.nnz)} if count else set())
     load = system.projected(np.eye(case.structure.nodes.size)[case.free_dofs[-1]])
     for k, omega in enumerate(2 * np.pi * f):
         matrix = system.stiffness - omega**2 * system.mass
         matrix = matrix.toarray() + 1j * omega * (system.modal.T @ system.modal)
         exact = system.expanded(np.linalg.solve(matrix, load)[:, None])[:, 0]
         assert largest_error(found.receptance.values[k].ravel(), exact) < 1e-9
+
+
+@pytest.mark.parametrize("share", [0.05, 0.3, 1.0])
+def test_both_forms_of_modal_damping_give_one_response(share, monkeypatch):
+    plain = miura_case(beta=1e-4)
+    count = max(1, int(share * len(plain.free_dofs))) if share < 1.0 else None
+    case = replace(plain, damping=[plain.rayleigh, fd.ModalDamping(0.02, count)])
+    f = np.linspace(0.5, 3.0, 7) * float(fd.modes(plain, 1).frequency[0])
+    found = []
+    for full in (False, True):
+        monkeypatch.setattr(Gram, "fills", lambda self, matrix, full=full: full)
+        found.append(fd.frf(case, fd.Force([7], (0, 0, 1)), f).receptance.values)
+    assert largest_error(found[1], found[0]) < 1e-9

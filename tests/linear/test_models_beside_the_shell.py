@@ -286,13 +286,14 @@ def test_models_of_ones_own(quick):
 
 
 def test_what_n5b8e_does_not_take_leaves_it_out():
-    """By default; who names it is told what stands in its way, in the words of discretize."""
-    clamped = held(**STANDARD, clamped=[(0, 1)])
-    assert list(comparison(clamped, 1, (2, 4)).compared) == ["own", "plate"]
-    with pytest.raises(InputError, match=r"^models: n5b8e: clamped: .*edges without clamps"):
-        comparison(clamped, 1, (2, 4), ["plate", "n5b8e"])
+    """By default, where no model is named."""
     soft = held(**STANDARD, fold_law="superlinear")  # no slope at rest
     assert list(comparison(soft, 1, (2, 4)).compared) == ["own", "plate"]
+
+
+def test_clamped_edges_go_with_all_models():
+    found = comparison(held(**STANDARD, clamped=[(0, 1)]), 1, (2, 4))
+    assert list(found.compared) == ["own", "plate", "n5b8e"]
 
 
 def test_a_rest_state_out_of_balance_is_told():

@@ -29,15 +29,10 @@ def test_shell_and_reduced_model_side_by_side(names):
     assert np.abs(reduced / shell - 1.0).max() < 0.5
 
 
-def test_the_clamped_plate_of_the_page(names):
-    assert names["coefficient"] == pytest.approx(0.00126532 * 1.083, rel=3e-3)
-    assert "8 % soft at 16 divisions, 2 % at 32" in PAGE
-
-
 def test_the_table_of_frequencies(names):
     rows = re.findall(r"^\| (\d+) \| ([\d., ]+) \| ([\d., ]+) \|$", PAGE, re.M)
-    assert [int(row[0]) for row in rows] == [8, 16, 30]
-    for divisions, *columns in rows[:2]:
+    assert [int(row[0]) for row in rows] == [8, 16]
+    for divisions, *columns in rows:
         for mass, shown in zip(("lumped", "consistent"), columns, strict=True):
             s = fd.shell(names["pattern"], names["sheet"], divisions=int(divisions), mass=mass)
             found = fd.modes(fd.Case(s, names["held"]), count=3).frequency.values

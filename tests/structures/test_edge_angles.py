@@ -233,7 +233,6 @@ def test_a_straight_edge_is_stiffer():
     [
         ({"calibration": "standard"}, r'calibration = "standard".*needs "plate"'),
         ({"bend_law": "plate_superlinear"}, r'bend_law = .*plate_superlinear.*needs "linear"'),
-        ({"clamped": [(0, 1)]}, r"clamped.*n5b8"),
         ({"straight": [(1, 4)]}, r"straight: \(1, 4\) is not a boundary edge"),
         (
             {"straight": [(0, 1)], "scheme": "n5b8", "membrane": "bars"},

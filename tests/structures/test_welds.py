@@ -175,11 +175,14 @@ def test_hinges_instead_are_told_of():
     assert triangles.bend_stiffness[-1] == pytest.approx(g * np.hypot(0.2, 0.05) / (2 * height / 3))
 
 
-def test_clamped_edges_take_hinges():
-    pattern = fd.welded(cut_across([0.5]))
-    with pytest.warns(FoldynWarning, match="its welds"):
-        made = fd.discretize(pattern, STEEL, clamped=[(0, 3)])
-    assert made.options.scheme == "n5b8"
+def test_a_weld_does_not_show_beside_a_clamped_edge():
+    """The first frequencies of a clamped panel in two halves: those of the whole one."""
+    halves = fd.discretize(fd.welded(cut_across([0.5])), STEEL, clamped="xmin")
+    assert halves.options.scheme == "n5b8e"
+    whole = fd.discretize(cut_across([]), STEEL, preset="n5b8e", clamped="xmin")
+    one = fd.modes(fd.Case(halves, [fd.Fix("xmin")]), 2).frequency.values
+    other = fd.modes(fd.Case(whole, [fd.Fix("xmin")]), 2, internal=3).frequency.values
+    np.testing.assert_allclose(one, other, rtol=0.03)
 
 
 def test_creases_know_nothing_of_welds():

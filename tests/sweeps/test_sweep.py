@@ -155,6 +155,45 @@ def test_a_measure_that_fails_leaves_the_others(case, tmp_path):
         assert "fails_sometimes: ZeroDivisionError: too thick" in why[1]
 
 
+def test_a_measure_cannot_change_the_result_for_others(case):
+    """`a -= a[0]` in a function of one's own changed what other measures saw."""
+    case.write_text(FRF)
+
+    def relative(result, case):
+        response = result["receptance"].values
+        response -= response[0]
+        return abs(response).max()
+
+    def taking(result, case):
+        del result["receptance"]
+        return 1.0
+
+    vary = {"sheet.thickness": [0.01]}
+    own = {
+        "relative": relative,
+        "taking": taking,
+        "there": lambda result, case: result.sizes["node"],
+    }
+    found = fd.sweep(case, vary, own, processes=1)
+    assert "relative: ValueError" in str(found["failure"].values[0])
+    assert found["taking"] == 1.0 and found["there"] > 8
+    left = {"taking": taking, "height": lambda result, case: float(abs(result.receptance).max())}
+    assert np.isfinite(fd.sweep(case, vary, left, processes=1)["height"]).all()
+
+
+def test_a_measure_gives_real_numbers(case):
+    """The real part of a response was taken, and nothing for a number, silently."""
+    case.write_text(FRF)
+    own = {
+        "complex": lambda result, case: result["receptance"].values[:, 8, 2],
+        "nothing": lambda result, case: None,
+    }
+    found = fd.sweep(case, {"sheet.thickness": [0.01]}, own, processes=1)
+    failure = str(found["failure"].values[0])
+    assert "complex: gave complex numbers; take their abs, real or imag" in failure
+    assert "nothing: gave nothing; let it return a number or an array" in failure
+
+
 def test_a_lack_of_memory_is_not_kept_as_a_failure(case, tmp_path):
     def greedy(result, case):
         raise MemoryError

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +30,7 @@ SHELL = "shell"
 MODELS = (*PRESETS, SHELL)
 STATIC = "trace"
 ANALYSES = (*METHODS, STATIC)
-EXTRAS = ("springs", "memory", "contact")
+EXTRAS = ("springs", "memory", "contact", "all")  # the last: the others together
 TRIES = 12  # of a part, until the library takes it
 SMALL = 0.02  # of the pattern's size: displacements
 ALWAYS = {"BaseMotion.value"}  # drawn: the default, a meter, is as large as the sheet
@@ -236,12 +236,18 @@ def structure_of(model: str, pattern: fd.Pattern, rng, extra: str) -> Any:
     """A structure of a pattern, with some options other than those of its model."""
     thick = rng.uniform(0.02, 0.05)
     sheet = fd.Sheet(1e6, rng.uniform(0.1, 0.4), thick, 1000.0, rng.uniform(0.5, 3.0))
+    if rng.random() < 0.3:
+        panel = int(rng.integers(len(pattern.faces)))
+        other = fd.PanelSheet(
+            [panel], 1e6 * rng.uniform(0.5, 3.0), thickness=rng.uniform(0.02, 0.05)
+        )
+        sheet = replace(sheet, panels=[other])
     build = fd.shell if model == SHELL else fd.discretize
     make: dict[str, Any] = {"divisions": 2} if model == SHELL else {"preset": model}
     known = inspect.signature(build).parameters
     s = build(pattern, sheet, **make)
     scene = scene_of(s, rng, True)
-    memory = extra == "memory"
+    memory = extra in ("memory", "all")
     laws = [law for law in HINGE_LAWS.values() if issubclass(law, MemoryLaw) == memory]
     count = len(pattern.creases)
     options: dict[str, Callable[[], Any]] = {
@@ -260,7 +266,8 @@ def structure_of(model: str, pattern: fd.Pattern, rng, extra: str) -> Any:
     }
     if model == "n5b8e":  # which a scheme stands for
         del options["scheme"]
-    if extra != "springs":  # of which clamps are some
+    springs = extra in ("springs", "all")
+    if not springs and model != "n5b8e":  # whose plates are clamped; other models get springs
         del options["clamped"]
     for name in (name for name in options if name in known):
         for _ in range(TRIES if rng.random() < 0.4 or (name == "fold_law" and memory) else 0):
@@ -347,7 +354,7 @@ def _draw(rng, chosen: Combination) -> Draw:
 
     held = list(s.pattern.faces[rng.integers(len(s.pattern.faces))])
     case = fd.Case(s, [fd.Fix(held)] if analysis == STATIC or rng.random() < 0.7 else [])
-    if extra == "contact":
+    if extra in ("contact", "all"):
         case = case.altered(contact=contact_of(scene))
     taken(case)
     supports = [kind for kind in SUPPORTS if kind is not fd.Spring]
@@ -355,7 +362,7 @@ def _draw(rng, chosen: Combination) -> Draw:
     for name, (kinds, most) in {**lists, "masses": ([fd.PointMass], 1)}.items():
         for _ in range(rng.integers(name == "loads", most + 1)):
             case = _with_one_more(case, name, kinds, scene, taken)
-    if extra == "springs":
+    if extra in ("springs", "all"):
         case = _with_one_more(case, "supports", [fd.Spring], scene, taken)
     initial = None
     if analysis != STATIC and rng.random() < 0.5:
@@ -388,12 +395,17 @@ def _with_one_more(case: fd.Case, name: str, kinds: Any, scene: Scene, taken: An
 
 
 def contact_of(scene: Scene) -> fd.Contact:
-    """Panels that touch, and planes that the sheet stands beside."""
-    planes = []
+    """Panels that touch, and planes that the sheet stands beside, some of which move."""
+    planes, thickness = [], scene.structure.sheet.thickness
     for _ in range(scene.rng.integers(3)):
         normal = scene.rng.normal(size=3)
         normal /= np.linalg.norm(normal)
-        lowest = (scene.structure.nodes @ normal).min() - scene.structure.sheet.thickness
+        lowest = (scene.structure.nodes @ normal).min() - thickness
         friction = None if scene.rng.random() < 0.5 else 0.3
-        planes.append(fd.Plane(tuple(lowest * normal), tuple(normal), friction))
-    return fd.Contact(friction=0.2 * scene.rng.integers(2), planes=planes)
+        plane = fd.Plane(tuple(lowest * normal), tuple(normal), friction)
+        if scene.rng.random() < 0.5:
+            moved = scene.vector(0.2 * thickness)
+            plane = replace(plane, motion=moved, history=drawn(scene, HISTORIES.values()))
+        planes.append(plane)
+    panels = not planes or bool(scene.rng.random() < 0.8)
+    return fd.Contact(friction=0.2 * scene.rng.integers(2), panels=panels, planes=planes)

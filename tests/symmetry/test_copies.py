@@ -101,7 +101,7 @@ def reactions(result) -> np.ndarray:
     return out
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(len(QUICK)))
 def test_copies_move_alike(seed):
     check(seed, draw(seed, QUICK))
 

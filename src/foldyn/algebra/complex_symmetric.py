@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg import lapack
 
 from foldyn.algebra.superlu import SingularTangentError, Solution, factorize
 from foldyn.algebra.woodbury import Updated
@@ -13,11 +16,32 @@ LOST = 1e-3  # of the solution: rounding above which it is a resonance without d
 PIVOT = 0.01  # of the largest entry in a column: what a pivot on the diagonal must have
 BESIDE = 64.0  # times rounding: by how much the factors of A are those of a matrix beside it
 REFINED, ROUNDS = 1e-12, 4  # of the solution: changes below which it is not refined further
+SPARSE = 40.0  # products of full matrices in the time of a solution per entry of a sparse matrix
 _EPS = float(np.finfo(np.float64).eps)
 
 
+class Gram:
+    """A matrix G'G of rows G (r, n), which is added to many others."""
+
+    def __init__(self, rows: NDArray) -> None:
+        self.rows = rows
+
+    @cached_property
+    def matrix(self) -> NDArray[np.float64]:
+        """G'G (n, n)."""
+        return self.rows.T @ self.rows
+
+    def fills(self, matrix: sparse.csc_array) -> bool:
+        """Whether factors of the full sum with a sparse matrix take less time than Woodbury's.
+
+        These take a sparse solution per row, a product of r r n and factors of an r by r matrix.
+        """
+        r, n = self.rows.shape
+        return SPARSE * r * matrix.nnz + r**2 * n + r**3 / 3.0 > n**3 / 4.0
+
+
 def solve(
-    matrix: sparse.csc_array, load: NDArray, rows: NDArray | None = None, weight: complex = 0.0
+    matrix: sparse.csc_array, load: NDArray, gram: Gram | None = None, weight: complex = 0.0
 ) -> NDArray[np.complex128]:
     """Solution of (A + w G'G) x = load, A complex symmetric; nan where rounding leaves nothing.
 
@@ -30,15 +54,17 @@ def solve(
     matrix : csc_array, shape (n, n)
         A.
     load : ndarray, shape (n,)
-    rows : ndarray, shape (r, n), optional
-        G; without it A stands alone.
+    gram : Gram, optional
+        G'G; without it A stands alone.
     weight : complex
         w.
     """
     lost = np.full(len(load), np.nan, np.complex128)
-    rows = np.zeros((0, len(load))) if rows is None or weight == 0.0 else rows
+    if gram is None or weight == 0.0:
+        gram = Gram(np.zeros((0, len(load))))
+    rows = gram.rows
     try:
-        factors = _factors(matrix, rows, weight)
+        factors = _factors(matrix, gram, weight)
     except SingularTangentError:
         return lost
     solution = factors.solve(load.astype(np.complex128))
@@ -59,15 +85,33 @@ def solve(
     return solution
 
 
-def _factors(matrix: sparse.csc_array, rows: NDArray, weight: complex) -> Solution:
+def _factors(matrix: sparse.csc_array, gram: Gram, weight: complex) -> Solution:
     """Factors of A + w G'G, to be refined.
 
     At a resonance that only G damps A is singular, and Woodbury's formula fails. It is therefore
     damped by more than its rounding, and by too little to keep refinement from converging wherever
     rounding leaves anything of the solution.
     """
+    rows = gram.rows
     if not len(rows):
         return factorize(matrix, pivot=PIVOT)
+    if gram.fills(matrix):
+        return _Full(matrix.toarray() + weight * gram.matrix)
     terms = np.abs(matrix.diagonal()) + abs(weight) * np.einsum("ri,ri->i", rows, rows)
     beside = sparse.diags_array(1j * BESIDE * _EPS * terms)
     return Updated(factorize(sparse.csc_array(matrix + beside), pivot=PIVOT), rows, weight)
+
+
+class _Full:
+    """Factors of a full matrix (Bunch and Kaufman, Math. Comput. 31, 1977)."""
+
+    def __init__(self, matrix: NDArray) -> None:
+        space = 64 * len(matrix)  # for LAPACK's blocks
+        found = lapack.zsytrf(matrix.T, lower=True, lwork=space, overwrite_a=True)
+        self._factors, self._pivots, failed = found
+        if failed:
+            raise SingularTangentError("the matrix is singular")
+
+    def solve(self, b: NDArray) -> NDArray:
+        """Solution x of A x = b."""
+        return lapack.zsytrs(self._factors, self._pivots, b, lower=True)[0]

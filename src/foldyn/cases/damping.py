@@ -129,7 +129,8 @@ class ModalDamping(Part):
     is constant (E. L. Wilson and J. Penzien, Int. J. Numer. Methods Eng. 4, 1972; R. W. Clough and
     J. Penzien, Dynamics of Structures, 2nd ed. 1993, section 12-3), and damps deformation alone:
     where supports move, it is the motion relative to where they would slowly bring the structure.
-    Rigid motions, and modes that nothing resists, are not counted and not damped.
+    Rigid motions, and modes that nothing resists, are not counted and not damped. Modes of one
+    frequency, of which any sums are modes too, get the mean of their ratios.
 
     Parameters
     ----------

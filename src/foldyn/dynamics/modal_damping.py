@@ -34,6 +34,7 @@ MOST_MODES = 2000  # free dofs of which all modes may be damped
 RIGID = 1.0 - 1e-6  # share of a shape in the space of rigid motions from which it is one,
 SLOW = 1e-6  # where its eigenvalue is less than that of the largest one found
 STILL = 1e-9  # of a hinge's gradient: what constraints leave of that of one that cannot turn
+ALIKE = 1e-6  # of a squared frequency: distance below which another is the same
 BEYOND = 6  # modes that are sought beyond those asked for: the rigid ones
 
 
@@ -66,9 +67,18 @@ class ModalRows(NamedTuple):
     rows: NDArray  # (r, m), sqrt(N s/m)
     rate: float  # 1/s, the largest 2 zeta omega
     soft: int  # hinges that have no slope in the state, so that modes are left out
+    alike: int = 0  # modes of the same frequencies, which get a mean of different ratios
 
     def warn(self) -> None:
-        """Warn where modes are left out."""
+        """Warn where modes are left out, or are no modes by themselves."""
+        if self.alike:
+            warnings.warn(
+                f"damping: {self.alike} modes have frequencies in common, but different ratios, or "
+                "some of them none: as any of their sums is a mode too, all of one frequency get "
+                "the mean; give them the same ratio",
+                FoldynWarning,
+                stacklevel=5,
+            )
         if self.soft:
             warnings.warn(
                 f"damping: {self.soft} hinges of the superlinear law stand at their rest angle, "
@@ -127,14 +137,26 @@ def rows_of(
     held = np.flatnonzero(ties.determined)
     rows[:, held] = (stiffness[held][:, free] @ shapes).T / values[:, None]
     rows = ties.rows_on_dofs(rows)
-    rates = 2.0 * np.broadcast_to(damping.ratios, len(values)) * np.sqrt(values)
-    return ModalRows(rows * np.sqrt(rates)[:, None], float(rates.max(initial=0.0)), 0)
+    ratios, alike = _ratios(damping, values)
+    rates = 2.0 * ratios * np.sqrt(values)
+    return ModalRows(rows * np.sqrt(rates)[:, None], float(rates.max(initial=0.0)), 0, alike)
+
+
+def _ratios(damping: ModalDamping, values: NDArray) -> tuple[NDArray, int]:
+    """Ratios of modes of increasing eigenvalues, and how many are a mean of those of some."""
+    ratios = np.zeros(len(values))
+    ratios[: damping.modes] = damping.ratios
+    first = np.append(True, np.diff(values) > ALIKE * values[1:])
+    group = np.cumsum(first) - 1
+    mean = (np.bincount(group, ratios) / np.bincount(group))[group]
+    differs = np.bincount(group, ~np.isclose(mean, ratios, rtol=1e-9, atol=0.0))[group] > 0
+    return np.where(differs, mean, ratios), int(differs.sum())
 
 
 def _swinging(
     pencil: Pencil, damping: ModalDamping, case: Case, state: NDArray, free: NDArray
 ) -> Spectrum:
-    """The lowest modes that swing, as many as are damped."""
+    """The lowest modes that swing, as many as are damped and others of the last one's frequency."""
     wanted = damping.modes
     if wanted is None and pencil.finite > MOST_MODES:
         raise InputError(
@@ -153,15 +175,22 @@ def _swinging(
                 "damping.modal",
             )
         swings = (spectrum.values > 0.0) & ~_rigid(pencil, spectrum, case, state, free)
-        found = int(swings.sum())
-        if wanted is None or found >= wanted:
-            kept = np.flatnonzero(swings)[:wanted]
+        found, all_known = int(swings.sum()), sought == pencil.finite
+        values = spectrum.values[swings]
+        if wanted is None or (found >= wanted and (all_known or _apart(values, wanted))):
+            last = np.inf if wanted is None else values[wanted - 1] * (1.0 + ALIKE)
+            kept = np.flatnonzero(swings)[values <= last]
             return Spectrum(spectrum.values[kept], spectrum.shapes[:, kept], math.nan, len(kept), 0)
-        if sought == pencil.finite:
+        if all_known:
             raise InputError(
                 f": ratios of {wanted} modes, but only {found} swing; give fewer", "damping.modal"
             )
         sought = min(2 * sought, pencil.finite)
+
+
+def _apart(values: NDArray, wanted: int) -> bool:
+    """Whether a higher mode than those of the last wanted one's frequency is known."""
+    return bool(values[-1] > values[wanted - 1] * (1.0 + ALIKE))
 
 
 def _rigid(

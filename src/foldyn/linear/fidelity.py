@@ -290,7 +290,7 @@ def named(models: Any, structure: Structure) -> Mapping[str, Mapping[str, Any]]:
     By default those of `BESIDE` that take the other options of the structure.
     """
     if models is None:
-        refused = structure.options.clamped or isinstance(structure.fold_law, Superlinear)
+        refused = isinstance(structure.fold_law, Superlinear)
         return {name: MODELS[name] for name in BESIDE if name != "n5b8e" or not refused}
     if isinstance(models, Mapping):
         for name, changes in models.items():

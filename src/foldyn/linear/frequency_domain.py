@@ -51,7 +51,7 @@ def direct(
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
         load = np.sum([term.shape * term.factor(omega) for term in terms], axis=0)
-        response[k] = solve(dynamic_stiffness(system, omega), load, system.modal, 1j * omega)
+        response[k] = solve(dynamic_stiffness(system, omega), load, system.gram, 1j * omega)
         report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
     warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
     return Answer(response, {}, {})

@@ -161,7 +161,7 @@ class _Balance:
         options: HarmonicBalance,
     ) -> None:  # fmt: skip
         self.hinges, self.stiffness = hinges, dynamic_stiffness(system, omega)
-        self.modal, self.omega, self.load = system.modal, omega, load
+        self.gram, self.omega, self.load = system.gram, omega, load
         self.options, self.iterations = options, 0
 
     def balanced(self, start: NDArray) -> tuple[NDArray | None, NDArray]:
@@ -187,7 +187,7 @@ class _Balance:
         while len(slopes) < most and self.iterations < self.options.iterations:
             self.iterations += 1
             matrix = sparse.csc_array(self.stiffness + self.hinges.change(slope))
-            motion = solve(matrix, self.load, self.modal, 1j * self.omega)
+            motion = solve(matrix, self.load, self.gram, 1j * self.omega)
             if np.isnan(motion).any() or not len(slope):
                 return motion, slope
             if before is not None:

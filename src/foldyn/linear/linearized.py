@@ -24,11 +24,13 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from foldyn.algebra.complex_symmetric import Gram
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, State
 from foldyn.cases.touching import check_contact
@@ -117,6 +119,11 @@ class Linearized:
     inner: Amplitudes = field(repr=False)
     branches: Branches | None = field(default=None, repr=False)
     responding: Branches | None = field(default=None, repr=False)
+
+    @cached_property
+    def gram(self) -> Gram:
+        """What modal damping adds to `damping`, G'G."""
+        return Gram(self.modal)
 
     def expanded(self, motions: NDArray) -> NDArray:
         """Displacements (3n, k) of all nodes in motions (nf, k) of the free dofs."""
@@ -294,15 +301,16 @@ def _modal_rows(
     """Rows (r, m) of the modal damping: of the modes in the state (n, 3), or of those at rest."""
     damping = case.modal_damping
     if damping is not None and damping.state == "start":
-        return rows_of(damping, case, stiffness, mass, state).rows
-    if damping is None or not internal:
+        modal = rows_of(damping, case, stiffness, mass, state)
+    elif damping is None or not internal:
         modal = modal_rows(case)
-        modal.warn()
-        return np.pad(modal.rows, ((0, 0), (0, stiffness.shape[0] - modal.rows.shape[1])))
-    body, rest = case.elastic_body, np.zeros_like(state)
-    inner = amplitudes(case.structure, rest, body.size, internal)
-    stiffness = inner.stiffened(body.tangent(body.dofs(rest)))
-    return rows_of(damping, case, stiffness, inner.massed(mass_of(case)), rest).rows
+    else:
+        body, rest = case.elastic_body, np.zeros_like(state)
+        inner = amplitudes(case.structure, rest, body.size, internal)
+        stiffness = inner.stiffened(body.tangent(body.dofs(rest)))
+        modal = rows_of(damping, case, stiffness, inner.massed(mass_of(case)), rest)
+    modal.warn()
+    return np.pad(modal.rows, ((0, 0), (0, stiffness.shape[0] - modal.rows.shape[1])))
 
 
 def _reference(case: Case, exact: sparse.csr_array) -> sparse.csr_array:

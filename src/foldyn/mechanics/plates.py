@@ -2,7 +2,9 @@
 
 A plate has angles phi: the turns of its hinges from rest, and rotations beta of its edges against
 the facets there. Its energy is 1/2 phi^T K phi. A fold is a hinge between two plates whose angle is
-the dihedral of the facets less the two rotations beside it.
+the dihedral of the facets less the two rotations beside it. At a clamped edge the sheet keeps its
+direction in space: the plate has there the angle of its facet with the mirror image at rest, a
+hinge whose last point is no node but rides on the ends of the edge (`mechanics.clamps`).
 
 Rotations are dofs without mass, beside the displacements u (n, 3). Their dofs x (r,) are lengths as
 well, m, so that norms over all dofs do not depend on the unit of length: beta is x times
@@ -16,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment
@@ -45,13 +47,18 @@ from foldyn.mechanics.threads import Team, team
 
 
 class BarsPlates(NamedTuple):
-    """Arrays of n nodes with bars, nf folds, nb bends and p plates of nq angles in all."""
+    """Arrays of n nodes with bars, nf folds, nb bends and p plates of nq angles in all.
+
+    The last of the bends, c of them, are clamped edges: in the place of a wing their hinges name
+    the first end of the edge.
+    """
 
     bars: BarsHinges  # without hinges
     rotations: int  # r
     per_reach: float  # rotation (rad) of a dof of 1 m, 1/m
     rotation_hinge: NDArray  # (r,) row in `hinges` that each rotation lies at
     hinges: NDArray  # (nf + nb, 4) of the folds, then of the bends
+    wings: NDArray  # (c, 3) of clamped edges, from the middle of each, m
     fold_rotations: NDArray  # (nf, 2) -1 where there is none
     fold_stiffness: NDArray  # (nf,) N m/rad
     fold_rest: NDArray  # (nf,) rad
@@ -102,18 +109,52 @@ def plates_work(model: BarsPlates) -> PlatesWork:
 @kernel
 def turn_hinges(model, u, work):
     """Dihedrals and their gradients at displacements u."""
-    rest, p = model.bars.rest, np.empty(12)
+    rest, p = model.bars.rest, np.empty((4, 3))
     for e in range(model.hinges.shape[0]):
         for v in range(4):
             node = model.hinges[e, v]
             for c in range(3):
-                p[3 * v + c] = rest[node, c] + u[node, c]
+                p[v, c] = rest[node, c] + u[node, c]
+        ride(model, e, 1.0, p)
         found = dihedral_gradient(
-            p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
-        )
+            p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2],
+            p[2, 0], p[2, 1], p[2, 2], p[3, 0], p[3, 1], p[3, 2],
+        )  # fmt: skip
         work.angle[e] = found[0]
         for c in range(12):
             work.gradient[e, c] = found[1 + c]
+        carry(model, e, work.gradient)
+
+
+@inner_scalar
+def rides(model, h):
+    """Whether hinge h is a clamped edge."""
+    return h >= model.hinges.shape[0] - model.wings.shape[0]
+
+
+@inner_scalar
+def ride(model, h, share, points):
+    """Put the wing of a clamped edge, if hinge h is one, to where it rides on the ends, (4, 3).
+
+    share : of the wing's distance from the middle of the edge; 0 in differences of positions.
+    """
+    if rides(model, h):
+        e = h - model.hinges.shape[0] + model.wings.shape[0]
+        for c in range(3):
+            middle = 0.5 * (points[0, c] + points[1, c])
+            points[3, c] = middle + share * model.wings[e, c]
+
+
+@inner_scalar
+def carry(model, h, gradient):
+    """Give to the second end of a clamped edge, if hinge h is one, its half of what a wing has.
+
+    The other half stays, since the first end stands in the place of the wing.
+    """
+    if rides(model, h):
+        for c in range(3):
+            gradient[h, 9 + c] *= 0.5
+            gradient[h, 3 + c] += gradient[h, 9 + c]
 
 
 @kernel
@@ -246,10 +287,15 @@ def add_mean_plates_force(model, u0, x0, u1, x1, before, force, couple, work):
     plain, gradient = np.empty((4, 3)), np.empty((4, 3))
     for h in range(model.hinges.shape[0]):
         put_motion(model.bars.rest, model.hinges, h, u0, u1, x, dx)
+        ride(model, h, 1.0, x)
+        ride(model, h, 0.0, dx)
         discrete_gradient(x, dx, work.angle[h] - before[h], points, plain, gradient)
+        for c in range(12):
+            work.gradient[h, c] = flat(gradient)[c]
+        carry(model, h, work.gradient)
         for v in range(4):
             for c in range(3):
-                force[model.hinges[h, v], c] += work.moment[h] * gradient[v, c]
+                force[model.hinges[h, v], c] += work.moment[h] * work.gradient[h, 3 * v + c]
 
 
 class _Context(NamedTuple):

@@ -14,8 +14,16 @@ from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner, kernel
 from foldyn.materials.switch import hinge_slope
-from foldyn.mechanics.dihedral import add_hessian
-from foldyn.mechanics.plates import BarsPlates, fold_moment, turn_folds, turn_hinges, turn_plate
+from foldyn.mechanics.dihedral import add_hessian, carry_wing
+from foldyn.mechanics.plates import (
+    BarsPlates,
+    fold_moment,
+    ride,
+    rides,
+    turn_folds,
+    turn_hinges,
+    turn_plate,
+)
 
 
 class PlatesPattern(NamedTuple):
@@ -116,8 +124,14 @@ def _curvature(model, u, work, h, points, gradient, out):
         for c in range(3):
             points[v, c] = model.bars.rest[node, c] + u[node, c]
             gradient[v, c] = work.gradient[h, 3 * v + c]
+    ride(model, h, 1.0, points)
+    if rides(model, h):
+        for c in range(3):
+            gradient[3, c] *= 2.0  # `carry` has given half of it away
     out[:] = 0.0
     add_hessian(points, gradient, work.moment[h], out)
+    if rides(model, h):
+        carry_wing(out)
 
 
 @kernel
@@ -158,7 +172,7 @@ def _add_plates(model, pattern, u, x, work, bend, resist, block, data):
             if h >= 0:
                 for v in range(4):
                     for c in range(3):
-                        bend[k, 3 * pattern.corner[first + k, v] + c] = work.gradient[h, 3 * v + c]
+                        bend[k, 3 * pattern.corner[first + k, v] + c] += work.gradient[h, 3 * v + c]
             else:
                 bend[k, pattern.rotation[first + k]] = model.per_reach
         for k in range(count):
@@ -174,8 +188,9 @@ def _add_plates(model, pattern, u, x, work, bend, resist, block, data):
                 continue
             work.moment[h] = moment
             _curvature(model, u, work, h, points, gradient, turned)
-            for v in range(4):
-                for w in range(4):
+            moved = 3 if rides(model, h) else 4
+            for v in range(moved):
+                for w in range(moved):
                     row, column = pattern.corner[first + k, v], pattern.corner[first + k, w]
                     for a in range(3):
                         for b in range(3):

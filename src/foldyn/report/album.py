@@ -122,8 +122,7 @@ def described_shell(shell: Shell) -> str:
         "A shell: panels that stretch and bend as thin sheets, in "
         f"{len(shell.triangles)} triangles ({shell.options.divisions} divisions of every edge), "
         "turning against each other along exact creases. The sides of the triangles are not drawn. "
-        "A run with half the divisions shows how far the numbers depend on the mesh: the "
-        "difference is about three times the remaining error."
+        "Runs with half and a quarter of the divisions show how far the numbers depend on the mesh."
     )
 
 

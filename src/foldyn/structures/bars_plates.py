@@ -12,11 +12,13 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, LinearHinge, Superlinear
+from foldyn.mechanics.clamps import RIDES
 from foldyn.mechanics.plates import (
     BarsPlates,
     PlatesWork,
     plates_kernels,
     plates_work,
+    turn_hinges,
 )
 from foldyn.mechanics.plates_tangent import PlatesPattern, add_plates_tangent, plates_pattern
 from foldyn.mechanics.sheet_term import (
@@ -26,6 +28,7 @@ from foldyn.mechanics.sheet_term import (
     SoftHinges,
     Unstrained,
     largest_turn,
+    unit_rows,
 )
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
@@ -132,7 +135,9 @@ class BarsPlatesTerm(SheetTerm):
     @property
     def hinges(self) -> NDArray:
         """See `SheetTerm`."""
-        return self.model.hinges
+        rows, wings = self.model.hinges.copy(), len(self.model.wings)
+        rows[len(rows) - wings :, 3] = RIDES
+        return rows
 
     @property
     def folds(self) -> Folds:
@@ -142,8 +147,21 @@ class BarsPlatesTerm(SheetTerm):
     # ------------------------------------------------------------------ measures
     def angles(self, q: NDArray) -> NDArray:
         """See `SheetTerm`."""
-        x = self.model.bars.rest + self._split(q)[0]
-        return mechanics.angles(x, self.model.hinges.astype(np.uint32))
+        model, x = self.model, self.model.bars.rest + self._split(q)[0]
+        rows, first = model.hinges.astype(np.uint32), len(model.hinges) - len(model.wings)
+        rows[first:, 3] = len(x) + np.arange(len(model.wings))
+        x = np.concatenate([x, x[model.hinges[first:, :2]].mean(axis=1) + model.wings])
+        return mechanics.angles(x, rows)
+
+    def holds(self, q: NDArray) -> sparse.csr_array:
+        """See `SheetTerm`: clamped edges as they turn."""
+        model, work = self.model, plates_work(self.model)
+        first = len(model.hinges) - len(model.wings)
+        if len(model.wings):
+            turn_hinges(model, self._split(q)[0], work)
+        turns = work.gradient[first:]
+        turns[:, :3] += turns[:, 9:]  # of the wing, in whose place the first end stands
+        return unit_rows(model.hinges[first:, :3], turns[:, :9], self.size)
 
     def turn(self, q: NDArray, other: NDArray) -> float:
         """Largest turn of a hinge, or of a bar with the rest of it; inf on penetration."""

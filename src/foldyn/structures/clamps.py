@@ -9,7 +9,8 @@ from it, its stiffness is
 That is a plate of width L in cylindrical bending, M = D L kappa. A chain of rigid pieces of length
 h with hinges between them bends like it if each hinge gathers the curvature of the half pieces on
 both of its sides, k = D L / h. At a clamp there is one half piece only: the panel and its mirror
-image would turn by twice the angle, with the same moment.
+image would turn by twice the angle, with the same moment. In the scheme n5b8e the same hinge is an
+angle of the panel's plate (`structures.edge_angles`).
 """
 
 from __future__ import annotations

@@ -4,7 +4,8 @@ The angles of a panel of m corners are the turns of its m spokes (none in a tria
 edge that is a crease, the turn beta of the sheet there against the facet of the spokes at that
 edge, averaged along the edge. Their energy 1/2 phi^T K phi is the least that a plate can have which
 goes through the corners and the center, keeps its straight edges straight and has these mean turns;
-other edges are free. An edge along which the sheet runs on into the next panel also has a bow: the
+other edges are free. At a clamped edge beta is the turn of all of the sheet there, not of its mean.
+An edge along which the sheet runs on into the next panel also has a bow: the
 mean distance of the sheet from the line between its ends, over its length. The plate is made of
 triangles of constant curvature (Morley; in `mechanics.triangle`), twice, and K extrapolated in
 their size.
@@ -16,6 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import null_space
 
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.structures.panel_plate import Outline, PanelPlate, facets_of, mass_of
@@ -144,17 +146,23 @@ def _curled(panel: Outline, poissons_ratio: float, n: int) -> tuple[NDArray, NDA
 def panel_mass(panel: Outline, poissons_ratio: float) -> NDArray:
     """Mass matrix (points, points) of a panel of mass 1 that follows its corners and center.
 
-    As a plate at rest does, without moments at its edges; exact for what is linear over the panel.
+    As a plate at rest does, without moments at its edges but those that hold clamped ones level;
+    exact for what is linear over the panel and level at those. Creased are none but the clamped.
     """
     coarse, fine = (PanelPlate(panel, poissons_ratio, n) for n in (COARSE, FINE))
+    x = _points(panel)
     less, more = (
-        mass_of(plate.points, plate.triangles, plate.solved(plate.heights)[0])
+        mass_of(
+            plate.points, plate.triangles,
+            plate.solved([*plate.heights, *plate.slopes])[0][:, : len(x)],
+        )
         for plate in (coarse, fine)
-    )
+    )  # fmt: skip
     out = extrapolated(less, more, FINE / COARSE)
     # what is linear over the panel to the last digit, as its facets have it
-    x = _points(panel)
-    linear = np.column_stack([np.ones(len(x)), x])
+    edges = np.roll(x[: len(panel.corners)], -1, axis=0) - x[: len(panel.corners)]
+    level = null_space(edges[list(panel.clamped)] @ [[0.0, -1.0], [1.0, 0.0]])
+    linear = np.column_stack([np.ones(len(x)), x @ level])
     along = linear @ np.linalg.pinv(linear)
     facets = np.array(facets_of(x, len(panel.corners)))[: None if panel.center else 1]
     out = out + along.T @ (mass_of(x, facets, np.eye(len(x))) - out) @ along

@@ -87,7 +87,7 @@ def discretize(
     clamped : sequence of (vertex, vertex), or str
         Boundary edges along which panels keep their rest tangent in space, wherever they are moved;
         their nodes need a support of their own. A selection ("xmin") means those of which it has
-        both ends. See `foldyn.structures.clamps`.
+        both ends. See `foldyn.structures.clamps`, and `edge_angles` for "n5b8e".
     rigid : "all" or sequence of int, optional
         Panels that cannot bend, exactly: all their nodes ride on three of their corners. They must
         be flat. Their bars still stretch.
@@ -161,20 +161,23 @@ def discretize(
     welds, onset = weld_stiffness(pattern, sheet), np.zeros(0)
     bends = np.concatenate([calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), welds])
     plates, softness = None, np.zeros(len(folds))
+    x, hinges = mesh.nodes, np.concatenate([mesh.bends, mesh.welds])
+    clamps, clamped_triangle = clamp_rows(edges, mesh.triangles)
+    clamped_panel = mesh.triangle_panel[clamped_triangle]
+    modulus = sheet.values("bending_modulus", len(pattern.faces))[clamped_panel]
+    turning = clamp_stiffness(x, clamps, modulus)
     if options.scheme == "n5b8e":
         stiff = rigid_panels(options.rigid, len(pattern.faces))
-        plates = edge_plates(mesh, pattern, sheet, options.straight, stiff)
-        bends = spoke_stiffness(plates, len(mesh.folds), len(bends))
+        springs = dict(zip(edges, turning.tolist(), strict=True))
+        plates = edge_plates(mesh, pattern, sheet, options.straight, stiff, springs)
+        stiffness = spoke_stiffness(plates, len(mesh.folds), len(bends) + len(edges))
+        bends, turning = np.split(stiffness, [len(bends)])
     elif options.calibration == "plate":
         plated = panel_plates(mesh, pattern, sheet, options.rigid)
         folds, softness, large = plated.folds(folds), plated.creases, bends
         bends = np.concatenate([plated.bends, welds])
         onset = plate_onset(bends, large)
 
-    x, hinges = mesh.nodes, np.concatenate([mesh.bends, mesh.welds])
-    clamps, clamped_triangle = clamp_rows(edges, mesh.triangles)
-    clamped_panel = mesh.triangle_panel[clamped_triangle]
-    modulus = sheet.values("bending_modulus", len(pattern.faces))[clamped_panel]
     coupled, gives = (), None
     if options.membrane == "panel":
         stiff = rigid_panels(options.rigid, len(pattern.faces))
@@ -199,7 +202,7 @@ def discretize(
         triangle_panel=mesh.triangle_panel,
         centers=mesh.centers,
         clamps=clamps,
-        clamp_stiffness=clamp_stiffness(x, clamps, modulus),
+        clamp_stiffness=turning,
         edge_plates=plates,
         membranes=coupled,
         edge_gives=gives,

@@ -11,11 +11,15 @@ It counts as such above `STRAIGHT` t/L, t the thickness and L its length.
 Along a weld the sheet is smooth: with d the change of the dihedral of the facets there, one panel
 turns by d/2 + x and the other by d/2 - x, x a rotation that they share. Where it does not stay
 straight they share its bow as well.
+
+A clamped edge has no rotation of its own: the sheet turns there against the facet by the dihedral
+of the facet with its mirror image at rest, less the flat one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +31,7 @@ from foldyn.materials import BarLaw, HingeLaw
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
+from foldyn.structures.clamps import mirrored
 from foldyn.structures.condensed_panel import panel_moments, panel_stiffness
 from foldyn.structures.mesh import Mesh, hinge_angles, lengths
 from foldyn.structures.panel_plate import Outline, outline
@@ -49,18 +54,24 @@ class EdgePlates(NamedTuple):
 def edge_plates(
     mesh: Mesh, pattern: Pattern, sheet: Sheet,
     straight_edges: Collection[Edge] = (), rigid: Collection[int] = (),
+    clamped: Mapping[Edge, float] = MappingProxyType({}),
 ) -> EdgePlates:  # fmt: skip
     """Panels of a mesh with center nodes as plates.
 
     straight_edges : boundary edges (low, high) that stay straight.
-    rigid : numbers of rigid panels, which have no angles.
+    rigid : numbers of rigid panels, which have no angles but those at clamped edges.
+    clamped : boundary edges whose hinges follow those of the bends and welds, in this order; and
+        the stiffness, N m/rad, of those of rigid panels.
     """
     kinds, kind = sheet.kinds(len(pattern.faces))
     folds, bends = len(mesh.folds), len(mesh.bends)
     hinge = edge_lookup(pattern.creases)
     hinge |= {edge: folds + bends + k for edge, k in edge_lookup(pattern.welds).items()}
     hinges = np.concatenate([mesh.folds, mesh.welds])
-    panels = outlines(mesh.nodes, mesh.centers, hinges, pattern, sheet, straight_edges, rigid)
+    hinge |= {edge: bends + len(hinges) + k for k, edge in enumerate(clamped)}
+    panels = outlines(
+        mesh.nodes, mesh.centers, hinges, pattern, sheet, straight_edges, rigid, clamped
+    )
     spokes = [len(face) if mesh.centers[p] >= 0 else 0 for p, face in enumerate(pattern.faces)]
     first = folds + np.concatenate([[0], np.cumsum(spokes)])
     rotations = np.full((folds, 2), -1)
@@ -77,11 +88,12 @@ def edge_plates(
     angles: list[list[int]] = []
     matrices: list[NDArray] = []
     for p, face in enumerate(pattern.faces):
-        panel = panels[p]
+        panel, edges = panels[p], [edge_of(a, b) for a, b in around(face)]
         if panel is None:
-            angles.append([])
+            held = [edge for edge in edges if edge in clamped]
+            angles.append([hinge[edge] for edge in held])
+            matrices.append(np.diag([clamped[edge] for edge in held]))
             continue
-        edges = [edge_of(a, b) for a, b in around(face)]
         turned = list(range(first[p], first[p + 1]))
         parts = [np.eye(len(turned))]
         for k in (hinge[edge] for edge in edges if edge in hinge):
@@ -90,6 +102,9 @@ def edge_plates(
                 turned.append(-1 - len(beside))
                 parts.append(np.ones((1, 1)))
                 beside.append(k)
+            elif k >= bends + len(hinges):
+                turned.append(k)
+                parts.append(np.ones((1, 1)))
             else:  # the dihedral there, and the rotation that both sides have
                 first_side = (k, "turn") not in shared
                 turned += [k, -1 - number(k, "turn")]
@@ -117,12 +132,13 @@ def edge_plates(
 
 def curl_moments(
     plates: EdgePlates, panels: Sequence[Outline | None], curvature: NDArray, sheet: Sheet,
-    area: NDArray,
+    area: NDArray, clamps: int,
 ) -> NDArray:  # fmt: skip
     """Moments (nq,), N m, of the angles of plates that would have these curvatures, 1/m.
 
     panels : see `outlines`.
     curvature, area : (np,), 1/m and m2.
+    clamps : number of the first hinge of a clamped edge.
     """
     kinds, kind = sheet.kinds(len(panels))
     out, seen = np.zeros(len(plates.angle)), set()
@@ -133,7 +149,7 @@ def curl_moments(
         scale, place = own.bending_modulus * curvature[p] * size, plates.start[p]
         spokes = len(panel.corners) if panel.center else 0
         for k, moment in enumerate(scale * panel_moments(panel, own.poissons_ratio)):
-            if k < spokes or plates.angle[place] < 0:
+            if k < spokes or not 0 <= plates.angle[place] < clamps:
                 out[place] = moment
                 place += 1
                 continue
@@ -147,6 +163,7 @@ def curl_moments(
 def outlines(
     nodes: NDArray, centers: NDArray, hinges: NDArray, pattern: Pattern, sheet: Sheet,
     straight_edges: Collection[Edge] = (), rigid: Collection[int] = (),
+    clamped: Collection[Edge] = (),
 ) -> list[Outline | None]:  # fmt: skip
     """Outline of each panel; None of a rigid one. Welds count as creases, which may bow.
 
@@ -154,7 +171,7 @@ def outlines(
     """
     bent = np.concatenate([pattern.creases, pattern.welds])
     straight = set(edge_lookup(bent[straight_creases(nodes, hinges, pattern, sheet)]))
-    straight |= set(straight_edges)
+    straight |= {*straight_edges, *clamped}
     hinged, welds = edge_lookup(bent), edge_lookup(pattern.welds)
     found: list[Outline | None] = []
     for p, face in enumerate(pattern.faces):
@@ -166,9 +183,10 @@ def outlines(
             outline(
                 pattern.vertices[list(face)],
                 nodes[centers[p]] if centers[p] >= 0 else None,
-                [edge in hinged for edge in edges],
+                [edge in hinged or edge in clamped for edge in edges],
                 [edge in straight for edge in edges],
                 [edge in welds and edge not in straight for edge in edges],
+                [edge in clamped for edge in edges],
             )
         )
     return found
@@ -186,27 +204,32 @@ def straight_creases(nodes: NDArray, hinges: NDArray, pattern: Pattern, sheet: S
 def plates_model(
     nodes: NDArray, bars: NDArray, bar_stiffness: NDArray, bar_law: BarLaw, folds: NDArray,
     fold_stiffness: NDArray, fold_rest: NDArray, fold_law: HingeLaw, bends: NDArray,
-    bend_rest: NDArray, plates: EdgePlates,
+    bend_rest: NDArray, plates: EdgePlates, clamps: NDArray,
 ) -> BarsPlates:  # fmt: skip
-    """Arrays of the model: bars with the stiffness E A / L, folds, and what `edge_plates` gives."""
-    length = lengths(nodes, bars)
+    """Arrays of the model: bars with the stiffness E A / L, folds, and what `edge_plates` gives.
+
+    clamps : (c, 3) triangles at clamped edges.
+    """
+    length, middle = lengths(nodes, bars), nodes[clamps[:, :2]].mean(axis=1)
+    wings = np.array([mirrored(corners) for corners in nodes[clamps]]).reshape(-1, 3) - middle
     return BarsPlates(
         bars=mechanics.build(nodes, bars, bar_stiffness, bar_law, ()),
         rotations=len(plates.rotation_hinge),
         per_reach=1.0 / float(np.sqrt((length**2).mean())),
-        hinges=np.concatenate([folds, bends]).astype(np.int64),
+        hinges=np.concatenate([folds, bends, clamps[:, [0, 1, 2, 0]]]).astype(np.int64),
+        wings=wings,
         fold_stiffness=np.array(fold_stiffness, float),
         fold_rest=np.array(fold_rest, float),
         fold_parameters=fold_law.parameters(fold_rest).reshape(-1, 4),
         code=int(fold_law.code),
         addresses=np.array(fold_law.addresses or (0, 0, 0), np.int64),
-        bend_rest=np.array(bend_rest, float),
+        bend_rest=np.append(bend_rest, np.full(len(clamps), np.pi)),
         **plates._asdict(),
     )
 
 
 def spoke_stiffness(plates: EdgePlates, folds: int, bends: int) -> NDArray:
-    """Stiffness (nb,), N m/rad, of each spoke if no other angle of its panel turns."""
+    """Stiffness (nb,), N m/rad, of each bend if no other angle of its panel turns."""
     out = np.zeros(bends)
     for p, first in enumerate(plates.start[:-1]):
         count = plates.start[p + 1] - first

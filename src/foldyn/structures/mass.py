@@ -33,6 +33,7 @@ class Surface(NamedTuple):
     triangle_area: NDArray  # (nt,) m2
     areal_density: NDArray  # (np,) kg/m2
     welds: tuple[tuple[int, int], ...]  # edges (low, high) across which the sheet runs on
+    clamped: tuple[tuple[int, int], ...] = ()  # edges at which panels stay level
 
     @property
     def panel_mass(self) -> NDArray:
@@ -216,12 +217,13 @@ def condensed(surface: Surface) -> sparse.csr_array:
 
     Between these a panel takes the shape of a plate with no moments at its edges and straight
     creases, while welds bow; see `foldyn.structures.condensed_panel`. Panels without a center node
-    have the consistent matrix of their triangles. The shape hardly depends on Poisson's ratio, for
-    which 0.3 is taken.
+    have the consistent matrix of their triangles, but at clamped edges. The shape hardly depends on
+    Poisson's ratio, for which 0.3 is taken.
     """
-    plated = surface.centers >= 0
+    panels = condensed_panels(surface)
+    plated = np.isin(np.arange(len(surface.faces)), list(panels))
     rows, columns, values = [], [], []
-    for p, matrix in condensed_panels(surface).items():
+    for p, matrix in panels.items():
         nodes = surface.nodes_of(p)
         rows.append(np.repeat(nodes, len(nodes)))
         columns.append(np.tile(nodes, len(nodes)))
@@ -233,18 +235,21 @@ def condensed(surface: Surface) -> sparse.csr_array:
 
 
 def condensed_panels(surface: Surface) -> dict[int, NDArray]:
-    """Matrices (k, k), kg, by the rule condensed: of panels with a center node, by number.
+    """Matrices (k, k), kg, by the rule condensed, by number: of panels with a center node.
 
-    Their nodes are the corners, then the center.
+    Their nodes are the corners, then the center. Also of triangles with a clamped edge.
     """
     edges = [edge_of(a, b) for face in surface.faces for a, b in around(face)]
     creases = {edge for edge, count in Counter(edges).items() if count == 2} - set(surface.welds)
-    found, total = {}, surface.panel_mass
-    for p in np.flatnonzero(surface.centers >= 0).tolist():
-        face = surface.faces[p]
-        straight = [edge_of(a, b) in creases for a, b in around(face)]
-        x = surface.nodes[surface.nodes_of(p)]
-        panel = outline(x[:-1], x[-1], [False] * len(face), straight)
+    found, total, level = {}, surface.panel_mass, set(surface.clamped)
+    for p, face in enumerate(surface.faces):
+        edges = [edge_of(a, b) for a, b in around(face)]
+        if surface.centers[p] < 0 and level.isdisjoint(edges):
+            continue
+        clamped = [edge in level for edge in edges]
+        straight = [edge in creases or edge in level for edge in edges]
+        x, m = surface.nodes[surface.nodes_of(p)], len(face)
+        panel = outline(x[:m], x[m] if len(x) > m else None, clamped, straight, clamped=clamped)
         found[p] = total[p] * panel_mass(panel, 0.3)
     return found
 

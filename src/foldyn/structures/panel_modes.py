@@ -37,8 +37,8 @@ class PanelModes(NamedTuple):
     stiffness : (k,)
         Of the amplitudes, whose mass is 1.
     mass : (b + k, b + k)
-        Of all its heights w: the heights of corners and center, the turns of creased edges, the
-        amplitudes.
+        Of all its heights w: the heights of corners and center, the turns of creased edges that
+        are not clamped, the amplitudes.
     between : (q, b + k)
         Heights by these in the middles of the edges, then of the spokes.
     """
@@ -67,7 +67,7 @@ def panel_modes(panel: Outline, poissons_ratio: float, count: int) -> PanelModes
     value, shapes = value[kept], shapes[:, kept]
     if value[count] < (1.0 + EQUAL) * value[count - 1]:
         count += 1
-    static = fine.solved([*fine.heights, *fine.slopes])[0] @ heights_and_slopes(panel)
+    static = fine.solved([*fine.heights, *fine.slopes])[0] @ turning(panel)
     heights = np.column_stack([static, shapes[:, :count]])
     mass = heights.T @ (fine.mass @ heights)
     _, middle = cKDTree(fine.points).query(middles(panel))
@@ -75,6 +75,16 @@ def panel_modes(panel: Outline, poissons_ratio: float, count: int) -> PanelModes
     for array in out:
         array.setflags(write=False)
     return out
+
+
+def turning(panel: Outline) -> NDArray:
+    """`heights_and_slopes` of a panel that stays level at its clamped edges, not against facets."""
+    points = len(panel.corners) + (panel.center is not None)
+    clamped = [c for c, there in zip(panel.clamped, panel.creased, strict=True) if there]
+    level = points + np.flatnonzero(clamped)
+    out = heights_and_slopes(panel)
+    out[level] = 0.0
+    return np.delete(out, level, axis=1)
 
 
 def middles(panel: Outline) -> NDArray:
@@ -109,8 +119,8 @@ def _held_modes(plate: PanelPlate, count: int) -> tuple[NDArray, NDArray]:
 def _basis(plate: PanelPlate) -> sparse.csc_array:
     """Unknowns of a plate by those that are left when corners, center and edges are held.
 
-    Held heights are zero; those along straight edges, too, since their ends are. Of the slopes of
-    an edge the last is the one that makes their mean zero.
+    Held heights are zero; those along straight edges, too, since their ends are, and slopes along
+    clamped ones. Of the slopes of an edge the last is the one that makes their mean zero.
     """
     size = plate.stiffness.shape[0]
     still = {next(iter(entries)) for entries in (*plate.heights, *plate.lines)}
@@ -119,6 +129,6 @@ def _basis(plate: PanelPlate) -> sparse.csc_array:
     column = {k: j for j, k in enumerate(free)}
     entries = [(k, j, 1.0) for k, j in column.items()]
     for k, mean in last.items():
-        entries += [(k, column[other], -mean[other] / mean[k]) for other in mean if other != k]
+        entries += [(k, column[other], -mean[other] / mean[k]) for other in mean if other in column]
     row, place, value = (np.array(each) for each in zip(*entries, strict=True))
     return sparse.csc_array((value, (row, place)), shape=(size, len(free)))

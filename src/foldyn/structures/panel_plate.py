@@ -6,6 +6,7 @@ heights of the points and the slopes across the sides.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -24,7 +25,8 @@ Rows = tuple[tuple[float, float], ...]
 class Outline(NamedTuple):
     """A panel: corners in its plane, counter-clockwise from the front, and how its edges are held.
 
-    Edge k runs from corner k to corner k + 1.
+    Edge k runs from corner k to corner k + 1. Clamped edges are creased and straight, too: all of
+    the sheet turns there as one.
     """
 
     corners: Rows  # m
@@ -32,6 +34,7 @@ class Outline(NamedTuple):
     creased: tuple[bool, ...]
     straight: tuple[bool, ...]
     bowed: tuple[bool, ...]
+    clamped: tuple[bool, ...]
 
 
 def outline(
@@ -39,10 +42,13 @@ def outline(
     center: NDArray | None,
     creased: list[bool],
     straight: list[bool],
-    bowed: list[bool] | None = None,
+    bowed: Sequence[bool] = (),
+    clamped: Sequence[bool] = (),
 ) -> Outline:
-    """Outline of a panel with corners x (m, 3), of size 1 with its first edge along an axis."""
-    bowed = [False] * len(x) if bowed is None else bowed
+    """Outline of a panel with corners x (m, 3), of size 1 with its first edge along an axis.
+
+    Without `bowed` or `clamped` no edge is.
+    """
     middle = x.mean(axis=0)
     points = x if center is None else np.concatenate([x, center[None]])
     _, _, axes = np.linalg.svd(x - middle)
@@ -54,7 +60,11 @@ def outline(
     flat = flat @ np.array([[e[0], -e[1]], [e[1], e[0]]]) / np.sqrt(np.linalg.norm(normal))
     rows = tuple((float(a), float(b)) for a, b in flat.round(DIGITS) + 0.0)
     hub = None if center is None else rows[-1]
-    return Outline(rows[: len(x)], hub, tuple(creased), tuple(straight), tuple(bowed))
+    none = (False,) * len(x)
+    return Outline(
+        rows[: len(x)], hub, tuple(creased), tuple(straight), tuple(bowed) or none,
+        tuple(clamped) or none,
+    )  # fmt: skip
 
 
 def facets_of(points: NDArray, corners: int) -> list[tuple[int, int, int]]:
@@ -69,7 +79,8 @@ class PanelPlate:
 
     Its unknowns are heights of the points, then slopes across the sides. `heights` (of corners and
     center), `slopes` (mean, outward, of creased edges), `bows` and `lines` (of points on straight
-    edges off the line between its ends) are linear functions of them: coefficients by number.
+    edges off the line between its ends, and of slopes at clamped ones off the last there) are
+    linear functions of them: coefficients by number.
     """
 
     def __init__(self, panel: Outline, poissons_ratio: float, n: int) -> None:
@@ -88,6 +99,9 @@ class PanelPlate:
                     for a, b in pairwise(nodes)
                 }
                 self.slopes.append(mean)
+                *others, (last, share) = mean.items()
+                for side, part in others if panel.clamped[k] else ():
+                    self.lines.append({side: n * part, last: -n * share})
             if panel.bowed[k]:
                 share = 1.0 / (n * float(np.linalg.norm(x[k] - x[(k + 1) % len(x)])))
                 ends = 0.5 * (1 - n) * share  # the line between them takes them off

@@ -3,8 +3,8 @@
 A preset gives what is left out. Without one it is "plate", unless an option is given that stands
 for another: the scheme n5b8e; or for the model of the paper, a calibration other than "plate" or
 superlinear bends without a calibration. A bar law other than "linear" stands for single bars. A
-pattern with welds has "n5b8e" in the place of "plate", but with clamped edges: a hinge on a weld
-cannot bend as a plate does.
+pattern with welds has "n5b8e" in the place of "plate": a hinge on a weld cannot bend as a plate
+does.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from foldyn.structures.structure import MEMBRANES, ModelOptions
 from foldyn.values import choice, show
 
 PLATE, N5B8E, HERKAL, MERLIN2 = "plate", "n5b8e", "herkal", "merlin2"
-AGAINST_PLATES = ("scheme", "calibration", "bend_law", "clamped")
-"""Options that say how a weld is to bend, or that panels as plates do not take."""
+AGAINST_PLATES = ("scheme", "calibration", "bend_law")
+"""Options that say how a weld is to bend."""
 
 PRESETS: Mapping[str, ModelOptions] = {
     PLATE: ModelOptions(membrane="panel", bar_law="linear"),
@@ -132,8 +132,4 @@ def _check_edges(options: ModelOptions) -> None:
     if hinge_law(options.bend_law, "bend_law") != hinge_law("linear"):
         raise InputError(
             f' = {show(options.bend_law)}: {needs} "linear", as its panels bend', "bend_law"
-        )
-    if options.clamped:
-        raise InputError(
-            f': {needs} edges without clamps; take scheme = "n5b8", or a shell', "clamped"
         )

@@ -23,12 +23,12 @@ from foldyn.materials import (
 )
 from foldyn.materials.plate_superlinear import onset_parameters
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.clamps import ClampsTerm
+from foldyn.mechanics.clamps import RIDES, ClampsTerm
 from foldyn.mechanics.edge_gives import BalancedGivesTerm, EdgeGives, EdgeGivesTerm
 from foldyn.mechanics.following import Following, joined, moments, pushes, tensions
 from foldyn.mechanics.membranes import MembranesTerm
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import Edge, edge_lookup
+from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm
 from foldyn.structures.bars_plates import BarsPlatesTerm
 from foldyn.structures.clamps import clamps
@@ -36,13 +36,13 @@ from foldyn.structures.condensed_plates import CondensedPlatesTerm, balanced
 from foldyn.structures.creases import PerCrease, per_crease
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.edge_angles import EdgePlates, curl_moments, outlines, plates_model
-from foldyn.structures.mass import MASS_RULES, lumped
+from foldyn.structures.mass import MASS_RULES, Surface, lumped
 from foldyn.structures.membranes import PanelKind, swelling
 from foldyn.structures.mesh import double_areas, hinge_angles
 from foldyn.structures.panel_plate import Outline
 from foldyn.structures.rigid_plates import Plate, rigid_panels, rigid_plates
 from foldyn.structures.sheet import Sheet
-from foldyn.structures.swelling import Chords, Swelling, chords
+from foldyn.structures.swelling import Chords, Swelling, chords, mean_of_neighbors
 from foldyn.values import choice
 
 FILL = Fill(2700.0, 340, "pattern", "take fewer panels, or an explicit method of motion")
@@ -257,6 +257,7 @@ class Structure(Discretized):
         model = plates_model(
             self.nodes, self.bars, stiffness, self.bar_law, self.folds, self.fold_stiffness,
             self.fold_rest, self.fold_law, self.bends, self.bend_rest, plates,
+            self.clamps,
         )  # fmt: skip
         kind = CondensedPlatesTerm if self.without_edge_angles else BarsPlatesTerm
         return kind(model, (self.fold_law, self.bend_law))
@@ -329,7 +330,7 @@ class Structure(Discretized):
             parts = swelling(self.membranes, self.edge_gives, self.nodes, strain)
         else:
             stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
-            free = _mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
+            free = mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
             tension = -stiffness * self.bar_law.stress(1.0 + free)
             parts = [tensions(self.nodes, self.bars, tension)]
         if self.edge_plates is not None:
@@ -345,11 +346,14 @@ class Structure(Discretized):
             return Swelling(turns, joined((part, 0) for part in parts))
         of_hinges, of_clamps = self._chords
         if len(self.clamps):
-            edges = clamps(self.nodes, self.clamps, self.clamp_stiffness, 0)
             turn = of_clamps.turns(curvature)
-            rows = np.column_stack([self.clamps, np.full(len(self.clamps), -1)])
-            parts.append(moments(edges.points, rows, self.clamp_stiffness * turn))
+            parts.append(self._clamping(self.clamp_stiffness * turn))
         return Swelling(of_hinges.turns(curvature), joined((part, 0) for part in parts))
+
+    def _clamping(self, moment: NDArray) -> Following:
+        """Moments (c,), N m, on the hinges of clamped edges."""
+        points = clamps(self.nodes, self.clamps, self.clamp_stiffness, 0).points
+        return moments(points, np.column_stack([self.clamps, np.full(len(moment), RIDES)]), moment)
 
     def _curled(self, plates: EdgePlates, curvature: NDArray) -> tuple[Following, NDArray]:
         """Moments on the hinges of plates, and forces (r,), N, on the dofs of their edge angles.
@@ -358,14 +362,28 @@ class Structure(Discretized):
         """
         area = 0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
         area = np.bincount(self.triangle_panel, area)
-        moment = curl_moments(plates, self.outlines, curvature, self.sheet, area)
         hinges, on_hinge = np.concatenate([self.folds, self.bends]), plates.angle >= 0
-        turning = np.bincount(plates.angle[on_hinge], moment[on_hinge], minlength=len(hinges))
+        count = len(hinges)
+        moment = curl_moments(plates, self.outlines, curvature, self.sheet, area, count)
+        turning = np.bincount(plates.angle[on_hinge], moment[on_hinge], count + len(self.clamps))
+        parts = [moments(self.nodes[hinges], hinges, turning[:count])]
+        if len(self.clamps):
+            parts.append(self._clamping(turning[count:]))
         push, count = self.body.sheet.per_hidden * moment[~on_hinge], len(plates.rotation_hinge)
         return (
-            moments(self.nodes[hinges], hinges, turning),
+            joined((part, 0) for part in parts),
             np.bincount(-1 - plates.angle[~on_hinge], push, minlength=count),
         )
+
+    @cached_property
+    def surface(self) -> Surface:
+        """See `Discretized`; panels as plates are level at their clamped edges."""
+        made = super().surface
+        if self.edge_plates is None:
+            return made
+        stiff = [made.faces[p] for p in rigid_panels(self.options.rigid, len(made.faces))]
+        edges = {edge_of(a, b) for face in stiff for a, b in around(face)}
+        return made._replace(clamped=tuple(e for e in self.options.clamped if e not in edges))
 
     @cached_property
     def outlines(self) -> list[Outline | None]:
@@ -375,7 +393,7 @@ class Structure(Discretized):
         hinges = np.concatenate([self.folds, self.bends[len(self.bends) - len(pattern.welds) :]])
         return outlines(
             self.nodes, self.centers, hinges, pattern, self.sheet, options.straight,
-            rigid_panels(options.rigid, len(pattern.faces)),
+            rigid_panels(options.rigid, len(pattern.faces)), options.clamped,
         )  # fmt: skip
 
     @cached_property
@@ -424,14 +442,3 @@ class Structure(Discretized):
         """Dihedrals (rad) of folds (nf,) and bends (nh,) at displacement u (n, 3), m."""
         x = self.nodes + self._displacement(u)
         return hinge_angles(x, self.folds), hinge_angles(x, self.bends)
-
-
-def _mean_of_neighbors(pairs: NDArray, triangles: NDArray, value: NDArray) -> NDArray:
-    """Mean (k,) over the triangles (nt, 3) on each pair of nodes (k, 2) of their values (nt,)."""
-    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)).reshape(-1, 2)
-    size = int(triangles.max(initial=0)) + 1
-    key = np.sort(pairs) @ [size, 1]
-    place = np.searchsorted(np.sort(key), sides @ [size, 1])
-    order = np.argsort(key)[place]
-    count = np.bincount(order, minlength=len(pairs))
-    return np.bincount(order, np.repeat(value, 3), minlength=len(pairs)) / count

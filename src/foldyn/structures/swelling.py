@@ -82,3 +82,14 @@ def chords(x: NDArray, triangles: NDArray, panel: NDArray, hinges: NDArray) -> C
         np.array([panel_of_triangle(triangles, panel, corners) for corners in wings]),
         np.array([chord_turns(x[corners]) for corners in wings]),
     )
+
+
+def mean_of_neighbors(pairs: NDArray, triangles: NDArray, value: NDArray) -> NDArray:
+    """Mean (k,) over the triangles (nt, 3) on each pair of nodes (k, 2) of their values (nt,)."""
+    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)).reshape(-1, 2)
+    size = int(triangles.max(initial=0)) + 1
+    key = np.sort(pairs) @ [size, 1]
+    place = np.searchsorted(np.sort(key), sides @ [size, 1])
+    order = np.argsort(key)[place]
+    count = np.bincount(order, minlength=len(pairs))
+    return np.bincount(order, np.repeat(value, 3), minlength=len(pairs)) / count

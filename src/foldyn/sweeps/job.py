@@ -103,9 +103,11 @@ class Job:
                 raise RuntimeError("this worker has another version of Foldyn than who asks it")
             case_file = self.case_file(point)
             result, case, shared = case_file.computation().result(), case_file.case(), {}
+            for variable in result.variables.values():  # a measure changes nothing for the others
+                variable.values.setflags(write=False)
             for each in self.measures:
                 with noted():
-                    values[each.name] = each.of(result, case, shared)
+                    values[each.name] = each.of(result.copy(deep=False), case, shared)
         said = [str(one.message) for one in told if issubclass(one.category, FoldynWarning)]
         failure, warned = ("; ".join(dict.fromkeys(texts)) for texts in (failures, said))
         return Evaluation(values, failure, warned, time.perf_counter() - began, lasting)

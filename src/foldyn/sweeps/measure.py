@@ -118,6 +118,10 @@ class Asked:
             raise
         except Exception as error:  # of a user's function, of any kind
             raise InputError(f"{self.text}: {type(error).__name__}: {error}") from error
+        if found is None:
+            raise InputError(f"{self.text}: gave nothing; let it return a number or an array")
+        if np.iscomplexobj(found):
+            raise InputError(f"{self.text}: gave complex numbers; take their abs, real or imag")
         try:
             value = np.asarray(found, dtype=np.float64)
         except (TypeError, ValueError):

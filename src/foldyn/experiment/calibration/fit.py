@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from foldyn.errors import ComputationError, FoldynWarning, InputError
-from foldyn.experiment.calibration.fit_problem import Problem, problem
+from foldyn.experiment.calibration.fit_problem import Finer, Problem, problem
 from foldyn.experiment.calibration.fitted import Descent, Fit, score
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter
@@ -261,31 +261,58 @@ class _Search:
         """How far ever smaller time steps, and elements, would move the estimates.
 
         The misfit at the optimum is computed anew with half of each. What that changes moves the
-        optimum by its `influence`, and Richardson's extrapolation goes the rest of the way.
+        optimum by its `influence`, and Richardson's extrapolation goes the rest of the way. Doubts
+        about that are shifts to both sides.
         """
         found = []
-        (coarse,) = self.at([values])
+        coarse = np.asarray(self.at([values])[0])
         for finer in self.made.finer(values):
-            with pool_of(partial(_evaluate, finer.problem), 1) as pool:
-                (fine,) = self._evaluations(finer.problem, pool).at([tuple(values.tolist())])
-            if fine.failure:
+            fine = self._outcome(finer.problem, values)
+            if isinstance(fine, str):
                 _warn(
                     f"at the values found, the model fails with a finer {finer.what} "
-                    f"({fine.failure}): the intervals do not include the error of the {finer.what}"
+                    f"({fine}): the intervals do not include the error of the {finer.what}"
                 )
                 found.append(np.full(len(values), np.nan))
                 continue
-            change = ((fine.values[PREDICTED] - coarse) * self.weight)[self.chosen]
+            change = ((fine - coarse) * self.weight)[self.chosen]
             shift = known.influence @ change / (1.0 - 0.5**finer.order)
-            for k in np.flatnonzero(np.abs(shift) > known.standard_error):
+            large = np.abs(shift) > known.standard_error
+            doubt = (
+                self._doubt(finer, values, shift, known) if large.any() else np.zeros(len(large))
+            )
+            doubt[~(doubt > known.standard_error)] = 0.0
+            for k in np.flatnonzero(large):
                 _warn(
                     f"{self.made.space.keys[k]}: the {finer.what} is too coarse: it shifts the "
                     f"value by about {-shift[k]:.2g}, more than the standard error "
-                    f"({known.standard_error[k]:.2g}). The interval is wide enough for both; for a "
-                    f"better value set {finer.remedy}"
+                    f"({known.standard_error[k]:.2g}). {_width(finer, doubt[k])}; for a better "
+                    f"value set {finer.remedy}"
                 )
-            found.append(shift)
+            found += [shift, doubt, -doubt]
         return found
+
+    def _doubt(
+        self, finer: Finer, values: NDArray[np.float64], shift: NDArray[np.float64],
+        known: Uncertainty,
+    ) -> NDArray[np.float64]:  # fmt: skip
+        """By how much the estimates of a much finer model are not where a shift leads them.
+
+        Where it leads, the model must fit but for the error that it still has itself.
+        """
+        there = np.clip(values + shift, self.lower, self.upper)
+        predicted = self._outcome(finer.proof, there)
+        if isinstance(predicted, str):  # where it leads there is no model
+            return np.abs(shift)
+        left = known.influence @ ((predicted - self.observed) * self.weight)[self.chosen]
+        expected = values + shift * (1.0 - float(finer.times) ** -finer.order) - there
+        return np.abs(left - expected)
+
+    def _outcome(self, made: Problem, values: NDArray[np.float64]) -> Outcome:
+        """Predictions of another model."""
+        with pool_of(partial(_evaluate, made), 1) as pool:
+            (found,) = self._evaluations(made, pool).at([tuple(values.tolist())])
+        return found.failure or found.values[PREDICTED]
 
     def _residual(self, points: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
         """Weighted residuals; infinite where the model fails, so that a search steps back."""
@@ -326,6 +353,19 @@ class _Search:
                 f"{self.made.space.keys[place]}: the model fails beside {values[place]:.6g}: {why}"
             )
         return np.stack(columns, axis=1)
+
+
+def _width(finer: Finer, doubt: float) -> str:
+    """What an interval of a coarse model is worth."""
+    if not doubt:
+        where = (
+            "" if finer.proof is not finer.problem else f", if its error has order {finer.order}"
+        )
+        return f"The interval is wide enough for both{where}"
+    return (
+        f"A finer {finer.what} disagrees with that by {doubt:.2g}: the interval is wider by "
+        "as much on both sides, and may still miss the truth"
+    )
 
 
 def _warn_of_pairing(made: Problem, values: NDArray[np.float64]) -> None:

@@ -172,11 +172,14 @@ class Problem:
         if steps:
             longest = 2.0 * max(one["analysis.dt"] for one in steps.values())
             remedy = f"analysis.dt below {longest:.3g} s"
-            found.append(Finer("time step", remedy, min(orders), self._changed(steps)))
+            half = self._changed(steps)
+            quarters = {k: {key: 0.5 * x for key, x in one.items()} for k, one in steps.items()}
+            quarter = self._changed(quarters)
+            found.append(Finer("time step", remedy, min(orders), half, quarter, 4))
         if meshes:
             most = max(one["model.divisions"] for one in meshes.values())
-            remedy = f"model.divisions = {most:g}"
-            found.append(Finer("mesh", remedy, MESH_ORDER, self._changed(meshes)))
+            remedy, half = f"model.divisions = {most:g}", self._changed(meshes)
+            found.append(Finer("mesh", remedy, MESH_ORDER, half, half, 2))
         return found
 
     def _motion(self, run: PredictedRun, values: Sequence[float] | NDArray) -> Any:
@@ -198,12 +201,15 @@ class Finer(NamedTuple):
     what : "time step" or "mesh".
     remedy : what a case file would say for it.
     order : with which the error falls.
+    proof : one as many times finer as `times`, to prove what the two tell of still finer ones.
     """
 
     what: str
     remedy: str
     order: int
     problem: Problem
+    proof: Problem
+    times: int
 
 
 def problem(

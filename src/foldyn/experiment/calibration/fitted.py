@@ -154,11 +154,16 @@ class Fit:
         return all(one.sigma is not None for one in self.problem.measurements if not one.held_out)
 
     @property
-    def unlikely(self) -> bool:
-        """Whether noise as large as the data's would hardly ever leave such a misfit."""
+    def unlikely(self) -> str:
+        """What a misfit says that the noise of the data would hardly ever leave; "" of others."""
         if not self.weighed or not np.isfinite(self.misfit):
-            return False
-        return bool(chi2.sf(self.freedom * self.misfit**2, self.freedom) < RARE)
+            return ""
+        square = self.freedom * self.misfit**2
+        if chi2.sf(square, self.freedom) < RARE:
+            return "more than noise explains: the model is wrong somewhere, or sigma is too small"
+        if chi2.cdf(square, self.freedom) < RARE:
+            return "less than such noise leaves: sigma is too large, and intervals go by the misfit"
+        return ""
 
     @property
     def quality(self) -> str:
@@ -172,9 +177,7 @@ class Fit:
                 "compare it with noise)."
             )
         text = f"Misfit: {self.misfit:.3g} sigma (reduced chi-square {self.misfit**2:.3g}, "
-        text += f"{freedom})"
-        wrong = ", more than noise explains: the model is wrong somewhere, or sigma is too small"
-        return f"{text}{wrong if self.unlikely else ''}."
+        return text + f"{freedom})" + (f", {self.unlikely}." if self.unlikely else ".")
 
     def document(self) -> dict[str, Any]:
         """The case file with the values found."""
