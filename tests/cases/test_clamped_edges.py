@@ -41,6 +41,21 @@ def test_moving_the_clamped_edge_with_the_sheet_strains_nothing(model):
     assert s.energy(turned) > 1e-7
 
 
+def test_turns_that_keep_the_tangent_strain_nothing(model):
+    """Those about the normal of the panel and about the tangent, which tilts the edge."""
+    skew = fd.Pattern([[0, 0, 0], [1, 0.3, 0], [1, 1.3, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+    s = structure(model, skew, clamped=[(0, 3)])
+    a, b = np.cos(0.3), np.sin(0.3)
+    for turn, least in (
+        ([[a, -b, 0], [b, a, 0], [0, 0, 1]], 0.0),
+        ([[1, 0, 0], [0, a, -b], [0, b, a]], 0.0),
+        ([[a, 0, b], [0, 1, 0], [-b, 0, a]], 1e-3),  # about the edge
+    ):
+        u = s.nodes @ np.transpose(turn) - s.nodes
+        energy = s.energy(u)
+        assert energy > least if least else energy < 1e-20
+
+
 def test_the_energy_of_a_clamp_in_bars_and_hinges_is_that_of_its_stiffness():
     """A panel that turns as a whole by phi about its edge: k phi^2 / 2 with k = 2 D L / h."""
     s = structure("bars and hinges", clamped=[(0, 3)])

@@ -35,7 +35,7 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, edge_lookup, edge_of
 from foldyn.shells.mesh import ShellMesh
 from foldyn.structures import Sheet
-from foldyn.structures.clamps import mirrored
+from foldyn.structures.clamps import opposite
 
 
 class Sides(NamedTuple):
@@ -103,7 +103,7 @@ def sides(
         hinge[k], weight[k] = len(numbers) + len(wings), 1.0
         row = (a[k], b[k], third[k], n + len(wings))
         hinges.append(np.array([row]))
-        wings.append(mirrored(mesh.nodes[[a[k], b[k], third[k]]]))
+        wings.append(opposite(mesh.nodes[[a[k], b[k], third[k]]]))
     free = np.zeros(3 * count, bool)
     free[alone] = True
     free[stiff] = False

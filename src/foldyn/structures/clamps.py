@@ -95,7 +95,7 @@ def clamps(x: NDArray, rows: NDArray, stiffness: NDArray, group: int) -> Clamps:
     group : of the energies, to which theirs belongs.
     """
     points = x[rows]
-    wings = np.array([mirrored(corners) for corners in points]).reshape(-1, 1, 3)
+    wings = np.array([opposite(corners) for corners in points]).reshape(-1, 1, 3)
     return Clamps(
         nodes=np.array(rows),
         points=np.ascontiguousarray(np.concatenate([points, wings], axis=1) - x.mean(axis=0)),
@@ -105,8 +105,11 @@ def clamps(x: NDArray, rows: NDArray, stiffness: NDArray, group: int) -> Clamps:
     )
 
 
-def mirrored(corners: NDArray) -> NDArray:
-    """Third corner of a triangle (3, 3), mirrored at its first side in its own plane."""
+def opposite(corners: NDArray) -> NDArray:
+    """Point beyond the middle of the first side of a triangle (3, 3), as far as its third corner.
+
+    At a right angle to the side: a panel whose edge tilts, but whose tangent stays, does not turn.
+    """
     a, b, c = corners
     foot = a + (b - a) * ((c - a) @ (b - a)) / ((b - a) @ (b - a))
-    return 2.0 * foot - c
+    return 0.5 * (a + b) + foot - c

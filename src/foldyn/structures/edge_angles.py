@@ -31,7 +31,7 @@ from foldyn.materials import BarLaw, HingeLaw
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
-from foldyn.structures.clamps import mirrored
+from foldyn.structures.clamps import opposite
 from foldyn.structures.condensed_panel import panel_moments, panel_stiffness
 from foldyn.structures.mesh import Mesh, hinge_angles, lengths
 from foldyn.structures.panel_plate import Outline, outline
@@ -211,7 +211,7 @@ def plates_model(
     clamps : (c, 3) triangles at clamped edges.
     """
     length, middle = lengths(nodes, bars), nodes[clamps[:, :2]].mean(axis=1)
-    wings = np.array([mirrored(corners) for corners in nodes[clamps]]).reshape(-1, 3) - middle
+    wings = np.array([opposite(corners) for corners in nodes[clamps]]).reshape(-1, 3) - middle
     return BarsPlates(
         bars=mechanics.build(nodes, bars, bar_stiffness, bar_law, ()),
         rotations=len(plates.rotation_hinge),
