@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.course import Outcome
 from foldyn.errors import InstabilityError, PenetrationError
+from foldyn.structures.condensed_plates import CondensedPlatesTerm
 from foldyn.structures.locking import kept_apart
 
 if TYPE_CHECKING:
@@ -96,7 +97,12 @@ def _reason(motion: Motion, code: int) -> str:
         if motion.case.contact is not None:
             why = 'panels meet too hard for an implicit method: use method = "dormand_prince"'
         return f"no equilibrium was found at the end of a step, however small the step: {why}"
-    reason = "a load is not finite"
+    case, reason = motion.case, "a load is not finite"
+    if case.remembering and isinstance(case.body.sheet, CondensedPlatesTerm):
+        reason += (
+            ', or panels find no balance beside creases with memory (take method = "newmark", or a '
+            "crease_stiffness nearer to that of panels)"
+        )
     if plan.steps and not method.implicit:
         reason = (
             f"the step of {plan.dt:.3g} s is too large (critical at the start: "
