@@ -12,7 +12,6 @@ from typing import Any, Literal
 from foldyn.errors import FoldynWarning, InputError, within
 from foldyn.formats import (
     cp,
-    cp_writer,
     dxf,
     dxf_writer,
     fold,
@@ -80,7 +79,7 @@ _FORMATS = (
     Format("FOLD", (".fold",), read=fold.read, write=fold_writer.write, frames=True),
     Format("OBJ", (".obj",), read=obj.read, write=obj.write),
     Format("SVG", (".svg",), read=svg.read, write=svg_writer.write),
-    Format("CP", (".cp",), read=cp.read, write=cp_writer.write),
+    Format("CP", (".cp",), read=cp.read, write=cp.write),
     Format("OPX", (".opx",), read=opx.read),
     Format("DXF", (".dxf",), read=dxf.read, write=dxf_writer.write),
     Format("STL", (".stl",), write=stl.write),
