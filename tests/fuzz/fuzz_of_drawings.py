@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fuzz_target import Target
 
-from foldyn.formats import cp, dxf_writer, svg_writer
+from foldyn.formats import cp, dxf, svg_writer
 from foldyn.formats.files import diagnose
 from foldyn.patterns import miura, simple_fold
 
@@ -81,7 +81,7 @@ def _dxf(_: Path) -> list[bytes]:
     space.add_line((0, 0), (9, 9), dxfattribs={"color": 5})
     text = io.StringIO()
     document.write(text)
-    return [text.getvalue().encode(), *(dxf_writer.write(pattern).encode() for pattern in _flat())]
+    return [text.getvalue().encode(), *(dxf.write(pattern).encode() for pattern in _flat())]
 
 
 def read(file: Path) -> str:

@@ -13,7 +13,6 @@ from foldyn.errors import FoldynWarning, InputError, within
 from foldyn.formats import (
     cp,
     dxf,
-    dxf_writer,
     fold,
     fold_writer,
     obj,
@@ -81,7 +80,7 @@ _FORMATS = (
     Format("SVG", (".svg",), read=svg.read, write=svg_writer.write),
     Format("CP", (".cp",), read=cp.read, write=cp.write),
     Format("OPX", (".opx",), read=opx.read),
-    Format("DXF", (".dxf",), read=dxf.read, write=dxf_writer.write),
+    Format("DXF", (".dxf",), read=dxf.read, write=dxf.write),
     Format("STL", (".stl",), write=stl.write),
 )
 
