@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, Continuation
 from foldyn.dynamics.audit import Rounding, audited
 from foldyn.dynamics.course import Outcome, Samples, StepPlan
-from foldyn.dynamics.doubts import doubts, is_off
+from foldyn.dynamics.doubts import INACCURATE, doubts, is_off
 from foldyn.dynamics.failures import failure, smaller_step
 from foldyn.dynamics.identity import identity, key_of
 from foldyn.dynamics.initial import begin
@@ -23,7 +23,6 @@ from foldyn.dynamics.methods import Compiled, Implicit, Integrator
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
-from foldyn.dynamics.second_attempt import announced, reason_of
 from foldyn.dynamics.stability import (
     MARGIN,
     damper_rate,
@@ -152,12 +151,24 @@ class Motion:
         """The same motion by the better method, if there is one."""
         other = self._better() if self._better else None
         if other is not None:
-            other.reason = reason_of(other, self)
+            off = f"with {self._unlike(other)[0]} the energy balance was off by more than"
+            other.reason = f"{self.reason}; computed anew: {off} {INACCURATE:.0%}"
         return other
+
+    def _unlike(self, other: Motion) -> tuple[str, str]:
+        """How it is computed, unlike another one: in words, and as an argument."""
+        if self.method is other.method:
+            return f"steps of {self.plan.dt:.3g} s", f"dt = {self.plan.dt:.6g}"
+        return self.method.name, f'method = "{self.method.name}"'
 
     def _anew(self, progress: bool | Reporter | None) -> xarray.Dataset:
         assert self._other is not None
-        text = announced(self._other, self, self.output.balance.relative)
+        new, ask = self._other._unlike(self)
+        text = (
+            f"the motion is computed anew with {new}: with {self._unlike(self._other)[0]}, which "
+            f"auto chose, its energy balance is off by {self.output.balance.relative:.1%} of the "
+            f"energies at play; {ask} saves the first attempt"
+        )
         warnings.warn(text, FoldynWarning, stacklevel=5)
         self._start()  # gives its samples' memory back
         if self._keeping is not None:
