@@ -33,7 +33,6 @@ from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.stored import stored
 from foldyn.dynamics.system import pack
-from foldyn.dynamics.touch import contact_quantities
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.results import Quantity
 from foldyn.values import choice, flag, number, of_kind
@@ -243,9 +242,7 @@ def prepare(
         )
     span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
     packed = pack(case, span, u, modal)
-    sampler = Sampler(
-        case, {} if sample is None else sample, u, v, plan.start, contact_quantities(case)
-    )
+    sampler = Sampler(case, {} if sample is None else sample, u, v, plan.start)
     state = u, v, remembered, initial.continuation if initial else None
     better = None
     if chosen.better:
