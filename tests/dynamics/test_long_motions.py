@@ -19,7 +19,7 @@ from long_cases import same, sheet, simulated
 import foldyn as fd
 from foldyn.dynamics import METHODS, keeping, motion, output
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
-from foldyn.results import columns, streams
+from foldyn.results import columns, netcdf
 
 OFTEN = 1e-9  # seconds: a checkpoint whenever there is an opportunity
 
@@ -124,9 +124,9 @@ def test_what_the_user_samples_goes_on_too(tmp_path):
 def test_samples_that_memory_does_not_hold_are_the_same(tmp_path, monkeypatch, method, every):
     """Room for some sixteen; the file is written and read in pieces as well."""
     whole = simulated("sheet", duration=0.8, every=every, method=method)
-    for module in (columns, output, streams):
+    for module in (columns, output, netcdf):
         monkeypatch.setattr(module, "PIECE", 4000)
-    monkeypatch.setattr(streams, "CHUNK", 3000)
+    monkeypatch.setattr(netcdf, "CHUNK", 3000)
     file = tmp_path / "run.nc"
     found = simulated("sheet", duration=0.8, every=every, method=method, store=file)
     same(found, whole)
