@@ -1,4 +1,4 @@
-"""`Stage`: the interactive part of a page, and what it shows of results of each kind."""
+"""`Stage`: the interactive part of a page, which shows results of each kind or a sheet at rest."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from foldyn import __version__
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import character, mac
+from foldyn.patterns import Pattern
 from foldyn.plots.along import displacements, stretches, way
 from foldyn.results.contents import pattern_of
 from foldyn.structures import Sheet, discretize
@@ -24,7 +25,7 @@ from foldyn.viewer.arrays import Arrays
 from foldyn.viewer.backdrop import Backdrop
 from foldyn.viewer.fields import Field, energies, fields, folding_fields
 from foldyn.viewer.scripts import in_page
-from foldyn.viewer.sheet import sheet
+from foldyn.viewer.sheet import bare_sheet, sheet
 
 OF_SIZE, OF_LARGEST, OF_COLORS = 5e-5, 1e-3, 4e-3
 """Errors of the page's displacements over the sheet's size and over the largest of them, of which
@@ -103,6 +104,25 @@ def stage(
 def _threads() -> ThreadpoolController:
     """Those of BLAS, whose libraries are found once."""
     return ThreadpoolController()
+
+
+def rest_stage(shown: Pattern | Case, title: str) -> Stage:
+    """Show a pattern, or a case with its supports and loads, at rest."""
+    arrays = Arrays()
+    bare = isinstance(shown, Pattern)
+    drawn = bare_sheet(arrays, "s0", shown) if bare else sheet(arrays, "s0", shown)
+    count = len(shown.vertices if bare else shown.structure.nodes)
+    result = {
+        "name": title,
+        "sheet": "s0",
+        "displacement": arrays.changing("u", np.zeros((1, count, 3)), 1.0),
+        "moments": arrays.exact("t", [0.0], "f4"),
+    }
+    about = {
+        "title": title, "kind": "shape", "version": __version__, "node": None, "axis": 0,
+        "sheets": {"s0": drawn}, "results": [result],
+    }  # fmt: skip
+    return Stage(about, arrays)
 
 
 def _kind(result: xr.Dataset) -> str:
