@@ -13,7 +13,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numba.core import event
 
 import foldyn as fd
 from foldyn.dynamics import METHODS
@@ -201,6 +200,8 @@ and all of them those of the stages before."""
 @contextmanager
 def count_compiled() -> Iterator[Callable[[], int]]:
     """Give what returns how many functions have been compiled so far within this context."""
+    from numba.core import event  # Numba itself only after `foldyn.jit` has checked its variables
+
     with event.install_recorder("numba:compile") as recorder:
         yield lambda: sum(one.is_start for _, one in recorder.buffer)
 
