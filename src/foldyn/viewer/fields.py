@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case
-from foldyn.cases.loaded import SomeLoads
+from foldyn.cases.case_assembly import SomeLoads
 from foldyn.dynamics.sampling import CONTACT_FORCE
 from foldyn.materials.series import in_series
 from foldyn.mechanics import angles
