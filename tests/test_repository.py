@@ -14,7 +14,7 @@ import foldyn as fd
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = sorted((ROOT / "src").glob("**/*.py"))
-MOST_LINES = 450
+MOST_LINES = 550
 
 # a home folder, a workplace, a temporary folder: of one machine, not of the project
 MACHINE_PATHS = re.compile(

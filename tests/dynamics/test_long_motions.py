@@ -17,7 +17,8 @@ import pytest
 from long_cases import same, sheet, simulated
 
 import foldyn as fd
-from foldyn.dynamics import METHODS, keeping, motion, output
+from foldyn.dynamics import METHODS, motion, output
+from foldyn.dynamics.checkpoint import CHECKPOINT
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
 from foldyn.results import columns, netcdf
 
@@ -163,7 +164,7 @@ def test_a_motion_goes_on_only_as_it_was_begun(tmp_path):
 def test_another_program_does_not_go_on(tmp_path, monkeypatch):
     options = {"duration": 1.0, "every": 0.01, "store": tmp_path / "run.nc", "checkpoint": OFTEN}
     cut_off(**options)
-    monkeypatch.setattr("foldyn.dynamics.identity.program", lambda *_: "another")
+    monkeypatch.setattr("foldyn.dynamics.checkpoint.program", lambda *_: "another")
     with pytest.raises(InputError, match="was begun with the version of Foldyn"):
         simulated("sheet", **options, resume=True)
 
@@ -242,8 +243,8 @@ def test_what_is_damaged_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"velocity\.f8: is damaged"):
         simulated("sheet", **options, resume=True)
     (folder / "velocity.f8").write_bytes(content)
-    checkpoint = (folder / keeping.CHECKPOINT).read_bytes()
-    (folder / keeping.CHECKPOINT).write_bytes(checkpoint[: len(checkpoint) // 2])
+    checkpoint = (folder / CHECKPOINT).read_bytes()
+    (folder / CHECKPOINT).write_bytes(checkpoint[: len(checkpoint) // 2])
     with pytest.raises(InputError, match=r"is damaged, or .*; remove that folder to begin anew"):
         simulated("sheet", **options, resume=True)
 
@@ -295,7 +296,7 @@ def refused(other: int, options) -> None:
 def test_sigkill_at_random_moments_with_a_second_process(tmp_path, kills):
     file, chance = tmp_path / "run.nc", random.Random(kills)
     options = {**LONG, "store": str(file), "resume": True}
-    checkpoint = tmp_path / "run.nc.unfinished" / keeping.CHECKPOINT
+    checkpoint = tmp_path / "run.nc.unfinished" / CHECKPOINT
     killed, reached = 0, [0.0]
     while killed < kills:
         process = started(options)

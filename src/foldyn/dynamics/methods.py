@@ -17,11 +17,11 @@ from foldyn.dynamics import (
     generalized_alpha,
     rk4,
 )
+from foldyn.dynamics.checkpoint import restore, snapshot, state_parts
 from foldyn.dynamics.course import Course, Samples, StepPlan
 from foldyn.dynamics.equation import EquationOfMotion
 from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.modal_damping import ModalRows, modal_rows
-from foldyn.dynamics.snapshot import parts_of, restore, snapshot
 from foldyn.dynamics.stability import (
     MARGIN,
     Growth,
@@ -86,7 +86,7 @@ class Compiled:
     def _parts(self) -> dict[str, Any]:
         contact = [self._packed.body.kept(work, ContactTerm) or () for work in self._works]
         powers = [memory.powers for memory in self._memories]
-        parts = parts_of(self._packed, self._course) | {"powers": powers, "contact": contact}
+        parts = state_parts(self._packed, self._course) | {"powers": powers, "contact": contact}
         if self._packed.system.touches:  # a step's limit looks at the end of the one before
             whole = self._memories[0]
             parts["seen"] = [self._works[0].angle, whole.displacement, whole.velocity]

@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case, Continuation
 from foldyn.dynamics.audit import Rounding, audited
+from foldyn.dynamics.checkpoint import KEY, Keeping, identity, identity_digest
 from foldyn.dynamics.course import Outcome, Samples, StepPlan
 from foldyn.dynamics.doubts import INACCURATE, doubts, is_off
 from foldyn.dynamics.failures import failure, smaller_step
-from foldyn.dynamics.identity import identity, key_of
 from foldyn.dynamics.initial import begin
-from foldyn.dynamics.keeping import KEY, Keeping
 from foldyn.dynamics.methods import Compiled, Implicit, Integrator
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
@@ -109,6 +108,22 @@ class Motion:
         self.integrate(progress, keeping)
         return self.result(progress)
 
+    def run_into_file(
+        self, keeping: Keeping, progress: bool | Reporter | None = None
+    ) -> xarray.Dataset:
+        """Integrate the motion into the file of its result; see `simulate`."""
+        if finished := self.finished(keeping):
+            return finished
+        with keeping.held():
+            try:
+                result = self.run(progress, keeping)
+            except ComputationError as error:
+                if error.partial is not None:
+                    error.partial.attrs["stopped_because"] = str(error)
+                    error.partial = keeping.save_result(error.partial)
+                raise
+            return keeping.save_result(result)
+
     def samples(self, progress: bool | Reporter | None = None) -> Samples:
         """Integrate the motion; its samples alone, which do not carry the case."""
         self.integrate(progress)
@@ -122,7 +137,7 @@ class Motion:
         """
         self.audit()
         if self._better is not None and is_off(self.output.balance, self._rounding):
-            return self._anew(progress)
+            return self._run_anew(progress)
         self._judge()
         crossings = self._crossings()
         if len(crossings.first):
@@ -161,7 +176,7 @@ class Motion:
             return f"steps of {self.plan.dt:.3g} s", f"dt = {self.plan.dt:.6g}"
         return self.method.name, f'method = "{self.method.name}"'
 
-    def _anew(self, progress: bool | Reporter | None) -> xarray.Dataset:
+    def _run_anew(self, progress: bool | Reporter | None) -> xarray.Dataset:
         assert self._other is not None
         new, ask = self._other._unlike(self)
         text = (
@@ -259,7 +274,7 @@ class Motion:
             report(Progress(now - plan.start, plan.end - plan.start, step, self.audit()))
             if step == plan.steps if plan.steps else now >= plan.end:
                 return
-            self._keep(engine)
+            self._checkpoint_if_due(engine)
             if plan.steps and step % self.recheck_after == 0 and step > done:
                 place(system, course.u, course.v, now, memory)
                 self.recheck(by.outward(memory.displacement))
@@ -291,7 +306,7 @@ class Motion:
 
     def finished(self, keeping: Keeping) -> xarray.Dataset | None:
         """Its result, if it is finished and to be gone on with."""
-        found = keeping.finished(key_of(self._identity()))
+        found = keeping.finished(identity_digest(self._identity()))
         if found is None and keeping.resume and self._other is not None:
             return self._other.finished(keeping)
         return found
@@ -304,7 +319,7 @@ class Motion:
             fits = self.output.fits(int(self.course.tally.steps), self.stored)
         return length if fits is None else max(0, min(length, fits))
 
-    def _keep(self, engine: Compiled | Implicit) -> None:
+    def _checkpoint_if_due(self, engine: Compiled | Implicit) -> None:
         """Make a checkpoint, if it is time for one."""
         if self._keeping is None or not self._keeping.due:
             return
@@ -390,7 +405,7 @@ class Motion:
             self._continuations(),
         )  # fmt: skip
         if self._keeping is not None:
-            result.attrs[KEY] = key_of(self._identity())
+            result.attrs[KEY] = identity_digest(self._identity())
         return crossings.recorded(self.output.whole(result, self.stored))
 
     def _statistics(self) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from foldyn.algebra.banded import one_thread
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.actuation import note_offsets
+from foldyn.dynamics.checkpoint import restore, snapshot, state_parts
 from foldyn.dynamics.course import Course, Outcome, Samples, StepPlan
 from foldyn.dynamics.equation import accelerate, write
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
@@ -24,7 +25,6 @@ from foldyn.dynamics.implicit.newton import Newton
 from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Scheme
 from foldyn.dynamics.implicit.touching import TouchingNewton
 from foldyn.dynamics.inertia import times_mass
-from foldyn.dynamics.snapshot import parts_of, restore, snapshot
 from foldyn.dynamics.system import Packed
 from foldyn.mechanics.hinge_memory import HingeMemory
 
@@ -182,7 +182,7 @@ class Implicit:
 
     def _parts(self) -> dict[str, Any]:
         own = {"engine": self, "scheme": self._scheme, "newton": self._newton}
-        return parts_of(self._packed, self._course) | own | {"matrices": self._matrix.changing}
+        return state_parts(self._packed, self._course) | own | {"matrices": self._matrix.changing}
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
