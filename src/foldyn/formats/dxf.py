@@ -21,12 +21,11 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError, optional
 from foldyn.formats.curves import CHORD
-from foldyn.formats.drawing import Drawing
+from foldyn.formats.drawing import METERS, Drawing
 from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
 from foldyn.formats.lines import MOST_LINES, too_many
 from foldyn.formats.notes import count, without_length
 from foldyn.formats.svg_writer import NAMES, PER_METER
-from foldyn.formats.units import METERS
 from foldyn.formats.writers import flat_points, letters, warn_of_angles
 from foldyn.input_files import DEEPEST
 from foldyn.patterns import Pattern

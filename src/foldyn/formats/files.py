@@ -14,9 +14,8 @@ import numpy as np
 from foldyn.errors import FoldynWarning, InputError, within
 from foldyn.formats import cp, dxf, fold, fold_writer, obj, opx, stl, svg, svg_writer
 from foldyn.formats.building import Built, built
-from foldyn.formats.drawing import Drawing
+from foldyn.formats.drawing import METERS, Drawing
 from foldyn.formats.facets import with_convex_panels, with_facets
-from foldyn.formats.units import METERS
 from foldyn.formats.writers import warn_of_boards
 from foldyn.input_files import path_of, read_text
 from foldyn.patterns import Pattern
