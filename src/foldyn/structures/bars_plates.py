@@ -19,17 +19,10 @@ from foldyn.mechanics.plates import (
     plates_work,
 )
 from foldyn.mechanics.plates_tangent import PlatesPattern, add_plates_tangent, plates_pattern
-from foldyn.mechanics.sheet_term import (
-    NO_DOF,
-    FoldHinges,
-    SheetTerm,
-    SoftHinges,
-    Unstrained,
-    largest_turn,
-)
+from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges, SheetTerm, SoftHinges, largest_turn
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
-from foldyn.mechanics.term import Compiled, Folds
+from foldyn.mechanics.term import Compiled, Folds, Unstrained
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm, stretch
 from foldyn.values import writable
 
