@@ -156,7 +156,7 @@ class Case(Loaded, Damped):
                 load.rest_changes(self.structure, place)
             with faults.collected():
                 load.following(self.structure, place)
-        faults.tell()
+        faults.raise_all()
 
     def altered(self, **changes: Any) -> Case:
         """With other fields; what this case warned of when it was made is not said again."""

@@ -1,4 +1,4 @@
-"""What a `Case` is assembled from: its supports, its loads and its damping."""
+"""Assembly of a `Case`: what its supports, loads and damping do to a structure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checkpoints of a motion, from which it goes on after whatever ended it.
+"""Checkpoints: how an interrupted motion is stored on disk, and resumed.
 
 Beside the file of its result stands a folder with its samples, which only grow, and a checkpoint:
 what the motion is, how many samples count, their checksums, and a snapshot of all on which the next
@@ -203,7 +203,7 @@ class Keeping:
         except OSError as error:
             self._fail(error)
 
-    def checkpoint(self, standing: Mapping[str, NDArray], reached: float) -> None:
+    def checkpoint(self, arrays: Mapping[str, NDArray], reached: float) -> None:
         """Make a checkpoint at the time (s) reached, after `append` of all samples until then."""
         told = {
             "motion": self._about, "samples": self.columns.count, "sums": self.columns.sums,
@@ -213,7 +213,7 @@ class Keeping:
         try:
             self.columns.settle()
             with whole(self.folder / CHECKPOINT) as part:
-                np.savez(part, **{_ABOUT: text, **standing})  # type: ignore[arg-type]
+                np.savez(part, **{_ABOUT: text, **arrays})  # type: ignore[arg-type]
                 seal(part)
         except OSError as error:
             self._fail(error)

@@ -75,13 +75,13 @@ class Compiled:
         arguments = [(equation.sampled(out), *case) for equation in self._equations]
         return run_together(self._loop, [work.team for work in self._works], arguments)[0]
 
-    def standing(self) -> dict[str, NDArray]:
+    def checkpoint_arrays(self) -> dict[str, NDArray]:
         """All on which the next steps depend beside the case, between two stretches."""
         return snapshot(self._parts())
 
-    def go_on(self, standing: Mapping[str, NDArray]) -> None:
+    def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
         """Go on as the engine that stood there; for as many threads."""
-        restore(self._parts(), standing)
+        restore(self._parts(), arrays)
 
     def _parts(self) -> dict[str, Any]:
         contact = [self._packed.body.kept(work, ContactTerm) or () for work in self._works]

@@ -195,7 +195,7 @@ class Motion:
         size, remedy = float(self.course.tally.farthest), smaller_step(self)
         texts = [doubts(self.output.balance, self._rounding, self.plan, size, remedy)]
         if resists_turns(self.case, self.packed):
-            seen, scale = self.output.looked_at(self.stored, LOOKS), self.output.balance.scale
+            seen, scale = self.output.evenly_spaced(self.stored, LOOKS), self.output.balance.scale
             texts.append(turns_told(self.case, self.packed, self._state[0], *seen, scale))
         for text in filter(None, texts):
             warnings.warn(text, FoldynWarning, stacklevel=5)
@@ -217,7 +217,7 @@ class Motion:
             engine = self.method.engine(self.case, self.packed, self.course, self.plan)
             continued = self._state[3] if self.case.contact is None else None
             if isinstance(engine, Implicit) and continued and continued.method == self.method.name:
-                engine.go_on_from(continued.values)
+                engine.continue_from(continued.values)
             self._engine = engine
             self._advance(engine, report)
         except KeyboardInterrupt:
@@ -324,9 +324,9 @@ class Motion:
         if self._keeping is None or not self._keeping.due:
             return
         self.output.flush(self.stored)
-        standing = {f"engine.{name}": array for name, array in engine.standing().items()}
-        standing |= self.output.standing() | {"seconds": np.array(self.seconds)}
-        self._keeping.checkpoint(standing, float(self.course.tally.time))
+        arrays = {f"engine.{name}": array for name, array in engine.checkpoint_arrays().items()}
+        arrays |= self.output.checkpoint_arrays() | {"seconds": np.array(self.seconds)}
+        self._keeping.checkpoint(arrays, float(self.course.tally.time))
 
     def _resumed(self, engine: Compiled | Implicit) -> float:
         """Go on from the last checkpoint, if there is one; seconds that were spent until then."""
@@ -337,8 +337,8 @@ class Motion:
         if kept is None:
             return 0.0
         own = "engine."
-        engine.go_on({name[len(own) :]: kept[name] for name in kept if name.startswith(own)})
-        self.output.go_on(kept, self.stored)
+        engine.resume_from({name[len(own) :]: kept[name] for name in kept if name.startswith(own)})
+        self.output.resume_from(kept, self.stored)
         return float(kept["seconds"])
 
     def _sample(self) -> None:
@@ -354,7 +354,7 @@ class Motion:
 
     def audit(self) -> float:
         """Relative energy error so far; raises where the energy has exploded."""
-        balance = self.output.see(self.stored)
+        balance = self.output.update_balance(self.stored)
         if balance.relative > EXPLODED and self._rounding.reveals(balance):
             bad = self.output.first_off(self.stored, EXPLODED)
             at = self.output.time(bad)
@@ -416,7 +416,7 @@ class Motion:
             "critical_step": self.critical,
             "wall_seconds": self.seconds,
             "threads": engine.threads if engine else 1,
-            "energy_error": self.output.see(self.stored).relative,
+            "energy_error": self.output.update_balance(self.stored).relative,
             "started_from": self._origin,
         }
         if self.reason:

@@ -1,4 +1,4 @@
-"""Quantities sampled along a motion: functions of the state, the user's and those of contact."""
+"""Quantities sampled along a motion: those of the user, and the forces of contact."""
 
 from __future__ import annotations
 

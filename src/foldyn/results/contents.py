@@ -1,4 +1,4 @@
-"""What a dataset from a file holds: checks of it, its case and pattern, its nodes."""
+"""Contents of a stored dataset: checks, its case, its pattern, selected nodes."""
 
 from __future__ import annotations
 

@@ -96,11 +96,11 @@ class Implicit:
         }
 
     def continuation(self) -> NDArray:
-        """All numbers (k,) on which the next steps depend; see `go_on_from`."""
+        """All numbers (k,) on which the next steps depend; see `continue_from`."""
         state = [*self._state(), self._acceleration()]
         return np.concatenate([array.ravel() for array in state])
 
-    def go_on_from(self, values: NDArray) -> None:
+    def continue_from(self, values: NDArray) -> None:
         """Have the motion go on as that one did whose end has these numbers.
 
         Its displacement, its velocity and the acceleration that follows from them must be those of
@@ -110,7 +110,7 @@ class Implicit:
         self._end = values
 
     def _resume(self, values: NDArray) -> bool:
-        """See `go_on_from`; tells whether it is the same motion."""
+        """See `continue_from`; tells whether it is the same motion."""
         scheme, old, tally = self._scheme, self._scheme.old, self._course.tally
         own = [*self._state(), old.a]
         if values.shape != (sum(array.size for array in own),) or not np.isfinite(values).all():
@@ -163,22 +163,22 @@ class Implicit:
             return {}
         return {"contact_lists": int(self._touching.memory.counts.lists)}
 
-    def standing(self) -> dict[str, NDArray]:
+    def checkpoint_arrays(self) -> dict[str, NDArray]:
         """All on which the next steps depend beside the case, between two stretches."""
         made = np.array([self._matrix.factorized, self._matrix.factorizations])
         origin = {f"origin.{k}": array for k, array in enumerate(self._newton.origin)}
         return snapshot(self._parts()) | {"factorized": made} | origin
 
-    def go_on(self, standing: Mapping[str, NDArray]) -> None:
+    def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
         """Go on as the engine that stood there."""
-        restore(self._parts(), standing)
-        made, count = standing["factorized"].tolist()
+        restore(self._parts(), arrays)
+        made, count = arrays["factorized"].tolist()
         if made:
             with one_thread():
                 self._newton.remake()
         self._matrix.factorizations = count
-        count = sum(name.startswith("origin.") for name in standing)
-        self._newton.origin = tuple(standing[f"origin.{k}"] for k in range(count))
+        count = sum(name.startswith("origin.") for name in arrays)
+        self._newton.origin = tuple(arrays[f"origin.{k}"] for k in range(count))
 
     def _parts(self) -> dict[str, Any]:
         own = {"engine": self, "scheme": self._scheme, "newton": self._newton}
@@ -236,7 +236,7 @@ class Implicit:
         whole = True
         while t < end - SAME_TIME * plan.dt:
             goal, jump = self._next_jump(t, end, SAME_TIME * plan.dt)
-            part, stop, jump = split_step(t, goal, h, jump)
+            part, stop, jump = equal_step(t, goal, h, jump)
             if abs(part - plan.dt) <= SAME_TIME * plan.dt:
                 part = plan.dt  # without the rounding of the times
             outcome, hinge = self._attempt(part, stop, jump)
@@ -265,7 +265,7 @@ class Implicit:
                 return Outcome.STUCK, -1
             near = SAME_TIME * wanted
             goal, jump = self._next_jump(t, next_stop(plan, t, due, near), near)
-            h, end, jump = split_step(t, goal, wanted, jump)
+            h, end, jump = equal_step(t, goal, wanted, jump)
             outcome, hinge = self._attempt(h, end, jump)
             if outcome != Outcome.DONE:
                 if self._hopeless(h):
@@ -406,7 +406,7 @@ def next_stop(plan: StepPlan, t: float, end: float, near: float) -> float:
     return plan.stops[k] if k < len(plan.stops) and plan.stops[k] < end - near else end
 
 
-def split_step(
+def equal_step(
     t: float, goal: float, wanted: float, jump: float | None
 ) -> tuple[float, float, float | None]:
     """Step from t, the first of equal ones to the goal, its end, and the jump if it is there."""
