@@ -14,7 +14,7 @@ import foldyn as fd
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = sorted((ROOT / "src").glob("**/*.py"))
-MOST_LINES = 450
+MOST_LINES = 550
 
 # a home folder, a workplace, a temporary folder: of one machine, not of the project
 MACHINE_PATHS = re.compile(
@@ -105,9 +105,9 @@ def test_every_top_level_name_is_in_the_api_page():
 
 
 def test_no_module_imports_itself_by_way_of_others():
-    """Circles of imports, late ones in functions included; those for type checkers do not count."""
+    """Circles of imports, in functions and for type checkers included."""
     grimp = pytest.importorskip("grimp")  # comes with import-linter
-    graph = grimp.build_graph("foldyn", exclude_type_checking_imports=True)
+    graph = grimp.build_graph("foldyn")
     left = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
     while free := [module for module, imported in left.items() if not imported & left.keys()]:
         for module in free:

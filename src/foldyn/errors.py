@@ -134,7 +134,7 @@ class Faults:
         alone = InputError(error.reason, error.field, error.file)
         self.found += [alone, *error.others]
 
-    def tell(self) -> None:
+    def raise_all(self) -> None:
         """Raise all faults in one error, if there are any."""
         if self.found:
             first, *others = self.found

@@ -21,9 +21,9 @@ OTHERS = """
 import sys
 sys.path.insert(0, sys.argv[1])
 import reference
-from foldyn.jit.counting import counted
+from foldyn.cli.first_uses import count_compiled
 for name, compute in list(reference.cases(""))[::10]:
-    with counted() as compiled:
+    with count_compiled() as compiled:
         compute()
     if compiled():
         print(name, compiled())

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 from foldyn.checks import observed_order, tangent_error
 from foldyn.dynamics.implicit.contact_measure import new_move
 from foldyn.dynamics.implicit.contact_pairs import edges_step, vertex_step
-from foldyn.dynamics.implicit.contact_quotient import quotient
 from foldyn.jit.compiled import kernel
 from foldyn.mechanics.contact.edge_edge import edge_edge
+from foldyn.mechanics.contact.potential import difference_quotient
 from foldyn.mechanics.contact.tables import Sheets, tables
 from foldyn.mechanics.contact.vertex_triangle import vertex_triangle
 
@@ -23,7 +23,7 @@ KINDS = ["vertex", "edges", "parallel edges"]
 
 @kernel
 def _quotient(x0, x1):
-    return quotient(x0, x1)
+    return difference_quotient(x0, x1)
 
 
 def test_quotients_are_those_of_the_potential():

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from foldyn.dynamics import Keeping
-from foldyn.dynamics.keeping import CHECKPOINT
+from foldyn.dynamics.checkpoint import CHECKPOINT
 from foldyn.errors import ComputationError, InputError
 from foldyn.results import columns
 

@@ -17,9 +17,10 @@ import pytest
 from long_cases import same, sheet, simulated
 
 import foldyn as fd
-from foldyn.dynamics import METHODS, keeping, motion, output
+from foldyn.dynamics import METHODS, motion, output
+from foldyn.dynamics.checkpoint import CHECKPOINT
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
-from foldyn.results import columns, streams
+from foldyn.results import columns, netcdf
 
 OFTEN = 1e-9  # seconds: a checkpoint whenever there is an opportunity
 
@@ -124,9 +125,9 @@ def test_what_the_user_samples_goes_on_too(tmp_path):
 def test_samples_that_memory_does_not_hold_are_the_same(tmp_path, monkeypatch, method, every):
     """Room for some sixteen; the file is written and read in pieces as well."""
     whole = simulated("sheet", duration=0.8, every=every, method=method)
-    for module in (columns, output, streams):
+    for module in (columns, output, netcdf):
         monkeypatch.setattr(module, "PIECE", 4000)
-    monkeypatch.setattr(streams, "CHUNK", 3000)
+    monkeypatch.setattr(netcdf, "CHUNK", 3000)
     file = tmp_path / "run.nc"
     found = simulated("sheet", duration=0.8, every=every, method=method, store=file)
     same(found, whole)
@@ -163,7 +164,7 @@ def test_a_motion_goes_on_only_as_it_was_begun(tmp_path):
 def test_another_program_does_not_go_on(tmp_path, monkeypatch):
     options = {"duration": 1.0, "every": 0.01, "store": tmp_path / "run.nc", "checkpoint": OFTEN}
     cut_off(**options)
-    monkeypatch.setattr("foldyn.dynamics.identity.program", lambda *_: "another")
+    monkeypatch.setattr("foldyn.dynamics.checkpoint.program", lambda *_: "another")
     with pytest.raises(InputError, match="was begun with the version of Foldyn"):
         simulated("sheet", **options, resume=True)
 
@@ -242,8 +243,8 @@ def test_what_is_damaged_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"velocity\.f8: is damaged"):
         simulated("sheet", **options, resume=True)
     (folder / "velocity.f8").write_bytes(content)
-    checkpoint = (folder / keeping.CHECKPOINT).read_bytes()
-    (folder / keeping.CHECKPOINT).write_bytes(checkpoint[: len(checkpoint) // 2])
+    checkpoint = (folder / CHECKPOINT).read_bytes()
+    (folder / CHECKPOINT).write_bytes(checkpoint[: len(checkpoint) // 2])
     with pytest.raises(InputError, match=r"is damaged, or .*; remove that folder to begin anew"):
         simulated("sheet", **options, resume=True)
 
@@ -295,7 +296,7 @@ def refused(other: int, options) -> None:
 def test_sigkill_at_random_moments_with_a_second_process(tmp_path, kills):
     file, chance = tmp_path / "run.nc", random.Random(kills)
     options = {**LONG, "store": str(file), "resume": True}
-    checkpoint = tmp_path / "run.nc.unfinished" / keeping.CHECKPOINT
+    checkpoint = tmp_path / "run.nc.unfinished" / CHECKPOINT
     killed, reached = 0, [0.0]
     while killed < kills:
         process = started(options)

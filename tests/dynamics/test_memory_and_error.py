@@ -9,7 +9,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.dynamics import prepare
-from foldyn.dynamics.snapshot import restore, snapshot
+from foldyn.dynamics.checkpoint import restore, snapshot
 from one_hinge import STIFFNESS, WING, moment, one_hinge, opened
 
 LAWS = {

@@ -122,19 +122,19 @@ def test_a_motion_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path,
     case, start = closing()
     given = options(case, method) | {"initial": start}
     whole = on(monkeypatch, 2, case, method, **given)
-    go_on = Compiled.go_on
+    resume_from = Compiled.resume_from
 
-    def forgetful(self, standing):
+    def forgetful(self, arrays):
         """What a new process would not know."""
         for array in (self._works[0].angle, *self._memories[0][6:8]):
             array[:] = 3.0
-        go_on(self, standing)
+        resume_from(self, arrays)
 
     def stop(now):
         if now.time > 0.7 * given["duration"]:
             raise Killed
 
-    monkeypatch.setattr(Compiled, "go_on", forgetful)
+    monkeypatch.setattr(Compiled, "resume_from", forgetful)
     kept = given | {"store": tmp_path / "run.nc", "checkpoint": 1e-9, "resume": True}
     with pytest.raises(Killed):
         on(monkeypatch, 2, case, method, **kept, progress=stop)

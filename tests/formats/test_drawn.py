@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from foldyn.formats import write_pattern
-from foldyn.formats.dxf_writer import ezdxf
+from foldyn.formats.dxf import ezdxf
 from foldyn.formats.stl import triangles
 from foldyn.patterns import Pattern, kresling, miura, simple_fold
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fuzz_target import Target
 
-from foldyn.formats import cp_writer, dxf_writer, svg_writer
+from foldyn.formats import cp, dxf, svg_writer
 from foldyn.formats.files import diagnose
 from foldyn.patterns import miura, simple_fold
 
@@ -59,11 +59,11 @@ def _svg(_: Path) -> list[bytes]:
 
 def _cp(_: Path) -> list[bytes]:
     crossing = "1 0 0 9 0\n1 9 0 9 9\n1 9 9 0 9\n1 0 9 0 0\n2 0 0 9 9\n3 9 0 0 9\n4 0 5 9 4\n"
-    return [crossing.encode(), *(cp_writer.write(pattern).encode() for pattern in _flat())]
+    return [crossing.encode(), *(cp.write(pattern).encode() for pattern in _flat())]
 
 
 def _opx(_: Path) -> list[bytes]:
-    texts = [cp_writer.write(pattern).split("\n")[:-1] for pattern in _flat()]
+    texts = [cp.write(pattern).split("\n")[:-1] for pattern in _flat()]
     lines = [[LINE.format(k, *line.split()) for k, line in enumerate(text)] for text in texts]
     return [OPX.format(len(some), "".join(some)).encode() for some in lines]
 
@@ -81,7 +81,7 @@ def _dxf(_: Path) -> list[bytes]:
     space.add_line((0, 0), (9, 9), dxfattribs={"color": 5})
     text = io.StringIO()
     document.write(text)
-    return [text.getvalue().encode(), *(dxf_writer.write(pattern).encode() for pattern in _flat())]
+    return [text.getvalue().encode(), *(dxf.write(pattern).encode() for pattern in _flat())]
 
 
 def read(file: Path) -> str:

@@ -186,7 +186,7 @@ def test_a_problem_takes_its_case_as_it_is_checked(monkeypatch):
     with pytest.warns(FoldynWarning, match="acts in part where supports hold"):
         case = fd.Case(s, supports, loads)
     ties = case.constraints
-    monkeypatch.setattr("foldyn.cases.supported.equations_of", None)
+    monkeypatch.setattr("foldyn.cases.case_assembly.equations_of", None)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         problem = OrigamiProblem(case, (1,))

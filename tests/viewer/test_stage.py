@@ -14,7 +14,7 @@ from page_samples import page, results
 
 import foldyn as fd
 from foldyn.errors import InputError
-from foldyn.live.page import live_page
+from foldyn.live.files import live_page
 from foldyn.plots.style import CREASE_NAMES, CREASES
 from foldyn.report import Chart, Curve
 from foldyn.viewer import stage

@@ -8,23 +8,28 @@ bisection on it.
 Nested dissection and the symbolic factorization take a third of the time of the numeric one. They
 belong to the places of the entries: as long as these stay, they are done once, for factors that
 live at the same time once more each. Parameters are those of `iparm` in the Developer Reference of
-oneMKL, counted from 0.
+oneMKL, counted from 0. The package mkl is a set of libraries without Python, which are called by
+their C interface.
 """
 
 from __future__ import annotations
 
 import ctypes
+import re
 import weakref
+from functools import cache
+from importlib.metadata import PackageNotFoundError, files
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.algebra.mkl import library, threads
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.errors import ComputationError
 
+LIBRARY = re.compile(r"(lib)?mkl_rt(\.\d+)*\.(so|dll)(\.\d+)*")
+SAME_BITS = 2  # MKL_CBWR_AUTO: the same arithmetic in each run on one machine
 SYMMETRIC_INDEFINITE = -2
 ANALYSIS, NUMERIC, SOLVE, RELEASE = 11, 22, 33, -1
 OWN_VALUES, ORDERING, PERTURBATION, REPLACED, NEGATIVE, REPRODUCIBLE = 0, 1, 9, 13, 22, 33
@@ -77,7 +82,7 @@ class _Memory:
         self.parameters[OWN_VALUES] = 1
         self.parameters[ORDERING] = NESTED_DISSECTION
         self.parameters[PERTURBATION] = SMALL
-        self.parameters[REPRODUCIBLE] = threads()
+        self.parameters[REPRODUCIBLE] = library().MKL_Get_Max_Threads()
         end = weakref.finalize(self, _call, RELEASE, self._handle, self.parameters, pattern, _NONE)
         end.atexit = False  # the process gives all memory back
 
@@ -175,3 +180,21 @@ def _reference(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.ctypes.data_as(ctypes.c_void_p)
     return ctypes.byref(value)
+
+
+@cache
+def library() -> Any:
+    """The loaded library, None if it is not there or cannot be loaded."""
+    try:
+        listed = files("mkl") or []
+    except PackageNotFoundError:
+        return None
+    for file in listed:
+        if LIBRARY.fullmatch(file.name):
+            try:
+                loaded = ctypes.CDLL(str(file.locate()))
+            except OSError:
+                continue
+            loaded.MKL_CBWR_Set(SAME_BITS)  # refused where MKL is at work already: no harm
+            return loaded
+    return None

@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 from scipy import sparse
 
-from foldyn.algebra.mkl import library
-from foldyn.algebra.pardiso import Pardiso
+from foldyn.algebra.pardiso import Pardiso, library
 from foldyn.algebra.superlu import Factorization, Factorizer, SuperLU
 from foldyn.errors import InputError
 from foldyn.memory import check_memory

@@ -67,7 +67,7 @@ def _check_generator(value: Mapping[str, Any]) -> None:
     if meant is not None:
         with faults.collected():
             check_keys(value, [*signature(GENERATORS[meant]).parameters, "kind", FACETS, HINGES])
-    faults.tell()
+    faults.raise_all()
 
 
 def _inline(value: Mapping[str, Any]) -> None:

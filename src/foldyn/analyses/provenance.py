@@ -22,7 +22,6 @@ from foldyn.values import plain, unit_of
 if TYPE_CHECKING:
     import xarray
 
-    from foldyn.analyses.casefile import CaseFile
     from foldyn.cases import Case
 
 MOST_LISTED = 24
@@ -50,8 +49,8 @@ class Call:
     cpu: float = 0.0
 
 
-def provenance(case_file: CaseFile, results: ByRule, call: Call | None = None) -> list[Section]:
-    """All that results were computed from in a table, and the case file itself."""
+def provenance(case_file: Any, results: ByRule, call: Call | None = None) -> list[Section]:
+    """All that results of a `CaseFile` were computed from in a table, and the file itself."""
     first = next(iter(results))
     rows = inputs(case_file, case_file.case(first), results)
     rows += computed(results, call or Call())
@@ -66,8 +65,8 @@ def inputs_table(rows: Iterable[tuple[str, str]]) -> Table:
     return Table(["part", "as computed"], [[*row] for row in rows if row[1]], sorts=False)
 
 
-def inputs(case_file: CaseFile, case: Case, results: ByRule) -> list[tuple[str, str]]:
-    """Pattern, sheet, model, supports, loads, damping and analysis, each in words."""
+def inputs(case_file: Any, case: Case, results: ByRule) -> list[tuple[str, str]]:
+    """Pattern, sheet, model, supports, loads, damping, analysis of a `CaseFile`, each in words."""
     structure = case.structure
     model = _given(structure.options) | {"mass": ", ".join(results)}
     pattern = structure.pattern

@@ -142,7 +142,7 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
         with faults.collected(), within("model: "):
             welds = bool(len(getattr(pattern, "welds", ())))  # no pattern where it is at fault
             resolved = model.options(welds=welds, **schema.model.options)
-        faults.tell()
+        faults.raise_all()
         with within("model: "):
             straight = straightened(resolved, pattern, schema.supports)
         options = {**schema.model.options, **straight}

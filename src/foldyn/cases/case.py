@@ -12,15 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.cases.case_assembly import Damped, Loaded
 from foldyn.cases.contact import Contact
-from foldyn.cases.damped import Damped
 from foldyn.cases.damping import Damping, Rayleigh, dampings
 from foldyn.cases.history import History, as_history
-from foldyn.cases.loaded import Loaded
 from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
 from foldyn.cases.straight import supported_points
-from foldyn.cases.supported import Supported
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
 from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.mechanics.assembly import Assembly
@@ -36,7 +34,7 @@ from foldyn.values import brief, show
 
 @brief
 @dataclass(frozen=True, eq=False)
-class Case(Supported, Loaded, Damped):
+class Case(Loaded, Damped):
     """A structure with supports, loads and damping.
 
     Parameters
@@ -158,7 +156,7 @@ class Case(Supported, Loaded, Damped):
                 load.rest_changes(self.structure, place)
             with faults.collected():
                 load.following(self.structure, place)
-        faults.tell()
+        faults.raise_all()
 
     def altered(self, **changes: Any) -> Case:
         """With other fields; what this case warned of when it was made is not said again."""

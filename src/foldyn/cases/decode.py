@@ -90,7 +90,7 @@ def call_from(
             if name in values:
                 with faults.collected():
                     values[name] = _checked(f".{name}", values[name], hints.get(name, Any))
-    faults.tell()
+    faults.raise_all()
     with within("." if checks_itself else ": "):
         return function(**values)
 
@@ -101,7 +101,7 @@ def check_keys(table: Mapping[str, Any], known: Iterable[str]) -> None:
     for key in table:
         if key not in known:
             faults.add(InputError(f": {unknown_key(key, known)}", f".{key}"))
-    faults.tell()
+    faults.raise_all()
 
 
 def unknown_key(key: str, known: Iterable[str]) -> str:

@@ -7,7 +7,8 @@ beside it. So it is enough that each part takes part in something, once with eve
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
@@ -17,7 +18,6 @@ import foldyn as fd
 from foldyn.dynamics import METHODS
 from foldyn.errors import FoldynWarning
 from foldyn.experiment.tracking.corners import refine
-from foldyn.jit.counting import counted
 from foldyn.materials.series import in_series
 
 STEPS, SHORT, LONG = 4, 1e-4, 5e-3  # s, steps of explicit and implicit methods
@@ -197,10 +197,19 @@ STAGES: Sequence[Uses] = (
 and all of them those of the stages before."""
 
 
+@contextmanager
+def count_compiled() -> Iterator[Callable[[], int]]:
+    """Give what returns how many functions have been compiled so far within this context."""
+    from numba.core import event  # Numba itself only after `foldyn.jit` has checked its variables
+
+    with event.install_recorder("numba:compile") as recorder:
+        yield lambda: sum(one.is_start for _, one in recorder.buffer)
+
+
 def use(name: str) -> int:
     """Compute what has a name among `STAGES`; how many functions had to be compiled."""
     (uses,) = (stage[name] for stage in STAGES if name in stage)
-    with counted() as compiled, warnings.catch_warnings():
+    with count_compiled() as compiled, warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
         for compute in uses:
             compute()

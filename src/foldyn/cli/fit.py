@@ -8,11 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.clock import Clock
 from foldyn.cli.folder import Results, drawing, held
 from foldyn.cli.options import BOTH, add_figures, add_results, integer, number
 from foldyn.cli.stamp import Owner
-from foldyn.cli.streams import noted_warnings, progress_bar, speech
+from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import InputError
 from foldyn.plots import FIGURES
 from foldyn.values import parsed

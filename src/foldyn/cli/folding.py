@@ -6,12 +6,11 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.clock import Clock
 from foldyn.cli.convert import RESULT
 from foldyn.cli.folder import check_folder, drawing
 from foldyn.cli.options import add_film, add_reading, add_switches, frame_of, integer
 from foldyn.cli.signals import ENDINGS
-from foldyn.cli.streams import noted_warnings, progress_bar, speech
+from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import InputError, within
 from foldyn.input_files import read_text
 from foldyn.values import parsed

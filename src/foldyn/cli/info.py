@@ -32,7 +32,7 @@ def info() -> str:
     from foldyn.dynamics import METHODS, compiled
     from foldyn.experiment.camera import opencv
     from foldyn.formats import FORMATS
-    from foldyn.formats.dxf_writer import ezdxf
+    from foldyn.formats.dxf import ezdxf
     from foldyn.linear.frf import METHODS as FRF_METHODS
     from foldyn.mechanics.threads import MOST
     from foldyn.patterns import GENERATORS

@@ -7,11 +7,13 @@ ended by a signal. What was computed until then is kept and named.
 from __future__ import annotations
 
 import argparse
+import gc
 import os
 import shlex
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import NoReturn
 
 from foldyn import __version__
@@ -19,7 +21,6 @@ from foldyn.cli.convert import add_convert, convert
 from foldyn.cli.fit import add_fit, run_fit
 from foldyn.cli.folder import reason
 from foldyn.cli.folding import add_fold, run_fold
-from foldyn.cli.lasting import lasting
 from foldyn.cli.options import add_figures, add_film, add_results, flag, integer, number
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Outlet, noticed, steady_streams
@@ -195,6 +196,25 @@ def _add_secant(command: argparse.ArgumentParser) -> None:
     )
 
 
+@contextmanager
+def uncollected_imports() -> Iterator[None]:
+    """Import what lasts as long as the process: nobody looks for garbage in it, then or later.
+
+    Modules make some hundred thousand objects, and the collector would look through all of them
+    again and again: a fifth of the time of a short run. Only the first import is treated so; what
+    a process that has worked before may leave as garbage is not kept.
+    """
+    if not gc.isenabled() or "foldyn.analyses" in sys.modules:
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+        gc.freeze()
+    finally:
+        gc.enable()
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status."""
     with ENDINGS.heeded(), steady_streams() as out:
@@ -248,7 +268,7 @@ def _call(given: argparse.Namespace) -> None:
     elif given.command in OTHERS:
         OTHERS[given.command](given)
     else:
-        with lasting():
+        with uncollected_imports():
             from foldyn.cli.run import run
 
         run(given)

@@ -16,11 +16,10 @@ from foldyn.analyses import ANALYSES, CaseFile, Computation, read_case
 from foldyn.analyses.casefile import Kept
 from foldyn.analyses.provenance import Call, mesh_error
 from foldyn.analyses.reading import read_as
-from foldyn.cli.clock import Clock
 from foldyn.cli.folder import Results, drawing, held
 from foldyn.cli.options import BOTH
 from foldyn.cli.stamp import Owner
-from foldyn.cli.streams import noted_warnings, speech
+from foldyn.cli.streams import Clock, noted_warnings, speech
 from foldyn.dynamics import SECONDS, Keeping
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
 from foldyn.plots import FIGURES

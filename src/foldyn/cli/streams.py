@@ -1,14 +1,18 @@
-"""What a command prints; standard output and error may be closed, full or short of letters."""
+"""Output of a command and the time it takes.
+
+Standard output and error may be closed, full or short of letters.
+"""
 
 from __future__ import annotations
 
 import os
 import sys
+import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import partial
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 
 
 class Outlet:
@@ -116,3 +120,19 @@ def noted_warnings() -> Iterator[list[str]]:
     with warnings.catch_warnings():
         warnings.showwarning = both
         yield noted
+
+
+class Clock(NamedTuple):
+    """When a command began, by the wall and by the processor (s)."""
+
+    wall: float
+    cpu: float
+
+    @classmethod
+    def now(cls) -> Clock:
+        """Both clocks at this moment."""
+        return cls(time.perf_counter(), time.process_time())
+
+    def spent(self) -> dict[str, float]:
+        """Time (s) since then: `wall` and `cpu`."""
+        return {name: b - a for name, a, b in zip(self._fields, self, self.now(), strict=True)}

@@ -8,11 +8,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.clock import Clock
 from foldyn.cli.folder import Results, held
 from foldyn.cli.options import add_results, flag
 from foldyn.cli.stamp import Owner
-from foldyn.cli.streams import progress_bar, speech
+from foldyn.cli.streams import Clock, progress_bar, speech
 from foldyn.errors import ComputationError, FoldynError, InputError
 
 if TYPE_CHECKING:

@@ -10,11 +10,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.clock import Clock
 from foldyn.cli.folder import Results, drawing, held
 from foldyn.cli.options import BOTH, add_figures, add_results, integer
 from foldyn.cli.stamp import Owner
-from foldyn.cli.streams import noted_warnings, progress_bar, speech
+from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import ComputationError, InputError
 from foldyn.plots import FIGURES
 

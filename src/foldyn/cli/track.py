@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.clock import Clock
 from foldyn.cli.folder import check_folder, drawing, rescued
 from foldyn.cli.options import BOTH, add_figures, add_switches
 from foldyn.cli.signals import ENDINGS
-from foldyn.cli.streams import noted_warnings, progress_bar, speech
+from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import ComputationError, InputError
 from foldyn.input_files import check_file
 from foldyn.studies import find_case

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import Outcome, share, tell
+from foldyn.dynamics.course import Outcome, post_totals, split_step
 from foldyn.dynamics.equation import acceleration, advance_clock, observe
 from foldyn.dynamics.explicit_contact import longest_step
 from foldyn.jit.compiled import shared
@@ -63,7 +63,7 @@ def advance(equation, course, plan, room, stretch):
     fa, ahead = flat(a)[low:high], flat(stage[0])[low:high]
     begun = course.tally.steps
     end = min(begun + stretch, plan.steps)
-    tell(team, 0.0, 0.0, 0)
+    post_totals(team, 0.0, 0.0, 0)
     for step in range(begun + 1 if begun > 0 else 0, end + 1):  # step 0, of no length, is the start
         work_in, work_out, wrong = 0.0, 0.0, 0
         span = plan.dt if step > 0 else 0.0
@@ -72,7 +72,7 @@ def advance(equation, course, plan, room, stretch):
             dt = 0.0
             if step > 0:
                 dt = longest_step(equation, course.u, course.v, a, left, RESOLVED)
-                dt = share(dt, left)
+                dt = split_step(dt, left)
             for i in range(u.size):
                 v[i] += 0.5 * dt * fa[i]
                 u[i] += dt * v[i]
@@ -91,7 +91,7 @@ def advance(equation, course, plan, room, stretch):
                 course.tally.evaluations += 1
             if left == 0.0 or wrong > 0:
                 break
-        tell(team, work_in, work_out, wrong)
+        post_totals(team, work_in, work_out, wrong)
         outcome, hinge = observe(equation, course, plan, a, step)
         if outcome != Outcome.DONE:
             return outcome, hinge

@@ -126,7 +126,7 @@ def passed_through(now, before, first, last):
 
 
 @scalar
-def share(longest, left):
+def split_step(longest, left):
     """Length (s) of the equal parts, none longer than `longest`, into which `left` is divided."""
     if longest >= left:
         return left
@@ -134,7 +134,7 @@ def share(longest, left):
 
 
 @scalar
-def tell(team, work_in, work_out, wrong):
+def post_totals(team, work_in, work_out, wrong):
     """Note for the team the work, the energy dissipated (J), and how many values are not finite."""
     note = team.note[team.number]
     note[WORK], note[DISSIPATED], note[WRONG] = work_in, work_out, wrong

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Dashpot, Rayleigh, State
 from foldyn.dynamics import generalized_alpha, timing
+from foldyn.dynamics.checkpoint import SECONDS, check_keeping
 from foldyn.dynamics.course import StepPlan
 from foldyn.dynamics.hereditary import check_state
 from foldyn.dynamics.inertia import check_mass, is_lumped
@@ -24,16 +25,13 @@ from foldyn.dynamics.initial import (
     check_touching,
     warn_of_unstable_damping,
 )
-from foldyn.dynamics.keeping import SECONDS, check_keeping
 from foldyn.dynamics.method_choice import AUTO, Choice, choose
 from foldyn.dynamics.methods import METHODS, Integrator, method_of, suited, with_mass
 from foldyn.dynamics.modal_damping import modal_rows
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.sampling import Sampler
-from foldyn.dynamics.stored import stored
 from foldyn.dynamics.system import pack
-from foldyn.dynamics.touch import contact_quantities
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.results import Quantity
 from foldyn.values import choice, flag, number, of_kind
@@ -160,7 +158,7 @@ def simulate(
         case, duration, method, dt, every, initial, force, tolerance, start, spectral_radius,
         sample, keeping is not None,
     )  # fmt: skip
-    return motion.run(progress) if keeping is None else stored(motion, keeping, progress)
+    return motion.run(progress) if keeping is None else motion.run_into_file(keeping, progress)
 
 
 def prepare(
@@ -243,9 +241,7 @@ def prepare(
         )
     span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
     packed = pack(case, span, u, modal)
-    sampler = Sampler(
-        case, {} if sample is None else sample, u, v, plan.start, contact_quantities(case)
-    )
+    sampler = Sampler(case, {} if sample is None else sample, u, v, plan.start)
     state = u, v, remembered, initial.continuation if initial else None
     better = None
     if chosen.better:

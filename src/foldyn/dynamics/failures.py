@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.dynamics.course import Outcome
+from foldyn.cases import Case
+from foldyn.dynamics.course import Course, Outcome, StepPlan
+from foldyn.dynamics.methods import Integrator
+from foldyn.dynamics.system import Packed
 from foldyn.errors import InstabilityError, PenetrationError
 from foldyn.structures.condensed_plates import CondensedPlatesTerm
 from foldyn.structures.locking import kept_apart
-
-if TYPE_CHECKING:
-    from foldyn.dynamics.motion import Motion
 
 SWING = 0.5  # turn (rad) of a hinge in one step that is too much for any law
 MET = 1e-3  # rad from closed: panels that have met
 
 
+class Failed(Protocol):
+    """What is asked of a motion whose last step failed."""
+
+    case: Case
+    method: Integrator
+    plan: StepPlan
+    critical: float
+    packed: Packed
+    course: Course
+
+
 def failure(
-    motion: Motion, code: int, hinge: int
+    motion: Failed, code: int, hinge: int
 ) -> tuple[type[InstabilityError | PenetrationError], str]:
     """Kind of error and its message, of a motion whose last step ended so.
 
@@ -65,7 +76,7 @@ def failure(
     return InstabilityError, f"{moment} {_reason(motion, code)}"
 
 
-def smaller_step(motion: Motion) -> str:
+def smaller_step(motion: Failed) -> str:
     """What makes a motion more accurate."""
     plan = motion.plan
     if not plan.steps:
@@ -75,7 +86,7 @@ def smaller_step(motion: Motion) -> str:
     return f"use a step below {plan.dt:.3g} s (critical at the start: {motion.critical:.3g} s)"
 
 
-def _apart(motion: Motion, hinge: int) -> str:
+def _apart(motion: Failed, hinge: int) -> str:
     """How to keep the panels at a hinge apart; its dihedral is that of the last step."""
     angle = motion.course.angle[hinge]
     if motion.plan.dt > motion.critical or _from_closed(angle) > SWING:
@@ -84,7 +95,7 @@ def _apart(motion: Motion, hinge: int) -> str:
     return kept_apart(motion.case.structure, j, k)
 
 
-def _reason(motion: Motion, code: int) -> str:
+def _reason(motion: Failed, code: int) -> str:
     """What has happened, where it is no single hinge's doing."""
     plan, method = motion.plan, motion.method
     if code == Outcome.STUCK:

@@ -19,7 +19,7 @@ from foldyn.cases.touching import check_contact, check_driven
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import TALLY, Course, StepPlan
 from foldyn.dynamics.inertia import moving_energy
-from foldyn.dynamics.system import Packed, follow, place, scratch
+from foldyn.dynamics.system import Packed, carry_supports, place, scratch
 from foldyn.dynamics.timing import histories
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.following import following_force
@@ -211,7 +211,7 @@ def begin(
     prescribed = np.where(case.fixed, v, 0.0)
     if ties := case.constraints:
         prescribed = ties.moved(prescribed, ties.values(v), "initial")
-    q, w = u - carried, v - by.outward(follow(mass, by.inward(prescribed)))
+    q, w = u - carried, v - by.outward(carry_supports(mass, by.inward(prescribed)))
     apart = np.where(imposed, np.abs(q), 0.0)
     apart.ravel()[case.imposed_slaves] = np.abs(ties.coordinates(q.ravel()))[case.imposed_slaves]
     if apart.max() > AGREES * case.structure.bar_length.max():

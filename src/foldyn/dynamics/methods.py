@@ -17,11 +17,11 @@ from foldyn.dynamics import (
     generalized_alpha,
     rk4,
 )
+from foldyn.dynamics.checkpoint import restore, snapshot, state_parts
 from foldyn.dynamics.course import Course, Samples, StepPlan
 from foldyn.dynamics.equation import EquationOfMotion
 from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.modal_damping import ModalRows, modal_rows
-from foldyn.dynamics.snapshot import parts_of, restore, snapshot
 from foldyn.dynamics.stability import (
     MARGIN,
     Growth,
@@ -75,18 +75,18 @@ class Compiled:
         arguments = [(equation.sampled(out), *case) for equation in self._equations]
         return run_together(self._loop, [work.team for work in self._works], arguments)[0]
 
-    def standing(self) -> dict[str, NDArray]:
+    def checkpoint_arrays(self) -> dict[str, NDArray]:
         """All on which the next steps depend beside the case, between two stretches."""
         return snapshot(self._parts())
 
-    def go_on(self, standing: Mapping[str, NDArray]) -> None:
+    def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
         """Go on as the engine that stood there; for as many threads."""
-        restore(self._parts(), standing)
+        restore(self._parts(), arrays)
 
     def _parts(self) -> dict[str, Any]:
         contact = [self._packed.body.kept(work, ContactTerm) or () for work in self._works]
         powers = [memory.powers for memory in self._memories]
-        parts = parts_of(self._packed, self._course) | {"powers": powers, "contact": contact}
+        parts = state_parts(self._packed, self._course) | {"powers": powers, "contact": contact}
         if self._packed.system.touches:  # a step's limit looks at the end of the one before
             whole = self._memories[0]
             parts["seen"] = [self._works[0].angle, whole.displacement, whole.velocity]

@@ -13,17 +13,15 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case, Continuation
 from foldyn.dynamics.audit import Rounding, audited
+from foldyn.dynamics.checkpoint import KEY, Keeping, identity, identity_digest
 from foldyn.dynamics.course import Outcome, Samples, StepPlan
-from foldyn.dynamics.doubts import doubts, is_off
+from foldyn.dynamics.doubts import INACCURATE, doubts, is_off
 from foldyn.dynamics.failures import failure, smaller_step
-from foldyn.dynamics.identity import identity, key_of
 from foldyn.dynamics.initial import begin
-from foldyn.dynamics.keeping import KEY, Keeping
 from foldyn.dynamics.methods import Compiled, Implicit, Integrator
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
-from foldyn.dynamics.second_attempt import announced, reason_of
 from foldyn.dynamics.stability import (
     MARGIN,
     damper_rate,
@@ -110,6 +108,22 @@ class Motion:
         self.integrate(progress, keeping)
         return self.result(progress)
 
+    def run_into_file(
+        self, keeping: Keeping, progress: bool | Reporter | None = None
+    ) -> xarray.Dataset:
+        """Integrate the motion into the file of its result; see `simulate`."""
+        if finished := self.finished(keeping):
+            return finished
+        with keeping.held():
+            try:
+                result = self.run(progress, keeping)
+            except ComputationError as error:
+                if error.partial is not None:
+                    error.partial.attrs["stopped_because"] = str(error)
+                    error.partial = keeping.save_result(error.partial)
+                raise
+            return keeping.save_result(result)
+
     def samples(self, progress: bool | Reporter | None = None) -> Samples:
         """Integrate the motion; its samples alone, which do not carry the case."""
         self.integrate(progress)
@@ -123,7 +137,7 @@ class Motion:
         """
         self.audit()
         if self._better is not None and is_off(self.output.balance, self._rounding):
-            return self._anew(progress)
+            return self._run_anew(progress)
         self._judge()
         crossings = self._crossings()
         if len(crossings.first):
@@ -152,12 +166,24 @@ class Motion:
         """The same motion by the better method, if there is one."""
         other = self._better() if self._better else None
         if other is not None:
-            other.reason = reason_of(other, self)
+            off = f"with {self._unlike(other)[0]} the energy balance was off by more than"
+            other.reason = f"{self.reason}; computed anew: {off} {INACCURATE:.0%}"
         return other
 
-    def _anew(self, progress: bool | Reporter | None) -> xarray.Dataset:
+    def _unlike(self, other: Motion) -> tuple[str, str]:
+        """How it is computed, unlike another one: in words, and as an argument."""
+        if self.method is other.method:
+            return f"steps of {self.plan.dt:.3g} s", f"dt = {self.plan.dt:.6g}"
+        return self.method.name, f'method = "{self.method.name}"'
+
+    def _run_anew(self, progress: bool | Reporter | None) -> xarray.Dataset:
         assert self._other is not None
-        text = announced(self._other, self, self.output.balance.relative)
+        new, ask = self._other._unlike(self)
+        text = (
+            f"the motion is computed anew with {new}: with {self._unlike(self._other)[0]}, which "
+            f"auto chose, its energy balance is off by {self.output.balance.relative:.1%} of the "
+            f"energies at play; {ask} saves the first attempt"
+        )
         warnings.warn(text, FoldynWarning, stacklevel=5)
         self._start()  # gives its samples' memory back
         if self._keeping is not None:
@@ -169,7 +195,7 @@ class Motion:
         size, remedy = float(self.course.tally.farthest), smaller_step(self)
         texts = [doubts(self.output.balance, self._rounding, self.plan, size, remedy)]
         if resists_turns(self.case, self.packed):
-            seen, scale = self.output.looked_at(self.stored, LOOKS), self.output.balance.scale
+            seen, scale = self.output.evenly_spaced(self.stored, LOOKS), self.output.balance.scale
             texts.append(turns_told(self.case, self.packed, self._state[0], *seen, scale))
         for text in filter(None, texts):
             warnings.warn(text, FoldynWarning, stacklevel=5)
@@ -191,7 +217,7 @@ class Motion:
             engine = self.method.engine(self.case, self.packed, self.course, self.plan)
             continued = self._state[3] if self.case.contact is None else None
             if isinstance(engine, Implicit) and continued and continued.method == self.method.name:
-                engine.go_on_from(continued.values)
+                engine.continue_from(continued.values)
             self._engine = engine
             self._advance(engine, report)
         except KeyboardInterrupt:
@@ -248,7 +274,7 @@ class Motion:
             report(Progress(now - plan.start, plan.end - plan.start, step, self.audit()))
             if step == plan.steps if plan.steps else now >= plan.end:
                 return
-            self._keep(engine)
+            self._checkpoint_if_due(engine)
             if plan.steps and step % self.recheck_after == 0 and step > done:
                 place(system, course.u, course.v, now, memory)
                 self.recheck(by.outward(memory.displacement))
@@ -280,7 +306,7 @@ class Motion:
 
     def finished(self, keeping: Keeping) -> xarray.Dataset | None:
         """Its result, if it is finished and to be gone on with."""
-        found = keeping.finished(key_of(self._identity()))
+        found = keeping.finished(identity_digest(self._identity()))
         if found is None and keeping.resume and self._other is not None:
             return self._other.finished(keeping)
         return found
@@ -293,14 +319,14 @@ class Motion:
             fits = self.output.fits(int(self.course.tally.steps), self.stored)
         return length if fits is None else max(0, min(length, fits))
 
-    def _keep(self, engine: Compiled | Implicit) -> None:
+    def _checkpoint_if_due(self, engine: Compiled | Implicit) -> None:
         """Make a checkpoint, if it is time for one."""
         if self._keeping is None or not self._keeping.due:
             return
         self.output.flush(self.stored)
-        standing = {f"engine.{name}": array for name, array in engine.standing().items()}
-        standing |= self.output.standing() | {"seconds": np.array(self.seconds)}
-        self._keeping.checkpoint(standing, float(self.course.tally.time))
+        arrays = {f"engine.{name}": array for name, array in engine.checkpoint_arrays().items()}
+        arrays |= self.output.checkpoint_arrays() | {"seconds": np.array(self.seconds)}
+        self._keeping.checkpoint(arrays, float(self.course.tally.time))
 
     def _resumed(self, engine: Compiled | Implicit) -> float:
         """Go on from the last checkpoint, if there is one; seconds that were spent until then."""
@@ -311,8 +337,8 @@ class Motion:
         if kept is None:
             return 0.0
         own = "engine."
-        engine.go_on({name[len(own) :]: kept[name] for name in kept if name.startswith(own)})
-        self.output.go_on(kept, self.stored)
+        engine.resume_from({name[len(own) :]: kept[name] for name in kept if name.startswith(own)})
+        self.output.resume_from(kept, self.stored)
         return float(kept["seconds"])
 
     def _sample(self) -> None:
@@ -328,7 +354,7 @@ class Motion:
 
     def audit(self) -> float:
         """Relative energy error so far; raises where the energy has exploded."""
-        balance = self.output.see(self.stored)
+        balance = self.output.update_balance(self.stored)
         if balance.relative > EXPLODED and self._rounding.reveals(balance):
             bad = self.output.first_off(self.stored, EXPLODED)
             at = self.output.time(bad)
@@ -379,7 +405,7 @@ class Motion:
             self._continuations(),
         )  # fmt: skip
         if self._keeping is not None:
-            result.attrs[KEY] = key_of(self._identity())
+            result.attrs[KEY] = identity_digest(self._identity())
         return crossings.recorded(self.output.whole(result, self.stored))
 
     def _statistics(self) -> dict[str, Any]:
@@ -390,7 +416,7 @@ class Motion:
             "critical_step": self.critical,
             "wall_seconds": self.seconds,
             "threads": engine.threads if engine else 1,
-            "energy_error": self.output.see(self.stored).relative,
+            "energy_error": self.output.update_balance(self.stored).relative,
             "started_from": self._origin,
         }
         if self.reason:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.dynamics.audit import Balance, audited
+from foldyn.dynamics.checkpoint import Keeping
 from foldyn.dynamics.course import Samples, StepPlan, samples
-from foldyn.dynamics.keeping import Keeping
 from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.timing import expected_samples
 from foldyn.results import Quantity
@@ -96,7 +96,7 @@ class Output:
         """Evaluate what the user samples where it is new; raises `SamplingError`."""
         self._sampler.take(self.window, stored)
 
-    def see(self, stored: int) -> Balance:
+    def update_balance(self, stored: int) -> Balance:
         """The balance of energies with all samples that are new."""
         new = self.written(stored)
         seen = self.balance.count - new.first
@@ -132,28 +132,28 @@ class Output:
         """Put the samples on the disk; the window is empty then."""
         assert self._keeping is not None
         out = self.written(stored)
-        self.see(stored)
+        self.update_balance(stored)
         rows = out._asdict() | self._sampler.columns(stored)
         del rows["first"]
         self._keeping.append(rows)
         self.window = self.window._replace(first=stored)
         self._sampler.drop(stored)
 
-    def standing(self) -> dict[str, NDArray]:
-        """What is known of the samples on the disk, to `go_on`."""
+    def checkpoint_arrays(self) -> dict[str, NDArray]:
+        """What is known of the samples on the disk, to `resume_from`."""
         own = self.balance
         return {
             "balance_start": own.start,
             "balance": np.array([getattr(own, name) for name in Balance.NUMBERS]),
         }
 
-    def go_on(self, standing: Mapping[str, NDArray], count: int) -> None:
+    def resume_from(self, arrays: Mapping[str, NDArray], count: int) -> None:
         """Go on after the samples on the disk."""
         self.window = self.window._replace(first=count)
         self._sampler.drop(count)
         own = self.balance
-        own.start, own.count = standing["balance_start"], count
-        for name, value in zip(Balance.NUMBERS, standing["balance"].tolist(), strict=True):
+        own.start, own.count = arrays["balance_start"], count
+        for name, value in zip(Balance.NUMBERS, arrays["balance"].tolist(), strict=True):
             setattr(own, name, value)
 
     # ------------------------------------------------------------------ what there is
@@ -166,7 +166,7 @@ class Output:
         columns = self._on_disk(stored)
         return self.written(stored).displacement if columns is None else columns["displacement"]
 
-    def looked_at(self, stored: int, most: int) -> tuple[NDArray, NDArray]:
+    def evenly_spaced(self, stored: int, most: int) -> tuple[NDArray, NDArray]:
         """Displacement and velocity (k, n, 3) at up to `most` samples from first to last."""
         picks = np.unique(np.linspace(0, stored - 1, min(most, stored)).astype(np.int64))
         columns, out = self._on_disk(stored), self.written(stored)

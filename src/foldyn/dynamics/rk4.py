@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import Outcome, share, tell
+from foldyn.dynamics.course import Outcome, post_totals, split_step
 from foldyn.dynamics.equation import acceleration, advance_clock, observe
 from foldyn.dynamics.explicit_contact import longest_step
 from foldyn.dynamics.stability import roots
@@ -43,7 +43,7 @@ def advance(equation, course, plan, room, stretch):
         ut[i], vt[i] = u[i], v[i]
     begun = course.tally.steps
     end = min(begun + stretch, plan.steps)
-    tell(team, 0.0, 0.0, 0)
+    post_totals(team, 0.0, 0.0, 0)
     for step in range(begun, end + 1):
         work_in, work_out, wrong, left = 0.0, 0.0, 0, plan.dt
         while left > 0.0:  # once, unless contact asks for shorter steps
@@ -65,7 +65,7 @@ def advance(equation, course, plan, room, stretch):
                         if outcome != Outcome.DONE or step == end:
                             return outcome, hinge
                     dt = longest_step(equation, course.u, course.v, a, left, RESOLVED)
-                    dt = share(dt, left)
+                    dt = split_step(dt, left)
                 ahead = 0.5 * dt if stage < 2 else dt
                 if stage == 0:
                     for i in range(u.size):
@@ -90,5 +90,5 @@ def advance(equation, course, plan, room, stretch):
             left = 0.0 if dt == left or wrong > 0 else left - dt
             if team.number == 0:
                 course.tally.evaluations += 4
-        tell(team, work_in, work_out, wrong)
+        post_totals(team, work_in, work_out, wrong)
     return Outcome.DONE, -1

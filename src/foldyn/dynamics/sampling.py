@@ -1,9 +1,8 @@
-"""Quantities that the user adds to a motion: functions of the state, evaluated at its samples."""
+"""Quantities sampled along a motion: those of the user, and the forces of contact."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,13 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.dynamics.course import Samples
 from foldyn.errors import FoldynError, InputError
+from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.results import Quantity
 from foldyn.results.dataset import TAKEN
+from foldyn.results.quantities import CONTACT
 from foldyn.values import show
+
+CONTACT_FORCE, PLANE_FORCE = CONTACT
 
 
 class SamplingError(FoldynError):
@@ -22,7 +25,7 @@ class SamplingError(FoldynError):
 
 
 class Sampler:
-    """Values of a user's quantities along a motion.
+    """Values of quantities along a motion.
 
     Parameters
     ----------
@@ -33,8 +36,6 @@ class Sampler:
         State at the start, at which each function is tried.
     start : float
         Time there, s.
-    own : mapping of str to Quantity
-        What is sampled beside these.
 
     Raises
     ------
@@ -43,13 +44,10 @@ class Sampler:
         array of the dimensions that it names.
     """
 
-    def __init__(
-        self, case: Case, given: Any, u: NDArray, v: NDArray, start: float,
-        own: Mapping[str, Quantity] = MappingProxyType({}),
-    ) -> None:  # fmt: skip
+    def __init__(self, case: Case, given: Any, u: NDArray, v: NDArray, start: float) -> None:
         if not isinstance(given, Mapping):
             raise InputError(f" = {show(given)}: give functions by name, as {{'tip': f}}", "sample")
-        structure = case.structure
+        structure, own = case.structure, _contact_quantities(case)
         taken = {*TAKEN, *case.energy_groups, *own}
         sizes = {"node": len(structure.nodes), "axis": 3, "support": len(case.reaction_dofs)}
         self._quantities: dict[str, tuple[Quantity, tuple[int, ...]]] = {}  # with their shapes
@@ -133,3 +131,25 @@ def _value(quantity: Quantity, u: NDArray, v: NDArray, time: float) -> NDArray:
     if not np.isfinite(value).all():
         raise SamplingError(f"returned {show(given)}; give finite numbers")
     return value
+
+
+def _contact_quantities(case: Case) -> dict[str, Quantity]:
+    """What is sampled of a case with contact; nothing without."""
+    if case.contact is None:
+        return {}
+    planes = case.contact.planes
+
+    def term_at(time: float) -> ContactTerm:
+        moved = np.zeros((len(planes), 3))
+        for plane, history in case.obstacle_terms:
+            moved[plane] = float(history(time)) * np.array(planes[plane].motion)
+        return case.contact_term.displaced(moved)
+
+    def force(u: NDArray, v: NDArray, time: float) -> NDArray:
+        return term_at(time).touch(u)
+
+    def push(u: NDArray, v: NDArray, time: float) -> NDArray:
+        return term_at(time).plane_forces(u)
+
+    functions = {CONTACT_FORCE: force} | ({PLANE_FORCE: push} if planes else {})
+    return {name: CONTACT[name]._replace(function=own) for name, own in functions.items()}

@@ -129,7 +129,7 @@ def pack(
     ties = ties_of(case.constraints, by)
     mass = inertia(nodal, by.held(case.fixed), ties)
     moves = [
-        (follow(mass, by.inward(shape)), history)
+        (carry_supports(mass, by.inward(shape)), history)
         for shape, history in (*case.imposed_terms, *case.base_terms)
     ]
     loads = [(by.inward(vector), history) for vector, history in case.load_terms]
@@ -188,7 +188,7 @@ def _ordered(entries: Entries) -> Entries:
     return Entries(*(column[order] for column in entries))
 
 
-def follow(mass: Inertia, shape: NDArray) -> NDArray:
+def carry_supports(mass: Inertia, shape: NDArray) -> NDArray:
     """Motion (n, 3) of all nodes with supports that move by `shape`: S of the module's text.
 
     shape : (n, 3), with what constraints tie to the supports.

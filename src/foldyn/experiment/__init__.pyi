@@ -22,11 +22,11 @@ from foldyn.experiment.calibration.modal import (
 )
 from foldyn.experiment.calibration.parameters import Parameter as Parameter
 from foldyn.experiment.calibration.responses import FrequencyResponse as FrequencyResponse
-from foldyn.experiment.calibration.sight import Sight as Sight
 from foldyn.experiment.calibration.uncertainty import Estimate as Estimate
 from foldyn.experiment.camera import (
     Camera as Camera,
     Scale as Scale,
+    Sight as Sight,
     opencv as opencv,
     scale_of_lengths as scale_of_lengths,
     scale_of_target as scale_of_target,

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
@@ -183,6 +184,45 @@ class Camera:
         top = seen.max() ** 2
         powers = (seen**2 / top)[:, np.newaxis] ** np.arange(_TERMS)
         return np.linalg.lstsq(powers, r / seen, rcond=None)[0] / top ** np.arange(_TERMS)
+
+
+class Sight(NamedTuple):
+    """A camera, as a model sees it.
+
+    Tracks tell where the line of sight of a node meets the plane in which it was when the model was
+    recognized: the motion along the line of sight is unknown to one camera. The model knows it, so
+    it is compared as it would look.
+
+    Attributes
+    ----------
+    position, direction : ndarray, shape (3,)
+        Of the camera (m), and the way in which it looks (a unit vector), in the model's axes.
+    depth : ndarray, shape (n,)
+        Distance (m) along it of the planes to which displacements of nodes 0..n-1 belong.
+    """
+
+    position: NDArray[np.float64]
+    direction: NDArray[np.float64]
+    depth: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, tracks: xr.Dataset) -> Sight | None:
+        """The camera of a film; None where its tracks do not tell."""
+        if "camera_depth" not in tracks:
+            return None
+        there, way = (
+            np.array(tracks.attrs[f"camera_{name}"]) for name in ("position", "direction")
+        )
+        return cls(there, way, tracks["camera_depth"].values)
+
+    def seen(self, nodes: NDArray[np.int64], rest: NDArray, moved: NDArray) -> NDArray[np.float64]:
+        """Displacements (t, m, 3), m, that tracks tell of nodes (m,) which move by `moved`.
+
+        rest : (m, 3) positions at rest, m.
+        """
+        away = rest + moved - self.position
+        nearer = self.depth[nodes] / (away @ self.direction)
+        return self.position + nearer[..., None] * away - rest
 
 
 @dataclass(frozen=True)

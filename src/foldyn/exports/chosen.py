@@ -9,8 +9,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.results.contents import nodes_of
 from foldyn.results.dataset import DOCUMENT
-from foldyn.results.node_choice import nodes_of
 from foldyn.values import choice, indices, show
 
 ALONG = {

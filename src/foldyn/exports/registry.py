@@ -18,7 +18,7 @@ from foldyn.exports.chosen import ALONG
 from foldyn.input_files import path_of
 from foldyn.results import case_of, check_result, load
 from foldyn.values import choice, suggest
-from foldyn.viewer.folding import folding_case
+from foldyn.viewer.stage import folding_case
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,17 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from foldyn.errors import InputError
 from foldyn.formats.drawing import Drawing
+from foldyn.formats.writers import flat_points, letters, warn_of_angles
+from foldyn.patterns import Pattern
 from foldyn.values import parsed, show
 
 LETTERS = {"0": "F", "1": "B", "2": "M", "3": "V", "4": "F"}
+KINDS = {"B": 1, "C": 1, "M": 2, "V": 3, "F": 4, "U": 4}
+PER_METER = 1e3
 
 
 def read(text: str) -> Drawing:
@@ -34,7 +40,7 @@ def read(text: str) -> Drawing:
     InputError
         A line that is no line of a crease pattern; the message names it.
     """
-    letters: list[str] = []
+    kinds: list[str] = []
     points: list[tuple[float, float]] = []
     places: list[str] = []
     for row, line in enumerate(text.splitlines(), 1):
@@ -54,9 +60,36 @@ def read(text: str) -> Drawing:
             raise InputError(f" = {show(line)}: coordinates must be numbers", place) from None
         if not all(map(math.isfinite, (x1, y1, x2, y2))):
             raise InputError(f" = {show(line)}: coordinates must be finite numbers", place)
-        letters.append(LETTERS[words[0]])
+        kinds.append(LETTERS[words[0]])
         points += [(x1, -y1), (x2, -y2)]
         places.append(place)
-    if not letters:
+    if not kinds:
         raise InputError(": there are none; give a file with a crease pattern", "lines")
-    return Drawing.of_lines(points, letters, assumed=1e-3, places=tuple(places))
+    return Drawing.of_lines(points, kinds, assumed=1e-3, places=tuple(places))
+
+
+def write(pattern: Pattern) -> str:
+    """Text of a CP file: kind, x1, y1, x2, y2, with the y of the screen, which runs down.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        A flat one; the format knows boundary, mountain, valley and auxiliary lines alone, so that
+        facets and unassigned creases become the last.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    InputError
+        The pattern is folded.
+    """
+    warn_of_angles(pattern, "CP")
+    points = (PER_METER * flat_points(pattern, "CP") * np.array([1.0, -1.0])).tolist()
+    lines = [
+        f"{KINDS[letter]} " + " ".join(map(repr, [*points[a], *points[b]]))
+        for (a, b), letter, _ in letters(pattern)
+    ]
+    return "\n".join(lines) + "\n"

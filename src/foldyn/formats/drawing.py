@@ -9,6 +9,20 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+METERS = {
+    "m": 1.0,
+    "cm": 1e-2,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "nm": 1e-9,
+    "km": 1e3,
+    "in": 0.0254,
+    "ft": 0.3048,
+    "pt": 0.0254 / 72,
+    "px": 0.0254 / 96,
+}
+"""Units of length that pattern files name (m)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Drawing:

@@ -19,15 +19,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import InputError
+from foldyn.errors import InputError, optional
 from foldyn.formats.curves import CHORD
-from foldyn.formats.drawing import Drawing
-from foldyn.formats.dxf_writer import ezdxf
+from foldyn.formats.drawing import METERS, Drawing
 from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
 from foldyn.formats.lines import MOST_LINES, too_many
 from foldyn.formats.notes import count, without_length
-from foldyn.formats.units import METERS
+from foldyn.formats.svg_writer import NAMES, PER_METER
+from foldyn.formats.writers import flat_points, letters, warn_of_angles
 from foldyn.input_files import DEEPEST
+from foldyn.patterns import Pattern
 from foldyn.values import LONGEST, parsed, shortened, show
 
 _LAYERS = (
@@ -42,6 +43,8 @@ _DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"
 _MOST_INSERTED = 10_000
 _UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 12: "nm", 13: "um", 21: "ft"}
 """Units by their number in $INSUNITS (DXF reference, header section)."""
+_COLOR_NUMBERS = {"B": 7, "M": 1, "V": 5, "F": 2, "U": 6, "C": 3}
+"""Of AutoCAD, for each layer that is written: black or white, red, blue, yellow, magenta, green."""
 
 
 def read(text: str) -> Drawing:
@@ -80,7 +83,7 @@ def read(text: str) -> Drawing:
     tolerance = CHORD * float(np.linalg.norm(np.ptp(every, axis=0)))
     colors: Counter[tuple[RGB, RGB | None]] = Counter()
     points: list[NDArray[np.float64]] = []
-    letters: list[str] = []
+    kinds: list[str] = []
     places: list[str] = []
     has_length: dict[str, bool] = {}
     total, curved = 0, 0
@@ -97,14 +100,14 @@ def read(text: str) -> Drawing:
         if total > MOST_LINES:
             raise too_many("the lines")
         points.append(pairs.reshape(-1, 3))
-        letters += [letter] * len(pairs)
+        kinds += [letter] * len(pairs)
         places += [_place(entity)] * len(pairs)
     if not total:
         raise InputError(": all are points; give a file with a crease pattern", "lines")
     repairs = [f"{count(curved, 'curve')} drawn as chords, within {tolerance:.3g} units"]
     return Drawing.of_lines(
         np.concatenate(points),
-        letters,
+        kinds,
         meters=_meters(document),
         assumed=1e-3,
         places=tuple(places),
@@ -253,3 +256,47 @@ def _meters(document: Any) -> float | None:
     """Length of the unit (m) that the header names; None for none."""
     unit = _UNITS.get(document.header.get("$INSUNITS", 0))
     return None if unit is None else METERS[unit]
+
+
+def write(pattern: Pattern) -> str:
+    """Text of a DXF file (R2010): a layer for each kind of line, "MOUNTAIN" and so on.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        A flat one.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    InputError
+        The pattern is folded, or ezdxf is not installed.
+    """
+    warn_of_angles(pattern, "DXF")
+    points = (PER_METER * flat_points(pattern, "DXF")).tolist()
+    library = ezdxf()
+    document = library.new("R2010", units=4)  # mm
+    space = document.modelspace()
+    edges = letters(pattern)
+    for letter in _COLOR_NUMBERS:
+        if any(edge[1] == letter for edge in edges):
+            document.layers.add(NAMES[letter].upper(), color=_COLOR_NUMBERS[letter])
+    for (a, b), letter, _ in edges:
+        space.add_line(points[a], points[b], dxfattribs={"layer": NAMES[letter].upper()})
+    text = io.StringIO()
+    document.write(text)
+    return text.getvalue()
+
+
+def ezdxf() -> Any:
+    """Return the module `ezdxf`, an optional dependency.
+
+    Raises
+    ------
+    InputError
+        It is not installed.
+    """
+    return optional("ezdxf", "DXF files need ezdxf", "ezdxf (or foldyn[dxf])")

@@ -5,40 +5,30 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from foldyn.errors import FoldynWarning, InputError, within
-from foldyn.formats import (
-    cp,
-    cp_writer,
-    dxf,
-    dxf_writer,
-    fold,
-    fold_writer,
-    obj,
-    opx,
-    stl,
-    svg,
-    svg_writer,
-)
+from foldyn.formats import cp, dxf, fold, fold_writer, obj, opx, stl, svg, svg_writer
 from foldyn.formats.building import Built, built
-from foldyn.formats.drawing import Drawing
+from foldyn.formats.drawing import METERS, Drawing
 from foldyn.formats.facets import with_convex_panels, with_facets
-from foldyn.formats.kept import with_families, without_repetition
-from foldyn.formats.units import METERS
 from foldyn.formats.writers import warn_of_boards
 from foldyn.input_files import path_of, read_text
 from foldyn.patterns import Pattern
 from foldyn.patterns.facets import LINE
-from foldyn.patterns.frames import Frame
+from foldyn.patterns.frames import Frame, fold_angles
 from foldyn.patterns.pattern import pattern_of
 from foldyn.values import choice, listed, number, of_kind
 from foldyn.writing import write_bytes
 
 MOST = 32
 """Size of a pattern file (MiB)."""
+SAME = 1e-4
+"""Difference of fold angles (rad) that are one, with the digits of a file."""
 
 
 @dataclass(frozen=True)
@@ -80,9 +70,9 @@ _FORMATS = (
     Format("FOLD", (".fold",), read=fold.read, write=fold_writer.write, frames=True),
     Format("OBJ", (".obj",), read=obj.read, write=obj.write),
     Format("SVG", (".svg",), read=svg.read, write=svg_writer.write),
-    Format("CP", (".cp",), read=cp.read, write=cp_writer.write),
+    Format("CP", (".cp",), read=cp.read, write=cp.write),
     Format("OPX", (".opx",), read=opx.read),
-    Format("DXF", (".dxf",), read=dxf.read, write=dxf_writer.write),
+    Format("DXF", (".dxf",), read=dxf.read, write=dxf.write),
     Format("STL", (".stl",), write=stl.write),
 )
 
@@ -176,9 +166,30 @@ def diagnose(
     with within("", file):
         drawing = fmt.read(text, *((frame,) if fmt.frames else ()))
         made = built(drawing, meters=meters, scale=factor)
-        made = with_families(without_repetition(made), drawing)
+        made = _with_families(_without_repetition(made), drawing)
         made = with_facets(made, drawing, facets)
         return made if facets == LINE else with_convex_panels(made)
+
+
+def _without_repetition(made: Built) -> Built:
+    """Leave out fold angles that only repeat how the vertices lie: they are no state to fold to."""
+    wanted, there = made.pattern.fold_angles, fold_angles(made.pattern)
+    given = ~np.isnan(wanted)
+    if given.any() and np.abs(wanted - there)[given].max() < SAME:
+        return made._replace(pattern=made.pattern.changed(fold_angles=None))
+    return made
+
+
+def _with_families(made: Built, drawing: Drawing) -> Built:
+    """Put families of creases into a pattern, where its vertices are still those of the drawing."""
+    if not drawing.families:
+        return made
+    creases = {(a, b) for a, b in made.pattern.creases.tolist()}
+    pairs = {tuple(sorted(pair)) for members in drawing.families.values() for pair in members}
+    if len(made.pattern.vertices) == len(drawing.vertices) and pairs <= creases:
+        return made._replace(pattern=made.pattern.changed(families=drawing.families))
+    told = (*made.diagnosis.repairs, "families of creases left out: the vertices are others now")
+    return made._replace(diagnosis=replace(made.diagnosis, repairs=told))
 
 
 def write_pattern(

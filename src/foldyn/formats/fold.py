@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.formats.drawing import Drawing
+from foldyn.formats.drawing import METERS, Drawing
 from foldyn.formats.notes import count
-from foldyn.formats.units import METERS
 from foldyn.input_files import from_json
 from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.values import choice, show, single

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.formats.drawing import Drawing
-from foldyn.formats.units import METERS
+from foldyn.formats.drawing import METERS, Drawing
 from foldyn.formats.writers import letters
 from foldyn.patterns import Pattern
 from foldyn.values import parsed, show

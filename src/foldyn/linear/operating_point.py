@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case, State
-from foldyn.cases.loaded import SomeLoads
+from foldyn.cases.case_assembly import SomeLoads
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import NO_POTENTIAL

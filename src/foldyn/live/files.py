@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
+from html import escape
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,13 +15,13 @@ from foldyn.errors import FoldynError, FoldynWarning, InputError
 from foldyn.formats import read_pattern
 from foldyn.live.case_session import CaseSession
 from foldyn.live.embedded import View, check_results, results_stage
-from foldyn.live.page import live_page
 from foldyn.live.server import Server
 from foldyn.patterns import Pattern
 from foldyn.patterns.frames import fold_angles
+from foldyn.report.page import CSS, document
 from foldyn.results import load
 from foldyn.statics import fold
-from foldyn.viewer import Stage, rest_stage
+from foldyn.viewer import Stage, rest_stage, scripts
 
 CASE, RESULT = ".toml", ".nc"
 MOST_FOLDED = 300
@@ -60,6 +62,22 @@ def served(paths: Sequence[Path], port: int = 0) -> tuple[Server, str]:
     except (OSError, OverflowError) as error:
         why = getattr(error, "strerror", None) or error
         raise InputError(f" = {port}: {why}; choose another one, or 0", "--port") from None
+
+
+def live_page(title: str, about: Mapping[str, Any], key: str) -> str:
+    """Text of the page.
+
+    about : what its script reads: "controls" and "offers".
+    key : what its requests carry.
+    """
+    told = scripts.in_page({**about, "key": key})
+    main = (
+        f"<h1>{escape(title)}</h1>\n"
+        '<div class="live" id="live"><p>This page needs JavaScript.</p></div>\n'
+        f'<script type="application/json" id="live.about">{told}</script>'
+    )
+    css = scripts.style("live") + CSS
+    return document(title, main, css, scripts.script_of_live(), "; connect-src 'self'")
 
 
 def _results(paths: Sequence[Path]) -> View:

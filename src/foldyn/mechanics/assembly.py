@@ -22,10 +22,20 @@ from scipy.sparse.linalg import splu
 
 from foldyn.errors import ComputationError
 from foldyn.mechanics.model import ranks
-from foldyn.mechanics.sheet_term import Blocks, SheetTerm, Strains, Unstrained, largest_turn
+from foldyn.mechanics.sheet_term import Blocks, SheetTerm, largest_turn
 from foldyn.mechanics.step_tangent import FLOOR
 from foldyn.mechanics.tangent import Sparsity, block_keys, joined
-from foldyn.mechanics.term import ENERGIES, FORCES, Compiled, Model, Term, evaluate, in_rows
+from foldyn.mechanics.term import (
+    ENERGIES,
+    FORCES,
+    Compiled,
+    Model,
+    Strains,
+    Term,
+    Unstrained,
+    evaluate,
+    in_rows,
+)
 from foldyn.mechanics.threads import Team
 
 ITERATIONS = 50

@@ -20,13 +20,15 @@ from foldyn.mechanics.block_matrix import pairs_within, places_of
 from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient
 from foldyn.mechanics.discrete_gradient import discrete_gradient
 from foldyn.mechanics.model import ranks
-from foldyn.mechanics.sheet_term import Strains, Unstrained, unit_rows
+from foldyn.mechanics.sheet_term import unit_rows
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
     MEAN_FORCES,
     Compiled,
+    Strains,
     Term,
+    Unstrained,
     energies,
     forces,
     mean_forces,

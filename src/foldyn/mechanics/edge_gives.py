@@ -24,13 +24,13 @@ from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.membranes import GROUP
 from foldyn.mechanics.model import ranks
-from foldyn.mechanics.sheet_term import Unstrained
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
     MEAN_FORCES,
     Compiled,
     Term,
+    Unstrained,
     energies,
     forces,
     mean_forces,

@@ -26,13 +26,14 @@ from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.block_matrix import pairs_within, places_of
 from foldyn.mechanics.lanes import WIDTH, add, take
 from foldyn.mechanics.model import ranks
-from foldyn.mechanics.sheet_term import Strains, Unstrained
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
     MEAN_FORCES,
     Compiled,
+    Strains,
     Term,
+    Unstrained,
     energies,
     forces,
     mean_forces,

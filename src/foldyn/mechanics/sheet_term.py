@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -17,7 +17,7 @@ from scipy import sparse
 
 from foldyn.materials import HingeLaw
 from foldyn.mechanics.tangent import Sparsity
-from foldyn.mechanics.term import Folds, Term
+from foldyn.mechanics.term import Folds, Strains, Term
 
 NO_DOF = np.iinfo(np.int64).max  # where there is none: no array has it as an index
 
@@ -28,26 +28,6 @@ class SoftHinges(NamedTuple):
     offset: NDArray  # (h,) angle from rest, rad
     stiffness: NDArray  # (h,) N m/rad
     gradient: sparse.csr_array  # (h, m) of their angles, 1/m
-
-
-class Unstrained(NamedTuple):
-    """A model with linear laws and without strain, whose soft motions are mechanisms."""
-
-    tangent: sparse.csr_array  # (m, m)
-    hinges: sparse.csr_array  # (m, m) of the hinges alone
-    stretch: Callable[[NDArray], float]  # of bars in a motion (m,), over what their ends could do
-
-
-class Strains(NamedTuple):
-    """Bars, p of them, hinges, h, and panels with membranes, with their stiffness at rest."""
-
-    bars: NDArray  # (p, 2) nodes
-    vector: NDArray  # (p, 3) from the first to the second at rest, m
-    bar_stiffness: NDArray  # (p,) N/m
-    hinges: NDArray  # (h, 4) nodes: axis j, k, wings i, l
-    corners: NDArray  # (h, 4, 3) where they are at rest, m
-    hinge_stiffness: NDArray  # (h,) N m/rad
-    membranes: tuple[Any, ...] = ()  # `membranes.Membranes`, of panels of one kind each
 
 
 class FoldHinges(NamedTuple):

@@ -20,13 +20,14 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.block_matrix import blocks_of_ends, pairs_of_ends, places_of
 from foldyn.mechanics.model import ranks
-from foldyn.mechanics.sheet_term import Unstrained, unit_rows
+from foldyn.mechanics.sheet_term import unit_rows
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
     MEAN_FORCES,
     Compiled,
     Term,
+    Unstrained,
     energies,
     forces,
     mean_forces,

@@ -38,8 +38,8 @@ are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numba import types
@@ -51,9 +51,6 @@ from foldyn.jit.context import Context, run_at, value_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.threads import Team
 from foldyn.values import writable
-
-if TYPE_CHECKING:
-    from foldyn.mechanics.sheet_term import Strains, Unstrained
 
 (
     FORCES, ENERGIES, LIMIT, PLACE_OBSTACLES, ADVANCE_CLOCK, COMMIT, DISSIPATED, BRANCH_STATES,
@@ -77,6 +74,26 @@ class Compiled(NamedTuple):
 
     context: Context
     kernels: Mapping[int, Addressed]
+
+
+class Unstrained(NamedTuple):
+    """A model with linear laws and without strain, whose soft motions are mechanisms."""
+
+    tangent: sparse.csr_array  # (m, m)
+    hinges: sparse.csr_array  # (m, m) of the hinges alone
+    stretch: Callable[[NDArray], float]  # of bars in a motion (m,), over what their ends could do
+
+
+class Strains(NamedTuple):
+    """Bars, p of them, hinges, h, and panels with membranes, with their stiffness at rest."""
+
+    bars: NDArray  # (p, 2) nodes
+    vector: NDArray  # (p, 3) from the first to the second at rest, m
+    bar_stiffness: NDArray  # (p,) N/m
+    hinges: NDArray  # (h, 4) nodes: axis j, k, wings i, l
+    corners: NDArray  # (h, 4, 3) where they are at rest, m
+    hinge_stiffness: NDArray  # (h,) N m/rad
+    membranes: tuple[Any, ...] = ()  # `membranes.Membranes`, of panels of one kind each
 
 
 class Term(ABC):

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 from html import escape
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.patterns.palette import CREASES, PAPER
-
-if TYPE_CHECKING:
-    from foldyn.patterns.pattern import Pattern
 
 WIDTH, HEIGHT, MARGIN = 520.0, 300.0, 8.0
 """Pixels."""
@@ -32,8 +29,8 @@ LINES = {
 """Color, width and dashes of edges by their letter, "B" for boundaries."""
 
 
-def picture(pattern: Pattern, words: str = "") -> str | None:
-    """Picture of a pattern as HTML with words below; None where it has too many panels.
+def picture(pattern: Any, words: str = "") -> str | None:
+    """Picture of a `Pattern` as HTML with words below; None where it has too many panels.
 
     Panels are drawn from back to front, each with the edges that no nearer panel has.
     """
@@ -57,7 +54,7 @@ def picture(pattern: Pattern, words: str = "") -> str | None:
     )
 
 
-def _panels(pattern: Pattern, places: NDArray, depth: NDArray, toward: NDArray) -> list[str]:
+def _panels(pattern: Any, places: NDArray, depth: NDArray, toward: NDArray) -> list[str]:
     """Panels and edges from back to front."""
     letters = {
         tuple(pair): letter

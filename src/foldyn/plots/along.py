@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from foldyn.cases.directions import signed
 from foldyn.errors import InputError
 from foldyn.plots.given import alone
-from foldyn.results.node_choice import nodes_of
+from foldyn.results.contents import nodes_of
 from foldyn.values import choice
 
 AXES = ("x", "y", "z")

@@ -29,7 +29,7 @@ class Share(NamedTuple):
 def on_panels(case: Case, kind: type[Pressure] | type[Temperature]) -> list[Share]:
     """Pressure (Pa) or changes of temperature (K) of panels, one for each load of a kind."""
     structure, found = case.structure, []
-    for place, load in case.placed(kind):
+    for place, load in case.loads_of(kind):
         triangles = resolve_panels(structure, load.panels, f"{place}.panels")
         panels = np.unique(structure.triangle_panel[triangles])
         value = load.pressure if kind is Pressure else load.change
@@ -40,7 +40,7 @@ def on_panels(case: Case, kind: type[Pressure] | type[Temperature]) -> list[Shar
 def moments(case: Case) -> list[Share]:
     """Moments of whole creases, one for each load."""
     found = []
-    for place, load in case.placed(CreaseMoment):
+    for place, load in case.loads_of(CreaseMoment):
         creases, moment = load.of_creases(case.structure, place)
         found.append(Share(creases, moment, load.history))
     return found

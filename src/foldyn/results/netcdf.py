@@ -15,9 +15,9 @@ import os
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-import h5netcdf  # noqa: F401  here, and not in the processes that read
+import h5netcdf
 import h5py
 import numpy as np
 import xarray as xr
@@ -27,9 +27,9 @@ from foldyn.errors import InputError
 from foldyn.input_files import check_file, path_of
 from foldyn.results.apart import apart
 from foldyn.results.attributes import FORMAT
+from foldyn.results.columns import PIECE, pieces
 from foldyn.results.contents import check_result, whole_attribute
 from foldyn.results.seal import seal, sound
-from foldyn.results.streams import put
 from foldyn.values import flag
 from foldyn.writing import whole
 
@@ -44,6 +44,10 @@ _PARTS = ("real", "imag")
 _WHOLE = "part_of_complex"  # attribute of both parts: the name of the variable
 MOST_PACKED = 1100
 """Bytes that one byte of a file may stand for: deflate packs no more than 1032."""
+ALONG = "time"
+"""The dimension that may be long."""
+CHUNK = 2**20
+"""Bytes of a chunk of a variable, which is what is read at least."""
 LEAST_MEMORY = 2**29
 """Bytes that a file without a seal may take besides its content."""
 LEAST_SECONDS, PER_SECOND = 2, 50_000
@@ -127,7 +131,7 @@ def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     path = check_target(path)
     try:
         with whole(path) as part:
-            fill(part, lambda sink: put(ds, sink, ENGINE))
+            fill(part, lambda sink: _write_pieces(ds, sink, ENGINE))
             seal(part)
     except PermissionError:
         raise InputError(f"{path}: may not be written; choose another folder") from None
@@ -329,3 +333,25 @@ def _joined(ds: xr.Dataset) -> xr.Dataset:
         ds = ds.drop_vars([f"{name}_{part}" for part in _PARTS])
         ds = ds.assign({name: (real.dims, whole, own)})
     return ds
+
+
+def _write_pieces(ds: xr.Dataset, sink: Any, engine: Literal["h5netcdf"]) -> None:
+    """Write a dataset to a file that is open; what is long along `ALONG`, piece by piece."""
+    along = {name: v for name, v in ds.variables.items() if v.dims[:1] == (ALONG,)}
+    if all(variable.nbytes <= PIECE for variable in along.values()):
+        ds.to_netcdf(sink, engine=engine)
+        return
+    count = ds.sizes[ALONG]
+    chunks = {
+        str(name): {
+            "chunksizes": (min(count, max(1, CHUNK // max(1, v.nbytes // count))), *v.shape[1:])
+        }
+        for name, v in along.items()
+    }
+    first = ds.isel({ALONG: slice(0, 1)})
+    first.to_netcdf(sink, engine=engine, unlimited_dims=[ALONG], encoding=chunks)
+    with h5netcdf.File(sink, "r+") as file:
+        file.resize_dimension(ALONG, count)
+        for name, variable in along.items():
+            for rows in pieces(count, variable.nbytes // count):
+                file.variables[str(name)][rows] = variable[rows].values

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Actuate, Case
-from foldyn.cases.loaded import SomeLoads
+from foldyn.cases.case_assembly import SomeLoads
 from foldyn.errors import InputError
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.term import ContactTerm

@@ -15,17 +15,9 @@ from foldyn.materials import BarLaw, HingeLaw, Superlinear
 from foldyn.mechanics.bars_hinges import bars_hinges_kernels
 from foldyn.mechanics.energy import gradients
 from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
-from foldyn.mechanics.sheet_term import (
-    NO_DOF,
-    FoldHinges,
-    SheetTerm,
-    SoftHinges,
-    Strains,
-    Unstrained,
-    largest_turn,
-)
+from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges, SheetTerm, SoftHinges, largest_turn
 from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_mean_tangent, put_tangent
-from foldyn.mechanics.term import Compiled, Folds
+from foldyn.mechanics.term import Compiled, Folds, Strains, Unstrained
 from foldyn.values import writable
 
 GROUPS: Mapping[str, str] = {

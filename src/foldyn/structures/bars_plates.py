@@ -26,13 +26,12 @@ from foldyn.mechanics.sheet_term import (
     FoldHinges,
     SheetTerm,
     SoftHinges,
-    Unstrained,
     largest_turn,
     unit_rows,
 )
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
-from foldyn.mechanics.term import Compiled, Folds
+from foldyn.mechanics.term import Compiled, Folds, Unstrained
 from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm, stretch
 from foldyn.values import writable
 

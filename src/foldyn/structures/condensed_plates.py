@@ -22,9 +22,9 @@ from foldyn.mechanics.plates_condensed import (
     condensed_plates,
     condensed_work,
 )
-from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges, Unstrained
+from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges
 from foldyn.mechanics.step_tangent import SparseBlocks
-from foldyn.mechanics.term import Compiled
+from foldyn.mechanics.term import Compiled, Unstrained
 from foldyn.structures.bars_plates import BarsPlatesTerm
 
 

@@ -106,7 +106,7 @@ def plan_of(
     for one in job.measures:
         with faults.collected():
             one.check(case_file)
-    faults.tell()
+    faults.raise_all()
     case_file.computation()  # which refuses what cannot be computed as it is
     number, drawn, start = how
     return Plan(case_file, keys, drawn if sampled else GRID, number, start, points, job)
@@ -209,4 +209,4 @@ def _check_keys(job: Job, keys: Sequence[Varied], first: Point) -> None:
                 validated(job.path, job.changed(point))
             if faults.found:
                 break
-    faults.tell()
+    faults.raise_all()

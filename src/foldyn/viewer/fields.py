@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case
-from foldyn.cases.loaded import SomeLoads
-from foldyn.dynamics.touch import CONTACT_FORCE
+from foldyn.cases.case_assembly import SomeLoads
+from foldyn.dynamics.sampling import CONTACT_FORCE
 from foldyn.materials.series import in_series
 from foldyn.mechanics import angles
 from foldyn.structures import Structure, membranes

@@ -1,7 +1,8 @@
-"""`Stage`: the interactive part of a page, and what it shows of results of each kind."""
+"""`Stage`: the interactive part of a page, which shows results of each kind or a sheet at rest."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -14,15 +15,17 @@ from threadpoolctl import ThreadpoolController
 
 from foldyn import __version__
 from foldyn.cases import Case
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import character, mac
+from foldyn.patterns import Pattern
 from foldyn.plots.along import displacements, stretches, way
+from foldyn.results.contents import pattern_of
+from foldyn.structures import Sheet, discretize
 from foldyn.viewer.arrays import Arrays
 from foldyn.viewer.backdrop import Backdrop
 from foldyn.viewer.fields import Field, energies, fields, folding_fields
-from foldyn.viewer.folding import folding_case
 from foldyn.viewer.scripts import in_page
-from foldyn.viewer.sheet import sheet
+from foldyn.viewer.sheet import bare_sheet, sheet
 
 OF_SIZE, OF_LARGEST, OF_COLORS = 5e-5, 1e-3, 4e-3
 """Errors of the page's displacements over the sheet's size and over the largest of them, of which
@@ -32,6 +35,8 @@ MOST_LINES = 20_000
 of its size."""
 MOST = 30_000_000
 """Displacements of a result that are looked at; of longer ones every k-th sample."""
+THIN = 1e-3
+"""Thickness of the sheet of a folding over the size of its pattern; it does not show."""
 
 Results = Mapping[str, xr.Dataset]
 
@@ -99,6 +104,25 @@ def stage(
 def _threads() -> ThreadpoolController:
     """Those of BLAS, whose libraries are found once."""
     return ThreadpoolController()
+
+
+def rest_stage(shown: Pattern | Case, title: str) -> Stage:
+    """Show a pattern, or a case with its supports and loads, at rest."""
+    arrays = Arrays()
+    bare = isinstance(shown, Pattern)
+    drawn = bare_sheet(arrays, "s0", shown) if bare else sheet(arrays, "s0", shown)
+    count = len(shown.vertices if bare else shown.structure.nodes)
+    result = {
+        "name": title,
+        "sheet": "s0",
+        "displacement": arrays.changing("u", np.zeros((1, count, 3)), 1.0),
+        "moments": arrays.exact("t", [0.0], "f4"),
+    }
+    about = {
+        "title": title, "kind": "shape", "version": __version__, "node": None, "axis": 0,
+        "sheets": {"s0": drawn}, "results": [result],
+    }  # fmt: skip
+    return Stage(about, arrays)
 
 
 def _kind(result: xr.Dataset) -> str:
@@ -244,3 +268,16 @@ def _likeness(results: Results, cases: Mapping[str, Case]) -> list[list[float | 
     )
     rows = mac(every, every).round(3).tolist()
     return [[value if np.isfinite(value) else None for value in row] for row in rows]
+
+
+def folding_case(result: xr.Dataset) -> Case:
+    """Case of the pattern of a folding, with the panels cut at their diagonals.
+
+    Its nodes are the vertices. Its sheet is made up, so that only its geometry counts; creases are
+    taken to rest when flat, as they may be closed.
+    """
+    pattern = pattern_of(result)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        thin = Sheet(1.0, 0.0, THIN * pattern.size)
+        return Case(discretize(pattern, thin, scheme="n4b5", crease_rest=180.0))

@@ -13,12 +13,11 @@ import math
 import numpy as np
 
 from foldyn.dynamics.implicit.contact_measure import add_measure, go
-from foldyn.dynamics.implicit.contact_quotient import quotient
 from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.contact.distances import cross, dot, minus, point
 from foldyn.mechanics.contact.edge_edge import PARALLEL, mollifier, square_of_cross, weigh_edges
 from foldyn.mechanics.contact.pairs import EDGES, VERTEX
-from foldyn.mechanics.contact.potential import barrier
+from foldyn.mechanics.contact.potential import barrier, difference_quotient
 from foldyn.mechanics.contact.second import apart_of, half_square
 from foldyn.mechanics.contact.vertex_triangle import PARTS, share_of, weigh_triangle
 
@@ -51,7 +50,7 @@ def _add_distance(kind, which, d0, k, move, size, tangent, force, block, push):
     free, _ = _weigh(kind, which, move.middle, move)
     apart_of(move.middle, move.weights, move.apart)
     half_square(move.middle, move.weights, move.moves, free, move.apart, move.slope, move.second)
-    value, slope = quotient(x0, x1)
+    value, slope = difference_quotient(x0, x1)
     law = 2.0 * k * value / (x0 + x1)
     law_slope = (2.0 * k * slope - law) / ((x0 + x1) * x1 * d0 * d0)
     change = 0.5 * d0 * d0 * (x1 - x0) * (x1 + x0)

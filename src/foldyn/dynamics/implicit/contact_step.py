@@ -16,7 +16,6 @@ from scipy import sparse
 
 from foldyn.dynamics.implicit.contact_measure import new_move
 from foldyn.dynamics.implicit.contact_pairs import edges_step, vertex_step
-from foldyn.dynamics.implicit.contact_quotient import quotient
 from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
@@ -31,7 +30,7 @@ from foldyn.mechanics.contact.pairs import (
     put_corners,
 )
 from foldyn.mechanics.contact.planes import farthest_stretch, height, move_planes, stretch_of
-from foldyn.mechanics.contact.potential import barrier
+from foldyn.mechanics.contact.potential import barrier, difference_quotient
 from foldyn.mechanics.contact.rubbing import add_rub
 from foldyn.mechanics.contact.rubbing_tangent import add_rub_tangent
 from foldyn.mechanics.contact.search import list_pairs, place, use_all
@@ -232,7 +231,7 @@ def _guard(tables, h, theta0, theta1):
     for sign in (1.0, -1.0):
         x0 = (theta0 if sign > 0.0 else TURN - theta0) / limit
         x1 = (theta1 if sign > 0.0 else TURN - theta1) / limit
-        value, rate = quotient(x0, x1)
+        value, rate = difference_quotient(x0, x1)
         moment += sign * k * limit * value
         slope += k * rate
         energy += k * limit * limit * barrier(x1)[0] if x1 < 1.0 else 0.0
@@ -318,7 +317,7 @@ def _plane_quotient(tables, start, moved, memory, p, i):
     before = height(tables, start, moved[0], p, i) / d0
     after = height(tables, memory.x, moved[1], p, i) / d0
     energy = tables.stiffness * d0 * d0 * barrier(after)[0] if after < 1.0 else 0.0
-    value, slope = quotient(before, after)
+    value, slope = difference_quotient(before, after)
     return value, slope, energy
 
 

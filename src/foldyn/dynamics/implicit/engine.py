@@ -15,23 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.algebra.banded import one_thread
+from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.actuation import note_offsets
+from foldyn.dynamics.checkpoint import restore, snapshot, state_parts
 from foldyn.dynamics.course import Course, Outcome, Samples, StepPlan
 from foldyn.dynamics.equation import accelerate, write
-from foldyn.dynamics.implicit.impulse import impulse_lasts
-from foldyn.dynamics.implicit.matrix import StepMatrix
+from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.newton import Newton
 from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Scheme
-from foldyn.dynamics.implicit.step_control import (
-    SAME_TIME,
-    divide,
-    next_step,
-    next_stop,
-    smaller_step,
-)
 from foldyn.dynamics.implicit.touching import TouchingNewton
 from foldyn.dynamics.inertia import times_mass
-from foldyn.dynamics.snapshot import parts_of, restore, snapshot
 from foldyn.dynamics.system import Packed
 from foldyn.mechanics.hinge_memory import HingeMemory
 
@@ -39,7 +32,14 @@ LEAST_STEP = 2.0**-20  # of the step wanted: where Newton's method fails with le
 LEAST_TIME = 1e-13  # step relative to the end of the motion
 TURN = math.pi  # by which no dihedral jumps in a step unless panels collide
 MEMORY = 0.9  # share of an error that counts a step later
+SAME_TIME = 1e-9  # of a step: times as near as that are one
 SAME_STATE = 1e-9  # relative difference of states and forces that are one
+# the control of the step by its error
+SAFETY = 0.9
+GROWTH = 2.0  # of a step at most
+WORTHWHILE = 1.25  # growth below which the step, and with it the matrix, is kept
+NEAR, CUT = 0.95, 0.85  # below which the error is about to be too large, and what is done then
+LEAST = 0.2  # share of a refused step that is tried next, at least
 # what is measured along a motion and counts for the next step
 MEASURED = ("wanted", "last", "error", "farthest")
 OUTCOMES = {SOLVED: Outcome.DONE, NOT_FINITE: Outcome.NOT_FINITE}
@@ -96,11 +96,11 @@ class Implicit:
         }
 
     def continuation(self) -> NDArray:
-        """All numbers (k,) on which the next steps depend; see `go_on_from`."""
+        """All numbers (k,) on which the next steps depend; see `continue_from`."""
         state = [*self._state(), self._acceleration()]
         return np.concatenate([array.ravel() for array in state])
 
-    def go_on_from(self, values: NDArray) -> None:
+    def continue_from(self, values: NDArray) -> None:
         """Have the motion go on as that one did whose end has these numbers.
 
         Its displacement, its velocity and the acceleration that follows from them must be those of
@@ -110,7 +110,7 @@ class Implicit:
         self._end = values
 
     def _resume(self, values: NDArray) -> bool:
-        """See `go_on_from`; tells whether it is the same motion."""
+        """See `continue_from`; tells whether it is the same motion."""
         scheme, old, tally = self._scheme, self._scheme.old, self._course.tally
         own = [*self._state(), old.a]
         if values.shape != (sum(array.size for array in own),) or not np.isfinite(values).all():
@@ -163,26 +163,26 @@ class Implicit:
             return {}
         return {"contact_lists": int(self._touching.memory.counts.lists)}
 
-    def standing(self) -> dict[str, NDArray]:
+    def checkpoint_arrays(self) -> dict[str, NDArray]:
         """All on which the next steps depend beside the case, between two stretches."""
         made = np.array([self._matrix.factorized, self._matrix.factorizations])
         origin = {f"origin.{k}": array for k, array in enumerate(self._newton.origin)}
         return snapshot(self._parts()) | {"factorized": made} | origin
 
-    def go_on(self, standing: Mapping[str, NDArray]) -> None:
+    def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
         """Go on as the engine that stood there."""
-        restore(self._parts(), standing)
-        made, count = standing["factorized"].tolist()
+        restore(self._parts(), arrays)
+        made, count = arrays["factorized"].tolist()
         if made:
             with one_thread():
                 self._newton.remake()
         self._matrix.factorizations = count
-        count = sum(name.startswith("origin.") for name in standing)
-        self._newton.origin = tuple(standing[f"origin.{k}"] for k in range(count))
+        count = sum(name.startswith("origin.") for name in arrays)
+        self._newton.origin = tuple(arrays[f"origin.{k}"] for k in range(count))
 
     def _parts(self) -> dict[str, Any]:
         own = {"engine": self, "scheme": self._scheme, "newton": self._newton}
-        return parts_of(self._packed, self._course) | own | {"matrices": self._matrix.changing}
+        return state_parts(self._packed, self._course) | own | {"matrices": self._matrix.changing}
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
@@ -212,7 +212,9 @@ class Implicit:
         scheme.begin(plan.start)
         self._course.tally.farthest = _largest(scheme.displacement())
         if self._packed.system.varies and not plan.steps:
-            self._horizon = impulse_lasts(scheme, self._matrix, self._packed, plan.end - plan.start)
+            self._horizon = impulse_duration(
+                scheme, self._matrix, self._packed, plan.end - plan.start
+            )
         if self._touching is not None:
             self._touching.begin()
         self._newton.prepare(plan.dt, plan.start)
@@ -234,7 +236,7 @@ class Implicit:
         whole = True
         while t < end - SAME_TIME * plan.dt:
             goal, jump = self._next_jump(t, end, SAME_TIME * plan.dt)
-            part, stop, jump = divide(t, goal, h, jump)
+            part, stop, jump = equal_step(t, goal, h, jump)
             if abs(part - plan.dt) <= SAME_TIME * plan.dt:
                 part = plan.dt  # without the rounding of the times
             outcome, hinge = self._attempt(part, stop, jump)
@@ -263,7 +265,7 @@ class Implicit:
                 return Outcome.STUCK, -1
             near = SAME_TIME * wanted
             goal, jump = self._next_jump(t, next_stop(plan, t, due, near), near)
-            h, end, jump = divide(t, goal, wanted, jump)
+            h, end, jump = equal_step(t, goal, wanted, jump)
             outcome, hinge = self._attempt(h, end, jump)
             if outcome != Outcome.DONE:
                 if self._hopeless(h):
@@ -383,3 +385,55 @@ def _same(now: NDArray, then: NDArray) -> bool:
 
 def _largest(values: NDArray) -> float:
     return float(np.abs(values).max(initial=0.0))
+
+
+def next_step(h: float, error: float) -> float:
+    """Step after an accepted one of h (s) with the error, relative to the tolerance."""
+    factor = GROWTH if error <= 0.0 else min(GROWTH, SAFETY * error ** (-1.0 / 3.0))
+    if factor < NEAR:
+        return h * CUT
+    return h if factor < WORTHWHILE else h * factor
+
+
+def smaller_step(h: float, error: float) -> float:
+    """Step after a refused one."""
+    return h * min(0.9, max(LEAST, SAFETY * error ** (-1.0 / 3.0)))
+
+
+def next_stop(plan: StepPlan, t: float, end: float, near: float) -> float:
+    """Where a step from t has to end at the latest, for the knots of the histories."""
+    k = int(np.searchsorted(plan.stops, t + near, side="right"))
+    return plan.stops[k] if k < len(plan.stops) and plan.stops[k] < end - near else end
+
+
+def equal_step(
+    t: float, goal: float, wanted: float, jump: float | None
+) -> tuple[float, float, float | None]:
+    """Step from t, the first of equal ones to the goal, its end, and the jump if it is there."""
+    parts = max(1, math.ceil((goal - t) / wanted * (1.0 - SAME_TIME)))
+    h = (goal - t) / parts
+    return (h, goal, jump) if parts == 1 else (h, t + h, None)
+
+
+def impulse_duration(scheme: Scheme, matrix: StepMatrix, packed: Packed, duration: float) -> float:
+    """How long (s) an impulse acts on, in which a vibration moves on; at most a duration.
+
+    1/omega of the vibration that the histories set in motion, with omega^2 Rayleigh's quotient of
+    the displacements that they would cause if they acted slowly: over the duration, for bodies
+    that nothing holds. Hinges count with their nominal stiffness.
+    """
+    u = scheme.displacement()
+    force = scheme.push(scheme.old, np.ones(len(scheme.old.factor)))
+    matrix.blocks.put(packed.body.nominal(u), matrix.pattern, u, u, False, matrix.stiffness)
+    slow = (2.0 * math.pi / duration) ** 2
+    try:
+        matrix.factorize(Weights(stiffness=1.0, mass=slow, damping=0.0))
+    except SingularTangentError:
+        return duration
+    scheme.step[:] = 0.0
+    x = matrix.solve(force, scheme.step)
+    matrix.forget()
+    times_mass(packed.mass, x, scheme.out)
+    inertia, work = float((x * scheme.out).sum()), float((x * force).sum())
+    square = work / inertia - slow if inertia > 0.0 else 0.0
+    return 1.0 / math.sqrt(square) if square * duration * duration > 1.0 else duration

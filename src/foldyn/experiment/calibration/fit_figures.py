@@ -18,11 +18,16 @@ from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.fitted import Fit
 from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
-from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes
+from foldyn.experiment.calibration.measured import (
+    MOST,
+    ForceDisplacement,
+    Shapes,
+    dense_curve,
+    picture_plane,
+)
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.modal import ModeShapes
 from foldyn.experiment.calibration.responses import FrequencyResponse
-from foldyn.experiment.calibration.shown import MOST, dense, plane
 from foldyn.plots import style
 
 WIDTH = 9.0  # inches
@@ -31,7 +36,7 @@ WIDTH = 9.0  # inches
 def plot_measured(one: Measurement, result: Any, case: Case) -> Figure:
     """Draw what was measured beside a result of the fitted model."""
     if isinstance(one, ForceDisplacement):
-        curve = dense(one)
+        curve = dense_curve(one)
         return plot_forces(one, (curve.displacement, curve.predicted(result, case)))
     if isinstance(one, Shapes):
         return plot_shapes(one, case, one.shapes(result, case))
@@ -87,7 +92,7 @@ def plot_shapes(one: Shapes, case: Case, model: NDArray[np.float64]) -> Figure:
         As `Shapes.shapes` gives it.
     """
     nodes = one.where(case)
-    across, up = plane(one, case)
+    across, up = picture_plane(one, case)
     rest = case.structure.nodes[nodes]
     letters = [AXES.index(axis) for axis in one.axes]
     origin = rest[:, letters] if one.quantity == "displacement" else 0.0

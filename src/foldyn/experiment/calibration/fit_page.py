@@ -17,11 +17,16 @@ from foldyn.analyses.provenance import Call, computed, inputs, inputs_table
 from foldyn.cases.directions import AXES
 from foldyn.experiment.calibration.fitted import Fit
 from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
-from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes
+from foldyn.experiment.calibration.measured import (
+    MOST,
+    ForceDisplacement,
+    Shapes,
+    dense_curve,
+    picture_plane,
+)
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.modal import ModalParameters, ModeShapes
 from foldyn.experiment.calibration.responses import FrequencyResponse
-from foldyn.experiment.calibration.shown import MOST, dense, plane
 from foldyn.experiment.calibration.vibration_charts import (
     modes_table,
     response_charts,
@@ -98,7 +103,7 @@ def _runs(fit: Fit) -> list[_Run]:
     values, runs = [*fit.values.values()], []
     for run in fit.problem.runs:
         members = [fit.problem.measurements[i] for i in run.members]
-        forces = [dense(one) for one in members if isinstance(one, ForceDisplacement)]
+        forces = [dense_curve(one) for one in members if isinstance(one, ForceDisplacement)]
         result = fit.problem.result(run, values, [*members, *forces])
         names = ", ".join(one.name for one in members)
         runs.append(_Run(run.members, fit.problem.case_file(run, values), result, names))
@@ -216,7 +221,7 @@ def _charts(fit: Fit, number: int, one: Measurement, run: _Run) -> list[Chart]:
     """What was measured beside the fitted model; empty where there is nothing to show."""
     case, result = run.case_file.case(), run.result
     if isinstance(one, ForceDisplacement):
-        curve = dense(one)
+        curve = dense_curve(one)
         model = Curve("model", curve.displacement, curve.predicted(result, case))
         seen = Curve(one.label, one.displacement, one.force, dots=True)
         return [Chart(f"{one.axis} displacement (m)", f"{one.axis} force (N)", [model, seen])]
@@ -249,7 +254,7 @@ def _charts(fit: Fit, number: int, one: Measurement, run: _Run) -> list[Chart]:
 def _shape_charts(one: Shapes, run: _Run) -> list[Chart]:
     """Points that were measured beside those of the model, a chart for each load factor."""
     case = run.case_file.case()
-    model, (across, up) = one.shapes(run.result, case), plane(one, case)
+    model, (across, up) = one.shapes(run.result, case), picture_plane(one, case)
     letters = [AXES.index(axis) for axis in one.axes]
     rest = case.structure.nodes[one.where(case)][:, letters]
     origin = rest if one.quantity == "displacement" else 0.0

@@ -24,7 +24,7 @@ from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.modal import ModalParameters, ModeShapes
 from foldyn.experiment.calibration.parameters import Parameter, Space, space
 from foldyn.experiment.calibration.responses import FrequencyResponse
-from foldyn.experiment.calibration.sight import Sight
+from foldyn.experiment.camera import Sight
 from foldyn.input_files import path_of
 from foldyn.program import program
 from foldyn.values import listed, show

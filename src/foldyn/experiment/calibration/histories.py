@@ -15,7 +15,7 @@ from foldyn.cases import Case
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.measurement import NodeValues, column
-from foldyn.experiment.calibration.sight import Sight
+from foldyn.experiment.camera import Sight
 from foldyn.signals import sampling_interval, spectrum
 from foldyn.values import choice, number, numbers, show
 

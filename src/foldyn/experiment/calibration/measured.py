@@ -18,6 +18,10 @@ from foldyn.values import choice
 IMPOSED = "imposed"
 """Selects all nodes that supports of the case move along the axis."""
 QUANTITIES = ("displacement", "position")
+MOST = 8
+"""Nodes, and shapes, that pages and figures show at most."""
+POINTS = 25
+"""Points of the curve through measured forces."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -164,3 +168,20 @@ def _steps(result: Any, factors: NDArray[np.float64]) -> NDArray[np.int64]:
     if len(found) > place[-1] and np.array_equal(found[place], factors):
         return place  # also of a path that passes some of them several times
     return np.abs(found[None] - factors[:, None]).argmin(axis=1)
+
+
+def dense_curve(one: ForceDisplacement) -> ForceDisplacement:
+    """The same test at more displacements, from 0 to beyond the measured ones, for a curve."""
+    ends = min(0.0, one.displacement.min()), max(0.0, one.displacement.max())
+    return one.at(np.union1d(np.linspace(*ends, POINTS), one.displacement))
+
+
+def picture_plane(one: Shapes, case: Case) -> tuple[int, int]:
+    """Indices in `axes` of the directions that pictures have across and upwards.
+
+    They are those along which the nodes lie farthest apart.
+    """
+    rest = case.structure.nodes[one.where(case)]
+    spans = [np.ptp(rest[:, AXES.index(axis)]) for axis in one.axes]
+    first, second = sorted(np.argsort(spans)[-2:].tolist())
+    return (second, first) if one.axes[first] == "x" else (first, second)

@@ -26,8 +26,8 @@ from foldyn.experiment.calibration.modal_files import (
     recognized,
 )
 from foldyn.experiment.calibration.responses import FrequencyResponse
-from foldyn.experiment.calibration.sight import Sight
 from foldyn.experiment.calibration.tables import by_node, limits, listed_nodes, made
+from foldyn.experiment.camera import Sight
 from foldyn.experiment.tracking.tracks_dataset import load_tracks
 from foldyn.values import choice, show
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
+from foldyn.experiment.calibration.measured import MOST
 from foldyn.experiment.calibration.modal import ModalParameters, ModeShapes, resisted
 from foldyn.experiment.calibration.responses import FrequencyResponse
-from foldyn.experiment.calibration.shown import MOST
 from foldyn.report.charts import Chart, Curve
 from foldyn.report.sections import Table, cell
 

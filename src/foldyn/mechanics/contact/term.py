@@ -30,8 +30,7 @@ from foldyn.mechanics.contact.tangent import (
     plane_tangents,
     touching_pairs,
 )
-from foldyn.mechanics.sheet_term import Unstrained
-from foldyn.mechanics.term import Compiled, Term, nodal
+from foldyn.mechanics.term import Compiled, Term, Unstrained, nodal
 
 GROUP = "contact"
 

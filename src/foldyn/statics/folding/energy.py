@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.mechanics.hinge_rows import dihedrals_and_gradients
+from foldyn.mechanics.dihedral import dihedrals_and_gradients
 from foldyn.patterns import Pattern
 from foldyn.structures.mesh import lengths, n4b5
 

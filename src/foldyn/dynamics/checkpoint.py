@@ -1,31 +1,39 @@
-"""A motion that is kept on the disk while it runs, so that it can go on after whatever ends it.
+"""Checkpoints: how an interrupted motion is stored on disk, and resumed.
 
 Beside the file of its result stands a folder with its samples, which only grow, and a checkpoint:
-how many of them count, their checksums, and all on which the next steps depend. The checkpoint is
-sealed and replaced whole, after its samples are on the disk. One process at a time keeps a motion
-in a file: it holds the lock beside it.
+what the motion is, how many samples count, their checksums, and a snapshot of all on which the next
+steps depend. The checkpoint is sealed and replaced whole, after its samples are on the disk. One
+process at a time keeps a motion in a file: it holds the lock beside it.
 """
 
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import math
 import os
 import shutil
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn import __version__
+from foldyn.cases import Case
+from foldyn.cases.document import to_document
+from foldyn.dynamics.course import Course, StepPlan
+from foldyn.dynamics.system import Packed
 from foldyn.errors import ComputationError, InputError
 from foldyn.lock import LockedError, locked
+from foldyn.mechanics.hinge_memory import HingeMemory
+from foldyn.program import program
 from foldyn.results.columns import Columns
-from foldyn.results.netcdf import check_target, load
+from foldyn.results.netcdf import check_target, load, save
 from foldyn.results.seal import seal, sound
 from foldyn.values import flag, number, show
 from foldyn.writing import remove_leftovers, whole
@@ -41,6 +49,8 @@ CHECKPOINT = "checkpoint.npz"
 _ABOUT = "about"
 KEY = "motion"
 """Attribute of a result that was kept meanwhile: what the motion is, as a digest."""
+CONSTANT = ("team", "strips", "packed", "course", "_packed", "_course", "_plan", "share")
+"""Fields that stay what they are, or serve one evaluation."""
 
 
 class Keeping:
@@ -193,7 +203,7 @@ class Keeping:
         except OSError as error:
             self._fail(error)
 
-    def checkpoint(self, standing: Mapping[str, NDArray], reached: float) -> None:
+    def checkpoint(self, arrays: Mapping[str, NDArray], reached: float) -> None:
         """Make a checkpoint at the time (s) reached, after `append` of all samples until then."""
         told = {
             "motion": self._about, "samples": self.columns.count, "sums": self.columns.sums,
@@ -203,7 +213,7 @@ class Keeping:
         try:
             self.columns.settle()
             with whole(self.folder / CHECKPOINT) as part:
-                np.savez(part, **{_ABOUT: text, **standing})  # type: ignore[arg-type]
+                np.savez(part, **{_ABOUT: text, **arrays})  # type: ignore[arg-type]
                 seal(part)
         except OSError as error:
             self._fail(error)
@@ -228,6 +238,16 @@ class Keeping:
         """Remove what is kept: the result is in its file."""
         shutil.rmtree(self.folder, ignore_errors=True)
         self.begun, self._reached = False, None
+
+    def save_result(self, result: xarray.Dataset) -> xarray.Dataset:
+        """Write the result to its file, and remove what was kept; the result as it is there."""
+        try:
+            save(result, self.file)
+        except OSError as error:
+            text = f"{self.file}: {_unwritable(error)}{self.summary}"
+            raise ComputationError(text, result) from None
+        self.remove()
+        return load(self.file, whole=False)
 
     def _read(self) -> dict[str, Any] | None:
         """The checkpoint; None where the first one was never made."""
@@ -261,10 +281,10 @@ class Keeping:
 
     def _fail(self, error: OSError) -> NoReturn:
         kept = self.summary or "; nothing of the motion was kept before"
-        raise ComputationError(f"{self.folder}: {unwritable(error)}{kept}") from None
+        raise ComputationError(f"{self.folder}: {_unwritable(error)}{kept}") from None
 
 
-def unwritable(error: OSError) -> str:
+def _unwritable(error: OSError) -> str:
     """Why something cannot be written, and what to do."""
     remedy = "make room" if error.errno in FULL else "see that nothing else moves or changes it"
     return f"cannot be written ({error.strerror or error}): {remedy}"
@@ -277,3 +297,169 @@ def check_keeping(store: Any, checkpoint: Any, resume: Any) -> Keeping:
     file = check_target(store)
     seconds = number("checkpoint", checkpoint, above=0.0)
     return Keeping(file, seconds, flag("resume", resume))
+
+
+def identity(
+    case: Case, method: Any, plan: StepPlan, state: Iterable[Any], sampled: Iterable[str],
+) -> dict[str, Any]:  # fmt: skip
+    """Numbers and texts by name, of a case file's keys where it has them.
+
+    Functions of the user's count by their places alone: their text is not known.
+
+    Parameters
+    ----------
+    case : Case
+    method : Integrator
+    plan : StepPlan
+    state : iterable
+        What the motion starts from.
+    sampled : iterable of str
+        Names of what the user samples.
+    """
+    document = to_document(case)
+    options = getattr(method.scheme, "keywords", {})
+    return {
+        **_flat(document.sections),
+        **{name: _digest(array) for name, array in document.arrays.items()},
+        "method": method.name,
+        "spectral_radius": options.get("facts", {}).get("spectral_radius"),
+        "start": plan.start,
+        "duration": plan.end - plan.start,
+        "every": plan.every or plan.interval,
+        "dt": plan.dt,
+        "tolerance": plan.tolerance,
+        "initial": [one if isinstance(one, str) else _digest(one) for one in state],
+        "sample": list(sampled),
+        "the version of Foldyn": f"{__version__} ({program('results')})",
+    }
+
+
+def identity_digest(about: Mapping[str, Any]) -> str:
+    """Digest of an identity, "1f0c6a2b9d3e4f58"."""
+    text = json.dumps(about, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _flat(table: Mapping[str, Any], place: str = "") -> dict[str, Any]:
+    """Values of tables within tables, by their keys with dots."""
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            found |= _flat(value, f"{place}{key}.")
+        elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
+            for k, one in enumerate(value):
+                found |= _flat(one, f"{place}{key}[{k}].")
+        else:
+            found[f"{place}{key}"] = value
+    return found
+
+
+def _digest(array: Any) -> str | None:
+    """Digest of the numbers of an array; None of none."""
+    if array is None:
+        return None
+    values = np.ascontiguousarray(array)
+    text = f"{values.dtype}{values.shape}".encode()
+    return hashlib.sha256(text + values.tobytes()).hexdigest()[:16]
+
+
+def state_parts(packed: Packed, course: Course) -> dict[str, Any]:
+    """What changes in a case and its state, for all methods."""
+    memory = packed.body.find(HingeMemory)
+    parts: dict[str, Any] = {"course": course}
+    if memory is not None:
+        parts["branches"] = memory.own
+    if packed.system.turns:
+        parts["folds"] = [packed.body.sheet.folds, packed.body.sheet.series()[1]]
+    return parts
+
+
+class _Place(NamedTuple):
+    """Something that changes: an array or a record, in place, or a number of its owner."""
+
+    name: str
+    owner: Any
+    field: str
+    value: Any
+
+
+def snapshot(parts: Mapping[str, Any]) -> dict[str, NDArray]:
+    """Copy what changes in parts.
+
+    Parameters
+    ----------
+    parts : mapping of str to ndarray, named tuple, list or object
+        Arrays and records, also those within tuples and lists; of other objects their own arrays,
+        tuples and numbers.
+
+    Returns
+    -------
+    dict of str to ndarray
+        What `restore` takes, by the names of the places.
+    """
+    kept = {}
+    for place in _places(parts):
+        if isinstance(place.value, np.void):
+            kept[place.name] = np.array(
+                [float(place.value[one]) for one in place.value.dtype.names or ()]
+            )
+        else:
+            kept[place.name] = np.array(place.value)
+    return kept
+
+
+def restore(parts: Mapping[str, Any], kept: Mapping[str, NDArray]) -> None:
+    """Put a snapshot of such parts back.
+
+    Raises
+    ------
+    KeyError, ValueError
+        It is one of other parts.
+    """
+    for name, owner, field, value in list(_places(parts)):
+        then = kept[name]
+        if isinstance(value, np.void):
+            for one, number in zip(value.dtype.names or (), then.tolist(), strict=True):
+                value[one] = number
+        elif isinstance(value, np.ndarray):
+            if value.shape != then.shape:
+                raise ValueError(f"{name}: {then.shape} instead of {value.shape}")
+            value[...] = then
+        else:
+            setattr(owner, field, type(value)(then[()]))
+
+
+def _places(parts: Mapping[str, Any]) -> Iterator[_Place]:
+    """Places in parts; an array that threads share is one."""
+    seen: set[int] = set()
+    for place in _all_places(parts):
+        if isinstance(place.value, np.ndarray):
+            if id(place.value) in seen:
+                continue
+            seen.add(id(place.value))
+        yield place
+
+
+def _all_places(parts: Mapping[str, Any]) -> Iterator[_Place]:
+    for name, part in parts.items():
+        if isinstance(part, tuple | list | np.ndarray | np.void):
+            yield from _arrays(name, part)
+            continue
+        for field, value in vars(part).items():
+            if isinstance(value, bool | int | float):
+                yield _Place(f"{name}.{field}", part, field, value)
+            elif field not in CONSTANT:
+                yield from _arrays(f"{name}.{field}", value)
+
+
+def _arrays(name: str, value: Any) -> Iterator[_Place]:
+    """Arrays and records in a value."""
+    if isinstance(value, np.void) or (isinstance(value, np.ndarray) and value.flags.writeable):
+        yield _Place(name, None, "", value)
+    elif isinstance(value, list):
+        for k, one in enumerate(value):
+            yield from _arrays(f"{name}[{k}]", one)
+    elif isinstance(value, tuple):
+        for field, one in zip(getattr(value, "_fields", ()), value, strict=False):
+            if field not in CONSTANT:
+                yield from _arrays(f"{name}.{field}", one)

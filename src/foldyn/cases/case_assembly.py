@@ -1,0 +1,410 @@
+"""Assembly of a `Case`: what its supports, loads and damping do to a structure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.constraints import Constraints
+from foldyn.cases.damping import CreaseDamping, Damping, ModalDamping, Rayleigh, StrainDamping
+from foldyn.cases.dashpots import Dashpot
+from foldyn.cases.directions import AXES, unit_vector
+from foldyn.cases.history import History, as_history
+from foldyn.cases.loads import Gravity, Load
+from foldyn.cases.straight import Straight, supported_points
+from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
+from foldyn.cases.ties import equations_of, values_of
+from foldyn.errors import Faults, InputError
+from foldyn.mechanics.following import Following
+from foldyn.mechanics.term import Term
+from foldyn.structures.discretized import read_only
+
+Terms = tuple[tuple[NDArray[np.float64], History], ...]
+Summands = Iterable[tuple[NDArray[np.float64], Any]]
+
+
+class Supported:
+    """Supports of a case, which has `structure` and `supports`; see `Case`."""
+
+    structure: Any
+    supports: Sequence[Any]
+
+    @cached_property
+    def fixed(self) -> NDArray[np.bool_]:
+        """Whether each node is held along each axis, by Fix or Impose, shape (n, 3)."""
+        return read_only(self._straight.held())
+
+    @cached_property
+    def imposed(self) -> NDArray[np.bool_]:
+        """Whether an Impose moves each node along each axis, shape (n, 3)."""
+        return read_only(self._straight.moved(self._stated))
+
+    @cached_property
+    def _straight(self) -> Straight:
+        return Straight(self.structure, self._stated | self._held)
+
+    @cached_property
+    def _stated(self) -> NDArray[np.bool_]:
+        """Whether an Impose names each node along each axis, shape (n, 3)."""
+        mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
+        for place, support in self._supports(Impose):
+            if support.axis is None:
+                continue
+            nodes, _ = supported_points(self.structure, support, place)
+            axis = AXES.index(support.axis)
+            for taken, both in ((self._held, "held and imposed"), (mask, "imposed twice")):
+                twice = nodes[taken[nodes, axis]]
+                if twice.size:
+                    raise InputError(
+                        f"{place}: node {twice[0]} is {both} along {support.axis}, a "
+                        "contradictory support; leave out one of the two"
+                    )
+            mask[nodes, axis] = True
+        return mask
+
+    @cached_property
+    def _held(self) -> NDArray[np.bool_]:
+        """Whether a Fix holds each node along each axis, shape (n, 3)."""
+        mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
+        for place, support in self._supports(Fix):
+            nodes, _ = supported_points(self.structure, support, place)
+            for axis in support.axes or "":
+                mask[nodes, AXES.index(axis)] = True
+        return mask
+
+    @cached_property
+    def constraints(self) -> Constraints:
+        """What ties displacements together: directions that are held, links, rigid panels."""
+        equations = equations_of(self.structure, self._supports(Fix, Impose, Link))
+        return Constraints(equations, self.fixed.ravel())
+
+    @property
+    def free_dofs(self) -> NDArray[np.int64]:
+        """Numbers 3 * node + axis that are free, increasing; all others depend on them."""
+        return self.constraints.free
+
+    @cached_property
+    def still(self) -> NDArray[np.bool_]:
+        """Whether supports keep each node where it stands along each axis, shape (n, 3)."""
+        held = self.fixed & ~self.imposed
+        for vector, _ in self.base_terms:
+            held &= vector == 0.0
+        return read_only(held)
+
+    @property
+    def imposed_slaves(self) -> NDArray[np.int64]:
+        """Numbers of the dofs that `Impose` along a direction moves with others of their nodes."""
+        return self.constraints.slaves_of([place for place, _ in self._supports(Impose)])
+
+    @property
+    def reaction_dofs(self) -> NDArray[np.int64]:
+        """Numbers 3 * node + axis on which supports exert forces, increasing."""
+        return self.constraints.supported
+
+    @cached_property
+    def supported_dofs(self) -> NDArray[np.int64]:
+        """Numbers 3 * node + axis that are held, increasing."""
+        return np.flatnonzero(self.fixed.ravel()).astype(np.int64)
+
+    @cached_property
+    def imposed_terms(self) -> Terms:
+        """Displacements (m) of imposed dofs at factor 1, shape (n, 3), each with its history."""
+        return _sum_by_history(self._imposed())
+
+    def _imposed(self) -> Summands:
+        for place, support in self._supports(Impose):
+            nodes, value = supported_points(self.structure, support, place)
+            vector, along = np.zeros((len(self.structure.nodes), 3)), {place: value}
+            if support.axis is not None:
+                vector[nodes, AXES.index(support.axis)] = value
+                along = {}
+            yield (
+                self._carry_supports(vector, place, along),
+                support.history,
+            )
+
+    @cached_property
+    def prescribed_terms(self) -> Terms:
+        """What each `Impose` says, alone, along its axis or direction: (n, 3), m, with history."""
+        return _sum_by_history(self._prescribed()) if self.constraints else self.imposed_terms
+
+    def _prescribed(self) -> Summands:
+        for place, support in self._supports(Impose):
+            vector = np.zeros((len(self.structure.nodes), 3))
+            nodes, value = supported_points(self.structure, support, place)
+            vector[nodes] = np.multiply.outer(value, unit_vector(support.direction or support.axis))
+            yield vector, support.history
+
+    def _carry_supports(self, stated: NDArray, place: str, values: Mapping[str, Any]) -> NDArray:
+        """Displacements (n, 3), m, when supports move as stated and by values along theirs."""
+        shape, ties = self._straight.carried(stated), self.constraints
+        return ties.moved(shape, values_of(ties.owners, values), place) if ties else shape
+
+    @cached_property
+    def base_terms(self) -> Terms:
+        """Displacements (m) of the base at factor 1, shape (n, 3), each with its history."""
+        return _sum_by_history(self._base_motions())
+
+    def _base_motions(self) -> Summands:
+        base = self.fixed & ~self.imposed
+        for place, support in self._supports(BaseMotion):
+            axis = AXES.index(support.axis)
+            along = {
+                where: support.value * unit_vector(other.direction)[axis]
+                for where, other in self._supports(Fix)
+                if other.direction is not None
+            }
+            if not base[:, axis].any() and not any(along.values()):
+                raise InputError(
+                    f"{place}: the base moves along {support.axis}, but no support holds a "
+                    f'node along {support.axis}; add one with axes = "{support.axis}", or leave '
+                    "out the base motion"
+                )
+            vector = np.zeros(base.shape)
+            vector[base[:, axis], axis] = support.value
+            yield (
+                self._carry_supports(vector, place, along),
+                support.history,
+            )
+
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """What its supports add to the energy, by their kinds."""
+        kinds = dict.fromkeys(type(support) for support in self.supports)
+        terms = (kind.term(list(self._supports(kind)), self.structure) for kind in kinds)
+        return tuple(term for term in terms if term is not None)
+
+    def _supports(self, *kinds: type) -> Iterator[tuple[str, Any]]:
+        """Supports of some kinds, with their places for messages."""
+        places = ((f"supports[{i}]", support) for i, support in enumerate(self.supports))
+        return ((place, support) for place, support in places if isinstance(support, kinds))
+
+
+class Loaded:
+    """Loads of a case, which has `structure`, `loads` and `nodal_mass`; see `Case`."""
+
+    structure: Any
+    loads: Sequence[Load]
+    nodal_mass: Any
+
+    @cached_property
+    def actuation_terms(self) -> Terms:
+        """Changes (rad) of the folds' rest angles at factor 1, shape (nf,), with their history."""
+        return _sum_by_history(self._actuations())
+
+    @cached_property
+    def rest_terms(self) -> Terms:
+        """Changes (rad) of all rest angles at factor 1, shape (nr,), with their history."""
+        return _sum_by_history(self._rest_changes())
+
+    def _rest_changes(self) -> Summands:
+        count = len(self.structure.body.sheet.rest_angles)
+        for change, history in self.actuation_terms:
+            yield np.pad(change, (0, count - len(change))), history
+        for place, load in self._loads():
+            turns = load.turns(self.structure, place)
+            if turns is not None and turns.any():
+                yield np.pad(turns, (0, count - len(turns))), load.history
+
+    def _actuations(self) -> Summands:
+        first: dict[int, str] = {}  # the load that actuates a crease
+        for place, load in self._loads():
+            actuated = load.rest_changes(self.structure, place)
+            if actuated is None:
+                continue
+            creases, change = actuated
+            for crease in creases.tolist():
+                if crease in first:
+                    raise InputError(
+                        f"{place}.creases: crease {crease} is actuated by {first[crease]} already; "
+                        "leave it out of one of the two"
+                    )
+                first[crease] = place
+            vector = np.zeros(len(self.structure.folds))
+            vector[creases] = change
+            yield vector, load.history
+
+    @cached_property
+    def load_terms(self) -> Terms:
+        """Forces (N) on all nodes, shape (n, 3), each with its history."""
+        return _sum_by_history(self._forces(self._loads()))
+
+    @cached_property
+    def force_terms(self) -> Terms:
+        """The terms of `load_terms` without gravity."""
+        return _sum_by_history(self._forces(pair for pair in self._loads() if pair[1].arrows))
+
+    def _forces(self, loads: Iterable[tuple[str, Load]]) -> Summands:
+        for place, load in loads:
+            forces = load.forces(self.structure, place)
+            if isinstance(load, Gravity):
+                forces = load.weight(self.nodal_mass)
+            if forces is not None:
+                yield forces, load.history
+
+    @cached_property
+    def following_terms(self) -> tuple[tuple[Following, History], ...]:
+        """Forces that depend on the displacement, of each load that has them, with its history."""
+        found = ((load.following(self.structure, place), load) for place, load in self._loads())
+        return tuple((part, as_history(load.history)) for part, load in found if part is not None)
+
+    @cached_property
+    def gravity_terms(self) -> Terms:
+        """Accelerations of gravity (m/s2), shape (3,), each with its history."""
+        gravity = (load for _, load in self.loads_of(Gravity))
+        return _sum_by_history((np.array(load.acceleration), load.history) for load in gravity)
+
+    @cached_property
+    def loaded_nodes(self) -> NDArray[np.int64]:
+        """Nodes on which a force acts, increasing; gravity, which acts on all, does not count."""
+        return _union([load.loaded(self.structure, place) for place, load in self._loads()])
+
+    @cached_property
+    def actuated_creases(self) -> NDArray[np.int64]:
+        """Creases that a load actuates, increasing."""
+        pairs = [load.rest_changes(self.structure, place) for place, load in self._loads()]
+        return _union([pair[0] for pair in pairs if pair is not None])
+
+    def loads_of(self, kind: type) -> Iterator[tuple[str, Any]]:
+        """Loads of one kind, with their places for messages."""
+        return (pair for pair in self._loads() if isinstance(pair[1], kind))
+
+    def _loads(self) -> Iterator[tuple[str, Load]]:
+        """Loads with their places for messages."""
+        return ((f"loads[{i}]", load) for i, load in enumerate(self.loads))
+
+
+@dataclass(frozen=True, eq=False)
+class SomeLoads(Loaded):
+    """Some loads of a case, which has checked them, with their places in it.
+
+    Parameters
+    ----------
+    case : Case
+    numbers : sequence of int
+        Their numbers among the loads of the case.
+    """
+
+    case: Loaded
+    numbers: Sequence[int]
+
+    @property
+    def structure(self) -> Any:
+        """The structure of the case."""
+        return self.case.structure
+
+    @property
+    def nodal_mass(self) -> NDArray[np.float64]:
+        """Mass (n,) that moves with each node in the case, kg."""
+        return self.case.nodal_mass
+
+    @property
+    def loads(self) -> Sequence[Load]:
+        """These loads."""
+        return tuple(self.case.loads[i] for i in self.numbers)
+
+    def _loads(self) -> Iterator[tuple[str, Load]]:
+        pairs = zip(self.numbers, self.loads, strict=True)
+        return ((f"loads[{i}]", load) for i, load in pairs)
+
+
+class Damped(Supported):
+    """Damping of a case, which has `damping`, and its dashpots, which are supports.
+
+    Attributes
+    ----------
+    rayleigh : Rayleigh
+        Its part of the damping, of nothing where there is none.
+    modal_damping : ModalDamping or None
+        Damping ratios of modes, if there are any.
+    crease_damping : ndarray, shape (nf,)
+        Damping of each fold, N m s/rad per m of crease.
+    strain_damping : float
+        Damping of strain rates, s.
+    dashpots : tuple of (str, Dashpot)
+        Those among the supports, with their places for messages.
+    damped : bool
+        Whether anything dissipates energy.
+    """
+
+    damping: Damping | Sequence[Damping]
+
+    @property
+    def dampings(self) -> tuple[Damping, ...]:
+        """Its kinds of damping."""
+        return tuple(self.damping) if isinstance(self.damping, Sequence) else (self.damping,)
+
+    def _check_damping(self, faults: Faults) -> None:
+        """Refuse nodes and creases that are not there."""
+        for place, dashpot in self.dashpots:
+            with faults.collected():
+                dashpot.ends(self.structure, place)
+        for part in self.dampings:
+            if isinstance(part, CreaseDamping):
+                with faults.collected():
+                    part.per_length(self.structure, "damping")
+        if self.strain_damping and self.structure.body.strains() is None:
+            with faults.collected():
+                raise InputError(
+                    "damping: StrainDamping takes bars and hinges, and the panels of this model "
+                    "bend as plates; take CreaseDamping, or Rayleigh for what hardly turns"
+                )
+
+    @cached_property
+    def rayleigh(self) -> Rayleigh:
+        """See the class."""
+        return next((part for part in self.dampings if isinstance(part, Rayleigh)), Rayleigh())
+
+    @cached_property
+    def modal_damping(self) -> ModalDamping | None:
+        """See the class."""
+        return next((part for part in self.dampings if isinstance(part, ModalDamping)), None)
+
+    @cached_property
+    def crease_damping(self) -> NDArray[np.float64]:
+        """See the class."""
+        parts = [part for part in self.dampings if isinstance(part, CreaseDamping)]
+        none = np.zeros(len(self.structure.folds))
+        return read_only(sum((part.per_length(self.structure, "damping") for part in parts), none))
+
+    @property
+    def strain_damping(self) -> float:
+        """See the class."""
+        return next((part.beta for part in self.dampings if isinstance(part, StrainDamping)), 0.0)
+
+    @cached_property
+    def dashpots(self) -> tuple[tuple[str, Dashpot], ...]:
+        """See the class."""
+        return tuple(self._supports(Dashpot))
+
+    @property
+    def damped(self) -> bool:
+        """See the class."""
+        rayleigh = self.rayleigh.alpha > 0.0 or self.rayleigh.beta > 0.0
+        modal = self.modal_damping is not None and bool(np.any(self.modal_damping.ratios))
+        dashpots = any(dashpot.coefficient > 0.0 for _, dashpot in self.dashpots)
+        strain = self.strain_damping > 0.0
+        return rayleigh or modal or dashpots or strain or bool(self.crease_damping.any())
+
+
+def _union(numbers: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
+    """Numbers that are among any of some, increasing."""
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *numbers]))
+
+
+def _sum_by_history(parts: Summands) -> Terms:
+    """Vectors with their histories, those with equal histories added."""
+    terms: list[tuple[NDArray[np.float64], History]] = []
+    for vector, given in parts:
+        history = as_history(given)
+        same = next((total for total, other in terms if other == history), None)
+        if same is None:
+            terms.append((vector, history))
+        else:
+            same += vector
+    return tuple((read_only(vector), history) for vector, history in terms)
