@@ -104,6 +104,15 @@ class Alpha(Scheme):
             )
         )  # fmt: skip
 
+    def begin(self, t: float) -> None:
+        """See `Scheme`."""
+        super().begin(t)
+        if len(self.damping):
+            for old, new in zip(self.old, self.new, strict=True):
+                new[:] = old
+            _taken(self._step)
+            self.old.damped[:] = self.new.damped
+
     def weights(self, h: float) -> Weights:
         """See `Scheme`; the mass carries what multiplies alpha M too."""
         am, af, beta, gamma = self._p
@@ -249,16 +258,15 @@ def _works(step, h):
 def _taken(step):
     """Energy that damping dissipates in a step, after `_works`: its mean force along it."""
     terms, moved, s = step.setting.terms, step.setting.system.moved, step.setting.s
-    u, v, force, du, work = s.product, s.velocity, flat(s.moving), flat(s.displacement), 0.0
-    for phase in (step.old, step.new):
-        carry(moved, phase.factor[:, 0], phase.q, u)
-        carry(moved, phase.factor[:, 1], phase.w, v)
-        s.moving[:] = 0.0
-        for k in step.damping:
-            given = terms.context[k], u, v, 0.0, s.moving, terms.powers
-            run_at(terms.kernel[k, FORCES], given)
-        for i in range(du.size):
-            work += 0.5 * force[i] * du[i]
+    old, new, u, v, du, work = step.old, step.new, s.product, s.velocity, flat(s.displacement), 0.0
+    carry(moved, new.factor[:, 0], new.q, u)
+    carry(moved, new.factor[:, 1], new.w, v)
+    new.damped[:] = 0.0
+    for k in step.damping:
+        given = terms.context[k], u, v, 0.0, new.damped, terms.powers
+        run_at(terms.kernel[k, FORCES], given)
+    for i in range(du.size):
+        work += 0.5 * (flat(old.damped)[i] + flat(new.damped)[i]) * du[i]
     return work
 
 

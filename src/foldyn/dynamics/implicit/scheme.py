@@ -74,6 +74,7 @@ class Phase(NamedTuple):
     force: NDArray  # F_int + beta K0 v - p, N
     factor: NDArray  # (h, 3) of the histories
     pushed: NDArray  # forces of loads that depend on the displacement, N; or none (0, 3)
+    damped: NDArray  # those of damping, for methods that keep them, N; or none
 
 
 class Scheme(ABC):
@@ -110,17 +111,16 @@ class Scheme(ABC):
         self.shift = np.zeros(shape)  # new.q - old.q: their difference would lose digits
         self.earlier = np.zeros(shape)  # new.q before the last iteration
         self._gap, self._pushed = np.zeros(histories[0]), np.zeros(shape)
-        pushed = self.scratch.pushed
-        rest = np.zeros(shape), np.zeros(histories), np.zeros_like(pushed)
+        self.damping = np.flatnonzero([term.damps for term in packed.body.terms])
+        damped = np.zeros(shape if len(self.damping) else (0, 3))
+        rest = np.zeros(shape), np.zeros(histories), np.zeros_like(self.scratch.pushed), damped
         self.old = Phase(course.u, course.v, course.carry, *rest)
-        q, w, a, force = (np.zeros(shape) for _ in range(4))
-        self.new = Phase(q, w, a, force, np.zeros(histories), np.zeros_like(pushed))
+        self.new = Phase(*map(np.zeros_like, self.old))
         # mean velocity of the last step, and its change per time from the middle of one to another
         self._speed, self._growth, self._last = course.v.copy(), np.zeros(shape), 0.0
         self.massless = packed.mass.diagonal <= 0.0
         self.rounding = EPS * float(np.linalg.norm(packed.body.scale()))
         self.folds = np.zeros_like(self.work.fold_angle)  # at old.q, rad
-        self.damping = np.flatnonzero([term.damps for term in packed.body.terms])
 
     @abstractmethod
     def weights(self, h: float) -> Weights:
