@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.jit.compiled import inner_scalar, kernel
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at
 from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.dihedral import dihedral_gradient
@@ -127,7 +127,7 @@ def hinge_gradient(x, dofs, hidden_turn, moved, out):
     return found[0] - hidden_turn[0] * moved[dofs[12]] - hidden_turn[1] * moved[dofs[13]]
 
 
-@kernel
+@inner
 def _gradient(elements, moved, e, out):
     """Gradient (14,) of element e at flat displacements."""
     dofs, p = elements.dofs[e], elements.axial.shape[0]
