@@ -102,6 +102,7 @@ def test_the_matrix_of_a_step_is_the_weighted_sum(symmetric, definite):
     free = case.free_dofs
     dense = dense[np.ix_(free, free)]
     assert (np.linalg.eigvalsh(dense)[0] > 0.0) == definite
+    matrix.follow(u, 1.0)
     matrix.factorize(weights)
     right = np.random.default_rng(4).standard_normal(s.nodes.shape)
     found = matrix.solve(right, np.zeros_like(u))

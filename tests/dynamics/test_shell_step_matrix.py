@@ -36,6 +36,7 @@ def test_it_solves_with_stiffness_mass_and_damping(name, mass):
     u[:n] = 1e-3 * rng.standard_normal((n, 3))
     rotation = np.zeros(shell.rotations)
     matrix.blocks.put(packed.body, matrix.pattern, u, u, False, matrix.stiffness)
+    matrix.follow(u, 1.0)
     matrix.factorize(weights)
     force = rng.standard_normal((rows, 3))
     found = matrix.solve(force, np.zeros((rows, 3))).ravel()

@@ -8,12 +8,12 @@ from oscillators import MASS, equal_steps, linear_law, oscillator, released
 
 import foldyn as fd
 from foldyn.dynamics import METHODS
-from foldyn.dynamics.dampers import dampers
+from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.system import pack
 from foldyn.dynamics.turned import turned
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.mechanics.viscous import add_viscous_elements, viscous_elements_work
 from foldyn.signals import log_decrement
+from resisted import resisted
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 BETA = 1e-3
@@ -56,14 +56,12 @@ def test_panels_of_several_kinds_are_damped_anywhere():
     case = fd.Case(fd.discretize(pattern, SHEET), damping=fd.StrainDamping(BETA))
     rng, body = np.random.default_rng(4), case.elastic_body
     u, v = 0.1 * rng.standard_normal((2, *case.structure.nodes.shape))
-    found, force = dampers(case), np.zeros_like(v)
-    power = add_viscous_elements(found.elements, u, v, force)
-    np.testing.assert_allclose(force.ravel(), found.matrix(body.dofs(u)) @ v.ravel(), rtol=1e-9)
+    force, power = resisted(case, u, v)
+    matrix = damping_matrix(case, body.dofs(u))
+    np.testing.assert_allclose(force.ravel(), matrix @ v.ravel(), rtol=1e-9)
     assert power == pytest.approx(float(np.vdot(force, v)), rel=1e-12)
     assert power > 0.0
-    work = viscous_elements_work(found.elements, u, v, u)
-    assert work == pytest.approx(float(np.vdot(force, u)), rel=1e-11)
-    rest = dampers(case).matrix(np.zeros(body.size)).toarray()
+    rest = damping_matrix(case, np.zeros(body.size)).toarray()
     np.testing.assert_allclose(
         rest, BETA * body.tangent(np.zeros(body.size)).toarray(), atol=1e-9 * np.abs(rest).max()
     )

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import inner_scalar, scalar
+from foldyn.jit.compiled import inner_scalar
 from foldyn.materials.memory_law import VARIABLES
 
 
@@ -125,7 +125,7 @@ def passed_through(now, before, first, last):
     return -1
 
 
-@scalar
+@inner_scalar
 def split_step(longest, left):
     """Length (s) of the equal parts, none longer than `longest`, into which `left` is divided."""
     if longest >= left:
@@ -133,7 +133,7 @@ def split_step(longest, left):
     return left / math.ceil(min(left / max(longest, SHORTEST * left), 1.0 / SHORTEST))
 
 
-@scalar
+@inner_scalar
 def post_totals(team, work_in, work_out, wrong):
     """Note for the team the work, the energy dissipated (J), and how many values are not finite."""
     note = team.note[team.number]

@@ -1,4 +1,4 @@
-"""Dashpots and damped creases of a case: a constant matrix, and elements that follow the motion.
+"""What damps a case beside drag, as terms: dashpots, creases, strains, beta K0, modes.
 
 Dashpots with a direction of their own, and those that act in any direction from the ground, have a
 constant matrix. Dashpots along the line between their nodes and creases are `mechanics.viscous`.
@@ -6,52 +6,41 @@ constant matrix. Dashpots along the line between their nodes and creases are `me
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case
+from foldyn.dynamics.modal_damping import ModalRows
 from foldyn.errors import InputError
-from foldyn.mechanics.assembly import Assembly, Numbering
+from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.block_matrix import assembled, blocks_of_ends, pairs_of_ends
-from foldyn.mechanics.membranes import Membranes
+from foldyn.mechanics.constant_damping import DampingMatrix, DampingRows
 from foldyn.mechanics.sheet_term import NO_DOF, no_fold_hinges
-from foldyn.mechanics.viscous import Viscous, viscous, viscous_matrix
-from foldyn.mechanics.viscous_panels import viscous_panels
+from foldyn.mechanics.term import Term
+from foldyn.mechanics.viscous import Viscous, ViscousTerm, viscous
+from foldyn.mechanics.viscous_panels import ViscousPanelsTerm, viscous_panels
 
 
-class Dampers(NamedTuple):
-    """What a case has of them, on its m dofs in their own order."""
-
-    constant: sparse.csr_array  # (m, m) N s/m
-    elements: Viscous
-
-    def matrix(self, q: NDArray) -> sparse.csr_array:
-        """Matrix (m, m), N s/m, at the dofs q (m,)."""
-        size = self.constant.shape[0]
-        if not self.elements.present:
-            return self.constant
-        return sparse.csr_array(self.constant + viscous_matrix(self.elements, q, size))
-
-    def placed(self, by: Numbering) -> Viscous:
-        """Elements as they stand in memory while a motion is computed."""
-        panels = self.elements.panels
-        return self.elements._replace(
-            dofs=placed(self.elements.dofs, by),
-            panels=panels._replace(nodes=by.rank[panels.nodes].astype(np.int64)),
-        )
+def damping_terms(case: Case, start: NDArray | None, modal: ModalRows) -> list[Term]:
+    """All terms that damp a motion from `start` (n, 3), or from rest; `modal` is its damping."""
+    terms, body, rayleigh = dampers(case), case.elastic_body, case.rayleigh
+    if rayleigh.beta > 0.0:
+        state = start if rayleigh.state == "start" else None
+        state = np.zeros_like(case.structure.nodes) if state is None else state
+        terms.insert(0, DampingMatrix(body.tangent(body.dofs(state)) * rayleigh.beta))
+    modal.warn()
+    return [*terms, DampingRows(modal.rows)] if len(modal.rows) else terms
 
 
-def placed(dofs: NDArray, by: Numbering) -> NDArray:
-    """Dofs of elements as they stand in memory while a motion is computed."""
-    nodal = 3 * len(by.order)
-    return np.where(dofs < nodal, by.dofs(np.minimum(dofs, nodal - 1)), dofs)
+def damping_matrix(case: Case, q: NDArray, quasi_static: bool = False) -> sparse.csr_array:
+    """Matrix (m, m), N s/m, of `dampers` at the dofs q (m,)."""
+    none = sparse.csr_array((q.size, q.size))
+    return sum((term.damping(q) for term in dampers(case, quasi_static)), none)
 
 
-def dampers(case: Case, quasi_static: bool = False) -> Dampers:
-    """Dampers of a case.
+def dampers(case: Case, quasi_static: bool = False) -> list[Term]:
+    """Dashpots, damped creases and damped strains of a case, on its m dofs.
 
     Those of creases between panels that give way are left out: the hinge remembers what they do
     (`Case.remembering`). In slow motions it has the damping of its crease times the square of the
@@ -78,8 +67,14 @@ def dampers(case: Case, quasi_static: bool = False) -> Dampers:
         blocks = blocks_of_ends(ends, np.tile(block, (len(ends), 1, 1)))
         constant = constant + assembled(pairs_of_ends(ends), blocks, body.size)
     ends = np.concatenate(pairs)
+    terms: list[Term] = [DampingMatrix(constant)] if constant.nnz else []
     elements = _elements(case, body, nodes, ends, strength, quasi_static)
-    return Dampers(sparse.csr_array(constant), elements)
+    if len(elements.coefficient):
+        terms.append(ViscousTerm(elements))
+    strains = body.strains() if case.strain_damping else None
+    if strains is not None and strains.membranes:
+        terms.append(ViscousPanelsTerm(viscous_panels(strains.membranes, case.strain_damping)))
+    return terms
 
 
 def _elements(
@@ -99,7 +94,6 @@ def _elements(
     axial, along = np.concatenate(strength), nodes[pairs[:, 1]] - nodes[pairs[:, 0]]
     rows, corners, hidden = hinges.nodes[damped], hinges.corners[damped], hinges.hidden[damped]
     hidden_turn, turning = hinges.hidden_turn[damped], coefficient[damped]
-    membranes: tuple[Membranes, ...] = ()
     if beta := case.strain_damping:
         strains = body.strains()
         assert strains is not None  # or the case would have refused it
@@ -114,8 +108,4 @@ def _elements(
         hidden = np.concatenate([hidden, none])
         hidden_turn = np.concatenate([hidden_turn, np.zeros(none.shape)])
         turning = np.concatenate([turning, beta * strains.hinge_stiffness[stiff]])
-        membranes = strains.membranes
-    return viscous(
-        pairs, along, axial, rows, corners, hidden, hidden_turn, turning,
-        viscous_panels(membranes, beta),
-    )  # fmt: skip
+    return viscous(pairs, along, axial, rows, corners, hidden, hidden_turn, turning)

@@ -1,15 +1,15 @@
 """The conserving method: midpoint rule with forces that do exactly the work of the strain energy.
 
     (q1 - q0)/h = (w0 + w1)/2,   M (w1 - w0)/h + alpha M (w0 + w1)/2 + b = 0,
-    b = F + C (u1 - u0)/h - (p0 + p1)/2,
+    b = F - (p0 + p1)/2,
 
-with F the mean forces of the terms (`mechanics.mean_forces`) and of contact
-(`implicit.contact_step`), C the damping but for alpha M, that of elements that follow the motion at
-(u0 + u1)/2 (a rigid motion dissipates nothing), and p at each end of the step those of all loads,
-also of those that depend on the displacement. Without damping and loads the energy of any structure
-and the momenta of a free one stay what they are, with any step, to the tolerance of the equations
-and to rounding; with them the energy balance closes as exactly. Of order 2 (Simo and Tarnow 1992,
-Gonzalez 1996). Nothing damps the vibrations that a step does not resolve.
+with F the mean forces of the terms (`mechanics.mean_forces`; damping at (u0 + u1)/2 and the
+velocity (u1 - u0)/h, so that a rigid motion dissipates nothing) and of contact
+(`implicit.contact_step`), and p at each end of the step those of all loads, also of those that
+depend on the displacement. Without damping and loads the energy of any structure and the momenta of
+a free one stay what they are, with any step, to the tolerance of the equations and to rounding;
+with them the energy balance closes as exactly. Of order 2 (Simo and Tarnow 1992, Gonzalez 1996).
+Nothing damps the vibrations that a step does not resolve.
 
 Dofs without mass obey F = p in the mean of the step: what is left at its end is less what was left
 at its start, but for what a law that is not linear adds. It is small, and part of what is kept.
@@ -26,18 +26,9 @@ from scipy import sparse
 
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import Course
-from foldyn.dynamics.damping import (
-    add_dampers,
-    add_viscous,
-    dampers_work,
-    drag,
-    drag_works,
-    has_dampers,
-    viscous_work,
-)
 from foldyn.dynamics.implicit.contact_step import StepContact
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.implicit.scheme import Phase, Scheme, add_load_work, copy, norms
+from foldyn.dynamics.implicit.scheme import Phase, Scheme, add_load_work, copy, drag_works, norms
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.parts import Setting
 from foldyn.dynamics.system import Packed, carry, place
@@ -118,7 +109,7 @@ class EnergyMomentum(Scheme):
 
     def weights(self, h: float) -> Weights:
         """See `Scheme`."""
-        return Weights(1.0, (2.0 / h + self.packed.system.damping.alpha) / h, 1.0 / h)
+        return Weights(1.0, (2.0 / h + self.packed.system.alpha) / h, 1.0 / h)
 
     def residual(self, h: float, t: float) -> tuple[float, float]:
         """See `Scheme`."""
@@ -156,8 +147,6 @@ class EnergyMomentum(Scheme):
         system = self.packed.system
         done, lost = _works(self._step, h)
         done, lost = done + h * self._terms.powers[0], lost + h * self._terms.powers[1]
-        if system.damping.follows:
-            lost += _taken(self._step, h)
         if system.turns:
             done += _actuation(self._step, self.displacement(), self.moved())
         return done, lost
@@ -178,7 +167,7 @@ def residual(step, h, t):
         q1[i] = q0[i] + d[i]
         w1[i] = 2.0 * d[i] / h - w0[i]
         a1[i] = (w1[i] - w0[i]) / h
-        x[i] = a1[i] + drag(system.damping, 0.5 * (w0[i] + w1[i]))
+        x[i] = a1[i] + system.alpha * (0.5 * (w0[i] + w1[i]))
     for node in range(mass.diagonal.size):
         if mass.diagonal[node] <= 0.0:  # no inertia: velocities would ring for ever
             for i in range(3 * node, 3 * node + 3):
@@ -205,22 +194,13 @@ def residual(step, h, t):
     touch = flat(step.touch)
     for i in range(touch.size):
         bracket[i] += touch[i]
-    u0, u1 = flat(s.displacement), flat(s.velocity)
-    if system.damping.data.size > 0:
-        speed = flat(s.product)
-        for i in range(speed.size):
-            speed[i] = (u1[i] - u0[i]) / h
-        add_viscous(system.damping, speed, bracket, 0, speed.size)
-    if has_dampers(system.damping):
-        _halfway(h, s)
-        add_dampers(system.damping, s.stage[0], s.product, new.force)
     loads = system.loads
     for k in range(loads.dof.size):
         bracket[loads.dof[k]] -= loads.value[k] * mean[loads.row[k], 0]
     if system.follows:
         before, after = flat(old.pushed), flat(new.pushed)
         after[:] = 0.0
-        add_following(system.following, u1, s.factor, after)
+        add_following(system.following, flat(s.velocity), s.factor, after)
         for i in range(after.size):
             bracket[i] -= 0.5 * (before[i] + after[i])
     times_mass(mass, s.moving, out)
@@ -240,29 +220,6 @@ def mean_factors(step):
     return step.mean
 
 
-@inner
-def _halfway(h, s):
-    """Middle and mean velocity, s.stage[0] and s.product, of a step.
-
-    It goes from s.displacement to s.velocity.
-    """
-    u0, u1 = flat(s.displacement), flat(s.velocity)
-    middle, speed = flat(s.stage[0]), flat(s.product)
-    for i in range(u0.size):
-        middle[i] = 0.5 * (u0[i] + u1[i])
-        speed[i] = (u1[i] - u0[i]) / h
-
-
-@kernel
-def _taken(step, h):
-    """Energy that dampers dissipate in a step."""
-    system, s, old, new = step.setting.system, step.setting.s, step.old, step.new
-    carry(system.moved, old.factor[:, 0], old.q, s.displacement)
-    carry(system.moved, new.factor[:, 0], new.q, s.velocity)
-    _halfway(h, s)
-    return h * dampers_work(system.damping, s.stage[0], s.product, s.product)
-
-
 @kernel
 def _works(step, h):
     """Work put in and energy dissipated in a step."""
@@ -273,16 +230,13 @@ def _works(step, h):
     for i in range(du.size):
         du[i] = flat(step.shift)[i]
         speed[i] = 0.5 * (flat(old.w)[i] + flat(new.w)[i])
-    done, lost = drag_works(
-        system.damping, mass, system.moved_mass, h, old.factor, new.factor, s.moving
-    )
+    done, lost = drag_works(system, mass, h, old.factor, new.factor, s.moving)
     for k in range(moved.dof.size):
         dof, row = moved.dof[k], moved.row[k]
         along = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
         du[dof] += along
         done += bracket[dof] * along
-    done = add_load_work(system.loads, old, new, s.displacement, done)
-    return done, lost + viscous_work(system.damping, s.displacement, s.displacement) / h
+    return add_load_work(system.loads, old, new, s.displacement, done), lost
 
 
 @kernel

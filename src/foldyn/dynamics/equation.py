@@ -2,8 +2,8 @@
 
 With terms by address, what a case consists of has the same types in every motion. Loops get the
 addresses of the functions here, so that they hold nothing but their own arithmetic. What only some
-motions have (histories, supports and rest angles that move, dampers, contact, a mass matrix that is
-not diagonal) are parts of their own, which are compiled where they are used; elsewhere their
+motions have (histories, supports and rest angles that move, contact, a mass matrix that is not
+diagonal) are parts of their own, which are compiled where they are used; elsewhere their
 address is 0. Dead loads, drag and a diagonal mass, which nearly all have, are no parts: calls cost.
 """
 
@@ -62,8 +62,6 @@ class Balance(NamedTuple):
     carry: int  # supports,
     presses: bool  # and obstacles
     follow: int  # loads that depend on the displacement
-    viscous: int
-    dampers: int
     solve: int  # M^-1, unless M is diagonal,
     kinetic: int  # and the kinetic energy
     moving_power: int  # of supports
@@ -135,11 +133,6 @@ def _acceleration(m, q, w, t, out, powers):
         power_in += load * speed[dof]
     if m.follow != 0:
         power_in += value_at(m.follow, (m.setting, u, v))
-    if m.viscous != 0:
-        power_out += value_at(m.viscous, (m.setting, v))
-        wait(m.team)  # others look at this member's velocities
-    if m.dampers != 0:
-        power_out += value_at(m.dampers, (m.setting, u, v))
     kinetic = 0.0
     if m.alpha > 0.0:
         if m.kinetic != 0:
@@ -357,7 +350,6 @@ class EquationOfMotion:
 def _balance(setting: Setting, whole: Context) -> Balance:
     """What accelerations need of a case; `whole` is the context of the setting."""
     terms, system, mass, share, s = setting
-    damping = system.damping
     solve = parts.solve_constrained if len(mass.ties.slave) else parts.solve
     return Balance(
         terms=terms,
@@ -367,13 +359,11 @@ def _balance(setting: Setting, whole: Context) -> Balance:
         carry=parts.carry.at(whole) if system.moves else 0,
         presses=system.presses,
         follow=parts.follow.at(whole) if system.follows else 0,
-        viscous=parts.viscous.at(whole) if damping.data.size else 0,
-        dampers=parts.dampers.at(whole) if damping.follows else 0,
         solve=0 if mass.lumped else solve.at(whole),
-        kinetic=0 if mass.lumped or not damping.alpha else parts.kinetic.at(whole),
+        kinetic=0 if mass.lumped or not system.alpha else parts.kinetic.at(whole),
         moving_power=parts.moving_power.at(whole) if system.moves else 0,
         turning_power=parts.turning_power.at(whole) if system.turns else 0,
-        alpha=damping.alpha,
+        alpha=system.alpha,
         diagonal=mass.diagonal,
         inverse=mass.inverse,
         loads=system.loads,

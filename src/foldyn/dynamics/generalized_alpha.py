@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 from foldyn.algebra.banded import substitute
 from foldyn.dynamics.actuation import actuator_power, offset_work, turn
 from foldyn.dynamics.course import Course
-from foldyn.dynamics.damping import dampers_work, drag, drag_works, viscous_work
 from foldyn.dynamics.equation import Equation, acceleration, advance_clock
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import (
@@ -40,6 +39,7 @@ from foldyn.dynamics.implicit.scheme import (
     Scheme,
     add_load_work,
     copy,
+    drag_works,
     judge,
     norms,
 )
@@ -48,8 +48,9 @@ from foldyn.dynamics.parts import Setting
 from foldyn.dynamics.system import Packed, carry
 from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import kernel
-from foldyn.jit.context import Context
+from foldyn.jit.context import Context, run_at
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.term import FORCES
 
 ORDER = 2
 SPECTRAL_RADIUS = 0.8
@@ -82,6 +83,7 @@ class Step(NamedTuple):
     shift: NDArray
     out: NDArray
     earlier: NDArray
+    damping: NDArray  # (k,) numbers of the terms that damp
 
 
 class Alpha(Scheme):
@@ -98,15 +100,24 @@ class Alpha(Scheme):
         self._step = Context(
             Step(
                 equation.still.value, equation.setting, parameters, self.old, self.new, self.shift,
-                self.out, self.earlier,
+                self.out, self.earlier, self.damping,
             )
         )  # fmt: skip
+
+    def begin(self, t: float) -> None:
+        """See `Scheme`."""
+        super().begin(t)
+        if len(self.damping):
+            for old, new in zip(self.old, self.new, strict=True):
+                new[:] = old
+            _taken(self._step)
+            self.old.damped[:] = self.new.damped
 
     def weights(self, h: float) -> Weights:
         """See `Scheme`; the mass carries what multiplies alpha M too."""
         am, af, beta, gamma = self._p
         rate = (1.0 - af) * gamma / (beta * h)
-        mass = (1.0 - am) / (beta * h * h) + rate * self.packed.system.damping.alpha
+        mass = (1.0 - am) / (beta * h * h) + rate * self.packed.system.alpha
         return Weights(1.0 - af, mass, rate)
 
     def residual(self, h: float, t: float) -> tuple[float, float]:
@@ -133,7 +144,7 @@ class Alpha(Scheme):
         """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""
         system = self.packed.system
         done, lost = _works(self._step, h)
-        if system.damping.follows:
+        if len(self.damping):
             lost += _taken(self._step)
         if system.turns:
             done += _actuation(self._step, self.folds, self.work.fold_angle)
@@ -189,7 +200,7 @@ def residual(step, h, t):
     acceleration(equation, new.q, new.w, t, out)
     for i in range(q0.size):
         b1[i] = flat(s.force)[i]
-        slowed = drag(system.damping, (1.0 - af) * w1[i] + af * w0[i])
+        slowed = system.alpha * ((1.0 - af) * w1[i] + af * w0[i])
         x[i] = (1.0 - am) * a1[i] + am * a0[i] + slowed
     copy(s.factor, new.factor)
     copy(s.pushed, new.pushed)
@@ -234,27 +245,28 @@ def _works(step, h):
     for i in range(du.size):
         du[i] = flat(step.shift)[i]
         flat(s.velocity)[i] = 0.5 * (v0[i] + v1[i])
-    done, lost = drag_works(
-        system.damping, mass, system.moved_mass, h, old.factor, new.factor, s.velocity
-    )
+    done, lost = drag_works(system, mass, h, old.factor, new.factor, s.velocity)
     for k in range(moved.dof.size):
         dof, row = moved.dof[k], moved.row[k]
         along = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
         du[dof] += along
-        flat(s.velocity)[dof] += 0.5 * moved.value[k] * (old.factor[row, 1] + new.factor[row, 1])
         done += 0.5 * (b0[dof] + b1[dof]) * along
-    done = add_load_work(system.loads, old, new, s.displacement, done)
-    return done, lost + viscous_work(system.damping, s.velocity, s.displacement)
+    return add_load_work(system.loads, old, new, s.displacement, done), lost
 
 
 @kernel
 def _taken(step):
-    """Energy that dampers dissipate in a step, after `_works`: their mean force along it."""
-    work, system, s = 0.0, step.setting.system, step.setting.s
-    for phase in (step.old, step.new):
-        carry(system.moved, phase.factor[:, 0], phase.q, s.product)
-        carry(system.moved, phase.factor[:, 1], phase.w, s.moving)
-        work += 0.5 * dampers_work(system.damping, s.product, s.moving, s.displacement)
+    """Energy that damping dissipates in a step, after `_works`: its mean force along it."""
+    terms, moved, s = step.setting.terms, step.setting.system.moved, step.setting.s
+    old, new, u, v, du, work = step.old, step.new, s.product, s.velocity, flat(s.displacement), 0.0
+    carry(moved, new.factor[:, 0], new.q, u)
+    carry(moved, new.factor[:, 1], new.w, v)
+    new.damped[:] = 0.0
+    for k in step.damping:
+        given = terms.context[k], u, v, 0.0, new.damped, terms.powers
+        run_at(terms.kernel[k, FORCES], given)
+    for i in range(du.size):
+        work += 0.5 * (flat(old.damped)[i] + flat(new.damped)[i]) * du[i]
     return work
 
 

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case
-from foldyn.dynamics.dampers import placed
 from foldyn.errors import InputError
 from foldyn.materials.memory_law import VARIABLES
 from foldyn.mechanics.assembly import Assembly, Numbering
@@ -35,7 +34,7 @@ def with_memory(case: Case, body: Assembly, by: Numbering) -> Assembly:
     state = memory_of_case(case)
     hinges = {"fold": body.sheet.fold_hinges, "bend": body.sheet.bend_hinges}
     row = np.concatenate([hinges[part.kind]().row for part in parts])
-    own = state.own._replace(dofs=placed(state.own.dofs, by), row=row)
+    own = state.own._replace(dofs=by.dofs(state.own.dofs), row=row)
     if isinstance(body.sheet, CondensedPlatesTerm):
         body = body.on(body.sheet.remembering(own))
         return body.with_terms(BalancedMemory(own, state.settles, body.sheet))

@@ -124,8 +124,8 @@ def topology(motion: Motion) -> tuple[bytes, ...]:
 
     They take bars and hinges with laws of the package, lumped masses, drag, and dead loads.
     """
-    packed, system, damping = motion.packed, motion.packed.system, motion.packed.system.damping
-    drives = system.moves, system.turns, system.follows, damping.data.size, damping.follows
+    packed, system = motion.packed, motion.packed.system
+    drives = system.moves, system.turns, system.follows
     plain = isinstance(packed.body.sheet, BarsHingesTerm) and packed.mass.lumped
     if not plain or packed.body.others or any(drives) or packed.model.addresses.any():
         return ()
@@ -190,7 +190,7 @@ def _loads(motions: Sequence[Motion]) -> LaneLoads:
         dof, value[:, dof].reshape(len(value), len(dof) * WIDTH),
         side_by_side([mass.inverse for mass in masses]),
         side_by_side([np.repeat(mass.diagonal, 3) for mass in masses]),
-        np.array([motion.packed.system.damping.alpha for motion in motions]),
+        np.array([motion.packed.system.alpha for motion in motions]),
     )  # fmt: skip
 
 

@@ -105,11 +105,11 @@ def threads_of(packed: Packed) -> int:
     """Threads on which a motion of a case runs fastest.
 
     One where something would have to be done by each of them: functions of the user, loads that
-    depend on the displacement, dampers, constraints.
+    depend on the displacement, constraints, and terms that threads cannot share.
     """
     system = packed.system
     called = bool((system.waves.code == CALLED).any())
-    alone = system.follows or called or system.damping.follows
+    alone = system.follows or called
     return 1 if alone or len(system.ties.slave) else packed.body.threads
 
 

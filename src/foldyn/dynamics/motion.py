@@ -371,7 +371,7 @@ class Motion:
         growth, damping = self.method.growth, self.case.rayleigh
         if self.force or growth is None:
             return
-        rate = damper_rate(self.case, u) + self.packed.system.damping.modal_rate
+        rate = damper_rate(self.case, u) + self.packed.modal.rate
         for frequency in (frequency_bound, largest_frequency):  # the first costs less
             omega = frequency(self.case, u)
             if np.isfinite(omega) and is_stable(growth, omega, damping, self.plan.dt, rate):

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.actuation import offset_work, power_of_part, turn_part
-from foldyn.dynamics.damping import add_dampers, add_viscous, drag_power
 from foldyn.dynamics.inertia import Inertia, kinetic_energy, moving_energy, solve_mass, solve_tied
 from foldyn.dynamics.system import Scratch, System, carry_part, power_of_moved
 from foldyn.jit.compiled import addressed
@@ -75,20 +74,6 @@ def follow(m, u, v):
 
 
 @addressed(ADDRESS)
-def viscous(m, v):
-    """Add the forces of a constant matrix of damping; returns the power taken, W."""
-    speed, own = flat(rows_at(v, m.s.force.shape[0])), m.share.strips.own
-    return add_viscous(m.system.damping, speed, flat(m.s.force), 3 * own[0], 3 * own[1])
-
-
-@addressed(ADDRESS, ADDRESS)
-def dampers(m, u, v):
-    """Add those of dashpots, creases and modes; returns the power taken, W. On one thread only."""
-    rows = m.s.force.shape[0]
-    return add_dampers(m.system.damping, rows_at(u, rows), rows_at(v, rows), m.s.force)
-
-
-@addressed(ADDRESS)
 def solve(m, out):
     """Solve with a mass matrix that is not diagonal."""
     rows, team = m.s.force.shape[0], m.share.team
@@ -115,7 +100,7 @@ def moving_power(m):
     """Power (W) of supports that move, but for what changes the kinetic energy of S f'."""
     power = power_of_moved(m.system.moved, m.s.force, m.s.factor, m.s.moved[0], m.s.moved[1])
     if m.share.team.number == 0:
-        power += drag_power(m.system.damping, moving_energy(m.system.moved_mass, m.s.factor))
+        power += 2.0 * m.system.alpha * moving_energy(m.system.moved_mass, m.s.factor)
     return power
 
 

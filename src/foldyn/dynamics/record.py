@@ -32,7 +32,7 @@ def record(model, system, mass, q, w, a, tally, s, displacement, velocity, react
     groups = s.energy.size
     energy[groups] = kinetic_energy(mass, s.velocity, (0, s.velocity.shape[0]))
     times_mass(mass, s.velocity, s.product)
-    add_reactions(system.ties.reactions, product, system.damping.alpha, reaction)
+    add_reactions(system.ties.reactions, product, system.alpha, reaction)
     energies_of(model, s.displacement, s.energy)
     for k in range(groups):
         energy[k] = s.energy[k]

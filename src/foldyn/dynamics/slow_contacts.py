@@ -10,7 +10,6 @@ That inertia is dragged as all mass is: else what vibrates in it would not come 
 
 from __future__ import annotations
 
-from foldyn.dynamics.damping import drag
 from foldyn.jit.compiled import inlined, inner
 from foldyn.jit.context import run_at
 from foldyn.jit.intrinsics import flat
@@ -54,7 +53,7 @@ def slow_down(m, w, a):
 
     m : see `explicit_contact.SlowContacts`.
     """
-    added, damping, out = m.added, m.system.damping, m.s.stage[0]
+    added, alpha, out = m.added, m.system.alpha, m.s.stage[0]
     size = added.count[0]
     if size == 0:
         return
@@ -62,7 +61,7 @@ def slow_down(m, w, a):
     y, left, p, q = added.lines[0], added.lines[1], added.lines[2], added.lines[3]
     before = 0.0
     for k in range(size):
-        y[k], left[k] = 0.0, _along(added, k, a) + drag(damping, _along(added, k, w))
+        y[k], left[k] = 0.0, _along(added, k, a) + alpha * _along(added, k, w)
         p[k] = left[k] / (ease[k] + lightness[k])
         before += left[k] * p[k]
     goal = before * ACCURATE * ACCURATE

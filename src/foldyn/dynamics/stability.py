@@ -17,7 +17,7 @@ from scipy.sparse import linalg
 
 from foldyn.algebra.superlu import SingularTangentError, factorize
 from foldyn.cases import Case, Rayleigh
-from foldyn.dynamics.dampers import dampers
+from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.hereditary import instant_stiffness
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import ComputationError, InputError
@@ -115,7 +115,7 @@ def damper_rate(case: Case, u: ArrayLike | None = None) -> float:
     """Largest rate (1/s) at which dashpots, creases and strains damp a motion about u (n, 3)."""
     if not case.dashpots and not case.crease_damping.any() and not case.strain_damping:
         return 0.0
-    return _largest_quotient(case, dampers(case).matrix(case.body.dofs(_state(case, u))))
+    return _largest_quotient(case, damping_matrix(case, case.body.dofs(_state(case, u))))
 
 
 def _tangent(case: Case, u: ArrayLike | None) -> sparse.csr_array:

@@ -20,10 +20,7 @@ from foldyn.cases import Case, History
 from foldyn.cases.waveforms import CONSTANT, Callbacks, Waveforms, evaluate
 from foldyn.cases.waveforms import pack as pack_waveforms
 from foldyn.dynamics.actuation import Actuators, actuators
-from foldyn.dynamics.damping import (
-    Damping,
-    damping_of,
-)
+from foldyn.dynamics.dampers import damping_terms
 from foldyn.dynamics.hereditary import with_memory
 from foldyn.dynamics.inertia import (
     Inertia,
@@ -61,7 +58,6 @@ class System(NamedTuple):
     energies: int  # groups of strain energy
     order: NDArray  # (n,) node number of each place in memory
     supported: NDArray  # (s,) held dofs 3 place + axis, in the order of the case's
-    damping: Damping
     waves: Waveforms
     loads: Entries  # N
     moved: Entries  # S, m
@@ -69,6 +65,7 @@ class System(NamedTuple):
     actuators: Actuators
     following: Following
     ties: Ties
+    alpha: float  # 1/s, of the drag alpha M v
     lightness: NDArray  # (n,) 1 / mass of the nodes with contact, else (0,), 1/kg
 
 
@@ -103,6 +100,7 @@ class Packed(NamedTuple):
     mass: Inertia
     callbacks: Callbacks
     numbering: Numbering
+    modal: ModalRows  # in the case's own order
 
     @property
     def model(self) -> Any:
@@ -124,7 +122,9 @@ def pack(
     for _, history in (*forces, *supports, *others):
         if history not in histories:
             histories.append(history)
-    body, by = _driven(case, histories).renumbered()
+    modal = modal_rows(case, start) if modal is None else modal
+    terms = damping_terms(case, start, modal)
+    body, by = _driven(case, histories).with_terms(*terms).renumbered()
     nodal = by.matrix(case.mass)
     ties = ties_of(case.constraints, by)
     mass = inertia(nodal, by.held(case.fixed), ties)
@@ -150,7 +150,6 @@ def pack(
         energies=len(body.energy_groups),
         order=by.order,
         supported=by.dofs(case.supported_dofs),
-        damping=damping_of(case, by, start, modal_rows(case, start) if modal is None else modal),
         waves=pack_waveforms(histories, callbacks, span),
         loads=_ordered(_entries(loads, histories)),
         moved=_ordered(_entries(moves, histories)),
@@ -158,9 +157,10 @@ def pack(
         actuators=turned,
         following=following,
         ties=ties,
+        alpha=float(case.rayleigh.alpha),
         lightness=lightness(mass) if case.contact is not None else np.zeros(0),
     )
-    return Packed(body, system, mass, callbacks, by)
+    return Packed(body, system, mass, callbacks, by, modal)
 
 
 def _driven(case: Case, histories: list[History]) -> Assembly:

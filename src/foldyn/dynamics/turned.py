@@ -25,7 +25,7 @@ SHARE = 0.01  # of the energies at play: what is said
 
 def resists_turns(case: Case, packed: Packed) -> bool:
     """Whether a case has such damping, and panels."""
-    constant = case.rayleigh.beta > 0.0 or len(packed.system.damping.modal) > 0
+    constant = case.rayleigh.beta > 0.0 or len(packed.modal.rows) > 0
     return constant and len(case.structure.triangles) > 0
 
 
@@ -45,7 +45,7 @@ def turns_told(
     if energy <= SHARE * scale:
         return ""
     kinds = ["beta"] if case.rayleigh.beta else []
-    kinds += ["modal damping"] if len(packed.system.damping.modal) else []
+    kinds += ["modal damping"] if len(packed.modal.rows) else []
     fits = case.structure.body.strains() is not None
     remedy = "fd.StrainDamping (strain in a case file)" if fits else "fd.CreaseDamping"
     return (
@@ -92,12 +92,8 @@ def _strained(case: Case, packed: Packed, there: NDArray) -> NDArray:
     if beta:
         k = body.tangent(body.dofs(there))
         out += beta * (fields.T @ (k[: x.size, : x.size] @ fields))
-    if len(rows := packed.system.damping.modal):
-        by = packed.numbering
-        inward = [by.inward(field.reshape(-1, 3)).ravel() for field in fields.T]
-        seen = rows @ np.stack(inward, axis=1)
-        out += seen.T @ seen
-    return out
+    seen = packed.modal.rows[:, : x.size] @ fields
+    return out + seen.T @ seen
 
 
 def _frames(corners: NDArray) -> tuple[NDArray, NDArray]:

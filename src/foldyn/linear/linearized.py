@@ -34,7 +34,7 @@ from foldyn.algebra.complex_symmetric import Gram
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, State
 from foldyn.cases.touching import check_contact
-from foldyn.dynamics.dampers import dampers
+from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of, modal_rows, rows_of, soft_slopes
 from foldyn.errors import FoldynWarning, InputError
@@ -220,7 +220,7 @@ def linearize(
     if loads is not None:
         stiffness = sparse.csr_array(stiffness + _symmetric(loads, free))
     stiffness, mass = inner.stiffened(stiffness), inner.massed(mass_of(case))
-    ties, more = case.constraints, inner.behind(dampers(case, True).matrix(point.dofs))
+    ties, more = case.constraints, inner.behind(damping_matrix(case, point.dofs, True))
     damping = case.rayleigh.matrix(mass, inner.stiffened(_reference(case, exact)))
     modal = _modal_rows(case, point.displacement, stiffness, mass, internal)
     if contact is not None:  # it damps nothing

@@ -24,7 +24,7 @@ from foldyn.errors import ComputationError
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.sheet_term import Blocks, SheetTerm, largest_turn
 from foldyn.mechanics.step_tangent import FLOOR
-from foldyn.mechanics.tangent import Sparsity, block_keys, joined
+from foldyn.mechanics.tangent import Sparsity, entry_slots, joined
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
@@ -341,11 +341,11 @@ class AssembledBlocks:
     """Blocks of all terms that have places in a tangent; see `mechanics.sheet_term.Blocks`."""
 
     def __init__(self, body: Assembly) -> None:
-        self._sheet, self._rows = body.sheet.blocks(), body.rows
+        self._sheet = body.sheet.blocks()
         self._places = [term.places for term in _with_places(body)]
         self.pattern = self._sheet.pattern
         for row, column in self._places:
-            self.pattern = joined(self.pattern, self._keys(row, column))
+            self.pattern = joined(self.pattern, row // 3 * body.rows + column // 3)
         self.order, self.unused = self._sheet.order, self._sheet.unused
         self._slots: tuple[Sparsity, list[NDArray]] | None = None
 
@@ -377,18 +377,10 @@ class AssembledBlocks:
             filled.reshape(-1)[slots] = True
         return filled
 
-    def _keys(self, row: NDArray, column: NDArray) -> NDArray:
-        return row // 3 * self._rows + column // 3
-
     def _slots_in(self, pattern: Sparsity) -> list[NDArray]:
         """Where the entries of each term stand among those of a pattern's blocks."""
         if self._slots is None or self._slots[0] is not pattern:
-            keys = block_keys(pattern.indptr, pattern.indices)
-            found = [
-                9 * np.searchsorted(keys, self._keys(row, column)) + 3 * (row % 3) + column % 3
-                for row, column in self._places
-            ]
-            self._slots = pattern, found
+            self._slots = pattern, [entry_slots(pattern, *places) for places in self._places]
         return self._slots[1]
 
 
@@ -436,8 +428,9 @@ class Numbering(NamedTuple):
         return np.ascontiguousarray(values[self.rank])
 
     def dofs(self, dofs: NDArray) -> NDArray:
-        """Numbers 3 place + axis of dofs 3 node + axis."""
-        return (3 * self.rank[np.asarray(dofs) // 3] + np.asarray(dofs) % 3).astype(np.int64)
+        """Numbers 3 place + axis of dofs 3 node + axis, and of those beside displacements."""
+        rank = np.append(self.rank, np.arange(len(self.rank), self.rows))
+        return (3 * rank[np.asarray(dofs) // 3] + np.asarray(dofs) % 3).astype(np.int64)
 
     def matrix(self, matrix: sparse.csr_array) -> sparse.csr_array:
         """Nodal (n, n) matrix, or one of all dofs, as it stands in memory."""

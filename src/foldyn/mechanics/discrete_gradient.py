@@ -23,7 +23,7 @@ import math
 
 import numpy as np
 
-from foldyn.jit.compiled import inner_scalar, kernel, scalar
+from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.materials import series, switch
 from foldyn.mechanics.dihedral import add_hessian, dihedral_gradient
 from foldyn.mechanics.energy import hinge_dihedral
@@ -158,7 +158,7 @@ def discrete_gradient(x, dx, turn, points, plain, gradient):
                 gradient[v, c] += missed / size * deform[v, c]
 
 
-@scalar
+@inner_scalar
 def _rotation(r, d):
     """Vector w of the rotation w x r that is nearest to d, both (4, 3) about their means."""
     xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -184,7 +184,7 @@ def _rotation(r, d):
     )
 
 
-@scalar
+@inner_scalar
 def put_motion(rest, hinges, e, u0, u1, x, dx):
     """Mean and difference (4, 3) of the positions of a hinge's points."""
     for v in range(4):

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.compiled import inner
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.membranes import GROUP
@@ -172,7 +172,7 @@ def add_given(gives, p, g, share, out):
             out[gives.number[p, k]] += share * gives.stiffness[p, k, j] * g[gives.number[p, j]]
 
 
-@kernel
+@inner
 def add_gives(gives, u, g, force, pull):
     """Add the forces on nodes (n, 3), and on gives (g,)."""
     for p in range(gives.nodes.shape[0]):
@@ -182,7 +182,7 @@ def add_gives(gives, u, g, force, pull):
         add_given(gives, p, g, 1.0, pull)
 
 
-@kernel
+@inner
 def strained_gives(gives, u, pull):
     """Forces (g,), N, of the strains at u on the gives."""
     pull[:] = 0.0

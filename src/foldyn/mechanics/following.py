@@ -178,7 +178,7 @@ def following_places(loads: Following) -> tuple[NDArray, NDArray]:
     return np.concatenate(rows), np.concatenate(columns)
 
 
-@kernel
+@inner
 def _edges(loads, u, t, a, b):
     """Vectors from the first corner of a triangle to the others, to a and b (3,)."""
     first, second, third = loads.triangles[t, 0], loads.triangles[t, 1], loads.triangles[t, 2]
@@ -298,7 +298,7 @@ def put_following(loads, u, factor, symmetric, out):
                 at += 1
 
 
-@kernel
+@inner
 def _cross(side, w, c, d):
     """Entry (c, d) of the matrix of the cross product with row w of `side`."""
     if c == d:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import inlined, inner, inner_scalar, kernel, scalar
+from foldyn.jit.compiled import inlined, inner, inner_scalar
 from foldyn.jit.intrinsics import flat, prefetch_range
 from foldyn.jit.rows import LANES, add_rows, load_rows
 from foldyn.materials import ogden, superlinear
@@ -89,7 +89,7 @@ def whole_lanes(m):
     return (m + LANES - 1) // LANES * LANES
 
 
-@scalar
+@inner_scalar
 def gather(rows, mask, nodes, width, v, first, m, out, at):
     """Coordinates of node v of m elements, rows of `width` nodes, to three rows from out[at]."""
     whole = m // LANES * LANES
@@ -101,7 +101,7 @@ def gather(rows, mask, nodes, width, v, first, m, out, at):
             out[at + c * BLOCK + q] = rows[row + c]
 
 
-@scalar
+@inner_scalar
 def scatter(rows, mask, nodes, width, v, first, m, vector, at, factor, start):
     """Add factor[start + q] times a vector, three rows from vector[at], to node v of elements."""
     whole = m // LANES * LANES
@@ -140,7 +140,7 @@ def elements_of(nodes, width, run, low, high, n):
     return start, end
 
 
-@kernel
+@inner
 def add_bar_forces(model, low, high, work):
     """Add the forces of the bars with lowest nodes from low to high to work.sums."""
     x, s, mask = work.points, work.value, work.strips.mask
@@ -248,7 +248,7 @@ def hinge_moments(code, address, stiffness, rest, p, share, offset, first, m, an
         )  # fmt: skip
 
 
-@kernel
+@inner
 def add_hinge_forces(model, low, high, work):
     """Add the forces of the hinges with lowest nodes from low to high to work.sums.
 
@@ -305,7 +305,7 @@ def add_hinge_forces(model, low, high, work):
                 scatter(sums, mask, hinges, 4, v, first, m, g, 3 * v * BLOCK, value, 0)
 
 
-@scalar
+@inner_scalar
 def place(at_rest, u, work, start, end):
     """Put the nodes start to end, flat rows of three, into the buffers of rows of four."""
     mask, last = np.uint32(work.strips.mask), at_rest.size // 3 - 1
@@ -328,7 +328,7 @@ def place(at_rest, u, work, start, end):
             position[row + c] = at_rest[3 * last + c] + u[3 * last + c]
 
 
-@scalar
+@inner_scalar
 def finish(force, work, start, end):
     """Take the sums of the nodes start to end from the buffer to flat rows of three."""
     mask, sums = np.uint32(work.strips.mask), flat(work.sums)

@@ -21,7 +21,7 @@ from foldyn.mechanics.inelastic import (
 )
 from foldyn.mechanics.sheet_term import SheetTerm
 from foldyn.mechanics.term import Compiled, Term, in_rows
-from foldyn.mechanics.viscous import WIDTH
+from foldyn.mechanics.viscous import WIDTH, coupled
 
 
 class HingeMemory(Term):
@@ -98,18 +98,15 @@ class HingeMemory(Term):
         return memory_kernels(self.own, self._offset, self._rows, group)
 
     @cached_property
-    def _pairs(self) -> NDArray:
-        """Which pairs (h, 14, 14) of its dofs a hinge has."""
+    def _coupled(self) -> tuple[NDArray, NDArray, NDArray]:
         mine = np.ones(self.own.dofs.shape, bool)
         mine[:, 12:] = self.own.hidden_turn > 0.0
-        return mine[:, :, None] & mine[:, None, :]
+        return coupled(self.own.dofs, mine)
 
-    @cached_property
+    @property
     def places(self) -> tuple[NDArray, NDArray]:
         """See `Term`."""
-        dofs, shape = self.own.dofs, self._pairs.shape
-        row, column = (np.broadcast_to(one, shape) for one in (dofs[:, :, None], dofs[:, None, :]))
-        return row[self._pairs], column[self._pairs]
+        return self._coupled[1:]
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
         """See `Term`; the elastic part of a hinge has a slope of 1 per unit stiffness."""
@@ -118,14 +115,14 @@ class HingeMemory(Term):
         evaluate_at(own, self._offset, u)
         np.maximum(own.slope, (floor - 1.0) * own.stiffness, out=own.slope)
         memory_tangents(own, u, out)
-        return out[self._pairs]
+        return out[self._coupled[0]]
 
     def mean_entries(self, q0: NDArray, q1: NDArray, floor: float = -np.inf) -> NDArray:
         """See `Term`."""
         out = np.empty((len(self.own.rest), WIDTH, WIDTH))
         ends = in_rows(q0, self._rows), in_rows(q1, self._rows)
         mean_memory_tangents(self.own, 0.5 * (floor - 1.0), *ends, out)
-        return out[self._pairs]
+        return out[self._coupled[0]]
 
     def on(self, sheet: SheetTerm) -> Self:
         """See `Term`; the branches measure from the rest angles that they have had."""

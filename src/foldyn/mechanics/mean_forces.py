@@ -109,10 +109,10 @@ class MeanForces:
             return own.context, own.kernels[MEAN_FORCES]
         hidden, energies = self._body.hidden.astype(np.int64), own.kernels.get(ENERGIES)
         dofs, rows = np.setdiff1d(np.arange(self._body.size), hidden), self._body.rows
-        states = 3 if len(hidden) or len(term.hinges) else 1
         if term is not self._body.sheet:
             hidden = hidden[:0]
             dofs = np.intersect1d(dofs, term.places[0]) if len(term.places[0]) else dofs
+        states = 3 if len(hidden) or len(term.hinges) else 1
         context = _Context(
             term=own.context.address,
             forces=own.kernels[FORCES].at(own.context),

@@ -178,7 +178,7 @@ def turn_plate(model, x, work, p):
             work.turn[k] = model.per_reach * x[-1 - h]
 
 
-@kernel
+@inner
 def fold_moment(model, work, f):
     """Moment (N m) of a fold."""
     p = model.fold_parameters
@@ -188,7 +188,7 @@ def fold_moment(model, work, f):
     )  # fmt: skip
 
 
-@kernel
+@inner
 def plates_energy(model, u, x, work, out):
     """Energies (J) of bars, folds and bends, to out (3,)."""
     strain_energies(model.bars, u, out)
@@ -210,7 +210,7 @@ def plates_energy(model, u, x, work, out):
                 out[2] += 0.5 * work.turn[k] * stiff * work.turn[m]
 
 
-@kernel
+@inner
 def plates_force(model, u, x, force, couple, work):
     """Internal force (n, 3), N, and that of the dofs of rotations (r,), N."""
     internal_force(model.bars, u, force, work.bars)
@@ -256,7 +256,7 @@ def add_plate_moments(model, couple, work, p):
             couple[-1 - h] += model.per_reach * moment
 
 
-@kernel
+@inner
 def add_mean_plates_force(model, u0, x0, u1, x1, before, force, couple, work):
     """Add forces whose work is the change of the energy; `before` are the dihedrals at u0."""
     add_bar_forces(model.bars, u0, u1, force)

@@ -193,7 +193,7 @@ def along_step(model, push, work):
     return total
 
 
-@kernel
+@inner
 def balance(model, u, work):
     """Rotations in balance at displacements u, to work.x; nan where there are none."""
     plates, push = model.plates, model.offset[model.plates.fold_rest.size :]
@@ -250,14 +250,14 @@ def balance(model, u, work):
     work.x[:] = np.nan
 
 
-@kernel
+@inner
 def condensed_force(model, u, force, work):
     """Internal force (n, 3), N, with rotations in balance."""
     balance(model, u, work)
     plates_force(model.plates, u, work.x, force, work.couple, work.plates)
 
 
-@kernel
+@inner
 def condensed_energy(model, u, work, out):
     """Energies (J) of bars, folds and bends, to out (3,), with rotations in balance."""
     balance(model, u, work)

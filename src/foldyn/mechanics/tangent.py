@@ -31,6 +31,13 @@ def block_keys(indptr: NDArray, indices: NDArray) -> NDArray:
     return np.repeat(np.arange(rows), np.diff(indptr)) * rows + indices.astype(np.int64)
 
 
+def entry_slots(pattern: Sparsity, row: NDArray, column: NDArray) -> NDArray:
+    """Where entries (k,) at dofs stand among those of the blocks of a pattern, all flat."""
+    keys, rows = block_keys(pattern.indptr, pattern.indices), len(pattern.indptr) - 1
+    block = np.searchsorted(keys, row // 3 * rows + column // 3)
+    return 9 * block + 3 * (row % 3) + column % 3
+
+
 def sparsity(model: BarsHinges) -> Sparsity:
     """Block pattern of the tangent; every node has a diagonal block."""
     n = len(model.rest)

@@ -114,12 +114,15 @@ class Term(ABC):
         Whether threads may share a model with it.
     owns_hidden : bool
         Whether some of the hidden dofs are its own.
+    damps : bool
+        Whether its forces resist velocities, and dissipate all their work.
     """
 
     energy_groups: ClassVar[Mapping[str, str]] = {}
     of_hinges: ClassVar[bool] = False
     shared: ClassVar[bool] = False
     owns_hidden: ClassVar[bool] = False
+    damps: ClassVar[bool] = False
 
     # ------------------------------------------------------------------ what is compiled
     @abstractmethod
@@ -173,6 +176,25 @@ class Term(ABC):
     def unstrained(self, q: NDArray) -> Unstrained | None:
         """The term as if it had no strain at q; None where it holds nothing."""
         return None
+
+    # ------------------------------------------------------------------ damping
+    @property
+    def damping_places(self) -> tuple[NDArray, NDArray]:
+        """Rows and columns (k,) of the dofs that its damping couples in any state."""
+        none = np.zeros(0, np.int64)
+        return none, none
+
+    def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
+        """Derivative (k,) of its forces there by the velocities, N s/m; added likewise.
+
+        hidden : change of the velocity of hidden dofs, over that of others.
+        """
+        return np.zeros(0)
+
+    def damping(self, q: NDArray) -> sparse.csr_array:
+        """The same as a matrix (m, m)."""
+        entries = (self.damping_entries(q), self.damping_places)
+        return sparse.csr_array(sparse.coo_array(entries, shape=(q.size, q.size)))
 
     # ------------------------------------------------------------------ measures
     @property

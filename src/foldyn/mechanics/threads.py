@@ -20,7 +20,7 @@ import numpy as np
 from numba import config
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import inner, scalar
+from foldyn.jit.compiled import inner, inner_scalar, scalar
 from foldyn.jit.intrinsics import call0, fetch_add, look
 from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.strips import shares
@@ -120,14 +120,14 @@ def _wait(team):
             call0(team.pause)
 
 
-@scalar
+@inner_scalar
 def wait(team):
     """Wait until all members have come here; then what they wrote before can be read."""
     if team.size > 1:
         _wait(team)
 
 
-@scalar
+@inner_scalar
 def total(team, k):
     """Sum of note k of all members, in the same order on each: after a `wait` for them."""
     out = 0.0
@@ -136,7 +136,7 @@ def total(team, k):
     return out
 
 
-@scalar
+@inner_scalar
 def largest(team, k):
     """Largest note k of all members: after a `wait` for them."""
     out = team.note[0, k]

@@ -11,24 +11,20 @@ them, as a piece of a shell's crease does.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.jit.compiled import inner_scalar, kernel
-from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.block_matrix import assembled, pairs_within
+from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.jit.context import Context, numbers_at
+from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.dihedral import dihedral_gradient
+from foldyn.mechanics.model import ranks
 from foldyn.mechanics.sheet_term import NO_DOF
-from foldyn.mechanics.term import nodal
-from foldyn.mechanics.viscous_panels import (
-    ViscousPanels,
-    add_viscous_panels,
-    panel_blocks,
-    viscous_panels_work,
-)
+from foldyn.mechanics.term import FORCES, Compiled, Term, forces
 
 WIDTH = 14  # dofs of an element at most: four nodes, and two beside displacements
 
@@ -42,12 +38,6 @@ class Viscous(NamedTuple):
     hidden_turn: NDArray  # (h, 2) what a unit of the last two dofs takes from the dihedral, rad/m
     coefficient: NDArray  # (p + h,) N s/m, N m s/rad
     gradient: NDArray  # (14,) memory of one element
-    panels: ViscousPanels
-
-    @property
-    def present(self) -> bool:
-        """Whether there are any."""
-        return len(self.coefficient) > 0 or len(self.panels.nodes) > 0
 
 
 def viscous(
@@ -59,7 +49,6 @@ def viscous(
     hidden: NDArray,
     hidden_turn: NDArray,
     hinge_coefficient: NDArray,
-    panels: ViscousPanels,
 ) -> Viscous:
     """Pack elements.
 
@@ -75,7 +64,6 @@ def viscous(
         Dofs beside displacements, or NO_DOF, and what a unit of each turns, rad/m.
     hinge_coefficient : (h,)
         N m s/rad.
-    panels : those that resist the rates of their strains.
     """
     p, h = len(pairs), len(hinges)
     dofs = np.zeros((p + h, WIDTH), np.int64)
@@ -88,7 +76,6 @@ def viscous(
         hidden_turn=np.array(hidden_turn, float).reshape(h, 2),
         coefficient=np.concatenate([axial_coefficient, hinge_coefficient]).astype(float),
         gradient=np.zeros(WIDTH),
-        panels=panels,
     )
 
 
@@ -103,14 +90,14 @@ def hinge_dofs(hinges: NDArray, hidden: NDArray) -> NDArray:
     return dofs
 
 
-def turns(elements: Viscous, hidden: NDArray) -> sparse.csr_array:
-    """Rows (k, r) of how hidden dofs (r,) turn those hinges that have some, over the largest."""
-    turn, dofs = elements.hidden_turn, elements.dofs[len(elements.axial) :, 12:]
-    some = turn.any(axis=1)
-    row, end = np.nonzero(turn[some])
-    values = turn[some][row, end] / turn[some].max(axis=1)[row]
-    entries = (values, (row, np.searchsorted(hidden, dofs[some][row, end])))
-    return sparse.csr_array(sparse.coo_array(entries, shape=(int(some.sum()), len(hidden))))
+def coupled(dofs: NDArray, own: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Which pairs (e, w, w) of the dofs (e, w) of elements are theirs; their rows and columns.
+
+    own : (e, w) bool, which of the dofs an element has.
+    """
+    pairs = own[:, :, None] & own[:, None, :]
+    row, column = (np.broadcast_to(d, pairs.shape) for d in (dofs[:, :, None], dofs[:, None, :]))
+    return pairs, row[pairs], column[pairs]
 
 
 @inner_scalar
@@ -140,7 +127,7 @@ def hinge_gradient(x, dofs, hidden_turn, moved, out):
     return found[0] - hidden_turn[0] * moved[dofs[12]] - hidden_turn[1] * moved[dofs[13]]
 
 
-@kernel
+@inner
 def _gradient(elements, moved, e, out):
     """Gradient (14,) of element e at flat displacements."""
     dofs, p = elements.dofs[e], elements.axial.shape[0]
@@ -160,54 +147,78 @@ def _gradient(elements, moved, e, out):
 
 
 @kernel
-def add_viscous_elements(elements, u, v, force):
-    """Add their forces at u and v to `force`, all (rows, 3); returns the power taken, W."""
-    power, moved, speed, out = 0.0, flat(u), flat(v), flat(force)
-    g = elements.gradient
+def put_gradients(elements, moved, out):
+    """Gradients of all elements at flat displacements, to out (p + h, 14)."""
+    for e in range(elements.coefficient.size):
+        _gradient(elements, moved, e, out[e])
+
+
+class _Context(NamedTuple):
+    elements: Viscous
+    size: int  # of flat arrays
+
+
+@forces
+def _forces(own, u, v, t, force, powers):
+    elements, g, power = own.elements, own.elements.gradient, 0.0
+    moved, speed, out = (
+        numbers_at(u, own.size), numbers_at(v, own.size), numbers_at(force, own.size)
+    )  # fmt: skip
     for e in range(elements.coefficient.size):
         _gradient(elements, moved, e, g)
         rate = 0.0
         for c in range(14):
             rate += g[c] * speed[elements.dofs[e, c]]
-        resist = elements.coefficient[e] * rate
+        resisted = elements.coefficient[e] * rate
         for c in range(14):
-            out[elements.dofs[e, c]] += resist * g[c]
-        power += resist * rate
-    return power + add_viscous_panels(elements.panels, u, v, force)
+            out[elements.dofs[e, c]] += resisted * g[c]
+        power += resisted * rate
+    numbers_at(powers, 2)[1] += power
 
 
-@kernel
-def viscous_elements_work(elements, u, v, shift):
-    """Work (J) of their forces at u and v along a shift, all (rows, 3)."""
-    work, moved, speed, along, g = 0.0, flat(u), flat(v), flat(shift), elements.gradient
-    for e in range(elements.coefficient.size):
-        _gradient(elements, moved, e, g)
-        rate, change = 0.0, 0.0
-        for c in range(14):
-            rate += g[c] * speed[elements.dofs[e, c]]
-            change += g[c] * along[elements.dofs[e, c]]
-        work += elements.coefficient[e] * rate * change
-    return work + viscous_panels_work(elements.panels, u, v, shift)
+class ViscousTerm(Term):
+    """Viscous elements; see `Term`."""
 
+    damps = True
 
-@kernel
-def put_gradients(elements, u, out):
-    """Gradients of all elements at u, flat or (rows, 3), to out (p + h, 14)."""
-    moved = flat(u)
-    for e in range(elements.coefficient.size):
-        _gradient(elements, moved, e, out[e])
+    def __init__(self, elements: Viscous) -> None:
+        self.elements = elements
 
+    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+        """See `Term`."""
+        own = Context(_Context(self.elements, 3 * int(work.strips.own[1])))
+        return Compiled(own, {FORCES: _forces})
 
-def viscous_matrix(elements: Viscous, q: NDArray, size: int) -> sparse.csr_array:
-    """Sum of c grad s grad s' and of panels at the dofs q (m,), a matrix (size, size), N s/m."""
-    gradients = np.zeros((len(elements.coefficient), WIDTH))
-    put_gradients(elements, np.ascontiguousarray(q, float), gradients)
-    row = np.repeat(np.arange(len(gradients)), WIDTH)
-    entries = (gradients.ravel(), (row, elements.dofs.ravel()))
-    rates = sparse.csr_array(entries, (len(gradients), size))
-    rates.eliminate_zeros()
-    matrix = sparse.csr_array(rates.T @ (sparse.diags_array(elements.coefficient) @ rates))
-    if len(elements.panels.nodes):
-        blocks = panel_blocks(elements.panels, nodal(q))
-        matrix = matrix + assembled(pairs_within(elements.panels.nodes), blocks, size)
-    return sparse.csr_array(matrix)
+    @cached_property
+    def _coupled(self) -> tuple[NDArray, NDArray, NDArray]:
+        axial, own = len(self.elements.axial), np.ones(self.elements.dofs.shape, bool)
+        own[:axial, 6:] = False
+        own[axial:, 12:] = self.elements.hidden_turn > 0.0
+        return coupled(self.elements.dofs, own)
+
+    @property
+    def damping_places(self) -> tuple[NDArray, NDArray]:
+        """See `Term`."""
+        return self._coupled[1:]
+
+    def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
+        """See `Term`; for symmetry, the other forces on hidden dofs count so, too."""
+        gradient = np.zeros(self.elements.dofs.shape)
+        put_gradients(self.elements, np.ravel(q), gradient)
+        gradient[:, 12:] *= hidden**0.5
+        weighted = self.elements.coefficient[:, None] * gradient
+        return (weighted[:, :, None] * gradient[:, None, :])[self._coupled[0]]
+
+    def turns(self, hidden: NDArray) -> sparse.csr_array:
+        """Rows (k, r) of how hidden dofs (r,) turn hinges that have some, over the largest."""
+        turn, dofs = self.elements.hidden_turn, self.elements.dofs[len(self.elements.axial) :, 12:]
+        some = turn.any(axis=1)
+        row, end = np.nonzero(turn[some])
+        values = turn[some][row, end] / turn[some].max(axis=1)[row]
+        entries = (values, (row, np.searchsorted(hidden, dofs[some][row, end])))
+        return sparse.csr_array(sparse.coo_array(entries, shape=(int(some.sum()), len(hidden))))
+
+    def placed(self, order: NDArray, before: Assembly) -> ViscousTerm:
+        """See `Term`."""
+        by = Numbering(order, ranks(order), before.rows)
+        return ViscousTerm(self.elements._replace(dofs=by.dofs(self.elements.dofs)))

@@ -10,13 +10,18 @@ and with bars of no length^-2, which feel nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner_scalar, kernel
+from foldyn.jit.context import Context, numbers_at, rows_at
+from foldyn.mechanics.block_matrix import pairs_within, places_of
 from foldyn.mechanics.membranes import Membranes
+from foldyn.mechanics.model import ranks
+from foldyn.mechanics.term import FORCES, Compiled, Term, forces, nodal
 
 
 class ViscousPanels(NamedTuple):
@@ -63,59 +68,34 @@ def _vectors(panels, p, u):
             panels.along[i, c] = panels.vector[p, i, c] + u[b, c] - u[a, c]
 
 
-@inner_scalar
-def _rate(panels, p, i, v):
-    """Rate (1/s) of the strain of its bar i at velocities v (rows, 3)."""
-    a, b = panels.nodes[p, panels.ends[p, i, 0]], panels.nodes[p, panels.ends[p, i, 1]]
-    rate = 0.0
-    for c in range(3):
-        rate += panels.along[i, c] * (v[b, c] - v[a, c])
-    return panels.per_length2[p, i] * rate
+class _Context(NamedTuple):
+    panels: ViscousPanels
+    rows: int
 
 
-@inner_scalar
-def _rates(panels, p, u, v):
-    """Those of all its bars to `rate`, and their vectors at u to `along`."""
-    _vectors(panels, p, u)
-    for i in range(panels.rate.size):
-        panels.rate[i] = _rate(panels, p, i, v)
-
-
-@inner_scalar
-def _stress(panels, p, i):
-    """Stress (J) of its bar i at the rates of all."""
-    stress = 0.0
-    for j in range(panels.rate.size):
-        stress += panels.resistance[p, i, j] * panels.rate[j]
-    return stress
-
-
-@kernel
-def add_viscous_panels(panels, u, v, force):
-    """Add their forces at u and v to `force`, all (rows, 3); returns the power taken, W."""
-    power, bars = 0.0, panels.rate.size
+@forces
+def _forces(own, u, v, t, force, powers):
+    panels, bars, power = own.panels, own.panels.rate.size, 0.0
+    moved, speed, out = rows_at(u, own.rows), rows_at(v, own.rows), rows_at(force, own.rows)
     for p in range(panels.nodes.shape[0]):
-        _rates(panels, p, u, v)
+        _vectors(panels, p, moved)
         for i in range(bars):
-            stress = _stress(panels, p, i)
-            power += stress * panels.rate[i]
             a, b = panels.nodes[p, panels.ends[p, i, 0]], panels.nodes[p, panels.ends[p, i, 1]]
+            rate = 0.0
+            for c in range(3):
+                rate += panels.along[i, c] * (speed[b, c] - speed[a, c])
+            panels.rate[i] = panels.per_length2[p, i] * rate
+        for i in range(bars):
+            a, b = panels.nodes[p, panels.ends[p, i, 0]], panels.nodes[p, panels.ends[p, i, 1]]
+            stress = 0.0
+            for j in range(bars):
+                stress += panels.resistance[p, i, j] * panels.rate[j]
+            power += stress * panels.rate[i]
             for c in range(3):
                 pull = stress * panels.per_length2[p, i] * panels.along[i, c]
-                force[b, c] += pull
-                force[a, c] -= pull
-    return power
-
-
-@kernel
-def viscous_panels_work(panels, u, v, shift):
-    """Work (J) of their forces at u and v along a shift, all (rows, 3)."""
-    work, bars = 0.0, panels.rate.size
-    for p in range(panels.nodes.shape[0]):
-        _rates(panels, p, u, v)
-        for i in range(bars):
-            work += _stress(panels, p, i) * _rate(panels, p, i, shift)
-    return work
+                out[b, c] += pull
+                out[a, c] -= pull
+    numbers_at(powers, 2)[1] += power
 
 
 @kernel
@@ -137,3 +117,30 @@ def panel_blocks(panels, u):
                                 a, b = panels.ends[p, i, k], panels.ends[p, j, m]
                                 out[p, a, b, c, d] += entry if k == m else -entry
     return out
+
+
+class ViscousPanelsTerm(Term):
+    """Viscous panels; see `Term`."""
+
+    damps = True
+
+    def __init__(self, panels: ViscousPanels) -> None:
+        self.panels = panels
+
+    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+        """See `Term`."""
+        own = Context(_Context(self.panels, int(work.strips.own[1])))
+        return Compiled(own, {FORCES: _forces})
+
+    @cached_property
+    def damping_places(self) -> tuple[NDArray, NDArray]:
+        """See `Term`."""
+        return places_of(pairs_within(self.panels.nodes))
+
+    def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
+        """See `Term`; panels have no hidden dofs."""
+        return panel_blocks(self.panels, nodal(q)).ravel()
+
+    def placed(self, order: NDArray, before: Any) -> ViscousPanelsTerm:
+        """See `Term`."""
+        return ViscousPanelsTerm(self.panels._replace(nodes=ranks(order)[self.panels.nodes]))

@@ -159,7 +159,7 @@ def side_rotations(model, x, turn, t, out):
             out[k] += model.sign[t, k] * model.per_reach * x[model.rotation[t, k]]
 
 
-@kernel
+@inner
 def shell_energy(model, u, x, work, out):
     """Energies (J) of membrane, bending and creases, to out (3,)."""
     fold(model, u, x, work)
@@ -182,7 +182,7 @@ def shell_energy(model, u, x, work, out):
         out[2] += model.piece_stiffness[k] * w
 
 
-@kernel
+@inner
 def shell_force(model, u, x, force, couple, work):
     """Internal force (n, 3), N, and that of the dofs of rotations (r,), N."""
     fold(model, u, x, work)
@@ -229,7 +229,7 @@ def shell_force(model, u, x, force, couple, work):
     carry(model, force, work)
 
 
-@kernel
+@inner
 def carry(model, force, work):
     """Give the forces on wings to the nodes on which they ride."""
     wings = model.rest.shape[0] - model.nodes
@@ -240,7 +240,7 @@ def carry(model, force, work):
                 force[model.hinges[h, end], c] += carried
 
 
-@kernel
+@inner
 def add_mean_shell_force(model, u0, x0, u1, x1, before, force, couple, work):
     """Add forces whose work is the change of the energy; `before` are the dihedrals at u0.
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.materials.switch import hinge_moment, hinge_slope
 from foldyn.mechanics.dihedral import add_hessian, carry_wing
 from foldyn.shells.kernels import (
@@ -161,7 +161,7 @@ def _membrane(model, t, e, gap, block):
                     block[3 * k + a, 3 * j + b] -= term
 
 
-@scalar
+@inner_scalar
 def _bending(model, t, bend, resist, block):
     """Add bend^T bending bend, bend (3, 21) the derivatives of the rotations beta."""
     for k in range(3):

@@ -156,7 +156,8 @@ class BarsHingesTerm(SheetTerm):
         """See `SheetTerm`."""
         model, rows = self.model, self._soft
         columns = 3 * model.hinges[rows].astype(np.int64)[:, :, None] + np.arange(3)
-        entries = gradients(model, self._nodal(q))[rows].ravel()
+        found = gradients(model, self._nodal(q)) if len(rows) else np.zeros((0, 12))
+        entries = found[rows].ravel()
         start = 12 * np.arange(len(rows) + 1)
         gradient = sparse.csr_array((entries, columns.ravel(), start), (len(rows), self.size))
         offset = (self.angles(q) - model.hinge_rest)[rows]

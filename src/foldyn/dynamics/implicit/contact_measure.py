@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar
 from foldyn.jit.intrinsics import flat
 
 NOISE = 16.0 * float(np.finfo(float).eps)  # of positions: what a measure may miss by rounding
@@ -54,7 +54,7 @@ def new_move() -> Move:
     )  # fmt: skip
 
 
-@kernel
+@inner
 def go(move, tangent):
     """What follows from start and end; returns |D|^2 (m2) and the largest coordinate (m).
 
@@ -92,7 +92,7 @@ def go(move, tangent):
     return size, farthest
 
 
-@scalar
+@inner_scalar
 def _moment(r, d):
     """Sum of r x d, both (4, 3)."""
     t0, t1, t2 = 0.0, 0.0, 0.0

@@ -107,7 +107,7 @@ def _across(corners, c0):
     return dot(n, n) / c0
 
 
-@kernel
+@inner
 def _edges(corners):
     """Vectors of two edges."""
     e = minus(point(corners, 1), point(corners, 0))

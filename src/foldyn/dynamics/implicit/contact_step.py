@@ -162,7 +162,7 @@ def _find(tables, u0, u1, start, middle, memory, pairs):
     return found[0], found[1]
 
 
-@kernel
+@inner
 def _list(tables, u0, u1, memory):
     """Have all pairs listed that are near on the way from u0 to u1; none if that is too long."""
     far = math.inf
@@ -238,7 +238,7 @@ def _guard(tables, h, theta0, theta1):
     return moment, slope, energy
 
 
-@kernel
+@inner
 def _turn(tables, h, start, end, move, points, plain, gradient):
     """Discrete gradient of the dihedral of a guarded hinge; its dihedrals, the gradient at the end.
 

@@ -21,15 +21,24 @@ from scipy import sparse
 from foldyn.algebra.banded import BandLU, Cholesky
 from foldyn.algebra.solvers import factorizer, takes_band
 from foldyn.algebra.superlu import SingularTangentError, SuperLU
-from foldyn.dynamics.implicit.damping import ElementBlocks, ModalTerm, Weights
+from foldyn.algebra.woodbury import Updated
 from foldyn.dynamics.system import Packed
 from foldyn.dynamics.ties import Ties, follow_masters, hand_over
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.constant_damping import DampingRows
 from foldyn.mechanics.following import following_places, put_following
-from foldyn.mechanics.tangent import Sparsity, block_keys, joined
+from foldyn.mechanics.tangent import Sparsity, block_keys, entry_slots, joined
 
 FULL = 200  # dofs up to which a full matrix takes what is added sooner than a sparse one
+
+
+class Weights(NamedTuple):
+    """Factors of the matrices in that of an iteration."""
+
+    stiffness: float
+    mass: float  # 1/s2
+    damping: float  # 1/s, of the damping but for alpha M
 
 
 class Matrices(NamedTuple):
@@ -37,7 +46,7 @@ class Matrices(NamedTuple):
 
     stiffness: NDArray
     mass: NDArray
-    damping: NDArray  # beta K0, dashpots and creases
+    damping: NDArray  # that of terms
 
 
 class StepMatrix:
@@ -67,24 +76,19 @@ class StepMatrix:
         mass, system = packed.mass, packed.system
         self.blocks = packed.body.blocks()
         nodes, self._following, self._symmetric = system.rows, system.following, symmetric
-        row, column = following_places(system.following)
-        nodal = sparse.csr_array((mass.data, mass.indices, mass.indptr), (nodes, nodes))
-        damping = system.damping.viscous(3 * nodes).tobsr((3, 3))
-        damping.sort_indices()
-        self._elements = ElementBlocks(system.damping.elements, nodes)
-        parts = (nodal, damping, self._elements.blocks)
-        keys = [block_keys(part.indptr, part.indices) for part in parts]
-        keys.append(row // 3 * nodes + column // 3)
+        self._damping = [term for term in packed.body.others if term.damps]
+        places = [following_places(system.following)]
+        places += [term.damping_places for term in self._damping]
+        keys = [block_keys(mass.indptr, mass.indices)]
+        keys += [row // 3 * nodes + column // 3 for row, column in places]
         self.pattern = joined(self.blocks.pattern, np.concatenate(keys))
         own = block_keys(self.pattern.indptr, self.pattern.indices)
-        where = [np.searchsorted(own, each) for each in keys]
         shape = (len(self.pattern.indices), 3, 3)
-        self.stiffness, masses, viscous = (np.zeros(shape) for _ in range(3))
-        masses[where[0]] = nodal.data[:, None, None] * np.eye(3)
-        viscous[where[1]] = damping.data
-        self._elements.settle(viscous, where[2])
-        self._follow = 9 * where[3] + 3 * (row % 3) + column % 3
-        self._matrices = Matrices(self.stiffness, masses, viscous)
+        self.stiffness, masses, damping = (np.zeros(shape) for _ in range(3))
+        masses[np.searchsorted(own, keys[0])] = mass.data[:, None, None] * np.eye(3)
+        self._follow, *slots = (entry_slots(self.pattern, *each) for each in places)
+        self._damped = np.concatenate([np.zeros(0, np.int64), *slots])
+        self._matrices = Matrices(self.stiffness, masses, damping)
         held = np.zeros(3 * nodes, bool)
         held[system.supported] = True
         held[system.ties.slave] = True
@@ -95,9 +99,8 @@ class StepMatrix:
         self.added: sparse.csr_array | None = None
         self._onto = _onto(self.free, self._ties, 3 * nodes) if system.touches else None
         self._across = sparse.csr_array(self._onto.T) if self._onto is not None else None
-        filled = self.blocks.filled(self.pattern) | (masses != 0.0) | (viscous != 0.0)
-        filled |= self._elements.filled(shape)
-        filled.reshape(-1)[self._follow] = True
+        filled = self.blocks.filled(self.pattern) | (masses != 0.0)
+        filled.reshape(-1)[self._follow] = filled.reshape(-1)[self._damped] = True
         entries = _entries(self.pattern, self.free, filled, self._ties)
         size = len(self.free)
         width = int(np.abs(entries.row - entries.column).max(initial=0))
@@ -109,10 +112,11 @@ class StepMatrix:
             self._band = _Band(entries, size, width, symmetric)
         self.solver = "banded" if self._band else self._sparse.solver
         self._factors: Any = None
-        modal = system.damping.modal.copy()
+        found = packed.body.find(DampingRows)
+        modal = np.zeros((0, 3 * nodes)) if found is None else found.rows.copy()
         for row in modal:
             hand_over(self._ties, row)
-        self._modal = ModalTerm(modal[:, self.free])
+        self._modal = modal[:, self.free]
         self.factorizations = 0
 
     def add_following(self, u: NDArray, factor: NDArray, share: float) -> None:
@@ -136,7 +140,9 @@ class StepMatrix:
         """
         self._factors = None
         self.factorizations += 1
-        self._factors = self._modal(weights, self._factorized(weights))
+        self._factors = self._factorized(weights)
+        if len(self._modal) and weights.damping != 0.0:
+            self._factors = Updated(self._factors, self._modal, weights.damping)
 
     def _factorized(self, weights: Weights) -> Any:
         """Factors of the matrix without modal damping."""
@@ -155,11 +161,11 @@ class StepMatrix:
         return self._sparse(weights, self._matrices)
 
     def follow(self, u: NDArray, hidden: float) -> None:
-        """Make the damping of elements that follow the motion what it is at u (n, 3).
-
-        hidden : change of the velocity of dofs without mass, over that of others.
-        """
-        self._elements.put(u, hidden, self._matrices.damping)
+        """Make the damping what it is at u (n, 3); see `Term.damping_entries` for `hidden`."""
+        if len(self._damped):
+            entries = [term.damping_entries(u, hidden) for term in self._damping]
+            out = self._matrices.damping.reshape(-1)
+            out[:] = np.bincount(self._damped, np.concatenate(entries), out.size)
 
     @property
     def changing(self) -> list[NDArray]:

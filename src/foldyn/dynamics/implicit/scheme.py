@@ -15,15 +15,17 @@ from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.equation import EquationOfMotion, accelerate
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
+from foldyn.dynamics.inertia import kinetic_energy, moving_energy
 from foldyn.dynamics.system import Packed, Scratch, carried, place, scratch
 from foldyn.dynamics.ties import hand_over
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.constant_damping import DampingMatrix
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import following_force
 from foldyn.mechanics.hinge_memory import HingeMemory
-from foldyn.mechanics.viscous import turns
+from foldyn.mechanics.viscous import ViscousTerm
 
 EPS = float(np.finfo(float).eps)
 FAST = 0.3  # share of the residual that an iteration leaves, below which its matrix is kept
@@ -72,6 +74,7 @@ class Phase(NamedTuple):
     force: NDArray  # F_int + beta K0 v - p, N
     factor: NDArray  # (h, 3) of the histories
     pushed: NDArray  # forces of loads that depend on the displacement, N; or none (0, 3)
+    damped: NDArray  # those of damping, for methods that keep them, N; or none
 
 
 class Scheme(ABC):
@@ -108,11 +111,11 @@ class Scheme(ABC):
         self.shift = np.zeros(shape)  # new.q - old.q: their difference would lose digits
         self.earlier = np.zeros(shape)  # new.q before the last iteration
         self._gap, self._pushed = np.zeros(histories[0]), np.zeros(shape)
-        pushed = self.scratch.pushed
-        rest = np.zeros(shape), np.zeros(histories), np.zeros_like(pushed)
+        self.damping = np.flatnonzero([term.damps for term in packed.body.terms])
+        damped = np.zeros(shape if len(self.damping) else (0, 3))
+        rest = np.zeros(shape), np.zeros(histories), np.zeros_like(self.scratch.pushed), damped
         self.old = Phase(course.u, course.v, course.carry, *rest)
-        q, w, a, force = (np.zeros(shape) for _ in range(4))
-        self.new = Phase(q, w, a, force, np.zeros(histories), np.zeros_like(pushed))
+        self.new = Phase(*map(np.zeros_like, self.old))
         # mean velocity of the last step, and its change per time from the middle of one to another
         self._speed, self._growth, self._last = course.v.copy(), np.zeros(shape), 0.0
         self.massless = packed.mass.diagonal <= 0.0
@@ -194,10 +197,11 @@ class Scheme(ABC):
         damping do not.
         """
         body, system, s = self.packed.body, self.packed.system, self.scratch
-        damping, hidden, memory = system.damping, body.hidden, body.find(HingeMemory)
+        matrix, viscous = body.find(DampingMatrix), body.find(ViscousTerm)
+        hidden, memory = body.hidden, body.find(HingeMemory)
         follows = len(hidden) > 0
-        if damping.data.size:
-            follows = follows and not np.diff(damping.indptr)[hidden].any()
+        if matrix is not None:
+            follows = follows and not np.isin(hidden, matrix.damping_places[0]).any()
         if not (follows or system.turns):
             return 0.0
         place(system, self.old.q, self.old.w, t, s)
@@ -207,7 +211,8 @@ class Scheme(ABC):
             turn(body.sheet.folds, system.actuators, s.factor)
         if follows:
             push = following_force(system.following, start, s.factor)
-            held = start[hidden], turns(damping.elements, hidden)
+            turns = sparse.csr_array((0, len(hidden))) if viscous is None else viscous.turns(hidden)
+            held = start[hidden], turns
             settled = body.dofs(s.displacement[: len(system.order)], push, memory, held)
             self.old.q.ravel()[hidden] = settled[hidden]
         stored = float((body.energies(settled) - before).sum())
@@ -349,6 +354,22 @@ def norms(system, force, inertia, factor, following):
     for i in range(values.size):
         left += values[i] * values[i]
     return np.sqrt(left), np.sqrt(max(inertia, reactions, pushed))
+
+
+@inner
+def drag_works(system, mass, h, before, after, velocity):
+    """Work of moving supports against drag in a step of h, and what drag takes in all, J.
+
+    velocity : (n, 3), the mean in the step without that of supports.
+    before, after : (h, 3) factors of the histories at its ends.
+    """
+    if system.alpha == 0.0:
+        return 0.0, 0.0
+    carried = moving_energy(system.moved_mass, before) + moving_energy(system.moved_mass, after)
+    carried *= system.alpha * h
+    kinetic = kinetic_energy(mass, velocity, (0, velocity.shape[0]))
+    taken = 2.0 * system.alpha * h * kinetic
+    return carried, taken + carried
 
 
 @inner

@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from foldyn.jit.compiled import inner, kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
 from foldyn.mechanics.contact.motions import farthest, fastest
 from foldyn.mechanics.contact.pairs import VERTEX, corners_gap, nodes_of, put_corners
@@ -32,7 +32,7 @@ LISTS = 40  # of pairs along one motion
 HALVINGS = 40  # where a hinge would pass
 
 
-@scalar
+@inner_scalar
 def _length(values, i):
     return math.sqrt(values[i, 0] ** 2 + values[i, 1] ** 2 + values[i, 2] ** 2)
 

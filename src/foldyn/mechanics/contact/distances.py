@@ -13,19 +13,19 @@ INSIDE, SIDE_AB, SIDE_BC, SIDE_CA, CORNER_A, CORNER_B, CORNER_C = range(7)  # re
 PARALLEL = 1e-14  # of the product of squared lengths: segments that count as parallel
 
 
-@scalar
+@inner_scalar
 def point(x, i):
     """Row i of positions (n, 3)."""
     return x[i, 0], x[i, 1], x[i, 2]
 
 
-@scalar
+@inner_scalar
 def dot(a, b):
     """Scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@scalar
+@inner_scalar
 def minus(a, b):
     """Difference a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
@@ -37,7 +37,7 @@ def cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@scalar
+@inner_scalar
 def apart(p, a, b, c, wa, wb, wc):
     """Vector from the point of a triangle with some weights to p."""
     return (
@@ -47,7 +47,7 @@ def apart(p, a, b, c, wa, wb, wc):
     )
 
 
-@scalar
+@inner_scalar
 def between(a, b, c, d, s, t):
     """Vector from the point at the fraction t of segment cd to that at s of ab."""
     return (

@@ -40,7 +40,7 @@ def mollifier(cc, c0):
     return (2.0 - cc / c0) * cc / c0, 2.0 * (1.0 - cc / c0) / c0, -2.0 / (c0 * c0)
 
 
-@kernel
+@inner
 def _part(x, force, nodes, s, t, d0, k):
     """Energy of k d0^2 f(d/d0) between the points at s and t of two edges, its force along d.
 

@@ -7,19 +7,19 @@ from __future__ import annotations
 
 import math
 
-from foldyn.jit.compiled import inner_scalar, kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar
 from foldyn.mechanics.contact.share import FAR, FAST, MOTION, SPEED
 from foldyn.mechanics.threads import largest, total, wait
 
 
-@scalar
+@inner_scalar
 def _moved(now, before, i, c):
     if before is None:
         return now[i, c]
     return now[i, c] - before[i, c]
 
 
-@scalar
+@inner_scalar
 def _mean(now, before, first, last, n):
     """Part of the nodes first to last - 1 in the mean of now - before, both (rows, 3), over n."""
     a, b, c = 0.0, 0.0, 0.0
@@ -30,7 +30,7 @@ def _mean(now, before, first, last, n):
     return a, b, c
 
 
-@scalar
+@inner_scalar
 def _largest(now, before, first, last, a, b, c):
     """Largest of now - before of these nodes against a mean; inf where something is not finite."""
     if not abs(a) + abs(b) + abs(c) < math.inf:
@@ -45,14 +45,14 @@ def _largest(now, before, first, last, a, b, c):
     return math.sqrt(worst)
 
 
-@kernel
+@inner
 def fastest(v, n):
     """Largest speed (m/s) of n nodes against the mean of all."""
     a, b, c = _mean(v, None, 0, n, n)
     return _largest(v, None, 0, n, a, b, c)
 
 
-@kernel
+@inner
 def farthest(u, memory):
     """Largest motion (m) of a node from where pairs were listed, against the mean of all."""
     n = len(memory.x)

@@ -17,7 +17,7 @@ from foldyn.mechanics.contact.distances import (
 VERTEX, EDGES = 0, 1  # kinds of pairs, and the places of their lists in `memory`
 
 
-@scalar
+@inner_scalar
 def nodes_of(triangles, edges, kind, one, other):
     """The four nodes of vertex `one` and triangle `other`, or of these two edges."""
     if kind == VERTEX:

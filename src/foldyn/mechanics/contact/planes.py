@@ -32,7 +32,7 @@ def move_planes(tables, factor, memory):
             memory.moved[p, 3 + c] = tables.planes[p, MOTION + c] * factor[row, 1]
 
 
-@kernel
+@inner
 def height(tables, x, moved, p, i):
     """Distance (m) of node i from plane p, positive on its side, as planes have moved (q, 3)."""
     plane, out = tables.planes[p], 0.0
@@ -121,7 +121,7 @@ def slip(tables, x, memory):
                     anchor[c] += (1.0 - most / stretch[3]) * stretch[c]
 
 
-@kernel
+@inner
 def plane_powers(tables, v, memory):
     """Power (W) of moving planes on nodes with velocities v (n, 3), and that of friction.
 

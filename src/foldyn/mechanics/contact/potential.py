@@ -17,13 +17,13 @@ from __future__ import annotations
 
 import math
 
-from foldyn.jit.compiled import inner, scalar
+from foldyn.jit.compiled import inner, inner_scalar
 
 STIFFNESS = 0.03
 """Of E t: the stiffness k (N/m) of contact, unless it is given."""
 
 
-@scalar
+@inner_scalar
 def barrier(x):
     """f and its first two derivatives at x < 1; infinite where surfaces have passed each other."""
     if x <= 0.0:

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.jit.compiled import inner_scalar, kernel
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.mechanics.block_matrix import assembled, pairs_within, places_of
 from foldyn.mechanics.contact.distances import cross, dot, minus, point
 
@@ -189,7 +189,7 @@ def add_back(ride, u, push, force):
             force[k, axis] += at_c[axis] + w[0, 2] * x + w[1, 2] * y + w[2, 2] * z
 
 
-@kernel
+@inner
 def put_lightness(ride, lightness, out):
     """Bounds (m,) of 1 / mass of the points for those of the nodes (n,), 1/kg."""
     first = len(out) - len(ride.x)

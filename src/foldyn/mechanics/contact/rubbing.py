@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.mechanics.contact.distances import dot, point
 from foldyn.mechanics.contact.edge_edge import edge_edge
 from foldyn.mechanics.contact.pairs import VERTEX, closest_of, gap_of, nodes_of, weights_of
@@ -63,7 +63,7 @@ def stretch_of_pair(tables, memory, x, kind, pair, p, q):
     return nodes, tied, closest, apart, r, math.sqrt(max(0.0, square))
 
 
-@scalar
+@inner_scalar
 def bound(tables, memory, kind, pair, pressed):
     """Stretch (m) at which the spring of a pair slips that is pressed by some force (N)."""
     normal = memory.tie[kind, pair, 2] if memory.counts.lagged == 1 else pressed

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from foldyn.jit.compiled import inner, kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.mechanics.contact.motions import farthest
 from foldyn.mechanics.contact.pairs import VERTEX, edge_gap, vertex_gap
 from foldyn.mechanics.contact.share import pass_on
@@ -53,7 +53,7 @@ def edge_d0(ranges, edges, nodes, panels, i, j):
     return best
 
 
-@kernel
+@inner
 def _corners(x, nodes, low, high):
     """The box (3,), (3,) of some nodes; whether it is finite."""
     for c in range(3):
@@ -66,7 +66,7 @@ def _corners(x, nodes, low, high):
     return True
 
 
-@kernel
+@inner
 def _cells(low, high, size, most, counts):
     """Numbers (3,) of cells of at least some size, and the size that gives no more than `most`."""
     while True:
@@ -81,7 +81,7 @@ def _cells(low, high, size, most, counts):
     return size
 
 
-@scalar
+@inner_scalar
 def _cell(value, low, size, count):
     return min(count - 1, max(0, int((value - low) / size)))
 
@@ -105,7 +105,7 @@ def _sort(points, low, size, counts, start, items):
         fill[cell[i]] += 1
 
 
-@scalar
+@inner_scalar
 def _within(x, v, low, high):
     """Whether a node is in a box."""
     inside = True
@@ -114,7 +114,7 @@ def _within(x, v, low, high):
     return inside
 
 
-@scalar
+@inner_scalar
 def _beside(x, edges, i, low, high):
     """Whether the box of an edge meets a box."""
     for c in range(3):
@@ -124,7 +124,7 @@ def _beside(x, edges, i, low, high):
     return True
 
 
-@kernel
+@inner
 def _pairs(tables, x, kind, far, skin, low, size, counts, half, start, items, memory):
     """List vertices and triangles, kind 0, or edges and edges; returns how many there are.
 
@@ -259,7 +259,7 @@ def use_all(memory):
     memory.counts.near_second = memory.counts.listed_second
 
 
-@kernel
+@inner
 def follow(tables, u, memory):
     """Have all pairs that are near at u, wherever it is, among the near ones.
 

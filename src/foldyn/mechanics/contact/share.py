@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar
 from foldyn.mechanics.contact.pairs import VERTEX
 from foldyn.mechanics.threads import Team, part, total, wait
 
@@ -36,7 +36,7 @@ class Share(NamedTuple):
     facts: NDArray  # (k, ...) and what they have measured
 
 
-@scalar
+@inner_scalar
 def reaches(team, first, last):
     """Note that this member's sums reach the nodes first to last - 1, and no other ones."""
     team.note[team.number, LOW], team.note[team.number, HIGH] = first, last
@@ -74,7 +74,7 @@ def gather(memory):
     counts.hinges = int(total(team, HINGES))
 
 
-@kernel
+@inner
 def finish(share, force):
     """Add the sums of all members to the force (n, 3) on this one's nodes; they become 0 there."""
     team = share.team

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.mechanics.contact.distances import (
     CORNER_A,
     CORNER_B,
@@ -42,12 +42,12 @@ def _push(force, i, by, r):
     force[i, 2] += by * r[2]
 
 
-@scalar
+@inner_scalar
 def _one(i, j):
     return 1.0 if i == j else 0.0
 
 
-@kernel
+@inner
 def _part(x, force, nodes, wa, wb, wc, d0, k):
     """Energy of k d0^2 f(d/d0) for weights of the closest point, and its force along d.
 

@@ -1,0 +1,108 @@
+"""Damping with a constant matrix C: sparse, or the product G' G of a few full rows.
+
+The forces are C v, and they take the power v' C v.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.jit.context import Context, numbers_at
+from foldyn.mechanics.assembly import Assembly, Numbering
+from foldyn.mechanics.model import ranks
+from foldyn.mechanics.term import FORCES, Compiled, Term, forces
+from foldyn.mechanics.threads import Team, wait
+
+
+class _Matrix(NamedTuple):
+    indptr: NDArray
+    indices: NDArray
+    data: NDArray
+    own: NDArray  # (2,) first and last + 1 of the thread's own rows
+    team: Team
+
+
+class _Rows(NamedTuple):
+    rows: NDArray  # (r, 3 rows)
+
+
+@forces
+def _of_matrix(own, u, v, t, force, powers):
+    size, power = own.indptr.size - 1, 0.0
+    speed, out = numbers_at(v, size), numbers_at(force, size)
+    for i in range(3 * own.own[0], 3 * own.own[1]):
+        resisted = 0.0
+        for k in range(own.indptr[i], own.indptr[i + 1]):
+            resisted += own.data[k] * speed[own.indices[k]]
+        out[i] += resisted
+        power += resisted * speed[i]
+    numbers_at(powers, 2)[1] += power
+    wait(own.team)  # others look at this member's velocities
+
+
+@forces
+def _of_rows(own, u, v, t, force, powers):
+    size, power = own.rows.shape[1], 0.0
+    speed, out = numbers_at(v, size), numbers_at(force, size)
+    for k in range(own.rows.shape[0]):
+        rate, row = 0.0, own.rows[k]
+        for i in range(size):
+            rate += row[i] * speed[i]
+        for i in range(size):
+            out[i] += rate * row[i]
+        power += rate * rate
+    numbers_at(powers, 2)[1] += power
+
+
+class DampingMatrix(Term):
+    """A sparse matrix C (m, m), N s/m; see `Term`."""
+
+    damps = shared = True
+
+    def __init__(self, matrix: sparse.csr_array) -> None:
+        self.matrix = matrix
+
+    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+        """See `Term`."""
+        start, column = self.matrix.indptr.astype(np.int64), self.matrix.indices.astype(np.int64)
+        rows = np.asarray(work.strips.own)
+        own = _Matrix(start, column, self.matrix.data, rows, work.team)
+        return Compiled(Context(own), {FORCES: _of_matrix})
+
+    @cached_property
+    def damping_places(self) -> tuple[NDArray, NDArray]:
+        """See `Term`."""
+        return self.matrix.tocoo().coords
+
+    def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
+        """See `Term`."""
+        return self.matrix.data
+
+    def placed(self, order: NDArray, before: Assembly) -> DampingMatrix:
+        """See `Term`."""
+        return DampingMatrix(Numbering(order, ranks(order), before.rows).matrix(self.matrix))
+
+
+class DampingRows(Term):
+    """Full rows G (r, m), sqrt(N s/m), which implicit steps add to factors; see `Term`."""
+
+    damps = True
+
+    def __init__(self, rows: NDArray) -> None:
+        self.rows = rows
+
+    def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
+        """See `Term`."""
+        return Compiled(Context(_Rows(self.rows)), {FORCES: _of_rows})
+
+    def placed(self, order: NDArray, before: Assembly) -> DampingRows:
+        """See `Term`."""
+        rows = np.zeros((len(self.rows), 3 * before.rows))
+        by = Numbering(order, ranks(order), before.rows)
+        rows[:, by.dofs(np.arange(self.rows.shape[1]))] = self.rows
+        return DampingRows(rows)
