@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from problem import Problem
 
 from foldyn.dynamics import rk4
-from foldyn.dynamics.course import StepPlan, samples
 from foldyn.dynamics.initial import begin
 from foldyn.dynamics.methods import Compiled
+from foldyn.dynamics.motion_state import StepPlan, samples
 from foldyn.dynamics.system import pack
 from foldyn.mechanics import internal_force, workspace
 

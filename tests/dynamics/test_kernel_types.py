@@ -7,8 +7,8 @@ import pytest
 from numba import typeof
 
 import foldyn as fd
-from foldyn.dynamics.course import TALLY, Course
 from foldyn.dynamics.equation import EquationOfMotion
+from foldyn.dynamics.motion_state import TALLY, Course
 from foldyn.dynamics.system import pack, scratch
 from foldyn.mechanics.clamps import clamp_blocks
 from foldyn.mechanics.contact.term import ContactTerm

@@ -12,9 +12,9 @@ from scipy.sparse import csr_array
 import foldyn as fd
 from contact_sheets import SHEET, crossing, on_a_panel
 from foldyn.dynamics import motion, prepare
-from foldyn.dynamics.course import TALLY, Course
 from foldyn.dynamics.equation import EquationOfMotion
 from foldyn.dynamics.explicit_contact import slow_contacts
+from foldyn.dynamics.motion_state import TALLY, Course
 from foldyn.dynamics.slow_contacts import slow_down
 from foldyn.dynamics.system import pack, scratch
 from foldyn.jit.context import Context

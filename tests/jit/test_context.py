@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from foldyn.dynamics.course import TALLY
+from foldyn.dynamics.motion_state import TALLY
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.context import Context
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from foldyn import __version__
 from foldyn.cases import Case
 from foldyn.cases.document import to_document
-from foldyn.dynamics.course import Course, StepPlan
+from foldyn.dynamics.motion_state import Course, StepPlan
 from foldyn.dynamics.system import Packed
 from foldyn.errors import ComputationError, InputError
 from foldyn.lock import LockedError, locked

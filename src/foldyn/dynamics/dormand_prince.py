@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import Outcome, passed_through
 from foldyn.dynamics.equation import (
     acceleration,
     advance_clock,
@@ -25,6 +24,7 @@ from foldyn.dynamics.explicit_contact import (
     slow_contacts_down,
     slow_energy,
 )
+from foldyn.dynamics.motion_state import Outcome, passed_through
 from foldyn.dynamics.stability import roots
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.context import run_at

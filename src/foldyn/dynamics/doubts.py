@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from foldyn.dynamics.audit import Balance, Rounding
-from foldyn.dynamics.course import StepPlan
+from foldyn.dynamics.motion_state import StepPlan
 
 INACCURATE = 1e-2  # relative energy error above which the user is warned
 

@@ -16,7 +16,6 @@ from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Dashpot, Rayleigh, State
 from foldyn.dynamics import generalized_alpha, timing
 from foldyn.dynamics.checkpoint import SECONDS, check_keeping
-from foldyn.dynamics.course import StepPlan
 from foldyn.dynamics.hereditary import check_state
 from foldyn.dynamics.inertia import check_mass, is_lumped
 from foldyn.dynamics.initial import (
@@ -29,6 +28,7 @@ from foldyn.dynamics.method_choice import AUTO, Choice, choose
 from foldyn.dynamics.methods import METHODS, Integrator, method_of, suited, with_mass
 from foldyn.dynamics.modal_damping import modal_rows
 from foldyn.dynamics.motion import Motion
+from foldyn.dynamics.motion_state import StepPlan
 from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.system import pack

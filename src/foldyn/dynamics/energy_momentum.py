@@ -25,11 +25,11 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.dynamics.actuation import turn
-from foldyn.dynamics.course import Course
 from foldyn.dynamics.implicit.contact_step import StepContact
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Phase, Scheme, add_load_work, copy, drag_works, norms
 from foldyn.dynamics.inertia import times_mass
+from foldyn.dynamics.motion_state import Course
 from foldyn.dynamics.parts import Setting
 from foldyn.dynamics.system import Packed, carry, place
 from foldyn.dynamics.ties import follow_masters

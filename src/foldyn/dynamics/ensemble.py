@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, State
 from foldyn.dynamics import timing
 from foldyn.dynamics.audit import audited
-from foldyn.dynamics.course import Samples
 from foldyn.dynamics.doubts import INACCURATE
 from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.lane_steps import integrate, topology
 from foldyn.dynamics.motion import Motion
+from foldyn.dynamics.motion_state import Samples
 from foldyn.errors import ComputationError, FoldynWarning, InputError, StretchWarning
 from foldyn.mechanics.lanes import WIDTH
 from foldyn.results.dataset import result_dataset

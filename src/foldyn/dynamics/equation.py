@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.dynamics import parts
-from foldyn.dynamics.course import (
+from foldyn.dynamics.explicit_contact import ContactParts, contact_parts, slow_contacts
+from foldyn.dynamics.inertia import lumped_energy
+from foldyn.dynamics.motion_state import (
     DISSIPATED,
     HINGE,
     OUTCOME,
@@ -26,8 +28,6 @@ from foldyn.dynamics.course import (
     Samples,
     passed_through,
 )
-from foldyn.dynamics.explicit_contact import ContactParts, contact_parts, slow_contacts
-from foldyn.dynamics.inertia import lumped_energy
 from foldyn.dynamics.parts import Setting
 from foldyn.dynamics.record import record
 from foldyn.dynamics.system import Entries, Packed, Scratch

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.dynamics.course import Course, Outcome, StepPlan
 from foldyn.dynamics.methods import Integrator
+from foldyn.dynamics.motion_state import Course, Outcome, StepPlan
 from foldyn.dynamics.system import Packed
 from foldyn.errors import InstabilityError, PenetrationError
 from foldyn.structures.condensed_plates import CondensedPlatesTerm

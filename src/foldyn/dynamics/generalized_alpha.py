@@ -28,7 +28,6 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.banded import substitute
 from foldyn.dynamics.actuation import actuator_power, offset_work, turn
-from foldyn.dynamics.course import Course
 from foldyn.dynamics.equation import Equation, acceleration, advance_clock
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import (
@@ -44,6 +43,7 @@ from foldyn.dynamics.implicit.scheme import (
     norms,
 )
 from foldyn.dynamics.inertia import times_mass
+from foldyn.dynamics.motion_state import Course
 from foldyn.dynamics.parts import Setting
 from foldyn.dynamics.system import Packed, carry
 from foldyn.dynamics.ties import follow_masters

@@ -17,8 +17,8 @@ from foldyn.cases.constraints import AGREES
 from foldyn.cases.ties import check_tied
 from foldyn.cases.touching import check_contact, check_driven
 from foldyn.dynamics.actuation import turn
-from foldyn.dynamics.course import TALLY, Course, StepPlan
 from foldyn.dynamics.inertia import moving_energy
+from foldyn.dynamics.motion_state import TALLY, Course, StepPlan
 from foldyn.dynamics.system import Packed, carry_supports, place, scratch
 from foldyn.dynamics.timing import histories
 from foldyn.errors import FoldynWarning, InputError

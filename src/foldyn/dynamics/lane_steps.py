@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.dynamics.course import Samples
 from foldyn.dynamics.motion import Motion
+from foldyn.dynamics.motion_state import Samples
 from foldyn.errors import ComputationError
 from foldyn.jit.compiled import inner, shared
 from foldyn.jit.eights import eight, put

@@ -18,10 +18,10 @@ from foldyn.dynamics import (
     rk4,
 )
 from foldyn.dynamics.checkpoint import restore, snapshot, state_parts
-from foldyn.dynamics.course import Course, Samples, StepPlan
 from foldyn.dynamics.equation import EquationOfMotion
 from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.modal_damping import ModalRows, modal_rows
+from foldyn.dynamics.motion_state import Course, Samples, StepPlan
 from foldyn.dynamics.stability import (
     MARGIN,
     Growth,

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, Continuation
 from foldyn.dynamics.audit import Rounding, audited
 from foldyn.dynamics.checkpoint import KEY, Keeping, identity, identity_digest
-from foldyn.dynamics.course import Outcome, Samples, StepPlan
 from foldyn.dynamics.doubts import INACCURATE, doubts, is_off
 from foldyn.dynamics.failures import failure, smaller_step
 from foldyn.dynamics.initial import begin
 from foldyn.dynamics.methods import Compiled, Implicit, Integrator
+from foldyn.dynamics.motion_state import Outcome, Samples, StepPlan
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.dynamics.audit import Balance, audited
 from foldyn.dynamics.checkpoint import Keeping
-from foldyn.dynamics.course import Samples, StepPlan, samples
+from foldyn.dynamics.motion_state import Samples, StepPlan, samples
 from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.timing import expected_samples
 from foldyn.results import Quantity

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.dynamics.course import Samples
+from foldyn.dynamics.motion_state import Samples
 from foldyn.errors import FoldynError, InputError
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.results import Quantity

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case, History
 from foldyn.cases.waveforms import CALLED
-from foldyn.dynamics.course import StepPlan
+from foldyn.dynamics.motion_state import StepPlan
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.memory import GIB, check_memory
 from foldyn.values import number, show, single, whole

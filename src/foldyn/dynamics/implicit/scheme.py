@@ -12,10 +12,10 @@ from scipy import sparse
 
 from foldyn.cases.waveforms import unseen
 from foldyn.dynamics.actuation import turn
-from foldyn.dynamics.course import Course
 from foldyn.dynamics.equation import EquationOfMotion, accelerate
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.inertia import kinetic_energy, moving_energy
+from foldyn.dynamics.motion_state import Course
 from foldyn.dynamics.system import Packed, Scratch, carried, place, scratch
 from foldyn.dynamics.ties import hand_over
 from foldyn.jit.compiled import inner, inner_scalar, kernel
