@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, State
 from foldyn.dynamics import timing
 from foldyn.dynamics.audit import audited
-from foldyn.dynamics.doubts import INACCURATE
+from foldyn.dynamics.diagnostics import INACCURATE
 from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.lane_steps import integrate, topology
 from foldyn.dynamics.motion import Motion

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, Continuation
 from foldyn.dynamics.audit import Rounding, audited
 from foldyn.dynamics.checkpoint import KEY, Keeping, identity, identity_digest
-from foldyn.dynamics.doubts import INACCURATE, doubts, is_off
+from foldyn.dynamics.diagnostics import INACCURATE, doubts, is_off
 from foldyn.dynamics.failures import failure, smaller_step
 from foldyn.dynamics.initial import begin
 from foldyn.dynamics.methods import Compiled, Implicit, Integrator
