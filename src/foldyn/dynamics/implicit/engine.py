@@ -19,10 +19,10 @@ from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.actuation import note_offsets
 from foldyn.dynamics.checkpoint import restore, snapshot, state_parts
 from foldyn.dynamics.equation import accelerate, write
+from foldyn.dynamics.implicit.contact_newton import TouchingNewton
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.newton import Newton
 from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Scheme
-from foldyn.dynamics.implicit.touching import TouchingNewton
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.motion_state import Course, Outcome, Samples, StepPlan
 from foldyn.dynamics.system import Packed
