@@ -7,7 +7,7 @@ import pytest
 
 import foldyn as fd
 from contact_sheets import strip
-from foldyn.cases.touching import _followers
+from foldyn.cases.contact_checks import _followers
 from foldyn.dynamics import prepare
 from foldyn.errors import InputError
 

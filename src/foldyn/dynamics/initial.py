@@ -14,8 +14,8 @@ from foldyn.algebra.solvers import factorized
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.cases import Case, Continuation, State
 from foldyn.cases.constraints import AGREES
+from foldyn.cases.contact_checks import check_contact, check_driven
 from foldyn.cases.ties import check_tied
-from foldyn.cases.touching import check_contact, check_driven
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.inertia import moving_energy
 from foldyn.dynamics.motion_state import TALLY, Course, StepPlan

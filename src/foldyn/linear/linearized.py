@@ -33,7 +33,7 @@ from scipy import sparse
 from foldyn.algebra.complex_symmetric import Gram
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, State
-from foldyn.cases.touching import check_contact
+from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of, modal_rows, rows_of, soft_slopes

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Gravity, State
+from foldyn.cases.contact_checks import check_contact, check_driven
 from foldyn.cases.ties import check_tied
-from foldyn.cases.touching import check_contact, check_driven
 from foldyn.errors import InputError
 from foldyn.materials.memory_law import VARIABLES
 from foldyn.memory import check_memory
