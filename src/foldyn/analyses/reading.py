@@ -18,9 +18,9 @@ from foldyn.analyses.messages import describe, dotted
 from foldyn.analyses.pattern_section import FACES, FACETS, HINGES, READING
 from foldyn.analyses.registry import ANALYSES, schema_of
 from foldyn.cases import Case, resolve_nodes
+from foldyn.cases.clamped_edges import straightened
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
-from foldyn.cases.straight import straightened
 from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.input_files import from_toml, path_of, read_text
 from foldyn.patterns import GENERATORS, Pattern, convex, thicken, welded

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases.case_assembly import Damped, Loaded
+from foldyn.cases.clamped_edges import supported_points
 from foldyn.cases.contact import Contact
 from foldyn.cases.damping import Damping, Rayleigh, dampings
 from foldyn.cases.history import History, as_history
 from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
-from foldyn.cases.straight import supported_points
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
 from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.mechanics.assembly import Assembly

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.cases.clamped_edges import Straight, supported_points
 from foldyn.cases.constraints import Constraints
 from foldyn.cases.damping import CreaseDamping, Damping, ModalDamping, Rayleigh, StrainDamping
 from foldyn.cases.dashpots import Dashpot
 from foldyn.cases.directions import AXES, unit_vector
 from foldyn.cases.history import History, as_history
 from foldyn.cases.loads import Gravity, Load
-from foldyn.cases.straight import Straight, supported_points
 from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
 from foldyn.cases.ties import equations_of, values_of
 from foldyn.errors import Faults, InputError

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.cases.clamped_edges import supported_points
 from foldyn.cases.constraints import AGREES, STRUCTURE, Equation
 from foldyn.cases.directions import AXES, unit_vector
 from foldyn.cases.selection import resolve_nodes
-from foldyn.cases.straight import supported_points
 from foldyn.cases.supports import Fix, Impose, Link
 from foldyn.errors import InputError
 from foldyn.structures.rigid_plates import OFF_PLANE, on_plate

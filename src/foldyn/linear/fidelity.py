@@ -14,7 +14,7 @@ import xarray
 
 from foldyn.algebra.extrapolation import convergence, limits
 from foldyn.cases import Case
-from foldyn.cases.straight import straightened
+from foldyn.cases.clamped_edges import straightened
 from foldyn.errors import FoldynWarning, InputError, within
 from foldyn.linear.compared import OWN, Fidelity
 from foldyn.linear.matched import SPARE, matched

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.cases import Case, Fix, Impose
-from foldyn.cases.straight import straightened
+from foldyn.cases.clamped_edges import straightened
 from foldyn.errors import FoldynWarning
 from foldyn.patterns import Pattern, kresling, miura
 from foldyn.shells import shell
