@@ -1,4 +1,4 @@
-"""Peak memory of a long motion against a short one: `python benchmarks/memory.py`.
+"""Peak memory of a long motion against a short one: `python benchmarks/ram_limit.py`.
 
 A sheet of the specimen's size, output every 1000 steps; each run is a process of its own, after one
 that fills the kernel cache.

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn import memory
+from foldyn import ram_limit
 from foldyn.errors import InputError
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
@@ -67,15 +67,15 @@ def test_what_is_too_large_is_refused_at_once(case, what):
 
 
 def test_half_of_the_memory_is_for_those_who_ask(monkeypatch):
-    monkeypatch.setattr(memory, "memory", lambda: 2.0 * memory.GIB)
-    check = memory.check_memory
-    check("cells", "a pattern", 1.5 * memory.GIB, "take fewer")
-    with memory.at_most(memory.HALF):
-        check("cells", "a pattern", 0.9 * memory.GIB, "take fewer")
+    monkeypatch.setattr(ram_limit, "memory", lambda: 2.0 * ram_limit.GIB)
+    check = ram_limit.check_memory
+    check("cells", "a pattern", 1.5 * ram_limit.GIB, "take fewer")
+    with ram_limit.at_most(ram_limit.HALF):
+        check("cells", "a pattern", 0.9 * ram_limit.GIB, "take fewer")
         with pytest.raises(InputError) as told:
-            check("cells", "a pattern", 1.5 * memory.GIB, "take fewer")
-        with memory.at_most(1.0):
-            check("cells", "a pattern", 1.5 * memory.GIB, "take fewer")
+            check("cells", "a pattern", 1.5 * ram_limit.GIB, "take fewer")
+        with ram_limit.at_most(1.0):
+            check("cells", "a pattern", 1.5 * ram_limit.GIB, "take fewer")
     assert str(told.value) == (
         "cells: a pattern needs about 1.5 GiB, more than half of the 2 GiB of this machine: take "
         "fewer, or go on with --force"
@@ -83,18 +83,18 @@ def test_half_of_the_memory_is_for_those_who_ask(monkeypatch):
     with pytest.raises(
         InputError, match=r"3 GiB, more than the 2 GiB of this machine: take fewer$"
     ):
-        check("cells", "a pattern", 3.0 * memory.GIB, "take fewer")
+        check("cells", "a pattern", 3.0 * ram_limit.GIB, "take fewer")
 
 
 def test_the_limit_of_a_container_counts(monkeypatch, tmp_path):
-    whole = memory.memory()
+    whole = ram_limit.memory()
     limit = tmp_path / "memory.max"
-    monkeypatch.setattr(memory, "_LIMITS", (str(limit),))
+    monkeypatch.setattr(ram_limit, "_LIMITS", (str(limit),))
     for text, most in (("max\n", whole), ("1048576\n", 2.0**20), ("", whole)):
         limit.write_text(text)
-        assert memory.memory() <= most
+        assert ram_limit.memory() <= most
     limit.write_text("1048576\n")
-    assert memory.memory() == 2.0**20
+    assert ram_limit.memory() == 2.0**20
 
 
 def _peak(make) -> float:
@@ -162,7 +162,7 @@ def test_the_command_takes_half_of_the_memory_unless_forced(tmp_path, monkeypatc
             assert time.perf_counter() - began < 2.0
             told = capsys.readouterr().err
             assert re.search(r"(cells = .* vertices|analysis.steps: .* points) needs about", told)
-    monkeypatch.setattr(memory, "memory", lambda: 195e3)  # the factors take 105 kB
+    monkeypatch.setattr(ram_limit, "memory", lambda: 195e3)  # the factors take 105 kB
     assert main(call) == 2
     assert "pattern: solving for 39 dofs needs about" in capsys.readouterr().err
     assert [one.name for one in tmp_path.iterdir() if one.is_dir()] == []

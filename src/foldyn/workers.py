@@ -21,7 +21,7 @@ from multiprocessing.connection import Connection
 from threading import Thread
 from typing import Any, Generic, Self, TypeVar
 
-from foldyn import memory
+from foldyn import ram_limit
 from foldyn.errors import ComputationError
 
 Item = TypeVar("Item")
@@ -62,7 +62,7 @@ class Workers(Generic[Item, Result]):
         self._pool = self._started()
 
     def _started(self) -> ProcessPoolExecutor:
-        given = (self._line, memory.share() / self.count, pickle.dumps(self.do))
+        given = (self._line, ram_limit.share() / self.count, pickle.dumps(self.do))
         return ProcessPoolExecutor(self.count, self._context, initializer=_live, initargs=given)
 
     def _submit(self, do: Callable[..., Any], *given: object) -> Future[Any]:
@@ -208,7 +208,7 @@ def _live(line: Connection, share: float, do: bytes) -> None:
     _arm(line)
     if line.poll():  # it ended before that
         os._exit(1)
-    memory.allow(share)
+    ram_limit.allow(share)
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     _own[:] = [pickle.loads(do)]
     if "numpy" in sys.modules:  # loaded before, with the script that started all this

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from foldyn import memory
+from foldyn import ram_limit
 
 LOAD = (
     "[[loads]]\nnodes = [7]\nforce = [0.01, 0, 0]\n"
@@ -246,7 +246,7 @@ def test_one_of_several_mass_rules(workplace, edited) -> None:
 
 
 def test_the_memory_of_all_mass_rules_together(workplace, edited, monkeypatch) -> None:
-    monkeypatch.setattr(memory, "memory", lambda: 200e3)  # one motion needs 75 kB
+    monkeypatch.setattr(ram_limit, "memory", lambda: 200e3)  # one motion needs 75 kB
     finer = ("every = 0.01", "every = 0.001")
     rules = ('"circumcenter"', '["panel", "centroid"]')
     assert workplace.run(edited(finer)).status == 0

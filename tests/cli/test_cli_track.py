@@ -171,7 +171,7 @@ def test_bad_input_gets_one_message_and_nothing_written(inside, capsys, argument
 
 
 def test_more_than_half_of_the_memory_is_taken_when_forced(inside, monkeypatch, capsys):
-    monkeypatch.setattr("foldyn.memory.memory", lambda: 1.5 * PER_NODE * (25 + 16))
+    monkeypatch.setattr("foldyn.ram_limit.memory", lambda: 1.5 * PER_NODE * (25 + 16))
     command = ["track", "film.mkv", "--model", "case.toml", "--out", "forced.nc", "--no-figures"]
     assert main(command) == 2
     assert "a structure of 41 nodes needs about" in capsys.readouterr().err

@@ -8,12 +8,12 @@ from pathlib import Path
 from fuzz_target import Target
 from fuzz_toml import mutator
 
-from foldyn import memory
+from foldyn import ram_limit
 from foldyn.analyses.reading import read_case
 from foldyn.studies import shipped_cases
 
 DOCS = Path(__file__).parents[2] / "docs"
-ROOM = 128 * memory.MEBI
+ROOM = 128 * ram_limit.MEBI
 """Memory of the machine that the command believes in: what is large is slow, too."""
 WORDS = (
     "pattern", "kind", "cells", "sides", "storeys", "vertices", "faces", "assignments", "sheet",
@@ -40,7 +40,7 @@ def seeds(_: Path) -> list[bytes]:
 
 def read(file: Path) -> None:
     """As `foldyn run` does, up to the first step."""
-    with memory.at_most(ROOM / memory.memory()):
+    with ram_limit.at_most(ROOM / ram_limit.memory()):
         case_file = read_case(file)
         computations = [case_file.computation(mass) for mass in case_file.masses]
         case_file.analysis.check([one.compute for one in computations], figures=True)

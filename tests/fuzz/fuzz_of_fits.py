@@ -8,7 +8,7 @@ from fuzz_of_cases import ROOM
 from fuzz_target import Target
 from fuzz_toml import mutator
 
-from foldyn import memory
+from foldyn import ram_limit
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment.calibration.fit_file import read_fit
 from foldyn.experiment.calibration.fit_problem import problem
@@ -149,7 +149,7 @@ def seeds(folder: Path) -> list[bytes]:
 
 def read(file: Path) -> None:
     """As `foldyn fit` does, up to the first evaluation."""
-    with memory.at_most(ROOM / memory.memory()):
+    with ram_limit.at_most(ROOM / ram_limit.memory()):
         plan = read_fit(file, find_case)
         try:
             made = problem(plan.case, plan.data, plan.parameters, plan.ties)

@@ -412,7 +412,7 @@ def test_the_specimen_is_left_out_without_opencv(tmp_path, monkeypatch, capsys):
 
 
 def test_the_command_takes_half_of_the_memory_unless_forced(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("foldyn.memory.memory", lambda: 1.5 * PER_NODE * 13)
+    monkeypatch.setattr("foldyn.ram_limit.memory", lambda: 1.5 * PER_NODE * 13)
     monkeypatch.setattr(studies, "QUICK", StudyPlan(SHORT, ("case2",), ("panel",)))
     monkeypatch.setattr(Study, "compute", lambda *_: [])
     monkeypatch.setattr("foldyn.cli.study._data", lambda *_: None)

@@ -11,7 +11,7 @@ from scipy import sparse
 from foldyn.algebra.pardiso import Pardiso, library
 from foldyn.algebra.superlu import Factorization, Factorizer, SuperLU
 from foldyn.errors import InputError
-from foldyn.memory import check_memory
+from foldyn.ram_limit import check_memory
 from foldyn.values import choice
 
 

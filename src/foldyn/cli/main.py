@@ -30,7 +30,7 @@ from foldyn.cli.track import add_track, track
 from foldyn.cli.view import add_view, run_view
 from foldyn.cli.warm_up import add_warm_up, run_warm_up
 from foldyn.errors import ComputationError, FoldynWarning, InputError, shortened
-from foldyn.memory import HALF, at_most
+from foldyn.ram_limit import HALF, at_most
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 OTHERS = {

@@ -19,7 +19,7 @@ from foldyn.cases import Case, History
 from foldyn.cases.waveforms import CALLED
 from foldyn.dynamics.motion_state import StepPlan
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.memory import GIB, check_memory
+from foldyn.ram_limit import GIB, check_memory
 from foldyn.values import number, show, single, whole
 
 MOST_STEPS = 1e13  # years of computing, whatever the structure

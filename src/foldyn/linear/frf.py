@@ -22,7 +22,7 @@ from foldyn.linear.linearized import Linearized, linearize
 from foldyn.linear.stepped_sine import SteppedSine, stepped_sine
 from foldyn.linear.time_domain import Rig
 from foldyn.linear.transients import BurstRandom, Impulse, burst_random, impulse
-from foldyn.memory import check_memory
+from foldyn.ram_limit import check_memory
 from foldyn.results import frf_dataset
 from foldyn.results.quantities import RESPONSES, variable
 from foldyn.signals import convert_response

@@ -24,7 +24,7 @@ from foldyn.dynamics.modal_damping import mass_of
 from foldyn.errors import FoldynWarning, StretchWarning
 from foldyn.linear.hereditary import Branches, damped_mode
 from foldyn.linear.linearized import Linearized, linearize
-from foldyn.memory import check_memory
+from foldyn.ram_limit import check_memory
 from foldyn.results import modes_dataset
 from foldyn.statics.rigid import free_rigid_motions, rigid_motions
 from foldyn.statics.stability import oriented

@@ -15,7 +15,7 @@ from foldyn.dynamics.progress import Reporter
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.excitation import Answer
 from foldyn.linear.time_domain import Integration, Rig, check_positive, overall
-from foldyn.memory import check_memory
+from foldyn.ram_limit import check_memory
 from foldyn.signals import exponential_window, frequency_response
 from foldyn.values import choice, number, whole
 

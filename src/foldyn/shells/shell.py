@@ -17,10 +17,10 @@ from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, hinge_law
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import joined, moments, pushes, tensions
-from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned
 from foldyn.patterns.topology import Edge
+from foldyn.ram_limit import check_memory
 from foldyn.shells.kernels import ShellModel
 from foldyn.shells.mesh import shell_mesh
 from foldyn.shells.sides import Sides, sides, stiffness, without_free_sides

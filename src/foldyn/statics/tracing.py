@@ -15,7 +15,7 @@ from foldyn.cases.contact_checks import check_contact, check_driven
 from foldyn.cases.ties import check_tied
 from foldyn.errors import InputError
 from foldyn.materials.memory_law import VARIABLES
-from foldyn.memory import check_memory
+from foldyn.ram_limit import check_memory
 from foldyn.statics.mechanism import refuse_mechanisms
 from foldyn.statics.memories import FOLLOWED, flowing
 from foldyn.statics.newton import Settings, Solver, settings_of

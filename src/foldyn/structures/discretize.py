@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BarLaw, HingeLaw
 from foldyn.materials.plate_superlinear import plate_onset
-from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned, pattern_of
+from foldyn.ram_limit import check_memory
 from foldyn.structures import calibration as calibrate
 from foldyn.structures.clamps import boundary_edges, clamp_rows, clamp_stiffness
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness

@@ -7,7 +7,7 @@ from numbers import Real
 from typing import Any
 
 from foldyn.errors import InputError
-from foldyn.memory import check_memory
+from foldyn.ram_limit import check_memory
 from foldyn.values import length, number, show, whole
 
 PER_VERTEX = 2200.0
