@@ -17,8 +17,8 @@ import numpy as np
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning
+from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.forces import add_contact
-from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.search import list_pairs
 
 # cells, steps of a run

@@ -8,8 +8,8 @@ from contact_samples import T, miura, touching
 from samples import relative
 
 from foldyn.jit.compiled import shared
+from foldyn.mechanics.contact.contact_state import memories
 from foldyn.mechanics.contact.forces import add_contact
-from foldyn.mechanics.contact.memory import memories
 from foldyn.mechanics.contact.planes import plane_powers
 from foldyn.mechanics.contact.step_limit import RESOLVED, limited
 from foldyn.mechanics.threads import run_together, team, wait

@@ -8,7 +8,7 @@ from contact_samples import NO_HINGES, sheets
 from numpy.testing import assert_allclose
 
 from foldyn.checks import gradient_error, tangent_error
-from foldyn.mechanics.contact.memory import memory
+from foldyn.mechanics.contact.contact_state import memory
 from foldyn.mechanics.contact.pairs import EDGES, VERTEX
 from foldyn.mechanics.contact.rubbing import (
     add_rub,

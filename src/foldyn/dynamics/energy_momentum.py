@@ -36,7 +36,7 @@ from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, run_at
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.contact.memory import Memory
+from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import add_following
 from foldyn.mechanics.mean_forces import MeanForces

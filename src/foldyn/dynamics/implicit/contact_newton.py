@@ -37,7 +37,7 @@ from foldyn.dynamics.implicit.scheme import (
 )
 from foldyn.dynamics.system import place
 from foldyn.mechanics.contact.approach import KEEP
-from foldyn.mechanics.contact.memory import Memory
+from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.planes import move_planes, slip
 from foldyn.mechanics.contact.rubbing import add_rubs, slip_pairs
 from foldyn.mechanics.contact.search import place as put_at

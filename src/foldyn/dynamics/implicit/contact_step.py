@@ -18,8 +18,8 @@ from foldyn.dynamics.implicit.contact_measure import new_move
 from foldyn.dynamics.implicit.contact_pairs import edges_step, vertex_step
 from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.block_matrix import assembled, pairs_within
+from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
-from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.motions import farthest, fastest
 from foldyn.mechanics.contact.pairs import (
     EDGES,

@@ -21,7 +21,7 @@ from foldyn.dynamics.ties import hand_over
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.constant_damping import DampingMatrix
-from foldyn.mechanics.contact.memory import Memory
+from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import following_force
 from foldyn.mechanics.hinge_memory import HingeMemory

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.mechanics.contact.memory import Memory
+from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.planes import LEAST, slip
 from foldyn.mechanics.contact.rubbing import rub_state, slip_pairs, tie_pairs
 from foldyn.mechanics.contact.tables import FRICTION, NORMAL, Tables

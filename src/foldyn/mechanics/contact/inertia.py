@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inlined, inner
+from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
-from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.pairs import VERTEX, closest_of, nodes_of, weights_of
 from foldyn.mechanics.contact.planes import height
 from foldyn.mechanics.contact.potential import barrier

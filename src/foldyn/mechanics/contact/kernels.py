@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner_scalar
 from foldyn.jit.context import Context, numbers_at, rows_at
+from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.forces import add_contact
-from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import move_planes, plane_powers
 from foldyn.mechanics.contact.ride import (
     Ride,
