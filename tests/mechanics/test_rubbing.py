@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from foldyn.checks import gradient_error, tangent_error
 from foldyn.mechanics.contact.contact_state import memory
 from foldyn.mechanics.contact.pairs import EDGES, VERTEX
-from foldyn.mechanics.contact.rubbing import (
+from foldyn.mechanics.contact.panel_friction import (
     add_rub,
     add_rubs,
     pressed_pair,

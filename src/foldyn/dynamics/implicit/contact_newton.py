@@ -38,8 +38,8 @@ from foldyn.dynamics.implicit.scheme import (
 from foldyn.dynamics.system import place
 from foldyn.mechanics.contact.approach import KEEP
 from foldyn.mechanics.contact.contact_state import Memory
+from foldyn.mechanics.contact.panel_friction import add_rubs, slip_pairs
 from foldyn.mechanics.contact.planes import move_planes, slip
-from foldyn.mechanics.contact.rubbing import add_rubs, slip_pairs
 from foldyn.mechanics.contact.search import place as put_at
 from foldyn.mechanics.contact.tables import NORMAL, POINT
 from foldyn.mechanics.contact.term import ContactTerm

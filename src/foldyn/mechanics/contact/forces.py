@@ -7,8 +7,8 @@ import numpy as np
 from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.contact.edge_edge import edge_edge
 from foldyn.mechanics.contact.hinge_guards import add_guards
+from foldyn.mechanics.contact.panel_friction import add_rubs
 from foldyn.mechanics.contact.planes import add_planes
-from foldyn.mechanics.contact.rubbing import add_rubs
 from foldyn.mechanics.contact.search import follow, place
 from foldyn.mechanics.contact.share import ENERGY, finish, reaches
 from foldyn.mechanics.contact.vertex_triangle import vertex_triangle

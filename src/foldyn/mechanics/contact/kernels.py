@@ -11,6 +11,7 @@ from foldyn.jit.compiled import inner_scalar
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.forces import add_contact
+from foldyn.mechanics.contact.panel_friction import rub_power
 from foldyn.mechanics.contact.planes import move_planes, plane_powers
 from foldyn.mechanics.contact.ride import (
     Ride,
@@ -19,7 +20,6 @@ from foldyn.mechanics.contact.ride import (
     put_points,
     put_rates,
 )
-from foldyn.mechanics.contact.rubbing import rub_power
 from foldyn.mechanics.contact.share import energy_of_all
 from foldyn.mechanics.contact.step_limit import Pace, limited
 from foldyn.mechanics.contact.tables import HISTORY, Tables

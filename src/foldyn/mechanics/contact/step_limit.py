@@ -28,9 +28,9 @@ from foldyn.mechanics.contact.distances import (
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
 from foldyn.mechanics.contact.motions import motions
 from foldyn.mechanics.contact.pairs import VERTEX
+from foldyn.mechanics.contact.panel_friction import slip_pairs
 from foldyn.mechanics.contact.planes import height, slip
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.contact.rubbing import slip_pairs
 from foldyn.mechanics.contact.search import place, relist
 from foldyn.mechanics.contact.share import HINGES, LIMIT, NEAR, gather
 from foldyn.mechanics.contact.tables import FRICTION, NORMAL

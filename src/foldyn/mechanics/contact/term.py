@@ -22,7 +22,7 @@ from foldyn.mechanics.contact.friction import Friction, stored
 from foldyn.mechanics.contact.holding import held_by_panels, held_by_planes
 from foldyn.mechanics.contact.kernels import contact_kernels
 from foldyn.mechanics.contact.pairs import VERTEX
-from foldyn.mechanics.contact.rubbing import add_rubs
+from foldyn.mechanics.contact.panel_friction import add_rubs
 from foldyn.mechanics.contact.tables import HISTORY, NORMAL, Sheets, Tables, tables
 from foldyn.mechanics.contact.tangent import (
     guard_tangents,
