@@ -18,7 +18,7 @@ from foldyn.mechanics.contact.panel_friction import (
     rub_state,
     slip_pairs,
 )
-from foldyn.mechanics.contact.rubbing_tangent import add_rub_tangent
+from foldyn.mechanics.contact.panel_friction_tangent import add_rub_tangent
 from foldyn.mechanics.contact.search import list_pairs, use_all
 from foldyn.mechanics.contact.tables import tables
 

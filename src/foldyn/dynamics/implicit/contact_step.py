@@ -30,9 +30,9 @@ from foldyn.mechanics.contact.pairs import (
     put_corners,
 )
 from foldyn.mechanics.contact.panel_friction import add_rub
+from foldyn.mechanics.contact.panel_friction_tangent import add_rub_tangent
 from foldyn.mechanics.contact.planes import farthest_stretch, height, move_planes, stretch_of
 from foldyn.mechanics.contact.potential import barrier, difference_quotient
-from foldyn.mechanics.contact.rubbing_tangent import add_rub_tangent
 from foldyn.mechanics.contact.search import list_pairs, place, use_all
 from foldyn.mechanics.contact.tables import FRICTION, NORMAL
 from foldyn.mechanics.contact.tangent import friction_tangent

@@ -12,9 +12,9 @@ from foldyn.mechanics.contact.distances import closest_of_segments, point
 from foldyn.mechanics.contact.edge_edge import edge_edge_tangent
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
 from foldyn.mechanics.contact.pairs import EDGES, VERTEX, edge_gap, nodes_of, vertex_gap
+from foldyn.mechanics.contact.panel_friction_tangent import add_rub_tangent
 from foldyn.mechanics.contact.planes import farthest_stretch, height, stretch_of
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.contact.rubbing_tangent import add_rub_tangent
 from foldyn.mechanics.contact.tables import FRICTION, NORMAL
 from foldyn.mechanics.contact.vertex_triangle import vertex_triangle_tangent
 from foldyn.mechanics.dihedral import add_hessian
