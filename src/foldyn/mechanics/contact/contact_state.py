@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.mechanics.contact.share import NOTES, Share
 from foldyn.mechanics.contact.tables import Tables
+from foldyn.mechanics.contact.thread_partition import NOTES, Share
 from foldyn.mechanics.threads import Team, team
 
 ROOM = 64  # pairs for each triangle, of either kind

@@ -10,7 +10,7 @@ from foldyn.mechanics.contact.hinge_guards import add_guards
 from foldyn.mechanics.contact.panel_friction import add_rubs
 from foldyn.mechanics.contact.planes import add_planes
 from foldyn.mechanics.contact.search import follow, place
-from foldyn.mechanics.contact.share import ENERGY, finish, reaches
+from foldyn.mechanics.contact.thread_partition import ENERGY, finish, reaches
 from foldyn.mechanics.contact.vertex_triangle import vertex_triangle
 from foldyn.mechanics.threads import part, wait
 

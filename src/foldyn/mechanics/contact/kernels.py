@@ -20,9 +20,9 @@ from foldyn.mechanics.contact.ride import (
     put_points,
     put_rates,
 )
-from foldyn.mechanics.contact.share import energy_of_all
 from foldyn.mechanics.contact.step_limit import Pace, limited
 from foldyn.mechanics.contact.tables import HISTORY, Tables
+from foldyn.mechanics.contact.thread_partition import energy_of_all
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,

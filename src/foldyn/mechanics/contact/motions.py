@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from foldyn.jit.compiled import inner, inner_scalar
-from foldyn.mechanics.contact.share import FAR, FAST, MOTION, SPEED
+from foldyn.mechanics.contact.thread_partition import FAR, FAST, MOTION, SPEED
 from foldyn.mechanics.threads import largest, total, wait
 
 

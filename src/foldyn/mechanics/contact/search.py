@@ -13,7 +13,7 @@ import numpy as np
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.mechanics.contact.motions import farthest
 from foldyn.mechanics.contact.pairs import VERTEX, edge_gap, vertex_gap
-from foldyn.mechanics.contact.share import pass_on
+from foldyn.mechanics.contact.thread_partition import pass_on
 from foldyn.mechanics.contact.ties import lay_ties, put_ties, take_ties
 
 CELLS = 8.0  # per node, at most

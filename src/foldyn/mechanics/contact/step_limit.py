@@ -32,8 +32,8 @@ from foldyn.mechanics.contact.panel_friction import slip_pairs
 from foldyn.mechanics.contact.planes import height, slip
 from foldyn.mechanics.contact.potential import barrier
 from foldyn.mechanics.contact.search import place, relist
-from foldyn.mechanics.contact.share import HINGES, LIMIT, NEAR, gather
 from foldyn.mechanics.contact.tables import FRICTION, NORMAL
+from foldyn.mechanics.contact.thread_partition import HINGES, LIMIT, NEAR, gather
 from foldyn.mechanics.threads import largest, part, wait
 
 APPROACH = 0.1
