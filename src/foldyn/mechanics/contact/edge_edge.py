@@ -17,6 +17,7 @@ import math
 import numpy as np
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.mechanics.contact.distance_hessian import add_second
 from foldyn.mechanics.contact.distances import (
     between,
     closest_end,
@@ -27,7 +28,6 @@ from foldyn.mechanics.contact.distances import (
     point,
 )
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.contact.second import add_second
 
 PARALLEL = 1e-3
 

@@ -15,12 +15,12 @@ import math
 import numpy as np
 
 from foldyn.jit.compiled import inner, kernel
+from foldyn.mechanics.contact.distance_hessian import apart_of, half_square
 from foldyn.mechanics.contact.distances import cross, dot, minus, point
 from foldyn.mechanics.contact.edge_edge import PARALLEL, mollifier, square_of_cross, weigh_edges
 from foldyn.mechanics.contact.pairs import VERTEX, nodes_of, put_corners, weights_of
 from foldyn.mechanics.contact.panel_friction import bound, pressed_pair
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.contact.second import apart_of, half_square
 from foldyn.mechanics.contact.vertex_triangle import PARTS, share_of, weigh_triangle
 
 

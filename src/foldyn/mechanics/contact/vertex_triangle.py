@@ -16,6 +16,7 @@ import math
 import numpy as np
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.mechanics.contact.distance_hessian import add_second
 from foldyn.mechanics.contact.distances import (
     CORNER_A,
     CORNER_B,
@@ -30,7 +31,6 @@ from foldyn.mechanics.contact.distances import (
     point,
 )
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.contact.second import add_second
 
 PARTS = 7  # of a triangle: itself, its sides, its corners
 
