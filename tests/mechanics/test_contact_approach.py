@@ -7,7 +7,7 @@ import pytest
 from contact_samples import T, miura, sheets, touching
 
 from foldyn.checks import tangent_error
-from foldyn.mechanics.contact.approach import KEEP, clear_share
+from foldyn.mechanics.contact.ccd import KEEP, clear_share
 from foldyn.mechanics.contact.contact_state import memory
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.pairs import edge_gap, vertex_gap

@@ -36,7 +36,7 @@ from foldyn.dynamics.implicit.scheme import (
     Scheme,
 )
 from foldyn.dynamics.system import place
-from foldyn.mechanics.contact.approach import KEEP
+from foldyn.mechanics.contact.ccd import KEEP
 from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.panel_friction import add_rubs, slip_pairs
 from foldyn.mechanics.contact.planes import move_planes, slip

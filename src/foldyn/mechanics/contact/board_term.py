@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.context import Context
-from foldyn.mechanics.contact.approach import clear_share
 from foldyn.mechanics.contact.boards import BoardSheets, board_tables
+from foldyn.mechanics.contact.ccd import clear_share
 from foldyn.mechanics.contact.contact_state import Memory, memory
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.kernels import board_kernels

@@ -16,7 +16,7 @@ from foldyn.jit.context import Context
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.contact.active_constraints import held_by_panels, held_by_planes
-from foldyn.mechanics.contact.approach import KEEP, clear_share
+from foldyn.mechanics.contact.ccd import KEEP, clear_share
 from foldyn.mechanics.contact.contact_state import Memory, memories, memory
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.friction import Friction, stored
