@@ -10,9 +10,9 @@ from foldyn.checks import observed_order, tangent_error
 from foldyn.dynamics.implicit.contact_measure import new_move
 from foldyn.dynamics.implicit.contact_pairs import edges_step, vertex_step
 from foldyn.jit.compiled import kernel
+from foldyn.mechanics.contact.candidates import Sheets, tables
 from foldyn.mechanics.contact.edge_edge import edge_edge
 from foldyn.mechanics.contact.potential import difference_quotient
-from foldyn.mechanics.contact.tables import Sheets, tables
 from foldyn.mechanics.contact.vertex_triangle import vertex_triangle
 
 D0 = 0.2

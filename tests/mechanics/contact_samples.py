@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import foldyn as fd
-from foldyn.mechanics.contact.tables import PLANE_COLUMNS, Sheets, Tables, tables
+from foldyn.mechanics.contact.candidates import PLANE_COLUMNS, Sheets, Tables, tables
 from foldyn.mechanics.contact.term import ContactTerm
 
 T = 0.24e-3

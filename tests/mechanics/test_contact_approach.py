@@ -7,13 +7,13 @@ import pytest
 from contact_samples import T, miura, sheets, touching
 
 from foldyn.checks import tangent_error
+from foldyn.mechanics.contact.candidates import tables
 from foldyn.mechanics.contact.ccd import KEEP, clear_share
 from foldyn.mechanics.contact.contact_state import memory
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.pairs import edge_gap, vertex_gap
 from foldyn.mechanics.contact.planes import slip
 from foldyn.mechanics.contact.search import list_pairs, place
-from foldyn.mechanics.contact.tables import tables
 from foldyn.mechanics.contact.term import ContactTerm, contact_tangent
 
 NO_HINGES = np.zeros((0, 4), np.int64)

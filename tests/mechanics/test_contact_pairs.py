@@ -8,10 +8,10 @@ from contact_samples import NO_HINGES, sheets
 
 from foldyn.checks import gradient_error, tangent_error
 from foldyn.jit.compiled import kernel
+from foldyn.mechanics.contact.candidates import tables
 from foldyn.mechanics.contact.distances import closest_of_segments, closest_on_triangle
 from foldyn.mechanics.contact.edge_edge import edge_edge, edge_edge_tangent
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.contact.tables import tables
 from foldyn.mechanics.contact.vertex_triangle import vertex_triangle, vertex_triangle_tangent
 
 D0 = 0.2

@@ -8,6 +8,7 @@ from contact_samples import NO_HINGES, sheets
 from numpy.testing import assert_allclose
 
 from foldyn.checks import gradient_error, tangent_error
+from foldyn.mechanics.contact.candidates import tables
 from foldyn.mechanics.contact.contact_state import memory
 from foldyn.mechanics.contact.pairs import EDGES, VERTEX
 from foldyn.mechanics.contact.panel_friction import (
@@ -20,7 +21,6 @@ from foldyn.mechanics.contact.panel_friction import (
 )
 from foldyn.mechanics.contact.panel_friction_tangent import add_rub_tangent
 from foldyn.mechanics.contact.search import list_pairs, use_all
-from foldyn.mechanics.contact.tables import tables
 
 D0, MU = 0.2, 0.3
 # a triangle amid others of its panel, and a triangle of another panel with vertex 0 and edge 0-8

@@ -14,8 +14,7 @@ from foldyn.cases.decode import Part, check_keys
 from foldyn.cases.history import History, as_history
 from foldyn.errors import InputError, within
 from foldyn.mechanics.contact.boards import BoardSheets
-from foldyn.mechanics.contact.potential import STIFFNESS
-from foldyn.mechanics.contact.tables import (
+from foldyn.mechanics.contact.candidates import (
     FRICTION,
     HISTORY,
     MOTION,
@@ -24,6 +23,7 @@ from foldyn.mechanics.contact.tables import (
     POINT,
     Sheets,
 )
+from foldyn.mechanics.contact.potential import STIFFNESS
 from foldyn.values import brief, flag, length, number, show, vector
 
 

@@ -12,7 +12,7 @@ from scipy import sparse
 from foldyn.cases.case import Case
 from foldyn.cases.constraints import AGREES
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.mechanics.contact.tables import NORMAL, POINT
+from foldyn.mechanics.contact.candidates import NORMAL, POINT
 from foldyn.mechanics.crossings import crossing_panels, pairs_text
 
 STRIDE = 5  # at every so manieth state panels that cross are looked for

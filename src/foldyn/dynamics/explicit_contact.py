@@ -14,9 +14,9 @@ from foldyn.dynamics.slow_contacts import slow_down
 from foldyn.dynamics.system import Packed, Scratch, System
 from foldyn.jit.compiled import addressed, inner_scalar
 from foldyn.jit.context import Context, rows_at, run_at, value_at
+from foldyn.mechanics.contact.candidates import Tables
 from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.inertia import Added, added_inertia, room_for
-from foldyn.mechanics.contact.tables import Tables
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.term import ADDRESS, NUMBER, limit_of
 

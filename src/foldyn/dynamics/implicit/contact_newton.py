@@ -36,12 +36,12 @@ from foldyn.dynamics.implicit.scheme import (
     Scheme,
 )
 from foldyn.dynamics.system import place
+from foldyn.mechanics.contact.candidates import NORMAL, POINT
 from foldyn.mechanics.contact.ccd import KEEP
 from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.panel_friction import add_rubs, slip_pairs
 from foldyn.mechanics.contact.planes import move_planes, slip
 from foldyn.mechanics.contact.search import place as put_at
-from foldyn.mechanics.contact.tables import NORMAL, POINT
 from foldyn.mechanics.contact.term import ContactTerm
 
 MOST = 60  # iterations, many of which are cut

@@ -8,9 +8,9 @@ import numpy as np
 from scipy import sparse
 
 from foldyn.jit.compiled import kernel
+from foldyn.mechanics.contact.candidates import FRICTION, NORMAL, Tables
 from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.pairs import EDGES, VERTEX, closest_of, nodes_of, weights_of
-from foldyn.mechanics.contact.tables import FRICTION, NORMAL, Tables
 from foldyn.mechanics.contact.tangent import touching_pairs
 from foldyn.mechanics.sheet_term import unit_rows
 

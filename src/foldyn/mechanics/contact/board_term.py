@@ -13,6 +13,7 @@ from scipy import sparse
 
 from foldyn.jit.context import Context
 from foldyn.mechanics.contact.boards import BoardSheets, board_tables
+from foldyn.mechanics.contact.candidates import Tables
 from foldyn.mechanics.contact.ccd import clear_share
 from foldyn.mechanics.contact.contact_state import Memory, memory
 from foldyn.mechanics.contact.forces import add_contact
@@ -27,7 +28,6 @@ from foldyn.mechanics.contact.ride import (
     put_points,
     step_jacobian,
 )
-from foldyn.mechanics.contact.tables import Tables
 from foldyn.mechanics.contact.term import ContactTerm, contact_tangent
 from foldyn.mechanics.term import Compiled, nodal
 

@@ -22,8 +22,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.mechanics.contact.ride import Ride, carried, ride_on
-from foldyn.mechanics.contact.tables import (
+from foldyn.mechanics.contact.candidates import (
     ACROSS_CORNER,
     ACROSS_CREASE,
     Sheets,
@@ -34,6 +33,7 @@ from foldyn.mechanics.contact.tables import (
     starts,
     tables,
 )
+from foldyn.mechanics.contact.ride import Ride, carried, ride_on
 
 JUST = 1.0 - 1e-9  # of d0: what just touches at rest does not push
 LEAST = 0.02  # of the angle at which sheets are guarded: least angle of a guard

@@ -18,12 +18,12 @@ import math
 import numpy as np
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.mechanics.contact.candidates import NORMAL
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
 from foldyn.mechanics.contact.motions import farthest, fastest
 from foldyn.mechanics.contact.pairs import VERTEX, corners_gap, nodes_of, put_corners
 from foldyn.mechanics.contact.planes import height
 from foldyn.mechanics.contact.search import list_pairs, place, use_all
-from foldyn.mechanics.contact.tables import NORMAL
 
 KEEP = 0.2  # of each gap
 NEAR = 0.01  # of the goal: gaps so little above it have reached it

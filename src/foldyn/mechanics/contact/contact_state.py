@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.mechanics.contact.tables import Tables
+from foldyn.mechanics.contact.candidates import Tables
 from foldyn.mechanics.contact.thread_partition import NOTES, Share
 from foldyn.mechanics.threads import Team, team
 

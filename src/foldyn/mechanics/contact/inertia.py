@@ -22,13 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inlined, inner
+from foldyn.mechanics.contact.candidates import NORMAL, Tables
 from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
 from foldyn.mechanics.contact.pairs import VERTEX, closest_of, nodes_of, weights_of
 from foldyn.mechanics.contact.planes import height
 from foldyn.mechanics.contact.potential import barrier
 from foldyn.mechanics.contact.search import place
-from foldyn.mechanics.contact.tables import NORMAL, Tables
 
 SLOWNESS = 2.0  # tau over the step: no vibration of a contact is faster than half a radian a step
 STRETCH = 1.02  # of what resolves a contact: steps that end where a load jumps may be so long

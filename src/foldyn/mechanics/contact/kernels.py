@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner_scalar
 from foldyn.jit.context import Context, numbers_at, rows_at
+from foldyn.mechanics.contact.candidates import HISTORY, Tables
 from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.panel_friction import rub_power
@@ -21,7 +22,6 @@ from foldyn.mechanics.contact.ride import (
     put_rates,
 )
 from foldyn.mechanics.contact.step_limit import Pace, limited
-from foldyn.mechanics.contact.tables import HISTORY, Tables
 from foldyn.mechanics.contact.thread_partition import energy_of_all
 from foldyn.mechanics.term import (
     ENERGIES,

@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.mechanics.contact.candidates import FRICTION, HISTORY, MOTION, NORMAL, POINT
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.contact.tables import FRICTION, HISTORY, MOTION, NORMAL, POINT
 
 LEAST = 1e-300  # N: a normal force that is not zero
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.mechanics.contact.candidates import FRICTION, NORMAL
 from foldyn.mechanics.contact.distances import (
     apart,
     between,
@@ -32,7 +33,6 @@ from foldyn.mechanics.contact.panel_friction import slip_pairs
 from foldyn.mechanics.contact.planes import height, slip
 from foldyn.mechanics.contact.potential import barrier
 from foldyn.mechanics.contact.search import place, relist
-from foldyn.mechanics.contact.tables import FRICTION, NORMAL
 from foldyn.mechanics.contact.thread_partition import HINGES, LIMIT, NEAR, gather
 from foldyn.mechanics.threads import largest, part, wait
 

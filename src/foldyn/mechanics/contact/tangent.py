@@ -8,6 +8,7 @@ import numpy as np
 
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.contact.candidates import FRICTION, NORMAL
 from foldyn.mechanics.contact.distances import closest_of_segments, point
 from foldyn.mechanics.contact.edge_edge import edge_edge_tangent
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
@@ -15,7 +16,6 @@ from foldyn.mechanics.contact.pairs import EDGES, VERTEX, edge_gap, nodes_of, ve
 from foldyn.mechanics.contact.panel_friction_tangent import add_rub_tangent
 from foldyn.mechanics.contact.planes import farthest_stretch, height, stretch_of
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.contact.tables import FRICTION, NORMAL
 from foldyn.mechanics.contact.vertex_triangle import vertex_triangle_tangent
 from foldyn.mechanics.dihedral import add_hessian
 

@@ -16,6 +16,7 @@ from foldyn.jit.context import Context
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.contact.active_constraints import held_by_panels, held_by_planes
+from foldyn.mechanics.contact.candidates import HISTORY, NORMAL, Sheets, Tables, tables
 from foldyn.mechanics.contact.ccd import KEEP, clear_share
 from foldyn.mechanics.contact.contact_state import Memory, memories, memory
 from foldyn.mechanics.contact.forces import add_contact
@@ -23,7 +24,6 @@ from foldyn.mechanics.contact.friction import Friction, stored
 from foldyn.mechanics.contact.kernels import contact_kernels
 from foldyn.mechanics.contact.pairs import VERTEX
 from foldyn.mechanics.contact.panel_friction import add_rubs
-from foldyn.mechanics.contact.tables import HISTORY, NORMAL, Sheets, Tables, tables
 from foldyn.mechanics.contact.tangent import (
     guard_tangents,
     pair_tangents,
