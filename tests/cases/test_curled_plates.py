@@ -11,7 +11,7 @@ import foldyn as fd
 from foldyn.checks import tangent_error
 from foldyn.dynamics import prepare
 from foldyn.errors import FoldynWarning
-from foldyn.statics.origami import OrigamiProblem
+from foldyn.statics.equilibrium import OrigamiProblem
 from sheets_with_facets import STEEL, cut_across, triangulated, with_lines
 
 SHEET = fd.Sheet(1e9, 0.3, 4e-4, 1000.0)

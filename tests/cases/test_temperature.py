@@ -137,7 +137,7 @@ def test_the_shell_moves_by_heat_too() -> None:
 
 
 def test_the_tangent_of_a_warm_strip_is_exact() -> None:
-    from foldyn.statics.origami import OrigamiProblem
+    from foldyn.statics.equilibrium import OrigamiProblem
 
     for structure in models(strip(1), clamped=[(0, 1)]):
         case = fd.Case(structure, [fd.Fix([0, 1])], [fd.Temperature(20.0, 1e-4, 0.02)])

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.results import case_of, check_result
+from foldyn.statics.equilibrium import OrigamiProblem
 from foldyn.statics.newton import Attempt, Settings, Solver, plane, settings_of
-from foldyn.statics.origami import OrigamiProblem
 from foldyn.statics.path_methods import METHODS, PathPlan, along
 from foldyn.statics.problem import balance
 from foldyn.statics.reached import until_of

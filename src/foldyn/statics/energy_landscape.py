@@ -21,8 +21,8 @@ from foldyn.cases import Case
 from foldyn.errors import ComputationError, InputError
 from foldyn.results import check_result
 from foldyn.statics.branch import problem_of, station_of
+from foldyn.statics.equilibrium import OrigamiProblem
 from foldyn.statics.newton import Settings, Solver, settings_of
-from foldyn.statics.origami import OrigamiProblem
 from foldyn.statics.stability import LostError, Section
 from foldyn.statics.stepping import Station
 from foldyn.values import brief

@@ -21,7 +21,7 @@ from foldyn.algebra.solvers import factorized
 from foldyn.algebra.superlu import Factorization
 from foldyn.errors import InputError
 from foldyn.mechanics.term import Unstrained
-from foldyn.statics.origami import OrigamiProblem
+from foldyn.statics.equilibrium import OrigamiProblem
 from foldyn.statics.rigid import AXES, name_rigid_motions
 from foldyn.statics.stability import softest_modes
 

@@ -28,8 +28,8 @@ from foldyn.errors import (
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.results import path_dataset
 from foldyn.results.crossings import crossings_of
+from foldyn.statics.equilibrium import OrigamiProblem
 from foldyn.statics.newton import Solver
-from foldyn.statics.origami import OrigamiProblem
 from foldyn.statics.path_methods import METHODS
 from foldyn.statics.stepping import (
     REMEDY_COLLISION,
