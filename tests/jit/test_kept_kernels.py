@@ -19,9 +19,9 @@ from llvmlite.binding import Linkage
 from numba import typeof
 
 from foldyn.errors import FoldynWarning
-from foldyn.jit import kept, sources
+from foldyn.jit import kernel_cache, sources
 from foldyn.jit.compiled import kernel, ready
-from foldyn.jit.kept import REMEDY, folder_for
+from foldyn.jit.kernel_cache import REMEDY, folder_for
 
 posix = pytest.mark.skipif(not hasattr(os, "getuid"), reason="folders have owners on POSIX only")
 _numbers = itertools.count()
@@ -30,7 +30,7 @@ _numbers = itertools.count()
 @pytest.fixture
 def kernels(tmp_path, monkeypatch):
     """Makes kernels from text, as importing a module in a folder of its own does."""
-    monkeypatch.setattr(kept.config, "CACHE_DIR", "")
+    monkeypatch.setattr(kernel_cache.config, "CACHE_DIR", "")
     path = tmp_path / "double.py"
 
     def make(text: str = "return 2.0 * x"):
@@ -89,12 +89,12 @@ def test_damaged_files_are_compiled_anew(kernels, damage):
 
 
 def test_only_the_last_versions_stay(kernels):
-    for turn in range(kept.OTHERS + 3):
+    for turn in range(kernel_cache.OTHERS + 3):
         function = kernels(f"return {turn}.0 * x")
         assert function(1.0) == turn
         for age, path in enumerate(sorted(files(function), key=os.path.getmtime, reverse=True)):
             os.utime(path, (1e9 - age, 1e9 - age))
-    assert len(files(function)) == kept.OTHERS + 1
+    assert len(files(function)) == kernel_cache.OTHERS + 1
     assert ready(function)
 
 
@@ -103,7 +103,7 @@ def test_fields_of_named_tuples_count(kernels):
     function = kernels("return x.a - x.b")
     assert function(one(3.0, 1.0)) == 2.0
     assert kernels("return x.a - x.b")(other(3.0, 1.0)) == -2.0
-    nested = [kept._spelled(typeof((np.zeros(2), pair(1.0, 2.0)))) for pair in (one, other)]
+    nested = [kernel_cache._spelled(typeof((np.zeros(2), pair(1.0, 2.0)))) for pair in (one, other)]
     assert nested[0] != nested[1]
 
 
@@ -111,8 +111,8 @@ def test_a_full_disk_is_told_and_does_no_harm(kernels, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    kept._warn.cache_clear()
-    monkeypatch.setattr(kept.os, "replace", full)
+    kernel_cache._warn.cache_clear()
+    monkeypatch.setattr(kernel_cache.os, "replace", full)
     function = kernels()
     with pytest.warns(FoldynWarning, match="No space left on device; set NUMBA_CACHE_DIR"):
         assert function(1.5) == 3.0
@@ -152,11 +152,11 @@ def folders(tmp_path, monkeypatch):
     found = {name: tmp_path / name for name in ("sources", "named", "home", "temporary")}
     for path in found.values():
         path.mkdir()
-    monkeypatch.setattr(kept.config, "CACHE_DIR", str(found["named"]))
+    monkeypatch.setattr(kernel_cache.config, "CACHE_DIR", str(found["named"]))
     monkeypatch.setenv("XDG_CACHE_HOME", str(found["home"]))
-    monkeypatch.setattr(kept.AppDirs, "user_cache_dir", str(found["home"]))
-    monkeypatch.setattr(kept.tempfile, "tempdir", str(found["temporary"]))
-    remembering = (kept.folder_for, kept._warn, kept._private)
+    monkeypatch.setattr(kernel_cache.AppDirs, "user_cache_dir", str(found["home"]))
+    monkeypatch.setattr(kernel_cache.tempfile, "tempdir", str(found["temporary"]))
+    remembering = (kernel_cache.folder_for, kernel_cache._warn, kernel_cache._private)
     for cached in remembering:
         cached.cache_clear()
     yield found
@@ -173,7 +173,7 @@ def spoil(path: Path) -> None:
 def test_the_first_folder_that_can_be_written(folders, recwarn):
     sources = folders["sources"]
     assert folder_for(sources).parent == folders["named"]
-    kept.config.CACHE_DIR = ""
+    kernel_cache.config.CACHE_DIR = ""
     folder_for.cache_clear()
     assert folder_for(sources) == sources / "__pycache__"
     spoil(sources / "__pycache__")
@@ -202,7 +202,7 @@ def test_a_folder_for_temporary_files_is_the_users_alone(folders):
     assert found.parent.parent == folders["temporary"]
     assert stat.S_IMODE(found.parent.stat().st_mode) == 0o700
     folder_for.cache_clear()
-    kept._private.cache_clear()
+    kernel_cache._private.cache_clear()
     assert folder_for(folders["sources"]) == found  # the next process finds it again
 
 
@@ -222,7 +222,7 @@ def test_a_folder_that_others_may_have_filled_is_not_taken(folders, trap, monkey
     if trap == "of another user":
         me = os.getuid()
         answers = itertools.chain([me], itertools.repeat(me + 1))
-        monkeypatch.setattr(kept.os, "getuid", lambda: next(answers))
+        monkeypatch.setattr(kernel_cache.os, "getuid", lambda: next(answers))
     with pytest.warns(FoldynWarning, match=REMEDY):
         found = folder_for(folders["sources"])
     assert not found.is_relative_to(usual)
@@ -234,7 +234,7 @@ def test_nowhere_to_keep_kernels(folders, kernels, monkeypatch):
     spoil(folders["temporary"])
     with pytest.warns(FoldynWarning, match=f"anywhere: each start compiles anew; {REMEDY}"):
         assert folder_for(folders["sources"]) is None
-    monkeypatch.setattr(kept, "folder_for", lambda source: None)
+    monkeypatch.setattr(kernel_cache, "folder_for", lambda source: None)
     function = kernels()
     assert function(1.5) == 3.0
     assert not ready(function) and function.stats.cache_path is None

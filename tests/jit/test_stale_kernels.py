@@ -14,7 +14,7 @@ import pytest
 from jit_lab import ask, copy_package, edit, environment
 
 from foldyn.jit import sources
-from foldyn.jit.kept import Kept
+from foldyn.jit.kernel_cache import Kept
 from foldyn.jit.sources import PACKAGE, digest, imports, made_from, read
 
 FILES = sorted(PACKAGE.rglob("*.py"))

@@ -19,7 +19,7 @@ from numba import cfunc, njit
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
-from foldyn.jit.kept import Kept
+from foldyn.jit.kernel_cache import Kept
 
 # fused multiply-adds are the only liberty taken: NaN must survive
 _FUSED = {"contract"}
