@@ -16,7 +16,7 @@ from foldyn.dynamics import initial_state
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment import TrackedModel
 from foldyn.results import netcdf, trajectory_dataset
-from foldyn.results.apart import apart
+from foldyn.results.sandbox import apart
 
 SEAL = 80  # bytes at the end
 

@@ -25,10 +25,10 @@ from xarray.backends import list_engines
 
 from foldyn.errors import InputError
 from foldyn.input_files import check_file, path_of
-from foldyn.results.apart import apart
 from foldyn.results.attributes import FORMAT
 from foldyn.results.columns import PIECE, pieces
 from foldyn.results.contents import check_result, whole_attribute
+from foldyn.results.sandbox import apart
 from foldyn.results.seal import seal, sound
 from foldyn.values import flag
 from foldyn.writing import whole
