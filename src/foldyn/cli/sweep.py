@@ -99,7 +99,7 @@ def run_sweep(given: argparse.Namespace) -> Path:
         No point has a value; the reasons are kept.
     """
     from foldyn.results import save
-    from foldyn.results.swept import has_values
+    from foldyn.results.sweep_dataset import has_values
     from foldyn.studies import find_case
 
     clock = Clock.now()

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.results.swept import (
+from foldyn.results.sweep_dataset import (
     SobolIndices,
     is_grid,
     keys_of,

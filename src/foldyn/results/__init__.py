@@ -12,7 +12,7 @@ from foldyn.results.dataset import (
 from foldyn.results.frames import Shapes, States, frames_of, shapes_of, state_of
 from foldyn.results.netcdf import load, save
 from foldyn.results.quantities import Quantity
-from foldyn.results.swept import MainEffect, SobolIndices, main_effects, sobol_indices
+from foldyn.results.sweep_dataset import MainEffect, SobolIndices, main_effects, sobol_indices
 
 __all__ = [
     "MainEffect",

@@ -18,7 +18,7 @@ from foldyn.report.album import Album
 from foldyn.report.charts import Chart, Charts, Curve
 from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Listing, Section, Table, Text, cell
-from foldyn.results.swept import (
+from foldyn.results.sweep_dataset import (
     POINT,
     SALTELLI,
     is_grid,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from foldyn.analyses.keys import parts
 from foldyn.results.dataset import DOCUMENT
-from foldyn.results.swept import POINT, sweep_dataset
+from foldyn.results.sweep_dataset import POINT, sweep_dataset
 from foldyn.sweeps.evaluations import Evaluation
 from foldyn.sweeps.measure import Asked
 from foldyn.sweeps.plan import Plan
