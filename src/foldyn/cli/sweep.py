@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray
 
     from foldyn.sweeps.plan import Plan
-    from foldyn.sweeps.swept import Course
+    from foldyn.sweeps.run_sweep import Course
 
 RESULT, KEPT = "sweep.nc", "points"
 DRAWN = [
@@ -183,7 +183,7 @@ def _swept(
     plan: Plan, given: argparse.Namespace, results: Results, say: Callable[[str], None]
 ) -> xarray.Dataset:
     """Compute with a bar, or with a line now and then."""
-    from foldyn.sweeps.swept import swept
+    from foldyn.sweeps.run_sweep import swept
 
     total = len(set(plan.points))
     with progress_bar(given.quiet, total=total, unit="point") as bar:
