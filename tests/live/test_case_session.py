@@ -12,7 +12,7 @@ import pytest
 from live_samples import FOLD, MIURA, write
 
 import foldyn as fd
-from foldyn.live import wishes
+from foldyn.live import view_requests
 from foldyn.live.case_session import CaseSession
 
 
@@ -77,7 +77,7 @@ def test_a_defect_is_told_as_one(session, monkeypatch):
 
 
 def test_warnings_are_notes(session, monkeypatch):
-    monkeypatch.setattr(wishes, "MOST_WORK", 1000.0)
+    monkeypatch.setattr(view_requests, "MOST_WORK", 1000.0)
     answer = session.compute(wish("dynamics"))
     (note,) = [note for note in answer["notes"] if "so that it is computed soon" in note]
     assert "of 2 s, so that it is computed soon" in note
@@ -101,7 +101,7 @@ def test_a_wrong_file_is_refused(tmp_path):
 
 def test_a_curve_has_the_loads_without_their_histories(tmp_path):
     path = write(tmp_path)
-    _, result = wishes.computed(path, tomllib.loads(FOLD), "statics")
+    _, result = view_requests.computed(path, tomllib.loads(FOLD), "statics")
     assert float(result["load_factor"][-1]) == 1.0
-    wanted = fd.trace(fd.case_of(result), steps=wishes.STEPS)
+    wanted = fd.trace(fd.case_of(result), steps=view_requests.STEPS)
     assert np.allclose(result["displacement"], wanted["displacement"], atol=1e-12)

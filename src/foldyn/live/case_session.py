@@ -14,7 +14,7 @@ from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.errors import FoldynError, FoldynWarning, InputError
 from foldyn.live.controls import changed, controls
 from foldyn.live.newest import Newest
-from foldyn.live.wishes import computed, offered
+from foldyn.live.view_requests import computed, offered
 from foldyn.viewer import stage
 
 Message = dict[str, Any]
