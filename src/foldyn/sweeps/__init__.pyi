@@ -2,4 +2,4 @@
 
 from foldyn.sweeps.measure import Measure as Measure
 from foldyn.sweeps.measures import MEASURES as MEASURES
-from foldyn.sweeps.swept import Course as Course, sweep as sweep
+from foldyn.sweeps.run_sweep import Course as Course, sweep as sweep
