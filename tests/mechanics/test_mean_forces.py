@@ -16,7 +16,7 @@ from foldyn.dynamics.system import pack
 from foldyn.jit.compiled import kernel
 from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.hinge_memory import HingeMemory
+from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.mechanics.mean_forces import MeanForces
 from foldyn.mechanics.term import FORCES, MEAN_FORCES, Compiled, Term, forces
 

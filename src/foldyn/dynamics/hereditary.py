@@ -13,7 +13,7 @@ from foldyn.errors import InputError
 from foldyn.materials.memory_law import VARIABLES
 from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.balanced_memory import BalancedMemory
-from foldyn.mechanics.hinge_memory import HingeMemory
+from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.structures.condensed_plates import CondensedPlatesTerm
 from foldyn.structures.remembering import memory
 from foldyn.values import show

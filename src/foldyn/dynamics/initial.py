@@ -23,7 +23,7 @@ from foldyn.dynamics.system import Packed, carry_supports, place, scratch
 from foldyn.dynamics.timing import histories
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.following import following_force
-from foldyn.mechanics.hinge_memory import HingeMemory
+from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.results.contents import check_variable
 from foldyn.results.quantities import CONTINUATIONS
 from foldyn.values import whole

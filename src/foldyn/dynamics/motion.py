@@ -41,7 +41,7 @@ from foldyn.errors import (
     MotionInterrupted,
     StretchWarning,
 )
-from foldyn.mechanics.hinge_memory import HingeMemory
+from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.results import trajectory_dataset
 from foldyn.results.crossings import Crossings, crossings_of
 from foldyn.structures.stretching import REMEDY, stretch

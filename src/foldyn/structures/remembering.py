@@ -13,8 +13,8 @@ from foldyn.materials.memory_law import VARIABLES, Branch, MemoryLaw, memory_of
 from foldyn.materials.prony import CODE as MAXWELL
 from foldyn.materials.prony import CreaseDampers, in_series, maxwell
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.hinge_memory import HingeMemory
 from foldyn.mechanics.inelastic import MemoryHinges
+from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.mechanics.sheet_term import FoldHinges
 from foldyn.mechanics.viscous import WIDTH, hinge_dofs
 

@@ -26,7 +26,7 @@ from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Scheme
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.motion_state import Course, Outcome, Samples, StepPlan
 from foldyn.dynamics.system import Packed
-from foldyn.mechanics.hinge_memory import HingeMemory
+from foldyn.mechanics.inelastic_branches import HingeMemory
 
 LEAST_STEP = 2.0**-20  # of the step wanted: where Newton's method fails with less, it fails
 LEAST_TIME = 1e-13  # step relative to the end of the motion
