@@ -12,7 +12,7 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.materials.memory_law import VARIABLES
 from foldyn.mechanics.assembly import Assembly, Numbering
-from foldyn.mechanics.balanced_memory import BalancedMemory
+from foldyn.mechanics.inelastic_balance import BalancedMemory
 from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.structures.condensed_plates import CondensedPlatesTerm
 from foldyn.structures.remembering import memory

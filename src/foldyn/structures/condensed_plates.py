@@ -13,8 +13,8 @@ from scipy.sparse.linalg import splu
 from foldyn.jit.context import Context
 from foldyn.materials import HingeLaw
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.balanced_memory import evaluation
 from foldyn.mechanics.inelastic import MemoryHinges
+from foldyn.mechanics.inelastic_balance import evaluation
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.mechanics.plates_condensed import (
     CondensedWork,
