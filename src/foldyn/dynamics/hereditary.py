@@ -10,7 +10,7 @@ from scipy import sparse
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.materials.memory_law import VARIABLES
+from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.inelastic_balance import BalancedMemory
 from foldyn.mechanics.inelastic_branches import HingeMemory

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner_scalar
-from foldyn.materials.memory_law import VARIABLES
+from foldyn.materials.inelastic_law import VARIABLES
 
 
 class Outcome(IntEnum):

@@ -11,9 +11,9 @@ from foldyn.errors import InputError
 from foldyn.materials.custom import CustomBarLaw, CustomHingeLaw
 from foldyn.materials.enhanced_linear import EnhancedLinear
 from foldyn.materials.eyring import Eyring
+from foldyn.materials.inelastic_law import MemoryLaw
 from foldyn.materials.law import BarLaw, HingeLaw
 from foldyn.materials.linear import LinearBar, LinearHinge
-from foldyn.materials.memory_law import MemoryLaw
 from foldyn.materials.ogden import Ogden
 from foldyn.materials.plastic import Plastic
 from foldyn.materials.plate_superlinear import PlateSuperlinear

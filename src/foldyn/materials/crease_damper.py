@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import scalar
-from foldyn.materials.memory_law import Branch, columns
+from foldyn.materials.inelastic_law import Branch, columns
 
 CODE = 3  # among branches
 FEW = 1e-3  # of q h: below, series stand for what cancels

@@ -23,8 +23,8 @@ from dataclasses import dataclass
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner_scalar, scalar
+from foldyn.materials.inelastic_law import Branch, MemoryLaw, columns
 from foldyn.materials.law import HingeLaw
-from foldyn.materials.memory_law import Branch, MemoryLaw, columns
 from foldyn.values import number
 
 CODE = 2

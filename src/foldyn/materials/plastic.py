@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import scalar
+from foldyn.materials.inelastic_law import Branch, MemoryLaw, columns
 from foldyn.materials.law import HingeLaw
-from foldyn.materials.memory_law import Branch, MemoryLaw, columns
 from foldyn.values import number
 
 CODE = 1

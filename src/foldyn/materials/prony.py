@@ -31,8 +31,8 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.jit.compiled import scalar
+from foldyn.materials.inelastic_law import Branch, MemoryLaw, columns
 from foldyn.materials.law import HingeLaw
-from foldyn.materials.memory_law import Branch, MemoryLaw, columns
 from foldyn.values import number, number_or_list, show
 
 CODE = 0  # among branches

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.materials.memory_law import memory_of
+from foldyn.materials.inelastic_law import memory_of
 from foldyn.materials.series import in_series
 from foldyn.shells import Shell
 from foldyn.structures import Structure

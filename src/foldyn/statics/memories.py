@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.materials.memory_law import VARIABLES
+from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.structures.remembering import Remembering
 from foldyn.structures.remembering import memory as memory_of
 

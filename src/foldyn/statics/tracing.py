@@ -14,7 +14,7 @@ from foldyn.cases import Case, Gravity, State
 from foldyn.cases.contact_checks import check_contact, check_driven
 from foldyn.cases.ties import check_tied
 from foldyn.errors import InputError
-from foldyn.materials.memory_law import VARIABLES
+from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.ram_limit import check_memory
 from foldyn.statics.equilibrium import AdaptiveLoad, OrigamiProblem, drives, is_actuated
 from foldyn.statics.mechanism import refuse_mechanisms

@@ -14,7 +14,7 @@ from scipy import sparse
 from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, PlateSuperlinear, hinge_law
-from foldyn.materials.memory_law import memory_of
+from foldyn.materials.inelastic_law import memory_of
 from foldyn.materials.series import in_series
 from foldyn.mechanics.assembly import Assembly
 from foldyn.patterns.picture import picture

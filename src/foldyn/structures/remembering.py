@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.materials.crease_damper import damper_branch
+from foldyn.materials.inelastic_law import VARIABLES, Branch, MemoryLaw, memory_of
 from foldyn.materials.law import PARAMETERS
-from foldyn.materials.memory_law import VARIABLES, Branch, MemoryLaw, memory_of
 from foldyn.materials.prony import CODE as MAXWELL
 from foldyn.materials.prony import CreaseDampers, in_series, maxwell
 from foldyn.mechanics.assembly import Assembly
