@@ -11,7 +11,7 @@ from scipy import sparse
 import foldyn as fd
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.term import ContactTerm
-from foldyn.structures.remembering import memory
+from foldyn.structures.inelastic_hinges import memory
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 

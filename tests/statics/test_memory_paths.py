@@ -7,7 +7,7 @@ import pytest
 
 import foldyn as fd
 from foldyn import checks
-from foldyn.structures.remembering import memory
+from foldyn.structures.inelastic_hinges import memory
 from one_hinge import STIFFNESS, WING, moment, one_hinge, opened
 
 LIMIT, HARD = 2e-3, 5e-3  # N m and N m/rad of a hinge 1 m long

@@ -27,8 +27,8 @@ from foldyn.mechanics.contact.boards import BoardSheets
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.patterns.picture import picture
 from foldyn.structures.discretized import read_only
+from foldyn.structures.inelastic_hinges import Remembering, remembering
 from foldyn.structures.mass import center_of_mass, inertia_tensor, row_sums
-from foldyn.structures.remembering import Remembering, remembering
 from foldyn.values import brief, show
 
 

@@ -15,7 +15,7 @@ from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.inelastic_balance import BalancedMemory
 from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.structures.condensed_plates import CondensedPlatesTerm
-from foldyn.structures.remembering import memory
+from foldyn.structures.inelastic_hinges import memory
 from foldyn.values import show
 
 

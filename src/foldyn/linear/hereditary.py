@@ -21,7 +21,7 @@ from scipy import sparse
 from foldyn.algebra.superlu import SingularTangentError, factorize
 from foldyn.cases import Case
 from foldyn.errors import ComputationError
-from foldyn.structures.remembering import memory, remembering
+from foldyn.structures.inelastic_hinges import memory, remembering
 
 MOST = 40  # iterations for a mode
 SETTLED = 1e-11  # relative change of s

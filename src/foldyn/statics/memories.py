@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.materials.inelastic_law import VARIABLES
-from foldyn.structures.remembering import Remembering
-from foldyn.structures.remembering import memory as memory_of
+from foldyn.structures.inelastic_hinges import Remembering
+from foldyn.structures.inelastic_hinges import memory as memory_of
 
 REFUSED, FOLLOWED, AT_REST = "refused", "followed", "at rest"
 
