@@ -16,7 +16,7 @@ from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import NO_POTENTIAL
 from foldyn.statics import OrigamiProblem, trace
 from foldyn.statics.equilibrium import drives, is_actuated
-from foldyn.statics.memories import AT_REST, REFUSED
+from foldyn.statics.path_memory import AT_REST, REFUSED
 from foldyn.statics.problem import Balance, balance
 from foldyn.statics.rigid import free_rigid_motions
 from foldyn.statics.tracing import check_movable, displacement_of

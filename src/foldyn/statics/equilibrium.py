@@ -17,8 +17,8 @@ from foldyn.errors import InputError
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import following_force, following_tangent, joined
-from foldyn.statics.memories import REFUSED, Memories
 from foldyn.statics.moving_planes import Plates
+from foldyn.statics.path_memory import REFUSED, Memories
 from foldyn.statics.problem import EPS
 from foldyn.statics.rigid import Relief
 

@@ -18,8 +18,8 @@ from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.ram_limit import check_memory
 from foldyn.statics.equilibrium import AdaptiveLoad, OrigamiProblem, drives, is_actuated
 from foldyn.statics.mechanism import refuse_mechanisms
-from foldyn.statics.memories import FOLLOWED, flowing
 from foldyn.statics.newton import Settings, Solver, settings_of
+from foldyn.statics.path_memory import FOLLOWED, flowing
 from foldyn.statics.path_methods import METHODS, PathPlan, Until, along, plan_path
 from foldyn.statics.reached import until_of
 from foldyn.statics.recording import record
