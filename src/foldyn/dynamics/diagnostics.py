@@ -1,4 +1,4 @@
-"""What the user is told of a motion that was computed, but perhaps not as it was meant."""
+"""Warnings about motions that were computed but may not be what was meant."""
 
 from __future__ import annotations
 

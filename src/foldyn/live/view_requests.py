@@ -1,4 +1,4 @@
-"""What the viewer computes of a case file: its own analysis, or a quick one of another kind."""
+"""Requests of the viewer: a case file's own analysis, or a quick one of another kind."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A call in a process of its own: if a library crashes on damaged bytes, only that process ends."""
+"""A call in a separate process: if a library crashes on damaged bytes, only that process ends."""
 
 from __future__ import annotations
 

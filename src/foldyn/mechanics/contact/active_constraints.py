@@ -1,4 +1,4 @@
-"""What contact holds where it touches: for the search for mechanisms."""
+"""Directions that contact holds where it touches, for the search for mechanisms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which parts of a sheet can touch, and at which distances: what does not change in a motion.
+"""Parts of a sheet that can touch, and at which distances: what stays the same in a motion.
 
 Parts of one panel never touch. Two panels that share a crease or a corner are near each other by
 nature, so the distance d0 at which a vertex of one feels the other is cut there:

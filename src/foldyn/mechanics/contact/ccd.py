@@ -1,4 +1,4 @@
-"""How far a motion may go before something crosses: the limit of steps that solve equations.
+"""Continuous collision detection: how far a step may go before something crosses.
 
 Explicit methods limit their steps by speeds (`step_limit`). A step of Newton's method is a motion
 without one: nodes and planes go along straight lines, and it is cut so that each gap keeps a share

@@ -1,4 +1,4 @@
-"""What contact keeps from one evaluation to the next: pairs that are near, anchors of friction."""
+"""State of contact between evaluations: pairs that are near, anchors of friction."""
 
 from __future__ import annotations
 

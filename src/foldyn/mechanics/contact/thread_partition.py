@@ -1,4 +1,4 @@
-"""The share of a member of a team of threads in contact.
+"""Partition of the work of contact among the threads of a team.
 
 A member owns nodes, as in `mechanics.strips`: it places them, meets planes with them and finishes
 the force on them. Pairs and guarded hinges are shared by their numbers, whoever owns their nodes.
