@@ -144,3 +144,12 @@ def _cosine_of_the_tilt() -> float:
     """Height 8 s = 100.48 mm of the specimen, b = 25 mm: t = s / sqrt(b^2 - s^2) = cos f tan g."""
     s = 100.48e-3 / 8
     return s / np.sqrt(0.025**2 - s**2) / np.tan(np.radians(60))
+
+
+def test_largest_frequency_of_panels_whose_edges_give_way():
+    """Their turns have no mass and are in balance, as in the motion whose step it limits."""
+    pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
+    sheet = fd.Sheet(1e6, 0.25, 0.01, density=100.0)
+    case = fd.Case(fd.discretize(pattern, sheet, preset="n5b8e"), [fd.Fix("xmin")])
+    step = fd.critical_step(case, method="central_difference")
+    assert step == pytest.approx(MARGIN * 2.0 / largest_frequency(case), rel=1e-6)

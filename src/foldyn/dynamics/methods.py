@@ -28,6 +28,7 @@ from foldyn.dynamics.stability import (
     checked_place,
     damper_rate,
     largest_frequency,
+    massive,
     stability_limit,
 )
 from foldyn.dynamics.system import Packed, scratches
@@ -224,8 +225,7 @@ def suited(name: str, case: Case) -> Integrator:
 
 def with_mass(method: Integrator, case: Case) -> Case:
     """The case for a method: without dofs that have no mass where the method needs one."""
-    other = None if method.massless else case.structure.condensed
-    return case if other is None else case.altered(structure=other)
+    return case if method.massless else massive(case)
 
 
 def lacking(method: Integrator, case: Case) -> str:

@@ -84,7 +84,14 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     once.
     """
     u = checked_place(of_kind("case", case, Case), u)
+    case = massive(case)
     return float(np.sqrt(max(_largest_quotient(case, _tangent(case, u)), 0.0)))
+
+
+def massive(case: Case) -> Case:
+    """The case without dofs that have no mass, if its structure can balance them."""
+    other = case.structure.condensed
+    return case if other is None else case.altered(structure=other)
 
 
 def checked_place(case: Case, u: ArrayLike | None) -> NDArray[np.float64] | None:
