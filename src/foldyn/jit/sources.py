@@ -39,7 +39,7 @@ _DECORATOR = re.compile(r"@(\w+)")
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _NO_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")  # variables that leave the code as it is
 # where kernels are kept leaves their code as it is; the rest of `jit` may change Numba itself
-_KEEPING, _COMPILING = ("kept.py", "sources.py"), PACKAGE / "jit"
+_KEEPING, _COMPILING = ("kernel_cache.py", "sources.py"), PACKAGE / "jit"
 _COMPILERS = ("foldyn.jit.compiled", "foldyn.mechanics.term")  # modules with decorators of kernels
 _NO_CODE_IN = ("from ", "import ", "if TYPE_CHECKING:")  # how statements begin that are no code
 _READ: set[Path] = set()

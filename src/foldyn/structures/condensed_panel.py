@@ -161,7 +161,8 @@ def panel_mass(panel: Outline, poissons_ratio: float) -> NDArray:
     out = extrapolated(less, more, FINE / COARSE)
     # what is linear over the panel to the last digit, as its facets have it
     edges = np.roll(x[: len(panel.corners)], -1, axis=0) - x[: len(panel.corners)]
-    level = null_space(edges[list(panel.clamped)] @ [[0.0, -1.0], [1.0, 0.0]])
+    across = edges[list(panel.clamped)] @ [[0.0, -1.0], [1.0, 0.0]]
+    level = null_space(across) if len(across) else np.eye(2)  # SciPy below 1.15 takes no empty one
     linear = np.column_stack([np.ones(len(x)), x @ level])
     along = linear @ np.linalg.pinv(linear)
     facets = np.array(facets_of(x, len(panel.corners)))[: None if panel.center else 1]
