@@ -43,7 +43,7 @@ def sweep_of(case, parameters, values, method="grid", **facts) -> xr.Dataset:
     if own:
         coordinates["mode"] = 1 + np.arange(np.shape(values)[-1])
     facts = {"method": method, "points": int(np.prod(shape)), "failed": 0, **facts}
-    return fd.results.swept.sweep_dataset(case, data, coordinates, facts)
+    return fd.results.sweep_dataset.sweep_dataset(case, data, coordinates, facts)
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ neither time nor code, and a tuple in it is passed on as an address. No referenc
 whoever holds the `Context` keeps all arrays alive.
 
 The layout is known to the type of a context alone, `ContextType`, whose `types` tell the store of
-kernels (`jit.kept`) all fields of the tuple.
+kernels (`jit.kernel_cache`) all fields of the tuple.
 """
 
 from __future__ import annotations

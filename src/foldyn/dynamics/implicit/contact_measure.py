@@ -37,7 +37,7 @@ class Move(NamedTuple):
     second: NDArray  # (12, 12) its second derivative there,
     after: NDArray  # (12,) its gradient at the end,
     gradient: NDArray  # (12,) its discrete gradient
-    weights: NDArray  # (4,) of a distance; see `mechanics.contact.second`
+    weights: NDArray  # (4,) of a distance; see `mechanics.contact.distance_hessian`
     moves: NDArray  # (2, 4)
     apart: NDArray  # (3,) m
 

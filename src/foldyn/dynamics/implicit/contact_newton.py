@@ -2,7 +2,7 @@
 
 The potential of contact has no value where something has passed another, and grows without bound
 before it. So the prediction of a step and every iteration are cut to the share in which no gap
-closes by more than a part of itself (`mechanics.contact.approach`), and then to where the residual
+closes by more than a part of itself (`mechanics.contact.ccd`), and then to where the residual
 along the iteration is no longer large on the other side: there the energy has passed its least
 value. Where none of this leads to equilibrium the step is refused, and halved.
 

@@ -153,7 +153,7 @@ class Scheme(ABC):
     def plane_push(self, before: NDArray, after: NDArray) -> NDArray:
         """Gradient of friction and normal force, both N, that do the work of planes in a step.
 
-        before, after : (q, n, 4) at its ends; see `mechanics.contact.memory`.
+        before, after : (q, n, 4) at its ends; see `mechanics.contact.contact_state`.
         """
         return 0.5 * (before + after)
 

@@ -27,7 +27,7 @@ from foldyn.mechanics.contact.ties import lay_ties, take_ties
 class Friction:
     """Where the springs of friction are tied, which changes in place.
 
-    It commits, takes snapshots and recalls them as `mechanics.hinge_memory.HingeMemory` does.
+    It commits, takes snapshots and recalls them as `mechanics.inelastic_branches.HingeMemory` does.
 
     Parameters
     ----------
