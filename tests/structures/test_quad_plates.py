@@ -105,7 +105,8 @@ def by_triangles(x, creased):
     """Flexibility of the twist and of the edges that are creases and straight."""
     x = x - x.mean(axis=0)
     flags = tuple(k in creased for k in range(4))
-    panel = Outline(tuple(map(tuple, x.tolist())), (0.0, 0.0), flags, flags, (False,) * 4)
+    none = (False,) * 4
+    panel = Outline(tuple(map(tuple, x.tolist())), (0.0, 0.0), flags, flags, none, none)
     stiffness = panel_stiffness(panel, 0.25)
     turns, slopes = facets(x)
     count = len(creased)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import runpy
 from dataclasses import replace
 from pathlib import Path
 
@@ -196,11 +195,6 @@ def test_motions_that_fail_are_told():
     assert (first.note, second.note) == ("", "the fold is not reached")
     assert third.alike == pytest.approx((1.0,) * len(third.alike))
     assert [run.note for run in runs(started(shell=bad, b=good))] == ["the fold is not reached"]
-
-
-def test_tables_of_the_page_are_those_of_the_results():
-    script = runpy.run_path(str(DOCS / "fidelity_tables.py"))
-    assert {"motions", "motion cases"} <= set(script["TABLES"])
 
 
 def test_the_command(tmp_path, monkeypatch, capsys):

@@ -188,21 +188,3 @@ def _summary(rows: list[Beside]) -> str:
     near, middle, most = (f"{value:.3g} %" for value in shares)
     good = f"{100 * (alike > ALIKE).mean():.0f} %"
     return f"{len(rows)} | {near} | {middle} | {most} | {np.median(alike):.3f} | {good}"
-
-
-def by_case(found: list[Run]) -> str:
-    """Errors of the mean period of every run, in Markdown."""
-    starts = {k: v for k, v in grouped(found).items()}
-    models = [m for m in next(iter(starts.values())) if m != SHELL]
-    lines = [f"| case | start | {' | '.join(models)} |", "|---|---|" + "---|" * len(models)]
-    for (case, start), every in starts.items():
-        cells = _cells(every, models) if told(every[SHELL]) else ["no period"] * len(models)
-        lines.append(f"| {case} | {start} | {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
-def _cells(every: Mapping[str, Run], models: Iterable[str]) -> list[str]:
-    rows = [beside(every[SHELL], every[model]) for model in models]
-    return [
-        f"{100 * b.error:+.1f} %, {b.mac:.2f}" if np.isfinite(b.error) else "none" for b in rows
-    ]
