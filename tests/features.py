@@ -159,14 +159,17 @@ def reason(said: str) -> str:
 
 
 def table() -> str:
-    """The table of the page, with the reasons that it has."""
+    """What works with all methods, and the table of the rest with the reasons that it has."""
     said, used = refusals(), set[str]()
-    lines = ["| | " + " | ".join(f"`{name}`" for name in COLUMNS) + " |"]
+    whole = [name for name in FEATURES if not any(said[name, one] for one in COLUMNS)]
+    lines = [f"With all methods: {'; '.join(whole)}.", ""]
+    lines.append("| | " + " | ".join(f"`{name}`" for name in COLUMNS) + " |")
     lines.append("|---" * (1 + len(COLUMNS)) + "|")
     for name in FEATURES:
-        cells = [reason(said[name, one]) if said[name, one] else "yes" for one in COLUMNS]
-        used.update(cells)
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+        if name not in whole:
+            cells = [reason(said[name, one]) if said[name, one] else "yes" for one in COLUMNS]
+            used.update(cells)
+            lines.append(f"| {name} | " + " | ".join(cells) + " |")
     notes = [f"- **{letter}**: {text}." for letter, (_, text) in REASONS.items() if letter in used]
     return "\n".join([*lines, "", *notes]) + "\n"
 
