@@ -145,7 +145,7 @@ STAGES: Sequence[Uses] = (
         "panels as plates": [
             partial(vibrating, model="n5b8e"),
             partial(moved, "rk4", "newmark", model="n5b8e"),
-            partial(vibrating, membrane="bars"),
+            partial(vibrating, membrane="bars", bend_law="superlinear", calibration="standard"),
             partial(moved, "rk4", "newmark", membrane="bars"),
         ],
         "shells": [partial(vibrating, model="shell"), partial(moved, "newmark", model="shell")],
@@ -179,7 +179,9 @@ STAGES: Sequence[Uses] = (
             partial(moved, CONSERVING, membrane="bars"),
             partial(moved, CONSERVING, model="shell"),
             partial(moved, CONSERVING, supports=MOVING, loads=[*TURNING, *FOLLOWING]),
-            partial(moved, CONSERVING, damping=[fd.StrainDamping(1e-5)], supports=DASHPOTS),
+            partial(
+                moved, CONSERVING, damping=[*DAMPED, fd.ModalDamping(0.05, 4)], supports=DASHPOTS
+            ),
             partial(moved, CONSERVING, law=PRONY),
         ],
         "contact in implicit methods and paths": [
