@@ -15,11 +15,10 @@ from foldyn.structures.plate_frequency import BELOW, plate_frequency
 from foldyn.studies.fidelity import __main__ as command
 from foldyn.studies.fidelity import independent
 from foldyn.studies.fidelity.cases import FidelityCase, documented, polygons, supports
-from foldyn.studies.fidelity.compare import MODELS, compare, first_modes
+from foldyn.studies.fidelity.compare import MODELS, compare, first_modes, reference
 from foldyn.studies.fidelity.drawn import drawn, sheets
 from foldyn.studies.fidelity.internal import AMPLITUDES
 from foldyn.studies.fidelity.large import twisted, under_loads
-from foldyn.studies.fidelity.reference import reference
 from foldyn.studies.fidelity.statics import study
 from foldyn.studies.fidelity.stored import (
     RESULTS,

@@ -1,4 +1,4 @@
-"""What damps a case beside drag, as terms: dashpots, creases, strains, beta K0, modes.
+"""The damping of a case, except drag, as terms: dashpots, creases, strains, beta K0, modes.
 
 Dashpots with a direction of their own, and those that act in any direction from the ground, have a
 constant matrix. Dashpots along the line between their nodes and creases are `mechanics.viscous`.

@@ -318,7 +318,11 @@ class Assembly:
         body = Assembly(sheet)
         for term in self.others:
             body = body.with_terms(term.placed(order, body))
-        return body, Numbering(order, ranks(order), self.rows)
+        return body, self.numbering(order)
+
+    def numbering(self, order: NDArray) -> Numbering:
+        """Of its dofs when node order[k] stands at place k in memory."""
+        return Numbering(order, ranks(order), self.rows)
 
     def nominal(self, q: NDArray) -> Assembly:
         """The same with hinges as stiff as they are meant to be, about their angles at q."""

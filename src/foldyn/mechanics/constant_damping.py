@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.context import Context, numbers_at
-from foldyn.mechanics.assembly import Assembly, Numbering
-from foldyn.mechanics.model import ranks
+from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.term import FORCES, Compiled, Term, forces
 from foldyn.mechanics.threads import Team, wait
 
@@ -85,7 +84,7 @@ class DampingMatrix(Term):
 
     def placed(self, order: NDArray, before: Assembly) -> DampingMatrix:
         """See `Term`."""
-        return DampingMatrix(Numbering(order, ranks(order), before.rows).matrix(self.matrix))
+        return DampingMatrix(before.numbering(order).matrix(self.matrix))
 
 
 class DampingRows(Term):
@@ -103,6 +102,5 @@ class DampingRows(Term):
     def placed(self, order: NDArray, before: Assembly) -> DampingRows:
         """See `Term`."""
         rows = np.zeros((len(self.rows), 3 * before.rows))
-        by = Numbering(order, ranks(order), before.rows)
-        rows[:, by.dofs(np.arange(self.rows.shape[1]))] = self.rows
+        rows[:, before.numbering(order).dofs(np.arange(self.rows.shape[1]))] = self.rows
         return DampingRows(rows)

@@ -100,7 +100,7 @@ class HingeMemory(Term):
     @cached_property
     def _coupled(self) -> tuple[NDArray, NDArray, NDArray]:
         mine = np.ones(self.own.dofs.shape, bool)
-        mine[:, 12:] = self.own.hidden_turn > 0.0
+        mine[:, 12:] = self.own.hidden_turn != 0.0
         return coupled(self.own.dofs, mine)
 
     @property

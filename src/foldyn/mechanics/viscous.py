@@ -20,9 +20,8 @@ from scipy import sparse
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at
-from foldyn.mechanics.assembly import Assembly, Numbering
+from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.dihedral import dihedral_gradient
-from foldyn.mechanics.model import ranks
 from foldyn.mechanics.sheet_term import NO_DOF
 from foldyn.mechanics.term import FORCES, Compiled, Term, forces
 
@@ -193,7 +192,7 @@ class ViscousTerm(Term):
     def _coupled(self) -> tuple[NDArray, NDArray, NDArray]:
         axial, own = len(self.elements.axial), np.ones(self.elements.dofs.shape, bool)
         own[:axial, 6:] = False
-        own[axial:, 12:] = self.elements.hidden_turn > 0.0
+        own[axial:, 12:] = self.elements.hidden_turn != 0.0
         return coupled(self.elements.dofs, own)
 
     @property
@@ -220,5 +219,5 @@ class ViscousTerm(Term):
 
     def placed(self, order: NDArray, before: Assembly) -> ViscousTerm:
         """See `Term`."""
-        by = Numbering(order, ranks(order), before.rows)
-        return ViscousTerm(self.elements._replace(dofs=by.dofs(self.elements.dofs)))
+        dofs = before.numbering(order).dofs(self.elements.dofs)
+        return ViscousTerm(self.elements._replace(dofs=dofs))

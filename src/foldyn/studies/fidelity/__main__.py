@@ -14,10 +14,10 @@ import sys
 from pathlib import Path
 
 from foldyn.studies.fidelity.cases import documented
+from foldyn.studies.fidelity.compare import reference
 from foldyn.studies.fidelity.drawn import COUNT, COUNT_SHEETS, SEED, drawn, sheets
 from foldyn.studies.fidelity.internal import first_table, modes_first
 from foldyn.studies.fidelity.large import large_table
-from foldyn.studies.fidelity.reference import reference
 from foldyn.studies.fidelity.statics import statics_table
 from foldyn.studies.fidelity.stored import RESULTS, modes_below, table, write
 

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 
 from foldyn.errors import FoldynWarning
 from foldyn.linear.matched import SPARE, Shown, matched
-from foldyn.linear.reference import Reference, modes_at_rest
+from foldyn.linear.reference import DIVISIONS, Reference, modes_at_rest, reference_modes
+from foldyn.shells import shell
 from foldyn.structures import Structure, discretize
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
 from foldyn.structures.presets import resolved
@@ -33,6 +34,7 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
 `mixed_voronoi` on all others."""
 COMPARED = 8  # modes of the shell, at most
 FIRST = 5  # that are compared whatever their frequency
+REFERENCE = 10  # modes of the shell that are computed
 
 
 class Row(NamedTuple):
@@ -56,6 +58,16 @@ class Row(NamedTuple):
     over_plate: float
     error: float
     mac: float
+
+
+def reference(case: FidelityCase) -> Reference:
+    """Modes of a case by the shell, frequencies extrapolated with the square of the mesh size."""
+    pattern, sheet = case.pattern(), case.sheet
+    cases = [
+        case.case(shell(pattern, sheet, divisions=n, mass="consistent"))
+        for n in (DIVISIONS[0] // 2, *DIVISIONS)
+    ]
+    return reference_modes(cases, REFERENCE)
 
 
 def structure_of(case: FidelityCase, model: str) -> Structure:

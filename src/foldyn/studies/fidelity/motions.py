@@ -32,10 +32,10 @@ from foldyn.structures import discretize
 from foldyn.structures.presets import resolved
 from foldyn.studies import find_case
 from foldyn.studies.fidelity.cases import FidelityCase, documented
+from foldyn.studies.fidelity.compare import reference
 from foldyn.studies.fidelity.cycles import Cycles, NoCyclesError, cycles
 from foldyn.studies.fidelity.large import LAWS
 from foldyn.studies.fidelity.motion_results import SHELL, STORED, Run, summaries, write
-from foldyn.studies.fidelity.reference import reference
 from foldyn.studies.fidelity.release import Release, vertex_mass
 from foldyn.studies.fidelity.statics import STUDIES
 
