@@ -10,7 +10,7 @@ from pathlib import Path
 from foldyn.studies.fidelity import motion_results as motions
 from foldyn.studies.fidelity.internal import first_table
 from foldyn.studies.fidelity.mixed_models import counted, gap_table, mixed_table
-from foldyn.studies.fidelity.stored import RESULTS, columns, read, summary, table
+from foldyn.studies.fidelity.stored import RESULTS, columns, read, summary
 
 PAGE = Path(__file__).with_name("fidelity.md")
 SHOWN = ("plate, consistent", "n5b8e, condensed", "standard, mixed_voronoi")
@@ -40,14 +40,26 @@ def without(table: str, *left_out: str) -> str:
 
 TABLES = {
     "sets": sets,
-    "documented": lambda: table(of("documented")),
-    "mixed": lambda: without(mixed_table(counted()), "`n5b8e, bars`"),
+    "mixed": lambda: without(
+        mixed_table(counted()),
+        "`n5b8e, bars`",
+        "| free |",
+        "| one edge |",
+        "| two edges |",
+        "| corners |",
+    ),
     "gaps": lambda: gap_table(of("gaps")),
     "internal": lambda: without(
         first_table(of("documented_internal") + of("drawn_internal")), "| 1 |"
     ),
     "motions": lambda: without(
-        motions.summaries(motions.read()), "| n5b8e, linear |", "| plate, plate_superlinear |"
+        motions.summaries(motions.read()),
+        "| n5b8e, linear |",
+        "| plate, plate_superlinear |",
+        "degrees | standard",
+        "degrees | plate",
+        "pulses | standard",
+        "pulses | plate",
     ),
 }
 
