@@ -1,7 +1,7 @@
 """A stack of thick boards that falls shut: they come to rest on each other, a thickness apart.
 
 Run it to print the table and draw the picture of docs/sheets.md:
-python examples/thick_contact.py docs/images
+python docs/stack_figures.py docs/images
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """All patterns of Foldyn, flat and folded.
 
-Run it to draw the pictures of docs/patterns.md:  python examples/patterns.py docs/images
+Run it to draw the pictures of docs/patterns.md:  python docs/pattern_figures.py docs/images
 """
 
 from __future__ import annotations

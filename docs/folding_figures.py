@@ -1,7 +1,7 @@
 """Crease patterns, folded from flat by their mountains and valleys.
 
 Run it to print how well each folds and draw the pictures of docs/folding.md:
-python examples/folding.py docs/images
+python docs/folding_figures.py docs/images
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import foldyn as fd
-from foldyn.plots import draw_folding, scene, style
+from foldyn.plots import scene, style
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, edge_keys
 
@@ -20,7 +20,7 @@ VIEW = View(38.0, -62.0)
 CELL, COLUMNS = 1.6, 3  # inches; patterns beside each other
 BENDS = "square twist, valleys in the middle"
 """The pattern whose panels must bend."""
-FILES = Path(__file__).parent / "patterns"
+FILES = Path(__file__).parents[1] / "examples" / "patterns"
 PATTERNS = {
     "Miura-ori": (fd.read_pattern(FILES / "miura.fold"), 0.75),
     "waterbomb": (fd.read_pattern(FILES / "waterbomb.fold"), 0.6),
@@ -89,13 +89,6 @@ def draw(results: dict, folder: Path) -> None:
     style.finish(figure, keys).savefig(folder / "folding.png", dpi=90)
 
 
-def draw_crane(folder: Path) -> None:
-    """The crane, opened from its flat state by panels that bend."""
-    flat = fd.read_pattern(FILES / "crane.fold").rotated(45.0)
-    crane = fd.fold(flat, fraction=0.8, start="folded", panels="subdivided")
-    draw_folding(crane, view=(50.0, -75.0)).savefig(folder / "crane.png", dpi=90)
-
-
 if __name__ == "__main__":
     _, computed = compute()
     check(computed)
@@ -103,4 +96,3 @@ if __name__ == "__main__":
         print(row(title, one))
     pictures = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
     draw(computed, pictures)
-    draw_crane(pictures)

@@ -1,6 +1,6 @@
 """Contact in statics: a folded Miura sheet that two plates press to a block.
 
-Run it to draw the pictures of the page on contact:  python examples/contact_press.py docs/images
+Run it to draw the pictures of the page on contact:  python docs/press_figures.py docs/images
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 The crane is folded on paper: every panel of the bird base is kept where it lies on the square and
 where it lies when it is folded, and each fold cuts the panels along a line in the folded state and
 reflects what is beyond it. Run it to write the files:
-python examples/crease_patterns.py examples/patterns
+python examples/patterns/make.py examples/patterns
 """
 
 from __future__ import annotations
@@ -209,7 +209,7 @@ def compute() -> tuple[dict, dict]:
 def check(patterns: dict) -> None:
     """The files are those that the code makes, and bird base and crane lie flat in some order."""
     for name, pattern in patterns.items():
-        stored = fd.read_pattern(Path(__file__).parent / "patterns" / f"{name}.fold")
+        stored = fd.read_pattern(Path(__file__).parent / f"{name}.fold")
         assert stored.faces == pattern.faces, name
         assert stored.assignments == pattern.assignments, name
         assert np.allclose(stored.vertices, pattern.vertices, atol=1e-12), name

@@ -1,7 +1,7 @@
 """The case studies and the specimen of Herkal et al., loaded slowly.
 
 Run it to print the tables and draw the pictures of docs/statics.md:
-python examples/quasi_static.py docs/images
+python docs/statics_figures.py docs/images
 """
 
 from __future__ import annotations
@@ -144,16 +144,11 @@ def more_tables(results: dict) -> str:
 
 
 def draw(case, results: dict, folder: Path) -> None:
-    """The specimen's forces and shape, and the two snap-throughs of the gallery."""
+    """The specimen's forces and shape, and the snap-through of a Miura vertex."""
     paths = {"without weight": results["specimen"], "with its weight": results["heavy"]}
     fd.plots.plot_reaction(paths, TOP, "x").savefig(folder / "specimen-force.png", dpi=90)
     shapes = fd.plots.draw_shapes(case, results["specimen"], [0, -1])
     shapes.savefig(folder / "specimen-shapes.png", dpi=80)
-    tower, path = shipped("gallery/kresling")
-    fd.plots.plot_load_displacement(path, [6], "-z").savefig(folder / "kresling-curve.png", dpi=90)
-    fd.plots.draw_shapes(tower, path, 3).savefig(folder / "kresling-shapes.png", dpi=80)
-    landscape = fd.plots.plot_landscape(fd.landscape(path))
-    landscape.savefig(folder / "kresling-landscape.png", dpi=90)
     _, path = shipped("gallery/miura-popthrough")
     fd.plots.plot_load_displacement(path, [24], "-z").savefig(
         folder / "popthrough-curve.png", dpi=90
