@@ -50,7 +50,11 @@ TABLES = {
     ),
     "gaps": lambda: gap_table(of("gaps")),
     "internal": lambda: without(
-        first_table(of("documented_internal") + of("drawn_internal")), "| 1 |"
+        first_table(of("documented_internal") + of("drawn_internal")),
+        "| 1 |",
+        "6 |",
+        "to 1 |",
+        "above",
     ),
     "motions": lambda: without(
         motions.summaries(motions.read()),
