@@ -52,9 +52,9 @@ TABLES = {
     "internal": lambda: without(
         first_table(of("documented_internal") + of("drawn_internal")),
         "| 1 |",
-        "6 |",
-        "to 1 |",
-        "above",
+        "| below 0.6 |",
+        "| 0.6 to 1 |",
+        "| above 1 |",
     ),
     "motions": lambda: without(
         motions.summaries(motions.read()),
