@@ -276,11 +276,10 @@ def test_what_a_swinging_panel_and_a_twisting_one_make_of_a_rule():
         return float(fd.modes(fd.Case(s, [fd.Fix(held, "xyz")]), 1).frequency[0])
 
     true = np.sqrt(1e-6 / (0.01 / 3.0)) / (2 * np.pi)  # a panel of 0.01 kg and 1 m
-    rows = re.findall(r"^\| ((?:`\w+`(?:, )?)+) \| ([\d.]+) % \|$", page, re.M)
-    assert len(rows) == 5
-    for names, percent in rows:
-        for rule in re.findall(r"\w+", names):
-            assert 100 * swing(rule) / true == pytest.approx(float(percent), abs=0.06), rule
+    rows = re.findall(r"([\d.]+) % with `(\w+)`", page)
+    assert len(rows) == 4
+    for percent, rule in rows:
+        assert 100 * swing(rule) / true == pytest.approx(float(percent), abs=0.06), rule
     corners = fd.Pattern([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2, 3]])
     for rule, twist in (("consistent", 6), ("inertia_exact", 3)):
         mass = fd.discretize(corners, sheet, mass=rule).mass
