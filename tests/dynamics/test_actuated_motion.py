@@ -46,16 +46,6 @@ def test_energy_of_a_fold_that_opens_itself(law):
     assert observed_order(0.6 / steps, errors) > 3.5
 
 
-def test_a_free_fold_comes_to_rest_at_its_new_angle():
-    """Nothing holds it: the dihedral of the crease becomes the rest angle and no energy stays."""
-    go = fd.Actuate([0], 200.0, fd.Ramp(duration=3.0, smooth=True))
-    case = fd.Case(fold(), loads=[go], damping=fd.Rayleigh(alpha=6.0))
-    motion = fd.simulate(case, 12.0, every=1.0)
-    folds, _ = case.structure.dihedrals(motion.displacement[-1])
-    assert np.degrees(folds[0]) == pytest.approx(200.0, abs=0.05)
-    assert float(motion.strain_folds[-1]) < 1e-5 * float(motion.work[-1])
-
-
 @pytest.mark.parametrize("law", LAWS)
 def test_a_constant_actuation_is_another_rest_angle(law):
     """The same motion as of a structure made with these rest angles."""
