@@ -53,7 +53,7 @@ def order(steps, errors) -> float:
 
 
 def decay(case: fd.Case, method: str, number: int = 0) -> tuple[float, float]:
-    """Damping ratio of a small free vibration in a mode over that of the mode; energy error."""
+    """Damping ratio of a small free vibration in a mode, and the energy error."""
     mode = fd.modes(case, number + 1).isel(mode=number)
     shape, period = mode["shape"].values, 1.0 / float(mode.frequency)
     start = fd.State(1e-6 * shape / np.abs(shape).max())
@@ -61,5 +61,4 @@ def decay(case: fd.Case, method: str, number: int = 0) -> tuple[float, float]:
     motion = fd.simulate(case, 3 * period, method, initial=start, every=period / 40, **numeric)
     modal = np.einsum("tna,na->t", motion.displacement.values, case.structure.mass @ shape)
     fit = matrix_pencil(modal, period / 40, 2)
-    ratio = fit.damping_ratio[np.argmax(fit.amplitude)]
-    return ratio / (float(mode.damping_ratio) or 1.0), motion.attrs["energy_error"]
+    return fit.damping_ratio[np.argmax(fit.amplitude)], motion.attrs["energy_error"]

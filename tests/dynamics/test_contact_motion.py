@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from contact_cases import G, folded_from_both_ends, on_slope, tower, two_sheets, without_step_limit
 from measured import drift, energy, momenta, order
-from moving_sheets import EXPLICIT
+from moving_sheets import EXPLICIT, steps_of
 
 import foldyn as fd
-from contact_sheets import SHEET, crossing, strip
+from contact_sheets import SHEET, crossing, on_a_panel, strip
+from foldyn.dynamics import METHODS
 from foldyn.errors import ComputationError, FoldynWarning, InputError, PenetrationError
 from foldyn.mechanics.contact import term
 from foldyn.viewer.fields import fields
@@ -279,3 +280,71 @@ def test_a_relaxing_fold_falls_on_a_plane_and_its_energies_balance():
     assert 0.0 < height.min() < 0.5e-3  # within half the thickness, and not through
     without = fd.simulate(case.altered(contact=None), 0.005, method="rk4", every=0.005)
     assert fallen.displacement.values[1] == pytest.approx(without.displacement.values[-1], abs=1e-9)
+
+
+# ------------------------------------------------------------------ friction between panels
+RUBBING = [name for name in METHODS if name != "newmark"]
+
+
+def on_panel_slope(angle: float, alpha: float = 0.0) -> tuple[fd.Case, list[int]]:
+    """A strip that lies, turned a little, on a panel that leans by some degrees."""
+    s, strip = on_a_panel(shift=(0.013, 0.007), turn=0.3)
+    a = np.radians(angle)
+    held = fd.Fix(np.setdiff1d(np.arange(len(s.nodes)), strip))
+    gravity = fd.Gravity((G * np.sin(a), 0, -G * np.cos(a)))
+    contact = fd.Contact(friction=0.3)
+    return fd.Case(s, [held], [gravity], fd.Rayleigh(alpha=alpha), contact=contact), strip
+
+
+def slid(case: fd.Case, strip: list[int], run) -> tuple[np.ndarray, float]:
+    """How far the strip's center of mass has gone along the slope, m, and its mass, kg."""
+    mass = case.structure.mass.toarray()[np.ix_(strip, strip)].sum(axis=1)
+    return run.displacement.values[:, strip, 0] @ mass / mass.sum(), mass.sum()
+
+
+@pytest.mark.thorough
+@pytest.mark.filterwarnings("ignore:contact. at rest panels are nearer")
+@pytest.mark.parametrize("method", RUBBING)
+def test_a_strip_slides_above_the_angle_of_friction(method):
+    """A slope of 20 degrees; friction of 0.3 holds up to 16.7. The strip passes inner sides."""
+    case, strip = on_panel_slope(20.0)
+    run = fd.simulate(case, 0.2, method=method, every=2e-3, **steps_of(method, 1e-4))
+    a, (way, mass) = np.radians(20.0), slid(case, strip, run)
+    assert way[-1] == pytest.approx(0.5 * G * (np.sin(a) - 0.3 * np.cos(a)) * 0.2**2, rel=0.02)
+    taken = 0.3 * mass * G * np.cos(a) * way[-1]
+    assert float(run.dissipated[-1]) == pytest.approx(taken, rel=0.03)
+    assert run.attrs["energy_error"] < 1e-2
+
+
+@pytest.mark.thorough
+@pytest.mark.filterwarnings("ignore:contact. at rest panels are nearer")
+@pytest.mark.parametrize("method", RUBBING)
+def test_a_strip_sticks_below_the_angle_of_friction(method):
+    """A slope of 15 degrees: where it has come to rest it stays, for good."""
+    case, strip = on_panel_slope(15.0, alpha=200.0)
+    run = fd.simulate(case, 0.4, method=method, every=2e-3, **steps_of(method, 1e-4))
+    way = slid(case, strip, run)[0]
+    assert abs(way[-1] - way[100]) < 1e-11
+    assert 0.0 < way[-1] < 1e-5
+
+
+@pytest.mark.parametrize("method", ["dormand_prince", "energy_momentum"])
+def test_sheets_that_collide_askew_keep_both_momenta_and_lose_what_friction_takes(method):
+    s, upper = two_sheets()
+    v = np.zeros_like(s.nodes)
+    v[upper] = 1.0, 0.5, -2.0
+    runs = {
+        mu: fd.simulate(
+            fd.Case(s, contact=fd.Contact(friction=mu)), 0.02, method=method, every=1e-4,
+            initial=fd.State(velocity=v), **steps_of(method, 1e-4),
+        )
+        for mu in (0.0, 0.5)
+    }  # fmt: skip
+    for mu, run in runs.items():
+        assert max(map(drift, momenta(s, run))) < 1e-7
+        assert run.attrs["energy_error"] < 1e-4
+        lost = float(run.dissipated[-1]) / float(run.kinetic[0])
+        assert lost > 1e-3 if mu else abs(lost) < 1e-12
+    # friction takes the upper sheet's speed across, and gives it to the lower one
+    across = [run.velocity.values[-1][~upper, 0].mean() for run in runs.values()]
+    assert across[1] > across[0] + 0.05

@@ -98,7 +98,7 @@ def states(radius: float | None, wh: float, damping: float, count: int) -> np.nd
 @pytest.mark.usefixtures("unaudited")
 @pytest.mark.filterwarnings("ignore:the energy balance")
 @pytest.mark.parametrize("damping", [0.0, 0.2])
-@pytest.mark.parametrize("wh", [0.5, 10.0, 3000.0])
+@pytest.mark.parametrize("wh", [0.5, 10.0, 1e4])
 @pytest.mark.parametrize(("method", "radius"), [("newmark", None), ("generalized_alpha", 0.6)])
 def test_steps_are_those_of_the_amplification_matrix(method, radius, wh, damping):
     """Every state of a computed motion is the matrix times the last one."""
@@ -111,20 +111,6 @@ def test_steps_are_those_of_the_amplification_matrix(method, radius, wh, damping
     np.testing.assert_allclose(place(motion), exact[:, 0], rtol=1e-6, atol=1e-10)
     v = motion.velocity.values[:, 1, 0] * dt
     np.testing.assert_allclose(v, exact[:, 1], rtol=1e-6, atol=1e-10 * max(1.0, wh))
-
-
-@pytest.mark.usefixtures("unaudited")
-@pytest.mark.filterwarnings("ignore:the energy balance")
-@pytest.mark.parametrize(("radius", "first", "last"), [(0.2, 4, 9), (0.5, 6, 20), (0.8, 20, 60)])
-def test_high_frequencies_die_out_with_the_radius(radius, first, last):
-    """Observed at w h = 1e4: the decay per step is the radius."""
-    case, dt, n = spring(OMEGA), 1e4 / OMEGA, np.arange(first, last)
-    options = {"dt": dt, "spectral_radius": radius, "initial": released(1e-4)}
-    x = np.abs(place(fd.simulate(case, last * dt, "generalized_alpha", **options)))[n]
-    np.testing.assert_allclose(x, np.abs(states(radius, 1e4, 0.0, last)[n, 0]), rtol=1e-3)
-    # a triple eigenvalue: |x| = r^n times a parabola in n
-    parabola = np.polyfit(n, x / radius**n, 2)
-    assert np.abs(np.polyval(parabola, n) * radius**n / x - 1.0).max() < 0.02
 
 
 @pytest.mark.filterwarnings("ignore:steps of 0.5 s do not resolve")

@@ -92,15 +92,6 @@ def test_constant_force_and_its_reaction():
     np.testing.assert_allclose(motion.reaction.values[:, held][:, 0], -K * x, atol=1e-10)
 
 
-def test_harmonic_force():
-    """Forced far from resonance: particular plus free motion."""
-    w = 2.0 * np.pi * 1.5
-    motion = fd.simulate(pulled(SPRING, 0.4, fd.Harmonic(frequency=1.5)), 3.0, dt=1e-3)
-    t = motion.time.values
-    exact = 0.4 / MASS / (OMEGA**2 - w**2) * (np.sin(w * t) - w / OMEGA * np.sin(OMEGA * t))
-    np.testing.assert_allclose(place(motion), exact, atol=1e-9)
-
-
 def test_histories_are_evaluated_at_stage_times():
     """The times are t_n + c dt with t_n = n dt, to the last bit."""
     seen = []

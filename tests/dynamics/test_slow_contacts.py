@@ -34,10 +34,8 @@ def curvature(x):
 
 def pressed(mass: str):
     """A packed case in which a strip lies on a panel and a corner on the ground."""
-    s = on_a_panel()[0]
-    s = fd.discretize(s.pattern, SHEET, fold_law="linear", mass=mass)
-    ground = fd.Plane((0, 0, -DEPTH), (0.0, 0.0, 1.0))
-    contact = fd.Contact(planes=[ground])
+    s = fd.discretize(on_a_panel()[0].pattern, SHEET, fold_law="linear", mass=mass)
+    contact = fd.Contact(planes=[fd.Plane((0, 0, -DEPTH), (0.0, 0.0, 1.0))])
     return pack(fd.Case(s, damping=fd.Rayleigh(alpha=ALPHA), contact=contact), 1e-4)
 
 
@@ -48,19 +46,15 @@ def test_accelerations_are_those_of_the_mass_with_the_inertia_of_contacts(mass):
     u = np.zeros((len(order), 3))
     contact = body.find(ContactTerm)
     contact.contact(u)
-    kept = contact.memory
+    kept, counts = contact.memory, []
     added = room_for(contact.tables, kept)
-    arguments = contact.tables, added, u, DT, 0.7, system.lightness, kept
-    kept.facts.resolved = 0.0
-    added_inertia(*arguments)
-    count, pairs = int(added.count[0]), kept.counts.near_first + kept.counts.near_second
-    assert count > len(contact.tables.meeting) - 8 and pairs > 0
-    kept.facts.resolved = DT
-    added_inertia(*arguments)
-    assert added.count[0] == 0
-    kept.facts.resolved = 0.0
-    added_inertia(*arguments)
-    assert added.count[0] == count
+    for resolved in (0.0, DT, 0.0):
+        kept.facts.resolved = resolved
+        added_inertia(contact.tables, added, u, DT, 0.7, system.lightness, kept)
+        counts.append(int(added.count[0]))
+    count = counts[0]
+    assert counts == [count, 0, count] and count > len(contact.tables.meeting) - 8
+    assert kept.counts.near_first + kept.counts.near_second > 0
     nodes, gradient = added.nodes[:count], added.gradient[:count]
     rows = np.zeros((count, u.size))
     for row, corners, slopes in zip(rows, nodes, gradient, strict=True):
