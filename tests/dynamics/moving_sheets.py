@@ -37,14 +37,6 @@ def case2(history=None, alpha: float = 0.0628, beta: float = 0.0, **options) -> 
     return fd.Case(cell(**options), CELL_HELD, [load], fd.Rayleigh(alpha, beta))
 
 
-def slammed() -> tuple[fd.Structure, fd.State]:
-    """A free fold that does not lock, driven shut so that its panels meet."""
-    s = fold(fold_law="linear")
-    v = np.zeros(s.nodes.shape)
-    v[[0, 1], 0], v[[4, 5], 0] = 10.0, -10.0
-    return s, fd.State(velocity=v)
-
-
 def steps_of(method: str, dt: float) -> dict[str, float]:
     """A step for an implicit method; explicit ones find their own."""
     return {"dt": dt} if METHODS[method].implicit else {}

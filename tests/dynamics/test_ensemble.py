@@ -45,6 +45,7 @@ def compare(many, k, case, duration, near, **options) -> None:
     alone = fd.simulate(case, duration, "central_difference", **options)
     np.testing.assert_allclose(many.time, alone.time, rtol=1e-14)
     names = [name for name in alone.data_vars if "time" in alone[name].dims]
+    names = [name for name in names if name != "contact_force"]  # which motions alone tell
     assert len(names) > 5
     for name in names:
         found, wanted = many[name].values[k], alone[name].values

@@ -112,7 +112,7 @@ def test_the_energy_balance_closes(make, method) -> None:
         fd.Pressure(0.05 if make is bars else 0.5, [0], fd.Ramp(0.1)),
         fd.Pressure(-0.02, [1]),
     ]
-    case = fd.Case(s, FOLD_HELD, loads, fd.Rayleigh(0.2, 1e-4) if make is bars else None)
+    case = fd.Case(s, FOLD_HELD, loads, fd.Rayleigh(0.2, 1e-4) if make is bars else ())
     found = fd.simulate(case, 0.3, method, every=0.02, **steps_of(method, 5e-4))
     assert abs(float(found.work[-1])) > 1e-5
     usual = 1e-5 if make is bars else 1e-3

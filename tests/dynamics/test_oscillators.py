@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from measured import order
 from oscillators import (
-    MASS,
     damped,
     duffing_law,
     equal_steps,
@@ -22,7 +21,7 @@ import foldyn as fd
 from foldyn.dynamics import METHODS
 
 OMEGA = 4.0
-K = MASS * OMEGA**2  # N/m
+K = 8.0  # N/m
 SPRING = spring(OMEGA)
 
 

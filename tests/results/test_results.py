@@ -295,18 +295,3 @@ def test_places_that_cannot_be_written(tmp_path, monkeypatch) -> None:
         save(ds, file)
     assert file.read_bytes() == before
     assert [path.name for path in tmp_path.iterdir()] == ["run.nc"]
-
-
-@pytest.mark.parametrize(
-    ("change", "text"),
-    [
-        (lambda ds: ds.drop_vars("face_offsets"), "lacks its variable face_offsets"),
-        (lambda ds: ds.isel(node=[1, 2]), "use the whole result"),
-        (lambda ds: ds.assign(case=((), "[pattern")), "damaged"),
-        (lambda ds: ds.assign(case=((), "title = 1")), "damaged"),
-        (lambda ds: ds.assign(faces=ds["faces"] + 1000), "vert"),
-    ],
-)
-def test_damaged_results(change, text) -> None:
-    with pytest.raises(InputError, match=text):
-        case_of(change(dataset(make_case())))
