@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from long_cases import same, sheet, simulated
+from long_cases import Killed, look_often, same, sheet, simulated
 
 import foldyn as fd
-from foldyn.dynamics import METHODS, motion, output
+from foldyn.dynamics import METHODS, output
 from foldyn.dynamics.checkpoint import CHECKPOINT
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
 from foldyn.results import columns, netcdf
@@ -27,16 +27,9 @@ SECOND = {"duration": 1.0, "every": 0.01}
 pytestmark = pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 
 
-class Killed(BaseException):
-    """What ends a run without a word."""
-
-
 @pytest.fixture(autouse=True)
 def short_stretches(monkeypatch):
-    """Look after every few steps; what the processor does is not waited for on the disk."""
-    monkeypatch.setattr(os, "fsync", lambda _: None)
-    monkeypatch.setattr(motion, "CHUNK", 16)
-    monkeypatch.setattr(motion, "REPORT_EVERY", 0.0)
+    look_often(monkeypatch)
 
 
 @pytest.fixture

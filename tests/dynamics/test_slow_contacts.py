@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import os
+from functools import partial
 
 import numpy as np
 import pytest
 from contact_cases import tower
+from long_cases import killed_and_resumed, look_often, same
 from scipy.sparse import csr_array
 
 import foldyn as fd
 from contact_sheets import SHEET, crossing, on_a_panel
-from foldyn.dynamics import motion, prepare
+from foldyn.dynamics import prepare
 from foldyn.dynamics.equation import EquationOfMotion
 from foldyn.dynamics.explicit_contact import slow_contacts
 from foldyn.dynamics.motion_state import TALLY, Course
@@ -146,29 +147,13 @@ def test_steps_overrun_no_gap_where_they_resolve_no_contact():
     assert longest(1e-3, 0.0) < longest(1e-3, 1e-9) < longest(1e-3, 4e-9) < closing
 
 
-class Killed(BaseException):
-    """What ends a run without a word."""
-
-
 @pytest.mark.thorough
 def test_a_motion_with_slow_contacts_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path):
-    monkeypatch.setattr(os, "fsync", lambda _: None)
-    monkeypatch.setattr(motion, "CHUNK", 256)
-    monkeypatch.setattr(motion, "REPORT_EVERY", 0.0)
+    look_often(monkeypatch, 256)
     case = tower(38.0, fd.Contact(), fd.Ramp(0.005, smooth=True), alpha=2000.0)
     given = {"duration": 0.04, "method": "dormand_prince", "every": 1e-3}
     once = prepare(case, **given)
     whole = once.run()
     assert once._engine._equations[0]._slow.value.added.count[0] > 0
 
-    def stop(now):
-        if now.time > 0.7 * given["duration"]:
-            raise Killed
-
-    kept = given | {"store": tmp_path / "run.nc", "checkpoint": 1e-9, "resume": True}
-    with pytest.raises(Killed):
-        fd.simulate(case, **kept, progress=stop)
-    found = fd.simulate(case, **kept)
-    for name in whole.data_vars:
-        np.testing.assert_array_equal(found[name].values, whole[name].values)
-    assert found.attrs["steps"] == whole.attrs["steps"]
+    same(killed_and_resumed(partial(fd.simulate, case), tmp_path / "run.nc", **given), whole)

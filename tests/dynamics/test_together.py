@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import os
+from functools import partial
 
 import numpy as np
 import pytest
+from long_cases import killed_and_resumed, look_often, same
 from measured import apart
 from moving_sheets import HEAVY
 
 import foldyn as fd
-from foldyn.dynamics import methods, motion
+from foldyn.dynamics import methods
 from foldyn.dynamics.methods import Compiled, threads_of
 from foldyn.dynamics.system import pack
 from foldyn.errors import InstabilityError, PenetrationError
@@ -168,16 +169,10 @@ def test_a_load_that_is_not_finite_stops_all_threads(monkeypatch, method, what):
             on(monkeypatch, threads, what.altered(loads=[blow]), method, duration=0.1)
 
 
-class Killed(BaseException):
-    """What ends a run without a word."""
-
-
 @pytest.mark.thorough
 @pytest.mark.parametrize("method", METHODS)
 def test_a_motion_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path, method):
-    monkeypatch.setattr(os, "fsync", lambda _: None)
-    monkeypatch.setattr(motion, "CHUNK", 16)
-    monkeypatch.setattr(motion, "REPORT_EVERY", 0.0)
+    look_often(monkeypatch)
     what, start = closing()
     given = half_steps(what, method, 60, 30) | {"initial": start}
     whole = on(monkeypatch, 2, what, method, **given)
@@ -189,14 +184,6 @@ def test_a_motion_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path,
             array[:] = 3.0
         resume_from(self, arrays)
 
-    def stop(now):
-        if now.time > 0.7 * given["duration"]:
-            raise Killed
-
     monkeypatch.setattr(Compiled, "resume_from", forgetful)
-    kept = given | {"store": tmp_path / "run.nc", "checkpoint": 1e-9, "resume": True}
-    with pytest.raises(Killed):
-        on(monkeypatch, 2, what, method, **kept, progress=stop)
-    found = on(monkeypatch, 2, what, method, **kept)
-    for name in whole.data_vars:
-        np.testing.assert_array_equal(found[name].values, whole[name].values)
+    run = partial(on, monkeypatch, 2, what, method)
+    same(killed_and_resumed(run, tmp_path / "run.nc", **given), whole)
