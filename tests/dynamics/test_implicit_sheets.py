@@ -57,29 +57,62 @@ def test_band_and_sparse_matrix_give_the_same_motion(method, mass, monkeypatch):
         assert apart(sparse, band) < 1e-6
 
 
-@pytest.mark.parametrize("symmetric", [True, False])
-@pytest.mark.parametrize("definite", [True, False])
-def test_the_matrix_of_a_step_is_the_weighted_sum(symmetric, definite):
+PATTERNS = {"fold": fd.patterns.simple_fold(), "miura": fd.patterns.miura(dihedral=60)}
+
+
+def shell_of(name, divisions, mass="lumped", beta=0.0):
+    shell = fd.shell(PATTERNS[name], SHEET, divisions, mass=mass)
+    return fd.Case(shell, [fd.Fix([0, 1], "xyz")], damping=fd.Rayleigh(0.0, beta))
+
+
+PLATES = fd.Case(cell(mass="consistent"), CELL_HELD, damping=fd.Rayleigh(0.3, 0.01))
+
+
+@pytest.mark.parametrize(
+    ("case", "share", "symmetric"),
+    [
+        *((PLATES, share, symmetric) for share in (0.6, -0.6) for symmetric in (True, False)),
+        *((shell_of(name, 3, mass, 0.01), 0.7, True)
+          for name in PATTERNS for mass in ("lumped", "consistent")),
+    ],
+)  # fmt: skip
+def test_the_matrix_of_a_step_is_the_weighted_sum(case, share, symmetric):
     """Against dense algebra; an indefinite one goes another way to the same solution."""
-    s = cell(mass="consistent")
-    case = fd.Case(s, CELL_HELD, damping=fd.Rayleigh(0.3, 2e-3))
-    u = 1e-3 * np.random.default_rng(2).standard_normal(s.nodes.shape)
-    matrix = StepMatrix(pack(case, 1e-3), symmetric)
-    k = s.tangent(u)
-    matrix.stiffness[:] = k.tobsr((3, 3)).data
-    mass, k0 = np.kron(s.mass.toarray(), np.eye(3)), s.tangent(np.zeros_like(u)).toarray()
-    weights = Weights(0.6 if definite else -0.6, 1e6, 7.0)
-    dense = weights.stiffness * k.toarray() + 1e6 * mass + 7.0 * 2e-3 * k0
-    free = case.free_dofs
-    dense = dense[np.ix_(free, free)]
-    assert (np.linalg.eigvalsh(dense)[0] > 0.0) == definite
+    packed, body, weights = pack(case, 1e-3), case.body, Weights(share, 1e6, 7.0)
+    matrix, rng = StepMatrix(packed, symmetric), np.random.default_rng(2)
+    n, rows = len(case.structure.nodes), packed.system.rows
+    u = np.zeros((rows, 3))
+    u[:n] = 1e-3 * rng.standard_normal((n, 3))
+    matrix.blocks.put(packed.body, matrix.pattern, u, u, False, matrix.stiffness)
     matrix.follow(u, 1.0)
     matrix.factorize(weights)
-    right = np.random.default_rng(4).standard_normal(s.nodes.shape)
-    found = matrix.solve(right, np.zeros_like(u))
-    wanted = np.linalg.solve(dense, right.ravel()[free])
-    np.testing.assert_allclose(found.ravel()[free], wanted, atol=1e-9 * np.abs(wanted).max())
-    np.testing.assert_array_equal(found.ravel()[case.supported_dofs], 0.0)
+    force = rng.standard_normal((rows, 3))
+    found = matrix.solve(force, np.zeros((rows, 3))).ravel()
+    rest = np.zeros(body.size)
+    inertia = np.zeros((body.size, body.size))
+    inertia[: 3 * n, : 3 * n] = sparse.kron(case.structure.mass, np.eye(3)).toarray()
+    free = np.setdiff1d(np.arange(body.size), case.supported_dofs)
+    moved = np.concatenate([u[:n].ravel(), rest[3 * n :]])
+    whole = share * body.tangent(moved) + 7.0 * 0.01 * body.tangent(rest)
+    whole = (whole.toarray() + 1e6 * inertia)[np.ix_(free, free)]
+    assert (np.linalg.eigvalsh(whole)[0] > 0.0) == (share > 0.0)
+    assert apart(found[free], np.linalg.solve(whole, force.ravel()[free])) < 1e-7
+    assert set(matrix.free.tolist()) == set(free.tolist())
+    np.testing.assert_array_equal(found[case.supported_dofs], 0.0)
+
+
+@pytest.mark.parametrize(("name", "across"), [("fold", 17), ("miura", 33)])
+def test_the_band_of_a_shell_is_two_lines_of_nodes_wide(name, across):
+    """A line across the sheet has `across` nodes, with three dofs and up to three sides each."""
+    case = shell_of(name, 16)
+    matrix, shell = StepMatrix(pack(case, 1.0), True), case.structure
+    number = np.full(case.body.size, -1)
+    number[matrix.free] = np.arange(len(matrix.free))
+    entries = sparse.coo_array(shell.tangent(np.zeros_like(shell.nodes)))
+    row, column = (number[coordinates] for coordinates in entries.coords)
+    known = (row >= 0) & (column >= 0)
+    assert np.abs(row - column)[known].max() < 2.2 * 6 * across
+    assert matrix.solver == "banded"  # no wider than that: nothing else is counted as an entry
 
 
 @pytest.mark.parametrize("method", ["rk4", "newmark", "energy_momentum"])
@@ -111,60 +144,3 @@ def test_damping_that_drives_is_told():
     with warnings.catch_warnings():
         warnings.simplefilter("error", FoldynWarning)
         fd.simulate(stable, 0.01, "newmark", dt=1e-3)
-
-
-# ------------------------------------------------------------------ shells
-PATTERNS = {
-    "fold": fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60),
-    "miura": fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60),
-}
-
-
-def matrix_of(name, divisions, mass="lumped", beta=0.0):
-    shell = fd.shell(PATTERNS[name], SHEET, divisions, mass=mass)
-    case = fd.Case(shell, [fd.Fix([0, 1], "xyz")], damping=fd.Rayleigh(0.0, beta))
-    packed = pack(case, 1.0)
-    return shell, packed, StepMatrix(packed, symmetric=True)
-
-
-@pytest.mark.parametrize("mass", ["lumped", "consistent"])
-@pytest.mark.parametrize("name", PATTERNS)
-def test_it_solves_with_stiffness_mass_and_damping(name, mass):
-    beta, weights = 0.01, Weights(0.7, 3e4, 50.0)
-    shell, packed, matrix = matrix_of(name, 3, mass, beta)
-    n, size = len(shell.nodes), 3 * len(shell.nodes) + shell.rotations
-    rows = packed.system.rows
-    rng = np.random.default_rng(1)
-    u = np.zeros((rows, 3))
-    u[:n] = 1e-3 * rng.standard_normal((n, 3))
-    rotation = np.zeros(shell.rotations)
-    matrix.blocks.put(packed.body, matrix.pattern, u, u, False, matrix.stiffness)
-    matrix.follow(u, 1.0)
-    matrix.factorize(weights)
-    force = rng.standard_normal((rows, 3))
-    found = matrix.solve(force, np.zeros((rows, 3))).ravel()
-
-    none = sparse.csr_array((shell.rotations, shell.rotations))
-    inertia = sparse.block_diag([sparse.kron(shell.mass, np.eye(3)), none])
-    body, rest = shell.body, np.concatenate([np.zeros(3 * n), rotation])
-    whole = weights.stiffness * body.tangent(np.concatenate([u[:n].ravel(), rotation]))
-    whole = whole + weights.mass * inertia + weights.damping * beta * body.tangent(rest)
-    free = np.setdiff1d(np.arange(size), range(6))
-    expected = np.linalg.solve(whole.toarray()[np.ix_(free, free)], force.ravel()[free])
-    np.testing.assert_allclose(found[free], expected, rtol=1e-7, atol=1e-9 * np.abs(expected).max())
-    assert set(matrix.free.tolist()) == set(free.tolist())
-
-
-@pytest.mark.parametrize(("name", "across"), [("fold", 17), ("miura", 33)])
-def test_its_band_is_two_lines_of_nodes_wide(name, across):
-    """A line across the sheet has `across` nodes, with three dofs and up to three sides each."""
-    shell, _, matrix = matrix_of(name, 16)
-    number = np.empty(3 * len(shell.nodes) + shell.rotations, int)
-    number[:] = -1
-    number[matrix.free] = np.arange(len(matrix.free))
-    entries = sparse.coo_array(shell.tangent(np.zeros_like(shell.nodes)))
-    row, column = number[entries.coords[0]], number[entries.coords[1]]
-    known = (row >= 0) & (column >= 0)
-    width = np.abs(row - column)[known].max()
-    assert width < 2.2 * 6 * across
-    assert matrix.solver == "banded"  # no wider than that: nothing else is counted as an entry

@@ -81,16 +81,6 @@ def test_damped_motion(alpha, beta, method):
     np.testing.assert_allclose(motion.dissipated, energy[0] - energy, atol=10 * errors[-1])
 
 
-def test_constant_force_and_its_reaction():
-    """x = F/k (1 - cos w t); the support feels - k x."""
-    motion = fd.simulate(pulled(SPRING, 0.4), 3.0, dt=1e-3)
-    x = 0.4 / K * (1.0 - np.cos(OMEGA * motion.time.values))
-    np.testing.assert_allclose(place(motion), x, atol=1e-11)
-    np.testing.assert_allclose(motion.work, 0.4 * x, atol=1e-11)
-    held = ((motion.support_node == 0) & (motion.support_axis == "x")).values
-    np.testing.assert_allclose(motion.reaction.values[:, held][:, 0], -K * x, atol=1e-10)
-
-
 def test_histories_are_evaluated_at_stage_times():
     """The times are t_n + c dt with t_n = n dt, to the last bit."""
     seen = []
