@@ -57,10 +57,9 @@ def test_accelerations_are_those_of_the_mass_with_the_inertia_of_contacts(mass):
     assert counts == [count, 0, count] and count > len(contact.tables.meeting) - 8
     assert kept.counts.near_first + kept.counts.near_second > 0
     nodes, gradient = added.nodes[:count], added.gradient[:count]
-    rows = np.zeros((count, u.size))
-    for row, corners, slopes in zip(rows, nodes, gradient, strict=True):
-        for node, slope in zip(corners, slopes, strict=True):
-            row[3 * node : 3 * node + 3] += slope
+    rows = np.zeros((count, len(u), 3))
+    np.add.at(rows, (np.arange(count)[:, None], nodes), gradient)
+    rows = rows.reshape(count, -1)
     # a tau of two steps, and the stiffness of contact: here of corners on the ground
     stiffness = 1.0 / (4.0 * DT**2 * added.ease[:count])
     grounded = stiffness[nodes[:, 0] == nodes[:, 1]]

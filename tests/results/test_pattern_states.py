@@ -104,10 +104,8 @@ def test_shapes_of_modes(motion):
     case = fd.case_of(motion)
     found = fd.modes(fd.Case(case.structure, case.supports), count=3)
     shapes = shapes_of(found, scale=0.5)
-    size = case.structure.pattern.size
-    np.testing.assert_allclose(
-        np.linalg.norm(shapes.displacement, axis=2).max(axis=1), 0.5 * SWING * size
-    )
+    farthest = np.linalg.norm(shapes.displacement, axis=2).max(axis=1)
+    np.testing.assert_allclose(farthest, 0.5 * SWING * case.structure.pattern.size)
     assert np.diag(fd.mac(shapes.displacement, found)) == pytest.approx(1.0)
     assert shapes.titles[0] == f"mode 1: {float(found.frequency[0]):.6g} Hz"
     unstable = found.copy(deep=True)
@@ -220,8 +218,7 @@ def test_a_folding_is_a_result_of_a_pattern_alone(tmp_path):
     np.testing.assert_array_equal(pattern.vertices, flat.vertices)
     np.testing.assert_allclose(frames[-1].vertices, way["position"].values[-1], atol=1e-15)
     assert [frame.title for frame in frames[::3]] == ["0 of the way", "1 of the way"]
-    np.testing.assert_array_equal(
-        state_of(found, 2).vertices, flat.vertices + way["displacement"].values[2]
-    )
+    moved = flat.vertices + way["displacement"].values[2]
+    np.testing.assert_array_equal(state_of(found, 2).vertices, moved)
     with pytest.raises(InputError, match="it is of a pattern alone, which has no sheet"):
         fd.case_of(found)

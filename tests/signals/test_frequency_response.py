@@ -94,18 +94,16 @@ def test_welch_averages_are_those_of_scipy():
     force = rng.normal(size=5000)
     x = signal.lfilter([0.3, 0.2], [1, -0.7], force) + 0.1 * rng.normal(size=5000)
     settings = {"fs": 50.0, "window": "hann", "nperseg": 256, "noverlap": 128}
-    estimate = frequency_response(
-        force, x, 1 / 50, segment=256, overlap=0.5, window="hann", detrend="constant"
-    )
+    given = {"segment": 256, "overlap": 0.5, "window": "hann", "detrend": "constant"}
+    estimate = frequency_response(force, x, 1 / 50, **given)
     f, ff = signal.welch(force, **settings)
     fx = signal.csd(force, x, **settings)[1]
     assert estimate.segments == 38
     np.testing.assert_allclose(estimate.frequency, f)
     np.testing.assert_allclose(estimate.force_density, ff, rtol=1e-12)
     np.testing.assert_allclose(estimate.response[1:], (fx / ff)[1:], rtol=1e-10)
-    np.testing.assert_allclose(
-        estimate.coherence[1:], signal.coherence(force, x, **settings)[1][1:], rtol=1e-10
-    )
+    coherence = signal.coherence(force, x, **settings)[1]
+    np.testing.assert_allclose(estimate.coherence[1:], coherence[1:], rtol=1e-10)
 
 
 @pytest.mark.parametrize("n", [400, 401])
