@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from moving_sheets import steps_of
-from oscillators import equal_steps
+from moving_sheets import equal_steps, steps_of
 
 import foldyn as fd
 from foldyn.signals import matrix_pencil
@@ -45,6 +44,15 @@ def apart(one: Any, other: Any, name: str = "displacement") -> float:
     a, b = (x[name].values if hasattr(x, "data_vars") else np.asarray(x) for x in (one, other))
     assert a.shape == b.shape
     return float(np.abs(a - b).max() / np.abs(b).max())
+
+
+def agree(found: Any, wanted: Any, near: float) -> None:
+    """Hold all that a result tells over time to another one, relative to the largest values."""
+    for name in wanted.data_vars:
+        values = wanted[name].values
+        if "time" in wanted[name].dims and values.dtype.kind == "f":
+            gap = np.abs(found[name].values - values).max()
+            assert gap <= near * np.abs(values).max(), name
 
 
 def order(steps, errors) -> float:

@@ -42,6 +42,11 @@ def steps_of(method: str, dt: float) -> dict[str, float]:
     return {"dt": dt} if METHODS[method].implicit else {}
 
 
+def equal_steps(method: str) -> dict[str, float]:
+    """Arguments of `simulate` with which a method that controls its error takes equal steps."""
+    return {"tolerance": 1e6} if METHODS[method].adaptive else {}
+
+
 def spinning(s: Any, spin, speed=(0.0, 0.0, 0.0)) -> fd.State:
     """Turning about the center of mass (rad/s) and flying (m/s)."""
     return fd.State(velocity=np.cross(spin, s.nodes - s.center_of_mass) + np.array(speed))

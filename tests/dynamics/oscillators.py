@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from moving_sheets import equal_steps
 
 import foldyn as fd
-from foldyn.dynamics import METHODS
 from foldyn.dynamics.stability import MARGIN
 from foldyn.signals import log_decrement
 from foldyn.structures import ModelOptions
@@ -16,12 +16,7 @@ MASS = 0.5  # kg
 
 def linear_law() -> fd.CustomBarLaw:
     """S = (lambda - 1) / lambda: the axial force is E A (lambda - 1), linear in displacement."""
-    return fd.CustomBarLaw(
-        energy_of=lambda s: 0.5 * (s - 1.0) ** 2,
-        stress_of=lambda s: (s - 1.0) / s,
-        slope_of=lambda s: 1.0 / s**3,
-        name="spring",
-    )
+    return duffing_law(0.0)
 
 
 def duffing_law(cubic: float) -> fd.CustomBarLaw:
@@ -113,8 +108,3 @@ def released(amplitude: float, speed: float = 0.0) -> fd.State:
     u, v = np.zeros((2, 3)), np.zeros((2, 3))
     u[1, 0], v[1, 0] = amplitude, speed
     return fd.State(u, v)
-
-
-def equal_steps(method: str) -> dict[str, float]:
-    """Arguments of `simulate` with which a method that controls its error takes equal steps."""
-    return {"tolerance": 1e6} if METHODS[method].adaptive else {}

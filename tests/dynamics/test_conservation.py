@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from measured import apart, drift, energy, momenta, order
-from moving_sheets import CELL_HELD, IMPLICIT, LINEAR, SHEET, cell, spinning, steps_of
-from oscillators import equal_steps
+from moving_sheets import CELL_HELD, IMPLICIT, LINEAR, SHEET, cell, equal_steps, spinning, steps_of
 
 import foldyn as fd
 from foldyn.dynamics import METHODS

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from moving_sheets import SHEET, cell
-from oscillators import about_the_limit, equal_steps, released, spring
+from moving_sheets import SHEET, cell, equal_steps
+from oscillators import about_the_limit, released, spring
 from scipy import linalg
 
 import foldyn as fd

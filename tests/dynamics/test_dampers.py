@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from measured import apart, decay, drift, momenta
-from moving_sheets import IMPLICIT, SHEET, cell, fold, spinning, steps_of
-from oscillators import LENGTH, MASS, about_the_limit, decrement, equal_steps, linear_law, steady
+from moving_sheets import IMPLICIT, SHEET, cell, equal_steps, fold, spinning, steps_of
+from oscillators import LENGTH, MASS, about_the_limit, decrement, linear_law, steady
 from oscillators import spring as oscillator
 
 import foldyn as fd

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from measured import apart, order
-from moving_sheets import CELL_HELD, HEAVY, LINEAR, SHEET, cell
-from oscillators import MASS, equal_steps, place, spring
+from moving_sheets import CELL_HELD, HEAVY, LINEAR, SHEET, cell, equal_steps
+from oscillators import MASS, place, spring
 
 import foldyn as fd
 from foldyn.dynamics import METHODS

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from measured import apart
-from moving_sheets import CELL_HELD, HEAVY, IMPLICIT, cell, fold
-from oscillators import equal_steps
+from moving_sheets import CELL_HELD, HEAVY, IMPLICIT, cell, equal_steps, fold
 
 import foldyn as fd
 from foldyn.dynamics import METHODS as METHODS_BY_NAME

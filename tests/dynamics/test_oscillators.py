@@ -5,16 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from measured import order
-from oscillators import (
-    damped,
-    duffing_law,
-    equal_steps,
-    oscillator,
-    place,
-    pulled,
-    released,
-    spring,
-)
+from moving_sheets import equal_steps
+from oscillators import damped, duffing_law, oscillator, place, pulled, released, spring
 from scipy import special
 
 import foldyn as fd

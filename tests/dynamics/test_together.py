@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 from long_cases import killed_and_resumed, look_often, same
-from measured import apart
+from measured import agree
 from moving_sheets import HEAVY
 
 import foldyn as fd
@@ -60,10 +60,8 @@ KINDS = {
 def shared(monkeypatch, threads, alone, what, method, **given):
     """The motion on some threads; that of one to rounding, and the same again."""
     found, again = (on(monkeypatch, threads, what, method, **given) for _ in range(2))
-    for name in alone.data_vars:
-        if alone[name].dtype.kind == "f" and "time" in alone[name].dims:
-            assert not alone[name].any() or apart(found, alone, name) <= ROUNDING, name
-        np.testing.assert_array_equal(found[name].values, again[name].values)
+    agree(found, alone, ROUNDING)
+    same(found, again)
     return found
 
 
