@@ -6,7 +6,6 @@ import numpy as np
 
 import foldyn as fd
 from contact_sheets import SHEET, strip
-from foldyn.dynamics import driver, prepare
 
 G = 9.81
 PULSE = fd.HalfSine(0.02)
@@ -51,16 +50,3 @@ def on_slope(angle: float, friction: float, alpha: float = 0.0) -> fd.Case:
     gravity = fd.Gravity((G * np.sin(a), 0, -G * np.cos(a)))
     contact = fd.Contact(panels=False, planes=[plane])
     return fd.Case(s, [], [gravity], fd.Rayleigh(alpha=alpha), contact=contact)
-
-
-def without_step_limit(monkeypatch, case: fd.Case, *arguments, **options):
-    """A motion with contact whose steps it does not limit."""
-    with monkeypatch.context() as patch:
-        packed = driver.pack
-
-        def unlimited(*given):
-            made = packed(*given)
-            return made._replace(system=made.system._replace(touches=False))
-
-        patch.setattr(driver, "pack", unlimited)
-        return prepare(case, *arguments, **options)

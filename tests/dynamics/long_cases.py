@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import xarray
 from contact_cases import folded_from_both_ends, on_slope
 
@@ -73,6 +77,30 @@ def same(one: xarray.Dataset, other: xarray.Dataset, also: tuple[str, ...] = ())
     aside = {"wall_seconds", "motion", *also}
     first, second = ({k: v for k, v in ds.attrs.items() if k not in aside} for ds in (one, other))
     assert first == second
+
+
+class Killed(BaseException):
+    """What ends a run without a word."""
+
+
+def look_often(monkeypatch, chunk: int = 16) -> None:
+    """Look after every few steps; what the processor does is not waited for on the disk."""
+    monkeypatch.setattr(os, "fsync", lambda _: None)
+    monkeypatch.setattr(motion, "CHUNK", chunk)
+    monkeypatch.setattr(motion, "REPORT_EVERY", 0.0)
+
+
+def killed_and_resumed(run: Callable[..., xarray.Dataset], file: Path, **given: Any):
+    """The motion, killed after seven tenths of it and resumed."""
+
+    def stop(now):
+        if now.time > 0.7 * given["duration"]:
+            raise Killed
+
+    kept = given | {"store": file, "checkpoint": 1e-9, "resume": True}
+    with pytest.raises(Killed):
+        run(**kept, progress=stop)
+    return run(**kept)
 
 
 if __name__ == "__main__":

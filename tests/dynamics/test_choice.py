@@ -4,25 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oscillators import MASS, linear_law, oscillator, released
+from moving_sheets import CELL_HELD, case2, cell
+from oscillators import MASS, linear_law, oscillator, pulled, released
 
 import foldyn as fd
 from foldyn.dynamics import METHODS, prepare
 from foldyn.dynamics.method_choice import frequency, vibrating_share
 from foldyn.errors import FoldynWarning, MotionInterrupted
 from foldyn.studies import find_case
-
-SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
-SUPPORTS = (fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2, 6, 8], "z"), fd.Fix([1], "y"))
-
-
-def miura(**options) -> fd.Structure:
-    pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
-    return fd.discretize(pattern, SHEET, **options, preset="herkal")
-
-
-def pushed(history, vector=(0.01, 0.0, 0.0), **damping) -> fd.Case:
-    return fd.Case(miura(), SUPPORTS, [fd.Force([7], vector, history)], fd.Rayleigh(**damping))
 
 
 def chosen(case: fd.Case, duration: float, **options) -> tuple[str, str]:
@@ -56,7 +45,7 @@ DAMPED = fd.Rayleigh(0.1)
 
 def test_velocities_that_shake_the_bars_get_steps_that_resolve_them():
     """RK4 takes the energy out of vibrations near its critical step, whatever damps the sheet."""
-    case = fd.Case(miura(), SUPPORTS, damping=DAMPED)
+    case = fd.Case(cell(), CELL_HELD, damping=DAMPED)
     motion = fd.simulate(case, 0.2, "auto", initial=KICK, every=0.01)
     assert motion.attrs["method"] == "dormand_prince"
     assert motion.attrs["energy_error"] < 2e-3
@@ -64,31 +53,40 @@ def test_velocities_that_shake_the_bars_get_steps_that_resolve_them():
     with pytest.warns(FoldynWarning, match="the energy balance of the motion is off"):
         damped = fd.simulate(case, 0.2, "rk4", initial=KICK, every=0.01)
     assert damped.attrs["energy_error"] > 0.1
-    thick = fd.discretize(miura().pattern, SHEET, preset="plate")
-    slow = fd.modes(fd.Case(thick, SUPPORTS), 1).shape[0].values
+    thick = cell(preset="plate")
+    slow = fd.modes(fd.Case(thick, CELL_HELD), 1).shape[0].values
     smooth = fd.State(velocity=1e-3 * slow / np.abs(slow).max())
-    assert chosen(fd.Case(thick, SUPPORTS, damping=DAMPED), 0.2, initial=smooth)[0] == "rk4"
+    assert chosen(fd.Case(thick, CELL_HELD, damping=DAMPED), 0.2, initial=smooth)[0] == "rk4"
 
 
-def test_a_motion_whose_energies_do_not_balance_is_computed_anew(tmp_path):
-    """What the choice does not look at: a start with stretched bars."""
-    case, start = fd.Case(miura(), SUPPORTS, damping=DAMPED), fd.State(0.01 * KICK.velocity)
-    kept = {"store": tmp_path / "run.nc", "checkpoint": 1e-9}
+@pytest.fixture
+def given(tmp_path) -> dict:
+    """A motion that is kept, and starts as the choice does not see: with stretched bars."""
+    start = {"initial": fd.State(0.01 * KICK.velocity), "every": 0.01}
+    case = fd.Case(cell(), CELL_HELD, damping=DAMPED)
+    return {"case": case, "duration": 0.2, "store": tmp_path / "run.nc", "checkpoint": 1e-9} | start
+
+
+def anew(motion, given) -> None:
+    """Hold a motion to one that was computed by the method of the second attempt."""
+    assert motion.attrs["method"] == "dormand_prince"
+    plain = {name: given[name] for name in ("case", "duration", "initial", "every")}
+    alone = fd.simulate(**plain, method="dormand_prince")
+    assert np.array_equal(motion.displacement, alone.displacement)
+
+
+def test_a_motion_whose_energies_do_not_balance_is_computed_anew(given):
     why = 'anew with dormand_prince: with rk4.* is off by .* method = "dormand_prince" saves'
     with pytest.warns(FoldynWarning, match=why):
-        motion = fd.simulate(case, 0.2, "auto", initial=start, every=0.01, **kept)
-    assert motion.attrs["method"] == "dormand_prince"
+        motion = fd.simulate(**given, method="auto")
     assert motion.attrs["energy_error"] < 0.01
     assert "computed anew: with rk4 the energy" in motion.attrs["method_reason"]
-    alone = fd.simulate(case, 0.2, "dormand_prince", initial=start, every=0.01)
-    assert np.array_equal(motion.displacement, alone.displacement)
-    read = fd.simulate(case, 0.2, "auto", initial=start, every=0.01, **kept, resume=True)
+    anew(motion, given)
+    read = fd.simulate(**given, method="auto", resume=True)
     assert read.attrs["wall_seconds"] == motion.attrs["wall_seconds"]  # not computed again
 
 
-def test_a_second_attempt_that_was_cut_off_goes_on(tmp_path):
-    case, start = fd.Case(miura(), SUPPORTS, damping=DAMPED), fd.State(0.01 * KICK.velocity)
-    given = {"initial": start, "every": 0.01, "store": tmp_path / "run.nc", "checkpoint": 1e-9}
+def test_a_second_attempt_that_was_cut_off_goes_on(given):
     reached = []
 
     def stop(now):
@@ -97,16 +95,13 @@ def test_a_second_attempt_that_was_cut_off_goes_on(tmp_path):
             raise KeyboardInterrupt
 
     with pytest.warns(FoldynWarning, match="anew"), pytest.raises(MotionInterrupted):
-        fd.simulate(case, 0.2, "auto", progress=stop, **given)
-    motion = fd.simulate(case, 0.2, "auto", resume=True, **given)
-    assert motion.attrs["method"] == "dormand_prince"
-    alone = fd.simulate(case, 0.2, "dormand_prince", initial=start, every=0.01)
-    assert np.array_equal(motion.displacement, alone.displacement)
+        fd.simulate(**given, method="auto", progress=stop)
+    anew(fd.simulate(**given, method="auto", resume=True), given)
 
 
 def test_a_lasting_motion_is_computed_anew_with_shorter_steps():
     """The errors of central differences do not grow; those of other explicit methods add up."""
-    case = fd.Case(miura(), SUPPORTS)
+    case = fd.Case(cell(), CELL_HELD)
     why = "anew with steps of .*: with steps of .*; dt = .* saves"
     with pytest.warns(FoldynWarning, match=why):
         motion = fd.simulate(case, 40.0, "auto", initial=KICK, every=0.1)
@@ -141,21 +136,19 @@ def test_what_nothing_damps_gets_a_method_that_conserves():
     v = np.zeros((13, 3))
     v[[6, 7, 8], 0] = 0.01
     state = fd.State(velocity=v)
-    assert chosen(fd.Case(miura(), SUPPORTS), 0.01, initial=state)[0] == "dormand_prince"
-    assert chosen(fd.Case(miura(), SUPPORTS), 100.0, initial=state)[0] == "central_difference"
+    assert chosen(fd.Case(cell(), CELL_HELD), 0.01, initial=state)[0] == "dormand_prince"
+    assert chosen(fd.Case(cell(), CELL_HELD), 100.0, initial=state)[0] == "central_difference"
     # a thin sheet, whose bars are far stiffer than its folds, let go from a slightly bent shape
-    thin = fd.discretize(
-        miura().pattern, fd.Sheet(1e9, 0.25, 1e-4, 1e3), bend_law="linear", preset="herkal"
-    )
-    bent = fd.trace(fd.Case(thin, SUPPORTS, [fd.Force([7], (1e-6, 0.0, 0.0))]), steps=1)
+    thin = cell(sheet=fd.Sheet(1e9, 0.25, 1e-4, 1e3), bend_law="linear")
+    bent = fd.trace(fd.Case(thin, CELL_HELD, [fd.Force([7], (1e-6, 0.0, 0.0))]), steps=1)
     start = fd.initial_state(bent)
     for springs in ([], [fd.Spring(1e-4, between=[(0, 8)])]):
-        name, reason = chosen(fd.Case(thin, [*SUPPORTS, *springs]), 100.0, initial=start)
+        name, reason = chosen(fd.Case(thin, [*CELL_HELD, *springs]), 100.0, initial=start)
         assert name == "energy_momentum", reason
 
 
 def test_a_given_step_or_tolerance_decides():
-    case = pushed(fd.HalfSine(0.5), alpha=0.1)
+    case = case2(fd.HalfSine(0.5), alpha=0.1)
     critical = fd.critical_step(case)
     assert chosen(case, 1.0, dt=0.5 * critical) == (
         "rk4",
@@ -180,16 +173,13 @@ def test_nodes_without_mass_are_implicit():
 
 def test_frequency_of_an_oscillator():
     """By the force that pushes it and by the state from which it is let go."""
-    omega = 4.0
+    omega, still = 4.0, np.zeros((2, 3))
     case = oscillator(linear_law(), MASS * omega**2)
-    u, v = np.zeros((2, 3)), np.zeros((2, 3))
-    push = fd.Case(case.structure, case.supports, [fd.Force([1], (0.1, 0.0, 0.0))])
-    assert frequency(push, u, v, 100.0) == pytest.approx(omega, rel=1e-2)
-    let_go = released(0.01)
-    assert frequency(case, let_go.displacement, v, 100.0) == pytest.approx(omega, rel=1e-2)
-    flung = released(0.0, 0.1)
-    assert frequency(case, u, flung.velocity, 100.0) == pytest.approx(omega, rel=1e-9)
-    turning = fd.Case(miura())
+    let_go, flung = released(0.01).displacement, released(0.0, 0.1).velocity
+    assert frequency(pulled(case, 0.1), still, still, 100.0) == pytest.approx(omega, rel=1e-2)
+    assert frequency(case, let_go, still, 100.0) == pytest.approx(omega, rel=1e-2)
+    assert frequency(case, still, flung, 100.0) == pytest.approx(omega, rel=1e-9)
+    turning = fd.Case(cell())
     spin = np.cross([0.0, 0.0, 3.0], turning.structure.nodes)
     found = frequency(turning, np.zeros_like(spin), spin, 10.0)
     assert found == pytest.approx(3.0, rel=1e-6)
@@ -200,14 +190,14 @@ def test_what_varies_slowly_vibrates_little():
     omega = 5.0  # a period of 1.3 s
 
     def share(history, start=0.0):
-        return vibrating_share(pushed(history), rest, still, start, 100.0, omega)
+        return vibrating_share(case2(history), rest, still, start, 100.0, omega)
 
     assert share(fd.Step(1.0)) == 1.0
     assert share(fd.Pulse(2.0)) == 1.0
-    assert share(None) == 1.0  # there from the beginning
+    assert share(fd.Constant()) == 1.0  # there from the beginning
     assert share(fd.Harmonic(0.8)) > 0.5
     assert share(fd.Ramp(90.0, smooth=True)) < 2e-3
     assert share(fd.Ramp(90.0, smooth=True)) < share(fd.Ramp(90.0)) < 0.02
     moving = still.copy()
     moving[7, 0] = 1.0
-    assert vibrating_share(pushed(fd.Ramp(90.0)), rest, moving, 0.0, 100.0, omega) == 1.0
+    assert vibrating_share(case2(fd.Ramp(90.0)), rest, moving, 0.0, 100.0, omega) == 1.0

@@ -14,27 +14,28 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from long_cases import same, sheet, simulated
+from long_cases import Killed, look_often, same, sheet, simulated
 
 import foldyn as fd
-from foldyn.dynamics import METHODS, motion, output
+from foldyn.dynamics import METHODS, output
 from foldyn.dynamics.checkpoint import CHECKPOINT
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
 from foldyn.results import columns, netcdf
 
 OFTEN = 1e-9  # seconds: a checkpoint whenever there is an opportunity
-
-
-class Killed(BaseException):
-    """What ends a run without a word."""
+SECOND = {"duration": 1.0, "every": 0.01}
+pytestmark = pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 
 
 @pytest.fixture(autouse=True)
 def short_stretches(monkeypatch):
-    """Look after every few steps; what the processor does is not waited for on the disk."""
-    monkeypatch.setattr(os, "fsync", lambda _: None)
-    monkeypatch.setattr(motion, "CHUNK", 16)
-    monkeypatch.setattr(motion, "REPORT_EVERY", 0.0)
+    look_often(monkeypatch)
+
+
+@pytest.fixture
+def kept(tmp_path) -> dict:
+    """Arguments of a motion of a second that is kept."""
+    return {**SECOND, "store": tmp_path / "run.nc", "checkpoint": OFTEN}
 
 
 def in_pieces(file: Path, calls: int, name: str, **options):
@@ -49,35 +50,36 @@ def in_pieces(file: Path, calls: int, name: str, **options):
                 raise Killed
 
         try:
-            found = simulated(
-                name, **options, store=file, checkpoint=OFTEN, resume=True, progress=look
-            )
+            given = options | {"store": file, "checkpoint": OFTEN, "resume": True}
+            return simulated(name, **given, progress=look), kills
         except Killed:
             kills += 1
-            continue
-        return found, kills
 
 
-def cut_off(**options):
-    """The motion of the sheet, killed half-way."""
+def cut_off(error=Killed, **options):
+    """The motion of the sheet, stopped half-way."""
 
     def stop(now):
         if now.time > 0.5:
-            raise Killed
+            raise error
 
+    simulated("sheet", **options, progress=stop)
+
+
+@pytest.fixture
+def begun(kept) -> dict:
+    """Arguments of one that was killed."""
     with pytest.raises(Killed):
-        simulated("sheet", **options, progress=stop)
+        cut_off(**kept)
+    return kept
 
 
 KINDS = {  # name of the case, its arguments, and what of the methods
-    "sheet": (METHODS, {"duration": 1.0, "every": 0.01}),
+    "sheet": (METHODS, SECOND),
     "steps": (["dormand_prince", "newmark"], {"duration": 1.0, "every": 3}),
     "fixed": (["newmark", "energy_momentum"], {"duration": 1.0, "every": 0.02, "dt": 0.005}),
     "actuated": (["rk4", "generalized_alpha"], {"duration": 0.6, "every": 0.01}),
-    "creeping": (
-        ["rk4", "dormand_prince", "generalized_alpha"],
-        {"duration": 1.0, "every": 0.01, "dt": 0.002},
-    ),
+    "creeping": (["rk4", "dormand_prince", "generalized_alpha"], {**SECOND, "dt": 0.002}),
     "sliding": (["newmark", "energy_momentum"], {"duration": 0.02, "every": 0.001}),
     "touching": (["dormand_prince"], {"duration": 0.24, "every": 0.01}),
 }
@@ -94,7 +96,6 @@ RUNS = [
 
 
 @pytest.mark.thorough
-@pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 @pytest.mark.parametrize(("kind", "method"), RUNS)
 def test_a_run_that_is_killed_again_and_again_gives_the_same_bits(tmp_path, kind, method):
     options = {"method": method, **KINDS[kind][1]}
@@ -107,42 +108,35 @@ def test_a_run_that_is_killed_again_and_again_gives_the_same_bits(tmp_path, kind
     assert os.listdir(tmp_path) == ["run.nc"]
 
 
-@pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 def test_what_the_user_samples_goes_on_too(tmp_path):
-    def tip(u, v, t):
-        return u[7] * t
-
-    sample = {"tip": fd.Quantity("m s", "something", ("axis",), tip)}
-    options = {"duration": 1.0, "every": 0.01, "sample": sample}
+    tip = fd.Quantity("m s", "something", ("axis",), lambda u, v, t: u[7] * t)
+    options = {**SECOND, "sample": {"tip": tip}}
     found, kills = in_pieces(tmp_path / "run.nc", 3, "sheet", **options)
     assert kills >= 1
     same(found, simulated("sheet", **options))
 
 
-@pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 @pytest.mark.parametrize("method", ["rk4", "dormand_prince", "newmark"])
 @pytest.mark.parametrize("every", [0.004, 1])
 def test_samples_that_memory_does_not_hold_are_the_same(tmp_path, monkeypatch, method, every):
     """Room for some sixteen; the file is written and read in pieces as well."""
-    whole = simulated("sheet", duration=0.8, every=every, method=method)
+    options = {"duration": 0.8, "every": every, "method": method}
+    whole = simulated("sheet", **options)
     for module in (columns, output, netcdf):
         monkeypatch.setattr(module, "PIECE", 4000)
     monkeypatch.setattr(netcdf, "CHUNK", 3000)
     file = tmp_path / "run.nc"
-    found = simulated("sheet", duration=0.8, every=every, method=method, store=file)
-    same(found, whole)
+    same(simulated("sheet", **options, store=file), whole)
     same(fd.load(file), whole)
     at_a_time = fd.load(file, whole=False).displacement[5:9, 3]
     np.testing.assert_array_equal(at_a_time, whole.displacement[5:9, 3])
     assert os.listdir(tmp_path) == ["run.nc"]
 
 
-@pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
-def test_a_motion_goes_on_only_as_it_was_begun(tmp_path):
-    options = {"duration": 1.0, "every": 0.01, "store": tmp_path / "run.nc", "checkpoint": OFTEN}
-    cut_off(**options)
-    thrown = np.zeros((13, 3))
-    thrown[8, 2] = 0.1
+THROWN = fd.State(velocity=0.1 * np.outer(np.arange(13) == 8, [0.0, 0.0, 1.0]))
+
+
+def test_a_motion_goes_on_only_as_it_was_begun(begun, monkeypatch):
     for changes, name in [
         ({"changes": {"thickness": 0.02}}, r"sheet\.thickness = 0\.01, which is 0\.02 now"),
         ({"changes": {"force": 0.06}}, r"loads\[0\]\.force = \[0\.05, 0\.0, 0\.0\]"),
@@ -150,108 +144,86 @@ def test_a_motion_goes_on_only_as_it_was_begun(tmp_path):
         ({"duration": 2.0}, r"duration = 1\.0, which is 2\.0 now"),
         ({"every": 4}, "every"),
         ({"sample": {"own": lambda u, v, t: 0.0}}, r"sample = \[\]"),
-        ({"initial": fd.State(velocity=thrown)}, "initial"),
+        ({"initial": THROWN}, "initial"),
     ]:
         with pytest.raises(InputError, match=rf"was begun with .*{name}"):
-            simulated("sheet", **{**options, **changes}, resume=True)
+            simulated("sheet", **{**begun, **changes}, resume=True)
     with pytest.raises(InputError, match=r"up to t = 0\.\d+ s: go on with it by resume=True"):
-        simulated("sheet", **options)
-    found = simulated("sheet", **options, resume=True)
-    del options["store"], options["checkpoint"]
-    same(found, simulated("sheet", **options))
+        simulated("sheet", **begun)
+    with monkeypatch.context() as patch:
+        patch.setattr("foldyn.dynamics.checkpoint.program", lambda *_: "another")
+        with pytest.raises(InputError, match="was begun with the version of Foldyn"):
+            simulated("sheet", **begun, resume=True)
+    same(simulated("sheet", **begun, resume=True), simulated("sheet", **SECOND))
 
 
-def test_another_program_does_not_go_on(tmp_path, monkeypatch):
-    options = {"duration": 1.0, "every": 0.01, "store": tmp_path / "run.nc", "checkpoint": OFTEN}
-    cut_off(**options)
-    monkeypatch.setattr("foldyn.dynamics.checkpoint.program", lambda *_: "another")
-    with pytest.raises(InputError, match="was begun with the version of Foldyn"):
-        simulated("sheet", **options, resume=True)
-
-
-def test_a_finished_motion_is_only_read(tmp_path):
-    options = {"duration": 0.2, "every": 0.01, "store": tmp_path / "run.nc", "resume": True}
-    first = simulated("sheet", **options)
-    looked = []
-    again = simulated("sheet", **options, progress=looked.append)
+def test_a_finished_motion_is_only_read(kept):
+    first, looked = simulated("sheet", **kept, resume=True), []
+    again = simulated("sheet", **kept, resume=True, progress=looked.append)
     assert not looked
     same(first, again)
     assert again.attrs["wall_seconds"] == first.attrs["wall_seconds"]
-    simulated("sheet", {"force": 0.06}, **options, progress=looked.append)
+    simulated("sheet", {"force": 0.06}, **kept, resume=True, progress=looked.append)
     assert looked
 
 
-def test_ctrl_c_says_what_is_kept(tmp_path):
-    options = {"duration": 1.0, "every": 0.01, "store": tmp_path / "run.nc", "checkpoint": OFTEN}
-
-    def stop(now):
-        if now.time > 0.5:
-            raise KeyboardInterrupt
-
-    with pytest.raises(
-        MotionInterrupted, match=r"keeps it up to t = 0\.\d+ s: go on by"
-    ) as stopped:
-        simulated("sheet", **options, progress=stop)
-    whole = simulated("sheet", duration=1.0, every=0.01)
+def test_ctrl_c_says_what_is_kept(kept):
+    said = r"keeps it up to t = 0\.\d+ s: go on by"
+    with pytest.raises(MotionInterrupted, match=said) as stopped:
+        cut_off(KeyboardInterrupt, **kept)
+    whole = simulated("sheet", **SECOND)
     there = stopped.value.partial
     assert there.sizes["time"] > 50
     np.testing.assert_array_equal(there.displacement, whole.displacement[: there.sizes["time"]])
-    same(simulated("sheet", **options, resume=True), whole)
+    same(simulated("sheet", **kept, resume=True), whole)
 
 
-@pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
-def test_a_motion_that_fails_is_stored_until_then(tmp_path):
-    file = tmp_path / "run.nc"
-    with pytest.raises(ComputationError) as failed:
-        simulated(
-            "sheet", duration=4.0, every=1, dt=0.0175, force=True, store=file, checkpoint=OFTEN
-        )
-    with pytest.raises(ComputationError) as wanted:
-        simulated("sheet", duration=4.0, every=1, dt=0.0175, force=True)
-    assert str(failed.value) == str(wanted.value)
-    same(failed.value.partial, wanted.value.partial, ("stopped_because",))
-    assert "stopped_because" in fd.load(file).attrs
+def test_a_motion_that_fails_is_stored_until_then(kept, tmp_path):
+    wild = {"duration": 4.0, "every": 1, "dt": 0.0175, "force": True}
+    failed = []
+    for given in (kept | wild, wild):
+        with pytest.raises(ComputationError) as error:
+            simulated("sheet", **given)
+        failed.append(error.value)
+    assert str(failed[0]) == str(failed[1])
+    same(failed[0].partial, failed[1].partial, ("stopped_because",))
+    assert "stopped_because" in fd.load(kept["store"]).attrs
     assert os.listdir(tmp_path) == ["run.nc"]
 
 
-def test_bad_arguments_are_refused_before_anything_is_computed(tmp_path):
-    for given, text in [
-        ({"store": tmp_path / "run.csv"}, "only NetCDF"),
-        ({"store": tmp_path / "none" / "run.nc"}, "does not exist"),
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ({"store": "run.csv"}, "only NetCDF"),
+        ({"store": "none/run.nc"}, "does not exist"),
         ({"store": 3}, "store = 3"),
-        ({"store": tmp_path / "run.nc", "checkpoint": 0.0}, "checkpoint"),
-        ({"store": tmp_path / "run.nc", "resume": 1}, "resume = 1"),
+        ({"store": "run.nc", "checkpoint": 0.0}, "checkpoint"),
+        ({"store": "run.nc", "resume": 1}, "resume = 1"),
         ({"resume": True}, "store: there is nothing to go on with"),
-    ]:
-        with pytest.raises(InputError, match=text):
-            fd.simulate(sheet(), 0.2, every=0.01, **given)
+    ],
+)
+def test_bad_arguments_are_refused_before_anything_is_computed(given, text, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=text):
+        fd.simulate(sheet(), 0.2, every=0.01, **given)
 
 
-def test_what_is_damaged_is_refused(tmp_path):
-    options = {"duration": 1.0, "every": 0.01, "store": tmp_path / "run.nc", "checkpoint": OFTEN}
-    cut_off(**options)
-    folder = tmp_path / "run.nc.unfinished"
-    content = (folder / "velocity.f8").read_bytes()
-    (folder / "velocity.f8").write_bytes(content[:-100])
-    with pytest.raises(
-        InputError, match=r"velocity\.f8: is damaged: samples .* are missing or have changed"
-    ):
-        simulated("sheet", **options, resume=True)
-    changed = np.frombuffer(content).copy()
-    changed[len(changed) // 3] += 0.4
-    (folder / "velocity.f8").write_bytes(changed.tobytes())
-    with pytest.raises(InputError, match=r"velocity\.f8: is damaged"):
-        simulated("sheet", **options, resume=True)
-    (folder / "velocity.f8").write_bytes(content)
-    checkpoint = (folder / CHECKPOINT).read_bytes()
-    (folder / CHECKPOINT).write_bytes(checkpoint[: len(checkpoint) // 2])
-    with pytest.raises(InputError, match=r"is damaged, or .*; remove that folder to begin anew"):
-        simulated("sheet", **options, resume=True)
+@pytest.mark.parametrize(
+    ("name", "change", "said"),
+    [
+        ("velocity.f8", lambda raw: raw[:-100], r"samples .* are missing or have changed"),
+        ("velocity.f8", lambda raw: raw[:9000] + b"else" + raw[9004:], ""),
+        (CHECKPOINT, lambda raw: raw[: len(raw) // 2], "remove that folder to begin anew"),
+    ],
+)
+def test_what_is_damaged_is_refused(name, change, said, begun, tmp_path):
+    file = tmp_path / "run.nc.unfinished" / name
+    file.write_bytes(change(file.read_bytes()))
+    with pytest.raises(InputError, match=rf"{file.name}.*is damaged.*{said}"):
+        simulated("sheet", **begun, resume=True)
 
 
-def test_samples_that_change_while_it_runs_do_not_become_a_result(tmp_path):
-    file = tmp_path / "run.nc"
-
+def test_samples_that_change_while_it_runs_do_not_become_a_result(kept, tmp_path):
     def harm(now):
         if now.time > 0.9:
             with (tmp_path / "run.nc.unfinished" / "displacement.f8").open("r+b") as samples:
@@ -259,8 +231,8 @@ def test_samples_that_change_while_it_runs_do_not_become_a_result(tmp_path):
                 samples.write(b"wrong")
 
     with pytest.raises(ComputationError, match=r"displacement\.f8: was changed"):
-        simulated("sheet", duration=1.0, every=0.01, store=file, checkpoint=OFTEN, progress=harm)
-    assert not file.exists()
+        simulated("sheet", **kept, progress=harm)
+    assert not kept["store"].exists()
 
 
 # ------------------------------------------------------------------ processes
@@ -291,7 +263,6 @@ def refused(other: int, options) -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 @pytest.mark.parametrize("kills", [3, pytest.param(10, marks=pytest.mark.slow)])
 def test_sigkill_at_random_moments_with_a_second_process(tmp_path, kills):
     file, chance = tmp_path / "run.nc", random.Random(kills)
@@ -325,27 +296,29 @@ def test_sigkill_at_random_moments_with_a_second_process(tmp_path, kills):
     same(fd.load(file), whole)
 
 
-@pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 def test_a_full_disk_keeps_the_last_checkpoint_and_says_so(tmp_path):
     """No file may be larger than some number of bytes, as where there is no room."""
     options = {**LONG, "store": str(tmp_path / "run.nc"), "duration": 50.0}
     process = started(options, limit=150_000)
     said = process.communicate()[1]
     assert process.returncode == 1
-    assert "ComputationError" in said
-    assert "cannot be written (File too large): make room" in said
-    assert "keeps it up to t = " in said
+    for words in (
+        "ComputationError",
+        "cannot be written (File too large): make room",
+        "keeps it up to t = ",
+    ):
+        assert words in said
     found = simulated(**{**options, "resume": True})
     same(found, simulated("sheet", duration=50.0, every=LONG["every"]))
 
 
-def test_a_disk_that_is_full_from_the_beginning(tmp_path, monkeypatch):
+def test_a_disk_that_is_full_from_the_beginning(kept, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(columns.Columns, "append", full)
     with pytest.raises(ComputationError, match=r"No space left on device.*nothing of the motion"):
-        simulated("sheet", duration=1.0, store=tmp_path / "run.nc", checkpoint=OFTEN)
+        simulated("sheet", **kept)
 
 
 @pytest.mark.slow

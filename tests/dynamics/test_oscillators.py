@@ -4,88 +4,59 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oscillators import MASS, duffing_law, equal_steps, linear_law, oscillator, released
+from measured import order
+from moving_sheets import equal_steps
+from oscillators import damped, duffing_law, oscillator, place, pulled, released, spring
 from scipy import special
 
 import foldyn as fd
-from foldyn.checks import observed_order
 from foldyn.dynamics import METHODS
 
+OMEGA = 4.0
 K = 8.0  # N/m
-OMEGA = np.sqrt(K / MASS)
+SPRING = spring(OMEGA)
 
 
-@pytest.fixture(scope="module")
-def spring() -> fd.Case:
-    return oscillator(linear_law(), K)
-
-
-def end(case: fd.Case, dt: float, duration: float, initial: fd.State, method: str) -> float:
-    motion = fd.simulate(case, duration, method, dt=dt, initial=initial, **equal_steps(method))
-    return float(motion.displacement[-1, 1, 0])
-
-
+@pytest.mark.parametrize("cubic", [0.0, 40.0])
 @pytest.mark.parametrize("method", METHODS)
-def test_order_on_the_linear_oscillator(spring, method):
-    """x = a cos(w t): the error at a fixed time falls with the method's order."""
-    duration, a = 2.0, 0.1
-    steps = np.array([60, 120, 240, 480])
-    errors = []
-    for n in steps:
-        motion = fd.simulate(
-            spring, duration, method, dt=duration / n, initial=released(a), **equal_steps(method)
-        )
-        phase = OMEGA * motion.time.to_numpy()
-        u = motion.displacement[:, 1, 0].to_numpy() - a * np.cos(phase)
-        v = motion.velocity[:, 1, 0].to_numpy() / OMEGA + a * np.sin(phase)
-        errors.append(np.hypot(u, v).max())
-    assert observed_order(duration / steps, errors) == pytest.approx(METHODS[method].order, abs=0.1)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_order_on_the_duffing_oscillator(method):
+def test_order_on_linear_and_duffing_oscillators(method, cubic):
     """x'' + w^2 (x + c x^3) = 0 has a Jacobi elliptic cosine as its motion.
 
     With x(0) = a, x = a cn(W t, m), W^2 = w^2 (1 + c a^2), m = c a^2 / (2 (1 + c a^2)).
     """
-    cubic = 40.0 / 2.0**2  # of the displacement, 1/m^2; of the strain e = x / L: times L^2
-    case = oscillator(duffing_law(40.0), K)
-    a, duration = 0.3, 2.0
-    fast = np.sqrt(OMEGA**2 * (1.0 + cubic * a**2))
-    m = cubic * a**2 / (2.0 * (1.0 + cubic * a**2))
-    exact = a * special.ellipj(fast * duration, m)[1]
-    steps = np.array([80, 160, 320, 640])
-    errors = [end(case, duration / n, duration, released(a), method) - exact for n in steps]
-    assert observed_order(duration / steps, errors) == pytest.approx(METHODS[method].order, abs=0.1)
-    assert abs(errors[-1]) < 10.0 ** (1 - 2 * METHODS[method].order) * a
-
-
-def test_rk4_loses_energy_with_the_fifth_power_of_the_step(spring):
-    """|R(i w h)|^2 = 1 - (w h)^6 / 72 + ...: over a fixed time the loss is T w (w h)^5 / 72."""
-    duration = 10.0
-    steps = np.array([200, 400, 800])
-    lost = []
+    c, a, duration = cubic / 2.0**2, 0.3, 2.0  # of e = x / L: times L^2
+    case = oscillator(duffing_law(cubic), K)
+    fast = OMEGA * np.sqrt(1.0 + c * a**2)
+    steps, errors = [80, 160, 320, 640], []
     for n in steps:
-        motion = fd.simulate(spring, duration, dt=duration / n, initial=released(0.1))
+        motion = fd.simulate(
+            case, duration, method, dt=duration / n, initial=released(a), **equal_steps(method)
+        )
+        m = c * a**2 / (2.0 * (1.0 + c * a**2))
+        sn, cn, dn, _ = special.ellipj(fast * motion.time.values, m)
+        v = motion.velocity.values[:, 1, 0] / fast + a * sn * dn
+        errors.append(np.hypot(place(motion) - a * cn, v).max())
+    assert order(steps, errors) == pytest.approx(METHODS[method].order, abs=0.1)
+    assert errors[-1] < 10.0 ** (1 - 2 * METHODS[method].order) * a
+
+
+def test_rk4_loses_energy_with_the_fifth_power_of_the_step():
+    """|R(i w h)|^2 = 1 - (w h)^6 / 72 + ...: over a fixed time the loss is T w (w h)^5 / 72."""
+    steps, lost = np.array([200, 400, 800]), []
+    for n in steps:
+        motion = fd.simulate(SPRING, 10.0, dt=10.0 / n, initial=released(0.1))
         energy = motion.kinetic + motion.strain_bars
         lost.append(float(1.0 - energy[-1] / energy[0]))
-    h = duration / steps
-    assert observed_order(h, lost) == pytest.approx(5.0, abs=0.05)
-    np.testing.assert_allclose(lost[-1], duration * OMEGA * (OMEGA * h[-1]) ** 5 / 72, rtol=0.02)
-
-
-def damped(t: np.ndarray, ratio: float) -> np.ndarray:
-    """x = a e^(-z w t) (cos + z w / wd sin) for x(0) = a = 0.1, x'(0) = 0."""
-    wd, decay = OMEGA * np.sqrt(1.0 - ratio**2), ratio * OMEGA
-    return 0.1 * np.exp(-decay * t) * (np.cos(wd * t) + decay / wd * np.sin(wd * t))
+    assert order(steps, lost) == pytest.approx(5.0, abs=0.05)
+    exact = 10.0 * OMEGA * (OMEGA * 10.0 / steps[-1]) ** 5 / 72
+    np.testing.assert_allclose(lost[-1], exact, rtol=0.02)
 
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(("alpha", "beta"), [(0.3, 0.0), (0.0, 0.02), (0.3, 0.02)])
 def test_damped_motion(alpha, beta, method):
     """The damping ratio is alpha / 2w + beta w / 2; the order holds with damping too."""
-    case = oscillator(linear_law(), K, alpha=alpha, beta=beta)
-    ratio = alpha / (2.0 * OMEGA) + beta * OMEGA / 2.0
+    case = spring(OMEGA, alpha=alpha, beta=beta)
     steps, errors = np.array([300, 600, 1200, 2400]), []
     if METHODS[method].order == 5:
         steps //= 6  # else rounding hides the order
@@ -93,39 +64,16 @@ def test_damped_motion(alpha, beta, method):
         motion = fd.simulate(
             case, 3.0, method, dt=3.0 / n, initial=released(0.1), **equal_steps(method)
         )
-        exact = damped(motion.time.to_numpy(), ratio)
-        errors.append(float(np.abs(motion.displacement[:, 1, 0].to_numpy() - exact).max()))
-    order = METHODS[method].order
-    assert observed_order(3.0 / steps, errors) == pytest.approx(order, abs=0.1)
-    assert errors[-1] < (1e-5 if order == 2 else 1e-10)
+        ratio = alpha / (2.0 * OMEGA) + beta * OMEGA / 2.0
+        exact = 0.1 * damped(motion.time.values, OMEGA, ratio)
+        errors.append(np.abs(place(motion) - exact).max())
+    assert order(steps, errors) == pytest.approx(METHODS[method].order, abs=0.1)
+    assert errors[-1] < (1e-5 if METHODS[method].order == 2 else 1e-10)
     energy = motion.kinetic + motion.strain_bars
     np.testing.assert_allclose(motion.dissipated, energy[0] - energy, atol=10 * errors[-1])
 
 
-def test_constant_force_and_its_reaction(spring):
-    """x = F/k (1 - cos w t); the support feels - k x."""
-    case = fd.Case(spring.structure, spring.supports, [fd.Force([1], (0.4, 0.0, 0.0))])
-    motion = fd.simulate(case, 3.0, dt=1e-3)
-    x = 0.4 / K * (1.0 - np.cos(OMEGA * motion.time))
-    np.testing.assert_allclose(motion.displacement[:, 1, 0], x, atol=1e-11)
-    np.testing.assert_allclose(motion.work, 0.4 * x, atol=1e-11)
-    held = (motion.support_node == 0) & (motion.support_axis == "x")
-    np.testing.assert_allclose(motion.reaction[:, held.to_numpy()][:, 0], -K * x, atol=1e-10)
-
-
-def test_harmonic_force(spring):
-    """Forced far from resonance: particular plus free motion."""
-    f = 1.5
-    w = 2.0 * np.pi * f
-    load = fd.Force([1], (0.4, 0.0, 0.0), fd.Harmonic(frequency=f))
-    motion = fd.simulate(fd.Case(spring.structure, spring.supports, [load]), 3.0, dt=1e-3)
-    amplitude = 0.4 / MASS / (OMEGA**2 - w**2)
-    t = motion.time
-    exact = amplitude * (np.sin(w * t) - w / OMEGA * np.sin(OMEGA * t))
-    np.testing.assert_allclose(motion.displacement[:, 1, 0], exact, atol=1e-9)
-
-
-def test_histories_are_evaluated_at_stage_times(spring):
+def test_histories_are_evaluated_at_stage_times():
     """The times are t_n + c dt with t_n = n dt, to the last bit."""
     seen = []
 
@@ -133,10 +81,8 @@ def test_histories_are_evaluated_at_stage_times(spring):
         seen.append(np.asarray(t, float).ravel())
         return np.zeros_like(t)
 
-    dt, steps = 0.003, 700
-    load = fd.Force([1], (1.0, 0.0, 0.0), history)
-    fd.simulate(fd.Case(spring.structure, spring.supports, [load]), steps * dt, dt=dt)
-    n = np.arange(steps)
+    dt, n = 0.003, np.arange(700)
+    fd.simulate(pulled(SPRING, 1.0, history), 700 * dt, dt=dt)
     wanted = np.unique(np.concatenate([n * dt, n * dt + 0.5 * dt, n * dt + dt]))
     assert np.isin(wanted, np.concatenate(seen)).all()
 
@@ -154,12 +100,11 @@ def test_superlinear_law_lowers_the_order_to_seven_thirds():
         slope_of=lambda s: 4.0 / 3.0 * abs(s - 1.0) ** (1.0 / 3.0) / s**2,
         name="superlinear bar",
     )
-    case, duration = oscillator(law, 40.0), 4.0
-    steps = 2 ** np.arange(8, 13)
-    errors = np.zeros(len(steps))
-    for a in np.linspace(0.2, 0.4, 24):
-        exact = end(case, duration / 2**16, duration, released(a), "rk4")
-        found = [end(case, duration / n, duration, released(a), "rk4") for n in steps]
-        errors += (np.array(found) - exact) ** 2
-    order = observed_order(duration / steps, np.sqrt(errors))
-    assert order == pytest.approx(7.0 / 3.0, abs=0.2)
+    case, steps = oscillator(law, 40.0), 2 ** np.arange(8, 13)
+
+    def end(n, a):
+        return place(fd.simulate(case, 4.0, dt=4.0 / n, initial=released(a)))[-1]
+
+    ends = np.array([[end(n, a) for n in (*steps, 2**16)] for a in np.linspace(0.2, 0.4, 24)])
+    errors = np.linalg.norm(ends[:, :-1] - ends[:, -1:], axis=0)
+    assert order(steps, errors) == pytest.approx(7.0 / 3.0, abs=0.2)

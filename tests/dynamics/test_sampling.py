@@ -16,28 +16,18 @@ def run(sample, method="rk4", **given):
 
 
 @pytest.mark.parametrize("method", ["rk4", "generalized_alpha"])
-def test_functions_get_the_state_at_the_samples(method):
-    motion = run(
-        {
-            "place": lambda u, v, t: u[1, 0],
-            "pair": lambda u, v, t: [t, v[1, 0]],
-            "all": fd.Quantity("m/s", "speed", ("node", "axis"), lambda u, v, t: np.abs(v)),
-        },
-        method,
-    )
+def test_functions_get_the_state_at_the_samples_and_are_stored(method, tmp_path):
+    speeds = fd.Quantity("m/s", "speed", ("node", "axis"), lambda u, v, t: np.abs(v))
+    pair = {"place": lambda u, v, t: u[1, 0], "pair": lambda u, v, t: [t, v[1, 0]]}
+    motion = run({**pair, "all": speeds}, method)
     np.testing.assert_array_equal(motion.place, motion.displacement[:, 1, 0])
     np.testing.assert_array_equal(motion.pair[:, 0], motion.time)
     np.testing.assert_array_equal(motion.pair[:, 1], motion.velocity[:, 1, 0])
     np.testing.assert_array_equal(motion["all"], np.abs(motion.velocity))
     assert motion.pair.dims == ("time", "pair_0")
     assert motion["all"].attrs == {"units": "m/s", "long_name": "speed"}
-
-
-def test_results_with_them_are_saved_and_run_again(tmp_path):
-    motion = run({"place": lambda u, v, t: u[1, 0]})
     fd.save(motion, tmp_path / "motion.nc")
-    again = fd.load(tmp_path / "motion.nc")
-    np.testing.assert_array_equal(again.place, motion.place)
+    np.testing.assert_array_equal(fd.load(tmp_path / "motion.nc").place, motion.place)
 
 
 def test_functions_cannot_change_the_motion():
@@ -79,9 +69,8 @@ def test_a_motion_stops_where_they_end(late, message):
             return t
         return late if late is not None else 1 / 0
 
-    with pytest.raises(
-        ComputationError, match=rf"sample\.x, at t = 0\.5 s: .*{message}"
-    ) as stopped:
+    said = rf"sample\.x, at t = 0\.5 s: .*{message}"
+    with pytest.raises(ComputationError, match=said) as stopped:
         run({"x": function})
     partial = stopped.value.partial
     np.testing.assert_allclose(partial.x[:5], partial.time[:5])

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import os
+from functools import partial
 
 import numpy as np
 import pytest
 from contact_cases import tower
+from long_cases import killed_and_resumed, look_often, same
 from scipy.sparse import csr_array
 
 import foldyn as fd
 from contact_sheets import SHEET, crossing, on_a_panel
-from foldyn.dynamics import motion, prepare
+from foldyn.dynamics import prepare
 from foldyn.dynamics.equation import EquationOfMotion
 from foldyn.dynamics.explicit_contact import slow_contacts
 from foldyn.dynamics.motion_state import TALLY, Course
@@ -34,10 +35,8 @@ def curvature(x):
 
 def pressed(mass: str):
     """A packed case in which a strip lies on a panel and a corner on the ground."""
-    s = on_a_panel()[0]
-    s = fd.discretize(s.pattern, SHEET, fold_law="linear", mass=mass)
-    ground = fd.Plane((0, 0, -DEPTH), (0.0, 0.0, 1.0))
-    contact = fd.Contact(planes=[ground])
+    s = fd.discretize(on_a_panel()[0].pattern, SHEET, fold_law="linear", mass=mass)
+    contact = fd.Contact(planes=[fd.Plane((0, 0, -DEPTH), (0.0, 0.0, 1.0))])
     return pack(fd.Case(s, damping=fd.Rayleigh(alpha=ALPHA), contact=contact), 1e-4)
 
 
@@ -48,24 +47,19 @@ def test_accelerations_are_those_of_the_mass_with_the_inertia_of_contacts(mass):
     u = np.zeros((len(order), 3))
     contact = body.find(ContactTerm)
     contact.contact(u)
-    kept = contact.memory
+    kept, counts = contact.memory, []
     added = room_for(contact.tables, kept)
-    arguments = contact.tables, added, u, DT, 0.7, system.lightness, kept
-    kept.facts.resolved = 0.0
-    added_inertia(*arguments)
-    count, pairs = int(added.count[0]), kept.counts.near_first + kept.counts.near_second
-    assert count > len(contact.tables.meeting) - 8 and pairs > 0
-    kept.facts.resolved = DT
-    added_inertia(*arguments)
-    assert added.count[0] == 0
-    kept.facts.resolved = 0.0
-    added_inertia(*arguments)
-    assert added.count[0] == count
+    for resolved in (0.0, DT, 0.0):
+        kept.facts.resolved = resolved
+        added_inertia(contact.tables, added, u, DT, 0.7, system.lightness, kept)
+        counts.append(int(added.count[0]))
+    count = counts[0]
+    assert counts == [count, 0, count] and count > len(contact.tables.meeting) - 8
+    assert kept.counts.near_first + kept.counts.near_second > 0
     nodes, gradient = added.nodes[:count], added.gradient[:count]
-    rows = np.zeros((count, u.size))
-    for row, corners, slopes in zip(rows, nodes, gradient, strict=True):
-        for node, slope in zip(corners, slopes, strict=True):
-            row[3 * node : 3 * node + 3] += slope
+    rows = np.zeros((count, len(u), 3))
+    np.add.at(rows, (np.arange(count)[:, None], nodes), gradient)
+    rows = rows.reshape(count, -1)
     # a tau of two steps, and the stiffness of contact: here of corners on the ground
     stiffness = 1.0 / (4.0 * DT**2 * added.ease[:count])
     grounded = stiffness[nodes[:, 0] == nodes[:, 1]]
@@ -152,29 +146,13 @@ def test_steps_overrun_no_gap_where_they_resolve_no_contact():
     assert longest(1e-3, 0.0) < longest(1e-3, 1e-9) < longest(1e-3, 4e-9) < closing
 
 
-class Killed(BaseException):
-    """What ends a run without a word."""
-
-
 @pytest.mark.thorough
 def test_a_motion_with_slow_contacts_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path):
-    monkeypatch.setattr(os, "fsync", lambda _: None)
-    monkeypatch.setattr(motion, "CHUNK", 256)
-    monkeypatch.setattr(motion, "REPORT_EVERY", 0.0)
+    look_often(monkeypatch, 256)
     case = tower(38.0, fd.Contact(), fd.Ramp(0.005, smooth=True), alpha=2000.0)
     given = {"duration": 0.04, "method": "dormand_prince", "every": 1e-3}
     once = prepare(case, **given)
     whole = once.run()
     assert once._engine._equations[0]._slow.value.added.count[0] > 0
 
-    def stop(now):
-        if now.time > 0.7 * given["duration"]:
-            raise Killed
-
-    kept = given | {"store": tmp_path / "run.nc", "checkpoint": 1e-9, "resume": True}
-    with pytest.raises(Killed):
-        fd.simulate(case, **kept, progress=stop)
-    found = fd.simulate(case, **kept)
-    for name in whole.data_vars:
-        np.testing.assert_array_equal(found[name].values, whole[name].values)
-    assert found.attrs["steps"] == whole.attrs["steps"]
+    same(killed_and_resumed(partial(fd.simulate, case), tmp_path / "run.nc", **given), whole)

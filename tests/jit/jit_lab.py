@@ -31,12 +31,8 @@ print(*probe(pack([fd.HalfSine(1.0)], Callbacks()), 0.5), sum(probe.stats.cache_
 
 def copy_package(folder: Path) -> Path:
     """Copy of the package below `folder`; returns its folder."""
-    package = folder / "foldyn"
-    shutil.copytree(
-        Path(foldyn.__file__).parent,
-        package,
-        ignore=shutil.ignore_patterns("__pycache__", "studies"),
-    )
+    package, without = folder / "foldyn", shutil.ignore_patterns("__pycache__", "studies")
+    shutil.copytree(Path(foldyn.__file__).parent, package, ignore=without)
     (package / "probes").mkdir()
     (package / "probes" / "__init__.py").touch()
     (package / "probes" / "probe.py").write_text(PROBE, "utf-8")
@@ -52,10 +48,8 @@ def environment(package: Path, **variables: str | None) -> dict[str, str]:
 
 def python(package: Path, code: str, **variables: str | None) -> subprocess.CompletedProcess[str]:
     """What a process said that ran some code."""
-    command = [sys.executable, "-c", code]
-    return subprocess.run(
-        command, env=environment(package, **variables), capture_output=True, text=True, check=False
-    )
+    command, where = [sys.executable, "-c", code], environment(package, **variables)
+    return subprocess.run(command, env=where, capture_output=True, text=True, check=False)
 
 
 def ask(package: Path, **variables: str | None) -> tuple[float, float, int]:

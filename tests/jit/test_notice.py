@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from itertools import pairwise
 
 import pytest
 from jit_lab import ASK, copy_package, python
@@ -43,28 +44,21 @@ def test_each_part_of_the_work_is_told_once_with_what_is_missing():
     assert pytest.approx(21.0) == 150 * PER_KERNEL
 
 
-def test_on_a_busy_machine_kernels_take_longer():
-    """The first ones may be small; others have the processor for three quarters of the time."""
-    slow = Compiler(0.1, share=0.25)
-    slow.compile(range(30))
-    slow.compile(range(30, 80))
-    assert [text.partition("about")[2].partition(";")[0] for text in slow.told] == [" 5 s", " 30 s"]
-
-
-def test_short_waits_are_not_worth_a_word():
-    quick = Compiler(0.01)
-    for k in range(30):
-        quick.compile([k])
-    assert quick.told == []
-
-
-def test_long_ones_are_told_in_minutes():
-    slow = Compiler(6.0)
-    slow.compile(range(10))  # none of which is told, as it should not take that long
-    slow.compile(range(10, 20))
-    slow.compile(range(20, 45))
-    ends = [text.partition("about")[2].partition(";")[0] for text in slow.told]
-    assert ends == [" a minute", " 2.5 minutes"]
+@pytest.mark.parametrize(
+    ("seconds", "share", "ends", "told"),
+    [
+        # the first may be small; others have the processor for three quarters of the time
+        (0.1, 0.25, [30, 80], [" 5 s", " 30 s"]),
+        (0.01, 1.0, range(1, 31), []),  # short waits are not worth a word
+        # none of the first is told, as it should not take that long
+        (6.0, 1.0, [10, 20, 45], [" a minute", " 2.5 minutes"]),
+    ],
+)
+def test_it_tells_of_the_time_that_kernels_take_here(seconds, share, ends, told):
+    compiler = Compiler(seconds, share)
+    for begin, end in pairwise([0, *ends]):
+        compiler.compile(range(begin, end))
+    assert [text.partition("about")[2].partition(";")[0] for text in compiler.told] == told
 
 
 TOLD = f"""

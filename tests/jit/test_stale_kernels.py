@@ -67,6 +67,20 @@ def test_what_a_kernel_is_made_from():
     assert "dynamics/rk4.py" not in files_of("mechanics/force.py", "internal_force")
 
 
+def written(folder, texts):
+    """Write files by their names."""
+    for name, text in texts.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text, "utf-8")
+
+
+def clear_sources():
+    """Forget what was read of files."""
+    for found in vars(sources).values():
+        if hasattr(found, "cache_clear"):
+            found.cache_clear()
+
+
 def kernels():
     """All compiled functions of the package: their files and names, and the functions."""
     for path in FILES:
@@ -126,18 +140,12 @@ def package(monkeypatch, tmp_path):
         texts = dict(files)
         assert old in texts[path]
         texts[path] = texts[path].replace(old, new) if old else texts[path]
-        for file, text in texts.items():
-            (tmp_path / file).parent.mkdir(exist_ok=True)
-            (tmp_path / file).write_text(text, "utf-8")
-        for found in vars(sources).values():
-            if hasattr(found, "cache_clear"):
-                found.cache_clear()
+        written(tmp_path, texts)
+        clear_sources()
         return digest(tmp_path / "kernels.py", name)
 
     yield digest_of
-    for found in vars(sources).values():
-        if hasattr(found, "cache_clear"):
-            found.cache_clear()
+    clear_sources()
 
 
 @pytest.mark.parametrize(
@@ -192,18 +200,19 @@ def test_imports_are_read_as_python_reads_them():
 
 
 def test_names_that_a_package_passes_on_lead_to_their_files(monkeypatch, tmp_path):
-    for name, text in {
-        "__init__.py": "",
-        "kernels.py": "from foldyn.laws import law\nfrom foldyn import tools\n",
-        "laws/__init__.py": "from foldyn.laws.one import law, other\nfrom foldyn.laws.two import b",
-        "laws/one.py": "from foldyn.values import (\n    A,  # the first\n    B,\n)\n",
-        "laws/two.py": "",
-        "values.py": "",
-        "tools/__init__.py": "",
-        "tools/deep/more.py": "",
-    }.items():
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text(text, "utf-8")
+    written(
+        tmp_path,
+        {
+            "__init__.py": "",
+            "kernels.py": "from foldyn.laws import law\nfrom foldyn import tools\n",
+            "laws/__init__.py": "from foldyn.laws.one import law, o\nfrom foldyn.laws.two import b",
+            "laws/one.py": "from foldyn.values import (\n    A,  # the first\n    B,\n)\n",
+            "laws/two.py": "",
+            "values.py": "",
+            "tools/__init__.py": "",
+            "tools/deep/more.py": "",
+        },
+    )
     monkeypatch.setattr(sources, "PACKAGE", tmp_path)
     monkeypatch.setattr(sources, "_home", sources._home.__wrapped__)
     monkeypatch.setattr(sources, "_READ", set())
@@ -213,20 +222,24 @@ def test_names_that_a_package_passes_on_lead_to_their_files(monkeypatch, tmp_pat
     assert found == wanted
 
 
-def test_tools_and_their_variables_count(monkeypatch):
+TOOLS = [(module, "__version__", "0.1") for module in (sources.numba, sources.np, sources.llvmlite)]
+READER = sources.config._env_reloader
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "value", "counts"),
+    [
+        *((*tool, True) for tool in TOOLS),
+        (READER, "old_environ", READER.old_environ | {"NUMBA_OPT": "other"}, True),
+        (READER, "old_environ", READER.old_environ | {"NUMBA_CACHE_DIR": "other"}, False),
+    ],
+)
+def test_tools_and_their_variables_count(owner, name, value, counts, monkeypatch):
     source = PACKAGE / "mechanics/force.py", "internal_force"
     before = digest.__wrapped__(*source)
-    for module, version in ((sources.numba, "0.1"), (sources.np, "0.1"), (sources.llvmlite, "0.1")):
-        with monkeypatch.context() as patch:
-            patch.setattr(module, "__version__", version)
-            patch.setattr(sources, "_tools", sources._tools.__wrapped__)
-            assert digest.__wrapped__(*source) != before
-    reader = sources.config._env_reloader
-    for name, counts in (("NUMBA_OPT", True), ("NUMBA_CACHE_DIR", False)):
-        with monkeypatch.context() as patch:
-            patch.setattr(reader, "old_environ", reader.old_environ | {name: "other"})
-            patch.setattr(sources, "_tools", sources._tools.__wrapped__)
-            assert (digest.__wrapped__(*source) != before) == counts
+    monkeypatch.setattr(owner, name, value)
+    monkeypatch.setattr(sources, "_tools", sources._tools.__wrapped__)
+    assert (digest.__wrapped__(*source) != before) == counts
 
 
 def test_all_that_compiles_is_compiled_in_one_place():

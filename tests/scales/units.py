@@ -104,11 +104,17 @@ ENERGIES = (
     "kinetic", "dissipated", "work", "strain_bars", "strain_folds", "strain_bends",
     "strain_membrane", "strain_bending",
 )  # fmt: skip
+PLAIN = (
+    "load_factor", "negative_eigenvalues", "damping_ratio", "transmissibility", "swing",
+    "rigid_share",
+)  # fmt: skip
 
 
 def in_units(result, by: Units) -> dict[str, np.ndarray]:
     """Numbers of a result without dimension."""
-    per = dict.fromkeys(ENERGIES, by.energy) | {
+    per = {
+        **dict.fromkeys(PLAIN, 1.0),
+        **dict.fromkeys(ENERGIES, by.energy),
         "displacement": by.length,
         "velocity": by.velocity,
         "reaction": by.force,
@@ -120,16 +126,8 @@ def in_units(result, by: Units) -> dict[str, np.ndarray]:
         "participation": by.mass**0.5,
         "effective_mass": by.mass,
     }
-    plain = (
-        "load_factor", "negative_eigenvalues", "damping_ratio", "transmissibility", "swing",
-        "rigid_share",
-    )  # fmt: skip
-    told = {name: 1.0 for name in plain} | per
-    return {
-        name: np.asarray(result[name].values) / unit
-        for name, unit in told.items()
-        if name in result.variables
-    }
+    names = per.keys() & result.variables.keys()
+    return {name: np.asarray(result[name].values) / per[name] for name in names}
 
 
 def largest_difference(one: dict, other: dict) -> tuple[float, str]:

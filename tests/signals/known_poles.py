@@ -71,18 +71,13 @@ def sampled_receptance(f: NDArray, dt: float, *modes: Mode) -> NDArray[np.comple
     late = np.exp(-2j * np.pi * np.asarray(f) * dt)
     total = 0
     for mode in modes:
-        for pole, residue in (
-            (mode.pole, mode.residue),
-            (np.conj(mode.pole), np.conj(mode.residue)),
-        ):
-            E, a, b = _recursion(pole, dt)
-            total = total + residue * (b + a * late) / (1 - E * late)
+        for half in (np.positive, np.conj):
+            E, a, b = _recursion(half(mode.pole), dt)
+            total = total + half(mode.residue) * (b + a * late) / (1 - E * late)
     return total
 
 
-def burst_random(
-    rng: np.random.Generator, records: int, n: int, burst: float = 0.5
-) -> NDArray[np.float64]:
+def burst_random(rng: np.random.Generator, records: int, n: int, burst: float = 0.5) -> NDArray:
     """White noise in the first part of each record, then silence, shape (records, n)."""
     force = rng.normal(size=(records, n))
     force[:, int(burst * n) :] = 0.0

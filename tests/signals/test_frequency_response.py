@@ -4,17 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from known_poles import (
-    SPECIMEN,
-    Mode,
-    burst_random,
-    receptance,
-    response,
-    sampled_receptance,
-)
+from known_poles import SPECIMEN, Mode, burst_random, receptance, response, sampled_receptance
 from scipy import signal
 
-from foldyn.checks import observed_order
 from foldyn.errors import InputError
 from foldyn.signals import circle_fit, exponential_window, frequency_response, without_window
 
@@ -31,25 +23,6 @@ def sweep(n: int, dt: float, start: float, end: float, duration: float) -> np.nd
     t = np.arange(n) * dt
     phase = 2 * np.pi * (start * t + (end - start) * t**2 / (2 * duration))
     return np.where(t < duration, np.sin(phase), 0.0)
-
-
-# ------------------------------------------------------------------------ the tool itself
-def test_the_known_response_is_that_of_the_equation_of_motion():
-    """Under a constant force after a ramp of one sample, from rest: x -> A / w0^2."""
-    mode = Mode(3.0, 0.2, 1.7)
-    w0, wd = 2 * np.pi * 3.0, mode.pole.imag
-    t = np.arange(4000) * 1e-3
-    x = response(np.ones(t.size), 1e-3, mode)  # the samples of a step that stands at t = 0
-    decay = np.exp(-0.2 * w0 * t) * (np.cos(wd * t) + 0.2 * w0 / wd * np.sin(wd * t))
-    np.testing.assert_allclose(x, 1.7 / w0**2 * (1 - decay), atol=1e-15)
-
-
-def test_the_sampled_receptance_tends_to_the_receptance():
-    f = np.linspace(0.5, 20, 40)
-    steps = np.array([4e-3, 2e-3, 1e-3])
-    exact = receptance(f, *SPECIMEN)
-    errors = [np.abs(sampled_receptance(f, dt, *SPECIMEN) - exact).max() for dt in steps]
-    assert observed_order(steps, errors) == pytest.approx(2.0, abs=0.05)
 
 
 # ------------------------------------------------------------------------ without noise
@@ -80,38 +53,30 @@ def test_records_tell_the_poles():
     dt, mode = 1 / 2000, Mode(9.3, 0.135, 2.0)
     force = half_sine(8000, dt, 0.03)
     estimate = frequency_response(force, response(force, dt, mode), dt)
-    fit = circle_fit(estimate.frequency, estimate.response, band=(7.0, 12.0))
-    assert fit.natural_frequency == pytest.approx(9.3, rel=1e-7)
-    assert fit.damping_ratio == pytest.approx(0.135, rel=2e-5)
-    # and with that error taken off
     f = estimate.frequency
-    held = sampled_receptance(f, dt, mode) / receptance(f, mode)
-    fit = circle_fit(f, estimate.response / held, band=(7.0, 12.0))
-    assert fit.natural_frequency == pytest.approx(9.3, rel=1e-10)
-    assert fit.damping_ratio == pytest.approx(0.135, rel=1e-9)
+    held = sampled_receptance(f, dt, mode) / receptance(f, mode)  # with that error taken off
+    for taken, near, damping in ((1.0, 1e-7, 2e-5), (held, 1e-10, 1e-9)):
+        fit = circle_fit(f, estimate.response / taken, band=(7.0, 12.0))
+        assert fit.natural_frequency == pytest.approx(9.3, rel=near)
+        assert fit.damping_ratio == pytest.approx(0.135, rel=damping)
 
 
 def test_an_exponential_window_serves_records_that_have_not_died_away():
-    mode, rate, n = Mode(9.3, 0.01, 2.0), 3.0, 2000
-    dt = 1 / 2000
+    mode, rate, n, dt = Mode(9.3, 0.01, 2.0), 24.0, 2000, 1 / 2000
     force = half_sine(n, dt, 0.03)
     x = response(force, dt, mode)
     assert np.abs(x[-200:]).max() > 0.5 * np.abs(x).max()
     plain = frequency_response(force, x, dt)
-    window = exponential_window(n, dt, rate=8 * rate)
-    damped = frequency_response(force, x, dt, window=window)
+    damped = frequency_response(force, x, dt, window=exponential_window(n, dt, rate=rate))
     f = damped.frequency
-    shifted = Mode(*without_window(9.3, 0.01, 8 * rate), 2.0)
-    w = 2j * np.pi * f + 8 * rate
-    s = mode.pole
-    exact = 2.0 / ((w - s) * (w - np.conj(s)))
-    band = (f > 3) & (f < 25)
-    size = np.abs(exact).max()
+    w = 2j * np.pi * f + rate
+    exact = 2.0 / ((w - mode.pole) * (w - np.conj(mode.pole)))
+    band, size = (f > 3) & (f < 25), np.abs(exact).max()
     assert np.abs(damped.response - exact)[band].max() < 2e-3 * size
     assert np.abs(plain.response - receptance(f, mode))[band].max() > 0.1 * size
-    assert shifted.damping < 0  # what a window takes off, it adds before
+    assert without_window(9.3, 0.01, rate)[1] < 0  # what a window takes off, it adds before
     fit = circle_fit(f, damped.response, band=(5.0, 15.0))
-    frequency, damping = without_window(fit.natural_frequency, fit.damping_ratio, 8 * rate)
+    frequency, damping = without_window(fit.natural_frequency, fit.damping_ratio, rate)
     assert frequency == pytest.approx(9.3, rel=1e-4)
     assert damping == pytest.approx(0.01, abs=2e-4)
 
@@ -129,18 +94,16 @@ def test_welch_averages_are_those_of_scipy():
     force = rng.normal(size=5000)
     x = signal.lfilter([0.3, 0.2], [1, -0.7], force) + 0.1 * rng.normal(size=5000)
     settings = {"fs": 50.0, "window": "hann", "nperseg": 256, "noverlap": 128}
-    estimate = frequency_response(
-        force, x, 1 / 50, segment=256, overlap=0.5, window="hann", detrend="constant"
-    )
+    given = {"segment": 256, "overlap": 0.5, "window": "hann", "detrend": "constant"}
+    estimate = frequency_response(force, x, 1 / 50, **given)
     f, ff = signal.welch(force, **settings)
     fx = signal.csd(force, x, **settings)[1]
     assert estimate.segments == 38
     np.testing.assert_allclose(estimate.frequency, f)
     np.testing.assert_allclose(estimate.force_density, ff, rtol=1e-12)
     np.testing.assert_allclose(estimate.response[1:], (fx / ff)[1:], rtol=1e-10)
-    np.testing.assert_allclose(
-        estimate.coherence[1:], signal.coherence(force, x, **settings)[1][1:], rtol=1e-10
-    )
+    coherence = signal.coherence(force, x, **settings)[1]
+    np.testing.assert_allclose(estimate.coherence[1:], coherence[1:], rtol=1e-10)
 
 
 @pytest.mark.parametrize("n", [400, 401])
@@ -180,33 +143,23 @@ def test_noise_in_the_response_leaves_h1_and_inflates_h2():
     assert np.min(noise / power) > 0.2
 
 
-def test_noise_in_the_force_leaves_h2_and_deflates_h1():
+def test_noise_in_the_force_leaves_h2_deflates_h1_and_lowers_the_coherence_by_its_share():
     # the burst fills half of the record, the noise all of it: one power in every line
     assert mean_ratio("h2", 0.5, 0.0) == pytest.approx(1.0, abs=0.02)
     assert mean_ratio("h1", 0.5, 0.0) == pytest.approx(1 / 1.5, rel=0.02)
-
-
-def test_noise_lowers_the_coherence_by_its_share():
     force, x, _ = noisy(4, 400, 0.5, 0.0)
-    coherence = frequency_response(force, x, DT).coherence
-    assert coherence[50:150].mean() == pytest.approx(1 / 1.5, rel=0.02)
-    assert coherence[50:150].max() < 0.8
-    # H1 / H2 is the coherence
-    h1, h2 = (frequency_response(force, x, DT, kind).response for kind in ("h1", "h2"))
-    np.testing.assert_allclose((h1 / h2)[1:], coherence[1:], rtol=1e-10)
+    h1, h2 = (frequency_response(force, x, DT, kind) for kind in ("h1", "h2"))
+    assert h1.coherence[50:150].mean() == pytest.approx(1 / 1.5, rel=0.02)
+    assert h1.coherence[50:150].max() < 0.8
+    np.testing.assert_allclose((h1.response / h2.response)[1:], h1.coherence[1:], rtol=1e-10)
 
 
 def test_coherence_of_unrelated_records_is_one_over_their_number():
     rng = np.random.default_rng(6)
     estimate = frequency_response(rng.normal(size=(20, 512)), rng.normal(size=(20, 512)), DT)
     assert estimate.coherence.mean() == pytest.approx(1 / 20, rel=0.15)
-
-
-def test_one_segment_tells_no_coherence():
-    force = np.random.default_rng(1).normal(size=100)
-    estimate = frequency_response(force, force, DT)
-    assert estimate.segments == 1
-    assert np.isnan(estimate.coherence).all()
+    one = frequency_response(*rng.normal(size=(2, 100)), DT)  # tells none
+    assert one.segments == 1 and np.isnan(one.coherence).all()
 
 
 def test_scatter_over_seeds_is_the_stated_random_error():
@@ -266,48 +219,45 @@ def test_lines_without_force_are_nan():
 
 def test_what_is_left_at_the_end_is_unused():
     force = np.random.default_rng(8).normal(size=130)
-    kept = frequency_response(force[:128], force[:128], 0.1, segment=32)
-    np.testing.assert_array_equal(
-        frequency_response(force, force, 0.1, segment=32).force_density, kept.force_density
+    kept, whole, more = (
+        frequency_response(each, each, 0.1, segment=32, overlap=overlap)
+        for each, overlap in ((force[:128], 0.0), (force, 0.0), (force, 0.75))
     )
-    assert kept.segments == 4
-    assert frequency_response(force, force, 0.1, segment=32, overlap=0.75).segments == 13
+    np.testing.assert_array_equal(whole.force_density, kept.force_density)
+    assert (kept.segments, more.segments) == (4, 13)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"response": np.ones(99)}, r"response: shape \(99,\)"),
-        ({"force": np.ones((2, 100))}, "response: shape"),
-        ({"force": np.ones((1, 2, 50))}, "force: shape"),
-        ({"force": np.zeros(100)}, "force: zero throughout"),
-        ({"response": np.full(100, np.nan)}, "response: 100 samples are NaN"),
-        ({"dt": 0.0}, "dt"),
-        ({"dt": np.arange(100) * 0.1}, "sampling_interval"),
-        ({"estimator": "h3"}, 'estimator = "h3"'),
-        ({"segment": 101}, "segment: 101"),
-        ({"segment": 2}, "segment = 2"),
-        ({"overlap": 1.0}, "overlap = 1.0"),
-        ({"overlap": -0.1}, "overlap = -0.1"),
-        ({"window": np.ones(5)}, "window"),
-        ({"detrend": "mean"}, "detrend"),
-    ],
-)
-def test_bad_input(arguments, words):
-    good = {"force": np.ones(100), "response": np.ones(100), "dt": 0.1}
-    with pytest.raises(InputError, match=words):
-        frequency_response(**(good | arguments))
+GOOD = {"force": np.ones(100), "response": np.ones(100), "dt": 0.1}
 
 
 @pytest.mark.parametrize(
     ("function", "arguments", "words"),
     [
-        (exponential_window, (100, 0.1, -1.0), "rate = -1.0: must be greater than 0"),
-        (exponential_window, (0, 0.1, 1.0), "n = 0"),
-        (without_window, (10.0, 1.2, 1.0), "damping_ratio"),
-        (without_window, (10.0, 0.1, "fast"), 'rate = "fast": must be a number'),
+        *(
+            (frequency_response, GOOD | arguments, words)
+            for arguments, words in (
+                ({"response": np.ones(99)}, r"response: shape \(99,\)"),
+                ({"force": np.ones((2, 100))}, "response: shape"),
+                ({"force": np.ones((1, 2, 50))}, "force: shape"),
+                ({"force": np.zeros(100)}, "force: zero throughout"),
+                ({"response": np.full(100, np.nan)}, "response: 100 samples are NaN"),
+                ({"dt": 0.0}, "dt"),
+                ({"dt": np.arange(100) * 0.1}, "sampling_interval"),
+                ({"estimator": "h3"}, 'estimator = "h3"'),
+                ({"segment": 101}, "segment: 101"),
+                ({"segment": 2}, "segment = 2"),
+                ({"overlap": 1.0}, "overlap = 1.0"),
+                ({"overlap": -0.1}, "overlap = -0.1"),
+                ({"window": np.ones(5)}, "window"),
+                ({"detrend": "mean"}, "detrend"),
+            )
+        ),
+        (exponential_window, {"n": 100, "dt": 0.1, "rate": -1.0}, "rate = -1.0: must be greater"),
+        (exponential_window, {"n": 0, "dt": 0.1, "rate": 1.0}, "n = 0"),
+        (without_window, {"frequency": 9.0, "damping_ratio": 1.2, "rate": 1.0}, "damping_ratio"),
+        (without_window, {"frequency": 9.0, "damping_ratio": 0.1, "rate": "x"}, 'rate = "x": must'),
     ],
 )
-def test_bad_windows(function, arguments, words):
+def test_bad_input(function, arguments, words):
     with pytest.raises(InputError, match=words):
-        function(*arguments)
+        function(**arguments)

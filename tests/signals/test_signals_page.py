@@ -34,9 +34,8 @@ def test_the_table_of_the_textbook_bias():
     assert len(table) == 5
     for z, *shown in table:
         H = receptance(f, Mode(9.3, float(z)))
-        for percent, size, quantity in zip(
-            shown, (H, f**2 * H), ("receptance", "accelerance"), strict=True
-        ):
+        kinds = (H, "receptance"), (f**2 * H, "accelerance")
+        for percent, (size, quantity) in zip(shown, kinds, strict=True):
             result = signals.half_power(f, np.abs(size), quantity=quantity)
             bias = 100 * (result.textbook_damping_ratio / float(z) - 1)
             assert float(percent) == pytest.approx(bias, rel=0.03)

@@ -1,18 +1,82 @@
-"""Eight numbers as one value: the arithmetic of each, and its place in an array."""
+"""What compiled functions take: fields of a context, eight numbers at once; who may call them."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.dynamics.motion_state import TALLY
+from foldyn.jit.compiled import inner, kernel, scalar
+from foldyn.jit.context import Context
 from foldyn.jit.eights import COUNT, any_of, choose, eight, per_cube_root, put
 from foldyn.materials import superlinear
 from foldyn.mechanics.dihedral import branch_free_atan2
 
 
+@inner
+def more(x):
+    return x + 1
+
+
+@kernel
+def twice_more(x):
+    return 2 * more(x)
+
+
+def test_a_call_of_an_inner_function_is_refused_before_and_after_it_is_compiled():
+    """There is no way in: without the refusal, the second call would end the process."""
+    for _ in range(2):
+        with pytest.raises(TypeError, match="more is for compiled functions"):
+            more(1)
+        assert twice_more(1) == 4
+
+
+# ------------------------------------------------------------------ contexts
+class Part(NamedTuple):
+    yes: bool
+    line: NDArray
+    size: float
+
+
+class Owner(NamedTuple):
+    part: Part
+    number: int
+    table: NDArray
+    tally: np.record
+    last: Part
+
+
+@inner
+def _told(part):
+    return part.size * part.line[1] if part.yes else -1.0
+
+
+@kernel
+def _read(own):
+    own.tally.steps += own.number
+    own.table[1, 2] = 7.0
+    return _told(own.part), _told(own.last), own.table.shape[0], own.number
+
+
+def test_fields_are_those_of_the_tuple():
+    line, table, tally = np.array([1.0, 2.0, 3.0]), np.zeros((2, 3)), np.zeros(1, TALLY)[0]
+    owner = Owner(Part(True, line, 2.5), -4, table, tally, Part(False, line[1:], 0.5))
+    assert _read(Context(owner)) == (5.0, -1.0, 2, -4)
+    assert tally.steps == -4 and table[1, 2] == 7.0
+    last = Part(True, np.arange(6.0)[::2], 0.5)  # of another layout, and so of another type
+    assert _read(Context(owner._replace(last=last)))[:2] == (5.0, 1.0)
+
+
+def test_what_is_no_tuple_of_arrays_and_numbers_has_no_place():
+    with pytest.raises(TypeError, match="str has no place in a context"):
+        Context(Part(True, np.zeros(2), "2.5"))  # type: ignore[arg-type]
+
+
+# ------------------------------------------------------------------ eights
 @scalar
 def formula(x, y):
     """All that eights can."""
