@@ -7,7 +7,7 @@ import tomllib
 
 import tomli_w
 
-_SHEET = """[sheet]
+SHEET_TEXT = """[sheet]
 youngs_modulus = 1e6
 poissons_ratio = 0.25
 thickness = 0.01
@@ -16,12 +16,12 @@ density = 1.0
 MIURA_TEXT = f"""
 [pattern]
 kind = "miura"
-{_SHEET}"""
+{SHEET_TEXT}"""
 FOLD_TEXT = f"""
 [pattern]
 kind = "simple_fold"
 dihedral = 60
-{_SHEET}"""
+{SHEET_TEXT}"""
 HELD_MIURA_TEXT = f"""{MIURA_TEXT}[[supports]]
 nodes = "xmin"
 """

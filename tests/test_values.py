@@ -80,14 +80,8 @@ def test_arrays_have_a_size_and_may_have_tails():
     tails = np.exp(-(np.linspace(-25.0, 25.0, 5) ** 2))  # to 1e-272
     np.testing.assert_array_equal(numbers("a", tails), tails)
     assert numbers("a", []).size == 0
-    for bad in (
-        [1.0, 1e51],
-        [0, 2**70, 1e300],
-        [0.0, 1e-60],
-        [1, np.nan],
-        np.float64("nan"),
-        10**400,
-    ):
+    nan = np.float64("nan")
+    for bad in ([1.0, 1e51], [0, 2**70, 1e300], [0.0, 1e-60], [1, np.nan], nan, 10**400):
         with pytest.raises(InputError, match=r"^a.* must be "):
             numbers("a", bad)
 

@@ -32,7 +32,7 @@ title = 3: must be text
 loads[0].nodes = [6, 99]: node 99 is out of range; this structure has nodes 0 to 12
 output.nodes = 13 | output.nodes = [13]: node 13 is out of range
 supports[0].nodes = "xmid": xmid is not known
-supports[0].nodes = "x > 99": selects no vertex
+supports[0].nodes = "x > 99": selects no vertex; the pattern spans x 0 to
 supports[0].nodes = [0.0]: 0.0 is not a node number
 supports[0].axes = "xw": must be letters
 supports = { nodes = [0, 1, 2], axes = "xyz" }: must be a list of tables, written [[
@@ -60,7 +60,9 @@ loads[0].history = { kind = "table", file = "a.csv", column = "F" } | loads[0].h
     unknown key; known keys: file, time, value, unit
 loads[0].history.duration =; loads[0].history.kind = "table" | loads[0].history: give times and
     values, or file (CSV)
-loads[0].nodes = [0, 1] | loads[0]: the force [0.01, 0.0, 0.0] acts only where supports hold
+loads[0].nodes = [0, 2] | loads[0]: the force [0.01, 0.0, 0.0] acts only where supports hold its
+    nodes: 0 (x), 2 ... load other nodes or axes, or free these
+loads[0].nodes = [7, 7]: node 7 is
 loads[0].history.kind = "puls": did you mean 'pulse'? choose one of const
 loads[0].history.duration = -1: must be greater than 0
 loads[0].history.duration =; loads[0].history.duratoin = 1.0 | loads[0].history.duratoin: unknown
@@ -69,6 +71,8 @@ loads[0].history.duration = | loads[0].history.duration: missing
 loads[0].history = "pulse": must be a table { kind = "..." }
 loads[0].history = { kind = "table", times = [0, 1], values = [0, nan] } |
     loads[0].history.values[1] = nan: must be a finite number
+loads[0].history = { kind = "table", times = [0, 2, 1], values = [0, 1, 2] } |
+    loads[0].history.times[2] = 1.0: must be greater than the time before it (2.0)
 model.mass = "circumcentre": did you mean 'circumcenter'? choose one of
 model.mass = ["panel", "pannel"] | model.mass[1] = "pannel": did you mean 'panel'?
 model.mass = ["panel", "panel"] | model.mass[1] = "panel": is listed twice
@@ -77,7 +81,8 @@ model.mass = 1: choose one of
 model.scheme = "n6b8": did you mean 'n5b8'?
 model.bend_law = "superliner": did you mean 'superlinear'?
 model.fold_law.theta1 = "45": must be a number
-model.fold_law.theta1 = 400 | model.fold_law: EnhancedLinear: theta1 =
+model.fold_law.theta1 = 400 | model.fold_law: EnhancedLinear: theta1 = 400.0, theta2 = 315.0: need
+    0 < theta1 < theta2
 model.fold_law.theta1 =; model.fold_law.thetta1 = 45 | model.fold_law.thetta1: unknown key; did
     you mean 'theta1'? known keys: theta1
 pattern.kind = "muira": did you mean 'miura'? choose one of simple_fold
@@ -91,6 +96,7 @@ pattern.kind = | pattern: give kind (a generator), file, or
 analysis.kind = "mode": did you mean 'modes'? choose one of dynamics, statics, modes
 analysis.method = "rk5": did you mean 'rk4'? choose one
 analysis.duration = | analysis.duration: missing
+analysis.duration = 0: must be greater than 0
 analysis.dt = 0: must be greater than 0
 analysis.force = 1: must be true or false
 output.every = 0: must be a whole number, at least 1 (steps)
@@ -103,20 +109,25 @@ output.axes = "x" | output.axes: unknown key; did you mean 'axis'? known keys: n
 output.max_frequency = 0: must be greater than 0
 output.animation = "mp3": did you mean 'mp4'? choose one of gif, mp4
 model.crease_stiffness = [1.0] | model:
+model.crease_rest = 0 | model: crease_rest = 0: must lie between 0 and 360 degrees
+model.crease_rest = [60, 60] | model: crease_rest: 2 values for 4 creases: give one, or one for each
 model.crease_rest = nan: must be a finite number
 """
 # the same in the short example
 BAD_SHORT = """
-pattern.kind =; pattern.file = "no.fold" | pattern.file = "no.fold":
-pattern.kind =; pattern.vertices = [[0, 0]] | pattern.faces: missing
-pattern.kind =; pattern.vertices = [[0, nan]]; pattern.faces = [[0]] | pattern.vertices[0][1] =
-    nan: must be a finite number
-pattern.kind =; pattern.vertices = [[0, 0]]; pattern.faces = [[0, 0.5]] | pattern.faces[0] = [0,
-    0.5]: must be a list of vertex numbers
-pattern.kind =; pattern.vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]];
-    pattern.faces = [[0, 1, 2], [1, 0, 3], [0, 1, 4]] | pattern:
-pattern.b = 4.0; pattern.panel_angle = 30; model = { mass = "circumcenter" } | model: mass =
-    "circumcenter":
+pattern = { file = "no.fold" } | pattern.file = "no.fold": ... no.fold: there is no such file
+pattern = { file = "case2.toml" } | pattern.file = "case2.toml": ... .fold
+pattern = { vertices = [[0, 0]] } | pattern.faces: missing
+pattern = { vertices = [[0, nan]], faces = [[0]] } | pattern.vertices[0][1] = nan: must be a finite
+pattern = { vertices = [[0, 0]], faces = [[0, 0.5]] } | pattern.faces[0] = [0, 0.5]: must be a list
+    of vertex numbers
+pattern = { vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]], faces = [[0, 1,
+    2], [1, 0, 3], [0, 1, 4]] } | pattern: ... 3 faces
+pattern.b = 4.0; pattern.panel_angle = 30; model.mass = "circumcenter" | model: mass =
+    "circumcenter": panel ... use mass = "mixed_voronoi"
+pattern = { vertices = [[0, 0], [1, 0], [1, 1], [0, 1]], faces = [[0, 1, 2], [0, 2, 3]] };
+    model.mass = "equi_inertial"; loads[0].nodes = [3] | model: mass = "equi_inertial" ... use
+    mass = "mixed_voronoi"
 """
 
 

@@ -7,22 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from case_texts import FOLD_TEXT
+from case_texts import FOLD_TEXT, HELD_FOLD_TEXT, edited
 from foldyn.cli import stamp
 from foldyn.cli.main import main
 
-MIURA = """
-title = "a Miura unit cell"
-[pattern]
-kind = "miura"
-cells = [1, 1]
-dihedral = 60
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
-[model]
+MIURA = f"""title = "a Miura unit cell"
+{FOLD_TEXT.replace("simple_fold", "miura")}[model]
 mass = "circumcenter"
 [damping]
 alpha = 0.0628
@@ -32,7 +22,7 @@ axes = "xyz"
 [[loads]]
 nodes = [7]
 force = [0.01, 0, 0]
-history = { kind = "half_sine", duration = 0.05 }
+history = {{ kind = "half_sine", duration = 0.05 }}
 [analysis]
 kind = "dynamics"
 duration = 0.1
@@ -41,16 +31,8 @@ every = 0.01
 """
 
 # a fold whose creases do not lock, pulled shut: panel passes through panel at 0.28 s
-SHUT = (
-    FOLD_TEXT
-    + """\
-[model]
+SHUT = f"""{HELD_FOLD_TEXT}[model]
 fold_law = "linear"
-[[supports]]
-nodes = [4, 5]
-[[supports]]
-nodes = [0, 1]
-axes = "z"
 [[loads]]
 nodes = [0, 1]
 force = [0.1, 0, 0]
@@ -60,7 +42,6 @@ duration = 2.0
 [output]
 every = 0.01
 """
-)
 
 
 @dataclass(frozen=True)
@@ -97,6 +78,20 @@ class Workplace:
         told = "".join(line for line in err.splitlines(True) if "warning: bars hold" not in line)
         return Outcome(status, out, told, sorted(set(after) - set(before)))
 
+    def good(self, *arguments: str) -> Outcome:
+        """Call the command, which neither fails nor warns."""
+        done = self.call(*arguments)
+        assert (done.status, done.err) == (0, "")
+        return done
+
+    def refused(self, *arguments: str) -> str:
+        """The one line that a call says of bad input, which leaves nothing."""
+        bad = self.call(*arguments)
+        assert (bad.status, bad.out, bad.new) == (2, "", []), bad
+        (line,) = bad.err.splitlines()
+        assert line.startswith("foldyn: ")
+        return line.removeprefix("foldyn: ")
+
     def run(self, content: str | bytes, *arguments: str) -> Outcome:
         """Write case.toml and run it without figures."""
         self.write(content)
@@ -115,17 +110,10 @@ def workplace(tmp_path, monkeypatch, capsys) -> Workplace:
     return Workplace(tmp_path, capsys)
 
 
-@pytest.fixture
-def edited():
+@pytest.fixture(name="edited")
+def edited_miura():
     """Function that gives the Miura's case file with things replaced that occur in it once."""
-
-    def edit(*pairs: tuple[str, str], text: str = MIURA) -> str:
-        for old, new in pairs:
-            assert text.count(old) == 1, old
-            text = text.replace(old, new)
-        return text
-
-    return edit
+    return lambda *pairs, text=MIURA: edited(text, *pairs)
 
 
 @pytest.fixture
