@@ -143,7 +143,8 @@ def test_a_bad_short_file_gets_one_message(read, short, edits, message) -> None:
 
 def test_missing_sections(read, example) -> None:
     check(read, example[example.index("[sheet]") :], "pattern: missing")
-    check(read, "", "sheet: missing")
+    for section in ("pattern", "sheet", "analysis"):
+        check(read, "", f"{section}: missing")
 
 
 def lines_of(read, text) -> list[str]:

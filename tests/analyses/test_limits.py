@@ -7,7 +7,7 @@ import warnings
 
 import pytest
 
-from case_texts import FOLD_TEXT, SHEET_TEXT, edited
+from case_texts import FOLD_TEXT, changed, edited
 from foldyn.analyses.reading import check_values, read_case
 from foldyn.errors import InputError
 
@@ -44,54 +44,19 @@ nodes = [7]
 every = 0.01
 max_frequency = 5.0
 """
-SHAKEN = f"""
-[pattern]
-kind = "kresling"
-sides = 6
-storeys = 1
-{SHEET_TEXT}[model]
-crease_stiffness = 0.1
-[[supports]]
-nodes = [0, 1, 2, 3, 4, 5]
-[[drive]]
-nodes = [7]
-force = [0.01, 0, 0]
-[analysis]
-kind = "frf"
-method = "burst_random"
-frequencies = {{ first = 1, last = 5, count = 41 }}
-amplitude = 1.0
-averages = 4
-seed = 1
-burst = 0.5
-duration = 10.0
-every = 0.01
-window_rate = 0.0
-[output]
-nodes = [7]
-"""
-PATH = f"""
-[pattern]
-vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.5]]
-faces = [[0, 1, 2], [0, 2, 3]]
-{SHEET_TEXT}[model]
-fold_law = {{ kind = "enhanced", theta1 = 45, theta2 = 315 }}
-[[supports]]
-nodes = [0, 1, 2]
-[[loads]]
-nodes = [3]
-force = [0, 0, 0.001]
-[analysis]
-kind = "statics"
-method = "arc_length"
-load_factors = [0, 1]
-steps = 5
-first_step = 0.1
-largest_turn = 10
-until = {{ node = 3, axis = "z", displacement = 0.1 }}
-[output]
-shapes = [0, 1]
-"""
+VIBRATION = """pattern = { kind = "kresling", sides = 6, storeys = 1 }; damping =; initial =;
+loads =; output = { nodes = [7] }; supports = [{ nodes = [0, 1, 2, 3] }];
+drive = [{ nodes = [7], force = [0.01, 0, 0] }]; model.crease_stiffness = 0.1;
+analysis = { kind = "frf", method = "burst_random", averages = 4, seed = 1, burst = 0.5,
+frequencies = { first = 1, last = 5, count = 41 }, amplitude = 1.0, duration = 10.0, every = 0.01,
+window_rate = 0.0 }"""
+SLOW = """pattern = { vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.5]],
+faces = [[0, 1, 2], [0, 2, 3]] }; model.fold_law = { kind = "enhanced", theta1 = 45, theta2 = 315 };
+damping =; initial =; supports = [{ nodes = [0, 1, 2] }]; output = { shapes = [0, 1] };
+loads = [{ nodes = [3], force = [0, 0, 0.001] }]; analysis = { kind = "statics",
+method = "arc_length", load_factors = [0, 1], steps = 5, first_step = 0.1, largest_turn = 10,
+until = { node = 3, axis = "z", displacement = 0.1 } }"""
+SHAKEN, PATH = (changed(CASE, " ".join(edits.split())) for edits in (VIBRATION, SLOW))
 NUMBER = re.compile(r"(?<![\w.\"])-?\d[\d.]*(?:e-?\d+)?(?![\w.\"])")
 WORDS = (
     "9223372036854775808", "-18446744073709551617", "0x" + "f" * 40, "0x" + "f" * 5000, "9" * 4400,
