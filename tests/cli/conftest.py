@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import base64
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from case_texts import FOLD_TEXT, HELD_FOLD_TEXT, edited
+from case_texts import FOLD_TEXT, changed
 from foldyn.cli import stamp
 from foldyn.cli.main import main
+from foldyn.cli.run import DRAWN
 
 MIURA = f"""title = "a Miura unit cell"
 {FOLD_TEXT.replace("simple_fold", "miura")}[model]
@@ -30,19 +33,6 @@ duration = 0.1
 every = 0.01
 """
 
-# a fold whose creases do not lock, pulled shut: panel passes through panel at 0.28 s
-SHUT = f"""{HELD_FOLD_TEXT}[model]
-fold_law = "linear"
-[[loads]]
-nodes = [0, 1]
-force = [0.1, 0, 0]
-[analysis]
-kind = "dynamics"
-duration = 2.0
-[output]
-every = 0.01
-"""
-
 
 @dataclass(frozen=True)
 class Outcome:
@@ -52,6 +42,13 @@ class Outcome:
     out: str
     err: str
     new: list[str]  # files and folders that were not there before
+
+    def failure(self, *files: str) -> str:
+        """Why a run failed that left these files and named them."""
+        assert (self.status, {*files}) == (1, {name for name in self.new if name.endswith(".nc")})
+        reason, kept = self.err.splitlines()
+        assert kept == f"foldyn: kept what was computed: {', '.join(files)}"
+        return reason
 
 
 class Workplace:
@@ -92,6 +89,17 @@ class Workplace:
         assert line.startswith("foldyn: ")
         return line.removeprefix("foldyn: ")
 
+    def page(self, *pictures: str, results: Sequence[str] = ("result.nc",)) -> str:
+        """The page of a run of case.toml, which holds just these pictures."""
+        done = self.good("run", "case.toml", "--out", "r", "--figures", "png")
+        drawn = {*pictures, "report.html"}
+        assert set(done.new) == {"r", *(f"r/{name}" for name in (*drawn, *results))}
+        assert drawn <= set(DRAWN)
+        page = Path("r/report.html").read_text(encoding="utf-8")
+        for name in pictures:
+            assert base64.b64encode(Path("r", name).read_bytes()).decode() in page, name
+        return page
+
     def run(self, content: str | bytes, *arguments: str) -> Outcome:
         """Write case.toml and run it without figures."""
         self.write(content)
@@ -110,17 +118,12 @@ def workplace(tmp_path, monkeypatch, capsys) -> Workplace:
     return Workplace(tmp_path, capsys)
 
 
-@pytest.fixture(name="edited")
-def edited_miura():
-    """Function that gives the Miura's case file with things replaced that occur in it once."""
-    return lambda *pairs, text=MIURA: edited(text, *pairs)
+@pytest.fixture
+def edited():
+    """Function that gives the Miura's case file with keys changed."""
+    return lambda edits: changed(MIURA, edits)
 
 
 @pytest.fixture
 def miura() -> str:
     return MIURA
-
-
-@pytest.fixture
-def shut() -> str:
-    return SHUT

@@ -36,7 +36,7 @@ def test_a_case_file_becomes_a_result_that_runs_again_from_itself(workplace, miu
 
 def test_a_list_of_mass_rules_gives_a_file_each(workplace, edited) -> None:
     rules = list(MASS_RULES)
-    done = workplace.run(edited(('"circumcenter"', str(rules).replace("'", '"'))))
+    done = workplace.run(edited(f"model.mass = {rules}"))
     assert done.status == 0
     assert done.new == ["case-results", *sorted(f"case-results/result-{r}.nc" for r in rules)]
     motions = {rule: fd.load(f"case-results/result-{rule}.nc") for rule in rules}
@@ -54,7 +54,7 @@ def test_out_names_the_folder(workplace, miura) -> None:
 def test_a_second_run_replaces_the_first(workplace, miura, edited) -> None:
     workplace.run(miura)
     (workplace.folder / "case-results" / "notes.txt").write_text("mine")
-    workplace.write(edited(("duration = 0.1", "duration = 0.2")))
+    workplace.write(edited("analysis.duration = 0.2"))
     assert main(["run", "case.toml", "--no-figures"]) == 0
     assert fd.load("case-results/result.nc").sizes["time"] == 21
     assert (workplace.folder / "case-results" / "notes.txt").read_text() == "mine"
@@ -92,7 +92,7 @@ def test_free_flight_is_legal(workplace, miura) -> None:
 
 
 def test_a_load_on_supports_in_part_warns_and_runs(workplace, edited) -> None:
-    done = workplace.run(edited(("nodes = [7]", "nodes = [0, 7]")))
+    done = workplace.run(edited("loads[0].nodes = [0, 7]"))
     assert done.status == 0
     (line,) = done.err.splitlines()
     assert line.startswith("foldyn: warning: loads[0]: the force [0.01, 0.0, 0.0] acts in part")

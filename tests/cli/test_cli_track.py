@@ -12,32 +12,19 @@ import pytest
 import xarray as xr
 
 import foldyn as fd
+from case_texts import HELD_MIURA_TEXT, changed
 from foldyn.cli.main import main
 from foldyn.experiment.tracking.tracks_page import filled
 from foldyn.structures.discretize import PER_NODE
 
 cv2 = pytest.importorskip("cv2")
 
-CASE = """
-[pattern]
-kind = "miura"
-cells = [2, 2]
-a = 0.025
-b = 0.025
-panel_angle = 60
-dihedral = 75
-[sheet]
-youngs_modulus = 1.2e9
-poissons_ratio = 0.2
-thickness = 0.24e-3
-density = 667.0
-[[supports]]
-nodes = [20, 22, 24]
-axes = "xyz"
-[analysis]
-kind = "dynamics"
-duration = 0.1
-"""
+CASE = changed(
+    HELD_MIURA_TEXT,
+    "pattern.cells = [2, 2]; pattern.a = 0.025; pattern.b = 0.025; pattern.dihedral = 75; "
+    "sheet = { youngs_modulus = 1.2e9, poissons_ratio = 0.2, thickness = 0.24e-3, density = 667 }; "
+    'supports[0].nodes = [20, 22, 24]; analysis = { kind = "dynamics", duration = 0.1 }',
+)
 
 
 @pytest.fixture(scope="module")
@@ -114,12 +101,8 @@ def test_gaps_of_tracks_are_filled_for_the_picture():
     moved = np.full((3, 4, 3), np.nan)
     moved[:, 0, :2] = [[0.0, 0.0], [np.nan, np.nan], [2.0, 4.0]]
     moved[:, 3, :2] = 3.0
-    tracks = xr.Dataset(
-        {
-            "displacement": (("time", "node", "axis"), moved),
-            "edges": (("edge", "end"), [[0, 1], [1, 2], [2, 3]]),
-        }
-    )
+    edges = (("edge", "end"), [[0, 1], [1, 2], [2, 3]])
+    tracks = xr.Dataset({"displacement": (("time", "node", "axis"), moved), "edges": edges})
     found = filled(tracks)
     assert found[1, 0].tolist() == [1.0, 2.0, 0.0]
     np.testing.assert_allclose(found[:, 1, 0], [1.0, 5.0 / 3.0, 7.0 / 3.0], rtol=1e-6)

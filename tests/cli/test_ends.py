@@ -19,7 +19,7 @@ from foldyn.cli import stamp
 from foldyn.cli.main import main
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-LONG = ("duration = 0.1", "duration = 1e4")  # half an hour
+LONG = "analysis.duration = 1e4"  # half an hour
 KEPT = "foldyn: kept what was computed: "
 
 
@@ -34,7 +34,7 @@ def limited(size: int):
 
 @pytest.mark.thorough
 def test_signals_keep_what_was_computed_and_four_at_once_are_one(tmp_path, edited) -> None:
-    (tmp_path / "case.toml").write_text(edited())
+    (tmp_path / "case.toml").write_text(edited(""))
     fd.read_case(tmp_path / "case.toml").run()  # compiles, which would take each of them minutes
     (tmp_path / "case.toml").write_text(edited(LONG))
     run = ("run", "case.toml", "--no-figures")
@@ -70,9 +70,10 @@ def test_signals_keep_what_was_computed_and_four_at_once_are_one(tmp_path, edite
 def test_a_kill_between_rules_leaves_no_old_result(workplace, tmp_path, edited) -> None:
     """Then the next run takes the folder over, and clears what the dead one left."""
     folder = tmp_path / "case-results"
-    text = edited(('"circumcenter"', '["panel", "centroid"]'))
+    rules = 'model.mass = ["panel", "centroid"]'
+    text = edited(rules)
     assert workplace.run(text).status == 0
-    workplace.write(text.replace(*LONG).replace("1e4", "30.0"))  # seconds each
+    workplace.write(edited(f"{rules}; analysis.duration = 30.0"))  # seconds each
     killed = start(tmp_path, "run", "case.toml", "--no-figures")
     wait_for_line(killed, "  panel: ")
     killed.kill()
@@ -88,7 +89,7 @@ def test_a_kill_between_rules_leaves_no_old_result(workplace, tmp_path, edited) 
 
 @pytest.mark.thorough
 def test_ctrl_c_and_a_full_disk_while_figures_are_drawn(workplace, tmp_path, edited) -> None:
-    workplace.run(edited(("every = 0.01", "every = 0.001")), "--out", "before")  # compiles
+    workplace.run(edited("output.every = 0.001"), "--out", "before")  # compiles
     stopped = start(tmp_path, "run", "case.toml", "--out", "stopped", "--figures", "png")
     full = start(
         tmp_path, "run", "case.toml", "--out", "full", "--figures", "png",
