@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -11,7 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
-from processes import children, ended, running, start, wait_for, wait_for_line
+from processes import COMMAND, children, ended, running, start, wait_for, wait_for_line
 from test_cli_fit import CASE, FIT
 
 import foldyn as fd
@@ -139,6 +140,26 @@ def test_no_room_for_the_result(workplace, tmp_path, miura) -> None:
     assert line.startswith("foldyn: case-results/result.nc: cannot be written (File too large)")
     assert "nor can a temporary folder" in line and "--out" in line
     assert not (tmp_path / "case-results").exists()
+
+
+def test_a_disk_that_is_full(tmp_path, miura) -> None:
+    """A real one, of 24 kB: the result goes to the temporary folder, and is named."""
+    small = ["unshare", "-rm", "sh", "-c", 'mount -t tmpfs -o size=24k none small && exec "$@"', ""]
+    (tmp_path / "small").mkdir()
+    (tmp_path / "elsewhere").mkdir()
+    if shutil.which("unshare") is None or ended(start(tmp_path, "true", command=small))[0]:
+        pytest.skip("no file system may be mounted here")
+    (tmp_path / "case.toml").write_text(miura)
+    command = (*COMMAND, "run", "case.toml", "--no-figures", "--out", "small/r")
+    place = {"TMPDIR": str(tmp_path / "elsewhere")}
+    status, _, err = ended(start(tmp_path, *command, command=small, changes=place))
+    assert status == 1
+    reason, kept = err.splitlines()
+    assert reason.startswith("foldyn: small/r/result.nc: cannot be written (")
+    assert "No space left on device" in reason
+    (saved,) = (tmp_path / "elsewhere").rglob("*.nc")
+    assert kept == f"{KEPT}{saved}"
+    assert fd.load(saved).sizes["time"] == 11
 
 
 HOLD = """
