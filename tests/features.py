@@ -8,6 +8,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -49,7 +50,23 @@ class Setting:
         return self.case(self.sheet(fold_law=law, **options))
 
 
-FEATURES: Mapping[str, Callable[[Setting], fd.Case]] = {
+Make = Callable[[Setting], fd.Case]
+
+
+def both(name: str, **parts: Any) -> dict[str, Make]:
+    """Parts of a case with either kind of panels."""
+    return {
+        name: lambda s: s.case(**parts),
+        f"{name} of `n5b8e`": lambda s: s.case(s.sheet(scheme="n5b8e"), **parts),
+    }
+
+
+LAWS = {
+    "relax (`prony`)": fd.Prony([0.5], [0.1]),
+    "yield (`plastic`)": fd.Plastic(1e-5, 0.01),
+    "creep (`eyring`)": fd.Eyring(1e-3, 1e-3),
+}
+FEATURES: Mapping[str, Make] = {
     "bars and hinges": lambda s: s.case(),
     "plates (`n5b8e`)": lambda s: s.case(s.sheet(scheme="n5b8e")),
     "panels' membranes": lambda s: s.case(s.sheet(membrane="panel")),
@@ -60,23 +77,14 @@ FEATURES: Mapping[str, Callable[[Setting], fd.Case]] = {
     "clamped edges of `n5b8e`": lambda s: s.case(s.sheet(scheme="n5b8e", clamped=[(0, 1)])),
     "ties, rigid panels": lambda s: s.case(s.sheet(rigid=[3]), [fd.Link([5, 7], "z")]),
     "dashpots": lambda s: s.case(supports=[fd.Dashpot(1e-3, nodes=[7])]),
-    "damped creases": lambda s: s.case(damping=fd.CreaseDamping(1e-4)),
-    "damped creases of `n5b8e`": lambda s: s.case(
-        s.sheet(scheme="n5b8e"), damping=fd.CreaseDamping(1e-4)
-    ),
+    **both("damped creases", damping=fd.CreaseDamping(1e-4)),
     "stiffness-proportional damping": lambda s: s.case(damping=fd.Rayleigh(0.1, 1e-5)),
     "modal damping": lambda s: s.case(damping=fd.ModalDamping(0.01)),
     "damped strains": lambda s: s.case(damping=fd.StrainDamping(1e-5)),
     "pressure": lambda s: s.case(loads=[fd.Pressure(1e-4)]),
-    "moments of creases": lambda s: s.case(loads=[fd.CreaseMoment([0], 1e-5)]),
-    "moments of creases of `n5b8e`": lambda s: s.case(
-        s.sheet(scheme="n5b8e"), loads=[fd.CreaseMoment([0], 1e-5)]
-    ),
+    **both("moments of creases", loads=[fd.CreaseMoment([0], 1e-5)]),
     "actuated creases": lambda s: s.case(loads=[fd.Actuate([0], 119.0, history=fd.Ramp(1.0))]),
-    "temperature": lambda s: s.case(loads=[fd.Temperature(1.0, 1e-6, 1e-3)]),
-    "temperature of `n5b8e`": lambda s: s.case(
-        s.sheet(scheme="n5b8e"), loads=[fd.Temperature(1.0, 1e-6, 1e-3)]
-    ),
+    **both("temperature", loads=[fd.Temperature(1.0, 1e-6, 1e-3)]),
     "contact of panels": lambda s: s.case(contact=fd.Contact()),
     "contact with planes": lambda s: s.case(contact=fd.Contact(planes=[FLOOR], panels=False)),
     "contact with friction": lambda s: s.case(contact=fd.Contact(planes=[FLOOR], friction=0.2)),
@@ -86,18 +94,11 @@ FEATURES: Mapping[str, Callable[[Setting], fd.Case]] = {
         s.sheet(fd.thicken(fd.patterns.simple_fold(dihedral=90), SHEET.thickness)),
         contact=fd.Contact(),
     ),
-    "creases that relax (`prony`)": lambda s: s.law(fd.Prony([0.5], [0.1])),
-    "creases that yield (`plastic`)": lambda s: s.law(fd.Plastic(1e-5, 0.01)),
-    "creases that creep (`eyring`)": lambda s: s.law(fd.Eyring(1e-3, 1e-3)),
-    "creases of `n5b8e` that relax (`prony`)": lambda s: s.law(
-        fd.Prony([0.5], [0.1]), scheme="n5b8e"
-    ),
-    "creases of `n5b8e` that yield (`plastic`)": lambda s: s.law(
-        fd.Plastic(1e-5, 0.01), scheme="n5b8e"
-    ),
-    "creases of `n5b8e` that creep (`eyring`)": lambda s: s.law(
-        fd.Eyring(1e-3, 1e-3), scheme="n5b8e"
-    ),
+    **{
+        f"creases{of} that {name}": partial(Setting.law, law=law, **options)
+        for of, options in (("", {}), (" of `n5b8e`", {"scheme": "n5b8e"}))
+        for name, law in LAWS.items()
+    },
 }
 
 
@@ -119,7 +120,7 @@ REASONS: Mapping[str, tuple[str, str]] = {
 """Why something is refused: what its message holds, and the words of the page."""
 
 
-def tried(column: str, make: Callable[[Setting], fd.Case], setting: Setting) -> str:
+def tried(column: str, make: Make, setting: Setting) -> str:
     """What a method says to a case: nothing where it computes it."""
     try:
         case = make(setting)

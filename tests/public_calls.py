@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 import foldyn as fd
+from case_texts import FOLD_TEXT, changed
 
 POINTS = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (2.0, 0.0), (2.0, 1.0)]
 PANELS = [(0, 1, 2, 3), (1, 4, 5, 2)]
@@ -161,21 +162,11 @@ PATTERNS: Calls = {
     "flasher": (fd.patterns.flasher, {"sides": 6, "a": 1.0, "rings": 2, "folded": False}),
 }  # fmt: skip
 
-CASE = """
-[pattern]
-kind = "simple_fold"
-dihedral = 120
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1000.0
-[[supports]]
-nodes = [0, 1, 2, 3]
-[analysis]
-kind = "modes"
-count = 2
-"""
+CASE = changed(
+    FOLD_TEXT,
+    "pattern.dihedral = 120; sheet.density = 1e3; supports = [{ nodes = [0, 1, 2, 3] }]; "
+    'analysis = { kind = "modes", count = 2 }',
+)
 
 
 def solved(folder: Path) -> Calls:

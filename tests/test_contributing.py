@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from case_texts import HELD_MIURA_TEXT
 from foldyn.analyses import registry
 from foldyn.cases import History, as_history, case, loads, resolve_nodes
 from foldyn.cases.loads import Load
@@ -32,17 +32,7 @@ EXISTING = {
     "A format": ("ply", "stl", r"\bstl\.write\b"),
     "An export": ("vtp", "vtkhdf", r"\bvtkhdf\.write\b"),
 }
-CASE = """
-[pattern]
-kind = "miura"
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 2.0
-[[supports]]
-nodes = "xmin"
-"""
+CASE = HELD_MIURA_TEXT.replace("density = 1.0", "density = 2.0")
 
 
 def section(title: str) -> str:
@@ -116,13 +106,6 @@ def test_the_analysis(tmp_path, monkeypatch, capsys):
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
     assert "kg" in capsys.readouterr().out
     assert "center (m)" in (tmp_path / "out/report.html").read_text("utf-8")
-    path.write_text(
-        CASE
-        + textwrap.dedent("""
-        [analysis]
-        kind = "modes"
-        axis = "x"
-    """)
-    )
+    path.write_text(CASE + '[analysis]\nkind = "modes"\naxis = "x"\n')
     with pytest.raises(fd.errors.InputError, match=r'only for analysis\.kind = "mass"'):
         fd.read_case(path)

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
+import features
 import foldyn as fd
 from foldyn.analyses import ANALYSES, read_case
 from foldyn.cases import LOADS, SUPPORTS, BaseMotion, Force, Table
@@ -29,17 +30,34 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", text, re.M | re.S)
 
 
+def executed(*codes: str, **names) -> dict:
+    """What Python blocks define."""
+    for code in codes:
+        exec(compile(code, "a page", "exec"), names)
+    return names
+
+
+def case_of_page(folder: Path, text: str):
+    """A case file of a page, read."""
+    (folder / "case.toml").write_text(text, "utf-8")
+    return read_case(folder / "case.toml")
+
+
+def without_loads() -> str:
+    """The case file of the page on them, with one mass rule, up to its loads."""
+    page = blocks("case-file.md", "toml")[0].partition("[[loads]]")[0]
+    return page.replace('mass = ["circumcenter", "consistent"]\n', "")
+
+
 @pytest.fixture(scope="module")
 def tutorial(tmp_path_factory):
     """The names that the tutorial makes, what it prints, and its folder."""
     folder = tmp_path_factory.mktemp("tutorial")
     shutil.copy(DOCS.parent / "examples" / "patterns" / "miura.fold", folder)
-    names: dict = {}
     printed = io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(printed):
         patch.chdir(folder)
-        for block in blocks("tutorial.md", "python"):
-            exec(compile(block, "tutorial.md", "exec"), names)
+        names = executed(*blocks("tutorial.md", "python"))
     return names, printed.getvalue(), folder
 
 
@@ -75,10 +93,8 @@ def test_the_quantities_of_the_results_page_can_be_sampled():
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
     structure = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0))
     case = fd.Case(structure, loads=[fd.Force([6, 7, 8], (0.01, 0.0, 0.0))])
-    names = {"fd": fd, "np": np, "case": case}
     (block,) = (b for b in blocks("results.md", "python") if "sample=" in b)
-    exec(compile(block, "results.md", "exec"), names)
-    motion = names["trajectory"]
+    motion = executed(block, fd=fd, np=np, case=case)["trajectory"]
     assert motion["opening"].dims == ("time",) and motion["opening"].attrs["units"] == "m"
     assert motion["momentum"].dims == ("time", "node", "axis")
     impulse = motion["momentum"].sum("node").sel(axis="x").values
@@ -86,17 +102,10 @@ def test_the_quantities_of_the_results_page_can_be_sampled():
 
 
 def test_the_case_file_page_shows_a_case_file(tmp_path):
-    block, *_ = blocks("case-file.md", "toml")
-    (tmp_path / "case.toml").write_text(block, "utf-8")
-    case_file = read_case(tmp_path / "case.toml")
-    assert case_file.masses == ["circumcenter", "consistent"]
-
-
-def test_the_supports_and_loads_of_the_case_file_page_can_be_read(tmp_path):
     page, moving, actuated, *_ = blocks("case-file.md", "toml")
+    assert case_of_page(tmp_path, page).masses == ["circumcenter", "consistent"]
     rest = re.sub(r"^\[\[(supports|loads)\]\]\n(.+\n)*", "", page, flags=re.M)
-    (tmp_path / "case.toml").write_text(rest + moving + actuated, "utf-8")
-    case = read_case(tmp_path / "case.toml").case()
+    case = case_of_page(tmp_path, rest + moving + actuated).case()
     assert len(case.supports) == 3
     assert case.imposed.sum() == 2
     assert len(case.base_terms) == 1
@@ -111,8 +120,7 @@ def test_the_patterns_page_shows_every_generator_by_calls_that_run():
         picture = f"images/pattern-{kind.replace('_', '-')}.png"
         assert f"({picture})" in page
         assert (DOCS / picture).stat().st_size < 150_000
-    names: dict = {}
-    exec(compile(calls, "patterns.md", "exec"), names)
+    names = executed(calls)
     assert len(names["links"]) == 14
     assert names["structure"].options.crease_stiffness == {"zigzag": 0.1, "straight": 0.3}
 
@@ -126,36 +134,24 @@ def test_the_patterns_page_names_the_arguments_and_families_of_every_generator()
         assert set(re.findall(r'"(\w+)"', families)) <= set(pattern.families)
 
 
-def test_the_loads_page_shows_a_case_that_can_be_made():
-    names: dict = {}
-    block, *_ = blocks("loads.md", "python")
-    exec(compile(block, "loads.md", "exec"), names)
+def test_the_loads_page_shows_a_case_that_can_be_made_and_creases_that_are_actuated():
+    block, actuated, *_ = blocks("loads.md", "python")
+    names = executed(block)
     assert len(names["case"].following_terms) == 2
+    assert executed(actuated, **names)["path"].attrs["status"] == "complete"
     listed = (DOCS / "loads.md").read_text("utf-8")
     assert all(f"`fd.{kind.__name__}(" in listed for kind in LOADS)
 
 
-def test_the_loads_page_shows_creases_that_are_actuated():
-    names: dict = {}
-    block, actuated, *_ = blocks("loads.md", "python")
-    exec(compile(block + actuated, "loads.md", "exec"), names)
-    assert names["path"].attrs["status"] == "complete"
-
-
 def test_the_laws_page_shows_one_model_in_python_and_in_a_case_file():
-    names: dict = {}
     (block,), (toml,) = blocks("laws.md", "python"), blocks("laws.md", "toml")
-    exec(compile(block, "laws.md", "exec"), names)
     law = law_from(tomllib.loads(toml)["model"]["fold_law"], fd.materials.HINGE_LAWS)
-    assert law == names["law"]
+    assert law == executed(block)["law"]
 
 
 def test_the_path_of_the_case_file_page_can_be_followed(tmp_path):
-    page, *_, slow, _ = blocks("case-file.md", "toml")
-    rest = re.sub(r'mass = \["circumcenter", "consistent"\]\n', "", page)
-    rest = rest[: rest.index("[[loads]]")]
-    (tmp_path / "case.toml").write_text(rest + slow, "utf-8")
-    case_file = read_case(tmp_path / "case.toml")
+    *_, slow, _ = blocks("case-file.md", "toml")
+    case_file = case_of_page(tmp_path, without_loads() + slow)
     path = fd.trace(case_file.case(), **case_file.analysis.arguments)
     moved = path.displacement.sel(node=7, axis="x").values
     assert moved[-1] >= 0.02 > moved[-2]  # until
@@ -163,11 +159,8 @@ def test_the_path_of_the_case_file_page_can_be_followed(tmp_path):
 
 
 def test_the_response_of_the_case_file_page_can_be_computed(tmp_path):
-    page, *_, shaken = blocks("case-file.md", "toml")
-    rest = re.sub(r'mass = \["circumcenter", "consistent"\]\n', "", page)
-    rest = rest[: rest.index("[[loads]]")]
-    (tmp_path / "case.toml").write_text(rest + shaken, "utf-8")
-    case_file = read_case(tmp_path / "case.toml")
+    *_, shaken = blocks("case-file.md", "toml")
+    case_file = case_of_page(tmp_path, without_loads() + shaken)
     response = fd.linear.frf(case_file.case(), **case_file.analysis.arguments)
     (drive,) = case_file.analysis.arguments["drive"]
     assert response.attrs["drive_force"] == pytest.approx(0.001 * 3)  # on three vertices
@@ -176,9 +169,7 @@ def test_the_response_of_the_case_file_page_can_be_computed(tmp_path):
 
 
 def test_compress_release_vibrate_of_the_statics_page():
-    block = blocks("statics.md", "python")[-1]
-    names: dict = {}
-    exec(compile(block, "statics.md", "exec"), names)
+    names = executed(blocks("statics.md", "python")[-1])
     path, motion = names["path"], names["motion"]
     np.testing.assert_array_equal(motion.displacement[0], path.displacement[5])
     top = motion.displacement.sel(node=3, axis="x").values
@@ -187,9 +178,7 @@ def test_compress_release_vibrate_of_the_statics_page():
 
 
 def test_the_folding_page_folds_a_pattern_and_computes_its_modes():
-    (block,) = blocks("folding.md", "python")
-    names: dict = {}
-    exec(compile(block, "folding.md", "exec"), names)
+    names = executed(*blocks("folding.md", "python"))
     assert names["folding"].kind == "rigid"
     assert (names["modes"].frequency > 0.0).all()
 
@@ -213,8 +202,7 @@ def test_the_loads_page_shows_a_table_that_can_be_read(tmp_path):
     page, *_ = blocks("case-file.md", "toml")
     old = 'history = { kind = "pulse", duration = 1.0 }\n'
     assert old in page
-    (tmp_path / "case.toml").write_text(page.replace(old, toml), "utf-8")
-    history = read_case(tmp_path / "case.toml").case().loads[0].history
+    history = case_of_page(tmp_path, page.replace(old, toml)).case().loads[0].history
     assert history == Table([0.0, 0.0025, 0.005], [0.0, 0.0125, 0.0])
 
 
@@ -243,16 +231,12 @@ def test_sections_are_found():
     assert {("analysis", "duration"), ("analysis", "load_factors")} <= set(sections())
 
 
-def test_inertia_table_is_what_the_code_gives():
+def test_inertia_table_is_what_the_code_gives_and_knows_the_rhombus():
     script = runpy.run_path(str(DOCS / "inertia_table.py"))
     page = (DOCS / "mass.md").read_text("utf-8")
     assert script["with_table"](page) == page
     assert script["table"]() in page
-
-
-def test_inertia_table_knows_the_rhombus():
     # by hand: m h^2/3 exactly; corners at 0, 0, h, h and the center at h/2
-    script = runpy.run_path(str(DOCS / "inertia_table.py"))
     rhombus = script["parallelogram"](1, 1, 60)
     for rule, corner, center in (("panel", 1 / 5, 1 / 5), ("circumcenter", 1 / 8, 1 / 2)):
         by_hand = 3 * (2 * corner + center / 4) - 1
@@ -269,9 +253,8 @@ def test_what_a_swinging_panel_and_a_twisting_one_make_of_a_rule():
     sheet = fd.Sheet(1e9, 0.25, 0.01, 1.0)
 
     def swing(rule: str) -> float:
-        s = fd.discretize(
-            square, sheet, mass=rule, fold_law="linear", bend_law="linear", crease_stiffness=1e-6
-        )
+        laws = {"fold_law": "linear", "bend_law": "linear", "crease_stiffness": 1e-6}
+        s = fd.discretize(square, sheet, mass=rule, **laws)
         held = [node for node in range(len(s.nodes)) if s.nodes[node, 0] < 1e-9]
         return float(fd.modes(fd.Case(s, [fd.Fix(held, "xyz")]), 1).frequency[0])
 
@@ -286,3 +269,25 @@ def test_what_a_swinging_panel_and_a_twisting_one_make_of_a_rule():
         w = np.array([1.0, -1.0, 1.0, -1.0, 0.0])
         assert w @ (mass @ w) == pytest.approx(mass.sum() / twist)
         assert f"m w^2/{twist}$" in page
+
+
+@pytest.mark.thorough
+def test_the_page_on_features_has_the_table_of_what_goes_with_what():
+    text = features.PAGE.read_text("utf-8")
+    assert features.table() in text, "python tests/features.py writes it anew"
+
+
+def test_the_example_of_the_readme_is_short_moves_and_saves(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (block,) = blocks("../README.md", "python")
+    assert len([line for line in block.splitlines() if line.strip()]) <= 12
+    trajectory = executed(block)["trajectory"]
+    assert float(abs(trajectory.displacement).max()) > 1e-3
+    (saved,) = tmp_path.glob("*.nc")
+    np.testing.assert_array_equal(fd.load(saved).displacement, trajectory.displacement)
+
+
+def test_the_files_that_the_readme_names_exist():
+    targets = re.findall(r"\]\(([^)#]+)\)", (DOCS.parent / "README.md").read_text("utf-8"))
+    local = [target for target in targets if "://" not in target]
+    assert [target for target in local if not (DOCS.parent / target).exists()] == []

@@ -115,12 +115,6 @@ for count in (3, 300, 30000):
 @pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
 def test_hdf5_stands_a_full_disk_wherever_it_comes(tmp_path) -> None:
     """HDF5 itself ends the process with a segmentation fault."""
-    done = subprocess.run(
-        [sys.executable, "-c", LIMITED],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": SOURCE},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command, source = [sys.executable, "-c", LIMITED], {**os.environ, "PYTHONPATH": SOURCE}
+    done = subprocess.run(command, cwd=tmp_path, env=source, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")

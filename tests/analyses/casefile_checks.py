@@ -4,15 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from case_texts import begins
 from foldyn.errors import InputError
-
-
-def edited(text: str, edits: list[tuple[str, str]]) -> str:
-    """Text with things replaced that occur in it once."""
-    for old, new in edits:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    return text
 
 
 def check(read, text: str, message: str) -> None:
@@ -23,4 +16,4 @@ def check(read, text: str, message: str) -> None:
     path, _, line = first.partition(": ")
     assert path.endswith("case2.toml")
     lines = [line, *(other.removeprefix("  also ") for other in more)]
-    assert any(line.startswith(message) for line in lines), lines
+    assert any(begins(line, message) for line in lines), lines

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from case_texts import begins, changed, rows
 from foldyn.errors import InputError
 
 pytestmark = pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
@@ -15,40 +16,31 @@ kind = "simple_fold"
 a = 1.0
 b = 1.3
 dihedral = 100
-
 [sheet]
 youngs_modulus = 1e6
 poissons_ratio = 0.3
 thickness = 0.01
 density = 100.0
-
 [model]
 clamped = [[0, 1]]
-
 [[supports]]
 nodes = "xmin"
-
 [[supports]]
 nodes = [4]
 stiffness = 30.0
 direction = "-z"
-
 [[supports]]
 between = [[4, 3], [5, 2]]
 stiffness = 0.05
 rest_length = 0.9
-
 [[supports]]
 nodes = [5]
 stiffness = 2.0
-
 [[masses]]
 nodes = "xmax"
 mass = 0.25
-
 [[loads]]
 gravity = [0, 0, -0.01]
-
 [analysis]
 kind = "statics"
 load_factors = [0.5, 1.0]
@@ -95,55 +87,50 @@ def test_its_result_rebuilds_the_case_and_its_page_is_written(path, tmp_path):
     assert "clamped" in text
 
 
-def test_the_picture_shows_springs_clamps_and_masses(path):
-    figure = fd.plots.draw_structure(fd.read_case(path).case())
+@pytest.mark.parametrize("shown", [True, False])
+def test_the_picture_shows_springs_clamps_and_masses(path, shown):
+    figure = fd.plots.draw_structure(fd.read_case(path).case(), supports=shown, loads=shown)
     texts = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
     for word in ("spring", "clamped edge", "point mass, 0.25 kg"):
-        assert word in texts
-    plain = fd.plots.draw_structure(fd.read_case(path).case(), supports=False, loads=False)
-    texts = [text.get_text() for legend in plain.legends for text in legend.get_texts()]
-    assert not {"spring", "clamped edge", "point mass, 0.25 kg"} & set(texts)
+        assert (word in texts) == shown
 
 
 def test_modes_of_the_file_with_either_model(path):
-    text = path.read_text("utf-8")
-    start = text.index("[analysis]")
-    path.write_text(text[:start] + '[analysis]\nkind = "modes"\ncount = 2\nstate = "equilibrium"')
+    modes = 'analysis = { kind = "modes", count = 2, state = "equilibrium" }'
+    path.write_text(changed(path.read_text("utf-8"), modes))
     found = fd.read_case(path).run()
     assert (found.frequency.values > 0.0).all()
     other = "shell" if fd.read_case(path).model == "bars_and_hinges" else "bars_and_hinges"
     assert fd.read_case(path, model=other).case().structure.options.clamped == ((0, 1),)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("stiffness = 30.0", "stiffness = -1", r"supports\[1\]\.stiffness = -1: must be greater"),
-        ("stiffness = 30.0", 'stiffness = 30.0\naxes = "x"', r"leave out axes, or write \[\[supp"),
-        ('direction = "-z"', 'direction = "up"', r'supports\[1\]\.direction = "up": choose one of'),
-        ("[[4, 3], [5, 2]]", "[[4, 3], [5, 5]]", r"supports\[2\]\.between\[1\] = \[5, 5\]: node 5"),
-        ("[[4, 3], [5, 2]]", "[[4, 30]]", r"supports\[2\]\.between.*30"),
-        ("mass = 0.25", "mass = 0", r"masses\[0\]\.mass = 0: must be greater than 0 kg"),
-        ("mass = 0.25", "", r"masses\[0\]\.mass: missing; give the mass"),
-        ("mass = 0.25", "mass = 1\nweight = 3", r"masses\[0\]\.weight: unknown key"),
-        ("[[0, 1]]", "[[0, 5]]", r"clamped: \(0, 5\) is not a boundary edge"),
-        ("[[0, 1]]", "[[0, 1, 2]]", r"model\.clamped\[0\] = \[0, 1, 2\]: must be two nodes"),
-    ],
-)
-def test_bad_files(path, old, new, message):
-    path.write_text(path.read_text("utf-8").replace(old, new), "utf-8")
-    with pytest.raises(InputError, match=message):
+BAD = """
+supports[1].stiffness = -1: must be greater
+supports[1].axes = "x" | supports[1].stiffness: ... leave out axes, or write [[supp
+supports[1].direction = "up": choose one of
+supports[2].between = [[4, 3], [5, 5]] | supports[2].between[1] = [5, 5]: node 5
+supports[2].between = [[4, 30]] | supports[2].between ... 30
+masses[0].mass = 0: must be greater than 0 kg
+masses[0].mass = | masses[0].mass: missing; give the mass
+masses[0].weight = 3 | masses[0].weight: unknown key
+model.clamped = [[0, 5]] | model: clamped: (0, 5) is not a boundary edge
+model.clamped = [[0, 1, 2]] | model.clamped[0] = [0, 1, 2]: must be two nodes
+"""
+
+
+@pytest.mark.parametrize(("edits", "message"), rows(BAD))
+def test_bad_files(path, edits, message):
+    path.write_text(changed(path.read_text("utf-8"), edits))
+    with pytest.raises(InputError) as caught:
         fd.read_case(path)
+    assert begins(str(caught.value).split("case.toml: ")[1], message), caught.value
 
 
 def test_a_file_without_density_needs_a_mass_on_each_free_node(tmp_path):
-    text = FILE.replace("density = 100.0\n", "").replace("[[loads]]\ngravity = [0, 0, -0.01]\n", "")
-    start = text.index("[analysis]")
-    text = text[:start] + '[analysis]\nkind = "modes"\ncount = 1\n'
-    (tmp_path / "case.toml").write_text(text, "utf-8")
+    case = tmp_path / "case.toml"
+    text = changed(FILE, 'sheet.density =; loads =; analysis = { kind = "modes", count = 1 }')
+    case.write_text(text, "utf-8")
     with pytest.raises(InputError, match="node 2, 3, 6, 7 is free but has no mass"):
-        fd.read_case(tmp_path / "case.toml").run()
-    text = text.replace('nodes = "xmax"\n', "nodes = [2, 3, 4, 5]\n")
-    text = text.replace("[model]\n", '[model]\nscheme = "n4b5"\n')
-    (tmp_path / "case.toml").write_text(text, "utf-8")
-    assert np.isfinite(float(fd.read_case(tmp_path / "case.toml").run().frequency[0]))
+        fd.read_case(case).run()
+    case.write_text(changed(text, 'masses[0].nodes = [2, 3, 4, 5]; model.scheme = "n4b5"'))
+    assert np.isfinite(float(fd.read_case(case).run().frequency[0]))

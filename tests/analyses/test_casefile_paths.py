@@ -4,38 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from casefile_checks import check, edited
+from casefile_checks import check
 
 import foldyn as fd
+from case_texts import HELD_MIURA_TEXT, changed, rows
 from foldyn.analyses.path import Reached
 from foldyn.cases import Fix, Force, Gravity, Impose
 from foldyn.errors import InputError
 from foldyn.statics import Settings
 from foldyn.structures import ModelOptions
 
-PATH = """
-[pattern]
-kind = "miura"
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-[[supports]]
-nodes = "xmin"
-[[loads]]
+PATH = f"""{HELD_MIURA_TEXT.replace("density = 1.0", "")}[[loads]]
 nodes = [7, 6]
 force = [1, 0, 0]
 [analysis]
 kind = "statics"
 """
-
-MOVED = """
-[[supports]]
-nodes = [8]
-axis = "z"
-displacement = -0.1
-"""
-
+MOVED = 'supports[1] = { nodes = [8], axis = "z", displacement = -0.1 }'
 EVERYTHING = """
 method = "arc_length"
 load_factors = [0, 0.5]
@@ -60,17 +45,9 @@ gravity = [0, 0, -9.81]
 def test_what_is_left_out_has_its_default(read) -> None:
     found = read(PATH)  # without density
     assert found.analysis.kind == "statics"
-    assert found.analysis.arguments == {
-        "method": "newton",
-        "load_factors": None,
-        "steps": None,
-        "duration": None,
-        "first_step": None,
-        "constant": (),
-        "until": None,
-        "inertia_relief": False,
-        "settings": Settings(),
-    }
+    none = dict.fromkeys(("load_factors", "steps", "duration", "first_step", "until"))
+    given = {"method": "newton", "constant": (), "inertia_relief": False, "settings": Settings()}
+    assert found.analysis.arguments == given | none
     output = found.output
     np.testing.assert_array_equal(output.nodes, [6, 7])  # the loaded ones
     assert (output.axis, output.shapes, output.animation) == (None, 4, None)
@@ -82,17 +59,11 @@ def test_what_is_left_out_has_its_default(read) -> None:
 
 def test_everything_that_can_be_said(read) -> None:
     found = read(PATH.replace("= 0.01\n", "= 0.01\ndensity = 1.0\n") + EVERYTHING)
-    assert found.analysis.arguments == {
-        "method": "arc_length",
-        "load_factors": [0.0, 0.5],
-        "steps": 30,
-        "duration": None,
-        "first_step": 0.01,
-        "constant": (1,),
-        "until": Reached(node=7, axis="x", displacement=0.02),
-        "inertia_relief": False,
-        "settings": Settings(tolerance=1e-10, largest_turn=3.0, stability=False),
-    }
+    given = {"method": "arc_length", "load_factors": [0.0, 0.5], "steps": 30, "first_step": 0.01}
+    given |= {"duration": None, "constant": (1,), "inertia_relief": False}
+    given["until"] = Reached(node=7, axis="x", displacement=0.02)
+    given["settings"] = Settings(tolerance=1e-10, largest_turn=3.0, stability=False)
+    assert found.analysis.arguments == given
     assert found.output.shapes == (0, 5, -1)
     assert (found.output.axis, found.output.animation) == ("-x", "mp4")
     assert found.case().loads[1] == Gravity((0, 0, -9.81))
@@ -106,11 +77,10 @@ def test_gravity_by_its_name_and_one_mass_rule(read) -> None:
 
 
 def test_moved_supports_are_shown_where_nothing_is_loaded(read) -> None:
-    text = PATH.replace("[[loads]]\nnodes = [7, 6]\nforce = [1, 0, 0]\n", "")
-    found = read(text + MOVED)
+    found = read(changed(PATH, f"loads =; {MOVED}"))
     assert found.case().supports == (Fix("xmin"), Impose([8], "z", -0.1))
     np.testing.assert_array_equal(found.output.nodes, [8])
-    np.testing.assert_array_equal(read(PATH + MOVED).output.nodes, [6, 7])
+    np.testing.assert_array_equal(read(changed(PATH, MOVED)).output.nodes, [6, 7])
 
 
 def test_where_a_path_ends() -> None:
@@ -132,163 +102,66 @@ def test_a_path_starts_from_a_stored_state(read, tmp_path) -> None:
     assert found.start().load_factor == 1e-5
 
 
-# what is replaced in the text, by what, and how the message begins
-BAD = {
-    "method": (
-        [('"statics"', '"statics"\nmethod = "newtn"')],
-        "analysis.method = \"newtn\": did you mean 'newton'? choose one of newton, displacement",
-    ),
-    "integrator": (
-        [('"statics"', '"statics"\nmethod = "rk4"')],
-        'analysis.method = "rk4": choose one of newton, displacement, mgdcm, arc_length',
-    ),
-    "unknown key": (
-        [('"statics"', '"statics"\nload_factor = [1]')],
-        "analysis.load_factor: unknown key; did you mean 'load_factors'? known keys: kind, method",
-    ),
-    "key of a motion": (
-        [('"statics"', '"statics"\ndt = 1.0')],
-        'analysis.dt: only for analysis.kind = "dynamics" or "frf"; leave it out',
-    ),
-    "output of a motion": (
-        [('"statics"', '"statics"\n[output]\nevery = 0.1')],
-        'output.every: only for analysis.kind = "dynamics"; leave it out',
-    ),
-    "start of a motion": (
-        [("[analysis]", "[initial]\nvelocity = [0, 0, 1]\n[analysis]")],
-        'initial.velocity: only for analysis.kind = "dynamics"; leave it out',
-    ),
-    "empty start": ([("[analysis]", "[initial]\n[analysis]")], "initial.file: missing"),
-    "load factors in words": (
-        [('"statics"', '"statics"\nload_factors = "all"')],
-        'analysis.load_factors = "all": must be a list of numbers, as in [0, 0.5, 1]',
-    ),
-    "load factor nan": (
-        [('"statics"', '"statics"\nload_factors = [0, nan]')],
-        "analysis.load_factors[1] = nan: must be a finite number",
-    ),
-    "no load factors": (
-        [('"statics"', '"statics"\nload_factors = []')],
-        "analysis.load_factors = []: must be a list of numbers",
-    ),
-    "steps": ([('"statics"', '"statics"\nsteps = 0')], "analysis.steps = 0: must be at least 1"),
-    "half a step": (
-        [('"statics"', '"statics"\nsteps = 2.5')],
-        "analysis.steps = 2.5: must be a whole number",
-    ),
-    "first step": (
-        [('"statics"', '"statics"\nfirst_step = "small"')],
-        'analysis.first_step = "small": must be a number',
-    ),
-    "constant in words": (
-        [('"statics"', '"statics"\nconstant = "weight"')],
-        'analysis.constant = "weight": give "gravity", or numbers of [[loads]], as in [0]',
-    ),
-    "constant fraction": (
-        [('"statics"', '"statics"\nconstant = [0.5]')],
-        "analysis.constant = [0.5]: 0.5 is not a load number",
-    ),
-    "tolerance": (
-        [('"statics"', '"statics"\ntolerance = 0.1')],
-        "analysis.tolerance = 0.1: must be at most 0.01",
-    ),
-    "turn": (
-        [('"statics"', '"statics"\nlargest_turn = 0')],
-        "analysis.largest_turn = 0: must be greater than 0",
-    ),
-    "stability": (
-        [('"statics"', '"statics"\nstability = 1')],
-        "analysis.stability = 1: must be true or false",
-    ),
-    "until a number": (
-        [('"statics"', '"statics"\nuntil = 0.1')],
-        "analysis.until = 0.1: must be a table",
-    ),
-    "until key": (
-        [('"statics"', '"statics"\nuntil = { nodes = 7, axis = "x", displacement = 0.1 }')],
-        "analysis.until.nodes: unknown key; did you mean 'node'? known keys: node, axis, displ",
-    ),
-    "until node": (
-        [('"statics"', '"statics"\nuntil = { node = 99, axis = "x", displacement = 0.1 }')],
-        "analysis.until.node = [99]: node 99 is out of range; this structure has nodes 0 to 12",
-    ),
-    "until axis": (
-        [('"statics"', '"statics"\nuntil = { node = 7, axis = "-x", displacement = 0.1 }')],
-        'analysis.until.axis = "-x": must be one of "x", "y" and "z"',
-    ),
-    "until nowhere": (
-        [('"statics"', '"statics"\nuntil = { node = 7, axis = "x", displacement = 0 }')],
-        "analysis.until.displacement = 0: the path begins there; say where it ends",
-    ),
-    "history of a load": (
-        [("force = [1, 0, 0]", 'force = [1, 0, 0]\nhistory = { kind = "step" }')],
-        'loads[0].history = { kind = "step" }: a path has no time; leave it out: what loads and',
-    ),
-    "history of a support": (
-        [
-            (
-                'nodes = "xmin"',
-                'nodes = [0]\naxis = "x"\ndisplacement = 1\nhistory = { kind = "step" }',
-            )
-        ],
-        'supports[0].history = { kind = "step" }: a path has no time; leave it out',
-    ),
-    "base": (
-        [("[[loads]]", '[[supports]]\nbase = "x"\n[[loads]]')],
-        'supports[1].base = "x": a base moves over time, and a path has no time; give nodes, axis',
-    ),
-    "masses": (
-        [("[[supports]]", '[model]\nmass = ["panel", "centroid"]\n[[supports]]')],
-        'model.mass = ["panel", "centroid"]: a path is computed once; give one rule, or none',
-    ),
-    "mass": (
-        [("[[supports]]", '[model]\nmass = "centroids"\n[[supports]]')],
-        "model.mass = \"centroids\": did you mean 'centroid'?",
-    ),
-    "gravity without density": (
-        [("nodes = [7, 6]\nforce = [1, 0, 0]", "gravity = [0, 0, -9.81]")],
-        "loads[0]: gravity needs the mass of the structure: ",
-    ),
-    "contradictory support": (
-        [("[[loads]]", '[[supports]]\nnodes = [0]\naxis = "x"\ndisplacement = 0.1\n[[loads]]')],
-        "supports[1]: node 0 is held and imposed along x, a contradictory support; leave out one",
-    ),
-    "axis": (
-        [('"statics"', '"statics"\n[output]\naxis = "+x"')],
-        "output.axis = \"+x\": did you mean 'x'? choose one of x, y, z, -x, -y, -z",
-    ),
-    "no shapes": (
-        [('"statics"', '"statics"\n[output]\nshapes = 0')],
-        "output.shapes = 0: give 1 to 12 shapes, or a list of point numbers",
-    ),
-    "too many shapes": (
-        [('"statics"', f'"statics"\n[output]\nshapes = {list(range(13))}')],
-        "output.shapes: 13 points; give at most 12",
-    ),
-    "shapes in words": (
-        [('"statics"', '"statics"\n[output]\nshapes = "all"')],
-        'output.shapes = "all": "all" is not a point number',
-    ),
-}
+# edits of the text, and how the message begins
+BAD = """
+analysis.method = "newtn": did you mean 'newton'? choose one of newton, displacement
+analysis.method = "rk4": choose one of newton, displacement, mgdcm, arc_length
+analysis.load_factor = [1] | analysis.load_factor: unknown key; did you mean 'load_factors'? known
+    keys: kind, method
+analysis.dt = 1.0 | analysis.dt: only for analysis.kind = "dynamics" or "frf"; leave it out
+output = { every = 0.1 } | output.every: only for analysis.kind = "dynamics"; leave it out
+initial = { velocity = [0, 0, 1] } | initial.velocity: only for analysis.kind = "dynamics"; leave
+    it out
+initial = {} | initial.file: missing
+analysis.load_factors = "all": must be a list of numbers, as in [0, 0.5, 1]
+analysis.load_factors = [0, nan] | analysis.load_factors[1] = nan: must be a finite number
+analysis.load_factors = []: must be a list of numbers
+analysis.steps = 0: must be at least 1
+analysis.steps = 2.5: must be a whole number
+analysis.first_step = "small": must be a number
+analysis.constant = "weight": give "gravity", or numbers of [[loads]], as in [0]
+analysis.constant = [0.5]: 0.5 is not a load number
+analysis.tolerance = 0.1: must be at most 0.01
+analysis.stability = 1: must be true or false
+analysis.until = 0.1: must be a table
+analysis.until = { nodes = 7, axis = "x", displacement = 0.1 } | analysis.until.nodes: unknown
+    key; did you mean 'node'? known keys: node, axis, displ
+analysis.until = { node = 99, axis = "x", displacement = 0.1 } | analysis.until.node = [99]: node
+    99 is out of range; this structure has nodes 0 to 12
+analysis.until = { node = 7, axis = "-x", displacement = 0.1 } | analysis.until.axis = "-x": must
+    be one of "x", "y" and "z"
+analysis.until = { node = 7, axis = "x", displacement = 0 } | analysis.until.displacement = 0: the
+    path begins there; say where it ends
+loads[0].history = { kind = "step" }: a path has no time; leave it out: what loads and
+supports[0] = { nodes = [0], axis = "x", displacement = 1, history = { kind = "step" } } |
+    supports[0].history = { kind = "step" }: a path has no time; leave it out
+supports[1] = { base = "x" } | supports[1].base = "x": a base moves over time, and a path has no
+    time; give nodes, axis
+model.mass = ["panel", "centroid"]: a path is computed once; give one rule, or none
+model.mass = "centroids": did you mean 'centroid'?
+loads[0] = { gravity = [0, 0, -9.81] } | loads[0]: gravity needs the mass of the structure:
+supports[1] = { nodes = [0], axis = "x", displacement = 0.1 } | supports[1]: node 0 is held and
+    imposed along x, a contradictory support; leave out one
+output.axis = "+x": did you mean 'x'? choose one of x, y, z, -x, -y, -z
+output.shapes = 0: give 1 to 12 shapes, or a list of point numbers
+output.shapes = "all": "all" is not a point number
+"""
 
 
-@pytest.mark.parametrize("name", BAD)
-def test_a_bad_file_gets_one_message(read, name) -> None:
-    edits, message = BAD[name]
-    check(read, edited(PATH, edits), message)
+@pytest.mark.parametrize(("edits", "message"), rows(BAD))
+def test_a_bad_file_gets_one_message(read, edits, message) -> None:
+    check(read, changed(PATH, edits), message)
 
 
 def test_keys_of_a_path_in_a_motion_are_told_as_such(read, short) -> None:
-    text = short + "[output]\nshapes = 3\n"
-    check(read, text, 'output.shapes: only for analysis.kind = "statics" or "modes"; leave it out')
-    text = short.replace("duration = 10", "duration = 10\nsteps = 5")
-    check(read, text, 'analysis.steps: only for analysis.kind = "statics"; leave it out')
+    for key, kinds in (("output.shapes", '"statics" or "modes"'), ("analysis.steps", '"statics"')):
+        text = changed(short, f"{key} = 3")
+        check(read, text, f"{key}: only for analysis.kind = {kinds}; leave it out")
 
 
 def test_a_file_that_does_not_say_its_kind(read) -> None:
-    text = PATH.replace('kind = "statics"', "load_factors = [1]") + "[output]\nshapes = 3\n"
     with pytest.raises(InputError) as caught:
-        read(text)
+        read(changed(PATH, "analysis.kind =; analysis.load_factors = [1]; output.shapes = 3"))
     (line,) = str(caught.value).splitlines()  # what depends on the kind is not complained about
     known = "dynamics, statics, modes, frf, fidelity"
     assert line.endswith(f"analysis.kind: missing; choose one of {known}")

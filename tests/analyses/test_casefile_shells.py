@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from casefile_checks import check, edited
+from casefile_checks import check
 
 import foldyn as fd
-from case_texts import FOLD_TEXT
+from case_texts import FOLD_TEXT, changed, rows
 from foldyn.analyses import read_case
 from foldyn.analyses.motion import MASSLESS_METHODS
 from foldyn.cases.models import MODELS
@@ -15,10 +15,7 @@ from foldyn.dynamics import METHODS
 from foldyn.errors import InputError
 
 # case study 1 of the paper, loaded slowly
-FOLD = (
-    FOLD_TEXT
-    + """\
-[model]
+FOLD = f"""{FOLD_TEXT}[model]
 kind = "bars_and_hinges"
 [[supports]]
 nodes = [4, 5]
@@ -34,40 +31,42 @@ steps = 1
 [output]
 nodes = [0, 1]
 """
+SHELL = 'model.kind = "shell"; model.divisions = 2'
+MOTION = 'analysis = { kind = "dynamics", duration = 1.0 }'
+IMPULSE = (
+    "loads =; drive = [{ nodes = [0, 1], force = [-1e-3, 0, 0] }]; analysis = "
+    '{ kind = "frf", method = "impulse", frequencies = [0.1, 0.2] }'
 )
-SHELL = ('kind = "bars_and_hinges"', 'kind = "shell"\ndivisions = 2')
-STATICS = 'kind = "statics"\nsteps = 1'
-MOTION = (STATICS, 'kind = "dynamics"\nduration = 1.0')
-MODES = [("[[loads]]\nnodes = [0, 1]\nforce = [-1e-3, 0, 0]\n", ""), (STATICS, 'kind = "modes"')]
 
 
-def drive(method: str, more: str = "") -> list[tuple[str, str]]:
-    """Edits that make it a frequency response."""
-    analysis = f'kind = "frf"\nmethod = "{method}"\nfrequencies = [0.1, 0.2]\n{more}'
-    return [("[[loads]]", "[[drive]]"), (STATICS, analysis)]
+@pytest.fixture
+def filed(tmp_path):
+    """Function that writes the text with edits and returns its path."""
+
+    def write(edits: str):
+        path = tmp_path / "case2.toml"
+        path.write_text(changed(FOLD, edits))
+        return path
+
+    return write
 
 
-def test_one_file_gives_both_models_and_they_bend_alike(read):
+def test_one_file_gives_both_models_and_they_bend_alike(filed):
     moved = {}
     for kind in MODELS:
-        case_file = read(edited(FOLD, [('kind = "bars_and_hinges"', f'kind = "{kind}"')]))
+        case_file = read_case(filed(f'model.kind = "{kind}"'))
         path = fd.trace(case_file.case(), **case_file.analysis.arguments)
         moved[kind] = path.displacement.sel(node=case_file.output.nodes, axis="x").values[-1]
         assert case_file.model == kind
-    # design, section 5: a shell 0.0348 m
-    np.testing.assert_allclose(moved["bars_and_hinges"], -0.0348, rtol=0.01)
-    np.testing.assert_allclose(moved["shell"], -0.0348, rtol=0.01)
+        np.testing.assert_allclose(moved[kind], -0.0348, rtol=0.01)  # design, section 5
     np.testing.assert_allclose(moved["bars_and_hinges"], moved["shell"], rtol=0.12)
 
 
-def test_the_keys_of_a_shell(read):
-    model = """kind = "shell"
-divisions = 3
-fold_law = { kind = "enhanced", theta1 = 30, theta2 = 330 }
-crease_stiffness = 0.02
-crease_rest = 290
-mass = ["lumped", "consistent"]"""
-    case_file = read(edited(FOLD, [('kind = "bars_and_hinges"', model), MOTION]))
+def test_the_keys_of_a_shell(filed):
+    model = """model = { kind = "shell", divisions = 3, crease_stiffness = 0.02, crease_rest = 290,
+    mass = ["lumped", "consistent"], fold_law = { kind = "enhanced", theta1 = 30, theta2 = 330 } }
+    """
+    case_file = read_case(filed(f"{' '.join(model.split())}; {MOTION}"))
     assert case_file.masses == ["lumped", "consistent"]
     shell = case_file.case().structure
     assert isinstance(shell, fd.Shell)
@@ -80,128 +79,77 @@ mass = ["lumped", "consistent"]"""
         case_file.case("panel")
 
 
-def test_defaults_of_a_shell(read):
-    case_file = read(edited(FOLD, [('kind = "bars_and_hinges"', 'kind = "shell"'), MOTION]))
+def test_defaults_of_a_shell(filed):
+    case_file = read_case(filed(f'model.kind = "shell"; {MOTION}'))
     assert case_file.case().structure.options == fd.shells.ShellOptions()
     assert case_file.masses == ["lumped"]
     assert case_file.analysis.arguments["method"] == "auto"
-    plain = read(edited(FOLD, [MOTION]))
+    plain = read_case(filed(MOTION))
     assert plain.masses == ["consistent"] and plain.analysis.arguments["method"] == "rk4"
 
 
-def test_integrators_of_shells_are_those_of_the_registry(read):
+def test_integrators_of_shells_are_those_of_the_registry(filed):
     massless = tuple(name for name, method in METHODS.items() if method.massless)
     assert massless == MASSLESS_METHODS
     for method in (*MASSLESS_METHODS, "auto"):
-        text = edited(FOLD, [SHELL, (STATICS, f'{MOTION[1]}\nmethod = "{method}"')])
-        assert read(text).analysis.arguments["method"] == method
+        path = filed(f'{SHELL}; {MOTION}; analysis.method = "{method}"')
+        assert read_case(path).analysis.arguments["method"] == method
 
 
-def test_integrators_of_simulated_responses(read):
-    named = drive("impulse", 'integrator = "newmark"')
-    assert read(edited(FOLD, [SHELL, *named])).analysis.arguments["integrator"] == "newmark"
-    left_out = read(edited(FOLD, [SHELL, *drive("impulse")])).analysis.arguments
+def test_integrators_of_simulated_responses(filed):
+    named = read_case(filed(f'{SHELL}; {IMPULSE}; analysis.integrator = "newmark"'))
+    assert named.analysis.arguments["integrator"] == "newmark"
+    left_out = read_case(filed(f"{SHELL}; {IMPULSE}")).analysis.arguments
     assert "integrator" not in left_out  # the response chooses an implicit one
 
 
-WRONG = {
-    "no such model": (
-        [(SHELL[0], 'kind = "shells"')],
-        "model.kind = \"shells\": did you mean 'shell'? choose one of bars_and_hinges, shell",
-    ),
-    "keys of bars and hinges": (
-        [(SHELL[0], 'kind = "shell"\nbend_law = "linear"\nscheme = "n4b5"')],
-        'model.scheme: only for model.kind = "bars_and_hinges"; a shell has no scheme, bend_law: '
-        "leave them out",
-    ),
-    "a key of shells": (
-        [(SHELL[0], "divisions = 4")],
-        'model.divisions: only for model.kind = "shell"; bars and hinges have no divisions: leave '
-        "it out",
-    ),
-    "a mass rule of bars and hinges": (
-        [(SHELL[0], 'kind = "shell"\nmass = "circumcenter"')],
-        'model.mass = "circumcenter": only for model.kind = "bars_and_hinges"; choose one of '
-        "lumped, consistent",
-    ),
-    "one of a list of mass rules": (
-        [(SHELL[0], 'kind = "shell"\nmass = ["lumped", "panel"]'), MOTION],
-        'model.mass[1] = "panel": only for model.kind = "bars_and_hinges"',
-    ),
-    "the mass of a shell": (
-        [(SHELL[0], 'mass = "lumped"')],
-        'model.mass = "lumped": only for model.kind = "shell"; choose one of equi_inertial',
-    ),
-    "no divisions": (
-        [(SHELL[0], 'kind = "shell"\ndivisions = 0')],
-        "model.divisions = 0: must be at least 1",
-    ),
-    "an explicit method": (
-        [SHELL, (STATICS, f'{MOTION[1]}\nmethod = "rk4"')],
-        'analysis.method = "rk4": needs mass everywhere, and the rotations of a shell have none; '
-        "choose one of auto, newmark, generalized_alpha, energy_momentum, or leave it out",
-    ),
-    "an explicit integrator": (
-        [SHELL, *drive("impulse", 'integrator = "rk4"')],
-        'analysis.integrator = "rk4": needs mass everywhere',
-    ),
-    "internal amplitudes": (
-        [SHELL, MODES[0], (STATICS, 'kind = "modes"\ninternal = 3')],
-        "analysis.internal = 3: is for the panels of bars and hinges; leave it out",
-    ),
-    "a secant": (
-        [SHELL, MODES[0], (STATICS, 'kind = "modes"\nsecant = 1')],
-        "analysis.secant = 1.0: is for superlinear bends, and a shell has none; leave it out",
-    ),
-    "a support on the mesh": (
-        [SHELL, ("nodes = [4, 5]", "nodes = [4, 6]")],
-        "supports[0].nodes: 6 is no vertex of the pattern, which has 0 to 5; a case file names "
-        "nodes of a shell by vertex, whatever its divisions",
-    ),
-    "a load on the mesh": (
-        [SHELL, ("nodes = [0, 1]\nforce", "nodes = [8]\nforce")],
-        "loads[0].nodes: 8 is no vertex",
-    ),
-    "a drive on the mesh": (
-        [SHELL, *drive("direct"), ("nodes = [0, 1]\nforce", "nodes = [8]\nforce")],
-        "drive[0].nodes: 8 is no vertex",
-    ),
-    "an output on the mesh": (
-        [SHELL, ("[output]\nnodes = [0, 1]", "[output]\nnodes = [6]")],
-        "output.nodes: 6 is no vertex",
-    ),
-    "an end on the mesh": (
-        [SHELL, ("steps = 1", 'until = { node = 6, axis = "x", displacement = -0.01 }')],
-        "analysis.until.node: 6 is no vertex",
-    ),
-}
+# edits, and how the message begins
+WRONG = """
+model.kind = "shells": did you mean 'shell'? choose one of bars_and_hinges, shell
+model.kind = "shell"; model.bend_law = "linear"; model.scheme = "n4b5" | model.scheme: only for
+    model.kind = "bars_and_hinges"; a shell has no scheme, bend_law: leave them out
+model.kind =; model.divisions = 4 | model.divisions: only for model.kind = "shell"; bars and
+    hinges have no divisions: leave it out
+model.kind = "shell"; model.mass = "circumcenter" | model.mass = "circumcenter": only for
+    model.kind = "bars_and_hinges"; choose one of lumped, consistent
+model.kind = "shell"; model.mass = ["lumped", "panel"]; analysis.steps =; analysis.kind =
+    "dynamics"; analysis.duration = 1.0 | model.mass[1] = "panel": only for model.kind =
+    "bars_and_hinges"
+model.kind =; model.mass = "lumped" | model.mass = "lumped": only for model.kind = "shell"; choose
+    one of equi_inertial
+model.kind = "shell"; model.divisions = 0 | model.divisions = 0: must be at least 1
+model.kind = "shell"; analysis = { kind = "dynamics", duration = 1.0, method = "rk4" } |
+    analysis.method = "rk4": needs mass everywhere, and the rotations of a shell have none; choose
+    one of auto, newmark, generalized_alpha, energy_momentum, or leave it out
+loads =; model.kind = "shell"; drive = [{ nodes = [0, 1], force = [-0.001, 0, 0] }]; analysis = {
+    kind = "frf", method = "impulse", frequencies = [0.1, 0.2], integrator = "rk4" } |
+    analysis.integrator = "rk4": needs mass everywhere
+loads =; model.kind = "shell"; analysis.steps =; analysis.kind = "modes"; analysis.internal = 3 |
+    analysis.internal = 3: is for the panels of bars and hinges; leave it out
+loads =; model.kind = "shell"; analysis.steps =; analysis.kind = "modes"; analysis.secant = 1 |
+    analysis.secant = 1.0: is for superlinear bends, and a shell has none; leave it out
+model.kind = "shell"; supports[0].nodes = [4, 6] | supports[0].nodes: 6 is no vertex of the
+    pattern, which has 0 to 5; a case file names nodes of a shell by vertex, whatever its
+    divisions
+model.kind = "shell"; loads[0].nodes = [8] | loads[0].nodes: 8 is no vertex
+loads =; model.kind = "shell"; drive = [{ nodes = [8], force = [-0.001, 0, 0] }]; analysis = {
+    kind = "frf", method = "direct", frequencies = [0.1, 0.2] } | drive[0].nodes: 8 is no vertex
+model.kind = "shell"; output.nodes = [6] | output.nodes: 6 is no vertex
+model.kind = "shell"; analysis.steps =; analysis.until = { node = 6, axis = "x", displacement =
+    -0.01 } | analysis.until.node: 6 is no vertex
+"""
 
 
-@pytest.mark.parametrize(("edits", "message"), WRONG.values(), ids=WRONG)
+@pytest.mark.parametrize(("edits", "message"), rows(WRONG))
 def test_wrong_files(read, edits, message):
-    check(read, edited(FOLD, edits), message)
-
-
-@pytest.fixture
-def filed(tmp_path):
-    """Function that writes a text with edits and returns its path."""
-
-    def write(*edits: tuple[str, str], text: str = FOLD):
-        path = tmp_path / "case2.toml"
-        path.write_text(edited(text, list(edits)))
-        return path
-
-    return write
+    check(read, changed(FOLD, edits), message)
 
 
 def test_a_file_of_bars_and_hinges_as_a_shell(filed):
-    model = """scheme = "n4b5"
-mass = ["panel", "consistent"]
-bend_law = "linear"
-fold_law = "linear"
-crease_rest = 290"""
-    motion = f'{MOTION[1]}\nmethod = "rk4"\ndt = 1e-5\nforce = true'
-    path = filed(('kind = "bars_and_hinges"', model), (STATICS, motion))
+    model = """model = { scheme = "n4b5", mass = ["panel", "consistent"], bend_law = "linear",
+    fold_law = "linear", crease_rest = 290 }"""
+    motion = f'{MOTION[:-2]}, method = "rk4", dt = 1e-5, force = true }}'
+    path = filed(f"{' '.join(model.split())}; {motion}")
     case_file = read_case(path, model="shell", divisions=3)
     assert (case_file.model, case_file.masses) == ("shell", ["lumped"])
     options = case_file.case().structure.options
@@ -213,24 +161,23 @@ crease_rest = 290"""
 
 
 def test_an_implicit_method_stays_with_its_step(filed):
-    path = filed((STATICS, f'{MOTION[1]}\nmethod = "newmark"\ndt = 0.01'))
+    path = filed(f'{MOTION}; analysis.method = "newmark"; analysis.dt = 0.01')
     arguments = read_case(path, model="shell").analysis.arguments
     assert (arguments["method"], arguments["dt"]) == ("newmark", 0.01)
 
 
 def test_responses_and_modes_as_those_of_a_shell(filed):
-    simulated = filed(*drive("impulse", 'integrator = "rk4"\ndt = 1e-4\npulse = 0.01'))
-    arguments = read_case(simulated, model="shell").analysis.arguments
+    options = 'analysis.integrator = "rk4"; analysis.dt = 1e-4; analysis.pulse = 0.01'
+    arguments = read_case(filed(f"{IMPULSE}; {options}"), model="shell").analysis.arguments
     assert arguments["pulse"] == 0.01
     assert not {"integrator", "dt"} & set(arguments)
-    judged = filed(MODES[0], (STATICS, 'kind = "modes"\nsecant = 1\ninternal = 2\ncount = 3'))
+    judged = filed('loads =; analysis = { kind = "modes", secant = 1, internal = 2, count = 3 }')
     given = read_case(judged, model="shell").analysis.arguments
-    assert (given["secant"], given["internal"]) == (None, 0)
-    assert read_case(judged, model="shell").analysis.arguments["count"] == 3
+    assert (given["secant"], given["internal"], given["count"]) == (None, 0, 3)
 
 
 def test_a_file_of_a_shell_as_bars_and_hinges(filed):
-    path = filed((SHELL[0], 'kind = "shell"\ndivisions = 2\nmass = "lumped"\ncrease_rest = 290'))
+    path = filed(f'{SHELL}; model.mass = "lumped"; model.crease_rest = 290')
     case_file = read_case(path, model="bars_and_hinges")
     assert (case_file.model, case_file.masses) == ("bars_and_hinges", ["consistent"])
     assert case_file.case().structure.options.crease_rest == 290
@@ -241,30 +188,23 @@ def test_a_file_of_a_shell_as_bars_and_hinges(filed):
 @pytest.mark.parametrize(
     ("arguments", "edits", "message"),
     [
-        ({"model": "plate"}, [], 'model = "plate": choose one of bars_and_hinges, shell'),
-        ({"divisions": 4}, [], 'model.divisions: only for model.kind = "shell"'),
-        ({"model": "shell", "divisions": 0}, [], "model.divisions = 0: must be at least 1"),
+        ({"model": "plate"}, "", 'model = "plate": choose one of bars_and_hinges, shell'),
+        ({"divisions": 4}, "", 'model.divisions: only for model.kind = "shell"'),
+        ({"model": "shell", "divisions": 0}, "", "model.divisions = 0: must be at least 1"),
         # the file is checked as it is, too
-        ({"model": "shell"}, [(SHELL[0], 'schema = "n5b8"')], "model.schema: unknown key"),
-        ({"model": "shell"}, [(SHELL[0], 'bend_law = "soft"')], 'model.bend_law = "soft"'),
-        (
-            {"model": "shell"},
-            [('\n[model]\nkind = "bars_and_hinges"', ""), ("[pattern]", "model = 3\n[pattern]")],
-            "model = 3: must be a table",
-        ),
+        ({"model": "shell"}, 'model = { schema = "n5b8" }', "model.schema: unknown key"),
+        ({"model": "shell"}, 'model = { bend_law = "soft" }', 'model.bend_law = "soft"'),
+        ({"model": "shell"}, "model = 3", "model = 3: must be a table"),
     ],
 )
 def test_wrong_models_for_a_file(filed, arguments, edits, message):
-    path = filed(*edits)
-    check(lambda _: read_case(path, **arguments), "", message)
+    check(lambda _: read_case(filed(edits), **arguments), "", message)
 
 
 def test_a_state_of_another_mesh_is_refused(filed, tmp_path):
-    coarse = read_case(filed(SHELL))
-    bent = fd.trace(coarse.case(), load_factors=[1.0])
+    bent = fd.trace(read_case(filed(SHELL)).case(), load_factors=[1.0])
     fd.save(bent, tmp_path / "coarse.nc")
-    path = filed(SHELL, MOTION, text=FOLD + '[initial]\nfile = "coarse.nc"\n')
-
+    path = filed(f'{SHELL}; {MOTION}; initial.file = "coarse.nc"')
     state = read_case(path).initial()
     assert state is not None
     np.testing.assert_array_equal(state.displacement, bent.displacement.values[-1])

@@ -9,21 +9,13 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from case_texts import FOLD_TEXT
 from foldyn.analyses.keys import replaced
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.cli.main import main
 
-CASE = """
-[pattern]
-kind = "simple_fold"
-dihedral = 120
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
-[model]
-{model}
+CASE = f"""{FOLD_TEXT.replace("= 60", "= 120")}[model]
+{{model}}
 fold_law = "linear"
 crease_stiffness = 0.05
 [damping]

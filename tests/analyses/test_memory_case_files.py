@@ -8,33 +8,17 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from case_texts import HELD_FOLD_TEXT
 from foldyn.errors import ComputationError, InputError
 from foldyn.exports.creased_shell import fold_slopes
 from foldyn.viewer.fields import fields
 
-FOLD = """
-[pattern]
-kind = "simple_fold"
-a = 1.0
-b = 1.0
-dihedral = 120
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
-[model]
-mass = "panel"
-{law}
-[[supports]]
-nodes = [4, 5]
-axes = "xyz"
-[[supports]]
-nodes = [0, 1]
-axes = "z"
-[[loads]]
+FOLD = f"""{HELD_FOLD_TEXT.replace("= 60", "= 120")}[[loads]]
 nodes = [0, 1]
 force = [1e-3, 0, 0]
+[model]
+mass = "panel"
+{{law}}
 """
 MOTION = '[analysis]\nkind = "dynamics"\nduration = 0.05\nmethod = "rk4"\n'
 LAWS = {

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
+import base64
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from case_texts import FOLD_TEXT
+from case_texts import FOLD_TEXT, changed
 from foldyn.cli import stamp
 from foldyn.cli.main import main
+from foldyn.cli.run import DRAWN
 
-MIURA = """
-title = "a Miura unit cell"
-[pattern]
-kind = "miura"
-cells = [1, 1]
-dihedral = 60
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
-[model]
+MIURA = f"""title = "a Miura unit cell"
+{FOLD_TEXT.replace("simple_fold", "miura")}[model]
 mass = "circumcenter"
 [damping]
 alpha = 0.0628
@@ -32,35 +25,13 @@ axes = "xyz"
 [[loads]]
 nodes = [7]
 force = [0.01, 0, 0]
-history = { kind = "half_sine", duration = 0.05 }
+history = {{ kind = "half_sine", duration = 0.05 }}
 [analysis]
 kind = "dynamics"
 duration = 0.1
 [output]
 every = 0.01
 """
-
-# a fold whose creases do not lock, pulled shut: panel passes through panel at 0.28 s
-SHUT = (
-    FOLD_TEXT
-    + """\
-[model]
-fold_law = "linear"
-[[supports]]
-nodes = [4, 5]
-[[supports]]
-nodes = [0, 1]
-axes = "z"
-[[loads]]
-nodes = [0, 1]
-force = [0.1, 0, 0]
-[analysis]
-kind = "dynamics"
-duration = 2.0
-[output]
-every = 0.01
-"""
-)
 
 
 @dataclass(frozen=True)
@@ -71,6 +42,13 @@ class Outcome:
     out: str
     err: str
     new: list[str]  # files and folders that were not there before
+
+    def failure(self, *files: str) -> str:
+        """Why a run failed that left these files and named them."""
+        assert (self.status, {*files}) == (1, {name for name in self.new if name.endswith(".nc")})
+        reason, kept = self.err.splitlines()
+        assert kept == f"foldyn: kept what was computed: {', '.join(files)}"
+        return reason
 
 
 class Workplace:
@@ -97,6 +75,31 @@ class Workplace:
         told = "".join(line for line in err.splitlines(True) if "warning: bars hold" not in line)
         return Outcome(status, out, told, sorted(set(after) - set(before)))
 
+    def good(self, *arguments: str) -> Outcome:
+        """Call the command, which neither fails nor warns."""
+        done = self.call(*arguments)
+        assert (done.status, done.err) == (0, "")
+        return done
+
+    def refused(self, *arguments: str) -> str:
+        """The one line that a call says of bad input, which leaves nothing."""
+        bad = self.call(*arguments)
+        assert (bad.status, bad.out, bad.new) == (2, "", []), bad
+        (line,) = bad.err.splitlines()
+        assert line.startswith("foldyn: ")
+        return line.removeprefix("foldyn: ")
+
+    def page(self, *pictures: str, results: Sequence[str] = ("result.nc",)) -> str:
+        """The page of a run of case.toml, which holds just these pictures."""
+        done = self.good("run", "case.toml", "--out", "r", "--figures", "png")
+        drawn = {*pictures, "report.html"}
+        assert set(done.new) == {"r", *(f"r/{name}" for name in (*drawn, *results))}
+        assert drawn <= set(DRAWN)
+        page = Path("r/report.html").read_text(encoding="utf-8")
+        for name in pictures:
+            assert base64.b64encode(Path("r", name).read_bytes()).decode() in page, name
+        return page
+
     def run(self, content: str | bytes, *arguments: str) -> Outcome:
         """Write case.toml and run it without figures."""
         self.write(content)
@@ -117,22 +120,10 @@ def workplace(tmp_path, monkeypatch, capsys) -> Workplace:
 
 @pytest.fixture
 def edited():
-    """Function that gives the Miura's case file with things replaced that occur in it once."""
-
-    def edit(*pairs: tuple[str, str], text: str = MIURA) -> str:
-        for old, new in pairs:
-            assert text.count(old) == 1, old
-            text = text.replace(old, new)
-        return text
-
-    return edit
+    """Function that gives the Miura's case file with keys changed."""
+    return lambda edits: changed(MIURA, edits)
 
 
 @pytest.fixture
 def miura() -> str:
     return MIURA
-
-
-@pytest.fixture
-def shut() -> str:
-    return SHUT

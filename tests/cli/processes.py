@@ -18,13 +18,14 @@ PATIENCE = 120.0  # s, for what takes seconds
 
 
 def start(
-    folder: Path, *arguments: str | bytes, changes: dict[str, str | None] | None = None, **how: Any
-) -> subprocess.Popen[str]:
-    """Start the command in a folder; `changes` of the environment, None removes."""
+    folder: Path, *arguments: str | bytes, changes: dict[str, str | None] | None = None,
+    command: list[str] = COMMAND, **how: Any,
+) -> subprocess.Popen[str]:  # fmt: skip
+    """Start a command in a folder; `changes` of the environment, None removes."""
     environment = {**os.environ, "PYTHONPATH": SOURCE, "MPLBACKEND": "Agg", **(changes or {})}
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | how
     return subprocess.Popen(
-        [*COMMAND, *arguments],
+        [*command, *arguments],
         cwd=folder,
         env={key: value for key, value in environment.items() if value is not None},
         text=True,

@@ -13,29 +13,24 @@ from pathlib import Path
 import pytest
 
 import foldyn as fd
+from case_texts import HELD_MIURA_TEXT
+from foldyn.analyses import motion
 from foldyn.cli import stamp
 from foldyn.cli.main import main
 from foldyn.errors import InputError
 from foldyn.plots.writers import find_ffmpeg
+from foldyn.report import album
 
+FEW = "output.every = 0.02"
 PICTURES = ("structure.png", "laws.png", "load.png", "motion.png", "energies.png")
 
 
 def test_figures_of_a_tiny_case(workplace, edited) -> None:
-    text = edited(
-        ('"circumcenter"', '["panel", "circumcenter"]'),
-        ('title = "a Miura unit cell"', 'title = "Miura & <co>"'),
-        ("every = 0.01", 'every = 0.02\nnodes = [7]\naxis = "x"\nmax_frequency = 20.0'),
-    )
-    workplace.write(text)
-    done = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
-    assert (done.status, done.err) == (0, "")
+    output = 'output = { every = 0.02, nodes = [7], axis = "x", max_frequency = 20.0 }'
+    rules = 'model.mass = ["panel", "circumcenter"]'
+    workplace.write(edited(f'{rules}; title = "Miura & <co>"; {output}'))
     results = ("result-panel.nc", "result-circumcenter.nc")
-    files = {f"r/{name}" for name in (*PICTURES, *results, "report.html")}
-    assert set(done.new) == {"r", *files}
-    page = Path("r/report.html").read_text(encoding="utf-8")
-    for name in PICTURES:
-        assert base64.b64encode(Path("r", name).read_bytes()).decode() in page, name
+    page = workplace.page(*PICTURES, results=results)
     assert page.count("<img ") == len(PICTURES)
     assert "<h1>Miura &amp; &lt;co&gt;</h1>" in page
     for rule in ("panel", "circumcenter"):
@@ -51,14 +46,12 @@ def test_figures_of_a_tiny_case(workplace, edited) -> None:
         escape(Path("case.toml").read_text("utf-8")),
     ):  # fmt: skip
         assert told in page, told
-    assert f"figures and {Path('r/report.html')}" in done.out
 
 
 @pytest.mark.thorough
 def test_a_film_where_it_is_asked_for(workplace, edited) -> None:
-    workplace.write(edited(("every = 0.01", "every = 0.02")))
-    done = workplace.call("run", "case.toml", "--out", "r", "--film", "gif")
-    assert (done.status, done.err) == (0, "")
+    workplace.write(edited(FEW))
+    done = workplace.good("run", "case.toml", "--out", "r", "--film", "gif")
     assert "r/motion.gif" in done.new
     assert main(["run", "case.toml", "--out", "r", "--quiet"]) == 0
     assert not Path("r/motion.gif").exists()  # it would show the old motion
@@ -69,9 +62,8 @@ def test_a_film_instead_of_a_gif(workplace, edited) -> None:
         find_ffmpeg()
     except InputError:
         pytest.skip("needs ffmpeg on the PATH or imageio-ffmpeg")
-    workplace.write(edited(("every = 0.01", 'every = 0.02\nanimation = "mp4"')))
-    done = workplace.call("run", "case.toml", "--out", "r")
-    assert (done.status, done.err) == (0, "")
+    workplace.write(edited(f'{FEW}; output.animation = "mp4"'))
+    done = workplace.good("run", "case.toml", "--out", "r")
     assert "r/motion.mp4" in done.new and "r/motion.gif" not in done.new
     page = Path("r/report.html").read_text(encoding="utf-8")
     assert base64.b64encode(Path("r/motion.mp4").read_bytes()).decode() in page
@@ -83,35 +75,27 @@ def test_mp4_without_ffmpeg_is_refused_at_once(workplace, edited, monkeypatch) -
         raise InputError("MP4 needs ffmpeg: install it")
 
     monkeypatch.setattr("foldyn.plots.writers.find_ffmpeg", missing)
-    workplace.write(edited(("every = 0.01", 'every = 0.02\nanimation = "mp4"')))
-    done = workplace.call("run", "case.toml", "--out", "r")
-    assert done.status == 2
-    assert 'case.toml: output.animation = "mp4": MP4 needs ffmpeg' in done.err
-    assert not done.new
+    workplace.write(edited(f'{FEW}; output.animation = "mp4"'))
+    line = workplace.refused("run", "case.toml", "--out", "r")
+    assert line.startswith('case.toml: output.animation = "mp4": MP4 needs ffmpeg')
     assert workplace.call("run", "case.toml", "--out", "r", "--no-figures").status == 0
 
 
 def test_figures_of_many_nodes_and_no_load(workplace, monkeypatch) -> None:
     """A sheet without loads shows some of its vertices, not hundreds of rows."""
-    from foldyn.analyses import motion
-    from foldyn.report import album
-
     shown = []
     monkeypatch.setattr(motion.plots, "animate", lambda *_, **__: Path("r/structure.png"))
     draw = motion.plots.plot_history
-    monkeypatch.setattr(
-        motion.plots,
-        "plot_history",
-        lambda r, nodes, **k: shown.extend(nodes) or draw(r, nodes, **k),
-    )
-    workplace.write(
-        '[pattern]\nkind = "miura"\ncells = [6, 6]\n'
-        "[sheet]\nyoungs_modulus = 1e6\npoissons_ratio = 0.25\nthickness = 0.01\ndensity = 1.0\n"
-        '[[supports]]\nnodes = "xmin"\n'
-        '[analysis]\nkind = "dynamics"\nduration = 0.01\n[output]\nevery = 0.001\n'
-    )
-    done = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
-    assert (done.status, done.err) == (0, "")
+
+    def drawn(result, nodes, **options):
+        shown.extend(nodes)
+        return draw(result, nodes, **options)
+
+    monkeypatch.setattr(motion.plots, "plot_history", drawn)
+    large = HELD_MIURA_TEXT.replace('"miura"', '"miura"\ncells = [6, 6]')
+    brief = '[analysis]\nkind = "dynamics"\nduration = 0.01\n[output]\nevery = 0.001\n'
+    workplace.write(large + brief)
+    workplace.good("run", "case.toml", "--out", "r", "--figures", "png")
     assert len(shown) == album.MOST_NODES
     page = Path("r/report.html").read_text(encoding="utf-8")
     assert f"the first {album.MOST_NODES} of 156" in page
@@ -120,15 +104,13 @@ def test_figures_of_many_nodes_and_no_load(workplace, monkeypatch) -> None:
 
 def test_a_page_without_figures(workplace, edited) -> None:
     """It has what they show, as charts of the page; libraries it does without are not loaded."""
-    workplace.write(edited(("every = 0.01", "every = 0.02")))
+    workplace.write(edited(FEW))
     code = "import sys; from foldyn.cli.main import main; status = main(sys.argv[1:]); "
     code += "unused = {'matplotlib', 'shapely', 'scipy.spatial'} & set(sys.modules); "
     code += "sys.exit(status or 10 * len(unused))"
     assert subprocess.call([sys.executable, "-c", code, "run", "case.toml", "--quiet"]) == 0
     folder = Path("case-results")
-    assert sorted(path.name for path in folder.iterdir() if path.name != stamp.NAME) == [
-        "report.html", "result.nc",
-    ]  # fmt: skip
+    assert {path.name for path in folder.iterdir()} == {stamp.NAME, "report.html", "result.nc"}
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert page.count("data-foldyn=") == 1 and "<img " not in page
     plots = [json.loads(unescape(text)) for text in re.findall(r'data-plot="(.*?)"', page)]
@@ -142,9 +124,8 @@ def test_a_page_without_figures(workplace, edited) -> None:
 @pytest.mark.thorough
 @pytest.mark.parametrize("form", ["svg", "pdf"])
 def test_figures_for_a_paper_stand_beside_the_page(workplace, edited, form) -> None:
-    workplace.write(edited(("every = 0.01", "every = 0.02")))
-    done = workplace.call("run", "case.toml", "--out", "r", "--figures", form)
-    assert (done.status, done.err) == (0, "")
+    workplace.write(edited(FEW))
+    done = workplace.good("run", "case.toml", "--out", "r", "--figures", form)
     names = [name.replace("png", form) for name in PICTURES]
     assert set(done.new) == {"r", *(f"r/{name}" for name in (*names, "result.nc", "report.html"))}
     page = Path("r/report.html").read_text(encoding="utf-8")
@@ -154,7 +135,6 @@ def test_figures_for_a_paper_stand_beside_the_page(workplace, edited, form) -> N
 
 
 def test_figures_and_none_are_refused(workplace, edited) -> None:
-    workplace.write(edited())
-    done = workplace.call("run", "case.toml", "--figures", "png", "--no-figures")
-    assert (done.status, done.new) == (2, [])
-    assert "--figures: draws figures; leave out --no-figures" in done.err
+    workplace.write(edited(""))
+    line = workplace.refused("run", "case.toml", "--figures", "png", "--no-figures")
+    assert "--figures: draws figures; leave out --no-figures" in line

@@ -47,10 +47,9 @@ def test_sizes(workplace, miura, number) -> None:
 
 def test_divisions_that_memory_does_not_hold(workplace, miura) -> None:
     workplace.write(miura)
+    shell = ("run", "case.toml", "--model", "shell", "--divisions=3000")
     for force in ([], ["--force"]):
-        told = refused(
-            workplace, "run", "case.toml", "--model", "shell", "--divisions=3000", *force
-        )
+        told = refused(workplace, *shell, *force)
         assert "model: divisions = 3000: a shell of about 3.6e+07 nodes needs about 536 GiB" in told
 
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from processes import ended, start
 
 import foldyn as fd
+from case_texts import changed
 from foldyn.cli.main import main
 from foldyn.structures import MASS_RULES
 from foldyn.studies import find_case, shipped_cases
@@ -19,8 +18,8 @@ PAPER_RULES = ["equi_inertial", "panel", "centroid", "circumcenter", "consistent
 
 
 def test_a_case_file_becomes_a_result_that_runs_again_from_itself(workplace, miura) -> None:
-    done = workplace.run(miura)
-    assert (done.status, done.err) == (0, "")
+    workplace.write(miura)
+    done = workplace.good("run", "case.toml", "--no-figures")
     assert done.new == ["case-results", "case-results/result.nc"]
     assert "a Miura unit cell: 13 nodes" in done.out
     assert f"wrote {Path('case-results/result.nc')}" in done.out
@@ -37,7 +36,7 @@ def test_a_case_file_becomes_a_result_that_runs_again_from_itself(workplace, miu
 
 def test_a_list_of_mass_rules_gives_a_file_each(workplace, edited) -> None:
     rules = list(MASS_RULES)
-    done = workplace.run(edited(('"circumcenter"', str(rules).replace("'", '"'))))
+    done = workplace.run(edited(f"model.mass = {rules}"))
     assert done.status == 0
     assert done.new == ["case-results", *sorted(f"case-results/result-{r}.nc" for r in rules)]
     motions = {rule: fd.load(f"case-results/result-{rule}.nc") for rule in rules}
@@ -55,7 +54,7 @@ def test_out_names_the_folder(workplace, miura) -> None:
 def test_a_second_run_replaces_the_first(workplace, miura, edited) -> None:
     workplace.run(miura)
     (workplace.folder / "case-results" / "notes.txt").write_text("mine")
-    workplace.write(edited(("duration = 0.1", "duration = 0.2")))
+    workplace.write(edited("analysis.duration = 0.2"))
     assert main(["run", "case.toml", "--no-figures"]) == 0
     assert fd.load("case-results/result.nc").sizes["time"] == 21
     assert (workplace.folder / "case-results" / "notes.txt").read_text() == "mine"
@@ -73,20 +72,14 @@ def test_names_beyond_ascii(workplace, miura) -> None:
     done = workplace.call("run", "Fälle/Miura – 折り紙.toml", "--no-figures", "--out", out)
     assert done.status == 0
     assert fd.load(Path(out) / "result.nc").sizes["time"] == 11
-    assert workplace.call("run", "Fälle/Miura – 折り紙.toml", "--no-figures").new == [
-        "Miura – 折り紙-results",
-        "Miura – 折り紙-results/result.nc",
-    ]
+    folder = "Miura – 折り紙-results"
+    done = workplace.call("run", "Fälle/Miura – 折り紙.toml", "--no-figures")
+    assert done.new == [folder, f"{folder}/result.nc"]
 
 
-def test_a_byte_order_mark_is_no_obstacle(workplace, miura) -> None:
-    assert workplace.run(b"\xef\xbb\xbf" + miura.encode()).status == 0
-
-
-def test_free_flight_is_legal(workplace, edited) -> None:
-    text = edited(('[[supports]]\nnodes = [0, 1, 2]\naxes = "xyz"\n', ""))
-    done = workplace.run(text)
-    assert (done.status, done.err) == (0, "")
+def test_free_flight_is_legal(workplace, miura) -> None:
+    workplace.write(changed(miura, "supports ="))
+    workplace.good("run", "case.toml", "--no-figures")
     result = fd.load("case-results/result.nc")
     assert result.sizes["support"] == 0
     # the impulse of the half sine, 2/pi force times duration, carries the mass (4 panels) away
@@ -99,7 +92,7 @@ def test_free_flight_is_legal(workplace, edited) -> None:
 
 
 def test_a_load_on_supports_in_part_warns_and_runs(workplace, edited) -> None:
-    done = workplace.run(edited(("nodes = [7]", "nodes = [0, 7]")))
+    done = workplace.run(edited("loads[0].nodes = [0, 7]"))
     assert done.status == 0
     (line,) = done.err.splitlines()
     assert line.startswith("foldyn: warning: loads[0]: the force [0.01, 0.0, 0.0] acts in part")
@@ -142,21 +135,29 @@ def test_a_shipped_case_runs_by_its_name(workplace, name) -> None:
 
 
 def test_the_module_runs_as_a_command(tmp_path, miura) -> None:
-    source = str(Path(fd.__file__).parents[1])
-    environment = {**os.environ, "PYTHONPATH": source, "MPLBACKEND": "Agg"}
-    command = [sys.executable, "-m", "foldyn.cli.main", "run", "case.toml", "--no-figures"]
     (tmp_path / "case.toml").write_text(miura)
-
-    def call() -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-        )
-
-    good = call()
-    assert (good.returncode, good.stderr) == (0, "")
+    status, _, err = ended(start(tmp_path, "run", "case.toml", "--no-figures"))
+    assert (status, err) == (0, "")
     assert fd.load(tmp_path / "case-results" / "result.nc").sizes["time"] == 11
     (tmp_path / "case.toml").write_text(miura.replace("thickness", "thicknes"))
-    bad = call()
-    assert (bad.returncode, bad.stdout) == (2, "")
-    assert bad.stderr.startswith("foldyn: case.toml: sheet.thicknes: unknown key; did you mean")
-    assert len(bad.stderr.splitlines()) == 1
+    status, out, err = ended(start(tmp_path, "run", "case.toml", "--no-figures"))
+    assert (status, out) == (2, "")
+    assert err.startswith("foldyn: case.toml: sheet.thicknes: unknown key; did you mean")
+    assert len(err.splitlines()) == 1
+
+
+def test_a_motion_goes_on_from_a_stored_one(workplace, miura) -> None:
+    free = changed(miura, "supports =; loads =; analysis.dt = 2.5e-4")
+    workplace.write(changed(free, "initial.spin = [3, -2, 5]"), "first.toml")
+    workplace.good("run", "first.toml", "--no-figures")
+    stored = 'initial = { file = "first-results/result.nc", at = 4 }'
+    workplace.write(changed(free, stored))
+    workplace.good("run", "case.toml", "--no-figures")
+    one, other = fd.load("first-results/result.nc"), fd.load("case-results/result.nc")
+    for name in ("displacement", "velocity"):
+        np.testing.assert_array_equal(other[name][0], one[name][4])
+        largest = float(np.abs(one[name]).max())
+        np.testing.assert_allclose(other[name][6], one[name][10], rtol=0, atol=1e-12 * largest)
+    workplace.write(changed(free, f"{stored}; initial.at = 11"))
+    line = workplace.refused("run", "case.toml")
+    assert line.startswith("case.toml: initial.at = 11: the result has samples 0 to 10")

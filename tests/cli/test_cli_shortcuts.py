@@ -6,17 +6,19 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from case_texts import MODES_TEXT, changed
 from foldyn.analyses.reading import read_as
 from foldyn.cases import Fix, Force, Gravity, Impose
 from foldyn.cli.main import main
 from foldyn.errors import FoldynWarning, InputError
 
 GRID = {"first": 0.0, "last": 3.0, "count": 31}
-STATICS = ('kind = "dynamics"\nduration = 0.1\n[output]\nevery = 0.01', 'kind = "statics"')
-HISTORY = 'history = { kind = "half_sine", duration = 0.05 }\n'
-GRAVITY = "[[loads]]\ngravity = [0, 0, -9.81]\n[analysis]"
-MOVED = '[[supports]]\nnodes = [8]\naxis = "z"\ndisplacement = 0.1\nhistory = { kind = "step" }\n'
-BASE = '[[supports]]\nbase = "x"\nhistory = { kind = "step" }\n'
+FEW = "--frequencies 0 3 4"
+STATICS = 'output =; loads[0].history =; analysis = { kind = "statics" }'
+GRAVITY = "loads[1] = { gravity = [0, 0, -9.81] }"
+STEP = '{ kind = "step" }'
+MOVED = f'{{ nodes = [8], axis = "z", displacement = 0.1, history = {STEP} }}'
+BASE = f'supports[1] = {{ base = "x", history = {STEP} }}'
 
 
 @pytest.fixture
@@ -49,10 +51,8 @@ def test_the_modes_of_a_motion(workplace, miura) -> None:
 
 def test_the_response_of_a_motion_to_its_forces(workplace, miura) -> None:
     workplace.write(miura)
-    done = workplace.call(
-        "frf", "case.toml", "--no-figures", "--secant", "2", "--frequencies", "0", "3", "31"
-    )
-    assert (done.status, done.err) == (0, "")  # nothing is left out: the force drives
+    grid = ("--secant", "2", "--frequencies", "0", "3", "31")
+    done = workplace.good("frf", "case.toml", "--no-figures", *grid)  # nothing is left out
     assert done.new == ["case-frf", "case-frf/result.nc"]
     stored = fd.load("case-frf/result.nc")
     np.testing.assert_allclose(stored["frequency"], np.linspace(0.0, 3.0, 31))
@@ -61,7 +61,7 @@ def test_the_response_of_a_motion_to_its_forces(workplace, miura) -> None:
 
 
 def test_about_the_equilibrium_loads_act(read, miura) -> None:
-    text = miura.replace("[[loads]]", MOVED + "[[loads]]").replace("[analysis]", GRAVITY)
+    text = changed(miura, f"supports[1] = {MOVED}; {GRAVITY}")
     found = read(text, "modes", state="equilibrium")
     given = {"count": 6, "state": "equilibrium", "secant": None, "internal": 0}
     assert found.analysis.arguments == given
@@ -74,7 +74,7 @@ def test_about_the_equilibrium_loads_act(read, miura) -> None:
 
 
 def test_at_rest_moved_nodes_are_held(read, miura) -> None:
-    text = miura.replace("[[loads]]", MOVED + "[[loads]]").replace("[analysis]", GRAVITY)
+    text = changed(miura, f"supports[1] = {MOVED}; {GRAVITY}")
     left = r"leaves out the displacement of supports\[1\], loads\[1\]: nothing acts or moves"
     with pytest.warns(FoldynWarning, match=left):
         found = read(text, "frf", frequencies=GRID)
@@ -83,28 +83,27 @@ def test_at_rest_moved_nodes_are_held(read, miura) -> None:
 
 
 def test_what_a_motion_starts_with_is_left_out(read, miura) -> None:
-    text = miura.replace("[analysis]", "[initial]\nspin = [0, 0, 0]\n[analysis]")
+    text = changed(miura, "initial.spin = [0, 0, 0]")
     with pytest.warns(FoldynWarning, match=r"leaves out loads\[0\], \[initial\]"):
         found = read(text, "modes")
     assert found.initial() is None
 
 
 def test_a_moving_base_drives_where_no_force_does(read, miura) -> None:
-    text = miura.replace("[[loads]]\nnodes = [7]\nforce = [0.01, 0, 0]\n" + HISTORY, BASE)
-    for displacement, value in (("", 1.0), ("displacement = -0.02\n", 0.02)):
-        moved = text.replace('base = "x"\n', f'base = "x"\n{displacement}')
-        (drive,) = read(moved, "frf", frequencies=GRID).analysis.arguments["drive"]
+    text = changed(miura, f"loads =; {BASE}")
+    for more, value in (("", 1.0), ("supports[1].displacement = -0.02", 0.02)):
+        moved = read(changed(text, more), "frf", frequencies=GRID)
+        (drive,) = moved.analysis.arguments["drive"]
         assert (drive.axis, drive.value) == ("x", value)
     with pytest.warns(FoldynWarning, match=r"leaves out supports\[1\]"):
         assert read(text, "modes").case().supports == (Fix([0, 1, 2]),)
-    both = miura.replace("[[loads]]", BASE + "[[loads]]")
     with pytest.warns(FoldynWarning, match=r"leaves out supports\[1\]"):
-        found = read(both, "frf", frequencies=GRID)
+        found = read(changed(miura, BASE), "frf", frequencies=GRID)
     assert found.analysis.arguments["drive"] == [Force([7], (0.01, 0, 0))]
 
 
-def test_a_path_and_what_its_figures_show(read, edited) -> None:
-    text = edited(STATICS, (HISTORY, "")) + '[output]\nnodes = [7, 8]\naxis = "-x"\nshapes = 3\n'
+def test_a_path_and_what_its_figures_show(read, miura) -> None:
+    text = changed(miura, f'{STATICS}; output = {{ nodes = [7, 8], axis = "-x", shapes = 3 }}')
     found = read(text, "frf", frequencies=GRID)
     assert found.output.nodes.tolist() == [7, 8]
     assert found.output.axis == "-x"  # a response has directions, too
@@ -114,23 +113,8 @@ def test_a_path_and_what_its_figures_show(read, edited) -> None:
     assert (modes.output.axis, modes.output.named, modes.output.shapes) == (None, False, 6)
 
 
-OWN = """
-[pattern]
-kind = "miura"
-dihedral = 60
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
-[[supports]]
-nodes = "xmin"
-[analysis]
-"""
-
-
 def test_flags_stand_above_what_the_file_says(read, tmp_path) -> None:
-    modes = OWN + 'kind = "modes"\ncount = 3\nsecant = 1.0\ninternal = 2\n'
+    modes = changed(MODES_TEXT, "analysis.secant = 1.0; analysis.internal = 2; analysis.count = 3")
     given = {"count": 3, "state": None, "secant": 1.0, "internal": 2}
     assert read(modes, "modes").analysis.arguments == given
     assert read(modes, "modes", count=5).analysis.arguments["count"] == 5
@@ -139,8 +123,8 @@ def test_flags_stand_above_what_the_file_says(read, tmp_path) -> None:
     assert read(stored, "modes", state="rest").initial() is None
     with pytest.raises(InputError, match=r"initial\.file = .*b\.nc.*no such file"):
         read(stored, "modes", state=str(tmp_path / "b.nc")).initial()
-    drive = "[[drive]]\nnodes = 7\nforce = [1, 0, 0]\n"
-    response = OWN + 'kind = "frf"\nmethod = "modal"\n' + drive  # without frequencies of its own
+    drive = "drive = [{ nodes = 7, force = [1, 0, 0] }]"  # without frequencies of its own
+    response = changed(MODES_TEXT, f'{drive}; analysis = {{ kind = "frf", method = "modal" }}')
     with pytest.raises(InputError, match=r"case\.toml: at which frequencies\?"):
         read(response, "frf")
     found = read(response, "frf", frequencies=GRID, method="direct")
@@ -148,78 +132,48 @@ def test_flags_stand_above_what_the_file_says(read, tmp_path) -> None:
     assert len(found.analysis.arguments["frequencies"]) == 31
 
 
-def test_a_state_from_a_result(workplace, edited) -> None:
-    text = edited(STATICS, (HISTORY, ""))
-    workplace.write(text, "slow.toml")
+def test_a_state_from_a_result(workplace, miura) -> None:
+    workplace.write(changed(miura, STATICS), "slow.toml")
     assert workplace.call("run", "slow.toml", "--no-figures").status == 0
     state = ("--state", "slow-results/result.nc")
-    done = workplace.call("modes", "slow.toml", "--no-figures", "--secant", "1", *state)
-    assert (done.status, done.err) == (0, "")
+    workplace.good("modes", "slow.toml", "--no-figures", "--secant", "1", *state)
     about = fd.load("slow-modes/result.nc")["displacement"]
     path = fd.load("slow-results/result.nc")["displacement"]
     np.testing.assert_array_equal(about.values, path.values[-1])
 
 
-BAD = {
-    "no frequencies": (("frf",), [], "at which frequencies? Give --frequencies FIRST LAST COUNT"),
-    "count": (("modes", "--count", "0"), [], "analysis.count = 0: must be at least 1"),
-    "method": (
-        ("frf", "--frequencies", "0", "3", "4", "--method", "drect"),
-        [],
-        "analysis.method = \"drect\": did you mean 'direct'?",
-    ),
-    "half a frequency": (
-        ("frf", "--frequencies", "0", "3", "4.5"),
-        [],
-        "analysis.frequencies.count = 4.5: must be a whole number, at least 2",
-    ),
-    "state": (
-        ("modes", "--state", "none.nc"),
-        [],
-        "initial.file = ",
-    ),
-    "nothing drives": (
-        ("frf", "--frequencies", "0", "3", "4"),
-        [("[[loads]]\nnodes = [7]\nforce = [0.01, 0, 0]\n" + HISTORY, "")],
-        "nothing drives a frequency response: the file has neither forces nor a base that moves",
-    ),
-    "a file that is wrong in its own terms": (
-        ("modes",),
-        [("duration = 0.1\n", "durations = 0.1\n")],
-        "analysis.durations: unknown key; did you mean 'duration'?",
-    ),
-    "no density": (
-        ("modes",),
-        [STATICS, (HISTORY, ""), ("density = 1.0\n", "")],
-        "sheet.density: missing; modes need it (kg/m3)",
-    ),
-}
+@pytest.mark.parametrize(
+    ("arguments", "edits", "message"),
+    [
+        ("frf", "", "at which frequencies? Give --frequencies FIRST LAST COUNT"),
+        ("modes --count 0", "", "analysis.count = 0: must be at least 1"),
+        (f"frf {FEW} --method drect", "", "analysis.method = \"drect\": did you mean 'direct'?"),
+        (
+            f"frf {FEW}.5",
+            "",
+            "analysis.frequencies.count = 4.5: must be a whole number, at least 2",
+        ),
+        ("modes --state none.nc", "", "initial.file = "),
+        (
+            f"frf {FEW}",
+            "loads =",
+            "nothing drives a frequency response: the file has neither forces nor a base that",
+        ),
+        # a file that is wrong in its own terms
+        ("modes", "analysis.durations = 0.1", "analysis.durations: unknown key; did you mean 'dur"),
+        ("modes", f"{STATICS}; sheet.density =", "sheet.density: missing; modes need it (kg/m3)"),
+    ],
+)
+def test_bad_input_gets_one_message(workplace, miura, arguments, edits, message) -> None:
+    command, *flags = arguments.split()
+    workplace.write(changed(miura, edits))
+    assert workplace.refused(command, "case.toml", *flags).startswith(f"case.toml: {message}")
 
 
-@pytest.mark.parametrize("name", BAD)
-def test_bad_input_gets_one_message_and_nothing_is_written(workplace, edited, name) -> None:
-    (command, *flags), edits, message = BAD[name]
-    workplace.write(edited(*edits))
-    bad = workplace.call(command, "case.toml", *flags)
-    assert (bad.status, bad.out, bad.new) == (2, "", [])
-    (line,) = bad.err.splitlines()
-    assert line.startswith(f"foldyn: case.toml: {message}"), line
-
-
-def test_a_file_that_is_no_case_file(read, workplace) -> None:
+def test_a_file_that_is_no_case_file(read) -> None:
     for text in ("analysis = 3", "", "[analysis]\nkind = 3", "supports = 3\n[analysis]"):
         with pytest.raises(InputError, match=r"case\.toml: "):
             read(text, "modes")
-
-
-@pytest.mark.parametrize(
-    "arguments", [["modes"], ["modes", "a.toml", "--count", "many"], ["frf", "a.toml", "--quick"]]
-)
-def test_a_wrong_command_line_has_status_2(workplace, arguments) -> None:
-    with pytest.raises(SystemExit) as left:
-        main(arguments)
-    assert left.value.code == 2
-    assert "usage: foldyn" in workplace.capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", ["modes", "frf"])

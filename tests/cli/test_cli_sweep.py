@@ -11,21 +11,21 @@ import pytest
 import foldyn as fd
 from case_texts import MODES_TEXT
 
-THICK = ("--vary", "sheet.thickness=0.01,0.02")
+THICK = "--vary sheet.thickness=0.01,0.02"
 
 
 @pytest.fixture
 def sweep(workplace):
-    def call(*arguments: str, text: str = MODES_TEXT):
+    def call(arguments: str, text: str = MODES_TEXT):
         workplace.write(text)
-        return workplace.call("sweep", "case.toml", *arguments)
+        return workplace.call("sweep", "case.toml", *arguments.split())
 
     return call
 
 
 def test_results_page_and_points_stand_in_one_folder(sweep, workplace):
-    vary = (*THICK, "--vary", "pattern.dihedral=60:120:3")
-    done = sweep(*vary, "--measure", "frequencies", "--processes", "1", "--figures", "png")
+    vary = f"{THICK} --vary pattern.dihedral=60:120:3 --measure frequencies"
+    done = sweep(f"{vary} --processes 1 --figures png")
     assert done.status == 0, done.err
     names = [name.removeprefix("case-sweep/") for name in done.new]
     drawn = [f"{name}-frequencies.png" for name in ("effects", "lines", "map")]
@@ -46,10 +46,8 @@ def test_results_page_and_points_stand_in_one_folder(sweep, workplace):
 
 
 def test_a_design_for_indices_has_them_on_its_page(sweep, workplace):
-    done = sweep(
-        "--vary", "sheet.thickness=0.01:0.02", "--vary", "sheet.density=1:2", "--samples", "8",
-        "--method", "saltelli", "--measure", "frequency[1]", "--processes", "1",
-    )  # fmt: skip
+    vary = "--vary sheet.thickness=0.01:0.02 --vary sheet.density=1:2 --samples 8"
+    done = sweep(f"{vary} --method saltelli --measure frequency[1] --processes 1")
     assert done.status == 0, done.err
     page = (workplace.folder / "case-sweep" / "report.html").read_text("utf-8")
     assert "with interactions" in page
@@ -58,8 +56,7 @@ def test_a_design_for_indices_has_them_on_its_page(sweep, workplace):
 
 
 def test_failed_points_are_told(sweep, workplace):
-    vary = ("--vary", "pattern.dihedral=90,500")
-    done = sweep(*vary, "--measure", "frequencies", "--processes", "1")
+    done = sweep("--vary pattern.dihedral=90,500 --measure frequencies --processes 1")
     assert done.status == 0
     said = "values are missing at 1 of 2 points:\n  1 of them: pattern: miura: dihedral = 500"
     assert said in done.out
@@ -68,8 +65,7 @@ def test_failed_points_are_told(sweep, workplace):
 
 
 def test_a_sweep_of_which_all_points_fail_fails(sweep):
-    done = sweep("--vary", "pattern.dihedral=400,500", "--measure", "frequencies",
-                 "--processes", "1")  # fmt: skip
+    done = sweep("--vary pattern.dihedral=400,500 --measure frequencies --processes 1")
     assert done.status == 1
     assert "all 2 points failed, the first with: pattern: miura: dihedral = 400" in done.err
     assert "sweep.nc" in done.err
@@ -77,7 +73,7 @@ def test_a_sweep_of_which_all_points_fail_fails(sweep):
 
 def test_the_table_and_the_command_line(sweep, workplace):
     table = '[sweep]\nmeasures = ["frequencies"]\n[sweep.vary]\n"sheet.thickness" = [0.01]\n'
-    assert sweep("--processes", "1", "--no-figures", text=MODES_TEXT + table).status == 0
+    assert sweep("--processes 1 --no-figures", text=MODES_TEXT + table).status == 0
     found = fd.load(workplace.folder / "case-sweep" / "sweep.nc")
     assert found["thickness"].values.tolist() == [0.01]
     done = workplace.call("run", "case.toml", "--no-figures")  # as if it were not there
@@ -87,20 +83,20 @@ def test_the_table_and_the_command_line(sweep, workplace):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "vary: missing"),
-        (("--vary", "sheet.thickness"), "write KEY=..."),
-        ((*THICK, *THICK, "--measure", "frequencies"), "sheet.thickness is named twice"),
-        ((*THICK,), "measures: none"),
-        ((*THICK, "--measure", "frequency"), "write frequency[mode]"),
-        ((*THICK, "--measure", "mine.py:tip"), "cannot be imported"),
-        (("--vary", "sheet.thicknes=1", "--measure", "frequencies"), "did you mean 'thickness'?"),
-        ((*THICK, "--measure", "frequencies", "--processes", "0"), "processes = 0"),
-        ((*THICK, "--measure", "frequencies", "--tie", "a"), '--tie "a": write KEY=...'),
-        ((*THICK, "--measure", "limit_load"), 'is for analysis.kind = "statics"'),
+        ("", "vary: missing"),
+        ("--vary sheet.thickness", "write KEY=..."),
+        (f"{THICK} {THICK} --measure frequencies", "sheet.thickness is named twice"),
+        (THICK, "measures: none"),
+        (f"{THICK} --measure frequency", "write frequency[mode]"),
+        (f"{THICK} --measure mine.py:tip", "cannot be imported"),
+        ("--vary sheet.thicknes=1 --measure frequencies", "did you mean 'thickness'?"),
+        (f"{THICK} --measure frequencies --processes 0", "processes = 0"),
+        (f"{THICK} --measure frequencies --tie a", '--tie "a": write KEY=...'),
+        (f"{THICK} --measure limit_load", 'is for analysis.kind = "statics"'),
     ],
 )
 def test_bad_input_leaves_nothing(sweep, arguments, message):
-    done = sweep(*arguments)
+    done = sweep(arguments)
     assert (done.status, done.new) == (2, [])
     assert message in done.err
 
@@ -108,7 +104,7 @@ def test_bad_input_leaves_nothing(sweep, arguments, message):
 def test_own_code_is_never_named_by_a_case_file(sweep, workplace):
     table = '[sweep]\nmeasures = ["mine.py:tip"]\n[sweep.vary]\n"sheet.thickness" = [0.01]\n'
     workplace.write("raise SystemExit(9)\n", "mine.py")
-    done = sweep(text=MODES_TEXT + table)
+    done = sweep("", text=MODES_TEXT + table)
     assert done.status == 2
     assert "measures[0]" in done.err
 

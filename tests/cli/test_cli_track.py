@@ -12,32 +12,19 @@ import pytest
 import xarray as xr
 
 import foldyn as fd
+from case_texts import HELD_MIURA_TEXT, changed
 from foldyn.cli.main import main
 from foldyn.experiment.tracking.tracks_page import filled
 from foldyn.structures.discretize import PER_NODE
 
 cv2 = pytest.importorskip("cv2")
 
-CASE = """
-[pattern]
-kind = "miura"
-cells = [2, 2]
-a = 0.025
-b = 0.025
-panel_angle = 60
-dihedral = 75
-[sheet]
-youngs_modulus = 1.2e9
-poissons_ratio = 0.2
-thickness = 0.24e-3
-density = 667.0
-[[supports]]
-nodes = [20, 22, 24]
-axes = "xyz"
-[analysis]
-kind = "dynamics"
-duration = 0.1
-"""
+CASE = changed(
+    HELD_MIURA_TEXT,
+    "pattern.cells = [2, 2]; pattern.a = 0.025; pattern.b = 0.025; pattern.dihedral = 75; "
+    "sheet = { youngs_modulus = 1.2e9, poissons_ratio = 0.2, thickness = 0.24e-3, density = 667 }; "
+    'supports[0].nodes = [20, 22, 24]; analysis = { kind = "dynamics", duration = 0.1 }',
+)
 
 
 @pytest.fixture(scope="module")
@@ -71,10 +58,8 @@ def inside(folder, monkeypatch):
 
 
 def test_a_film_becomes_histories(inside, capsys):
-    assert (
-        main(["track", "film.mkv", "--model", "case.toml", "--out", "a/run.nc", "--figures", "png"])
-        == 0
-    )
+    command = "track film.mkv --model case.toml --out a/run.nc --figures png"
+    assert main(command.split()) == 0
     said = capsys.readouterr().out
     assert "nodes recognized" in said and "wrote a/run.nc" in said
     tracks = fd.experiment.load_tracks("a/run.nc")
@@ -116,12 +101,8 @@ def test_gaps_of_tracks_are_filled_for_the_picture():
     moved = np.full((3, 4, 3), np.nan)
     moved[:, 0, :2] = [[0.0, 0.0], [np.nan, np.nan], [2.0, 4.0]]
     moved[:, 3, :2] = 3.0
-    tracks = xr.Dataset(
-        {
-            "displacement": (("time", "node", "axis"), moved),
-            "edges": (("edge", "end"), [[0, 1], [1, 2], [2, 3]]),
-        }
-    )
+    edges = (("edge", "end"), [[0, 1], [1, 2], [2, 3]])
+    tracks = xr.Dataset({"displacement": (("time", "node", "axis"), moved), "edges": edges})
     found = filled(tracks)
     assert found[1, 0].tolist() == [1.0, 2.0, 0.0]
     np.testing.assert_allclose(found[:, 1, 0], [1.0, 5.0 / 3.0, 7.0 / 3.0], rtol=1e-6)
@@ -140,33 +121,34 @@ def test_without_a_model_there_are_pixels(inside):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["photo0.png"], "one photograph alone"),
-        (["photo0.png", "photo3.png"], "--model: photographs need one"),
-        (["film.mkv", "photo0.png"], "not both"),
-        (["film.mkv", "film.mkv"], "one film at a time"),
-        (["missing.mp4"], "no such file"),
-        (["case.toml"], "codec is unknown"),
-        (["film.mkv", "--scale", "0"], "--scale = 0.0: must be greater than 0"),
-        (["film.mkv", "--scale", "wide"], "give numbers"),
-        (["film.mkv", "--scale", "1", "--reference", "0,0,1,1,1"], "give one or the other"),
-        (["film.mkv", "--reference", "0,0,1,1"], "4 numbers; 5 are needed"),
-        (["film.mkv", "--roi", "0,0,9999,10"], "--roi 0,0,9999,10: must lie in the image"),
-        (["film.mkv", "--roi", "0,0,60,60"], "no corners"),
-        (["film.mkv", "--nodes", "1"], "--nodes"),
-        (["film.mkv", "--loads", "1"], "--loads"),
-        (["film.mkv", "--out", "tracks.csv"], "ends in .nc"),
-        (["film.mkv", "--model", "nothing.toml"], "no such file"),
-        (["film.mkv", "--up=z"], "same axis"),
+        ("photo0.png", "one photograph alone"),
+        ("photo0.png photo3.png", "--model: photographs need one"),
+        ("film.mkv photo0.png", "not both"),
+        ("film.mkv film.mkv", "one film at a time"),
+        ("missing.mp4", "no such file"),
+        ("case.toml", "codec is unknown"),
+        ("film.mkv --scale 0", "--scale = 0.0: must be greater than 0"),
+        ("film.mkv --scale wide", "give numbers"),
+        ("film.mkv --scale 1 --reference 0,0,1,1,1", "give one or the other"),
+        ("film.mkv --reference 0,0,1,1", "4 numbers; 5 are needed"),
+        ("film.mkv --roi 0,0,9999,10", "--roi 0,0,9999,10: must lie in the image"),
+        ("film.mkv --roi 0,0,60,60", "no corners"),
+        ("film.mkv --nodes 1", "--nodes"),
+        ("film.mkv --loads 1", "--loads"),
+        ("film.mkv --out tracks.csv", "ends in .nc"),
+        ("film.mkv --model nothing.toml", "no such file"),
+        ("film.mkv --up=z", "same axis"),
     ],
 )
 def test_bad_input_gets_one_message_and_nothing_written(inside, capsys, arguments, message):
     before = sorted(inside.rglob("*"))
-    given = arguments if "--out" in arguments else [*arguments, "--out", "never/bad.nc"]
+    given = arguments.split()
+    if "--out" not in given:
+        given += ["--out", "never/bad.nc"]
     assert main(["track", *given]) == 2
     said = capsys.readouterr()
     assert message in said.err
-    assert len(said.err.strip().splitlines()) == 1
-    assert said.out == ""
+    assert (len(said.err.strip().splitlines()), said.out) == (1, "")
     assert sorted(inside.rglob("*")) == before
 
 

@@ -15,9 +15,8 @@ from processes import ended, start
 import foldyn as fd
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="streams and names of POSIX")
-FEW = ("every = 0.01", "every = 0.02")
 ODD = b"f\xffall"
-TITLE = ('title = "a Miura unit cell"', 'title = "F\u00e4lle \u6298 $x^{$"')
+ODD_TITLE = 'output.every = 0.02; title = "F\u00e4lle \u6298 $x^{$"'
 
 
 def result_of(folder: bytes) -> int:
@@ -34,13 +33,11 @@ def close_streams() -> None:
 def test_all_that_is_odd_at_once(tmp_path, edited) -> None:
     """Letters that the terminal lacks, names that are no UTF-8, no HOME, a backend that is none."""
     file = os.fsencode(tmp_path) + b"/" + ODD + b".toml"
-    Path(os.fsdecode(file)).write_text(edited(FEW, TITLE), encoding="utf-8")
+    Path(os.fsdecode(file)).write_text(edited(ODD_TITLE), encoding="utf-8")
     odd = {"PYTHONIOENCODING": "ascii", "HOME": None, "MPLBACKEND": "bogus", "TMPDIR": "/nowhere"}
-    odd["LC_ALL"] = "xx_YY.none"
-    run = start(
-        tmp_path, "run", ODD + b".toml", "--out", b"o/" + ODD, "--figures", "png", changes=odd
-    )
-    status, out, err = ended(run)
+    odd |= {"LC_ALL": "xx_YY.none", "PYTHONUTF8": "0", "MPLCONFIGDIR": "/proc/none"}
+    command = ("run", ODD + b".toml", "--out", b"o/" + ODD, "--figures", "png")
+    status, out, err = ended(start(tmp_path, *command, changes=odd))
     assert status == 0, err
     assert "F\\xe4lle \\u6298 $x^{$: 13 nodes" in out
     assert "wrote o/f\\udcffall/result.nc\n" in out
@@ -83,27 +80,3 @@ def test_a_working_folder_that_is_gone(tmp_path, miura) -> None:
     status, _, err = ended(nowhere)
     assert status == 2
     assert err.startswith("foldyn: results folder case-results: cannot be written (No such file")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("changes", "how"),
-    [
-        ({"PYTHONIOENCODING": "ascii"}, {}),
-        ({"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}, {}),
-        ({"LC_ALL": "xx_YY.none"}, {}),
-        ({"MPLBACKEND": "bogus"}, {}),
-        ({"HOME": None}, {}),
-        ({"MPLCONFIGDIR": "/proc/none", "TMPDIR": "/nowhere"}, {}),
-        ({}, {"preexec_fn": lambda: os.close(1)}),
-        ({}, {"preexec_fn": lambda: os.close(2)}),
-    ],
-    ids=str,
-)
-def test_one_by_one(tmp_path, edited, changes, how) -> None:
-    (tmp_path / "case.toml").write_text(edited(FEW, TITLE), encoding="utf-8")
-    status, _, err = ended(start(tmp_path, "run", "case.toml", changes=changes, **how))
-    assert status == 0, err
-    assert (tmp_path / "case-results" / "report.html").exists()
-    bad = start(tmp_path, "run", "none.toml", changes=changes, **how)
-    assert ended(bad)[0] == 2

@@ -112,16 +112,21 @@ def _rename(random: Random, file: h5py.File, name: str) -> None:
 
 def _replace(random: Random, file: h5py.File, name: str) -> None:
     """Other numbers, types and shapes under a name."""
-    known = dict(file[name].attrs)
-    scales = known.pop("DIMENSION_LIST", None) if random.random() < 0.3 else None
+    left = ("DIMENSION_LIST", "REFERENCE_LIST")[: random.choice((1, 2, 2))]
     shape = file[name].shape if isinstance(file[name], h5py.Dataset) else ()
     shape = random.choice((shape, shape, shape, (), (0,), (1,), (3,), (*shape, 2), shape[:-1]))
     if np.prod(shape, dtype=float) > 10_000:
         shape = (3,)
+    _put(file, name, left, data=_values(random, shape))
+
+
+def _put(file: h5py.File, name: str, left: Sequence[str] = (), **made: Any) -> None:
+    """Make a variable anew; attributes stay but for those that are left out."""
+    known = dict(file[name].attrs)
     del file[name]
-    file.create_dataset(name, data=_values(random, shape))
+    file.create_dataset(name, **made)
     for key, value in known.items():
-        if key not in ("DIMENSION_LIST", "REFERENCE_LIST") or (scales is not None):
+        if key not in left:
             _set(file[name], key, value)
 
 
@@ -163,11 +168,7 @@ def _text(random: Random, file: h5py.File, name: str) -> None:
     if not isinstance(text, bytes):
         return
     text = mutate(random, text, [text], WORDS_OF_CASES).replace(b"\0", b"")
-    known = dict(file["case"].attrs)
-    del file["case"]
-    file.create_dataset("case", data=text.decode("utf-8", "replace"), dtype=h5py.string_dtype())
-    for key, value in known.items():
-        _set(file["case"], key, value)
+    _put(file, "case", data=text.decode("utf-8", "replace"), dtype=h5py.string_dtype())
 
 
 def _attribute(random: Random, file: h5py.File, name: str) -> None:
@@ -193,15 +194,9 @@ def _set(holder: Any, key: str, value: Any) -> None:
 
 def _huge(random: Random, file: h5py.File, name: str) -> None:
     """A variable that is declared but was never written."""
-    known = dict(file[name].attrs)
-    del file[name]
     shape = random.choice(((3 * 10**9,), (50_000, 50_000), (2**40,), (10**6,), (4, 10**9, 3)))
-    chunks = random.choice((None, True))
-    file.create_dataset(
-        name, shape, random.choice(("f8", "i1", h5py.string_dtype())), chunks=chunks
-    )
-    for key, value in known.items():
-        _set(file[name], key, value)
+    kind = random.choice(("f8", "i1", h5py.string_dtype()))
+    _put(file, name, shape=shape, dtype=kind, chunks=random.choice((None, True)))
 
 
 def _other(random: Random, file: h5py.File, name: str) -> None:

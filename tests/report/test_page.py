@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import base64
+import io
 import re
 import struct
-import zlib
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from PIL import Image
 
 from foldyn.errors import InputError
 from foldyn.report import Heading, Picture, Table, Text, write_report
@@ -23,24 +25,18 @@ class _Page(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.open, self.images, self.links, self.anchors, self.rows = [], [], [], [], []
-        self.texts = {}
-        self.tags = []
+        self.open, self.rows, self.texts, self.tags = [], [], {}, []
         self.feed(text)
         self.close()
         assert self.open == []
+        self.images = [attrs for tag, attrs in self.tags if tag == "img"]
+        self.links = [attrs["href"] for tag, attrs in self.tags if tag == "a"]
+        self.anchors = [attrs["id"] for _, attrs in self.tags if "id" in attrs]
 
     def handle_starttag(self, tag, attrs):
-        attrs = dict(attrs)
-        self.tags.append((tag, attrs))
+        self.tags.append((tag, dict(attrs)))
         if tag not in _VOID:
             self.open.append(tag)
-        if tag == "img":
-            self.images.append(attrs)
-        if tag == "a":
-            self.links.append(attrs["href"])
-        if "id" in attrs:
-            self.anchors.append(attrs["id"])
         if tag == "tr":
             self.rows.append([])
         if tag in ("td", "th"):
@@ -57,14 +53,9 @@ class _Page(HTMLParser):
 
 
 def _png(width=2, height=2):
-    def chunk(kind, data):
-        body = kind + data
-        return struct.pack(">I", len(data)) + body + struct.pack(">I", zlib.crc32(body))
-
-    rows = b"".join(b"\0" + b"\x40" * width for _ in range(height))
-    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    parts = (b"IHDR", header), (b"IDAT", zlib.compress(rows)), (b"IEND", b"")
-    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts)
+    file = io.BytesIO()
+    Image.new("L", (width, height), 64).save(file, "PNG")
+    return file.getvalue()
 
 
 def _write(tmp_path, *sections, title="Report"):
@@ -75,11 +66,8 @@ def _write(tmp_path, *sections, title="Report"):
 def test_pictures_are_inside_and_unchanged(tmp_path):
     png, gif = _png(), b"GIF89a" + bytes(20)
     (tmp_path / "a.png").write_bytes(png)
-    page = _write(
-        tmp_path,
-        Picture(tmp_path / "a.png", caption="A sheet", alt="gray square"),
-        Picture(gif, caption="It moves"),
-    )
+    sheet = Picture(tmp_path / "a.png", caption="A sheet", alt="gray square")
+    page = _write(tmp_path, sheet, Picture(gif, caption="It moves"))
     first, second = page.images
     assert first["src"] == "data:image/png;base64," + base64.b64encode(png).decode()
     assert first["alt"] == "gray square"
@@ -111,10 +99,7 @@ def test_wide_pictures_are_scrolled_on_a_phone(tmp_path):
 
 
 def test_figures_are_drawn_as_png(tmp_path):
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(2, 1), dpi=50)
-    page = _write(tmp_path, Picture(figure))
+    page = _write(tmp_path, Picture(Figure(figsize=(2, 1), dpi=50)))
     data = base64.b64decode(page.images[0]["src"].split(",")[1])
     assert struct.unpack(">II", data[16:24]) == (100, 50)
 
@@ -132,19 +117,15 @@ def test_page_refers_to_nothing_outside(tmp_path):
 
 
 def test_table_cells(tmp_path):
-    table = Table(
-        header=["rule", "error (-)", "steps", "holds"],
-        rows=[
-            ["centroid", 0.062034567, 1000, True],
-            ["panel", np.float64(1.25), np.int64(7), np.bool_(False)],
-            ["none", None, None, None],
-        ],
-        caption="Errors",
-        digits=3,
-    )
-    page = _write(tmp_path, table)
+    header = ["rule", "error (-)", "steps", "holds"]
+    rows = [
+        ["centroid", 0.062034567, 1000, True],
+        ["panel", np.float64(1.25), np.int64(7), np.bool_(False)],
+        ["none", None, None, None],
+    ]
+    page = _write(tmp_path, Table(header, rows, caption="Errors", digits=3))
     assert page.rows == [
-        ["rule", "error (-)", "steps", "holds"],
+        header,
         ["centroid", "0.062", "1000", "yes"],
         ["panel", "1.25", "7", "no"],
         ["none", "", "", ""],
@@ -203,14 +184,8 @@ def test_exponents_are_for_numbers_far_from_one(value, text):
 
 def test_everything_is_escaped(tmp_path):
     bad = '<script>alert("x")</script> & more'
-    page = _write(
-        tmp_path,
-        Heading(bad),
-        Text(bad),
-        Table([bad], [[bad]], caption=bad),
-        Picture(_png(), caption=bad),
-        title=bad,
-    )
+    table, picture = Table([bad], [[bad]], caption=bad), Picture(_png(), caption=bad)
+    page = _write(tmp_path, Heading(bad), Text(bad), table, picture, title=bad)
     assert [tag for tag, _ in page.tags].count("script") == 1  # that of tables
     assert page.rows == [[bad], [bad]]
     assert page.images[0]["alt"] == bad

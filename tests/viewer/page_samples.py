@@ -31,13 +31,12 @@ def case(loaded=True, **options):
 
 @cache
 def results(kind):
+    rules = ("circumcenter", "panel")
     if kind == "motion":
-        rules = ("circumcenter", "panel")
         return {rule: fd.simulate(case(mass=rule), 3.0, every=0.01) for rule in rules}
     if kind == "path":
         return {"fold": fd.trace(case(), load_factors=[0.5, 1.0, 1.5, 2.0])}
     if kind == "modes":
-        rules = ("circumcenter", "panel")
         return {rule: fd.modes(case(loaded=False, mass=rule), 4) for rule in rules}
     drive = [fd.Force([0, 1], (-1.0, 0.0, 0.0))]
     frequencies = [0.2 * k for k in range(1, 40)]
@@ -64,3 +63,8 @@ def film():
         pictures[moment] = found.getvalue()
     nodes = case().structure.nodes
     return Backdrop(pictures, (640, 480), projection(nodes, camera().project(nodes)))
+
+
+def evaluate(tab, code):
+    """What a script gives in a page, which it calls p."""
+    return tab.evaluate(f"(() => {{ const p = {PAGE}; {code} }})()")

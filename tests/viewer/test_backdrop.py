@@ -21,15 +21,8 @@ def seen(matrix, points):
 
 @pytest.mark.parametrize("distance", [0.5, 3.0, np.inf])
 def test_the_camera_of_a_tracked_film_comes_back(distance):
-    rotation = camera().rotation
-    view = View(
-        rotation,
-        np.full(3, 0.5),
-        np.array([310.0, 200.0]),
-        2e-3,
-        distance,
-        np.array([320.0, 240.0]),
-    )
+    at, center = np.array([310.0, 200.0]), np.array([320.0, 240.0])
+    view = View(camera().rotation, np.full(3, 0.5), at, 2e-3, distance, center)
     others = np.random.default_rng(3).uniform(0.0, 1.0, (5, 3))
     matrix = projection(POINTS, view.project(POINTS))
     assert np.abs(seen(matrix, others) - view.project(others)).max() < 1e-6
@@ -49,13 +42,17 @@ def test_points_that_leave_the_camera_open_are_refused():
         projection(POINTS[:5], camera().project(POINTS[:5]))
 
 
-def test_other_pictures_and_matrices_are_refused():
-    with pytest.raises(InputError, match="neither JPEG nor PNG"):
-        Backdrop({0.0: b"GIF89a"}, (8, 8), np.eye(3, 4))
-    with pytest.raises(InputError, match="none; give at least one photograph"):
-        Backdrop({}, (8, 8), np.eye(3, 4))
-    with pytest.raises(InputError, match=r"of shape \(3, 3\)"):
-        Backdrop({0.0: PNG}, (8, 8), np.eye(3))
+@pytest.mark.parametrize(
+    ("pictures", "columns", "message"),
+    [
+        ({0.0: b"GIF89a"}, 4, "neither JPEG nor PNG"),
+        ({}, 4, "none; give at least one photograph"),
+        ({0.0: PNG}, 3, r"of shape \(3, 3\)"),
+    ],
+)
+def test_other_pictures_and_matrices_are_refused(pictures, columns, message):
+    with pytest.raises(InputError, match=message):
+        Backdrop(pictures, (8, 8), np.eye(3, columns))
 
 
 def test_pictures_come_in_the_order_of_their_moments():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from page_samples import KINDS, PAGE, PAINTERS, case, results
+from page_samples import KINDS, PAGE, PAINTERS, case, evaluate, results
 
 
 @pytest.mark.parametrize("painter", PAINTERS)
@@ -18,13 +18,13 @@ def test_opens_alone_and_draws(opened, kind, painter):
     tab.wait_for_timeout(200)
     assert tab.errors == []
     assert [url for url in tab.asked if not url.startswith(("file:", "data:", "blob:"))] == []
-    drawn = tab.evaluate(
-        f"""(() => {{ const p = {PAGE}; p.play(false); p.draw();
-        const c = document.createElement('canvas');
+    drawn = evaluate(
+        tab,
+        """p.play(false); p.draw(); const c = document.createElement('canvas');
         c.width = p.view.canvas.width; c.height = p.view.canvas.height;
         const x = c.getContext('2d'); x.drawImage(p.view.canvas, 0, 0);
-        return new Set(new Uint32Array(x.getImageData(0, 0, c.width, c.height).data.buffer)).size
-        }})()"""
+        const pixels = x.getImageData(0, 0, c.width, c.height).data.buffer;
+        return new Set(new Uint32Array(pixels)).size""",
     )
     assert drawn > 5  # paper in several shades, lines
 
@@ -40,13 +40,10 @@ def test_fits_the_window(opened, kind, width):
 def test_positions_are_those_of_the_result(opened, painter):
     tab = opened("motion", painter=painter)
     result = results("motion")["panel"]
+    nodes = case().structure.nodes
     for sample in (0, 57, 211):
-        got = tab.evaluate(
-            f"""(() => {{ const p = {PAGE}; p.play(false);
-            p.moment = {float(result["time"][sample])!r}; p.draw();
-            return Array.from(p.results[1].positions) }})()"""
-        )
-        nodes = case().structure.nodes
+        moment = f"p.play(false); p.moment = {float(result['time'][sample])!r}; p.draw(); "
+        got = evaluate(tab, moment + "return Array.from(p.results[1].positions)")
         wanted = nodes + result["displacement"].values[sample]
         assert np.abs(np.reshape(got, (-1, 3)) - wanted).max() < 1e-4 * np.ptp(nodes, axis=0).max()
 
@@ -56,14 +53,9 @@ def test_colors_are_levels_of_the_values(opened):
     tab.select_option(".field", "displacement")
     result = results("motion")["circumcenter"]
     sizes = np.linalg.norm(result["displacement"].values, axis=2)
-    top = max(
-        float(np.linalg.norm(r["displacement"], axis=2).max()) for r in results("motion").values()
-    )
-    got = tab.evaluate(
-        f"""(() => {{ const p = {PAGE}; p.play(false);
-        p.moment = {float(result["time"][120])!r}; p.draw();
-        return Array.from(p.results[0].shown.levels) }})()"""
-    )
+    top = max(np.linalg.norm(r["displacement"], axis=2).max() for r in results("motion").values())
+    moment = f"p.play(false); p.moment = {float(result['time'][120])!r}; p.draw(); "
+    got = evaluate(tab, moment + "return Array.from(p.results[0].shown.levels)")
     assert np.abs(np.array(got) - sizes[120] / top).max() < 2e-3
     assert "displacement" in tab.inner_text(".legend")
 
@@ -81,10 +73,10 @@ def test_plays_scrubs_and_picks_by_keys_and_mouse(opened):
     tab.focus("canvas.over")
     tab.keyboard.press("ArrowRight")
     assert tab.evaluate(f"{PAGE}.camera.azimuth") == before + 5
-    x, y = tab.evaluate(
-        f"""(() => {{ const p = {PAGE}; p.draw(); const v = p.view.views()[0];
-        const at = p.camera.projector(v); const n = p.results[0].positions.subarray(9, 12);
-        return at(...n, [0, 0, 0]).slice(0, 2) }})()"""
+    x, y = evaluate(
+        tab,
+        """p.draw(); const at = p.camera.projector(p.view.views()[0]);
+        return at(...p.results[0].positions.subarray(9, 12), [0, 0, 0]).slice(0, 2)""",
     )
     tab.click("canvas.over", position={"x": x, "y": y})
     assert tab.evaluate(f"{PAGE}.node") == 3
@@ -96,10 +88,8 @@ def test_plays_scrubs_and_picks_by_keys_and_mouse(opened):
 
 def test_the_spectrum_has_the_peak_of_the_motion(opened):
     tab = opened("motion")
-    frequency, amplitude = tab.evaluate(
-        f"(() => {{ const c = {PAGE}.plots[1].curves[0];"
-        "return [Array.from(c.x), Array.from(c.y)] })()"
-    )
+    curve = "const c = p.plots[1].curves[0]; return [Array.from(c.x), Array.from(c.y)]"
+    frequency, amplitude = evaluate(tab, curve)
     result = results("motion")["circumcenter"]
     axis = tab.evaluate(f"{PAGE}.axis")
     values = result["displacement"].values[:, 0, axis]

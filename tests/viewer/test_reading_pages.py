@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import csv
+import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
 import pytest
-from page_samples import ALL, PAGE, PAINTERS, camera, case, results
+from page_samples import ALL, PAINTERS, camera, case, evaluate, results
 
 SVG = "{http://www.w3.org/2000/svg}"
-
-
-def evaluate(tab, code):
-    return tab.evaluate(f"(() => {{ const p = {PAGE}; {code} }})()")
 
 
 def saved(tab, button):
@@ -31,12 +28,8 @@ def test_an_accessibility_checker_finds_nothing_serious(opened, kind, scheme):
     tab = opened(kind, bypass_csp=True, color_scheme=scheme, reduced_motion="reduce")
     response = checker.Axe().run(tab).response
     assert {"button-name", "color-contrast"} <= {each["id"] for each in response["passes"]}
-    serious = [
-        (each["id"], [node["target"] for node in each["nodes"]])
-        for each in response["violations"]
-        if each["impact"] in ("serious", "critical")
-    ]
-    assert serious == []
+    grave = ("serious", "critical")
+    assert [each for each in response["violations"] if each["impact"] in grave] == []
 
 
 @pytest.mark.parametrize("kind", ALL)
@@ -51,12 +44,9 @@ def test_tab_reaches_every_control(opened, kind):
     for _ in range(wanted):
         tab.keyboard.press("Tab")
         evaluate(tab, "window.reached.add(document.activeElement); return 0")
-    outlined = "getComputedStyle(document.activeElement).outlineStyle"
-    assert (
-        evaluate(tab, "return [...window.reached].filter((e) => p.root.contains(e)).length")
-        == wanted
-    )
-    assert tab.evaluate(outlined) != "none"
+    reached = "return [...window.reached].filter((e) => p.root.contains(e)).length"
+    assert evaluate(tab, reached) == wanted
+    assert tab.evaluate("getComputedStyle(document.activeElement).outlineStyle") != "none"
 
 
 def test_a_motion_by_keys_alone(opened):
@@ -134,10 +124,8 @@ def test_the_matrix_of_modes_shows_pairs_of_shapes(opened):
     tab.keyboard.press("Enter")
     assert evaluate(tab, "return p.shown.map(({ name }) => name)") == ["circumcenter 2", "panel 2"]
     assert tab.evaluate("document.activeElement.dataset.key") == "mac 1 5"
-    assert (
-        tab.evaluate("document.activeElement.textContent")
-        == f"{evaluate(tab, 'return p.about.mac[1][5]'):.2f}"
-    )
+    told = tab.evaluate("document.activeElement.textContent")
+    assert told == f"{evaluate(tab, 'return p.about.mac[1][5]'):.2f}"
 
 
 @pytest.mark.parametrize("painter", PAINTERS)
@@ -179,26 +167,11 @@ def test_a_vector_picture_has_the_lines_and_the_legend(opened):
     texts = ["".join(each.itertext()) for each in root.iter(f"{SVG}text")]
     assert {"node 0", "mountain crease"} <= set(texts)
     assert any(text.startswith("displacement (") for text in texts)
-    paths = (
-        " ".join(each.get("d") for each in root.iter(f"{SVG}path"))
-        .replace("M", " ")
-        .replace("L", " ")
-    )
-    numbers = [
-        float(word) for word in paths.replace("Z", " ").replace("a", " ").split() if is_number(word)
-    ]
-    points = np.array(numbers[: len(numbers) // 2 * 2]).reshape(-1, 2)
+    paths = " ".join(each.get("d") for each in root.iter(f"{SVG}path"))
+    points = np.array(re.findall(r"[ML](-?[\d.]+) (-?[\d.]+)", paths), float)
     for x, y, _ in ends:
         assert np.hypot(*(points - [x, y]).T).min() < 0.1
     assert root.find(f".//{SVG}linearGradient[@gradientUnits]") is not None
-
-
-def is_number(word):
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def test_the_table_has_what_is_drawn(opened):
@@ -206,9 +179,8 @@ def test_the_table_has_what_is_drawn(opened):
     before = next(csv.reader(saved(tab, ".save-curves").splitlines()))
     tab.locator(".keys button", has_text="work").click()
     after = next(csv.reader(saved(tab, ".save-curves").splitlines()))
-    assert [head for head in before if head not in after] == [
-        next(h for h in before if h.endswith("work"))
-    ]
+    (gone,) = (head for head in before if head not in after)
+    assert gone.endswith("work")
     assert len(before) == len(after) + 2
 
 
@@ -217,6 +189,5 @@ def test_energies_of_each_result_can_be_seen(opened):
     tab.select_option(".told select", "panel")
     found = evaluate(tab, "return p.plots.at(-1).curves[0].y[30]")
     wanted = results("motion")["panel"]["kinetic"].values[30]
-    assert found > 0 and np.isclose(
-        found / wanted, 10 ** round(np.log10(found / wanted)), rtol=1e-4
-    )
+    ratio = found / wanted  # of units: a power of ten
+    assert found > 0 and np.isclose(ratio, 10 ** round(np.log10(ratio)), rtol=1e-4)

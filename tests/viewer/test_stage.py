@@ -21,6 +21,8 @@ from foldyn.viewer import stage
 from foldyn.viewer.sheet import KINDS, edge_pieces
 from foldyn.viewer.stage import OF_SIZE
 
+CORNERS, TRIANGLES = [(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)]
+
 
 def staged(kind):
     shown = results(kind)
@@ -38,24 +40,14 @@ def test_positions_are_those_of_the_result(kind):
         assert about["name"] == name
         assert np.abs(u - true).max() <= OF_SIZE * size
     sheet = part.about["sheets"][part.about["results"][0]["sheet"]]
-    assert np.array_equal(
-        decoded(part.arrays, sheet["nodes"]), case_nodes(cases).astype(np.float32)
-    )
-
-
-def case_nodes(cases):
-    return next(iter(cases.values())).structure.nodes
+    nodes = next(iter(cases.values())).structure.nodes.astype(np.float32)
+    assert np.array_equal(decoded(part.arrays, sheet["nodes"]), nodes)
 
 
 def test_large_sheets_have_values_of_panels_alone(monkeypatch):
     monkeypatch.setattr(import_module("foldyn.viewer.stage"), "MOST_LINES", 0)
     part, _, _ = staged("motion")
     assert [field["on"] for field in part.about["results"][0]["fields"].values()] == ["panel"]
-
-
-def test_results_of_one_pattern_share_their_sheet_only_if_it_is_the_same():
-    part, _, _ = staged("motion")
-    assert {about["sheet"] for about in part.about["results"]} <= set(part.about["sheets"])
 
 
 def test_strains_and_moments_are_those_of_the_structure():
@@ -80,28 +72,30 @@ def test_a_response_holds_its_real_and_imaginary_parts():
     assert np.abs(values[:, 0] + 1j * values[:, 1] - true).max() < 2e-4 * np.abs(true).max()
 
 
-def test_modes_say_what_they_do():
+def test_modes_say_what_they_do_and_how_alike_they_are():
     part, shown, _ = staged("modes")
     frequencies = [about["frequency"] for about in part.about["results"]]
     wanted = np.concatenate([modes["frequency"].values for modes in shown.values()])
     assert np.array_equal(frequencies, wanted)
     assert all(about["what"] for about in part.about["results"])
 
-
-def test_likeness_of_modes_is_their_mac():
-    part, shown, _ = staged("modes")
     first, second = (modes["shape"].values[:, :6] for modes in shown.values())
     found = np.array(part.about["mac"])
     assert np.abs(found[:4, 4:] - fd.mac(first, second)).max() < 1e-3
     assert np.array_equal(np.diag(found), np.ones(8))
 
 
+def scripted(text):
+    """Data of a page that are written as scripts."""
+    found = re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', text)
+    assert "<" not in "".join(found)
+    return [json.loads(one) for one in found]
+
+
 def test_pages_name_all_their_arrays_and_let_nothing_in(tmp_path):
     for kind in ("motion", "path", "modes", "response"):
         text = page(kind, tmp_path).read_text("utf-8")
-        about = json.loads(
-            re.search(r'<script type="application/json"[^>]*>(.*)</script>', text)[1]
-        )
+        (about,) = scripted(text)
         held = set(re.findall(r'data-array="stage-1\.([^"]+)"', text))
         assert held == set(about["arrays"])
         policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', text)[1]
@@ -123,15 +117,15 @@ def test_kinds_of_edges_are_those_of_the_script_and_of_figures():
 
 
 def test_welds_are_not_drawn():
-    square = fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)])
-    made = fd.discretize(fd.welded(square, join=False), fd.Sheet(1e9, 0.3, 1e-3, 700.0))
+    square = fd.welded(fd.Pattern(CORNERS, TRIANGLES), join=False)
+    made = fd.discretize(square, fd.Sheet(1e9, 0.3, 1e-3, 700.0))
     pairs, kind, _, _ = edge_pieces(made.pattern, made.nodes, made.edge_nodes)
     assert len(pairs) == len(kind) == len(made.pattern.boundary)
 
 
 def test_a_folding_is_shown_without_a_case():
     """Its geometry alone: no moments, as there is no sheet."""
-    flat = fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)], ["M"])
+    flat = fd.Pattern(CORNERS, TRIANGLES, ["M"])
     way = fd.fold(flat, 90, steps=4).path
     part = stage({"folding": way}, {}, "title", [1])
     (about,) = part.about["results"]
@@ -145,8 +139,7 @@ def test_a_folding_is_shown_without_a_case():
 
 
 def test_a_folding_may_begin_and_end_closed():
-    flat = fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)], ["V"])
-    shut = fd.fold(flat, 180, steps=2).pattern
+    shut = fd.fold(fd.Pattern(CORNERS, TRIANGLES, ["V"]), 180, steps=2).pattern
     way = fd.fold(shut, 90, steps=2).path
     (about,) = stage({"folding": way}, {}, "title", [1]).about["results"]
     assert about["fields"]["turn"]["on"] == "crease"
@@ -159,13 +152,9 @@ def test_no_title_can_end_a_script_element_or_open_a_comment_in_it():
     """After "<!--<script" a browser looks for two ends of the script."""
     result = next(iter(results("motion").values()))
     text = stage({BREAKING: result}, {BREAKING: fd.case_of(result)}, BREAKING, [0]).html()
-    (about,) = re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', text)
-    assert "<" not in about
-    assert json.loads(about)["title"] == BREAKING
+    assert [about["title"] for about in scripted(text)] == [BREAKING]
     live = live_page(BREAKING, {"name": BREAKING}, "key")
-    (about,) = re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', live)
-    assert "<" not in about
-    assert json.loads(about) == {"name": BREAKING, "key": "key"}
+    assert scripted(live) == [{"name": BREAKING, "key": "key"}]
     chart = Chart("x", "y", [Curve(BREAKING, [0.0, 1.0], [0.0, 1.0])], BREAKING, BREAKING).html()
     for whole in (live.partition("<main")[0], chart):
         assert "<!--" not in whole
