@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from frf_structures import chain, chain_matrices, largest_error, miura_case
@@ -14,7 +12,6 @@ import foldyn as fd
 from foldyn.algebra import complex_symmetric, superlu
 from foldyn.algebra.complex_symmetric import Gram
 from foldyn.linear.linearized import linearize
-from foldyn.signals import half_power
 
 F = np.linspace(0.1, 4.0, 60)
 K, M = chain_matrices()
@@ -93,15 +90,6 @@ def test_a_matrix_that_only_modal_damping_makes_regular(size, full, monkeypatch)
     if size > 1:  # what is damped is another direction
         other = complex_symmetric.solve(matrix, load, Gram(axes[:, 1:2].T), 0.1j)
         assert np.isnan(other).all()
-
-
-def test_half_power_of_the_peaks():
-    """The bandwidth of well separated peaks gives the ratios back."""
-    case, _ = damped("modal")
-    for value, ratio in zip(np.sqrt(VALUES) / (2 * np.pi), (0.02, 0.05), strict=True):
-        f = np.linspace(0.85 * value, 1.15 * value, 200)
-        found = fd.frf(case, fd.Force([1], (1, 0, 0)), f).receptance[:, 1, 0].values
-        assert half_power(f, np.abs(found)).damping_ratio == pytest.approx(ratio, rel=0.03)
 
 
 @pytest.mark.parametrize("method", ["direct", "modal"])
@@ -184,16 +172,3 @@ def test_modal_damping_fills_the_matrix_where_that_is_cheaper(count, method, mon
         matrix = matrix.toarray() + 1j * omega * (system.modal.T @ system.modal)
         exact = system.expanded(np.linalg.solve(matrix, load)[:, None])[:, 0]
         assert largest_error(found.receptance.values[k].ravel(), exact) < 1e-9
-
-
-@pytest.mark.parametrize("share", [0.05, 0.3, 1.0])
-def test_both_forms_of_modal_damping_give_one_response(share, monkeypatch):
-    plain = miura_case(beta=1e-4)
-    count = max(1, int(share * len(plain.free_dofs))) if share < 1.0 else None
-    case = replace(plain, damping=[plain.rayleigh, fd.ModalDamping(0.02, count)])
-    f = np.linspace(0.5, 3.0, 7) * float(fd.modes(plain, 1).frequency[0])
-    found = []
-    for full in (False, True):
-        monkeypatch.setattr(Gram, "fills", lambda self, matrix, full=full: full)
-        found.append(fd.frf(case, fd.Force([7], (0, 0, 1)), f).receptance.values)
-    assert largest_error(found[1], found[0]) < 1e-9

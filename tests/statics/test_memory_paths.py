@@ -70,15 +70,6 @@ def test_methods_with_a_free_factor_follow_the_law(method):
     assert float(path.dissipated[-1]) == pytest.approx(LIMIT * plastic, rel=1e-7)
 
 
-def test_the_work_of_closed_cycles_is_dissipated():
-    """The loop's area, by the corners of the parallelogram, in three cycles."""
-    path = cycled(KINEMATIC, [1.0, *[-1.0, 1.0] * 3])
-    top = np.flatnonzero(opened(path) > 0.3 - 1e-9)
-    lost = np.diff(path.dissipated.values[top])
-    area = 4.0 * LIMIT * (0.3 - LIMIT / STIFFNESS) / (1.0 + HARD / STIFFNESS)
-    np.testing.assert_allclose(lost, area, rtol=1e-6)
-
-
 def test_a_path_goes_on_from_a_stored_point():
     whole = cycled(KINEMATIC, [1.0, 0.0])
     case = one_hinge(KINEMATIC, [fd.Impose([WING], "z", np.tan(0.3))], hold=False)

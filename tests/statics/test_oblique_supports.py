@@ -105,6 +105,28 @@ def test_a_landscape_along_a_direction() -> None:
     np.testing.assert_allclose(heights, [0.0, truss.h, 2.0 * truss.h], atol=1e-9)
 
 
+@pytest.mark.parametrize("model", MODELS)
+def test_a_turned_fold_deforms_as_before(model) -> None:
+    """Both models, under forces and under an imposed displacement along a direction."""
+    pattern, load = fd.patterns.simple_fold(), np.array([-1e-3, 0.0, 0.0])
+    turned = fd.Pattern(pattern.vertices @ TURN.T, pattern.faces, pattern.assignments)
+    s, t = MODELS[model](pattern), MODELS[model](turned)
+    plain = [fd.Fix([4, 5]), fd.Fix([0, 1], "z")]
+    oblique = [fd.Fix([4, 5]), fd.Fix([0, 1], direction=TURN[:, 2])]
+    way = [-0.05, -0.06]
+    for one, other in (
+        (fd.Case(s, plain, [fd.Force([0, 1], load)]),
+         fd.Case(t, oblique, [fd.Force([0, 1], TURN @ load)])),
+        (fd.Case(s, [*plain, fd.Impose([0, 1], "x", way)]),
+         fd.Case(t, [*oblique, fd.Impose([0, 1], value=way, direction=TURN[:, 0])])),
+    ):  # fmt: skip
+        a, b = (trace(case, load_factors=[0.5, 1.0]) for case in (one, other))
+        fields = [(path.displacement.values, reactions(path, len(s.nodes))) for path in (a, b)]
+        for before, after, close in zip(*fields, (1e-7, 1e-6), strict=True):
+            np.testing.assert_allclose(before @ TURN.T, after, atol=close * np.abs(before).max())
+        np.testing.assert_allclose(a.work, b.work, rtol=1e-6)
+
+
 def test_mechanisms_with_directions_are_named() -> None:
     """A roller in a direction leaves what it does not hold, and links hold what they tie."""
     s = MODELS["bars"](fd.patterns.simple_fold())
