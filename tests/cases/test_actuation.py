@@ -21,26 +21,31 @@ def test_change_goes_from_the_rest_value_to_the_angle() -> None:
     case = Case(STRUCTURE, loads=[Actuate([3, 0], [120, 90.5], Ramp(2.0))])
     ((change, history),) = case.actuation_terms
     assert history == Ramp(2.0)
-    assert change.shape == (len(STRUCTURE.folds),)
-    expected = np.zeros_like(change)
-    expected[3] = np.radians(120) - STRUCTURE.fold_rest[3]
-    expected[0] = np.radians(90.5) - STRUCTURE.fold_rest[0]
+    expected = np.zeros(len(STRUCTURE.folds))
+    expected[[3, 0]] = np.radians([120, 90.5]) - STRUCTURE.fold_rest[[3, 0]]
     np.testing.assert_array_equal(change, expected)
     assert not change.flags.writeable
     np.testing.assert_array_equal(case.actuated_creases, [0, 3])
 
 
 def test_rest_values_given_to_discretize_are_where_it_starts() -> None:
+    """An angle that is the rest value still actuates."""
     structure = fd.discretize(PATTERN, SHEET, crease_rest=100)
-    ((change, _),) = Case(structure, loads=[Actuate("all", 130)]).actuation_terms
-    np.testing.assert_allclose(change, np.radians(30), rtol=1e-14)
+    case = Case(structure, loads=[Actuate([4, 5], [100, 130])])
+    ((change, _),) = case.actuation_terms
+    np.testing.assert_allclose(change[[4, 5]], [0.0, np.radians(30)], rtol=1e-14, atol=1e-15)
+    np.testing.assert_array_equal(case.actuated_creases, [4, 5])
 
 
 def test_creases_by_assignment() -> None:
-    case = Case(STRUCTURE, loads=[Actuate("valley", 80), Actuate("mountain", 280, Ramp(1.0))])
+    """One angle for all of a word, or one for each."""
+    angles = np.linspace(60, 100, (LETTERS == "V").sum())
+    case = Case(STRUCTURE, loads=[Actuate("valley", angles), Actuate("mountain", 280, Ramp(1.0))])
     (valleys, _), (mountains, _) = case.actuation_terms
     np.testing.assert_array_equal(valleys != 0.0, LETTERS == "V")
     np.testing.assert_array_equal(mountains != 0.0, LETTERS == "M")
+    rest = (STRUCTURE.fold_rest + valleys)[LETTERS == "V"]
+    np.testing.assert_allclose(rest, np.radians(angles), rtol=1e-15)
     np.testing.assert_array_equal(case.actuated_creases, np.arange(len(LETTERS)))
 
 
@@ -54,15 +59,6 @@ def test_all_leaves_out_flat_creases() -> None:
     rest = case.structure.fold_rest + change
     np.testing.assert_allclose(rest[1:], np.pi, rtol=1e-15)
     assert rest[0] == case.structure.fold_rest[0]
-
-
-def test_an_angle_for_each_of_the_creases_of_a_word() -> None:
-    valleys = np.flatnonzero(LETTERS == "V")
-    angles = np.linspace(60, 100, len(valleys))
-    ((change, _),) = Case(STRUCTURE, loads=[Actuate("valley", angles)]).actuation_terms
-    np.testing.assert_allclose(
-        (STRUCTURE.fold_rest + change)[valleys], np.radians(angles), rtol=1e-15
-    )
 
 
 def test_equal_histories_are_one_term_and_no_force() -> None:
@@ -82,21 +78,12 @@ def test_equal_histories_are_one_term_and_no_force() -> None:
     np.testing.assert_array_equal(case.loaded_nodes, [5])
 
 
-def test_an_angle_that_is_the_rest_value_still_actuates() -> None:
-    structure = fd.discretize(PATTERN, SHEET, crease_rest=90)
-    case = Case(structure, loads=[Actuate([4], 90)])
-    ((change, _),) = case.actuation_terms
-    assert abs(change[4]) < 1e-15
-    np.testing.assert_array_equal(case.actuated_creases, [4])
-
-
 @pytest.mark.parametrize("angle", [0, 360.0, [120, 360]])
 def test_closed_creases_need_a_law_that_allows_them(angle) -> None:
     load = Actuate([0, 1], angle)
     with pytest.raises(InputError, match=r"loads\[0\]\.angle = (0|360): .*infinite moment"):
         Case(STRUCTURE, loads=[load])
-    laws = (fd.EnhancedLinear(rest="as_published"), "linear")
-    for law in laws:
+    for law in (fd.EnhancedLinear(rest="as_published"), "linear"):
         structure = fd.discretize(PATTERN, SHEET, fold_law=law)
         ((change, _),) = Case(structure, loads=[load]).actuation_terms
         rest = np.degrees(structure.fold_rest + change)[:2]
@@ -112,47 +99,25 @@ def test_equal_actuations_compare_equal() -> None:
 FLAT = fd.discretize(fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)]), SHEET)
 PANEL = fd.discretize(fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2, 3)]), SHEET)
 BARE = dataclasses.replace(STRUCTURE, pattern=None)
+PUSHED = [Force([5], (1, 0, 0)), Actuate([2, 3], 90)]
+WORDS = [Actuate("all", 90), Actuate("valley", 90)]
 
 
 @pytest.mark.parametrize(
     ("structure", "loads", "text"),
     [
-        (
-            STRUCTURE,
-            [Actuate([1, 24], 90)],
-            r"loads\[0\].creases = \[1, 24\]: crease 24 is out of range; this structure has "
-            "creases 0 to 23",
-        ),
+        (STRUCTURE, [Actuate([1, 24], 90)], r"= \[1, 24\]: crease 24 is out of range; .* 0 to 23"),
         (STRUCTURE, [Actuate(-1, 90)], r"loads\[0\].creases = \[-1\]: crease -1 is out of range"),
-        (
-            STRUCTURE,
-            [Force([5], (1, 0, 0)), Actuate([2, 3], 90), Actuate([4, 3], 90)],
-            r"loads\[2\].creases: crease 3 is actuated by loads\[1\] already; leave it out of",
-        ),
-        (
-            STRUCTURE,
-            [Actuate("all", 90), Actuate("valley", 90)],
-            r"loads\[1\].creases: crease \d+ is actuated by loads\[0\] already",
-        ),
-        (
-            STRUCTURE,
-            [Actuate([2, 3], [90])],
-            r"loads\[0\].angle = \[90.0\]: 1 angles for 2 creases; give one, or one for each",
-        ),
+        (STRUCTURE, [*PUSHED, Actuate([4, 3], 90)], r"\[2\].creases: crease 3 is .* loads\[1\] al"),
+        (STRUCTURE, WORDS, r"loads\[1\].creases: crease \d+ is actuated by loads\[0\] already"),
+        (STRUCTURE, [Actuate([2, 3], [90])], r"loads\[0\].angle = .* 1 angles for 2 creases; give"),
         (STRUCTURE, [Actuate("all", [90, 90])], r"2 angles for 24 creases"),
+        (STRUCTURE, [Actuate("valleys", 90)], r"= \"valleys\": did you mean 'valley'\? this patte"),
         (PANEL, [Actuate([0], 90)], r"loads\[0\].creases = \[0\]: this structure has no folds"),
         (PANEL, [Actuate("all", 90)], r'loads\[0\].creases = "all": this structure has no folds'),
-        (
-            FLAT,
-            [Actuate("all", 90)],
-            r'"all": this pattern has no crease that is not flat; give crease numbers, or assign',
-        ),
+        (FLAT, [Actuate("all", 90)], r'"all": this pattern has no crease that is not flat; give'),
         (FLAT, [Actuate("valley", 90)], r'"valley": this pattern has no crease assigned valley;'),
-        (
-            BARE,
-            [Actuate("all", 90)],
-            r'"all": this structure has no pattern with assignments; give',
-        ),
+        (BARE, [Actuate("all", 90)], r'"all": this structure has no pattern with assignments; giv'),
     ],
 )
 def test_creases_that_a_structure_does_not_have(structure, loads, text) -> None:
@@ -168,25 +133,14 @@ def test_a_structure_without_a_pattern_takes_crease_numbers() -> None:
 @pytest.mark.parametrize(
     ("make", "text"),
     [
-        (
-            lambda: Case(STRUCTURE, loads=[Actuate("valleys", 90)]),
-            r"loads\[0\].creases = \"valleys\": did you mean 'valley'\? this pattern knows",
-        ),
         (lambda: Actuate("", 90), r'creases = "": give crease numbers, as in \[0, 1\], or one of'),
         (lambda: Actuate([], 90), r'creases = \[\]: must be crease numbers, as .* or one of "all"'),
-        (lambda: Actuate([0.0], 90), r"creases = \[0.0\]: 0.0 is not a crease number"),
         (lambda: Actuate([True], 90), "true is not a crease number"),
         (lambda: Actuate([1, 1], 90), r"creases = \[1, 1\]: crease 1 is listed twice"),
-        (lambda: Actuate(None, 90), "creases = None: None is not a crease number"),
         (lambda: Actuate(0, -1), "angle = -1: must lie between 0 and 360 degrees"),
-        (lambda: Actuate(0, 360.1), "angle = 360.1: must lie between 0 and 360 degrees"),
         (lambda: Actuate([0, 1], [90, 400]), r"angle\[1\] = 400: must lie between"),
         (lambda: Actuate(0, np.nan), "angle = nan: must be a finite number"),
-        (lambda: Actuate([0, 1], [90, np.inf]), r"angle\[1\] = inf: must be a finite number"),
-        (lambda: Actuate(0, "90"), 'angle = "90": must be a number'),
-        (lambda: Actuate(0, True), "angle = true: must be a number"),
         (lambda: Actuate(0, []), r"angle = \[\]: must be a number, or a list of one per crease"),
-        (lambda: Actuate(0, [[90]]), "angle = .*: must be a number, or a list of one per crease"),
         (lambda: Actuate(0, 90, 1.0), "history = 1.0: must be a history"),
     ],
 )

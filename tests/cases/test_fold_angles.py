@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from case_texts import FOLD_TEXT
 from foldyn.cases.loads import load_from
 from foldyn.errors import InputError
 
@@ -29,11 +30,9 @@ def reached(load: fd.Actuate, structure: fd.Structure | None = None) -> np.ndarr
 
 @pytest.mark.parametrize("make", MAKERS)
 def test_one_fold_angle_of_a_word_is_a_size(make):
-    s = make(PATTERN, SHEET)
-    found = reached(fd.Actuate("all", fold_angle=70), s)
-    np.testing.assert_allclose(found, np.where(LETTERS == "V", 110.0, 250.0), rtol=1e-14)
-    found = reached(fd.Actuate("mountain", fold_angle=70), s)
-    np.testing.assert_allclose(found, np.where(LETTERS == "V", np.nan, 250.0), rtol=1e-14)
+    for word, valley in (("all", 110.0), ("mountain", np.nan)):
+        found = reached(fd.Actuate(word, fold_angle=70), make(PATTERN, SHEET))
+        np.testing.assert_allclose(found, np.where(LETTERS == "V", valley, 250.0), rtol=1e-14)
 
 
 def test_fold_angles_of_numbers_have_their_sign():
@@ -61,15 +60,11 @@ def test_a_fraction_folds_each_crease_its_own_way(fraction):
 def test_fully_folded_needs_a_law_that_allows_it(given):
     with pytest.raises(InputError, match=r"loads\[0\]\.(fraction = 1|fold_angle = 180): this fold"):
         reached(fd.Actuate("all", **given))
-    open_to_all = fd.discretize(PATTERN, SHEET, fold_law="linear")
-    found = reached(fd.Actuate("all", **given), open_to_all)
-    np.testing.assert_allclose(found, np.where(LETTERS == "V", 0.0, 360.0), atol=1e-13)
-
-
-def test_the_closed_mountain_is_named_by_its_own_fold_angle():
-    mountain = int(np.flatnonzero(LETTERS == "M")[0])
+    mountain = fd.Actuate(int(np.flatnonzero(LETTERS == "M")[0]), fold_angle=-180)
     with pytest.raises(InputError, match=r"loads\[0\]\.fold_angle = -180: this fold law"):
-        reached(fd.Actuate(mountain, fold_angle=-180))
+        reached(mountain)  # is named by its own fold angle
+    found = reached(fd.Actuate("all", **given), fd.discretize(PATTERN, SHEET, fold_law="linear"))
+    np.testing.assert_allclose(found, np.where(LETTERS == "V", 0.0, 360.0), atol=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -85,9 +80,6 @@ def test_the_closed_mountain_is_named_by_its_own_fold_angle():
         ({"fraction": "120%"}, "fraction = 1.2: must be at most 1"),
         ({"fraction": "80"}, 'fraction = "80": must be as in "80%"'),
         ({"fraction": "most%"}, 'fraction = "most%": must be as in "80%"'),
-        ({"fraction": "nan%"}, "fraction = nan: must be a finite number"),
-        ({"fraction": [0.1, 0.2]}, "fraction = .*must be a number"),
-        ({"fraction": True}, "fraction = true: must be a number"),
     ],
 )
 def test_wrong_arguments(given, message):
@@ -112,29 +104,19 @@ def test_creases_that_cannot_fold_so(load, message):
         fd.Case(structure, loads=[load])
 
 
-@pytest.mark.parametrize("key", ["angle = 100", "fold_angle = 80.5", 'fraction = "45%"',
-                                 "fold_angle = [80.5, -3]"])  # fmt: skip
+@pytest.mark.parametrize(
+    "key", ["angle = 100", "fold_angle = 80.5", 'fraction = "45%"', "fold_angle = [80.5, -3]"]
+)
 def test_from_a_table_and_back(key):
     load = load_from(loads(f"creases = [0, 1]\n{key}"))
     assert load_from(load.table()) == load
     assert len(load.table()) == 2
 
 
-@pytest.mark.parametrize("kind", ["bars_and_hinges", "shell"])
-def test_from_a_case_file_to_a_result_and_back(tmp_path, kind):
-    path = tmp_path / "case.toml"
-    path.write_text(f"""
-[pattern]
-kind = "simple_fold"
-dihedral = 150
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1
-[model]
-kind = "{kind}"
-{"divisions = 2" if kind == "shell" else ""}
+@pytest.mark.parametrize("model", ["", 'kind = "shell"\ndivisions = 2'])
+def test_from_a_case_file_to_a_result_and_back(model, read, kept):
+    case_file = read(f"""{FOLD_TEXT}[model]
+{model}
 [[supports]]
 nodes = [0, 1, 2]
 [[loads]]
@@ -145,10 +127,7 @@ kind = "statics"
 method = "displacement"
 load_factors = [0.5, 1]
 """)
-    result = fd.read_case(path).run()
-    fd.save(result, tmp_path / "result.nc")
-    case = fd.case_of(fd.load(tmp_path / "result.nc"))
+    case = kept(case_file.run())
     assert case.loads == (fd.Actuate("all", fraction=0.25),)
-    np.testing.assert_array_equal(
-        case.actuation_terms[0][0], fd.read_case(path).case().actuation_terms[0][0]
-    )
+    (change, _), (own, _) = (one.actuation_terms[0] for one in (case, case_file.case()))
+    np.testing.assert_array_equal(change, own)

@@ -12,6 +12,7 @@ from foldyn.errors import InputError
 from foldyn.structures import MASS_RULES
 
 G = np.array([0.0, 0.0, -9.81])
+MASSLESS = r"loads\[0\]: gravity needs the mass of the structure: .*density is missing"
 
 
 def structure(mass: str = "mixed_voronoi", density: float | None = 1000.0) -> fd.Structure:
@@ -34,8 +35,6 @@ def test_standard_gravity_by_its_direction() -> None:
     """9.80665 m/s2 (3rd General Conference on Weights and Measures, 1901)."""
     assert fd.Gravity("-z") == fd.Gravity((0.0, 0.0, -9.80665))
     assert fd.Gravity("x").acceleration == (9.80665, 0.0, 0.0)
-    with pytest.raises(InputError, match=r'acceleration = "down": .*choose one of x, y, z, -x'):
-        fd.Gravity("down")
 
 
 @pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
@@ -44,28 +43,15 @@ def test_a_free_structure_falls_with_g(mass) -> None:
     motion = fd.simulate(fd.Case(structure(mass), loads=[fd.Gravity(g)]), 0.1, every=0.01)
     t = motion.time.to_numpy()[:, None, None]
     assert t[-1] == pytest.approx(0.1)
-    u, v = motion.displacement.to_numpy(), motion.velocity.to_numpy()
-    fall = np.broadcast_to(0.5 * g * t**2, u.shape)
-    np.testing.assert_allclose(u, fall, rtol=0, atol=1e-12 * np.abs(fall).max())
-    np.testing.assert_allclose(
-        v, np.broadcast_to(g * t, v.shape), rtol=0, atol=1e-12 * np.abs(g * t).max()
-    )
+    for name, expected in (("displacement", 0.5 * g * t**2), ("velocity", g * t)):
+        found = motion[name].to_numpy() - expected
+        np.testing.assert_allclose(found, 0.0, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
-def test_supports_carry_the_whole_weight(mass) -> None:
+@pytest.mark.parametrize("held", [range(13), [0, 2, 6, 8]], ids=["all", "some"])
+def test_supports_carry_what_does_not_fall(mass, held) -> None:
     sheet = structure(mass)
-    every_node = list(range(len(sheet.nodes)))
-    case = fd.Case(sheet, [fd.Fix(every_node, "z")], [fd.Gravity(G)])
-    first = fd.simulate(case, 0.001, every=1).isel(time=0)
-    weight = float(sheet.mass.sum()) * 9.81
-    assert float(first.reaction.sum()) == pytest.approx(weight, rel=1e-13)
-
-
-@pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
-def test_some_supports_carry_what_does_not_fall(mass) -> None:
-    sheet = structure(mass)
-    held = [0, 2, 6, 8]
     case = fd.Case(sheet, [fd.Fix(held, "z")], [fd.Gravity(G)])
     reaction = fd.simulate(case, 0.001, every=1).isel(time=0).reaction.to_numpy()
     # at rest and unstrained: M a = p + r, with a = 0 on the supports and r = 0 elsewhere
@@ -78,26 +64,21 @@ def test_some_supports_carry_what_does_not_fall(mass) -> None:
 
 
 def test_gravity_beside_forces() -> None:
-    sheet, pulse = structure(), fd.Pulse(1.0)
+    sheet, pulse, way = structure(), fd.Pulse(1.0), np.array([1.0, 2.0, 0.0])
     loads = [
-        fd.Gravity(G),
-        fd.Force([7], (1, 0, 0)),
-        fd.Force([6], (0, 1, 0), pulse),
-        fd.Gravity((1, 0, 0), pulse),
-        fd.Gravity((0, 2, 0), pulse),
-    ]
-    case = fd.Case(sheet, loads=loads)
-    mass = sheet.mass.sum(axis=1)
+        fd.Gravity(G), fd.Force([7], (1, 0, 0)), fd.Force([6], (0, 1, 0), pulse),
+        fd.Gravity((1, 0, 0), pulse), fd.Gravity((0, 2, 0), pulse),
+    ]  # fmt: skip
+    case, mass = fd.Case(sheet, loads=loads), sheet.mass.sum(axis=1)
     (steady, constant), (short, law) = case.load_terms
     assert (constant, law) == (fd.Constant(), pulse)
     np.testing.assert_allclose(steady[:, 2], mass * G[2], rtol=1e-15)
     np.testing.assert_array_equal(np.flatnonzero(steady[:, 0]), [7])
-    np.testing.assert_allclose(short[0], mass[0] * np.array([1.0, 2.0, 0.0]), rtol=1e-15)
-    np.testing.assert_allclose(short[6], mass[6] * np.array([1.0, 2.0, 0.0]) + [0, 1, 0])
+    np.testing.assert_allclose(short[0], mass[0] * way, rtol=1e-15)
+    np.testing.assert_allclose(short[6], mass[6] * way + [0, 1, 0])
     np.testing.assert_array_equal(case.loaded_nodes, [6, 7])
     assert [np.flatnonzero(f.any(axis=1)).tolist() for f, _ in case.force_terms] == [[7], [6]]
-    (down, _), (aside, _) = case.gravity_terms
-    np.testing.assert_array_equal([down, aside], [G, [1.0, 2.0, 0.0]])
+    np.testing.assert_array_equal([g for g, _ in case.gravity_terms], [G, way])
     with pytest.raises(ValueError, match="read-only"):
         steady[0, 0] = 1.0
 
@@ -113,14 +94,11 @@ def test_gravity_on_supports_is_silent() -> None:
 @pytest.mark.parametrize(
     ("make", "text"),
     [
+        (lambda: fd.Gravity("down"), r'acceleration = "down": .*choose one of x, y, z, -x'),
         (lambda: fd.Gravity((0, 0, 0)), r"acceleration = \[0, 0, 0\]: must not be zero"),
         (lambda: fd.Gravity((0, 0, np.nan)), r"acceleration\[2\] = nan: must be a finite"),
-        (lambda: fd.Gravity(-9.81), r"acceleration = -9.81: must be three numbers"),
         (lambda: fd.Gravity(G, "pulse"), 'history = "pulse": must be a history'),
-        (
-            lambda: fd.Case(structure(density=None), loads=[fd.Gravity(G)]),
-            r"loads\[0\]: gravity needs the mass of the structure: .*density is missing",
-        ),
+        (lambda: fd.Case(structure(density=None), loads=[fd.Gravity(G)]), MASSLESS),
         (lambda: fd.Case(structure(), loads=[fd.Fix(0)]), "must be a Force or Gravity"),
         (lambda: fd.Case(structure(), loads=fd.Gravity(G)), "must be a list of Force or Gravity"),
     ],

@@ -9,10 +9,8 @@ import pytest
 
 import foldyn as fd
 from case_texts import MIURA_TEXT
-from foldyn.analyses import read_case
 from foldyn.analyses.reading import read_as
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.results.contents import case_of
 
 SHEET = fd.Sheet(2e11, 0.3, 1e-3, density=7850.0)
 MIURA = fd.patterns.miura(cells=(2, 2), a=0.04, b=0.04, panel_angle=60, dihedral=110)
@@ -48,10 +46,8 @@ def test_a_shell_is_held_on_the_whole_edge(shell):
 def test_axes_and_directions_say_the_same(shell):
     one = frequencies(shell, fd.Fix("xmin", "z", along=True), fd.Fix("xmin", "xy", along=True))
     assert one == pytest.approx(frequencies(shell, ALONG), rel=1e-9)
-    other = frequencies(
-        shell, *(fd.Fix("xmin", direction=axis, along=True) for axis in ("x", "y", "z"))
-    )
-    assert other == pytest.approx(one, rel=1e-6)
+    by_direction = [fd.Fix("xmin", direction=axis, along=True) for axis in "xyz"]
+    assert frequencies(shell, *by_direction) == pytest.approx(one, rel=1e-6)
 
 
 @pytest.mark.parametrize("options", [{"direction": "z"}, {"axis": "z"}])
@@ -85,20 +81,17 @@ MODELS: dict[str, Any] = {
 
 @pytest.mark.parametrize("name", sorted(MODELS))
 def test_edges_of_bars_and_hinges_must_be_straight(name):
+    bowed = fd.discretize(MIURA, SHEET, **MODELS[name])
     with pytest.raises(InputError, match=r"supports\[0\].along: the edge \(0, 1\) may bow .* "
                        'make the structure with straight = "xmin"'):  # fmt: skip
-        fd.Case(fd.discretize(MIURA, SHEET, **MODELS[name]), [ALONG])
-    structure = fd.discretize(MIURA, SHEET, **MODELS[name], straight="xmin")
-    bowed = fd.discretize(MIURA, SHEET, **MODELS[name])
-    held = frequencies(structure, ALONG)
-    assert np.array_equal(held, frequencies(structure, fd.Fix("xmin")))
+        fd.Case(bowed, [ALONG])
+    straight = fd.discretize(MIURA, SHEET, **MODELS[name], straight="xmin")
+    held = frequencies(straight, ALONG)
+    assert np.array_equal(held, frequencies(straight, fd.Fix("xmin")))
     assert (held >= frequencies(bowed, fd.Fix("xmin"))).all()
-
-
-def test_other_bars_and_hinges_are_straight():
-    structure = fd.discretize(MIURA, SHEET, preset="herkal")
-    case = fd.Case(structure, [ALONG])
-    assert np.array_equal(case.fixed, fd.Case(structure, [fd.Fix("xmin")]).fixed)
+    paper = fd.discretize(MIURA, SHEET, preset="herkal")  # always straight
+    one, other = (fd.Case(paper, [support]) for support in (ALONG, fd.Fix("xmin")))
+    assert np.array_equal(one.fixed, other.fixed)
 
 
 def test_a_shell_and_bars_and_hinges_agree():
@@ -107,34 +100,35 @@ def test_a_shell_and_bars_and_hinges_agree():
     assert frequencies(reduced, ALONG) == pytest.approx(frequencies(shell, ALONG), rel=0.05)
 
 
-def test_creases_cannot_be_held_straight_in_bars_and_hinges():
-    crease = FOLD.creases[0].tolist()
-    structure = fd.discretize(FOLD, SHEET, **MODELS["both"])
-    with pytest.raises(InputError, match=r"the crease \(\d, \d\) .* take a shell"):
-        fd.Case(structure, [fd.Fix(crease, along=True)])
-    assert fd.Case(fd.shell(FOLD, SHEET, 4), [fd.Fix(crease, along=True)]).fixed.sum() == 15
+def bare():
+    """A structure without a pattern."""
+    made = fd.discretize(FOLD, SHEET)
+    return fd.Structure(made.nodes, made.bars, made.bar_area, SHEET)
+
+
+CREASE = FOLD.creases[0].tolist()
+NONE = r"along: no edge .* nodes = \[0, 8\]; name them"
 
 
 @pytest.mark.parametrize(
-    ("support", "text"),
+    ("make", "nodes", "text"),
     [
-        (lambda: fd.Fix([0, 8], along=True), r"along: no edge .* nodes = \[0, 8\]; name them"),
         (
-            lambda: fd.Fix([0, 1], along="yes"),  # pyright: ignore[reportArgumentType]
-            'along = "yes": must be True or False',
+            lambda: fd.discretize(FOLD, SHEET, **MODELS["both"]),
+            CREASE,
+            "the crease .* take a shell",
         ),
+        (lambda: fd.shell(MIURA, SHEET, 4), [0, 8], NONE),
+        (bare, [0, 1], "along: this structure has no pattern with edges"),
     ],
 )
-def test_refusals(support, text):
+def test_refusals(make, nodes, text):
     with pytest.raises(InputError, match=text):
-        fd.Case(fd.shell(MIURA, SHEET, 4), [support()])
-
-
-def test_a_structure_without_a_pattern_has_no_edges():
-    made = fd.discretize(FOLD, SHEET)
-    bare = fd.Structure(made.nodes, made.bars, made.bar_area, SHEET)
-    with pytest.raises(InputError, match="along: this structure has no pattern with edges"):
-        fd.Case(bare, [fd.Fix([0, 1], along=True)])
+        fd.Case(make(), [fd.Fix(nodes, along=True)])
+    with pytest.raises(InputError, match='along = "yes": must be True or False'):
+        fd.Fix([0, 1], along="yes")  # pyright: ignore[reportArgumentType]
+    held = fd.Case(fd.shell(FOLD, SHEET, 4), [fd.Fix(CREASE, along=True)])
+    assert held.fixed.sum() == 15
 
 
 # ------------------------------------------------------------------ case files and comparisons
@@ -148,37 +142,28 @@ along = true
 kind = "modes"
 count = 2
 """
-
-
-def read(folder, text, kind=None, divisions=None):
-    (folder / "case.toml").write_text(TEXT.replace("MODEL", text))
-    return read_case(folder / "case.toml", kind, divisions)
+SHELL = 'kind = "shell"\ndivisions = 4\n'
 
 
 @pytest.mark.parametrize("model", ['preset = "n5b8e"', 'membrane = "panel"', 'preset = "herkal"'])
-def test_case_files_make_held_edges_straight(tmp_path, model):
-    case = read(tmp_path, model).case()
+def test_case_files_make_held_edges_straight(read, model):
+    case = read(TEXT.replace("MODEL", model)).case()
     bowed = "herkal" not in model
     assert case.structure.options.straight == (((0, 1), (1, 2)) if bowed else ())
     assert not {(0, 1), (1, 2)} & set(case.structure.bowed_edges)
-    shell = read(tmp_path, model, "shell", 4).case()
+    shell = read(TEXT.replace("MODEL", model), "shell", 4).case()
     assert len(np.flatnonzero(shell.fixed.all(axis=1))) == 9
     assert shell.supports == case.supports
 
 
-def test_edges_that_the_file_names_stay(tmp_path):
-    case = read(tmp_path, 'preset = "n5b8e"\nstraight = [[0, 3]]').case()
-    straight = case.structure.options.straight
-    assert straight == ((0, 3), (0, 1), (1, 2))
-
-
-def test_a_radius_in_a_case_file(tmp_path):
-    case = read(tmp_path, 'kind = "shell"\ndivisions = 4\nvertex_radius = 0.01').case()
-    assert case.structure.options.vertex_radius == 0.01
-    assert case.structure.graded.radius == 0.01
-    other = read(tmp_path, 'kind = "shell"\ndivisions = 4\nvertex_radius = 0.01',
-                 kind="bars_and_hinges")  # fmt: skip
-    assert not hasattr(other.case().structure.options, "vertex_radius")
+def test_what_a_case_file_names_stays(read):
+    case = read(TEXT.replace("MODEL", 'preset = "n5b8e"\nstraight = [[0, 3]]')).case()
+    assert case.structure.options.straight == ((0, 3), (0, 1), (1, 2))
+    graded = TEXT.replace("MODEL", SHELL + "vertex_radius = 0.01")
+    made = read(graded).case().structure
+    assert made.options.vertex_radius == made.graded.radius == 0.01
+    other = read(graded, "bars_and_hinges").case().structure
+    assert not hasattr(other.options, "vertex_radius")
 
 
 def test_files_read_as_small_vibrations_keep_it(tmp_path):
@@ -190,19 +175,17 @@ along = true
 [analysis]
 kind = "statics"
 """
-    text = TEXT.replace("MODEL", 'kind = "shell"\ndivisions = 4')
+    text = TEXT.replace("MODEL", SHELL)
     (tmp_path / "case.toml").write_text(text[: text.index("[analysis]")] + moved)
     with pytest.warns(FoldynWarning, match=r"the displacement of supports\[1\]"):
         case = read_as(tmp_path / "case.toml", "modes", {"state": "rest"}).case()
     assert case.supports == (ALONG, fd.Fix("xmax", "x", along=True))
 
 
-def test_stored_cases_keep_it(tmp_path):
+def test_stored_cases_keep_it(kept):
     shell = fd.shell(FOLD, SHEET, 4, vertex_radius=1e-3)
-    fd.save(fd.modes(fd.Case(shell, [ALONG]), 2), tmp_path / "modes.nc")
-    again = case_of(fd.load(tmp_path / "modes.nc"))
-    assert again.supports == (ALONG,)
-    assert again.structure.options.vertex_radius == 1e-3
+    again = kept(fd.modes(fd.Case(shell, [ALONG]), 2))
+    assert again.supports == (ALONG,) and again.structure.options.vertex_radius == 1e-3
 
 
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")

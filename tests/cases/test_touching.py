@@ -39,11 +39,7 @@ def test_panels_that_cross_are_refused_before_contact_is_looked_at(
 ):
     s = MODELS[model](through_each_other(depth))
     case = fd.Case(s, [fd.Fix([2, 3])], [DOWN], contact=fd.Contact())
-
-    def never(*arguments):
-        raise AssertionError("contact's kernels were called")
-
-    monkeypatch.setattr(ContactTerm, "contact", never)
+    monkeypatch.setattr(ContactTerm, "contact", None)  # contact's kernels are not called
     with pytest.raises(InputError, match=r"contact: at the start .* through each other: 0 and 1;"):
         ANALYSES[analysis](case, None)
 
@@ -59,22 +55,19 @@ def test_so_are_displacements_that_make_them_cross(analysis, monkeypatch):
         ANALYSES[analysis](case, fd.State(displacement=u))
 
 
-@pytest.mark.parametrize(
-    ("gap", "message"),
-    [(0.0, "meet, or fold onto themselves"), (1e-4, "meet, or fold onto themselves"), (0.3, None)],
-)
-def test_panels_that_meet_are_named(gap, message):
+@pytest.mark.parametrize("gap", [0.0, 1e-4, 0.3])
+def test_panels_that_meet_are_named(gap):
     """Two layers some part of their thickness apart; they cross nowhere."""
     low = [[0, 0, 0], [0.04, 0, 0], [0.04, 0.04, 0], [0, 0.04, 0]]
     high = [[x + 0.01, y + 0.01, gap * T] for x, y, _ in low]
     s = MODELS["bars and hinges"](fd.Pattern([*low, *high], [(0, 1, 2, 3), (4, 5, 6, 7)]))
-    case = fd.Case(s, contact=fd.Contact())
-    if message is not None:
-        with pytest.raises(InputError, match=rf"contact: at the start panels {message} \(0 and 1"):
-            fd.simulate(case, 1e-6)
-        return
-    with pytest.warns(FoldynWarning, match=r"than the sheet is thick \(0 and 1\); they will be"):
-        fd.simulate(case, 1e-6)
+    told = pytest.raises(InputError, match=r"at the start panels meet, or fold onto .* \(0 and 1")
+    if gap == 0.3:
+        told = pytest.warns(
+            FoldynWarning, match=r"than the sheet is thick \(0 and 1\); they will be"
+        )
+    with told:
+        fd.simulate(fd.Case(s, contact=fd.Contact()), 1e-6)
 
 
 @pytest.mark.parametrize(

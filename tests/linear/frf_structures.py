@@ -64,9 +64,9 @@ def flap(alpha=0.0, beta=0.0, law="superlinear") -> fd.Case:
 def smooth_miura(mass="circumcenter", **model) -> fd.Structure:
     """A Miura unit cell of linear laws: 39 dofs."""
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
+    linear = dict.fromkeys(("bar_law", "fold_law", "bend_law"), "linear")
     sheet = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
-    linear = {"bar_law": "linear", "fold_law": "linear", "bend_law": "linear"}
-    return fd.discretize(pattern, sheet, mass=mass, **(linear | model), preset="herkal")
+    return fd.discretize(pattern, sheet, preset="herkal", mass=mass, **(linear | model))
 
 
 def miura_case(loads=(), mass="circumcenter", alpha=0.5, beta=0.0, **model) -> fd.Case:

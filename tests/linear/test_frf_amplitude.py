@@ -54,9 +54,14 @@ def test_simulated_motions_follow_the_same_law():
 
 def test_a_linear_fold_does_not_depend_on_the_amplitude():
     case, f = flap(alpha=1.0, law="linear"), np.arange(0.2, 2.0, 0.2)
-    weak, strong = (frf(case, LIFT, f, method="harmonic", amplitude=a) for a in (1e-6, 1.0))
-    np.testing.assert_allclose(weak.receptance, strong.receptance, rtol=1e-12)
-    np.testing.assert_allclose(weak.receptance, frf(case, LIFT, f).receptance, rtol=1e-12)
+    exact = frf(case, LIFT, f).receptance
+    for amplitude in (1e-6, 1.0):
+        found = frf(case, LIFT, f, method="harmonic", amplitude=amplitude)
+        np.testing.assert_allclose(found.receptance, exact, rtol=1e-12)
+    base = fd.BaseMotion("x", value=0.01)  # of bars alone
+    found, direct = (frf(chain(alpha=0.4), base, f, method=m) for m in ("harmonic", "direct"))
+    np.testing.assert_allclose(found.transmissibility, direct.transmissibility, rtol=1e-12)
+    assert (found.swing.values == 0.0).all()
 
 
 def test_one_hinge_balances_with_its_own_slope():
@@ -77,12 +82,9 @@ def test_rising_and_falling_sweeps_differ_where_there_are_two_branches():
         np.abs(frf(case, LIFT, f, sweep=way, **options).receptance.values[:, 3, 2])
         for way in ("up", "down")
     )
-    upper = up > 2 * down
-    np.testing.assert_allclose(up[~upper], down[~upper], rtol=0.01)
-    assert 3 <= upper.sum() < len(f) - 2
-    assert np.flatnonzero(upper).tolist() == list(
-        range(upper.argmax(), upper.argmax() + upper.sum())
-    )
+    upper = np.flatnonzero(up > 2 * down)
+    assert 3 <= len(upper) < len(f) - 2 and (np.diff(upper) == 1).all()
+    np.testing.assert_allclose(np.delete(up, upper), np.delete(down, upper), rtol=0.01)
     balanced = frf(case, LIFT, np.r_[0.4, 0.42, f], method="harmonic", amplitude=5e-6)
     np.testing.assert_allclose(np.abs(balanced.receptance.values[2:, 3, 2]), up, rtol=0.005)
 
@@ -102,14 +104,6 @@ def test_an_iteration_that_is_cut_short_is_told():
     assert np.isnan(found.swing.values).all()
 
 
-def test_without_superlinear_hinges_it_is_the_direct_response():
-    case, f = chain(alpha=0.4), np.arange(0.5, 4.0, 0.5)
-    found = frf(case, fd.BaseMotion("x", value=0.01), f, method="harmonic")
-    direct = frf(case, fd.BaseMotion("x", value=0.01), f)
-    np.testing.assert_allclose(found.transmissibility, direct.transmissibility, rtol=1e-12)
-    assert (found.swing.values == 0.0).all()
-
-
 # ------------------------------------------------------------------------ the specimen
 # paper (design, section 7): peaks at 3.8, 9.3 and 16.7 Hz; damping 13.5 % (second) and 9 % (third)
 PAPER = np.array([3.8, 9.3, 16.7])
@@ -117,9 +111,7 @@ DRIVE = fd.Force(TOP, (1e-3, 0, 0))
 
 
 def specimen(alpha, beta=0.0, **options):
-    case = paper_specimen(**options)
-    damping = fd.Rayleigh(alpha, beta)
-    return fd.Case(case.structure, case.supports, damping=damping)
+    return paper_specimen(**options).altered(damping=fd.Rayleigh(alpha, beta))
 
 
 @pytest.mark.thorough

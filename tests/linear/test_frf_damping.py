@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from frf_structures import chain, chain_matrices, largest_error, miura_case, smooth_miura
+from frf_structures import chain, chain_matrices, largest_error, miura_case
 from scipy import sparse
 from scipy.linalg import eigh
 
@@ -14,7 +12,6 @@ import foldyn as fd
 from foldyn.algebra import complex_symmetric, superlu
 from foldyn.algebra.complex_symmetric import Gram
 from foldyn.linear.linearized import linearize
-from foldyn.signals import half_power
 
 F = np.linspace(0.1, 4.0, 60)
 K, M = chain_matrices()
@@ -35,33 +32,26 @@ CASES = {
 def damped(name: str) -> tuple[fd.Case, np.ndarray]:
     damping, dashpots, matrix = CASES[name]
     plain = chain()
-    return fd.Case(plain.structure, [*plain.supports, *dashpots], damping=damping), matrix
+    return plain.altered(supports=[*plain.supports, *dashpots], damping=damping), matrix
 
 
 @pytest.mark.parametrize("method", ["direct", "modal", "harmonic"])
 @pytest.mark.parametrize("name", CASES)
 def test_two_masses(name, method):
-    """Receptance by dense inversion of K - w^2 M + i w C, C written down by hand."""
-    case, c = damped(name)
-    s = 2j * np.pi * F[:, None, None]
-    exact = np.linalg.inv(s**2 * M + s * c + K)
-    found = fd.frf(case, fd.Force([1], (1, 0, 0)), F, method=method)
-    assert largest_error(found.receptance.values[:, 1:, 0], exact[:, :, 0]) < 1e-12
+    """Receptance by dense inversion of K - w^2 M + i w C, C written down by hand.
 
-
-@pytest.mark.parametrize("method", ["direct", "modal", "harmonic"])
-@pytest.mark.parametrize("name", CASES)
-def test_two_masses_on_a_moving_base(name, method):
-    """Absolute motion: the base pulls at the first spring, the ground at its dashpots."""
+    On a moving base absolute motion: the base pulls at the first spring, the ground at dashpots.
+    """
     case, c = damped(name)
     w = 2 * np.pi * F[:, None]
-    ground = {"ground": np.array([C, 0.0]), "both": np.array([C, C])}.get(name, np.zeros(2))
-    alpha = case.rayleigh.alpha
-    load = (w**2 - 1j * w * alpha) * np.diag(M) - 1j * w * ground
     matrix = K - w[:, :, None] ** 2 * M + 1j * w[:, :, None] * c
+    found = fd.frf(case, fd.Force([1], (1, 0, 0)), F, method=method).receptance
+    assert largest_error(found.values[:, 1:, 0], np.linalg.inv(matrix)[:, :, 0]) < 1e-12
+    ground = {"ground": np.array([C, 0.0]), "both": np.array([C, C])}.get(name, np.zeros(2))
+    load = (w**2 - 1j * w * case.rayleigh.alpha) * np.diag(M) - 1j * w * ground
     exact = 1.0 + np.linalg.solve(matrix, load[:, :, None])[:, :, 0]
-    found = fd.frf(case, fd.BaseMotion("x"), F, method=method)
-    assert largest_error(found.transmissibility.values[:, 1:, 0], exact) < 1e-12
+    found = fd.frf(case, fd.BaseMotion("x"), F, method=method).transmissibility
+    assert largest_error(found.values[:, 1:, 0], exact) < 1e-12
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -73,17 +63,14 @@ def test_ratios_of_modes(name):
 
 def test_at_a_resonance_that_only_modal_damping_limits():
     """The undamped matrix is singular there, and Woodbury's formula alone would fail."""
-    plain = chain()
-    case = fd.Case(plain.structure, plain.supports, damping=fd.ModalDamping(0.02))
-    peaks = np.sqrt(VALUES) / (2 * np.pi)
+    case = chain().altered(damping=fd.ModalDamping(0.02))
+    squares = VALUES[:, None]  # of w, at each resonance
+    modal = VALUES - squares + 0.04j * np.sqrt(squares * VALUES)
+    exact = (SHAPES[0] ** 2 / modal).sum(axis=1)
     for method in ("direct", "modal"):
-        found = fd.frf(case, fd.Force([1], (1, 0, 0)), peaks, method=method)
-        for k in range(2):
-            own = SHAPES[0, k] ** 2 / (0.04j * VALUES[k])
-            other = SHAPES[0, 1 - k] ** 2 / (
-                VALUES[1 - k] - VALUES[k] + 0.04j * np.sqrt(VALUES[k] * VALUES[1 - k])
-            )
-            assert complex(found.receptance[k, 1, 0]) == pytest.approx(own + other, rel=1e-9)
+        f = np.sqrt(VALUES) / (2 * np.pi)
+        found = fd.frf(case, fd.Force([1], (1, 0, 0)), f, method=method).receptance
+        np.testing.assert_allclose(found.values[:, 1, 0], exact, rtol=1e-9)
 
 
 @pytest.mark.parametrize("full", [False, True])
@@ -105,33 +92,18 @@ def test_a_matrix_that_only_modal_damping_makes_regular(size, full, monkeypatch)
         assert np.isnan(other).all()
 
 
-def test_half_power_of_the_peaks():
-    """The bandwidth of well separated peaks gives the ratios back."""
-    case, _ = damped("modal")
-    for value, ratio in zip(np.sqrt(VALUES) / (2 * np.pi), (0.02, 0.05), strict=True):
-        f = np.linspace(0.85 * value, 1.15 * value, 200)
-        found = fd.frf(case, fd.Force([1], (1, 0, 0)), f).receptance[:, 1, 0].values
-        assert half_power(f, np.abs(found)).damping_ratio == pytest.approx(ratio, rel=0.03)
-
-
 @pytest.mark.parametrize("method", ["direct", "modal"])
 @pytest.mark.parametrize("model", ["bars", "shell"])
 def test_ratios_of_rayleigh_give_its_response(model, method):
     """Bars and hinges and the shell: Rayleigh's ratios of all modes are Rayleigh."""
-    if model == "bars":
-        plain = miura_case(beta=1e-3)
-    else:
+    plain = miura_case(beta=1e-3)
+    if model == "shell":
         pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=80)
         s = fd.shell(pattern, fd.Sheet(1e5, 0.25, 0.01, 1.0), divisions=2, fold_law="linear")
         plain = fd.Case(s, [fd.Fix([0, 1]), fd.Fix([4], "z")], damping=fd.Rayleigh(0.5, 1e-3))
-    count = len(plain.free_dofs)
-    modes = fd.modes(plain, count)
-    case = fd.Case(
-        plain.structure, plain.supports,
-        damping=fd.ModalDamping(modes.damping_ratio.values.tolist()),
-    )  # fmt: skip
-    f = np.linspace(0.5, 1.5, 7) * float(modes.frequency[1])
-    drive = fd.Force([3], (0, 0, 1.0))
+    modes = fd.modes(plain, len(plain.free_dofs))
+    case = plain.altered(damping=fd.ModalDamping(modes.damping_ratio.values.tolist()))
+    f, drive = np.linspace(0.5, 1.5, 7) * float(modes.frequency[1]), fd.Force([3], (0, 0, 1.0))
     both = [fd.frf(one, drive, f, method=method).receptance.values for one in (plain, case)]
     assert largest_error(both[1], both[0]) < 1e-7
 
@@ -142,52 +114,36 @@ def test_creases_on_a_fold(model, method):
     """One flap on a crease of k and c per meter: the response of one degree of freedom."""
     k, c = 0.05, 2e-3
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=120)
-    sheet = fd.Sheet(1e9, 0.25, 0.01, 1.0)
+    sheet, laws = fd.Sheet(1e9, 0.25, 0.01, 1.0), {"fold_law": "linear", "crease_stiffness": k}
     if model == "bars":
-        s = fd.discretize(
-            pattern,
-            sheet,
-            fold_law="linear",
-            bend_law="linear",
-            crease_stiffness=k,
-            preset="herkal",
-        )
+        s = fd.discretize(pattern, sheet, bend_law="linear", preset="herkal", **laws)
     else:
-        s = fd.shell(pattern, sheet, divisions=2, fold_law="linear", crease_stiffness=k)
-    held = np.flatnonzero(s.nodes[:, 0] <= s.nodes[2, 0] + 1e-9).tolist()
-    case = fd.Case(s, [fd.Fix(held)], damping=fd.CreaseDamping(c))
-    turning = np.setdiff1d(np.arange(len(s.nodes)), held)
-    arm = s.nodes[turning] - s.nodes[2]
-    arm[:, 1] = 0.0
-    inertia = (s.nodal_mass[turning] * (arm**2).sum(axis=1)).sum()
-    normal = np.array([-arm[-1, 2], 0.0, arm[-1, 0]]) / np.linalg.norm(arm[-1])
-    reach = float(np.linalg.norm(s.nodes[4] - s.nodes[2]))
+        s = fd.shell(pattern, sheet, divisions=2, **laws)
+    arm = (s.nodes - s.nodes[2]) * [1, 0, 1]
+    turning = s.nodes[:, 0] > s.nodes[2, 0] + 1e-9
+    case = fd.Case(s, [fd.Fix(np.flatnonzero(~turning))], damping=fd.CreaseDamping(c))
+    inertia = (s.nodal_mass[turning] * (arm[turning] ** 2).sum(axis=1)).sum()
+    reach = np.linalg.norm(arm[4])
+    normal = np.array([-arm[4, 2], 0.0, arm[4, 0]]) / reach
     w = np.linspace(0.5, 1.5, 9) * np.sqrt(k / inertia)
-    exact = reach / 2 * (reach / (k - w**2 * inertia + 1j * w * c))  # two nodes, half the load each
+    exact = reach**2 / (k - w**2 * inertia + 1j * w * c)
     found = fd.frf(case, fd.Force([4, 5], normal), w / (2 * np.pi), method=method)
-    along = found.receptance.values[:, 4] @ normal
-    assert largest_error(along, 2 * exact / 1.0) < 3e-3
+    assert largest_error(found.receptance.values[:, 4] @ normal, exact) < 3e-3
 
 
 def test_in_time():
     """The burst of an impulse with all kinds of damping: the linear response."""
-    s = smooth_miura()
-    supports = [fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2, 6, 8], "z"), fd.Fix([1], "y")]
-    more = [fd.Dashpot(0.02, nodes=[7], direction="x"), fd.Dashpot(0.01, between=(1, 7))]
+    dashpots = [fd.Dashpot(0.02, nodes=[7], direction="x"), fd.Dashpot(0.01, between=(1, 7))]
     damping = [fd.Rayleigh(0.8), fd.CreaseDamping(1e-3), fd.ModalDamping(0.02, 3)]
-    case = fd.Case(s, [*supports, *more], damping=damping)
-    f = np.arange(0.2, 2.0, 0.2)
-    drive = fd.Force([7], (1e-5, 0, 0))
+    plain = miura_case()
+    case = plain.altered(supports=[*plain.supports, *dashpots], damping=damping)
+    drive, f = fd.Force([7], (1e-5, 0, 0)), np.arange(0.2, 2.0, 0.2)
     exact = fd.frf(case, drive, f).receptance.values
     found = fd.frf(case, drive, f, method="impulse", integrator="newmark", dt=0.01)
     assert largest_error(found.receptance.values, exact) < 5e-3
-
-
-def test_stepped_sine_refuses_modes_of_the_start():
-    case = miura_case()
-    case = fd.Case(case.structure, case.supports, damping=fd.ModalDamping(0.1, 2, "start"))
+    begun = plain.altered(damping=fd.ModalDamping(0.1, 2, "start"))
     with pytest.raises(fd.errors.InputError, match="K0 or modes where the one before has ended"):
-        fd.frf(case, fd.Force([7], (1e-5, 0, 0)), [1.0], method="stepped_sine")
+        fd.frf(begun, drive, [1.0], method="stepped_sine")
 
 
 @pytest.mark.parametrize("method", ["direct", "harmonic"])
@@ -216,16 +172,3 @@ def test_modal_damping_fills_the_matrix_where_that_is_cheaper(count, method, mon
         matrix = matrix.toarray() + 1j * omega * (system.modal.T @ system.modal)
         exact = system.expanded(np.linalg.solve(matrix, load)[:, None])[:, 0]
         assert largest_error(found.receptance.values[k].ravel(), exact) < 1e-9
-
-
-@pytest.mark.parametrize("share", [0.05, 0.3, 1.0])
-def test_both_forms_of_modal_damping_give_one_response(share, monkeypatch):
-    plain = miura_case(beta=1e-4)
-    count = max(1, int(share * len(plain.free_dofs))) if share < 1.0 else None
-    case = replace(plain, damping=[plain.rayleigh, fd.ModalDamping(0.02, count)])
-    f = np.linspace(0.5, 3.0, 7) * float(fd.modes(plain, 1).frequency[0])
-    found = []
-    for full in (False, True):
-        monkeypatch.setattr(Gram, "fills", lambda self, matrix, full=full: full)
-        found.append(fd.frf(case, fd.Force([7], (0, 0, 1)), f).receptance.values)
-    assert largest_error(found[1], found[0]) < 1e-9

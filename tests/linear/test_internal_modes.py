@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import foldyn as fd
 from foldyn.errors import InputError
@@ -22,11 +23,8 @@ def edged(pattern, **options):
     return fd.discretize(pattern, SHEET, preset="n5b8e", **{"fold_law": "linear", **options})
 
 
-def miura(turn=None, **case):
-    pattern = fd.patterns.miura(cells=(1, 1), panel_angle=60, dihedral=80)
-    if turn is not None:
-        pattern = fd.Pattern(pattern.vertices @ turn.T, pattern.faces, pattern.assignments)
-    return fd.Case(edged(pattern), **case)
+def miura(**case):
+    return fd.Case(edged(fd.patterns.miura(cells=(1, 1), panel_angle=60, dihedral=80)), **case)
 
 
 def true(pattern, supports, count=5, **options):
@@ -55,26 +53,23 @@ def test_a_free_square_panel():
     assert np.abs(without[1:]).min() > 0.25
 
 
-def test_a_panel_held_along_an_edge():
-    """Beside a crease, whose other panel is free."""
+ALONG = [fd.Fix([0, 1], along=True)]  # of an edge beside a crease, whose other panel is free
+HELD = [fd.Fix([0, 1, 2, 3])]  # a panel, which is rigid
 
-    def along(s):
-        rows = [row for row in s.edge_nodes if {int(row[0]), int(row[-1])} == {0, 1}]
-        return [fd.Fix(np.unique(rows).tolist())]
 
-    expected = true(FOLD, along)
-    case = fd.Case(edged(FOLD, straight=[(0, 1)]), along(edged(FOLD)))
+@pytest.mark.parametrize(
+    ("supports", "shell", "plates", "close", "missing"),
+    [
+        (ALONG, {}, {"straight": [(0, 1)]}, 0.035, [4]),
+        (HELD, {"rigid": [0]}, {"rigid": [0]}, 0.04, [2, 3, 4]),
+    ],
+)
+def test_a_panel_that_swings(supports, shell, plates, close, missing):
+    expected = true(FOLD, lambda s: supports, **shell)
+    case = fd.Case(edged(FOLD, **plates), supports)
     without, found = (frequencies(case, k)[:5] / expected - 1.0 for k in (0, 3))
-    np.testing.assert_allclose(found, 0.0, atol=0.035)
-    assert without[4] > 0.2
-
-
-def test_a_panel_that_swings_on_a_rigid_one():
-    expected = true(FOLD, lambda s: [fd.Fix([0, 1, 2, 3])], rigid=[0])
-    case = fd.Case(edged(FOLD, rigid=[0]), [fd.Fix([0, 1, 2, 3])])
-    without, found = (frequencies(case, k)[:5] / expected - 1.0 for k in (0, 3))
-    np.testing.assert_allclose(found, 0.0, atol=0.04)
-    assert without[2:].min() > 0.2
+    np.testing.assert_allclose(found, 0.0, atol=close)
+    assert without[missing].min() > 0.2
 
 
 def test_shapes_between_the_nodes():
@@ -169,22 +164,11 @@ def test_without_amplitudes_nothing_changes():
     assert "internal" not in other.attrs
 
 
-def test_a_turned_pattern():
-    a, b = 0.7, 1.1
-    turn = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]) @ np.array(
-        [[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]]
-    )
-    one, other = (frequencies(miura(by), 3, 14) for by in (None, turn))
-    np.testing.assert_allclose(one, other, rtol=1e-6)
-
-
 def test_a_turned_state():
     """Amplitudes act along the normals of the panels in the state."""
     case = miura()
-    a = 1.0
-    turn = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
-    x = case.structure.nodes
-    moved = fd.State(displacement=x @ turn.T - x)
+    x, turn = case.structure.nodes, Rotation.from_euler("y", 1.0).as_matrix()
+    moved = fd.State(displacement=x @ turn - x)
     one, other = (fd.modes(case, 14, state, internal=3).frequency for state in (None, moved))
     np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9)
 
@@ -245,22 +229,25 @@ def test_a_base_moves_all_that_stands_on_it():
 # ---------------------------------------------------------------------------- messages
 
 
-def test_what_is_refused():
-    case = miura()
-    with pytest.raises(InputError, match="internal = 7: must be at most 6"):
-        fd.modes(case, 4, internal=7)
-    with pytest.raises(InputError, match="internal = -1: must be a whole number, at least 0"):
-        fd.modes(case, 4, internal=-1)
-    with pytest.raises(InputError, match=r'internal = 2: .* discretize with preset = "n5b8e"'):
-        fd.modes(fd.Case(fd.discretize(FOLD, SHEET)), 4, internal=2)
-    with pytest.raises(InputError, match=r"internal = 2: .*scheme n5b8e"):
-        fd.modes(fd.Case(fd.shell(FOLD, SHEET, 4)), 4, internal=2)
-    with pytest.raises(InputError, match='the mass is "bubble"; take mass = "condensed"'):
-        fd.modes(fd.Case(edged(FOLD, mass="bubble")), 4, internal=2)
-    with pytest.raises(InputError, match="the mass is given by nodes"):
-        fd.modes(fd.Case(replace(edged(FOLD), node_mass=np.ones(8))), 4, internal=2)
+BUBBLE = 'the mass is "bubble"; take mass = "condensed"'
+
+
+@pytest.mark.parametrize(
+    ("structure", "internal", "message"),
+    [
+        (edged(FOLD), 7, "internal = 7: must be at most 6"),
+        (edged(FOLD), -1, "internal = -1: must be a whole number, at least 0"),
+        (fd.discretize(FOLD, SHEET), 2, r'internal = 2: .* discretize with preset = "n5b8e"'),
+        (fd.shell(FOLD, SHEET, 4), 2, r"internal = 2: .*scheme n5b8e"),
+        (edged(FOLD, mass="bubble"), 2, BUBBLE),
+        (replace(edged(FOLD), node_mass=np.ones(8)), 2, "the mass is given by nodes"),
+    ],
+)
+def test_what_is_refused(structure, internal, message):
+    with pytest.raises(InputError, match=message):
+        fd.modes(fd.Case(structure), 4, internal=internal)
     with pytest.raises(InputError, match=r'internal = 3: .* method = "direct" or "modal"'):
-        fd.frf(case, fd.Force([8], (0, 0, 1)), [1.0], method="harmonic", internal=3)
+        fd.frf(miura(), fd.Force([8], (0, 0, 1)), [1.0], method="harmonic", internal=3)
 
 
 def test_results_are_kept(tmp_path):
@@ -269,5 +256,5 @@ def test_results_are_kept(tmp_path):
     again = fd.load(tmp_path / "modes.nc")
     assert again.attrs["internal"] == 3
     np.testing.assert_array_equal(again.internal_share, found.internal_share)
-    case = fd.case_of(again)
-    np.testing.assert_allclose(fd.modes(case, 8, internal=3).frequency, found.frequency)
+    same = fd.modes(fd.case_of(again), 8, internal=3)
+    np.testing.assert_allclose(same.frequency, found.frequency)

@@ -10,6 +10,7 @@ import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.linear import mac, modes, pair_modes
 
+HELD = [fd.Fix([0, 1, 2], "xyz")]
 RNG = np.random.default_rng(3)
 STRAIGHT = {"fold_law": "linear", "bend_law": "linear"}
 
@@ -25,34 +26,26 @@ def test_by_hand():
 
 
 def test_symmetric_with_a_unit_diagonal_whatever_the_scale():
-    a = some()
+    a, b = some(), some(3)
     values = mac(a, a)
     np.testing.assert_allclose(values, values.T, rtol=1e-14)
     np.testing.assert_allclose(values.diagonal(), 1.0, rtol=1e-14)
     assert (values >= 0).all() and (values <= 1).all()
     scaled = a * np.array([2.0, -0.3, 1e6, -1e-9])[:, None, None]
     np.testing.assert_allclose(mac(scaled, a), values, rtol=1e-12)
-    b = some(3)
     np.testing.assert_allclose(mac(a, b), mac(b, a).T, rtol=1e-14)
+    np.testing.assert_allclose(mac(a[:, :, 0], a[:, :, 0]), mac(a[:, :, :1], a[:, :, :1]))
+    a[1] = 0.0  # a shape that does not move
+    np.testing.assert_array_equal(np.isnan(mac(a, b)), np.arange(4)[:, None] == [1, 1, 1])
 
 
 @pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
 def test_modes_are_orthogonal_in_the_mass(mass):
-    case = fd.Case(body("miura", mass=mass, **STRAIGHT), [fd.Fix([0, 1, 2], "xyz")])
-    found = modes(case, 8)
-    weighted = mac(found, found, mass=case.structure.mass)
-    np.testing.assert_allclose(weighted, np.eye(8), atol=1e-12)
+    s = body("miura", mass=mass, **STRAIGHT)
+    found = modes(fd.Case(s, HELD), 8)
+    for given in (s.mass, flat(s.mass), *([s.mass.diagonal()] if mass != "consistent" else [])):
+        np.testing.assert_allclose(mac(found, found, mass=given), np.eye(8), atol=1e-12)
     assert np.abs(mac(found, found) - np.eye(8)).max() > 1e-4  # without it they are not
-
-
-def test_lumped_masses_as_a_list():
-    case = fd.Case(body("eggbox", **STRAIGHT), [fd.Fix([0, 1, 2], "xyz")])
-    found = modes(case, 5)
-    listed = mac(found, found, mass=case.structure.mass.diagonal())
-    np.testing.assert_allclose(listed, mac(found, found, mass=case.structure.mass), atol=1e-15)
-    np.testing.assert_allclose(
-        listed, mac(found, found, mass=flat(case.structure.mass)), atol=1e-15
-    )
 
 
 def test_complex_shapes():
@@ -67,7 +60,7 @@ def test_complex_shapes():
 def test_common_nodes_of_two_models():
     """N4B5 and N5B8 share the vertices, whose numbers are the same."""
     five, four = (body("miura", scheme, **STRAIGHT) for scheme in ("n5b8", "n4b5"))
-    a, b = (modes(fd.Case(s, [fd.Fix([0, 1, 2], "xyz")]), 3) for s in (five, four))
+    a, b = (modes(fd.Case(s, HELD), 3) for s in (five, four))
     shared = np.arange(25)
     values = mac(a, b, nodes=shared)
     np.testing.assert_array_equal(values, mac(a["shape"].values[:, :25], b))
@@ -76,19 +69,6 @@ def test_common_nodes_of_two_models():
     np.testing.assert_array_equal(mac(a, turned, nodes=(shared, shared[::-1])), values)
     with pytest.raises(InputError, match=r"41 nodes .* 25 .* give nodes ="):
         mac(a, b)
-
-
-def test_measured_along_one_axis():
-    a = some(axes=3)
-    np.testing.assert_allclose(mac(a[:, :, 0], a[:, :, 0]), mac(a[:, :, :1], a[:, :, :1]))
-
-
-def test_a_shape_that_does_not_move():
-    a = some(2)
-    a[1] = 0.0
-    values = mac(a, a)
-    assert np.isnan(values[1]).all() and np.isnan(values[:, 1]).all()
-    assert values[0, 0] == pytest.approx(1.0)
 
 
 def test_pairs():

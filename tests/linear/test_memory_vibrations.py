@@ -71,22 +71,21 @@ def test_creep_is_a_dashpot_to_small_vibrations():
 
 def test_modes_of_a_sheet_solve_their_equation():
     """Every mode of a Miura sheet with a memory of its folds and its bends, to rounding."""
-    pattern = fd.patterns.miura((2, 2), 0.05, 0.05, dihedral=120)
-    laws = {
-        "fold_law": fd.Prony([0.5, 0.2], [0.02, 0.3]),
-        "bend_law": fd.Prony(0.3, 0.01, "linear"),
-    }
-    structure = fd.discretize(pattern, fd.Sheet(1e9, 0.3, 5e-4, 1000.0), **laws)
+    pattern, sheet = (
+        fd.patterns.miura((2, 2), 0.05, 0.05, dihedral=120),
+        fd.Sheet(1e9, 0.3, 5e-4, 1e3),
+    )
+    folds, bends = fd.Prony([0.5, 0.2], [0.02, 0.3]), fd.Prony(0.3, 0.01, "linear")
+    structure = fd.discretize(pattern, sheet, fold_law=folds, bend_law=bends)
     case = fd.Case(structure, [fd.Fix([0, 1, 2, 3, 4], "xyz")])
     system, found = linearize(case), fd.modes(case, 5)
     assert system.branches is not None
     assert system.branches.share.shape == (len(structure.folds) + len(structure.bends), 2)
-    for k in range(5):
-        ratio, omega = float(found.damping_ratio[k]), np.sqrt(float(found.eigenvalue[k]))
+    for ratio, value in zip(found.damping_ratio.values, found.eigenvalue.values, strict=True):
         assert 0.0 < ratio < 0.2
-        s = omega * (-ratio + 1j * np.sqrt(1.0 - ratio**2))
+        s = np.sqrt(value) * (-ratio + 1j * np.sqrt(1.0 - ratio**2))
         matrix = system.stiffness + system.branches.stiffness(s) + s**2 * system.mass
         values = np.linalg.eigvals(np.linalg.solve(system.mass.toarray(), matrix.toarray()))
         assert np.abs(values).min() < 1e-7 * np.abs(values).max()
-    plain = fd.modes(fd.Case(fd.discretize(pattern, structure.sheet), case.supports), 5)
+    plain = fd.modes(fd.Case(fd.discretize(pattern, sheet), case.supports), 5)
     assert (found.frequency.values > plain.frequency.values).all()

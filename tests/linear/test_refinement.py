@@ -9,6 +9,7 @@ import pytest
 from xarray import Dataset
 
 import foldyn as fd
+from case_texts import HELD_MIURA_TEXT
 from foldyn.algebra.extrapolation import SETTLED, convergence, doubt, extrapolated, limits
 from foldyn.analyses.provenance import mesh_error
 from foldyn.linear import refinement
@@ -97,9 +98,8 @@ def test_a_coarse_mesh_without_modes():
     found = refinement(fd.Case(fd.shell(square, SHEET, 4), [fd.Fix([0, 1, 2, 3])]))
     assert found is not None and np.isnan(found.error) and np.isnan(found.frequencies[0]).all()
     told = fd.modes(fd.Case(fd.shell(square, replace(SHEET, density=1.0), 2)), 1)
-    assert "cannot be judged: with 1 piece of every edge" in mesh_error(
-        told.assign_attrs(found.facts())
-    )
+    said = mesh_error(told.assign_attrs(found.facts()))
+    assert "cannot be judged: with 1 piece of every edge" in said
 
 
 def test_where_there_is_nothing_to_compare_with():
@@ -109,28 +109,17 @@ def test_where_there_is_nothing_to_compare_with():
     assert refinement(miura(3, only_there)) is None
 
 
-def test_results_of_case_files_say_it(tmp_path):
+def test_results_of_case_files_say_it(read, tmp_path):
     """As attributes, on the page, and by the command; not of bars and hinges."""
-    text = """
-[pattern]
-kind = "miura"
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-[[supports]]
-nodes = "xmin"
-[[loads]]
+    text = f"""{HELD_MIURA_TEXT}[[loads]]
 nodes = [7]
 force = [1e-3, 0, 0]
 [analysis]
 kind = "statics"
 load_factors = [1.0]
 """
-    (tmp_path / "case.toml").write_text(text)
-    assert "mesh_error" not in fd.read_case(tmp_path / "case.toml").run().attrs
-    (tmp_path / "case.toml").write_text(text + '[model]\nkind = "shell"\ndivisions = 4\n')
-    path = fd.read_case(tmp_path / "case.toml").run()
+    assert "mesh_error" not in read(text).run().attrs
+    path = read(f'{text}[model]\nkind = "shell"\ndivisions = 4\n').run()
     found = refinement(fd.case_of(path))
     assert found is not None and path.attrs["mesh_error"] == pytest.approx(found.error)
     assert path.attrs["extrapolated"] == pytest.approx(found.extrapolated)

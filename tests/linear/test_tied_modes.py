@@ -46,15 +46,10 @@ def test_modes_of_a_turned_structure(model) -> None:
     assert other.complete == one.complete
 
 
-@pytest.mark.parametrize("model", MODELS)
-def test_effective_masses_add_up(model) -> None:
+def test_effective_masses_add_up() -> None:
     """To what can move along each axis: all modes together, also where directions are held."""
-    case = pair(model)[1]
-    count = len(case.free_dofs)
-    if count > 60:
-        case = pair("bars")[1]
-        count = len(case.free_dofs)
-    found = fd.modes(case, count)
+    case = pair("bars")[1]
+    found = fd.modes(case, len(case.free_dofs))
     np.testing.assert_allclose(found.effective_mass.sum("mode"), found.free_mass, rtol=1e-9)
     assert (found.free_mass < case.structure.total_mass).all()
 
@@ -62,21 +57,18 @@ def test_effective_masses_add_up(model) -> None:
 @pytest.mark.parametrize("model", MODELS)
 def test_responses_of_a_turned_structure(model) -> None:
     """To forces, and to a base that moves along the turned axis by its parts."""
-    frequencies = np.linspace(0.2, 6.0, 9)
-    load = np.array([-1.0, 0.2, 0.0])
+    f, load = np.linspace(0.2, 6.0, 9), np.array([-1.0, 0.2, 0.0])
     plain, oblique = pair(model)
-    one = fd.frf(plain, fd.Force([0, 1], load), frequencies).receptance.values
-    other = fd.frf(oblique, fd.Force([0, 1], TURN @ load), frequencies).receptance.values
-    scale = np.abs(load).sum() / np.abs(TURN @ load).sum()  # they are per unit of these
-    ratio = float(np.abs(one @ TURN.T).max() / np.abs(other).max())
-    np.testing.assert_allclose(one @ TURN.T, ratio * other, atol=1e-7 * np.abs(one).max())
-    assert ratio == pytest.approx(1.0, rel=1e-7) or ratio == pytest.approx(1.0 / scale, rel=1e-7)
+    one = fd.frf(plain, fd.Force([0, 1], load), f).receptance.values @ TURN.T
+    other = fd.frf(oblique, fd.Force([0, 1], TURN @ load), f).receptance.values
+    ratio = float(np.abs(one).max() / np.abs(other).max())
+    np.testing.assert_allclose(one, ratio * other, atol=1e-7 * np.abs(one).max())
+    scale = np.abs(TURN @ load).sum() / np.abs(load).sum()  # they are per unit of these
+    assert min(abs(ratio - 1.0), abs(ratio / scale - 1.0)) < 1e-7
     # absolute motions to a base along each old axis, summed to one along a new one
-    axes = {axis: fd.frf(plain, fd.BaseMotion(axis), frequencies).transmissibility.values
-            for axis in "xz"}  # fmt: skip
-    axes["y"] = fd.frf(plain, fd.BaseMotion("y"), frequencies).transmissibility.values
-    moved = sum(TURN[2, k] * axes[axis] for k, axis in enumerate("xyz")) @ TURN.T
-    found = fd.frf(oblique, fd.BaseMotion("z"), frequencies).transmissibility.values
+    axes = [fd.frf(plain, fd.BaseMotion(axis), f).transmissibility.values for axis in "xyz"]
+    moved = np.tensordot(TURN[2], axes, 1) @ TURN.T
+    found = fd.frf(oblique, fd.BaseMotion("z"), f).transmissibility.values
     np.testing.assert_allclose(found, moved, atol=1e-6 * np.abs(moved).max())
 
 
@@ -98,35 +90,36 @@ def test_methods_agree_with_links_and_directions(method) -> None:
 
 def test_springs_in_parallel() -> None:
     """Masses m1, m2 on springs k1, k2, linked along the springs: (k1 + k2) / (m1 + m2)."""
-    length, area, stiffness = 2.0, 1e-4, (100.0, 60.0)
+    k, length, area = np.array([100.0, 60.0]), 2.0, 1e-4
     s = fd.Structure(
-        nodes=np.array([[0, 0, 0], [length, 0, 0], [0, 1, 0], [length, 1, 0]], float),
-        bars=np.array([[0, 1], [2, 3]]),
-        bar_area=area * np.array(stiffness) / stiffness[0],
-        sheet=fd.Sheet(stiffness[0] * length / area, 0.3, 0.01),
+        np.array([[0, 0, 0], [length, 0, 0], [0, 1, 0], [length, 1, 0]], float),
+        np.array([[0, 1], [2, 3]]), area * k / k[0], fd.Sheet(k[0] * length / area, 0.3, 0.01),
         node_mass=np.array([1.0, 0.5, 1.0, 0.4]),
-    )
+    )  # fmt: skip
     case = fd.Case(s, [fd.Fix([0, 2]), fd.Fix([1, 3], "yz"), fd.Link([1, 3], axes="x")])
     found = fd.modes(case, 1)
-    expected = np.sqrt(sum(stiffness) / 0.9) / (2.0 * np.pi)
+    expected = np.sqrt(k.sum() / 0.9) / (2.0 * np.pi)
     assert found.frequency.item(0) == pytest.approx(expected, rel=1e-12)
     np.testing.assert_allclose(found["shape"].values[0, [1, 3], 0], 1.0 / np.sqrt(0.9), rtol=1e-12)
 
 
 def test_bends_of_rigid_panels_are_not_soft() -> None:
     """Only hinges that can turn are counted, and the modes are proper without a secant."""
-    pattern = fd.patterns.simple_fold()
     supports = [fd.Fix([4, 5]), fd.Fix([0, 1], "z")]
-    soft = fd.discretize(pattern, SHEET, fold_law="linear", preset="herkal")
-    with pytest.warns(fd.errors.FoldynWarning, match="8 hinges of the superlinear law"):
-        assert linearize(fd.Case(soft, supports)).soft == 8
-    half = fd.discretize(pattern, SHEET, fold_law="linear", rigid=[1], preset="herkal")
-    with pytest.warns(fd.errors.FoldynWarning, match="4 hinges of the superlinear law"):
-        assert linearize(fd.Case(half, supports)).soft == 4
-    rigid = fd.Case(
-        fd.discretize(pattern, SHEET, fold_law="linear", rigid="all", preset="herkal"), supports
+
+    def case(rigid):
+        s = fd.discretize(
+            fd.patterns.simple_fold(), SHEET, fold_law="linear", rigid=rigid, preset="herkal"
+        )
+        return fd.Case(s, supports)
+
+    for rigid, soft in ((None, 8), ([1], 4)):
+        with pytest.warns(fd.errors.FoldynWarning, match=f"{soft} hinges of the superlinear law"):
+            assert linearize(case(rigid)).soft == soft
+    assert linearize(case("all")).soft == 0
+    drive = fd.Force([0, 1], (1e-3, 0.0, 0.0))
+    direct, balanced = (
+        fd.frf(case("all"), drive, [1.0], method=method).receptance
+        for method in ("direct", "harmonic")
     )
-    assert linearize(rigid).soft == 0
-    direct = fd.frf(rigid, fd.Force([0, 1], (1e-3, 0.0, 0.0)), [1.0]).receptance
-    balanced = fd.frf(rigid, fd.Force([0, 1], (1e-3, 0.0, 0.0)), [1.0], method="harmonic")
-    np.testing.assert_allclose(balanced.receptance, direct, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(balanced, direct, rtol=1e-9, atol=1e-12)

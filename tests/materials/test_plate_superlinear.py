@@ -10,11 +10,12 @@ from scipy.integrate import quad
 
 import foldyn as fd
 from case_texts import HELD_MIURA_TEXT
+from foldyn import checks
 from foldyn.errors import InputError
 from foldyn.materials import PlateSuperlinear, Superlinear
 from foldyn.materials.plate_superlinear import SQUARE
 
-SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
+SHEET, HELD = fd.Sheet(1e6, 0.25, 0.01, density=1.0), fd.Fix("xmin", "xyz")
 
 
 def structure(**options):
@@ -74,20 +75,14 @@ def test_onset_of_a_square_panel():
 def test_force_and_tangent_are_derivatives(scale):
     """Small and large motions, bends with onsets of their own: central differences."""
     s = structure(scheme="n5b8")
-    rng = np.random.default_rng(1)
-    u, v = scale * 0.1 * rng.standard_normal((2, *s.nodes.shape))
-    h = 1e-4
-    force = (s.energy(u + h * v) - s.energy(u - h * v)) / (2 * h)
-    assert float((s.internal_force(u) * v).sum()) == pytest.approx(force, rel=1e-6)
-    stiffness = (s.internal_force(u + h * v) - s.internal_force(u - h * v)).ravel() / (2 * h)
-    found = s.tangent(u) @ v.ravel()
-    assert np.linalg.norm(found - stiffness) < 1e-5 * np.linalg.norm(stiffness)
+    u = scale * 0.1 * np.random.default_rng(1).standard_normal(s.nodes.shape)
+    assert checks.gradient_error(s.energy, s.internal_force, u) < 1e-6
+    assert checks.tangent_error(s.internal_force, s.tangent, u) < 1e-5
 
 
 def test_modes_at_rest_are_those_of_linear_bends():
-    supports = [fd.Fix("xmin", "xyz")]
     found, linear = (
-        fd.modes(fd.Case(structure(bend_law=law), supports), 6).frequency.values
+        fd.modes(fd.Case(structure(bend_law=law), [HELD]), 6).frequency.values
         for law in ("plate_superlinear", "linear")
     )
     np.testing.assert_allclose(found, linear, rtol=1e-9)
@@ -95,44 +90,31 @@ def test_modes_at_rest_are_those_of_linear_bends():
 
 @pytest.mark.parametrize("method", ["rk4", "generalized_alpha", "energy_momentum"])
 def test_motions_keep_their_energy(method):
-    case = fd.Case(
-        structure(),
-        [fd.Fix("xmin", "xyz")],
-        [fd.Force([7], (0.0, 0.0, 2e-3), fd.HalfSine(0.2))],
-    )
-    motion = fd.simulate(case, duration=0.5, method=method)
+    push = fd.Force([7], (0.0, 0.0, 2e-3), fd.HalfSine(0.2))
+    motion = fd.simulate(fd.Case(structure(), [HELD], [push]), duration=0.5, method=method)
     assert abs(motion.attrs["energy_error"]) < 5e-3
 
 
 def test_in_case_files_and_results(tmp_path):
-    text = (
-        HELD_MIURA_TEXT
-        + """\
-[model]
+    text = f"""{HELD_MIURA_TEXT}[model]
 calibration = "plate"
 bend_law = LAW
 [analysis]
 kind = "modes"
 count = 2
 """
-    )
-    for law in ('"plate_superlinear"', '{ kind = "plate_superlinear", onset = 3.0 }'):
-        (tmp_path / "case.toml").write_text(text.replace("LAW", law), "utf-8")
-        found = fd.read_case(tmp_path / "case.toml").run()
-        fd.save(found, tmp_path / "modes.nc")
+    kind, name = 'kind = "plate_superlinear"', "plate_superlinear"
+    for given, law, onset in (
+        (f'"{name}"', name, None), (f"{{ {kind} }}", PlateSuperlinear(), None),
+        (f"{{ {kind}, onset = 3.0 }}", PlateSuperlinear(onset=3.0), np.radians(3.0)),
+    ):  # fmt: skip
+        (tmp_path / "case.toml").write_text(text.replace("LAW", given), "utf-8")
+        fd.save(fd.read_case(tmp_path / "case.toml").run(), tmp_path / "modes.nc")
         again = fd.case_of(fd.load(tmp_path / "modes.nc")).structure
         kept = again.model.hinge_parameters[again.model.hinge_group == 1, 0]
-        own = again.bend_onset**-2.0 if "kind" not in law else np.radians(3.0) ** -2.0
-        np.testing.assert_allclose(np.sort(kept), np.sort(np.broadcast_to(own, kept.shape)))
-
-
-@pytest.mark.parametrize("law", [PlateSuperlinear(), PlateSuperlinear(onset=3.0)])
-def test_results_keep_a_law_object(tmp_path, law):
-    found = fd.modes(fd.Case(structure(bend_law=law), [fd.Fix("xmin", "xyz")]), 1)
-    fd.save(found, tmp_path / "modes.nc")
-    again = fd.case_of(fd.load(tmp_path / "modes.nc")).structure
-    assert again.options.bend_law == law
-    assert again.as_made
+        own = np.broadcast_to(onset or again.bend_onset, kept.shape) ** -2.0
+        np.testing.assert_allclose(np.sort(kept), np.sort(own))
+        assert again.options.bend_law == law and again.as_made
 
 
 def test_pictures_draw_each_bend_with_its_onset():

@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import foldyn as fd
 from foldyn.errors import InputError
-from foldyn.materials import (
-    BAR_LAWS,
-    HINGE_LAWS,
-    BarLaw,
-    HingeLaw,
-    MemoryLaw,
-    bar_law,
-    hinge_law,
-)
+from foldyn.materials import BAR_LAWS, HINGE_LAWS, BarLaw, HingeLaw, MemoryLaw, bar_law, hinge_law
 from foldyn.materials.switch import move_rest
 
-ROOT = Path(__file__).resolve().parents[2]
 STEP = 1e-5
 HINGES = {
     **{name: hinge_law(name) for name, law in HINGE_LAWS.items() if not issubclass(law, MemoryLaw)},
@@ -95,8 +85,7 @@ def test_codes_of_registered_laws_differ():
     """But for laws with memory, which have that of their elastic part."""
     elastic = [law for law in HINGE_LAWS.values() if not issubclass(law, MemoryLaw)]
     for laws in (BAR_LAWS.values(), elastic):
-        codes = [kind().code for kind in laws]
-        assert len(set(codes)) == len(codes)
+        assert len({kind().code for kind in laws}) == len(laws)
 
 
 @dataclass(frozen=True)
@@ -119,12 +108,7 @@ class Nameless(HingeLaw):
 
 @pytest.mark.parametrize(
     ("field", "law"),
-    [
-        ("bar_law", UnknownBar()),
-        ("fold_law", UnknownHinge()),
-        ("bend_law", UnknownHinge()),
-        ("fold_law", Nameless()),
-    ],
+    [("bar_law", UnknownBar()), ("bend_law", UnknownHinge()), ("fold_law", Nameless())],
 )
 def test_a_law_that_the_kernels_do_not_know_is_refused(field, law):
     pattern, sheet = fd.patterns.simple_fold(), fd.Sheet(1e6, 0.25, 0.01)

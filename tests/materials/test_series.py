@@ -14,11 +14,9 @@ from foldyn.materials.prony import in_series
 from foldyn.structures import ModelOptions
 
 OWN = fd.CustomHingeLaw(
-    energy_of=lambda t, r: 0.5 * (t - r) ** 2 + (t - r) ** 4,
-    moment_of=lambda t, r: (t - r) + 4.0 * (t - r) ** 3,
-    slope_of=lambda t, r: 1.0 + 12.0 * (t - r) ** 2,
-    name="own",
-)
+    lambda t, r: 0.5 * (t - r) ** 2 + (t - r) ** 4, lambda t, r: (t - r) + 4.0 * (t - r) ** 3,
+    lambda t, r: 1.0 + 12.0 * (t - r) ** 2, name="own",
+)  # fmt: skip
 SOFTNESS = 2.0  # rad/(N m)
 
 
@@ -46,8 +44,8 @@ def fold(law, rest, crease):
 
 
 @pytest.mark.parametrize(
-    "law", ["linear", "superlinear", OWN], ids=["linear", "superlinear", "own"],
-)  # fmt: skip
+    "law", ["linear", "superlinear", OWN], ids=["linear", "superlinear", "own"]
+)
 @pytest.mark.parametrize("rest", [60.0, 120.0])
 @pytest.mark.parametrize("stiff", [0.1, 5.0])
 def test_a_fold_is_its_crease_and_its_panels_in_series(law, rest, stiff):
@@ -69,12 +67,10 @@ def test_a_fold_is_its_crease_and_its_panels_in_series(law, rest, stiff):
 
 def test_a_law_that_locks_does_so_where_panels_meet():
     """Between its limits the fold is in series; beyond, its law is that of the hinge."""
-    law = fd.EnhancedLinear(theta1=75, theta2=285)
+    law, start = fd.EnhancedLinear(theta1=75, theta2=285), math.radians(120.0)
     structure, at = fold(law, 120.0, 5.0)
-    k, start = structure.fold_stiffness[0], math.radians(120.0)
-    for turned in (20.0, 100.0, 340.0):
-        theta = math.radians(turned)
-        energy = k * float(law.energy(theta, start))
+    for theta in np.radians([20.0, 100.0, 340.0]):
+        energy = structure.fold_stiffness[0] * float(law.energy(theta, start))
         assert structure.energies(at(theta))["strain_folds"] == pytest.approx(energy, rel=1e-9)
 
 

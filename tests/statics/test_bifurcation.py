@@ -5,28 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from trusses import APEX, VonMises, apex
+from trusses import VonMises, apex, marked, snapped
 
 import foldyn as fd
+from foldyn.algebra.superlu import SuperLU
 from foldyn.errors import InputError
-from foldyn.statics import Settings, switch_branch, trace
+from foldyn.statics import Settings, stability, switch_branch, trace
 
 pytestmark = pytest.mark.filterwarnings("ignore:the path loses stability")
 
 STEEP = VonMises(h=2.0)  # above sqrt(3) b: it gives way sideways first
 Z0 = np.sqrt(STEEP.h**2 - 2 * STEEP.b**2)  # height of the apex at the bifurcation
 CRITICAL = 2 * STEEP.EA * STEEP.b**2 * Z0 / STEEP.L**3
+FACTORS = [CRITICAL, STEEP.limit, -STEEP.limit, -CRITICAL]
 
 
 def down(method="arc_length", **given):
-    return trace(
-        STEEP.case(free="xz"),
-        method,
-        first_step=100.0,
-        steps=60,
-        until=lambda u, factor: u[APEX, 2] < -2.2 * STEEP.h,
-        **given,
-    )
+    return snapped(STEEP.case(free="xz"), method, first_step=100.0, steps=60, **given)
 
 
 @pytest.fixture(scope="module")
@@ -36,71 +31,47 @@ def path():
 
 @pytest.mark.parametrize("method", ["mgdcm", "arc_length"])
 def test_located_and_labelled(method):
-    path = down(method)
-    marked = path.isel(step=path.point.values != "regular")
-    assert marked.point.values.tolist() == ["bifurcation", "limit", "limit", "bifurcation"]
-    expected = np.array([CRITICAL, STEEP.limit, -STEEP.limit, -CRITICAL])
-    np.testing.assert_allclose(marked.load_factor, expected, rtol=1e-11)
+    found = marked(down(method))
+    assert found.point.values.tolist() == ["bifurcation", "limit", "limit", "bifurcation"]
+    np.testing.assert_allclose(found.load_factor, FACTORS, rtol=1e-11)
     heights = [STEEP.h - Z0, *STEEP.limit_at, STEEP.h + Z0]
-    np.testing.assert_allclose(-apex(marked), heights, rtol=1e-8)
-
-
-def test_symmetric_path_stays_symmetric(path):
-    assert np.abs(apex(path, "x")).max() < 1e-10
+    np.testing.assert_allclose(-apex(found), heights, rtol=1e-8)
 
 
 def test_stability_counts(path):
     """One for giving way sideways, between the bifurcations; one more between the limit points."""
-    v = -apex(path)
-    regular = path.point.values == "regular"
+    v, regular = -apex(path), path.point.values == "regular"
     sideways = (v > STEEP.h - Z0) & (v < STEEP.h + Z0)
-    downwards = (v > STEEP.limit_at[0]) & (v < STEEP.limit_at[1])
-    expected = sideways.astype(int) + downwards
+    expected = sideways + ((v > STEEP.limit_at[0]) & (v < STEEP.limit_at[1])).astype(int)
     assert set(expected[regular]) == {0, 1, 2}
     np.testing.assert_array_equal(path.negative_eigenvalues.values[regular], expected[regular])
+    assert np.abs(apex(path, "x")).max() < 1e-10  # the path stays symmetric
 
 
 def test_by_bisection_alone(monkeypatch):
     """Solvers that do not tell their pivots (PARDISO) locate by the count."""
-    from foldyn.algebra import superlu
-    from foldyn.statics import stability
-
-    found = []
-    plain = stability._bisected
+    found, plain, pivots = [], stability._bisected, SuperLU.pivots
     monkeypatch.setattr(stability, "_bisected", lambda *a: found.append(1) or plain(*a))
-    count = superlu.SuperLU.negative
-    pivots = superlu.SuperLU.pivots
-    monkeypatch.setattr(superlu.SuperLU, "negative", lambda self: int((pivots(self) < 0).sum()))
-    monkeypatch.setattr(superlu.SuperLU, "pivots", lambda self: None)
-    assert count is not superlu.SuperLU.negative
-    path = down()
+    monkeypatch.setattr(SuperLU, "negative", lambda self: int((pivots(self) < 0).sum()))
+    monkeypatch.setattr(SuperLU, "pivots", lambda self: None)
+    np.testing.assert_allclose(marked(down()).load_factor, FACTORS, rtol=1e-9)
     assert len(found) == 4
-    marked = path.isel(step=path.point.values != "regular")
-    np.testing.assert_allclose(
-        marked.load_factor, [CRITICAL, STEEP.limit, -STEEP.limit, -CRITICAL], rtol=1e-9
-    )
 
 
-@pytest.mark.parametrize("direction", [1, -1])
-def test_branch_is_the_circle(path, direction):
-    branch = switch_branch(path, case=STEEP.case(free="xz"), direction=direction, steps=40)
-    x, z = apex(branch, "x"), STEEP.h + apex(branch)
-    assert branch.point.values[0] == "bifurcation"
-    assert np.sign(x[1]) == direction
-    assert np.ptp(z) > 1.9 * Z0  # from one crossing to the other
-    np.testing.assert_allclose(x**2 + z**2, Z0**2, rtol=1e-8)
-    np.testing.assert_allclose(
-        branch.load_factor, 2 * STEEP.EA * STEEP.b**2 * z / STEEP.L**3, atol=1e-8 * CRITICAL
-    )
-    assert branch.attrs["branch_direction"] == direction
-
-
-def test_directions_are_mirror_images(path):
-    one, other = (
-        switch_branch(path, case=STEEP.case(free="xz"), direction=d, steps=10) for d in (1, -1)
-    )
-    np.testing.assert_allclose(apex(one, "x"), -apex(other, "x"), atol=1e-9)
-    np.testing.assert_allclose(apex(one), apex(other), atol=1e-9)
+def test_branch_is_the_circle(path):
+    """In both directions, which are mirror images."""
+    case, ends = STEEP.case(free="xz"), []
+    for direction in (1, -1):
+        branch = switch_branch(path, case=case, direction=direction, steps=40)
+        x, z = apex(branch, "x"), STEEP.h + apex(branch)
+        assert branch.point.values[0] == "bifurcation"
+        assert np.sign(x[1]) == direction == branch.attrs["branch_direction"]
+        assert np.ptp(z) > 1.9 * Z0  # from one crossing to the other
+        np.testing.assert_allclose(x**2 + z**2, Z0**2, rtol=1e-8)
+        load = 2 * STEEP.EA * STEEP.b**2 * z / STEEP.L**3
+        np.testing.assert_allclose(branch.load_factor, load, atol=1e-8 * CRITICAL)
+        ends.append((direction * x[:10], z[:10]))
+    np.testing.assert_allclose(*ends, atol=1e-9)
 
 
 def test_settings_turn_it_off():
@@ -120,27 +91,23 @@ def test_double_bifurcation():
     directions being 1/2; S and S' are the stress and its slope at the stretch of all three.
     """
     h, b, EA = 2.0, 1.0, 1e4
-    angle = np.radians([0.0, 120.0, 240.0])
+    angle, length = np.radians([0.0, 120.0, 240.0]), np.hypot(h, b)
     feet = np.column_stack([b * np.cos(angle), b * np.sin(angle), np.zeros(3)])
-    length = np.hypot(h, b)
-    structure = fd.Structure(
-        nodes=np.vstack([feet, [0, 0, h]]),
-        bars=np.array([[0, 3], [1, 3], [2, 3]]),
-        bar_area=np.full(3, 1e-4),
-        sheet=fd.Sheet(EA / 1e-4, 0.3, 0.01),
-    )
-    law = structure.bar_law
-    stretch = brentq(
-        lambda s: law.slope(s) * b**2 / (2 * length**2) + law.stress(s), 0.7, 1.0, xtol=1e-15
-    )
+    nodes, bars = np.vstack([feet, [0, 0, h]]), np.array([[0, 3], [1, 3], [2, 3]])
+    s = fd.Structure(nodes, bars, np.full(3, 1e-4), fd.Sheet(EA / 1e-4, 0.3, 0.01))
+    law = s.bar_law
+
+    def sideways(stretch):
+        return law.slope(stretch) * b**2 / (2 * length**2) + law.stress(stretch)
+
+    stretch = brentq(sideways, 0.7, 1.0, xtol=1e-15)
     load = -3 * EA / length * float(law.stress(stretch)) * np.sqrt((stretch * length) ** 2 - b**2)
-    case = fd.Case(structure, [fd.Fix([0, 1, 2], "xyz")], [fd.Force([3], (0, 0, -1.0))])
+    case = fd.Case(s, [fd.Fix([0, 1, 2], "xyz")], [fd.Force([3], (0, 0, -1.0))])
     path = trace(
         case, "arc_length", first_step=50.0, steps=20, until=lambda u, f: u[3, 2] < -0.3 * h
     )
-    marked = path.isel(step=path.point.values == "bifurcation")
-    assert marked.sizes["step"] == 1
-    assert float(marked.load_factor[0]) == pytest.approx(load, rel=1e-8)
+    (factor,) = marked(path, "bifurcation").load_factor
+    assert float(factor) == pytest.approx(load, rel=1e-8)
     assert {0, 2} <= set(path.negative_eigenvalues.values.tolist())
     for mode in (0, 1):
         branch = switch_branch(path, case=case, mode=mode, steps=3)
@@ -152,15 +119,16 @@ def test_double_bifurcation():
         assert branch.residual.values.max() < 1e-9
 
 
-def test_refuses_what_is_no_bifurcation(path):
-    case = STEEP.case(free="xz")
-    with pytest.raises(InputError, match="the bifurcations of the path are steps"):
-        switch_branch(path, at=0, case=case)
-    with pytest.raises(InputError, match="give 1 or -1"):
-        switch_branch(path, case=case, direction=2)
-    with pytest.raises(InputError, match="'arc_length' or 'mgdcm'"):
-        switch_branch(path, case=case, method="newton")
-    with pytest.raises(InputError, match="has only 2 modes"):
-        switch_branch(path, case=case, mode=5)
-    with pytest.raises(InputError, match="cannot be run again"):
-        switch_branch(path)  # built by hand, so the path cannot rebuild its case
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"at": 0}, "the bifurcations of the path are steps"),
+        ({"direction": 2}, "give 1 or -1"),
+        ({"method": "newton"}, "'arc_length' or 'mgdcm'"),
+        ({"mode": 5}, "has only 2 modes"),
+        ({"case": None}, "cannot be run again"),  # built by hand, so that no path rebuilds it
+    ],
+)
+def test_refuses_what_is_no_bifurcation(path, options, message):
+    with pytest.raises(InputError, match=message):
+        switch_branch(path, **{"case": STEEP.case(free="xz"), **options})

@@ -6,18 +6,23 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import pdist
+from scipy.spatial.transform import Rotation
 
 import foldyn as fd
 from foldyn.errors import CrossingWarning, FoldynWarning, InputError
 
-SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
+SQUARE, HALVES = [(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)]
 
 
-def flat_miura(cells=(2, 2), **keys):
+def miura(dihedral, cells=(2, 2)):
+    return fd.patterns.miura(cells=cells, a=1.0, b=1.2, panel_angle=65, dihedral=dihedral)
+
+
+def flat_miura(cells=(2, 2)):
     """A Miura-ori laid flat, with the assignments that it has when folded."""
-    folded = fd.patterns.miura(cells=cells, a=1.0, b=1.2, panel_angle=65, dihedral=120)
-    flat = fd.patterns.miura(cells=cells, a=1.0, b=1.2, panel_angle=65, dihedral=180)
-    return fd.Pattern(flat.vertices, flat.faces, folded.assignments, **keys)
+    flat = miura(180, cells)
+    return fd.Pattern(flat.vertices, flat.faces, miura(120, cells).assignments)
 
 
 def vertex(sectors, letters):
@@ -30,24 +35,13 @@ def vertex(sectors, letters):
     return fd.Pattern(np.vstack([[0.0, 0.0], rim]), faces, assignments)
 
 
-def distances(x):
-    return np.linalg.norm(x[:, None] - x[None], axis=2)
-
-
 @pytest.mark.parametrize("dihedral", [150.0, 60.0, 20.0])
 def test_one_crease_drives_a_miura_to_its_closed_form(dihedral):
-    pattern = flat_miura()
-    exact = fd.patterns.miura(cells=(2, 2), a=1.0, b=1.2, panel_angle=65, dihedral=dihedral)
-    driven = next(
-        k
-        for k, (a, b) in enumerate(exact.creases.tolist())
-        if abs(math.degrees(exact.dihedrals[k]) - dihedral) < 1e-9
-    )
+    pattern, exact = flat_miura(), miura(dihedral)
+    driven = np.argmin(np.abs(np.degrees(exact.dihedrals) - dihedral))
     pair = tuple(pattern.creases[driven].tolist())
     folding = fd.fold(pattern, {pair: 180.0 - dihedral}, steps=8)
-    np.testing.assert_allclose(
-        distances(folding.pattern.vertices), distances(exact.vertices), atol=1e-6
-    )
+    np.testing.assert_allclose(pdist(folding.pattern.vertices), pdist(exact.vertices), atol=1e-6)
     np.testing.assert_allclose(folding.pattern.dihedrals, exact.dihedrals, atol=1e-6)
     assert folding.kind == "rigid" and folding.rigid_path and not folding.wrong
     assert folding.pattern.faces == pattern.faces
@@ -73,13 +67,12 @@ def test_a_vertex_of_degree_4_keeps_the_relation_of_half_angles():
 
 @pytest.mark.parametrize(("angle", "letter"), [(90.0, "V"), (35.0, "M"), (170.0, "V")])
 def test_a_simple_fold_is_exact(angle, letter):
-    pattern = fd.Pattern(SQUARE, [(0, 1, 2), (0, 2, 3)], [letter])
-    folding = fd.fold(pattern, angle, steps=4)
-    sign = 1.0 if letter == "V" else -1.0
-    np.testing.assert_allclose(folding.pattern.dihedrals, math.pi - sign * math.radians(angle))
-    apart = distances(folding.pattern.vertices)
-    np.testing.assert_allclose(apart[1, 3], math.sqrt(2.0) * math.cos(math.radians(angle) / 2))
-    assert folding.error < 1e-9 and folding.pattern.assignments == (letter,)
+    folding = fd.fold(fd.Pattern(SQUARE, HALVES, [letter]), angle, steps=4)
+    sign, found = 1.0 if letter == "V" else -1.0, folding.pattern
+    np.testing.assert_allclose(found.dihedrals, math.pi - sign * math.radians(angle))
+    apart = np.linalg.norm(found.vertices[1] - found.vertices[3])
+    assert apart == pytest.approx(math.sqrt(2.0) * math.cos(math.radians(angle) / 2))
+    assert folding.error < 1e-9 and found.assignments == (letter,)
 
 
 def test_a_vertex_of_eight_equal_sectors_folds_symmetrically():
@@ -98,41 +91,34 @@ def test_a_vertex_of_eight_equal_sectors_folds_symmetrically():
 def test_every_mountain_and_valley_of_a_miura_turns_its_way():
     folding = fd.fold(flat_miura((3, 2)), fraction="75%", steps=6)
     signs = np.where(np.array(folding.pattern.assignments) == "V", 1.0, -1.0)
-    angles = folding.path["fold_angle"].values[1:]
-    assert (signs * angles > 0.0).all()
+    assert (signs * folding.path["fold_angle"].values[1:] > 0.0).all()
     assert folding.kind == "rigid"
     np.testing.assert_allclose(folding.pattern.dihedrals, math.pi - folding.angles, atol=1e-9)
-
-
-def test_fraction_0_gives_the_same_pattern():
     pattern = flat_miura()
-    folding = fd.fold(pattern, fraction=0.0, steps=2)
-    np.testing.assert_allclose(folding.pattern.vertices, pattern.vertices, atol=1e-9)
-    assert not folding.wrong and folding.strain < 1e-12
+    none = fd.fold(pattern, fraction=0.0, steps=2)  # gives the same pattern
+    np.testing.assert_allclose(none.pattern.vertices, pattern.vertices, atol=1e-9)
+    assert not none.wrong and none.strain < 1e-12
 
 
 STATES = {
-    "square_twist": (fd.patterns.square_twist(dihedral=180), fd.patterns.square_twist()),
-    "waterbomb": (fd.patterns.waterbomb((3, 2), dihedral=180), fd.patterns.waterbomb((3, 2))),
-    "arc_miura": (fd.patterns.arc_miura(dihedral=180), fd.patterns.arc_miura()),
-    "resch": (fd.patterns.resch((2, 2), dihedral=180), fd.patterns.resch((2, 2))),
+    "square_twist": fd.patterns.square_twist,
+    "waterbomb": lambda **keys: fd.patterns.waterbomb((3, 2), **keys),
+    "arc_miura": fd.patterns.arc_miura,
+    "resch": lambda **keys: fd.patterns.resch((2, 2), **keys),
 }
 
 
 @pytest.mark.parametrize("name", STATES)
 def test_flat_patterns_reach_the_states_of_their_generators(name):
-    flat, folded = STATES[name]
+    flat, folded = STATES[name](dihedral=180), STATES[name]()
     folding = fd.fold(flat, folded, steps=8)
     assert folding.kind == "rigid" and not folding.wrong and not len(folding.crossings)
-    np.testing.assert_allclose(
-        distances(folding.pattern.vertices), distances(folded.vertices), atol=1e-6
-    )
+    np.testing.assert_allclose(pdist(folding.pattern.vertices), pdist(folded.vertices), atol=1e-6)
     assert folding.pattern.families.keys() == flat.families.keys()
 
 
 def test_a_partly_folded_pattern_goes_on_from_where_it_is():
-    half = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.2, panel_angle=65, dihedral=100)
-    exact = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.2, panel_angle=65, dihedral=40)
+    half, exact = miura(100, (1, 1)), miura(40, (1, 1))
     pair = tuple(half.creases[np.argmin(np.abs(half.dihedrals - math.radians(260)))].tolist())
     folding = fd.fold(half, {pair: -140.0}, steps=4)
     np.testing.assert_allclose(folding.path["position"].values[0], half.vertices, atol=1e-12)
@@ -141,7 +127,7 @@ def test_a_partly_folded_pattern_goes_on_from_where_it_is():
 
 def test_angles_are_given_by_assignment_family_pair_or_crease():
     families = {"edge": [(0, 2)]}
-    pattern = fd.Pattern(SQUARE, [(0, 1, 2), (0, 2, 3)], ["M"], families=families)
+    pattern = fd.Pattern(SQUARE, HALVES, ["M"], families=families)
     for angles in (60, {"mountain": 60}, {"all": 60}, {"edge": 60}, {(2, 0): -60}, [-60.0]):
         folding = fd.fold(pattern, angles, steps=2)
         assert math.degrees(folding.angles[0]) == pytest.approx(-60.0), angles
@@ -152,7 +138,7 @@ def test_angles_are_given_by_assignment_family_pair_or_crease():
 
 def test_fold_angles_of_a_file_are_the_whole_way():
     keys = {"fold_angles": [math.radians(-80)], "custom": {"x:y": 1}}
-    pattern = fd.Pattern(SQUARE, [(0, 1, 2), (0, 2, 3)], ["M"], "flap", **keys)
+    pattern = fd.Pattern(SQUARE, HALVES, ["M"], "flap", **keys)
     assert math.degrees(fd.fold(pattern, steps=2).angles[0]) == pytest.approx(-80.0)
     half = fd.fold(pattern, fraction="50%", steps=2)
     assert math.degrees(half.angles[0]) == pytest.approx(-40.0)
@@ -176,19 +162,14 @@ def square_twist(pleats="MV"):
     """Square twist with valleys around its square, which no rigid folding allows."""
     inner = 0.5 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], float)
     across = np.array([(0, -1), (1, 0), (0, 1), (-1, 0)], float)
-    turn = math.radians(30)
-    pleat = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-    points, faces, letters = [*inner], [(0, 1, 2, 3)], {}
+    pleat = across @ Rotation.from_euler("z", 30, degrees=True).as_matrix()[:2, :2].T
+    outer = np.stack([inner + 1.5 * pleat, np.roll(inner, -1, axis=0) + 1.5 * pleat], axis=1)
+    faces, letters = [(0, 1, 2, 3)], {}
     for k in range(4):
-        ends = [inner[k] + 1.5 * pleat @ across[k], inner[(k + 1) % 4] + 1.5 * pleat @ across[k]]
-        points += ends
-    for k in range(4):
-        after = (k + 1) % 4
-        a, b = 4 + 2 * k, 5 + 2 * k
-        faces.append((k, a, b, after))
-        faces.append((after, b, 4 + 2 * after))
+        after, a, b = (k + 1) % 4, 4 + 2 * k, 5 + 2 * k
+        faces += [(k, a, b, after), (after, b, 4 + 2 * after)]
         letters |= {(k, after): "V", (k, a): pleats[0], (after, b): pleats[1]}
-    return fd.Pattern(np.array(points), faces, letters)
+    return fd.Pattern(np.vstack([inner, outer.reshape(-1, 2)]), faces, letters)
 
 
 def test_a_square_twist_folds_only_with_strain_and_says_so():
@@ -228,9 +209,7 @@ def test_a_state_that_rotations_close_is_opened():
     assert folding.started_from == "folded" and not folding.wrong
     np.testing.assert_allclose(np.abs(folding.path["fold_angle"].values[0]), math.pi, atol=1e-9)
     assert folding.rigid_path
-    unfolded = fd.fold(
-        pattern, fraction=0.7, steps=6, start="pattern"
-    )  # the same state, the other way
+    unfolded = fd.fold(pattern, fraction=0.7, steps=6, start="pattern")  # the other way
     np.testing.assert_allclose(folding.angles, unfolded.angles, atol=1e-6)
     with pytest.raises(InputError, match='start = "folded": the panels do not close'):
         fd.fold(vertex([80, 90, 90, 100], "VVVM"), fraction=0.9, start="folded")
@@ -256,16 +235,14 @@ def test_panels_that_pass_through_each_other_are_named():
 
 
 def test_the_path_can_be_watched():
-    steps = []
-    folding = fd.fold(
-        flat_miura((1, 1)), {(1, 4): -90}, steps=5, progress=lambda *at: steps.append(at)
-    )
+    steps, pattern = [], flat_miura((1, 1))
+    folding = fd.fold(pattern, {(1, 4): -90}, steps=5, progress=lambda *at: steps.append(at))
     assert steps == [(k, 5) for k in range(1, 6)]
     path = folding.path
     assert path["position"].dims == ("step", "node", "axis") and path.sizes["step"] == 6
     np.testing.assert_allclose(path["share"], np.linspace(0, 1, 6))
     np.testing.assert_array_equal(path["position"].values[-1], folding.pattern.vertices)
-    jumps = np.abs(np.diff(path["position"].values, axis=0)).max(axis=(1, 2))
+    jumps = np.abs(np.diff(path["position"].values, axis=0))
     assert jumps.max() < 0.6  # placed near each other, not turned about
 
 
@@ -291,25 +268,27 @@ def test_the_path_can_be_watched():
     ],
 )
 def test_wrong_arguments_are_refused(arguments, message):
-    pattern = fd.Pattern(SQUARE, [(0, 1, 2), (0, 2, 3)], ["M"])
+    pattern = fd.Pattern(SQUARE, HALVES, ["M"])
     with pytest.raises(InputError, match=message):
         fd.fold(pattern, **arguments)
 
 
-def test_what_cannot_be_folded_is_refused():
-    with pytest.raises(InputError, match="pattern: got list, give a Pattern"):
-        fd.fold([[0, 0, 0]], 30)
-    with pytest.raises(InputError, match="has no creases"):
-        fd.fold(fd.Pattern(SQUARE, [(0, 1, 2, 3)]), 30)
-    families = {"a": [(0, 2)]}
-    unassigned = fd.Pattern(SQUARE, [(0, 1, 2), (0, 2, 3)], ["U"], families=families)
-    with pytest.raises(InputError, match="neither mountains and valleys nor fold angles"):
-        fd.fold(unassigned, fraction=0.5)
-    with pytest.raises(InputError, match="has no way to fold"):
-        fd.fold(
-            fd.Pattern(SQUARE, [(0, 1, 2), (0, 2, 3)], ["U"], families={"a": [(0, 2)]}), {"a": 9}
-        )
-    assert math.degrees(fd.fold(unassigned, [40], steps=2).angles[0]) == pytest.approx(40)
+UNASSIGNED = fd.Pattern(SQUARE, HALVES, ["U"], families={"a": [(0, 2)]})
+
+
+@pytest.mark.parametrize(
+    ("pattern", "arguments", "message"),
+    [
+        ([[0, 0, 0]], {"angles": 30}, "pattern: got list, give a Pattern"),
+        (fd.Pattern(SQUARE, [(0, 1, 2, 3)]), {"angles": 30}, "has no creases"),
+        (UNASSIGNED, {"fraction": 0.5}, "neither mountains and valleys nor fold angles"),
+        (UNASSIGNED, {"angles": {"a": 9}}, "has no way to fold"),
+    ],
+)
+def test_what_cannot_be_folded_is_refused(pattern, arguments, message):
+    with pytest.raises(InputError, match=message):
+        fd.fold(pattern, **arguments)
+    assert math.degrees(fd.fold(UNASSIGNED, [40], steps=2).angles[0]) == pytest.approx(40)
 
 
 def test_welds_stay_flat_where_they_can():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 from sheets import compression
-from trusses import APEX, VonMises
+from trusses import APEX, VonMises, snapped
 
 import foldyn as fd
 from foldyn.errors import InputError
@@ -15,48 +15,35 @@ from foldyn.statics import landscape, trace
 TRUSS = VonMises()
 
 
-@pytest.fixture(scope="module")
-def snapped():
-    return trace(
-        TRUSS.case(),
-        "arc_length",
-        first_step=0.5,
-        steps=60,
-        until=lambda u, factor: u[APEX, 2] < -2.1 * TRUSS.h,
-    )
-
-
-def test_truss(snapped):
+def test_truss():
     """Upright, flat (the top of the barrier) and hanging; closed forms in tests/statics/trusses."""
-    found = landscape(snapped, TRUSS.case())
+    case, h = TRUSS.case(), TRUSS.h
+    found = landscape(snapped(case, past=2.1, first_step=0.5, steps=60), case)
     assert [state.stable for state in found.states] == [True, False, True]
-    strokes = [state.stroke for state in found.states]
-    np.testing.assert_allclose(strokes, [0.0, TRUSS.h, 2 * TRUSS.h], atol=1e-10)
+    np.testing.assert_allclose([s.stroke for s in found.states], [0.0, h, 2 * h], atol=1e-10)
     for start, end in ((0, 1), (1, 0)):
-        assert found.barrier(start, end) == pytest.approx(TRUSS.energy(TRUSS.h), rel=1e-9)
+        assert found.barrier(start, end) == pytest.approx(TRUSS.energy(h), rel=1e-9)
     np.testing.assert_allclose(found.negative_stiffness, [TRUSS.limit_at], rtol=1e-8)
     np.testing.assert_allclose(found.energy, TRUSS.energy(found.stroke), atol=1e-12)
     np.testing.assert_allclose(found.force, TRUSS.load(found.stroke), atol=1e-8 * TRUSS.limit)
-    hanging = found.stable[1].displacement
-    assert hanging[APEX, 2] == pytest.approx(-2 * TRUSS.h, rel=1e-9)
+    assert found.stable[1].displacement[APEX, 2] == pytest.approx(-2 * h, rel=1e-9)
+
+
+def storey():
+    """It snaps from 1.2 m to 0.51 m."""
+    pattern = fd.patterns.kresling(sides=6, radius=1.0, height=1.2, twist=40)
+    s = fd.discretize(pattern, fd.Sheet(1e6, 0.3, 0.01), fold_law="linear", preset="herkal")
+    return s, fd.Fix(list(range(6)), "xyz"), list(range(6, 12))
 
 
 @pytest.fixture(scope="module")
 def kresling():
-    """A storey that snaps from 1.2 m to 0.51 m."""
-    pattern = fd.patterns.kresling(sides=6, radius=1.0, height=1.2, twist=40)
-    s = fd.discretize(pattern, fd.Sheet(1e6, 0.3, 0.01), fold_law="linear", preset="herkal")
-    low, top = list(range(6)), list(range(6, 12))
-    moved = fd.Case(s, [fd.Fix(low, "xyz"), fd.Impose(top, "z", -0.8)])
-    loaded = fd.Case(s, [fd.Fix(low, "xyz")], [fd.Force(top, (0, 0, -1.0))])
-    by_motion = trace(moved, "displacement", steps=40)
+    s, low, top = storey()
+    by_motion = trace(fd.Case(s, [low, fd.Impose(top, "z", -0.8)]), "displacement", steps=40)
     by_force = trace(
-        loaded,
-        "arc_length",
-        first_step=0.5,
-        steps=300,
+        fd.Case(s, [low], [fd.Force(top, (0, 0, -1.0))]), "arc_length", first_step=0.5, steps=300,
         until=lambda u, factor: u[6, 2] < -0.8,
-    )
+    )  # fmt: skip
     return landscape(by_motion), landscape(by_force)
 
 
@@ -83,48 +70,31 @@ def test_barrier_is_the_work_of_the_force(kresling):
 
 def test_states_stay_when_let_go(kresling):
     """Each state without force is an equilibrium of the structure with its supports alone."""
-    pattern = fd.patterns.kresling(sides=6, radius=1.0, height=1.2, twist=40)
-    s = fd.discretize(pattern, fd.Sheet(1e6, 0.3, 0.01), fold_law="linear", preset="herkal")
-    case = fd.Case(s, [fd.Fix(list(range(6)), "xyz")])
+    s, low, _ = storey()
+    case = fd.Case(s, [low])
     for state in kresling[0].stable:
         path = trace(case, load_factors=[0.0], initial=fd.State(state.displacement))
-        moved = np.abs(path.displacement.values[0] - state.displacement).max()
-        assert moved < 1e-7
+        assert np.abs(path.displacement.values[0] - state.displacement).max() < 1e-7
         assert path.negative_eigenvalues.values.tolist() == [0]
 
 
 def test_constant_loads_belong_to_the_energy():
     """With a dead load on the apex the states are those of the force beside it, P(v) = P0."""
-    load = 1.0
-    case = fd.Case(
-        TRUSS.structure(),
-        TRUSS.case().supports,
-        [fd.Force([APEX], (0, 0, -load)), fd.Force([APEX], (0, 0, -1.0))],
-    )
-    path = trace(
-        case,
-        "arc_length",
-        first_step=0.2,
-        steps=80,
-        constant=[0],
-        until=lambda u, factor: u[APEX, 2] < -2.1 * TRUSS.h,
-    )
-    found = landscape(path, case)
+    push = fd.Force([APEX], (0, 0, -1.0))
+    case = TRUSS.case().altered(loads=[push, push])
+    found = landscape(snapped(case, past=2.1, first_step=0.2, steps=80, constant=[0]), case)
     strokes = np.array([state.stroke for state in found.states])
-    np.testing.assert_allclose(TRUSS.load(strokes), load, rtol=1e-9)
-    total = TRUSS.energy(strokes) - load * strokes
+    np.testing.assert_allclose(TRUSS.load(strokes), 1.0, rtol=1e-9)
+    total = TRUSS.energy(strokes) - strokes
     np.testing.assert_allclose([s.energy for s in found.states], total - total[0], atol=1e-12)
     assert found.barrier() < TRUSS.energy(TRUSS.h)
 
 
 def test_refuses_what_has_no_landscape():
-    case = compression(weight=True)
-    both = trace(case, "displacement", steps=3)  # its weight grows along the path
+    both = trace(compression(weight=True), "displacement", steps=3)  # its weight grows, too
     with pytest.raises(InputError, match="forces and moved supports together"):
         landscape(both)
-    one = trace(compression(), "displacement", steps=3)
-    found = landscape(one)
-    assert len(found.states) == 1
-    assert found.negative_stiffness == ()
+    found = landscape(trace(compression(), "displacement", steps=3))
+    assert len(found.states) == 1 and found.negative_stiffness == ()
     with pytest.raises(InputError, match="1 stable states, there is no 1"):
         found.barrier()

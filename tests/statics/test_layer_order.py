@@ -47,33 +47,21 @@ def found(pattern):
 def stacks(widths, letters):
     """Whether some order of a strip's panels, from below, lets it lie flat (by trying all)."""
     ends = np.concatenate([[0.0], np.cumsum([w * (-1) ** k for k, w in enumerate(widths)])])
-    spans = [tuple(sorted(ends[k : k + 2])) for k in range(len(widths))]
-    count = len(widths)
-    for order in itertools.permutations(range(count)):
-        height = np.argsort(order)
+    spans, count = np.sort(np.stack([ends[:-1], ends[1:]], axis=1), axis=1), len(widths)
 
-        def is_free(k, height=height):
-            """Nothing between two panels at the crease k that covers it or is folded there too."""
-            low, high = sorted(height[[k, k + 1]])
-            up = (height[k + 1] > height[k]) == (k % 2 == 0)  # panel k faces up where k is even
-            if up != (letters[k] == "V"):
-                return False
-            at = ends[k + 1]
-            for other in range(count):
-                inside = spans[other][0] < at - 1e-9 and spans[other][1] > at + 1e-9
-                if inside and low < height[other] < high:
-                    return False
-            for other in range(count - 1):  # folds at the same place, on the same side
-                if other == k or abs(ends[other + 1] - at) > 1e-9 or (other - k) % 2:
-                    continue
-                between = [low < height[p] < high for p in (other, other + 1)]
-                if between[0] != between[1]:
-                    return False
-            return True
+    def is_free(height, k):
+        """Nothing between two panels at the crease k that covers it or is folded there too."""
+        low, high = sorted(height[[k, k + 1]])
+        up = (height[k + 1] > height[k]) == (k % 2 == 0)  # panel k faces up where k is even
+        at, between = ends[k + 1], (low < height) & (height < high)
+        covers = (spans[:, 0] < at - 1e-9) & (spans[:, 1] > at + 1e-9)
+        # folds at the same place, on the same side, have both panels between or none
+        beside = [p for p in range(k % 2, count - 1, 2) if p != k and abs(ends[p + 1] - at) < 1e-9]
+        pairs = all(between[p] == between[p + 1] for p in beside)
+        return up == (letters[k] == "V") and not (covers & between).any() and pairs
 
-        if all(is_free(k) for k in range(count - 1)):
-            return True
-    return False
+    heights = (np.argsort(order) for order in itertools.permutations(range(count)))
+    return any(all(is_free(height, k) for k in range(count - 1)) for height in heights)
 
 
 WIDTHS = [(1, 1, 1, 1), (2, 1, 2), (1, 0.6, 1, 0.6), (1, 0.5, 0.5, 1), (1, 0.4, 0.7, 0.5, 1)]
@@ -89,42 +77,39 @@ def test_strips_have_an_order_where_trying_all_finds_one(widths):
 
 def check_points(pattern, angles, rows):
     """Look at a flat state from above in many places: layers, and the folds between them."""
-    state = flat_state(pattern, angles, CLOSED)
-    above = {}
+    state, above = flat_state(pattern, angles, CLOSED), {}
     for f, g, s in rows.tolist():
         up = s if state.up[g] else -s
         above[f, g], above[g, f] = up, -up
-    corners = [state.points[list(face)] for face in pattern.faces]
-    for points, orientation in zip(corners, state.up, strict=True):
-        if not orientation:
-            points[:] = points[::-1].copy()
+    corners = [
+        state.points[list(face)][:: 1 if up else -1]
+        for face, up in zip(pattern.faces, state.up, strict=True)
+    ]
 
     def depth(face, x):
         """Distance of x inside a convex panel, negative outside."""
         a = corners[face]
-        b = np.roll(a, -1, axis=0)
-        along = (b - a) / np.linalg.norm(b - a, axis=1)[:, None]
+        along = np.roll(a, -1, axis=0) - a
+        along /= np.linalg.norm(along, axis=1)[:, None]
         return (along[:, 0] * (x - a)[:, 1] - along[:, 1] * (x - a)[:, 0]).min()
 
-    small, random = 1e-3 * pattern.size, np.random.default_rng(3)
+    small, random, panels = 1e-3 * pattern.size, np.random.default_rng(3), range(len(corners))
     seen = 0
-    for k, (a, b) in enumerate(pattern.creases.tolist()):
+    creases = zip(pattern.creases.tolist(), pattern.crease_faces.tolist(), angles, strict=True)
+    for (a, b), (one, other), angle in creases:
         share = random.uniform(0.05, 0.95)
         at = (1 - share) * state.points[a] + share * state.points[b]
-        one, other = pattern.crease_faces[k].tolist()
-        for face in range(len(pattern.faces)):
-            if face in (one, other) or depth(face, at) < small:
-                continue
-            seen += 1  # a panel that the crease runs through is not between those of the crease
-            assert above[face, one] == above[face, other], (k, face)
+        for face in panels:
+            if face not in (one, other) and depth(face, at) >= small:
+                seen += 1  # what the crease runs through is not between the panels of the crease
+                assert above[face, one] == above[face, other], ((a, b), face)
+        if abs(angle) > CLOSED:  # fronts face each other across a valley
+            assert (above[other, one] > 0) == (bool(state.up[one]) == (angle > 0))
     for _ in range(200):
         x = random.uniform(state.points.min(axis=0), state.points.max(axis=0))
-        here = [face for face in range(len(pattern.faces)) if depth(face, x) > small]
+        here = [face for face in panels if depth(face, x) > small]
         heights = sorted(sum(above[f, g] > 0 for g in here if g != f) for f in here)
         assert heights == list(range(len(here)))  # no cycles
-    for k, (one, other) in enumerate(pattern.crease_faces.tolist()):
-        if abs(angles[k]) > CLOSED:  # fronts face each other across a valley
-            assert (above[other, one] > 0) == (bool(state.up[one]) == (angles[k] > 0))
     return seen
 
 
@@ -151,18 +136,16 @@ def test_an_order_that_is_found_has_no_crossings(name):
 
 def test_what_has_no_order_is_refused_with_the_panels():
     # two flaps, each wider than the panel between them, fold to the same side
-    with pytest.raises(
-        InputError, match=r"lies flat when folded, but no order .*found at panels 0, 1"
-    ):
+    message = r"lies flat when folded, but no order .*found at panels 0, 1"
+    with pytest.raises(InputError, match=message):
         fd.fold(strip([2, 1, 2], "VV"), fraction=1.0, steps=4)
     assert fd.fold(strip([2, 1, 2], "VM"), fraction=1.0, steps=4).layers is not None
 
 
 def test_a_folded_state_that_lies_flat_says_its_order():
     folding = fd.fold(strip([1, 1, 1], "VM"), fraction=1.0, steps=4)
-    assert (
-        "2 creases are closed: panels lie upon each other in an order without" in folding.report()
-    )
+    told = "2 creases are closed: panels lie upon each other in an order without"
+    assert told in folding.report()
     # panel 1 lies upon the front of 0, and panel 2 at the back of 1
     assert folding.layers[[0, 2]].tolist() == [[0, 1, 1], [1, 2, -1]]
     assert fd.fold(strip([1, 1, 1], "VM"), fraction=0.9, steps=4).layers is None

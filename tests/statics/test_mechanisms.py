@@ -10,7 +10,6 @@ from trusses import VonMises
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.statics import OrigamiProblem, mechanisms, trace
-from foldyn.structures import ModelOptions
 
 
 def names(structure, supports):
@@ -22,37 +21,26 @@ def sheet():
     return specimen()
 
 
-def test_free_body(sheet):
-    assert names(sheet, []) == [
-        "translation along x",
-        "translation along y",
-        "translation along z",
-        "rotation about x",
-        "rotation about y",
-        "rotation about z",
-    ]
+MOTIONS = [f"{kind} {axis}" for kind in ("translation along", "rotation about") for axis in "xyz"]
 
 
 @pytest.mark.parametrize(
     ("supports", "expected"),
     [
-        ([fd.Fix([59], "xyz")], ["rotation about x", "rotation about y", "rotation about z"]),
-        ([fd.Fix([3, 10, 20, 40], "xy")], ["translation along z"]),
-        ([fd.Fix(BOTTOM, "x"), fd.Fix([59], "yz")], ["rotation about x"]),
-        ([fd.Fix([57, 59, 61, 3], "z")], ["translation along x", "translation along y",
-                                         "rotation about z"]),
-        ([fd.Fix([3, 60], "xyz")], ["rotation about (1"]),
+        ([], MOTIONS),
+        ([fd.Fix([59], "xyz")], MOTIONS[3:]),
+        ([fd.Fix([3, 10, 20, 40], "xy")], MOTIONS[2:3]),
+        ([fd.Fix(BOTTOM, "x"), fd.Fix([59], "yz")], MOTIONS[3:4]),
+        ([fd.Fix([57, 59, 61, 3], "z")], [*MOTIONS[:2], MOTIONS[5]]),
+        (ideal_supports(), []),
     ],
-)  # fmt: skip
+)
 def test_rigid_motions(sheet, supports, expected):
-    if "(1" in expected[0]:  # about the line through two nodes that do not lie along an axis
-        x = sheet.nodes[60] - sheet.nodes[3]
-        expected = [f"rotation about ({x[0] / x[0]:g}, {x[1] / x[0]:.3g}, {x[2] / x[0]:.3g})"]
     assert names(sheet, supports) == expected
-
-
-def test_enough_supports(sheet):
-    assert names(sheet, ideal_supports()) == []
+    # about the line through two nodes that do not lie along an axis
+    x = sheet.nodes[60] - sheet.nodes[3]
+    (found,) = names(sheet, [fd.Fix([3, 60], "xyz")])
+    assert found == f"rotation about (1, {x[1] / x[0]:.3g}, {x[2] / x[0]:.3g})"
 
 
 def test_folds_without_stiffness(sheet):
@@ -71,30 +59,25 @@ def test_large_soft_sheet_is_no_mechanism():
     assert names(s, [fd.Fix("xmin", "xyz")]) == []
 
 
-def test_trusses():
-    """Out of its plane a truss turns about its feet; a flat one gives way to first order."""
-    truss = VonMises()
-    assert mechanisms(OrigamiProblem(truss.case(free="xyz"))) == ["rotation about x"]
-    assert mechanisms(OrigamiProblem(truss.case(free="xz"))) == []
-    flat = VonMises(h=0.0)
-    assert mechanisms(OrigamiProblem(flat.case())) == [
-        "internal mechanism that moves node 2 along z"
-    ]
-    shallow = VonMises(h=1e-4)
-    assert mechanisms(OrigamiProblem(shallow.case())) == []
+@pytest.mark.parametrize(
+    ("truss", "free", "expected"),
+    [
+        (VonMises(), "xyz", ["rotation about x"]),  # out of its plane, about its feet
+        (VonMises(), "xz", []),
+        (VonMises(h=0.0), "z", ["internal mechanism that moves node 2 along z"]),  # to first order
+        (VonMises(h=1e-4), "z", []),
+    ],
+)
+def test_trusses(truss, free, expected):
+    assert mechanisms(OrigamiProblem(truss.case(free=free))) == expected
 
 
 def test_node_that_no_bar_touches():
-    structure = fd.Structure(
-        nodes=np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]], float),
-        bars=np.array([[0, 1], [1, 2], [2, 0]]),
-        bar_area=np.full(3, 1e-4),
-        sheet=fd.Sheet(1e6, 0.3, 0.01),
-        options=ModelOptions(bar_law="linear"),
-    )
+    nodes = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]], float)
+    bars, sheet = np.array([[0, 1], [1, 2], [2, 0]]), fd.Sheet(1e6, 0.3, 0.01)
+    structure = fd.Structure(nodes, bars, np.full(3, 1e-4), sheet)
     found = names(structure, [fd.Fix([0, 1, 2], "z"), fd.Fix([0], "xy"), fd.Fix([1], "y")])
-    assert len(found) == 3
-    assert all("node 3" in name for name in found)
+    assert len(found) == 3 and all("node 3" in name for name in found)
 
 
 def test_trace_refuses_and_says_what_helps(sheet):

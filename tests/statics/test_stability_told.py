@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from trusses import APEX, VonMises
+from trusses import VonMises, snapped
 
 import foldyn as fd
 from foldyn.errors import ComputationError, FoldynWarning, StretchWarning
@@ -21,23 +21,20 @@ def strut(kind="force"):
     """Two flat panels in a row, pressed together: they buckle."""
     corners = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [0, 1, 0]]
     pattern = fd.Pattern(corners, [[0, 1, 4, 5], [1, 2, 3, 4]])
-    s = fd.discretize(
-        pattern, fd.Sheet(1e6, 0.25, 0.01), crease_stiffness=0.1, fold_law="linear",
-        bend_law="linear", preset="herkal")  # fmt: skip
-    supports, loads = [fd.Fix([0, 5], "xyz"), fd.Fix([2, 3], "yz")], []
+    laws = {"crease_stiffness": 0.1, "fold_law": "linear", "bend_law": "linear"}
+    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01), preset="herkal", **laws)
+    supports = [fd.Fix([0, 5], "xyz"), fd.Fix([2, 3], "yz")]
     if kind == "force":
-        loads.append(fd.Force([2, 3], (-1.0, 0.0, 0.0)))
-    else:
-        supports.append(fd.Impose([2, 3], "x", -1e-3))
-    return fd.Case(s, supports, loads)
+        return fd.Case(s, supports, [fd.Force([2, 3], (-1.0, 0.0, 0.0))])
+    return fd.Case(s, [*supports, fd.Impose([2, 3], "x", -1e-3)])
 
 
-def told(case, *arguments, **given):
+def told(case, *arguments, of=trace, **given):
     """The path and what was said of it."""
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always", FoldynWarning)
         warnings.simplefilter("ignore", StretchWarning)
-        path = trace(case, *arguments, **given)
+        path = of(case, *arguments, **given)
     return path, [str(one.message) for one in found]
 
 
@@ -58,10 +55,7 @@ def test_newton_past_a_buckling_load(kind):
 
 
 def test_a_located_bifurcation_is_told_once():
-    path, said = told(
-        STEEP.case(free="xz"), "arc_length", first_step=100.0, steps=60,
-        until=lambda u, factor: u[APEX, 2] < -2.2 * STEEP.h,
-    )  # fmt: skip
+    path, said = told(STEEP.case(free="xz"), of=snapped, first_step=100.0, steps=60)
     assert len(said) == 1
     assert "is 0 up to the load factor 2530 (bifurcation), then 1." in said[0]
     changes = path.attrs["stability_changes"].split("; ")
@@ -69,26 +63,23 @@ def test_a_located_bifurcation_is_told_once():
 
 
 def test_a_limit_point_that_was_asked_for_is_marked_and_not_warned_of():
-    limit = SHALLOW.limit
-    path, said = told(SHALLOW.case(), "arc_length", first_step=0.2 * limit, steps=40)
+    options = {"first_step": 0.2 * SHALLOW.limit, "steps": 40}
+    path, said = told(SHALLOW.case(), "arc_length", **options)
     assert not said and "limit" in path.point.values
     assert path.attrs["unstable_points"] == (path.negative_eigenvalues.values > 0).sum() > 0
     assert "(limit point)" in path.attrs["stability_changes"]
-    _, said = told(
-        SHALLOW.case(), "arc_length", first_step=0.2 * limit, steps=40,
-        settings=Settings(locate=False),
-    )  # fmt: skip
+    _, said = told(SHALLOW.case(), "arc_length", **options, settings=Settings(locate=False))
     assert len(said) == 1  # nothing marks it
 
 
 def test_stable_paths_and_uncounted_ones():
-    path, said = told(STEEP.case(free="xz"), load_factors=[0.0, 1000.0, 2000.0])
-    assert not said
-    assert path.attrs["unstable_points"] == 0 and path.attrs["stability_changes"] == "none"
-    path, said = told(strut(), steps=10, settings=Settings(stability=False))
-    assert not said
-    assert path.attrs["unstable_points"] == -1
-    assert path.attrs["stability_changes"] == "not counted"
+    stable = told(STEEP.case(free="xz"), load_factors=[0.0, 1000.0, 2000.0])
+    uncounted = told(strut(), steps=10, settings=Settings(stability=False))
+    for (path, said), points, changes in (
+        (stable, 0, "none"), (uncounted, -1, "not counted")
+    ):  # fmt: skip
+        assert not said and path.attrs["unstable_points"] == points
+        assert path.attrs["stability_changes"] == changes
 
 
 def test_a_path_that_stops_tells_it_too():

@@ -77,13 +77,20 @@ def test_a_crane_opens_from_its_folded_state_with_every_crease_its_way():
     assert len(structure.folds) == 186
 
 
-def test_what_panels_are_is_checked():
-    with pytest.raises(InputError, match='panels = "fine": choose one of whole'):
-        fd.fold(vertex([90] * 4, "VVVM"), 30, panels="fine")
+LINE = [(0, 0), (1, -1e-6), (2, 0), (1, 50), (-1, 25)]  # three corners are on a line
 
 
-def test_a_panel_with_corners_on_a_line_is_not_subdivided():
-    points = [(0, 0), (1, -1e-6), (2, 0), (1, 50), (-1, 25)]
-    pattern = fd.Pattern(points, [(0, 1, 2, 3), (0, 3, 4)], ["V"])
-    with pytest.raises(InputError, match=r"panels = .*: panel 0 has three corners on a line"):
-        fd.fold(pattern, 30, panels="subdivided")
+@pytest.mark.parametrize(
+    ("pattern", "panels", "message"),
+    [
+        (vertex([90] * 4, "VVVM"), "fine", 'panels = "fine": choose one of whole'),
+        (
+            fd.Pattern(LINE, [(0, 1, 2, 3), (0, 3, 4)], ["V"]),
+            "subdivided",
+            r"panels = .*: panel 0 has three corners on a line",
+        ),
+    ],
+)
+def test_what_panels_are_is_checked(pattern, panels, message):
+    with pytest.raises(InputError, match=message):
+        fd.fold(pattern, 30, panels=panels)

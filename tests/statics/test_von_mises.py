@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from trusses import APEX, SpringLoaded, VonMises, apex
+from trusses import APEX, SpringLoaded, VonMises, apex, marked, snapped
 
 import foldyn as fd
 from foldyn.errors import ComputationError
@@ -15,116 +15,80 @@ FREE = ("mgdcm", "arc_length")
 TRUSS = VonMises()
 
 
-def through(method, **given):
-    return trace(
-        TRUSS.case(),
-        method,
-        first_step=0.5,
-        steps=60,
-        until=lambda u, factor: u[APEX, 2] < -2.2 * TRUSS.h,
-        **given,
-    )
+@pytest.fixture(scope="module", params=FREE)
+def whole(request):
+    return snapped(TRUSS.case(), request.param, first_step=0.5, steps=60)
 
 
-@pytest.mark.parametrize("method", FREE)
-def test_whole_path(method):
-    path = through(method)
-    v, load = -apex(path), path.load_factor.values
-    assert v[-1] > 2 * TRUSS.h
-    assert load.min() < -0.9 * TRUSS.limit
+def test_whole_path(whole):
+    """In equilibrium, with its limit points."""
+    v, load = -apex(whole), whole.load_factor.values
+    assert v[-1] > 2 * TRUSS.h and load.min() < -0.9 * TRUSS.limit
     assert np.abs(load - TRUSS.load(v)).max() < 1e-8 * TRUSS.limit
-    assert path.attrs["status"] == "complete"
-
-
-@pytest.mark.parametrize("method", FREE)
-def test_limit_points_are_located(method):
-    path = through(method)
-    marked = path.isel(step=path.point.values == "limit")
-    assert set(path.point.values) == {"regular", "limit"}
-    np.testing.assert_allclose(marked.load_factor, [TRUSS.limit, -TRUSS.limit], rtol=1e-12)
-    np.testing.assert_allclose(-apex(marked), TRUSS.limit_at, rtol=1e-8)
+    assert whole.attrs["status"] == "complete"
+    limits = marked(whole, "limit")
+    assert set(whole.point.values) == {"regular", "limit"}
+    np.testing.assert_allclose(limits.load_factor, [TRUSS.limit, -TRUSS.limit], rtol=1e-12)
+    np.testing.assert_allclose(-apex(limits), TRUSS.limit_at, rtol=1e-8)
 
 
 def test_stability_along_the_path():
-    path = through("arc_length", settings=Settings(largest_turn=1.0))
-    v = -apex(path)
-    low, high = TRUSS.limit_at
-    regular = path.point.values == "regular"
-    unstable = (v > low) & (v < high)
+    settings = Settings(largest_turn=1.0)
+    path = snapped(TRUSS.case(), first_step=0.5, steps=60, settings=settings)
+    path = path.isel(step=path.point.values == "regular")
+    unstable = (-apex(path) > TRUSS.limit_at[0]) & (-apex(path) < TRUSS.limit_at[1])
     assert unstable.any()
-    np.testing.assert_array_equal(
-        path.negative_eigenvalues.values[regular], unstable[regular].astype(int)
-    )
+    np.testing.assert_array_equal(path.negative_eigenvalues, unstable.astype(int))
 
 
 def test_displacement_control():
     """A spring stiff enough not to snap back: k > -min P'."""
     truss = SpringLoaded(k=150.0)
     path = trace(truss.case(-0.3), "displacement", steps=40)
-    v, w = -apex(path), 0.3 * path.load_factor.values
-    top = (path.support_node.values == 3) & (path.support_axis.values == "z")
+    v = -apex(path)
+    top = (path.support_node == 3) & (path.support_axis == "z")
     load = truss.load(v)
-    np.testing.assert_allclose(-path.reaction.values[:, top].ravel(), load, atol=1e-8)
-    np.testing.assert_allclose(w - v, load / truss.k, atol=1e-10)
-    assert v[-1] > 2 * truss.h
-    assert load.min() < 0 < load.max()
+    np.testing.assert_allclose(-path.reaction[:, top].values.ravel(), load, atol=1e-8)
+    np.testing.assert_allclose(0.3 * path.load_factor, truss.moved(v), atol=1e-10)
+    assert v[-1] > 2 * truss.h and load.min() < 0 < load.max()
     assert not path.negative_eigenvalues.values.any()
 
 
 @pytest.mark.parametrize("method", FREE)
 def test_snap_back(method):
     """Through a soft spring the far end's displacement has limit points itself: 1 + P'(v)/k = 0."""
-    truss = SpringLoaded(k=50.0)
-    path = trace(
-        truss.case(-1.0),
-        method,
-        first_step=0.02,
-        steps=200,
-        until=lambda u, factor: u[APEX, 2] < -2.05 * truss.h,
-        settings=Settings(largest_turn=2.0),
-    )
-    v, w = -apex(path), path.load_factor.values
-    np.testing.assert_allclose(w, v + truss.load(v) / truss.k, atol=1e-9)
+    truss, settings = SpringLoaded(k=50.0), Settings(largest_turn=2.0)
+    path = snapped(truss.case(-1.0), method, 2.05, first_step=0.02, steps=200, settings=settings)
+    np.testing.assert_allclose(path.load_factor, truss.moved(-apex(path)), atol=1e-9)
     low, top = truss.h * np.array([1e-3, 1.0])
     first = brentq(lambda x: 1 + truss.slope(x) / truss.k, low, top, xtol=1e-15)
-    turns = np.array([first, 2 * truss.h - first])
-    marked = path.point.values == "limit"
-    np.testing.assert_allclose(v[marked], turns, rtol=1e-8)
-    np.testing.assert_allclose(w[marked], turns + truss.load(turns) / truss.k, rtol=1e-11)
-    assert w[marked][0] - w[marked][1] > 0.2 * truss.h  # it goes back a long way
+    turns, limits = np.array([first, 2 * truss.h - first]), marked(path, "limit")
+    np.testing.assert_allclose(-apex(limits), turns, rtol=1e-8)
+    np.testing.assert_allclose(limits.load_factor, truss.moved(turns), rtol=1e-11)
+    assert np.ptp(limits.load_factor.values) > 0.2 * truss.h  # it goes back a long way
 
 
 def test_load_stepping_ends_at_the_limit_point():
+    """It returns exactly the given factors, and has not snapped through."""
     with pytest.raises(ComputationError, match="arc_length") as caught:
         trace(TRUSS.case(), load_factors=np.linspace(0.5, 5.0, 10))
     path = caught.value.partial
     assert path.attrs["status"] == "stopped"
-    assert "3.79" in path.attrs["stopped_because"]
-    assert "arc_length" in path.attrs["remedy"]
+    assert "3.79" in path.attrs["stopped_because"] and "arc_length" in path.attrs["remedy"]
     np.testing.assert_allclose(path.load_factor, np.arange(0.5, 4.0, 0.5))
-    assert (-apex(path) < TRUSS.limit_at[0]).all()  # it has not snapped through
-
-
-def test_load_stepping_returns_exactly_the_given_factors():
-    factors = [0.0, 1.0, 0.5, 3.0]
-    path = trace(TRUSS.case(), load_factors=factors)
+    assert (-apex(path) < TRUSS.limit_at[0]).all()
+    path = trace(TRUSS.case(), load_factors=(factors := [0.0, 1.0, 0.5, 3.0]))
     assert path.load_factor.values.tolist() == factors
-    v = -apex(path)
-    np.testing.assert_allclose(TRUSS.load(v), factors, atol=1e-9)
+    np.testing.assert_allclose(TRUSS.load(-apex(path)), factors, atol=1e-9)
 
 
 @pytest.mark.parametrize("method", FREE)
 def test_path_ends_exactly_at_the_last_factor(method):
     path = trace(TRUSS.case(), method, load_factors=(0.0, 3.0))
-    assert path.load_factor.values[-1] == 3.0
-    assert (path.load_factor.values[:-1] < 3.0).all()
+    assert path.load_factor.values[-1] == 3.0 > path.load_factor.values[:-1].max()
     back = trace(TRUSS.case(), method, load_factors=(0.0, -20.0))
     assert back.load_factor.values[-1] == -20.0
     np.testing.assert_allclose(TRUSS.load(-apex(back)), back.load_factor, atol=1e-7)
-
-
-@pytest.mark.parametrize("method", FREE)
-def test_last_factor_not_reached(method):
     with pytest.raises(ComputationError, match="3 was not reached in 2 steps; give more") as caught:
         trace(TRUSS.case(), method, load_factors=(0.0, 3.0), steps=2)
     assert caught.value.partial.sizes["step"] == 3

@@ -55,13 +55,10 @@ class VonMises:
         return self.EA / self.L**3 * (v * (2 * self.h - v)) ** 2 / 4
 
     def structure(self):
-        return fd.Structure(
-            nodes=np.array([[-self.b, 0, 0], [self.b, 0, 0], [0, 0, self.h]], float),
-            bars=np.array([[0, 2], [1, 2]]),
-            bar_area=np.array([AREA, AREA]),
-            sheet=fd.Sheet(self.EA / AREA, 0.3, 0.01),
-            options=ModelOptions(bar_law="linear"),
-        )
+        nodes = np.array([[-self.b, 0, 0], [self.b, 0, 0], [0, 0, self.h]], float)
+        bars, sheet = np.array([[0, 2], [1, 2]]), fd.Sheet(self.EA / AREA, 0.3, 0.01)
+        options = ModelOptions(bar_law="linear")
+        return fd.Structure(nodes, bars, np.array([AREA, AREA]), sheet, options=options)
 
     def case(self, free="z", load=-1.0):
         """The apex free along some axes under a load (N) along z at factor 1."""
@@ -90,6 +87,10 @@ class SpringLoaded:
         length = np.hypot(self.b, self.h - v)
         return 2 * self.EA * (self.h - v) * (1 / length - 1 / np.hypot(self.h, self.b))
 
+    def moved(self, v):
+        """w."""
+        return v + self.load(v) / self.k
+
     def slope(self, v):
         """dP/dv."""
         length = np.hypot(self.b, self.h - v)
@@ -98,23 +99,28 @@ class SpringLoaded:
     def case(self, displacement):
         """The far end moved along z by a displacement (m) at factor 1."""
         law = fd.CustomBarLaw(
-            energy_of=lambda s: 0.5 * (s - 1.0) ** 2,
-            stress_of=lambda s: (s - 1.0) / s,
-            slope_of=lambda s: 1.0 / s**3,
-            name="spring",
+            lambda s: 0.5 * (s - 1.0) ** 2, lambda s: (s - 1.0) / s, lambda s: 1.0 / s**3
         )
         above = 1.0  # length of the third spring
+        nodes = [[-self.b, 0, 0], [self.b, 0, 0], [0, 0, self.h], [0, 0, self.h + above]]
+        bars, area = [[0, 2], [1, 2], [2, 3]], [AREA, AREA, AREA * self.k * above / self.EA]
         structure = fd.Structure(
-            nodes=np.array(
-                [[-self.b, 0, 0], [self.b, 0, 0], [0, 0, self.h], [0, 0, self.h + above]], float
-            ),
-            bars=np.array([[0, 2], [1, 2], [2, 3]]),
-            bar_area=np.array([AREA, AREA, AREA * self.k * above / self.EA]),
-            sheet=fd.Sheet(self.EA / AREA, 0.3, 0.01),
-            options=ModelOptions(bar_law=law),
-        )
+            np.array(nodes, float), np.array(bars), np.array(area),
+            fd.Sheet(self.EA / AREA, 0.3, 0.01), options=ModelOptions(bar_law=law),
+        )  # fmt: skip
         supports = [fd.Fix([0, 1], "xyz"), fd.Fix([APEX, 3], "xy")]
         return fd.Case(structure, [*supports, fd.Impose([3], "z", displacement)])
+
+
+def snapped(case, method="arc_length", past=2.2, **given):
+    """Path until the apex of a truss, which is node 2, has gone down so many times its height."""
+    down = past * case.structure.nodes[APEX, 2]
+    return fd.trace(case, method, until=lambda u, factor: u[APEX, 2] < -down, **given)
+
+
+def marked(path, kind=None):
+    """Points of a path that are not regular, or those of a kind."""
+    return path.isel(step=path.point.values != "regular" if kind is None else path.point == kind)
 
 
 def apex(path, axis="z"):

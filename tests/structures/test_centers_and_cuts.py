@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 
@@ -32,20 +34,16 @@ def test_center_of_a_flat_quad_is_where_diagonals_cross():
 
 
 def test_center_of_a_quad_that_is_not_flat_lies_on_the_shorter_diagonal():
+    """Of equal ones on that through corners 2 and 4, from 1; also where they differ by rounding."""
     # diagonal 0-2 along x at z = 0, longer; diagonal 1-3 along y at z = 0.1
     x = np.array([[[-2.0, 0, 0], [0.1, -1, 0.1], [2, 0, 0], [0.1, 1, 0.1]]])
-    np.testing.assert_allclose(quad_centers(x), [[0.1, 0, 0.1]], atol=1e-15)
-    swapped = np.roll(x, 1, axis=1)
-    np.testing.assert_allclose(quad_centers(swapped), [[0.1, 0, 0.1]], atol=1e-15)
-
-
-def test_center_at_equal_diagonals():
-    """The one through corners 2 and 4, counted from 1; also where they differ by rounding."""
-    x = np.array([[[-1.0, 0, 0], [0, -1, 0.1], [1, 0, 0], [0, 1, 0.1]]])
-    np.testing.assert_allclose(quad_centers(x), [[0, 0, 0.1]], atol=1e-15)
-    np.testing.assert_allclose(quad_centers(np.roll(x, 1, axis=1)), [[0, 0, 0]], atol=1e-15)
-    x[0, 2, 0] -= 1e-15
-    np.testing.assert_allclose(quad_centers(x), [[0, 0, 0.1]], atol=1e-15)
+    equal = np.array([[[-1.0, 0, 0], [0, -1, 0.1], [1, 0, 0], [0, 1, 0.1]]])
+    nearly = equal - [[[0, 0, 0], [0, 0, 0], [1e-15, 0, 0], [0, 0, 0]]]
+    for corners, center in (
+        (x, [0.1, 0, 0.1]), (np.roll(x, 1, axis=1), [0.1, 0, 0.1]), (equal, [0, 0, 0.1]),
+        (np.roll(equal, 1, axis=1), [0, 0, 0]), (nearly, [0, 0, 0.1]),
+    ):  # fmt: skip
+        np.testing.assert_allclose(quad_centers(corners), [center], atol=1e-15)
 
 
 def test_quad_that_is_not_flat_is_discretized():
@@ -56,14 +54,11 @@ def test_quad_that_is_not_flat_is_discretized():
 
 def objective(x, points):
     """Sum of |(xj - c) x (xi - c)| / Lij^2 over diagonals, as MERLIN2 minimizes it."""
-    m = len(x)
-    total = np.zeros(len(points))
-    for i in range(m):
-        for j in range(i + 2, m):
-            if (i, j) != (0, m - 1):
-                a, b = x[j] - points, x[i] - points
-                cross = np.linalg.norm(np.cross(a, b), axis=1)
-                total += cross / np.sum((x[j] - x[i]) ** 2)
+    total, m = np.zeros(len(points)), len(x)
+    for i, j in combinations(range(m), 2):
+        if j - i not in (1, m - 1):
+            cross = np.linalg.norm(np.cross(x[j] - points, x[i] - points), axis=1)
+            total += cross / np.sum((x[j] - x[i]) ** 2)
     return total
 
 
@@ -99,52 +94,41 @@ def diagonals(s):
     return sorted(tuple(sorted(row)) for row in s.bends[:, :2].tolist())
 
 
-def test_n4b5_cuts_the_shorter_diagonal():
-    assert diagonals(one([[0, 0], [1, 0], [1.5, 1], [0.5, 1]], scheme="n4b5")) == [(1, 3)]
-    assert diagonals(one([[0, 0], [1, 0], [0.5, 1], [-0.5, 1]], scheme="n4b5")) == [(0, 2)]
-    assert diagonals(one(SQUARE, scheme="n4b5")) == [(0, 2)]  # tie: corners 1, 3 from 1
-    almost = [[0, 0], [1, 0], [1 + 1e-15, 1], [0, 1]]
-    assert diagonals(one(almost, scheme="n4b5")) == [(0, 2)]
-
-
-def test_dart():
-    """A quad with a reflex corner: no center sees all its edges; N4B5 cuts through the corner."""
-    with pytest.raises(InputError, match=r"panel 0 .*n4b5"):
-        one(DART)
-    s = one(DART, scheme="n4b5")
-    assert diagonals(s) == [(0, 2)]
-    for turn in range(1, 4):
-        s = one(np.roll(DART, turn, axis=0), scheme="n4b5")
-        assert diagonals(s) == [tuple(sorted((turn, (2 + turn) % 4)))]
-    # also where the diagonal outside the panel is the shorter one
-    flat_dart = [[0, 0], [2, -0.2], [1.7, 0], [2, 0.2]]
-    assert diagonals(one(flat_dart, scheme="n4b5")) == [(0, 2)]
+@pytest.mark.parametrize(
+    ("vertices", "cut"),
+    [
+        ([[0, 0], [1, 0], [1.5, 1], [0.5, 1]], (1, 3)),
+        ([[0, 0], [1, 0], [0.5, 1], [-0.5, 1]], (0, 2)),
+        (SQUARE, (0, 2)),  # tie: corners 1, 3 from 1
+        ([[0, 0], [1, 0], [1 + 1e-15, 1], [0, 1]], (0, 2)),
+        # through a reflex corner, also where the diagonal outside the panel is the shorter one
+        *((np.roll(DART, turn, axis=0), (turn % 2, turn % 2 + 2)) for turn in range(4)),
+        ([[0, 0], [2, -0.2], [1.7, 0], [2, 0.2]], (0, 2)),
+    ],
+)
+def test_n4b5_cuts_the_shorter_diagonal_inside(vertices, cut):
+    assert diagonals(one(vertices, scheme="n4b5")) == [cut]
 
 
 def test_l_shape_is_cut_inside():
     s = one(L_SHAPE, scheme="n4b5")
-    assert len(s.triangles) == 4
-    assert len(s.bends) == 3
+    assert (len(s.triangles), len(s.bends)) == (4, 3)
     a, b, c = (s.nodes[s.triangles[:, k]] for k in range(3))
     areas = np.cross(b - a, c - a)[:, 2] / 2
-    assert (areas > 0).all()
-    assert areas.sum() == pytest.approx(3.0, rel=1e-14)
-    for p, q in diagonals(s):
-        middle = (s.nodes[p] + s.nodes[q]) / 2
-        assert not (middle[0] > 1 and middle[1] > 1)  # the notch
+    assert (areas > 0).all() and areas.sum() == pytest.approx(3.0, rel=1e-14)
+    middles = np.array([s.nodes[list(pair)].mean(axis=0) for pair in diagonals(s)])
+    assert (middles[:, :2].min(axis=1) <= 1.0).all()  # the notch
     np.testing.assert_allclose(s.bend_rest, np.pi, atol=1e-14)
-    # the shortest diagonals of all: 0-3 (sqrt 2) first
-    assert (0, 3) in diagonals(s)
+    assert (0, 3) in diagonals(s)  # the shortest of all: sqrt 2
 
 
-def test_l_shape_n5b8_needs_a_center_that_sees_every_edge():
-    with pytest.raises(InputError, match=r"panel 0 .*cannot see every edge.*n4b5"):
-        one(L_SHAPE)
+def test_n5b8_needs_a_center_that_sees_every_edge():
+    for shape, options in ((L_SHAPE, {}), (SQUARE, {"centers": {0: [2.0, 0.5, 0]}}), (DART, {})):
+        with pytest.raises(InputError, match=r"panel 0 .*cannot see every edge.*n4b5"):
+            one(shape, **options)
     s = one(L_SHAPE, centers={0: [0.5, 0.5, 0]})
     assert len(s.triangles) == 6
     assert s.surface.triangle_area.sum() == pytest.approx(3.0, rel=1e-14)
-    with pytest.raises(InputError, match="cannot see"):
-        one(SQUARE, centers={0: [2.0, 0.5, 0]})
 
 
 def test_n4b5_with_a_diagonal_that_is_an_edge_elsewhere():
@@ -153,22 +137,14 @@ def test_n4b5_with_a_diagonal_that_is_an_edge_elsewhere():
     pattern = fd.Pattern(vertices, [[0, 1, 2, 3], [0, 2, 1], [0, 3, 2]])
     s = fd.discretize(pattern, SHEET, scheme="n4b5", crease_rest=180)
     assert diagonals(s) == [(0, 2)]
-    panels = dict(zip(map(tuple, s.triangles.tolist()), s.triangle_panel.tolist(), strict=True))
-    assert sorted(panels.values()) == [0, 0, 1, 2]
-    j, k, i, l = s.bends[0]  # noqa: E741
-    assert {i, l} == {1, 3}
-
-    def owner(*corners):
-        return [p for t, p in panels.items() if sorted(t) == sorted(corners)]
-
-    crease = [row for row in s.folds.tolist() if sorted(row[:2]) == [0, 2]]
-    assert len(crease) == 1
-    j, k, i, l = crease[0]  # noqa: E741
+    assert sorted(s.triangle_panel.tolist()) == [0, 0, 1, 2]
+    assert set(s.bends[0, 2:].tolist()) == {1, 3}
+    (crease,) = (row for row in s.folds.tolist() if sorted(row[:2]) == [0, 2])
+    j, k, i, l = crease  # noqa: E741
     # the face of wing i (1 or 2, never the quad) runs j to k
     for wing, (start, end) in ((i, (j, k)), (l, (k, j))):
         face = next(f for f in pattern.faces[1:] if wing in f)
         assert face[(face.index(start) + 1) % 3] == end
-        assert owner(start, end, wing)
 
 
 def test_pattern_of_many_kinds_of_panels():

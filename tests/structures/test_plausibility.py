@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from case_texts import HELD_MIURA_TEXT
+from foldyn.cli.main import main
 from foldyn.errors import UnitsWarning
 from foldyn.studies import find_case, shipped_cases
 
@@ -46,10 +48,13 @@ def test_a_panel_of_its_own():
     assert "thickness = 0.1 m is 2.5 times the shortest edge of panel 2, 0.04 m" in text
 
 
-@pytest.mark.parametrize("density", [None, 1.0, 1000.0])
-def test_sheets_of_the_paper(density):
-    sheet = fd.Sheet(1e6, 0.25, 0.01, density)
-    assert told(lambda: fd.discretize(fd.patterns.miura(), sheet)) == []
+def test_what_is_not_told():
+    for density in (None, 1.0, 1000.0):  # sheets of the paper
+        sheet = fd.Sheet(1e6, 0.25, 0.01, density)
+        assert told(lambda sheet=sheet: fd.discretize(fd.patterns.miura(), sheet)) == []
+    angles = [0.1, 0.5, 1, 1.05, 1.5, 1.57, 2, 2.5, 3, 3.14, 3.5, 4, 5, 5.5, 6, 6.3, 7, 9.42478]
+    assert told(lambda: [fd.patterns.simple_fold(dihedral=angle) for angle in angles]) == []
+    assert told(lambda: [fd.Actuate("all", angle=[angle, 120.0]) for angle in angles]) == []
 
 
 @pytest.mark.parametrize("name", shipped_cases())
@@ -68,7 +73,7 @@ def test_shipped_cases(name):
         (lambda: fd.Actuate("all", fold_angle=[0.0, np.pi / 2]), "fold_angle = 1.5708 is pi/2"),
         (
             lambda: fd.discretize(SMALL, fd.Sheet(*STEEL), crease_rest=np.pi / 4),
-            "crease_rest = 0.785.* is pi/4, .* give 45 ",
+            "= 0.785.* is pi/4, ",
         ),
     ],
 )
@@ -77,32 +82,11 @@ def test_radians(make, message):
         make()
 
 
-@pytest.mark.parametrize(
-    "angle", [0.1, 0.5, 1, 1.05, 1.5, 1.57, 2, 2.5, 3, 3.14, 3.5, 4, 5, 5.5, 6, 6.3, 7, 9.42478]
-)
-def test_small_angles_in_degrees(angle):
-    assert told(lambda: fd.patterns.simple_fold(dihedral=angle)) == []
-    assert told(lambda: fd.Actuate("all", angle=[angle, 120.0])) == []
-
-
 def test_a_case_file_says_it_once(tmp_path, capsys):
-    from foldyn.cli.main import main
-
-    text = """
-[pattern]
-kind = "miura"
-panel_angle = 1.0471975511965976
-[sheet]
-youngs_modulus = 200.0
-poissons_ratio = 0.3
-thickness = 0.01
-density = 1000.0
-[[supports]]
-nodes = "xmin"
-[analysis]
-kind = "modes"
-"""
-    (tmp_path / "case.toml").write_text(text)
+    text = HELD_MIURA_TEXT.replace("[sheet]", f"panel_angle = {np.pi / 3}\n[sheet]")
+    text = text.replace("youngs_modulus = 1e6", "youngs_modulus = 200.0")
+    text = text.replace("density = 1.0", "density = 1000.0")
+    (tmp_path / "case.toml").write_text(f'{text}[analysis]\nkind = "modes"\n')
     main(["run", str(tmp_path / "case.toml"), "--no-figures", "--out", str(tmp_path / "out")])
     said = capsys.readouterr().err
     assert said.count("is pi/3, but angles are in degrees: give 60") == 1

@@ -53,8 +53,7 @@ def test_flexibility_of_a_rhombus(angle, edges):
 def test_plates_of_one_shape_share_what_they_have():
     x = np.stack([rhombus(60), rhombus(60) + 1e-13, rhombus(61)])
     found = flexibilities(x, np.ones((3, 4), bool), np.full(3, 0.3))
-    np.testing.assert_array_equal(found[0], found[1])
-    assert (found[0] != found[2]).any()
+    assert (found[0] == found[1]).all() and (found[0] != found[2]).any()
 
 
 @pytest.mark.parametrize("name", QUADS)
@@ -124,18 +123,13 @@ def facets(x):
 
     In the twist of the corners x (4, 2) and when the center rises.
     """
-    heights = np.zeros((2, 5))
-    heights[0, :4], heights[1, 4] = twists(x[None])[0], 1.0
-    following = np.roll(np.arange(4), -1)
-    turns, slopes, gradient = np.zeros((4, 2)), np.zeros((4, 2)), np.zeros((4, 2, 2))
-    for k in range(4):
-        facet = np.array([x[k], x[following[k]]])
-        for i in range(2):
-            rise = heights[i, [k, following[k]]] - heights[i, 4]
-            gradient[k, i] = np.linalg.solve(facet, rise)
-        along = x[following[k]] - x[k]
-        slopes[k] = gradient[k] @ [along[1], -along[0]] / np.linalg.norm(along)
-    for k in range(4):
-        left = np.array([-x[k, 1], x[k, 0]]) / np.linalg.norm(x[k])
-        turns[k] = (gradient[k - 1] - gradient[k]) @ left
-    return turns, slopes
+    ahead = np.roll(x, -1, axis=0)
+    heights = np.stack([twists(x[None])[0], -np.ones(4)], axis=1)  # over the center's
+    rise = np.stack([heights, np.roll(heights, -1, axis=0)], axis=1)
+    gradient = np.linalg.solve(np.stack([x, ahead], axis=1), rise).transpose(0, 2, 1)
+    along = ahead - x
+    outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    outward /= np.linalg.norm(along, axis=1)[:, None]
+    left = np.stack([-x[:, 1], x[:, 0]], axis=1) / np.linalg.norm(x, axis=1)[:, None]
+    turns = np.einsum("kic,kc->ki", np.roll(gradient, 1, axis=0) - gradient, left)
+    return turns, np.einsum("kic,kc->ki", gradient, outward)

@@ -16,6 +16,7 @@ SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
 LINEAR = {"bar_law": "linear", "fold_law": "linear", "bend_law": "linear"}
 MIURA = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
 TOWER = fd.patterns.kresling(sides=6, radius=1.0, height=0.9, twist=30)
+BASE = [fd.Fix("zmin")]
 FOLDING = [fd.Fix([0, 1, 2], "x"), fd.Fix([1], "y"), fd.Fix([0, 2, 6, 8], "z")]
 
 
@@ -49,11 +50,10 @@ def test_the_share_in_a_mode_is_that_of_its_energies():
 
 def test_modes():
     assert told(lambda: fd.modes(held(MIURA, FOLDING), 6)) == []
-    tower = held(TOWER, [fd.Fix("zmin")])
-    (text,) = told(lambda: fd.modes(tower, 3))
+    (text,) = told(lambda: fd.modes(held(TOWER, BASE), 3))
     assert text.startswith("bars hold more than 5% of the strain energy of modes 1, 2, 3 (mode ")
     assert "foldyn fidelity" in text and "--model shell" in text
-    assert told(lambda: fd.modes(held(TOWER, [fd.Fix("zmin")], fd.shell, divisions=2), 3)) == []
+    assert told(lambda: fd.modes(held(TOWER, BASE, fd.shell, divisions=2), 3)) == []
 
 
 def test_frequency_responses():
@@ -61,7 +61,7 @@ def test_frequency_responses():
     f = first * np.linspace(0.5, 1.5, 41)
     push = fd.Force([7], (1.0, 0, 0))
     assert told(lambda: fd.frf(held(MIURA, FOLDING), push, f)) == []
-    tower = held(TOWER, [fd.Fix("zmin")])
+    tower = held(TOWER, BASE)
     f = fd.modes(tower, 1).frequency.values[0] * np.linspace(0.9, 1.1, 41)
     (text,) = told(lambda: fd.frf(tower, fd.Force([6], (0, 0, 1.0)), f))
     assert text.startswith("bars hold more than 5% of the strain energy of the response at ")
@@ -74,7 +74,7 @@ def test_paths_and_motions():
     assert told(lambda: fd.trace(case, "newton", [0.0, 1.0])) == []
     assert told(lambda: fd.simulate(case, 0.5, "rk4")) == []
     load = [fd.Force(list(range(6, 12)), (0, 0, -1e-3))]
-    tower = held(TOWER, [fd.Fix("zmin")], loads=load)
+    tower = held(TOWER, BASE, loads=load)
     (text,) = told(lambda: fd.trace(tower, "newton", [0.0, 1.0]))
     assert text.startswith("bars hold 100% of the strain energy where that is largest, at point 1")
     (text,) = told(lambda: fd.simulate(tower, 0.05, "rk4"))

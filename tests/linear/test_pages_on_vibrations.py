@@ -1,25 +1,35 @@
-"""The page of the modes: what it shows runs, and its numbers are computed."""
+"""The pages of modes and of frequency responses: what they show runs, and is computed."""
 
 from __future__ import annotations
 
 import re
 import warnings
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bodies import paper_specimen
 
-from foldyn.linear import character, equivalent_slope, modes
+import foldyn as fd
+from foldyn.errors import FoldynWarning
+from foldyn.linear import METHODS, character, equivalent_slope, frf, modes
 from foldyn.results.quantities import MODES
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "modes.md").read_text("utf-8")
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGE = (DOCS / "modes.md").read_text("utf-8")
 
 
-def test_the_examples_run():
+def ran(text: str) -> dict:
+    """What the code of a page makes."""
     names: dict = {}
-    for block in re.findall(r"^```python\n(.*?)^```$", PAGE, re.M | re.S):
-        exec(compile(block, "modes.md", "exec"), names)
+    for block in re.findall(r"^```python\n(.*?)^```$", text, re.M | re.S):
+        exec(compile(block, "page.md", "exec"), names)
+    return names
+
+
+def test_the_examples_of_modes_run():
+    names = ran(PAGE)
     omega = 2 * np.pi * names["found"].frequency.values
     np.testing.assert_allclose(names["found"].damping_ratio, 0.03 / omega, rtol=1e-9)
     assert float(names["full"].displacement[40, 0]) > float(names["half"].displacement[40, 0]) > 0
@@ -75,3 +85,41 @@ def test_modes_without_a_secant_warn_on_this_page():
         warnings.simplefilter("always")
         modes(paper_specimen(), 2)
     assert "192 hinges" in str(caught[0].message)
+
+
+TEXT = (DOCS / "frequency-response.md").read_text("utf-8")
+ROWS = "".join(line.split("|")[1] for line in TEXT.splitlines() if line.startswith("| `"))
+
+
+@pytest.fixture(scope="module")
+def names():
+    return ran(TEXT)
+
+
+@pytest.mark.thorough
+def test_the_examples_run(names):
+    weak, full = names["first"]
+    assert 0.3 < weak < full < 1.5
+    assert 0.1 < float(names["full"].swing.max()) < 30
+    coherence = names["bursts"].coherence.sel(node=7, axis="x")
+    assert 0.3 < float(coherence.min()) < 0.9999
+    still = complex(names["base"].transmissibility.sel(node=4, axis="z")[0])
+    assert still == pytest.approx(1.0, abs=0.05)
+    size = np.abs(names["response"].receptance.sel(node=7, axis="x"))
+    ratio = np.abs(names["mobility"].mobility.sel(node=7, axis="x")) / size
+    np.testing.assert_allclose(ratio, 2 * np.pi * names["frequencies"])
+
+
+def test_every_method_and_option_has_a_row():
+    assert [name for name in METHODS if f"`{name}`" not in ROWS] == []
+    timed = ("impulse", "stepped_sine", "burst_random")
+    options = {field.name for name in timed for field in fields(METHODS[name].options)}
+    shared = {"integrator", "dt", "tolerance"}
+    assert [name for name in options - shared if f"`{name}`" not in ROWS] == []
+    assert all(f"`{name}`" in TEXT for name in shared)
+
+
+def test_the_warning_that_the_page_speaks_of(names):
+    with pytest.warns(FoldynWarning, match="secant"):
+        frf(names["soft"], names["drive"], [1.0])
+    assert fd.case_of(names["response"]).damping == names["case"].damping

@@ -1,0 +1,3 @@
+"""What the tests of structures share."""
+
+from case_fixtures import kept, read  # noqa: F401 - fixtures
