@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -118,38 +116,3 @@ def test_force_is_gradient_and_tangent_its_slope(name):
     coarse, fine = errors(2e-3), errors(1e-3)
     np.testing.assert_allclose(np.log2(coarse / fine), 2.0, atol=0.15)
     assert fine.max() < 1e-2
-
-
-@pytest.mark.parametrize("name", ["miura n5b8", "hexagon", "miura n4b5"])
-def test_numbering_does_not_matter(name):
-    """Nodes, bars and hinges in another order: the same energy, force and tangent."""
-    s = structure(name)
-    rng = np.random.default_rng(8)
-    n = len(s.nodes)
-    new = rng.permutation(n)  # new[i]: new number of node i
-    rows = {k: rng.permutation(len(getattr(s, k))) for k in ("bars", "folds", "bends")}
-    nodes = np.empty_like(s.nodes)
-    nodes[new] = s.nodes
-    other = dataclasses.replace(
-        s,
-        nodes=nodes,
-        pattern=None,
-        bars=new[s.bars][rows["bars"]],
-        bar_area=s.bar_area[rows["bars"]],
-        panel_softness=s.panel_softness[rows["folds"]] if len(s.panel_softness) else np.zeros(0),
-        **{
-            f"{kind}{part}": (new[value] if part == "s" else value)[rows[kind + "s"]]
-            for kind in ("fold", "bend")
-            for part in ("s", "_stiffness", "_rest")
-            for value in [getattr(s, f"{kind}{part}")]
-        },
-    )
-    u = state(s, 9)
-    moved = np.empty_like(u)
-    moved[new] = u
-    for key, value in s.energies(u).items():
-        assert other.energies(moved)[key] == pytest.approx(value, rel=1e-13)
-    assert relative(other.internal_force(moved)[new], s.internal_force(u)) < 1e-13
-    dof = (3 * new[:, None] + np.arange(3)).ravel()
-    ours = other.tangent(moved).toarray()[np.ix_(dof, dof)]
-    assert relative(ours, s.tangent(u).toarray()) < 1e-13

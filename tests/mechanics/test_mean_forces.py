@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,18 @@ from foldyn.mechanics.term import FORCES, MEAN_FORCES, Compiled, Term, forces
 SHEET = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.3, thickness=0.01, density=1.0)
 FOLD = fd.patterns.simple_fold(a=1.0, b=1.3, dihedral=100)
 MODELS = ("plate", "herkal", "n5b8e", "shell")
+CUBIC = fd.CustomHingeLaw(
+    energy_of=lambda t, r: 0.5 * (t - r) ** 2 + 0.25 * (t - r) ** 4,
+    moment_of=lambda t, r: (t - r) + (t - r) ** 3,
+    slope_of=lambda t, r: 1.0 + 3.0 * (t - r) ** 2,
+    name="cubic",
+)
+OTHER_LAWS = {
+    "superlinear": {"fold_law": "superlinear", "bend_law": "superlinear"},
+    "locking": {"fold_law": fd.EnhancedLinear(110, 285), "bend_law": "linear"},
+    "custom": {"bar_law": "linear", "fold_law": CUBIC, "bend_law": CUBIC},
+}
+ELASTIC = (*MODELS, *OTHER_LAWS)
 FREE = [
     fd.Spring(40.0, between=[(0, 2), (1, 3)]),
     fd.Spring(25.0, between=[(3, 0)], rest_length=0.4),
@@ -44,6 +57,8 @@ NO_POWERS = np.zeros(2)
 def structure(model: str, **options: Any) -> Any:
     if model == "shell":
         return fd.shell(FOLD, SHEET, 1, **options)
+    if model in OTHER_LAWS:
+        return fd.discretize(FOLD, SHEET, preset="herkal", **OTHER_LAWS[model])
     return fd.discretize(FOLD, SHEET, preset=model, **options)
 
 
@@ -94,10 +109,21 @@ def nodes(body: Assembly) -> np.ndarray:
     return rest[: (body.size - len(body.hidden)) // 3]
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.3])
+def assert_no_resultant(body: Assembly, force: np.ndarray, q0: np.ndarray, q1: np.ndarray) -> None:
+    """Neither a force nor a moment about the mean positions."""
+    rest, scale = nodes(body), np.abs(force).max()
+    own = force[: rest.size].reshape(-1, 3)
+    middle = rest + 0.5 * (q0 + q1)[: rest.size].reshape(-1, 3)
+    assert np.abs(own.sum(axis=0)).max() < 1e-12 * scale
+    assert np.abs(np.cross(middle, own).sum(axis=0)).max() < 1e-11 * scale
+
+
+@pytest.mark.parametrize("turn", [0.0, 1e-3, 0.3, 1.5])
 @pytest.mark.parametrize("deform", [1e-9, 1e-4, 0.02])
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("supports", [[], FREE, GROUNDED], ids=["sheet", "axial", "directed"])
+@pytest.mark.parametrize(
+    ("model", "supports"),
+    [*product(ELASTIC, ([],)), *product(MODELS, (FREE, GROUNDED))],
+)
 def test_work_is_the_change_of_the_energy(model, supports, deform, turn):
     """However far the step goes; without resultant and moment where nothing holds the sheet."""
     body = fd.Case(structure(model), supports).body
@@ -106,11 +132,22 @@ def test_work_is_the_change_of_the_energy(model, supports, deform, turn):
     change = body.energies(q1).sum() - before
     assert force @ (q1 - q0) == pytest.approx(change, abs=4e-13 * (before + abs(change)))
     if supports is not GROUNDED:
-        rest, scale = nodes(body), np.abs(force).max()
-        own = force[: rest.size].reshape(-1, 3)
-        middle = rest + 0.5 * (q0 + q1)[: rest.size].reshape(-1, 3)
-        assert np.abs(own.sum(axis=0)).max() < 1e-12 * scale
-        assert np.abs(np.cross(middle, own).sum(axis=0)).max() < 1e-11 * scale
+        assert_no_resultant(body, force, q0, q1)
+
+
+@pytest.mark.parametrize("model", ["herkal", *OTHER_LAWS])
+def test_a_rigid_motion_turns_the_forces_with_the_body(model):
+    """Half turned, they are the internal forces, but for the mean positions being nearer."""
+    body = fd.Case(structure(model)).body
+    q0, q1 = states(body, 0.0, 0.4)
+    middle = Rotation.from_rotvec(0.2 * np.array([0.48, -0.6, 0.64])).as_matrix()
+    turned = body.internal(q0).reshape(-1, 3) @ middle.T
+    # bars along the axis keep their force, those across act along directions cos(0.2) as long
+    w = 2.0 * np.tan(0.2) * np.array([0.48, -0.6, 0.64])
+    values, vectors = np.linalg.eigh(np.eye(3) * (1.0 + w @ w / 4.0) - np.outer(w, w) / 4.0)
+    expected = turned @ (vectors / np.sqrt(values)) @ vectors.T
+    found = mean_forces(body, q0, q1).reshape(-1, 3)
+    np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(turned).max())
 
 
 @pytest.mark.parametrize("deform", [1e-6, 0.02])
@@ -134,8 +171,7 @@ def closes(body: Assembly, deform: float) -> None:
     assert work == pytest.approx(change, abs=4e-13 * (before + abs(change)))
 
 
-@pytest.mark.parametrize("own", [True, False], ids=["own", "halfway"])
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(("model", "own"), [*product(ELASTIC, (True,)), *product(MODELS, (False,))])
 def test_small_steps_give_the_force_in_the_middle(model, own):
     """The difference falls with the square of the step, and nothing breaks without one."""
     body = fd.Case(structure(model), FREE + GROUNDED).body
@@ -149,10 +185,13 @@ def test_small_steps_give_the_force_in_the_middle(model, own):
     assert observed_order(sizes, errors) == pytest.approx(2.0, abs=0.1)
     still, scale = body.internal(middle), np.abs(body.internal(middle)).max()
     np.testing.assert_allclose(mean_forces(body, middle, middle), still, atol=1e-12 * scale)
+    near = mean_forces(body, middle, middle * (1.0 + 1e-15))
+    np.testing.assert_allclose(near, still, atol=1e-9 * scale)
 
 
-@pytest.mark.parametrize("law", ["elastic", *LAWS])
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    ("model", "law"), [*product(MODELS, ("elastic", *LAWS)), *product(OTHER_LAWS, ("elastic",))]
+)
 def test_the_tangent_is_the_derivative_to_first_order(model, law):
     made = structure(model, fold_law=LAWS[law]) if law in LAWS else structure(model)
     case = fd.Case(made, FREE + GROUNDED)
@@ -198,11 +237,7 @@ def test_creases_that_remember_do_the_work_that_is_stored_and_lost(model, law, d
     lost, change = memory.own.lost[1] + h * powers[1], body.energies(q1).sum() - before
     assert force @ (q1 - q0) == pytest.approx(change + lost, abs=4e-13 * (before + abs(change)))
     assert lost > -1e-14 * before
-    rest, scale = nodes(body), np.abs(force).max()
-    own = force[: rest.size].reshape(-1, 3)
-    middle = rest + 0.5 * (q0 + q1)[: rest.size].reshape(-1, 3)
-    assert np.abs(own.sum(axis=0)).max() < 1e-12 * scale
-    assert np.abs(np.cross(middle, own).sum(axis=0)).max() < 1e-11 * scale
+    assert_no_resultant(body, force, q0, q1)
 
 
 class DragContext(NamedTuple):
