@@ -9,6 +9,7 @@ from foldyn.errors import InputError
 from sheets_with_facets import crossed_miura
 
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
+HALVES = fd.Pattern([(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1)], [(0, 1, 4, 5), (1, 2, 3, 4)])
 
 
 @pytest.mark.parametrize("dihedral", [60, 120, 179])
@@ -36,6 +37,10 @@ def test_only_some_facets():
     assert (kept.creases.tolist(), kept.welds.tolist()) == ([[1, 2]], [[0, 2]])
     assert kept.weld_faces.tolist() == [[1, 0]]
     assert kept.weld_dihedrals.tolist() == [pytest.approx(np.pi)]
+    named = fd.Pattern(square.vertices, square.faces, families={"middle": [(0, 2)]})
+    assert fd.welded(named, "middle", join=False).welds.tolist() == [[0, 2]]
+    with pytest.raises(InputError, match=r'facets = "midle": did you mean'):
+        fd.welded(named, "midle")
 
 
 def test_what_is_not_convex_or_loses_a_vertex_keeps_its_lines():
@@ -43,10 +48,7 @@ def test_what_is_not_convex_or_loses_a_vertex_keeps_its_lines():
     assert fd.welded(dart).welds.tolist() == [[0, 2]]  # a corner that points inwards
     middle = fd.Pattern([*SQUARE, (0.5, 0.5)], [(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)])
     assert fd.welded(middle).welds.tolist() == [[0, 4], [1, 4], [2, 4], [3, 4]]
-    halves = fd.Pattern(
-        [(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1)], [(0, 1, 4, 5), (1, 2, 3, 4)]
-    )
-    assert fd.welded(halves).welds.tolist() == [[1, 4]]  # it ends between two corners
+    assert fd.welded(HALVES).welds.tolist() == [[1, 4]]  # it ends between two corners
     hexagon = np.column_stack([np.cos(np.arange(6) * np.pi / 3), np.sin(np.arange(6) * np.pi / 3)])
     fan = fd.Pattern(hexagon, [(0, k, k + 1) for k in range(1, 5)])
     assert fd.welded(fan).faces == ((0, 1, 2, 3, 4, 5),)
@@ -87,10 +89,7 @@ def test_random_triangles(seed):
 
 
 def test_copies_keep_welds():
-    halves = fd.Pattern(
-        [(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1)], [(0, 1, 4, 5), (1, 2, 3, 4)]
-    )
-    made = fd.welded(halves)
+    made = fd.welded(HALVES)
     for copy in (made.scaled(2), made.moved((1, 2, 3)), made.mirrored(), made.rotated(30, "x")):
         assert copy.welds.tolist() == [[1, 4]]
         assert not len(copy.creases)
@@ -130,10 +129,7 @@ def test_wrong_welds():
 
 
 def test_thick_panels_are_no_sheet():
-    halves = fd.Pattern(
-        [(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1)], [(0, 1, 4, 5), (1, 2, 3, 4)]
-    )
     with pytest.raises(InputError, match="are welded to one sheet"):
-        fd.thicken(fd.welded(halves), 0.01)
+        fd.thicken(fd.welded(HALVES), 0.01)
     with pytest.raises(InputError, match="facets: thick panels are boards"):
-        fd.welded(fd.thicken(halves, 0.01))
+        fd.welded(fd.thicken(HALVES, 0.01))

@@ -75,47 +75,6 @@ def test_families_survive_thick_panels_and_say_where_they_are_hinged():
     assert (thick.vertices[2, 2] - thick.vertices[1, 2]) == pytest.approx(-0.02)
 
 
-def test_a_case_file_names_families_and_stores_them(tmp_path):
-    path = tmp_path / "case.toml"
-    path.write_text(
-        """
-[pattern]
-kind = "miura"
-dihedral = 100
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 2.0
-[model]
-preset = "herkal"
-crease_stiffness = { zigzag = 0.1, straight = 0.3 }
-[damping]
-creases = { coefficient = 1e-3, creases = "straight" }
-[[loads]]
-creases = "zigzag"
-fold_angle = 85
-[[supports]]
-nodes = [0, 1, 3]
-[analysis]
-kind = "statics"
-steps = 1
-"""
-    )
-    case_file = fd.read_case(path)
-    case = case_file.case()
-    pattern = case.structure.pattern
-    length = np.linalg.norm(np.diff(pattern.vertices[pattern.creases], axis=1)[:, 0], axis=1)
-    zigzag, straight = pattern.families["zigzag"], pattern.families["straight"]
-    np.testing.assert_allclose(case.structure.fold_stiffness[zigzag], 0.1 * length[zigzag])
-    np.testing.assert_allclose(case.structure.fold_stiffness[straight], 0.3 * length[straight])
-    assert np.flatnonzero(case.crease_damping).tolist() == straight.tolist()
-    np.testing.assert_array_equal(case.actuated_creases, zigzag)
-    path.write_text(path.read_text().replace('creases = "zigzag"', 'creases = "zigzags"'))
-    with pytest.raises(InputError, match=r"loads\[0\]\.creases = .zigzags.: did you mean 'zigzag'"):
-        fd.read_case(path).case()
-
-
 INLINE = """
 [pattern]
 vertices = [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]]
@@ -127,6 +86,11 @@ youngs_modulus = 1e6
 poissons_ratio = 0.25
 thickness = 0.01
 density = 2.0
+[model]
+preset = "herkal"
+crease_stiffness = { spine = 0.1 }
+[damping]
+creases = { coefficient = 1e-3, creases = "spine" }
 [[loads]]
 creases = "spine"
 fold_angle = 30
@@ -142,11 +106,13 @@ def test_families_of_a_pattern_in_a_case_file(tmp_path):
     path.write_text(INLINE)
     case_file = fd.read_case(path)
     assert case_file.pattern.families["spine"].tolist() == [0]
-    found = case_file.run()
-    structure = fd.discretize(case_file.pattern, case_file.sheet)
-    folds, _ = structure.dihedrals(found.displacement.values[-1])
+    case, found = case_file.case(), case_file.run()
+    assert case.structure.fold_stiffness == pytest.approx([0.1])  # of one metre
+    assert case.crease_damping == pytest.approx([1e-3])
+    folds, _ = case.structure.dihedrals(found.displacement.values[-1])
     assert np.degrees(folds) == pytest.approx([150])
     for old, new, message in (
+        ('creases = "spine"\nf', 'creases = "spin"\nf', r"loads\[0\]\.creases = .spin.: did you"),
         ("[[1, 4]]", "[[0, 4]]", r"families\['spine'\]: \(0, 4\) is not a crease"),
         ("spine = [[", "valley = [[", "families: 'valley' is no name for a family"),
         ("{ spine = [[1, 4]] }", "[1]", r"families = \[1\]: must be a table"),
@@ -169,14 +135,6 @@ def test_letters_and_angles_of_a_pattern_by_family():
     assert set(told[STRAIGHT]) == {0.5}
     only = named.changed(fold_angles={"mountain": 1.0}).fold_angles
     np.testing.assert_array_equal(np.isnan(only), letters != "M")
-
-
-def test_facets_by_family():
-    flat = [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1)]
-    strip = Pattern(flat, [(0, 1, 4, 3), (1, 2, 5, 4)], families={"middle": [(1, 4)]})
-    assert fd.welded(strip, "middle", join=False).welds.tolist() == [[1, 4]]
-    with pytest.raises(InputError, match=r'facets = "midle": did you mean'):
-        fd.welded(strip, "midle")
 
 
 def test_letters_and_angles_by_family_in_a_case_file(tmp_path):
