@@ -61,18 +61,6 @@ def test_renumbered_elements_of_mixed_and_user_laws_behave_alike(count):
     assert [run[2] for run in other.hinge_runs] == [run[2] for run in model.hinge_runs]
 
 
-def test_there_and_back_is_the_model_itself():
-    """But for the order of hinges with the same lowest node."""
-    model = structure("miura n5b8").model
-    order, other, rows = shuffled(model)
-    back, rows_back = renumber(other, np.argsort(order))
-    old = rows[rows_back]
-    assert sorted(old) == list(range(len(model.hinges)))
-    np.testing.assert_array_equal(back.rest, model.rest)
-    for name in ("hinges", "hinge_stiffness", "hinge_rest", "hinge_parameters", "hinge_group"):
-        np.testing.assert_array_equal(getattr(back, name), getattr(model, name)[old], err_msg=name)
-
-
 def test_node_order_brings_neighbors_together():
     """Across a sheet of 30 x 8 cells there are 17 vertices and 16 centers; its own numbers
     put all centers after all vertices."""

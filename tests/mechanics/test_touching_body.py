@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from contact_samples import T, miura, tables_of, touching
+from contact_samples import SHEET, T, miura, tables_of, touching
 
 import foldyn as fd
 from foldyn.checks import gradient_error, tangent_error
@@ -155,12 +155,14 @@ def test_guards_keep_dihedrals_between_0_and_360(dihedral):
     assert error < 1e-8
 
 
-def test_neighbors_meet_everywhere_at_once():
+@pytest.mark.parametrize("make", [fd.discretize, fd.shell])
+def test_neighbors_meet_everywhere_at_once(make):
     """At the dihedral 2 t / w: all pairs across a crease begin to touch at the same angle."""
-    begin = np.degrees(2.0 * T / 0.02)
-    energies = []
+    begin, energies = np.degrees(2.0 * T / 0.02), []
+    options = {"scheme": "n4b5"} if make is fd.discretize else {"divisions": 4}
     for factor in (1.002, 0.998):
         pattern = fd.patterns.simple_fold(a=0.02, b=0.02, dihedral=factor * begin)
-        s = fd.discretize(pattern, miura(60.0).sheet, scheme="n4b5", fold_law="linear")
-        energies.append(touching(s).contact(np.zeros(s.nodes.size))[0])
+        s = make(pattern, SHEET, fold_law="linear", **options)
+        contact = fd.Case(s, contact=fd.Contact()).contact_term
+        energies.append(contact.contact(np.zeros(s.body.size))[0])
     assert energies[0] == 0.0 < energies[1]

@@ -5,10 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from shell_lab import (
-    EAST,
-    NORTH,
-    SOUTH,
-    WEST,
     at_rest,
     dofs,
     equilibrium,
@@ -182,10 +178,3 @@ def test_a_plate_bent_by_moments_on_its_rim_is_bent_evenly():
     level = np.linalg.solve(np.c_[np.ones(3), x[held]], w[held])
     w -= np.c_[np.ones(len(x)), x] @ level
     assert np.abs(q[2 : 3 * len(x) : 3] - w).max() < 1e-10 * np.abs(w).max()
-
-
-def test_edges_of_the_grid():
-    mesh, number = irregular()
-    assert mesh.edge_points[SOUTH] == number[:, 0].tolist()
-    assert mesh.edge_points[EAST][0] == mesh.edge_points[SOUTH][-1]
-    assert mesh.edge_points[NORTH][-1] == mesh.edge_points[WEST][-1]
