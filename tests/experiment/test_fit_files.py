@@ -241,12 +241,6 @@ def test_of_many_columns_a_message_names_some(folder) -> None:
         recognize(folder / "sway.csv", axis="y")
 
 
-def test_a_constant_history_is_named_with_its_file(folder) -> None:
-    (folder / "sway.csv").write_text("time [s],node 0 x [m],node 2 x [m]\n0,1,0\n1,1,1\n2,1,0\n")
-    with pytest.raises(InputError, match=r"data\[2\]: .*sway\.csv: sway: .*0 is constant"):
-        read_fit(folder / "fit.toml")
-
-
 def test_columns_tell_what_a_file_holds(folder) -> None:
     assert isinstance(recognize(folder / "forces.csv"), ForceDisplacement)
     assert recognize(folder / "shapes.csv").nodes == (0, 2)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import foldyn as fd
 from foldyn.errors import InputError
-from foldyn.experiment import Look, Sensor, film_of, photos_of, refine, write_film
+from foldyn.experiment import Look, film_of, refine, write_film
 from foldyn.experiment.rendering.picture import two_colors
 
 
@@ -110,24 +110,6 @@ def test_films_of_simulations_and_photos_of_paths(tmp_path):
         film_of(motion, camera(), duration=1.0)
     with pytest.raises(InputError, match="films are written to"):
         write_film(film, tmp_path / "film.gif")
-
-
-def test_photos_of_a_path():
-    structure = folded(70.0)
-    case = fd.Case(
-        structure,
-        supports=[
-            fd.Fix(nodes=[20, 21, 22, 23, 24], axes="x"),
-            fd.Fix(nodes=[22], axes="y"),
-            fd.Fix(nodes=[21, 23], axes="z"),
-            fd.Impose(nodes=[0, 1, 2, 3, 4], axis="x", value=0.004),
-        ],
-    )
-    path = fd.trace(case, method="displacement", steps=4)
-    photos, truth = photos_of(path, [0, 4], camera(), sensor=Sensor(samples=4))
-    assert len(photos) == 2 and photos[0].shape == (620, 580)
-    moved = truth["position"].sel(axis="x").values[1, :5] - truth["position"].sel(axis="x")[0, :5]
-    np.testing.assert_allclose(moved, 0.004, rtol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["ink", "paper", "background", "ambient", "vignette"])
