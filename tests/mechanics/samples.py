@@ -37,6 +37,10 @@ MODELS = {
         lambda: fd.patterns.miura(a=1.0, b=1.4, dihedral=60),
         {"fold_law": PUBLISHED, "calibration": "merlin2"},
     ),
+    "miura lopsided": (
+        lambda: fd.patterns.miura(a=1.0, b=1.1, dihedral=120),
+        {"fold_law": fd.EnhancedLinear(110, 200), "bend_law": fd.PlateSuperlinear(onset=30.0)},
+    ),
     "miura n4b5": (
         lambda: fd.patterns.miura(a=1.0, b=1.2, dihedral=80),
         {"scheme": "n4b5", "bend_law": "linear", "bar_law": "linear"},

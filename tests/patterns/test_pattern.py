@@ -244,6 +244,7 @@ def test_bad_assignments(assignments, message):
         ([[0, 0], [1, 0]], r"has shape \(2, 2\): give at least 3"),
         ([[0, 0], [1, np.nan], [0, 1]], r"\[1\] = \[1.0, nan\]: coordinates must be finite"),
         ([[0, 0], [1, 0], [np.inf, 1]], r"\[2\] = .*must be finite"),
+        ([[0, 0], [1e-40, 0], [0, 1e-40]], "they span 1e-40 m: give coordinates that span"),
     ],
 )
 def test_bad_vertices(vertices, message):

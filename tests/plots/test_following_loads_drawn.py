@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from pictures import keys
 
 import foldyn as fd
 from foldyn.plots import draw_structure, following, plot_load_history, style
@@ -16,10 +17,6 @@ PATTERN = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
 
 def models():
     return [fd.discretize(PATTERN, SHEET), fd.shell(PATTERN, SHEET, divisions=4)]
-
-
-def keys(figure):
-    return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def heads(figure) -> int:

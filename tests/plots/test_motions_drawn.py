@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pictures import assert_white_rim, keys
 
 from foldyn import cases, patterns, structures
 from foldyn.plots import draw_structure, plot_load_history, style
@@ -37,10 +38,6 @@ def shaken(sheet):
         [cases.Fix("xmin"), cases.BaseMotion("x", cases.Harmonic(2.0), -0.01)],
         [cases.Force([22], (0.01, 0, 0))],
     )
-
-
-def keys(figure) -> list[str]:
-    return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def shafts(figure) -> list[np.ndarray]:
@@ -103,10 +100,7 @@ def test_a_moving_base_is_one_arrow(shaken, sheet):
 
 def test_nothing_is_cut_off(moved, shaken):
     for figure in (draw_structure(moved), draw_structure(shaken), plot_load_history(moved, 3.0)):
-        figure.canvas.draw()
-        pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]
-        for strip in (pixels[:2], pixels[-2:], pixels[:, :2], pixels[:, -2:]):
-            assert (strip == 255).all()
+        assert_white_rim(figure)
         box = figure.legends[0].get_window_extent()
         assert box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y0 >= 0
 

@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+from pictures import assert_white_rim, keys
 
 from foldyn.errors import InputError
 from foldyn.linear import Peak, peaks_of
@@ -48,10 +49,6 @@ def response(case):
 def line(axes, label):
     (found,) = [curve for curve in axes.get_lines() if curve.get_label() == label]
     return found
-
-
-def keys(figure):
-    return [t.get_text() for legend in figure.legends for t in legend.get_texts()]
 
 
 def peak_dots(axes, label="response"):
@@ -203,10 +200,7 @@ def test_nothing_is_cut_off(case):
         plot_frf({"a": noisy, "b": noisy}, [6, 7], title="Responses"),
         plot_nyquist(noisy, 7, "x", title="Circles"),
     ):
-        figure.canvas.draw()
-        pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]
-        for strip in (pixels[:2], pixels[-2:], pixels[:, :2], pixels[:, -2:]):
-            assert (strip == 255).all()
+        assert_white_rim(figure)
 
 
 def test_circles_go_through_the_mobility(response):

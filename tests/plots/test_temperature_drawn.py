@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from pictures import keys
 
 import foldyn as fd
 from foldyn.plots import following
@@ -19,14 +20,10 @@ def case() -> fd.Case:
     return fd.Case(structure, [fd.Fix("xmin")], LOADS)
 
 
-def texts(figure) -> list[str]:
-    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
-
-
 def test_warm_panels_have_stars_in_their_middles() -> None:
     figure = fd.plots.draw_structure(case())
-    assert "20 K warmer on panels 0, 3" in texts(figure)
-    assert any(text.startswith("5 K colder on panels 0, 1, 2") for text in texts(figure))
+    assert "20 K warmer on panels 0, 3" in keys(figure)
+    assert any(text.startswith("5 K colder on panels 0, 1, 2") for text in keys(figure))
     share, _ = following.on_panels(case(), fd.Temperature)
     middles = following.panel_middles(case().structure, case().structure.nodes, share)
     expected = [PATTERN.vertices[list(PATTERN.faces[panel])].mean(axis=0) for panel in (0, 3)]
