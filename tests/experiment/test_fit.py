@@ -1,35 +1,26 @@
-"""Fits to data that a case of known parameters has made."""
+"""Fits to data that a case of known parameters has made, memory of its creases included."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
-import fit_cases
 import numpy as np
 import pytest
 import xarray as xr
+from fit_cases import PRESSED, SAME_STEPS, SWUNG, write
 
 import foldyn as fd
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment import ForceDisplacement, Parameter, Shapes, TimeHistory
 from foldyn.experiment.calibration.fit_problem import problem
 
-pytestmark = pytest.mark.filterwarnings(fit_cases.SAME_STEPS)
+pytestmark = pytest.mark.filterwarnings(SAME_STEPS)
 
 MOVED = -np.linspace(0.03, 0.3, 8)
 TIME = np.linspace(0.0, 2.0, 60)
 RATIO = Parameter("sheet.length_scale_ratio", 1.6, 0.2, 5.0)
 ALPHA = Parameter("damping.alpha", 1.0, 0.0, 10.0)
-
-
-@pytest.fixture(scope="module")
-def pressed(tmp_path_factory):
-    return fit_cases.write(tmp_path_factory.mktemp("pressed"))
-
-
-@pytest.fixture(scope="module")
-def swung(tmp_path_factory):
-    return fit_cases.write(tmp_path_factory.mktemp("swung"), fit_cases.SWUNG)
 
 
 def forces(path, noise=0.0, **known) -> ForceDisplacement:
@@ -172,7 +163,7 @@ def test_each_measurement_may_change_the_case(pressed) -> None:
 def test_shapes_under_a_force_give_a_stiffness(tmp_path) -> None:
     text = fit_cases.SWUNG.replace('history = { kind = "half_sine", duration = 0.5 }', "")
     text = text[: text.index("[analysis]")] + '[analysis]\nkind = "statics"\n'
-    path = fit_cases.write(tmp_path, text)
+    path = write(tmp_path, text)
     state = fd.trace(fd.read_case(path).case(), load_factors=[0.5, 1.0])
     seen = state.displacement.sel(node=[0, 2], axis=["x", "z"]).values
     one = Shapes(nodes=[0, 2], load_factor=[0.5, 1.0], values=seen, axes="xz")
@@ -237,9 +228,7 @@ def test_damaged_evaluations_are_computed_again(pressed, tmp_path) -> None:
 def test_kept_evaluations_of_another_model_are_not_used(pressed, tmp_path) -> None:
     data = [forces(pressed)]
     fd.fit(pressed, data, [RATIO], folder=tmp_path)
-    thick = fit_cases.write(
-        tmp_path, fit_cases.PRESSED.replace("thickness = 0.01", "thickness = 0.011")
-    )
+    thick = write(tmp_path, PRESSED.replace("thickness = 0.01", "thickness = 0.011"))
     found = fd.fit(thick, data, [RATIO], folder=tmp_path)
     assert found.values == fd.fit(thick, data, [RATIO]).values
     assert found.estimates[0].value > 1.01
@@ -310,3 +299,57 @@ def test_a_parameter_that_does_not_exist(pressed) -> None:
     for parameter in (Parameter("sheet.lenght_scale_ratio"), Parameter("sheet.thicknes", 1.0)):
         with pytest.raises(InputError, match="did you mean"):
             fd.fit(pressed, [forces(pressed)], [parameter])
+
+
+ELASTIC = 'fold_law = { kind = "enhanced", theta1 = 45, theta2 = 290 }'
+PRONY = 'fold_law = { kind = "prony", ratios = [0.6], times = [0.15] }'
+PLASTIC = 'fold_law = { kind = "plastic", yield_moment = 2e-3, kinematic = 0.01, law = "linear" }'
+
+
+def test_a_relaxation_is_found_in_a_motion(tmp_path):
+    """Ratio and time of a branch from the history of one node, exact and within its noise."""
+    path = write(tmp_path, SWUNG.replace(ELASTIC, PRONY))
+    time = np.arange(0.1, 2.0, 0.02)
+    parameters = [
+        Parameter("model.fold_law.ratios[0]", 0.3, 0.05, 3.0),
+        Parameter("model.fold_law.times[0]", 0.3, 0.02, 2.0),
+    ]
+    blank = TimeHistory(nodes=[0], time=time, values=np.sin(time)[:, None])
+    (exact,) = problem(path, [blank], parameters, {}).predict([0.6, 0.15])
+    exact = exact.reshape(-1, 1)
+    fit = fd.fit(path, [TimeHistory(nodes=[0], time=time, values=exact)], parameters)
+    assert fit["model.fold_law.ratios[0]"].value == pytest.approx(0.6, rel=1e-3)
+    assert fit["model.fold_law.times[0]"].value == pytest.approx(0.15, rel=1e-3)
+    noise = 1e-2 * np.ptp(exact) * np.random.default_rng(1).standard_normal(exact.shape)
+    fit = fd.fit(path, [TimeHistory(nodes=[0], time=time, values=exact + noise)], parameters)
+    for one, truth in zip(fit.estimates, (0.6, 0.15), strict=True):
+        assert one.value == pytest.approx(truth, abs=4.0 * one.standard_error)
+
+
+def cyclic(path, displacement):
+    """The test that the case itself gives."""
+    case = fd.read_case(path).case()
+    factors = displacement / -0.3
+    way = fd.statics.trace(case, load_factors=factors.tolist())
+    moved = np.isin(way.support_node, [0, 1]) & (way.support_axis == "x").values
+    force = way.reaction.values[:, moved].sum(axis=1)
+    return ForceDisplacement(displacement=displacement, force=force)
+
+
+def test_a_cyclic_test_gives_yield_moment_and_hardening(tmp_path):
+    path = write(tmp_path, PRESSED.replace(ELASTIC, PLASTIC))
+    way = np.array([0.0, 0.1, 0.2, 0.3, 0.2, 0.1, 0.0, 0.1, 0.2, 0.3])
+    test = cyclic(path, -way)
+    assert abs(test.force[4] - test.force[2]) > 0.1 * np.ptp(test.force)
+    fit = fd.fit(
+        path, [test],
+        [
+            Parameter("model.fold_law.yield_moment", 4e-3, 1e-4, 2e-2),
+            Parameter("model.fold_law.kinematic", 0.02, 1e-3, 0.2),
+        ],
+    )  # fmt: skip
+    assert fit["model.fold_law.yield_moment"].value == pytest.approx(2e-3, rel=1e-3)
+    assert fit["model.fold_law.kinematic"].value == pytest.approx(0.01, rel=1e-3)
+    test, other = (replace(one, sigma=1e-6) for one in (test, cyclic(path, -way[:3])))
+    with pytest.raises(ComputationError, match="creases that yield depend on the way"):
+        fd.fit(path, [test, other], [Parameter("model.fold_law.yield_moment", 4e-3, 1e-4, 2e-2)])

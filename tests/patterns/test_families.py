@@ -167,51 +167,31 @@ def test_words_of_a_pattern():
     assert set(value[ZIGZAG]) == {2.0}
 
 
+SHARED = {"a": MIURA.creases[:2], "b": MIURA.creases[1:3]}
+KNOWN = '"all", "mountain", "valley", "flat", "unassigned", "zigzag", "straight"; give one of these'
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (
-            lambda: fd.Case(bars(), loads=[fd.Actuate("zig-zag", 90)]),
-            r'loads\[0\]\.creases = "zig-zag": did you mean \'zigzag\'. this pattern knows "all", '
-            r'"mountain", "valley", "flat", "unassigned", "zigzag", "straight"; give one of these',
-        ),
-        (
-            lambda: fd.Case(bars(), damping=fd.CreaseDamping(1.0, "ring")),
-            r'creases = "ring": .*this pattern knows .*"straight"',
-        ),
-        (
-            lambda: bars(crease_stiffness={"zigzag": 1.0, "valley": 2.0}),
-            r"crease_stiffness.valley = 2: crease \d+ has a value by another name already",
-        ),
+        (lambda: fd.Case(bars(), loads=[fd.Actuate("zig", 90)]), f"knows {KNOWN}"),
+        (lambda: fd.Case(bars(), damping=fd.CreaseDamping(1.0, "ring")), '= "ring": .*knows'),
+        (lambda: bars(crease_stiffness={"zigzag": 1.0, "valley": 2.0}), "a value by another name"),
         (lambda: bars(crease_rest={"sides": 90}), "crease_rest.sides: this pattern knows"),
         (lambda: bars(crease_rest={3: 90}), "crease_rest: 3 is no assignment or family"),
         (lambda: fd.thicken(MIURA, 1e-4, {"rim": 0.0}), "offsets.rim: this pattern knows"),
         (lambda: fd.Actuate(" ", 90), 'creases = " ": give crease numbers'),
-        (
-            lambda: MIURA.changed(assignments={"rim": "V"}),
-            r'assignments.rim: is no family; this pattern has "zigzag", "straight"; give a family',
-        ),
-        (
-            lambda: MIURA.changed(assignments={"valley": "V"}),
-            "assignments.valley: is no family; this pattern has",
-        ),
-        (
-            lambda: MIURA.changed(
-                families={"a": MIURA.creases[:2], "b": MIURA.creases[1:3]},
-                assignments={"a": "V", "b": "M"},
-            ),
-            r'assignments.b = "M": crease \(\d+, \d+\) has a letter by another family already',
-        ),
-        (
-            lambda: MIURA.changed(assignments={"zigzag": "U"}, fold_angles={"zigzag": 1.0}),
-            "fold_angles.zigzag = 1: some of them are neither mountain nor valley",
-        ),
-        (
-            lambda: crease_rows("creases", "flat", MIURA),
-            'creases = "flat": this pattern has no crease assigned flat',
-        ),
+        (lambda: wrong({"rim": "V"}), 'rim: is no family; this pattern has "zigzag"'),
+        (lambda: wrong({"valley": "V"}), "assignments.valley: is no family; this pattern has"),
+        (lambda: wrong({"a": "V", "b": "M"}, families=SHARED), 'b = "M": crease .* has a letter'),
+        (lambda: wrong({"zigzag": "U"}, fold_angles={"zigzag": 1.0}), "some of them are neither"),
+        (lambda: crease_rows("creases", "flat", MIURA), "no crease assigned flat"),
     ],
 )  # fmt: skip
 def test_wrong_words(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def wrong(letters, **changes):
+    return MIURA.changed(assignments=letters, **changes)
