@@ -161,7 +161,7 @@ def test_each_measurement_may_change_the_case(pressed) -> None:
 
 
 def test_shapes_under_a_force_give_a_stiffness(tmp_path) -> None:
-    text = fit_cases.SWUNG.replace('history = { kind = "half_sine", duration = 0.5 }', "")
+    text = SWUNG.replace('history = { kind = "half_sine", duration = 0.5 }', "")
     text = text[: text.index("[analysis]")] + '[analysis]\nkind = "statics"\n'
     path = write(tmp_path, text)
     state = fd.trace(fd.read_case(path).case(), load_factors=[0.5, 1.0])
