@@ -108,25 +108,6 @@ def test_tangents_of_a_stack_are_exact(stack):
     assert abs(matrix - matrix.T).max() < 1e-9 * abs(matrix).max()
 
 
-def test_third_law_and_angular_momentum():
-    body = touching(STACK)  # the floor takes up momentum
-    for u in states(3):
-        force = body.contact(u)[1]
-        x = STACK.nodes - STACK.nodes.mean(axis=0) + u.reshape(-1, 3)
-        size = np.abs(force).max()
-        assert np.abs(force.sum(axis=0)).max() < 1e-13 * size * len(force)
-        assert np.abs(np.cross(x, force).sum(axis=0)).max() < 1e-14 * size * len(force)
-
-
-def test_the_whole_body_adds_contact_to_its_model(stack):
-    u = states(1)[0]
-    whole = STACK.body.with_terms(stack)
-    assert list(whole.energy_groups) == [*STACK.body.energy_groups, "contact"]
-    assert whole.energies(u)[-1] == stack.contact(u)[0]
-    added = whole.internal(u) - STACK.body.internal(u)
-    np.testing.assert_allclose(added, stack.contact(u)[1].ravel(), atol=1e-12)
-
-
 @pytest.mark.parametrize("dihedral", [1.0, 359.0])
 def test_guards_keep_dihedrals_between_0_and_360(dihedral):
     pattern = fd.patterns.simple_fold(a=0.02, b=0.02, dihedral=10.0)

@@ -20,13 +20,6 @@ def vertex(degrees, letters):
     return Pattern([[0, 0], *rim], faces, {(0, 1 + k): letter for k, letter in enumerate(letters)})
 
 
-def test_the_vertex_of_four_creases():
-    found = flat_foldability(vertex([60, 90, 120, 90], "MMMV"))
-    assert found.vertices.tolist() == [0]
-    assert (found.mountains[0], found.valleys[0], found.degrees[0]) == (3, 1, 4)
-    assert found.maekawa[0] and found.kawasaki(1e-9)[0] and found.developable(1e-9)[0]
-
-
 @given(
     st.lists(st.floats(25, 65), min_size=6, max_size=6).map(lambda a: np.array(a) * 360 / sum(a)),
     st.permutations("MMMMVV"),

@@ -12,7 +12,6 @@ from foldyn.errors import CrossingWarning, InputError
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.tangent import guard_tangents
 from foldyn.mechanics.contact.term import ContactTerm
-from foldyn.mechanics.term import nodal
 from foldyn.viewer.fields import fields
 
 T, G = SHEET.thickness, 9.81
@@ -68,17 +67,6 @@ def test_forces_are_the_gradient_and_tangents_exact():
         assert gradient_error(lambda q: stack.contact(q)[0], contact, q, size=size) < 1e-10
         assert tangent_error(contact, stack.tangent, q, size=size) < 1e-8
         assert tangent_error(body.internal, body.tangent, q, size=size) < 1e-8
-
-
-def test_contact_has_no_resultant_and_no_moment():
-    shell = miura_stack(clamped=False)
-    body = touching(shell, thickness=THICK)
-    for q in states(shell.body):
-        force, x = body.contact(q)[1], body.tables.rest + nodal(q)[: len(shell.nodes)]
-        size = np.abs(force).max() * len(force)
-        assert size > 0.0
-        assert np.abs(force.sum(axis=0)).max() < 1e-13 * size
-        assert np.abs(np.cross(x, force).sum(axis=0)).max() < 1e-14 * size
 
 
 @pytest.mark.parametrize("divisions", [2, 5])

@@ -57,14 +57,6 @@ PATTERNS = {**FLAT_PANELS, "twisted": twisted}
 DIVISIONS = [1, 2, 3, 6]
 
 
-def test_the_polygons_are_flat_and_folded():
-    pattern = polygons()
-    assert sorted(map(len, pattern.faces)) == [3, 4, 5, 6]
-    assert max(pattern.face_planarity) < 1e-12
-    assert np.abs(pattern.dihedrals - np.pi).min() > 0.3
-    assert twisted().face_planarity.min() > 0.01
-
-
 def areas(mesh):
     x = mesh.nodes[mesh.triangles]
     return 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)

@@ -42,14 +42,6 @@ def area_of(s):
     return 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1).sum()
 
 
-def test_the_mesh_is_irregular():
-    mesh, _ = irregular()
-    x = mesh.nodes[mesh.triangles]
-    area = 0.5 * np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])[:, 2]
-    assert area.min() > 0
-    assert area.max() > 3 * area.min()
-
-
 # ------------------------------------------------------------------ membrane
 
 

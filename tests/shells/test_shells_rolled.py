@@ -145,11 +145,6 @@ def elastica(load, length):
     return curve(start)[2:]
 
 
-def test_the_published_table_is_the_elastica():
-    for part, table in END_SHEAR.items():
-        assert table == pytest.approx(elastica(4.0 * part, 10.0), abs=4e-3)
-
-
 def test_cantilever_under_end_shear():
     errors, cells = [], np.array([8, 16, 32])
     for nx in cells:

@@ -48,15 +48,6 @@ def test_folds_from_forces_and_shapes(static_data) -> None:
     assert abs(found.correlation[0, 1]) > 0.99  # a softer crease locks earlier: hard to tell apart
 
 
-@pytest.mark.thorough
-def test_folds_from_three_weights_alone(static_data) -> None:
-    data = calibration.noisy(static_data, np.random.default_rng(7))[:1]
-    found = fd.fit(CASE, data, calibration.FOLD_RANGES, ties=calibration.MIRRORED)
-    assert found["sheet.length_scale_ratio"].value == pytest.approx(2.7, rel=0.03)
-    assert found["model.fold_law.theta1"].value == pytest.approx(75.0, abs=2.0)
-    assert found.freedom == 1
-
-
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*time step is too coarse")  # as coarse as the data's
 def test_damping_from_node_8_alone(released, release_data) -> None:
