@@ -25,12 +25,9 @@ ALPHA = Parameter("damping.alpha", 1.0, 0.0, 10.0)
 
 def forces(path, noise=0.0, **known) -> ForceDisplacement:
     """Forces that the case file itself gives, with noise."""
-    blank = ForceDisplacement(displacement=MOVED, force=np.zeros(8))
+    blank = ForceDisplacement(displacement=MOVED, force=np.zeros(8), **known)
     (true,) = problem(path, [blank], [RATIO], {}).predict([1.0])
-    draw = np.random.default_rng(4)
-    return ForceDisplacement(
-        displacement=MOVED, force=true + noise * draw.standard_normal(8), **known
-    )
+    return replace(blank, force=true + noise * np.random.default_rng(4).standard_normal(8))
 
 
 def histories(path, nodes, noise=0.0, **known) -> TimeHistory:
@@ -39,17 +36,13 @@ def histories(path, nodes, noise=0.0, **known) -> TimeHistory:
     blank = TimeHistory(nodes=nodes, time=TIME, values=wave)
     (true,) = problem(path, [blank], [ALPHA], {}).predict([0.4])
     true = true.reshape(len(nodes), -1).T
-    draw = np.random.default_rng(4)
-    values = true + noise * draw.standard_normal(true.shape)
+    values = true + noise * np.random.default_rng(4).standard_normal(true.shape)
     return TimeHistory(nodes=nodes, time=TIME, values=values, **known)
 
 
 def test_exact_forces_give_the_parameters_exactly(pressed) -> None:
-    found = fd.fit(
-        pressed,
-        [forces(pressed)],
-        [RATIO, Parameter("model.fold_law.theta2", 280.0, 240.0, 299.0)],
-    )
+    theta = Parameter("model.fold_law.theta2", 280.0, 240.0, 299.0)
+    found = fd.fit(pressed, [forces(pressed)], [RATIO, theta])
     assert found["sheet.length_scale_ratio"].value == pytest.approx(1.0, rel=1e-5)
     assert found["model.fold_law.theta2"].value == pytest.approx(290.0, rel=1e-5)
     assert found.descents[0].converged
@@ -57,12 +50,8 @@ def test_exact_forces_give_the_parameters_exactly(pressed) -> None:
 
 
 def test_a_tie_follows_its_parameter(pressed) -> None:
-    found = fd.fit(
-        pressed,
-        [forces(pressed, 1e-5)],
-        [RATIO],
-        ties={"sheet.thickness": "0.01 * sheet.length_scale_ratio"},
-    )
+    ties = {"sheet.thickness": "0.01 * sheet.length_scale_ratio"}
+    found = fd.fit(pressed, [forces(pressed, 1e-5)], [RATIO], ties=ties)
     document = found.document()
     ratio = found["sheet.length_scale_ratio"].value
     assert document["sheet"]["thickness"] == pytest.approx(0.01 * ratio, rel=1e-12)
@@ -145,17 +134,10 @@ def test_a_case_of_statics_and_one_of_dynamics_together(pressed, swung) -> None:
 def test_each_measurement_may_change_the_case(pressed) -> None:
     """Two specimens of one paper, the other with twice the thickness."""
     blank = ForceDisplacement(displacement=MOVED, force=np.zeros(8), sigma=1e-5)
-    thick = ForceDisplacement(
-        displacement=MOVED, force=np.zeros(8), sigma=1e-5, changes={"sheet.thickness": 0.02}
-    )
-    one, other = problem(pressed, [blank, thick], [RATIO], {}).predict([1.0])
+    both = [blank, replace(blank, changes={"sheet.thickness": 0.02})]
+    one, other = problem(pressed, both, [RATIO], {}).predict([1.0])
     assert np.abs(other / one).min() > 4.0
-    data = [
-        ForceDisplacement(displacement=MOVED, force=one, sigma=1e-5),
-        ForceDisplacement(
-            displacement=MOVED, force=other, sigma=1e-5, changes={"sheet.thickness": 0.02}
-        ),
-    ]
+    data = [replace(each, force=f) for each, f in zip(both, (one, other), strict=True)]
     found = fd.fit(pressed, data, [RATIO])
     assert found.estimates[0].value == pytest.approx(1.0, rel=1e-5)
 
@@ -293,12 +275,6 @@ def test_results_as_files(pressed, tmp_path) -> None:
 def test_arguments_that_make_no_sense(pressed, changes, message) -> None:
     with pytest.raises(InputError, match=message):
         fd.fit(pressed, [forces(pressed)], [RATIO], **changes)
-
-
-def test_a_parameter_that_does_not_exist(pressed) -> None:
-    for parameter in (Parameter("sheet.lenght_scale_ratio"), Parameter("sheet.thicknes", 1.0)):
-        with pytest.raises(InputError, match="did you mean"):
-            fd.fit(pressed, [forces(pressed)], [parameter])
 
 
 ELASTIC = 'fold_law = { kind = "enhanced", theta1 = 45, theta2 = 290 }'

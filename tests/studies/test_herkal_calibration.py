@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.errors import InputError
 from foldyn.studies import find_case
 from foldyn.studies.herkal import calibration, coverage
 
@@ -67,12 +66,6 @@ def test_damping_from_node_8_alone(released, release_data) -> None:
     assert filmed == pytest.approx(modeled, rel=0.02)  # what noise does to the estimator
     assert modeled == pytest.approx(9.5, rel=0.05)  # the paper's film: 9.5 Hz and 16 %
     assert ratio == pytest.approx(0.16, abs=0.03)
-
-
-def test_a_misspelled_parameter_of_the_specimen(static_data) -> None:
-    wrong = fd.experiment.Parameter("sheet.length_scale_ration", 2.0)
-    with pytest.raises(InputError, match="did you mean 'length_scale_ratio'"):
-        fd.fit(CASE, static_data, [wrong])
 
 
 def test_stored_intervals_contain_the_truth_in_90_of_100_draws() -> None:
