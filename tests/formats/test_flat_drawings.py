@@ -61,14 +61,6 @@ def test_random_lines_obey_euler_and_fill_the_sheet(count, seed):
     assert away.max() < 1e-3
 
 
-def test_lines_in_general_position():
-    # n chords with k crossings inside make n + k + 1 panels
-    chords = [("M", (0, 0.3), (1, 0.6)), ("V", (0.4, 0), (0.5, 1)), ("M", (0.9, 0), (0, 0.8))]
-    p = built(square(*chords)).pattern
-    assert len(p.faces) == 3 + 3 + 1
-    assert len(p.vertices) == 4 + 6 + 3
-
-
 @pytest.mark.parametrize("count", [3, 4, 7, 12])
 def test_lines_through_one_point(count):
     # diameters of a polygon: pairs of opposite sectors

@@ -74,15 +74,6 @@ def test_real_files(name, tmp_path):
     assert_same(p, diagnose(tmp_path / "x.fold").pattern)
 
 
-def test_angles_of_origami_simulator_are_the_state_to_fold_to():
-    path = SAMPLES / "origami-code+rtori__simpleVertex_50.fold"
-    if not path.exists():
-        pytest.skip(f"{path.name} is not here")
-    p = diagnose(path).pattern
-    wanted = {"M": -np.pi, "V": np.pi, "F": 0.0}
-    assert p.fold_angles.tolist() == [wanted[letter] for letter in p.assignments]
-
-
 def test_real_file_without_faces():
     path = SAMPLES / "oriedita+oriedita__oriedita.fold"
     if not path.exists():

@@ -97,20 +97,6 @@ def test_a_folded_sheet_with_panels_that_are_not_convex():
         assert elastic(reduced)[0] == pytest.approx(elastic(shell)[0], rel=0.15)
 
 
-def test_a_shell_runs_on_across_the_cuts():
-    """An L, cut in two by its diagonal or in three squares, has the same frequencies."""
-    corners = [*L_SHAPE, (0.1, 0.0), (0.0, 0.1)]
-    squares = fd.Pattern(corners, [(0, 6, 3, 7), (6, 1, 2, 3), (7, 3, 4, 5)])
-    found = [
-        elastic(fd.shell(pattern, STEEL, divisions=d, mass="consistent"))[:3]
-        for pattern, d in (
-            (fd.convex(fd.Pattern(L_SHAPE, [range(6)])), 8),
-            (fd.welded(squares, [(3, 6), (3, 7)], join=False), 8),
-        )
-    ]
-    np.testing.assert_allclose(found[0], found[1], rtol=0.005)
-
-
 INLINE = """
 [pattern]
 vertices = [[0, 0], [0.2, 0], [0.2, 0.1], [0.1, 0.1], [0.1, 0.2], [0, 0.2]]

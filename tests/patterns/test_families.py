@@ -8,7 +8,7 @@ import pytest
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
-from foldyn.patterns.crease_data import crease_rows, crease_values
+from foldyn.patterns.crease_data import crease_rows
 
 MIURA = fd.patterns.miura((2, 2), 0.03, 0.03, 60, 80)
 ZIGZAG, STRAIGHT = MIURA.families["zigzag"], MIURA.families["straight"]
@@ -156,15 +156,6 @@ def test_letters_and_angles_by_family_in_a_case_file(tmp_path):
         path.write_text(text.replace(old, new))
         with pytest.raises(InputError, match=message):
             fd.read_case(path)
-
-
-def test_words_of_a_pattern():
-    assert crease_rows("creases", "all", MIURA).tolist() == list(range(len(LETTERS)))
-    np.testing.assert_array_equal(crease_rows("c", "valley", MIURA), np.flatnonzero(LETTERS == "V"))
-    np.testing.assert_array_equal(crease_rows("c", "zigzag", MIURA), ZIGZAG)
-    value, chosen = crease_values("c", {"zigzag": 2.0}, MIURA)
-    np.testing.assert_array_equal(np.flatnonzero(chosen), ZIGZAG)
-    assert set(value[ZIGZAG]) == {2.0}
 
 
 SHARED = {"a": MIURA.creases[:2], "b": MIURA.creases[1:3]}

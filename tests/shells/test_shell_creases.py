@@ -119,21 +119,6 @@ def test_rigid_folding_through_270_degrees(law, degrees):
         assert side * about_y == pytest.approx(K * LENGTH * moment, rel=1e-9, abs=1e-11)
 
 
-@pytest.mark.parametrize("law", sorted(LAWS))
-def test_stiff_panels_take_nothing_of_the_fold(law):
-    """With rotations in balance: the panels' share goes as the crease over their stiffness."""
-    given, formula = LAWS[law]
-    s, rest = fold_of(STIFF, given), np.radians(REST)
-    for degrees in (45, 200, 315):
-        theta = np.radians(degrees)
-        u = rigid_fold(s, rest, theta)
-        moment, energy = formula(theta, rest)
-        found = s.energies(u)
-        ratio = K / STIFF.bending_modulus
-        assert found["strain_folds"] == pytest.approx(K * LENGTH * energy, rel=50 * ratio)
-        assert found["strain_bending"] < 50 * ratio * K * LENGTH * moment**2
-
-
 @pytest.mark.parametrize("rest", [40.0, 330.0])
 @pytest.mark.parametrize("law", ["enhanced as published", "enhanced stress free"])
 def test_rest_angles_beyond_the_linear_range(law, rest):
@@ -151,21 +136,6 @@ def test_rest_angles_beyond_the_linear_range(law, rest):
     assert found - found[1] == pytest.approx(expected - expected[1], rel=1e-10)  # from rest
     if free:
         assert abs(found[1]) < 1e-15
-
-
-def test_a_moment_folds_stiff_panels_by_what_the_crease_gives():
-    """One panel held, two forces on the other that stay normal to it: M / (k L)."""
-    s = fold_of(fd.Sheet(1e9, 0.25, 0.05), "linear")
-    moment, load, q = 0.4, at_rest(s), at_rest(s)
-    held = dofs(np.flatnonzero(s.nodes[:, 0] < 1e-12))
-    for _ in range(60):  # the forces turn with the panel: a fixed point
-        tip = (s.nodes + split(s, q)[0])[4]
-        normal = np.array([tip[2], 0.0, -tip[0]]) / np.linalg.norm(tip)
-        load[dofs([4, 5])] = np.tile(0.5 * moment * normal, 2)
-        q = equilibrium(s, q, load, held)
-    tip = (s.nodes + split(s, q)[0])[4]
-    turned = np.arctan2(tip[0], tip[2]) - np.radians(REST) / 2
-    assert turned == pytest.approx(moment / (K * LENGTH), rel=2e-4)
 
 
 # ------------------------------------------------------------------ along the crease
