@@ -27,6 +27,9 @@ def l_shape() -> fd.Pattern:
     return fd.Pattern([*flat, [2.5, 0, 0.6], [2.6, 1, 0.6]], [[0, 1, 2, 3, 4, 5], [1, 6, 7, 2]])
 
 
+CUBIC = fd.CustomHingeLaw(
+    lambda t, r: 0.25 * (t - r) ** 4, lambda t, r: (t - r) ** 3, lambda t, r: 3.0 * (t - r) ** 2
+)
 ENHANCED = fd.EnhancedLinear(75, 285)
 PUBLISHED = fd.EnhancedLinear(75, 285, rest="as_published")
 

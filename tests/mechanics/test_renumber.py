@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from samples import MODELS, relative, state, structure
+from samples import CUBIC, MODELS, relative, state, structure
 from test_blocks import force_of, random_model
 
 import foldyn as fd
 from foldyn import mechanics
-from foldyn.materials import CustomHingeLaw
 from foldyn.mechanics.model import GROUP, node_order, renumber
 from foldyn.mechanics.strips import reach
-
-CUBIC = CustomHingeLaw(
-    lambda t, r: 0.25 * (t - r) ** 4, lambda t, r: (t - r) ** 3, lambda t, r: 3.0 * (t - r) ** 2
-)
 
 
 def shuffled(model, seed=0):
