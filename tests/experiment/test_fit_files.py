@@ -121,7 +121,6 @@ def test_fit_files_are_told_from_case_files(folder) -> None:
         ("nodes = [0, 2]", "nodes = [0, 1]", '"node 1 x": no such column; did you mean'),
         ("nodes = [0, 2]", 'nodes = "xmin"', "give the numbers of the nodes in sway.csv"),
         ("band = [1, 6]", "band = [6, 1]", "data[3]: band = [6, 1]: give two frequencies"),
-        ("band = [1, 6]", "band = [[1, 6], [2, 3]]", "data[3]: band = [[1, 6], [2, 3]]: give two"),
         ("band = [1, 6]\n", "", "data[3]: band = None: give two frequencies"),
         ("band = [1, 6]", 'band = [1, "b"]', 'data[3]: band = [1, "b"]: must be numbers'),
         ("nodes = [0, 2]", "nodes = [0.5]", "data[2]: nodes = [0.5]: 0.5 is not a node number"),
@@ -130,7 +129,6 @@ def test_fit_files_are_told_from_case_files(folder) -> None:
         ("nodes = [0, 2]", 'nodes = [0]\naxis = "w"', 'axis = "w": choose one of x, y, z'),
         ("sigma = 1e-5", 'columns = { "f" = "x" }', "give the headings of displacement and force"),
         ("band = [1, 6]", "band = [1, 6]\nwindw = [0, 1]", "data[3].windw: unknown key; did you"),
-        ("sigma = 1e-5", "sigma = -1", "forces.csv: forces: sigma = -1: must be greater than 0"),
         ("335 - ", "335 -* ", 'tie model.fold_law.theta2 = "335 -* '),
     ],
 )
@@ -174,7 +172,6 @@ def test_an_empty_cell_is_a_lost_node(folder, lost) -> None:
     ("name", "old", "new", "message"),
     [
         ("sway.csv", "200;0;1", "200;nan;1", '4, column "node 0 x [mm]": "nan" is not a finite'),
-        ("sway.csv", "200;0;1", "200;NaN;1", '4, column "node 0 x [mm]": "NaN" is not a finite'),
         ("sway.csv", "200;0;1", "200;0;-inf", '4, column "node 2 x [mm]": "-inf" is not a finite'),
         ("sway.csv", "200;0;1", "200;lost;1", '4, column "node 0 x [mm]": "lost" is not a number'),
         ("sway.csv", "200;0;1", ";0;1", '4, column "time [ms]": is empty; every line needs a'),

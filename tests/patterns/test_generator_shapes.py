@@ -222,7 +222,6 @@ def test_columns_of_resch_turn_alike_about_one_axis():
         (lambda p: p.resch(dihedral=-1), "resch: dihedral = -1: must be between 0 and 180"),
         (lambda p: p.resch((0, 1)), r"resch: cells\[0\] = 0"),
         (lambda p: p.flasher(sides=2), "flasher: sides = 2: must be a whole number, at least 3"),
-        (lambda p: p.flasher(a="1"), 'flasher: a = "1"'),
         (lambda p: p.kresling(alternating="no"), 'kresling: alternating = "no": must be True or F'),
     ],
 )  # fmt: skip

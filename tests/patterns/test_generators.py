@@ -278,7 +278,6 @@ def test_bad_panel_angle(kind, value):
         ((1, 0), r"cells\[1\] = 0: must be a whole number, at least 1"),
         ((-1, 1), r"cells\[0\] = -1: must be a whole number, at least 1"),
         ((1.5, 1), r"cells\[0\] = 1.5: must be a whole number, at least 1"),
-        ((True, 1), r"cells\[0\] = true: must be a whole number"),
     ],
 )
 def test_bad_cells(kind, value, message):
@@ -290,14 +289,12 @@ def test_bad_cells(kind, value, message):
     ("arguments", "message"),
     [
         ({"sides": 2}, "kresling: sides = 2: must be a whole number, at least 3"),
-        ({"sides": 6.0}, "sides = 6.0: must be a whole number, at least 3"),
         ({"storeys": 0}, "storeys = 0: must be a whole number, at least 1"),
         ({"radius": 0}, "radius = 0: must be greater than 0 m"),
         ({"height": -1}, "height = -1: must be greater than 0 m"),
         ({"twist": 120}, "twist = 120: must be between -180 and 120 degrees: beyond.*6 sides"),
         ({"twist": -180}, "twist = -180: must be between"),
         ({"sides": 3, "twist": 60}, "between -180 and 60 degrees"),
-        ({"twist": np.nan}, "twist = nan"),
         ({"twist": "30"}, 'twist = "30": must be a number'),
     ],
 )

@@ -215,7 +215,6 @@ def test_no_warning_near_flat(letter):
         ({(1, 4): "M", (4, 1): "V"}, r"\(1, 4\) is given both 'M' and 'V'"),
         ({3: "M"}, "key 3 is not a pair"),
         ({"14": "M"}, "14: is no family; this pattern has none; give a family, or pairs"),
-        ({(1, 2.5): "M"}, "is not a pair"),
         ({(1, 2, 3): "M"}, "is not a pair"),
         (["M", "V"], "has 2 letters for 1 creases"),
         (["B"], r'edge \(1, 4\) is "B"'),
@@ -236,8 +235,6 @@ def test_bad_assignments(assignments, message):
     [
         ([[0, 0, 0], [1, 0]], "different lengths"),
         ([["a", 0], [1, 0], [0, 1]], "not all entries are real numbers"),
-        ([[None, 0], [1, 0], [0, 1]], "not all entries are real numbers"),
-        ([[1j, 0], [1, 0], [0, 1]], "not all entries are real numbers"),
         ("text", "real numbers"),
         ([0, 1, 2], r"has shape \(3,\)"),
         ([[0, 0, 0, 0]] * 3, r"has shape \(3, 4\)"),
@@ -308,7 +305,6 @@ STAR = [[np.cos(t), np.sin(t)] for t in 2 * np.pi * np.arange(5) * 2 / 5]
         (SQUARES, [0, 1, 2], r"faces\[0\] = 0: give a list of vertex numbers"),
         (SQUARES, ["012"], r'faces\[0\] = "012": give'),
         (SQUARES, [[0, 1, 4.0, 3]], r"faces\[0\]: vertex number 4.0 is not an integer"),
-        (SQUARES, [[0, 1, "4", 3]], r"faces.*vertex number '4' is not an integer"),
         (SQUARES, [[0, 1, True]], "faces.*vertex number True is not an integer"),
         (
             SQUARES,

@@ -265,7 +265,6 @@ def test_without_a_circle_the_whole_curve_is_drawn(case):
         (lambda r: plot_frf({"a": r}, []), "nodes = ..: give nodes"),
         (lambda r: plot_frf(r, [7.5]), "nodes = 7.5: must be a whole number"),
         (lambda r: plot_frf({"a": r}, [13]), "13 is not in 'a', whose nodes are 0..12"),
-        (lambda r: plot_frf({"a": r}, [7], "w"), 'axes = "w"'),
         (lambda r: plot_frf({"a": r}, [7, 6], ["x", "y", "z"]), "3 directions for 2 nodes"),
         (lambda r: plot_frf({"a": r}, [7], "x", "speed"), "quantity: 'speed'; the response has"),
         (lambda r: plot_frf({"a": r}, [7], prominence=1.0), "prominence = 1.0: must be"),
