@@ -193,20 +193,14 @@ def test_kresling(sides, radius, height, twist, storeys, edge_length, dihedral_b
             expected = [radius * np.cos(angle), radius * np.sin(angle), r * height]
             np.testing.assert_allclose(p.vertices[r * n + m], expected, atol=1e-14 * radius * n)
     for r in range(storeys):
+        low, high = r * n, (r + 1) * n
         for m in range(n):
             after = (m + 1) % n
-            bottom, bottom_next, top, top_next = (
-                r * n + m,
-                r * n + after,
-                (r + 1) * n + m,
-                (r + 1) * n + after,
-            )
-            assert p.faces[2 * (r * n + m)] == (bottom, bottom_next, top_next)
-            assert p.faces[2 * (r * n + m) + 1] == (bottom, top_next, top)
-            chord = 2 * radius * np.sin(np.radians(twist) / 2)
-            assert edge_length(p, bottom, top) == pytest.approx(np.hypot(chord, height))
-            chord = 2 * radius * np.sin(np.radians(twist + 360 / n) / 2)
-            assert edge_length(p, bottom, top_next) == pytest.approx(np.hypot(chord, height))
+            assert p.faces[2 * (low + m)] == (low + m, low + after, high + after)
+            assert p.faces[2 * (low + m) + 1] == (low + m, high + after, high + m)
+            for top, turn in ((high + m, twist), (high + after, twist + 360 / n)):
+                chord = 2 * radius * np.sin(np.radians(turn) / 2)
+                assert edge_length(p, low + m, top) == pytest.approx(np.hypot(chord, height))
     assert not any(p.flipped)
     np.testing.assert_allclose(p.dihedrals, dihedral_by_wings(p), atol=1e-11)
     middles = np.array([p.vertices[list(face)].mean(axis=0) for face in p.faces])

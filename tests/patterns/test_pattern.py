@@ -22,15 +22,8 @@ def hinge(dihedral_degrees):
     """Two unit squares about the y axis; positive-z side in front."""
     fold = np.pi - np.radians(dihedral_degrees)  # the second panel rises by this much
     wing = [np.cos(fold), np.sin(fold)]
-    vertices = [
-        [-1, 0, 0],
-        [0, 0, 0],
-        [wing[0], 0, wing[1]],
-        [-1, 1, 0],
-        [0, 1, 0],
-        [wing[0], 1, wing[1]],
-    ]
-    return vertices
+    side = np.array([[-1, 0, 0], [0, 0, 0], [wing[0], 0, wing[1]]])
+    return np.concatenate([side, side + [0, 1, 0]])
 
 
 def test_two_squares():
@@ -165,13 +158,9 @@ def test_turning_all_faces_over_turns_the_dihedrals():
 @pytest.mark.parametrize("letter", ["M", "V", "F", "U"])
 @pytest.mark.parametrize("how", ["mapping", "sequence", "array", "string"])
 def test_given_letters_are_kept(letter, how):
-    given_as = {
-        "mapping": {(4, 1): letter, (0, 1): "B"},
-        "sequence": [letter],
-        "array": np.array([letter]),
-        "string": letter,
-    }[how]
-    p = Pattern(SQUARES, TWO, given_as)
+    mapping = {(4, 1): letter, (0, 1): "B"}
+    given_as = {"mapping": mapping, "sequence": [letter], "array": np.array([letter])}
+    p = Pattern(SQUARES, TWO, given_as.get(how, letter))
     assert p.assignments == (letter,)
     assert type(p.assignments[0]) is str
 
@@ -259,15 +248,9 @@ def test_small_and_far_patterns_are_not_degenerate():
 def test_moebius_strip_is_refused():
     n = 5
     t = 2 * np.pi * np.arange(n) / n
-    strip = [
-        [
-            (2 + s * np.cos(u / 2)) * np.cos(u),
-            (2 + s * np.cos(u / 2)) * np.sin(u),
-            s * np.sin(u / 2),
-        ]
-        for u in t
-        for s in (-1, 1)
-    ]
+    u, s = np.repeat(t, 2), np.tile([-1, 1], n)
+    away = 2 + s * np.cos(u / 2)
+    strip = np.column_stack([away * np.cos(u), away * np.sin(u), s * np.sin(u / 2)])
     quads = [(2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2) for k in range(n - 1)]
     quads.append((2 * n - 2, 2 * n - 1, 0, 1))  # closed with a half twist
     with pytest.raises(InputError, match=r"only one side.*edge \(\d+, \d+\) between faces"):
