@@ -23,7 +23,7 @@ def hinge(dihedral_degrees):
     fold = np.pi - np.radians(dihedral_degrees)  # the second panel rises by this much
     wing = [np.cos(fold), np.sin(fold)]
     side = np.array([[-1, 0, 0], [0, 0, 0], [wing[0], 0, wing[1]]])
-    return np.concatenate([side, side + [0, 1, 0]])
+    return np.concatenate([side, side + np.array([0, 1, 0])])
 
 
 def test_two_squares():
