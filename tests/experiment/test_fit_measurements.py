@@ -99,12 +99,8 @@ def test_warnings_of_a_case_are_told_once(tmp_path) -> None:
 
 def test_forces_need_imposed_displacements(pressed) -> None:
     with pytest.raises(InputError, match="no support of the case moves node 2 along x"):
-        problem(
-            pressed,
-            [ForceDisplacement(nodes=[2], displacement=[-0.1], force=[0.1])],
-            [Parameter("sheet.thickness")],
-            {},
-        )
+        data = [ForceDisplacement(nodes=[2], displacement=[-0.1], force=[0.1])]
+        problem(pressed, data, [Parameter("sheet.thickness")], {})
 
 
 def test_forces_are_the_reactions_of_the_path(pressed) -> None:

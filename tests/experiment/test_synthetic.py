@@ -93,12 +93,8 @@ def test_neighboring_panels_differ_in_color():
 
 def test_films_of_simulations_and_photos_of_paths(tmp_path):
     structure = folded(70.0)
-    case = fd.Case(
-        structure,
-        supports=[fd.Fix(nodes=[20, 22, 24], axes="xyz")],
-        loads=[fd.Force(nodes=[1, 3], vector=(0.01, 0, 0))],
-        damping=fd.Rayleigh(alpha=10.0),
-    )
+    held, pull = fd.Fix([20, 22, 24]), fd.Force([1, 3], (0.01, 0, 0))
+    case = fd.Case(structure, [held], [pull], damping=fd.Rayleigh(alpha=10.0))
     motion = fd.simulate(case, duration=0.02, method="rk4", every=0.001)
     film = film_of(motion, camera(), rate=200.0, start=0.005, duration=0.01)
     np.testing.assert_allclose(film.time, [0.0, 0.005, 0.01])

@@ -68,11 +68,8 @@ def law_energy(law):
 
     def stress_free(theta, rest):
         moment = jax.grad(published)(rest, jax.lax.stop_gradient(rest), *limits)
-        return (
-            published(theta, rest, *limits)
-            - published(rest, rest, *limits)
-            - moment * (theta - rest)
-        )
+        change = published(theta, rest, *limits) - published(rest, rest, *limits)
+        return change - moment * (theta - rest)
 
     return stress_free
 

@@ -21,14 +21,8 @@ def wings(theta, length=1.0, along=(0.3, 0.6), width=(1.0, 1.0)):
 
     Wing i lies in the x-y plane, so its front is +z and theta < pi is a valley.
     """
-    return np.array(
-        [
-            [0.0, 0.0, 0.0],
-            [length, 0.0, 0.0],
-            [along[0], width[0], 0.0],
-            [along[1], width[1] * math.cos(theta), width[1] * math.sin(theta)],
-        ]
-    )
+    other = [along[1], width[1] * math.cos(theta), width[1] * math.sin(theta)]
+    return np.array([[0.0, 0.0, 0.0], [length, 0.0, 0.0], [along[0], width[0], 0.0], other])
 
 
 def angle(points):

@@ -33,6 +33,12 @@ def assert_white_rim(picture: Figure | NDArray) -> None:
         assert (strip == 255).all()
 
 
+def shafts(figure: Figure) -> list[NDArray]:
+    """Segments (k, 2, 3) of the arrows, one array for each color."""
+    lines = [c for c in figure.axes[0].collections if hasattr(c, "_segments3d")]
+    return [np.array(c._segments3d) for c in lines if c.get_zorder() == 7.0]
+
+
 def keys(figure: Figure) -> list[str]:
     """Texts of the legends."""
     return [text.get_text() for legend in figure.legends for text in legend.get_texts()]

@@ -56,13 +56,8 @@ def drawn(axes):
     lines = [c for c in axes.collections if isinstance(c, Line3DCollection)]
     (front,) = [line for line in lines if line.get_label() == "boundary"]
     gray = min(lines, key=lambda line: line.get_zorder())
-    return [
-        {
-            tuple(corner)
-            for corner in np.round(np.array(line._segments3d).reshape(-1, 3), 9).tolist()
-        }
-        for line in (front, gray)
-    ]
+    corners = [np.round(np.reshape(line._segments3d, (-1, 3)), 9) for line in (front, gray)]
+    return [set(map(tuple, each.tolist())) for each in corners]
 
 
 def texts(figure):

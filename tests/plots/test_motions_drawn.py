@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pictures import assert_white_rim, keys
+from pictures import assert_white_rim, keys, shafts
 
 from foldyn import cases, patterns, structures
 from foldyn.plots import draw_structure, plot_load_history, style
@@ -33,17 +33,8 @@ def moved(sheet):
 
 @pytest.fixture(scope="module")
 def shaken(sheet):
-    return cases.Case(
-        sheet,
-        [cases.Fix("xmin"), cases.BaseMotion("x", cases.Harmonic(2.0), -0.01)],
-        [cases.Force([22], (0.01, 0, 0))],
-    )
-
-
-def shafts(figure) -> list[np.ndarray]:
-    """Segments of the arrows (k, 2, 3), one array per color."""
-    lines = [c for c in figure.axes[0].collections if hasattr(c, "_segments3d")]
-    return [np.array(c._segments3d) for c in lines if c.get_zorder() == 7.0]
+    supports = [cases.Fix("xmin"), cases.BaseMotion("x", cases.Harmonic(2.0), -0.01)]
+    return cases.Case(sheet, supports, [cases.Force([22], (0.01, 0, 0))])
 
 
 def glowing(figure) -> list:

@@ -133,13 +133,8 @@ def test_coherence_is_drawn_where_there_is_one(case, response):
 def test_models_and_nodes_are_told_apart(case, response):
     stiffer = made(case, poles=((5.0, 0.02, 1.0),))
     figure = plot_frf({"a": response, "b": stiffer}, [7, 6])
-    assert keys(figure) == [
-        "a, node 7 along x",
-        "a, node 6 along y",
-        "b, node 7 along x",
-        "b, node 6 along y",
-        "peak",
-    ]
+    ways = ("node 7 along x", "node 6 along y")
+    assert keys(figure) == [*(f"{label}, {way}" for label in "ab" for way in ways), "peak"]
     magnitude, phase = figure.axes
     np.testing.assert_allclose(
         line(magnitude, "b, node 6 along y").get_ydata(),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mpl_toolkits.mplot3d.proj3d import proj_transform
-from pictures import assert_white_rim, keys, pixels
+from pictures import assert_white_rim, keys, pixels, shafts
 
 from foldyn import cases, patterns, structures
 from foldyn.errors import InputError
@@ -90,13 +90,7 @@ def test_supports_name_the_held_directions(case):
 def test_load_arrow_points_along_the_force(structure):
     force = np.array([0.0, 3.0, 4.0])
     case = cases.Case(structure, loads=[cases.Force([4], tuple(force))])
-    figure = draw_structure(case)
-    shafts = [
-        np.array(c._segments3d)
-        for c in figure.axes[0].collections
-        if hasattr(c, "_segments3d") and c.get_zorder() == 7.0
-    ]
-    ((start, end),) = shafts[0]
+    (((start, end),),) = shafts(draw_structure(case))
     np.testing.assert_allclose(start, structure.nodes[4])
     np.testing.assert_allclose((end - start) / np.linalg.norm(end - start), force / 5.0, atol=1e-12)
 
@@ -105,13 +99,7 @@ def test_gravity_is_one_arrow_at_the_center_of_mass(structure):
     gravity = cases.Gravity((0.0, 0.0, -9.81))
     figure = draw_structure(cases.Case(structure, loads=[gravity, cases.Force([7], (1, 0, 0))]))
     assert keys(figure)[-2:] == ["1 N along +x on node 7", "gravity 9.81 m/s2 along -z"]
-    shafts = [
-        np.array(c._segments3d)
-        for c in figure.axes[0].collections
-        if hasattr(c, "_segments3d") and c.get_zorder() == 7.0
-    ]
-    assert [len(group) for group in shafts] == [1, 1]
-    (start, end) = shafts[1][0]
+    _, ((start, end),) = shafts(figure)
     mass = structure.mass.diagonal()
     np.testing.assert_allclose(start, mass @ structure.nodes / mass.sum())
     np.testing.assert_allclose(start[:2], end[:2], atol=1e-12)
