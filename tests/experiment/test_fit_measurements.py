@@ -98,8 +98,8 @@ def test_warnings_of_a_case_are_told_once(tmp_path) -> None:
 
 
 def test_forces_need_imposed_displacements(pressed) -> None:
+    data = [ForceDisplacement(nodes=[2], displacement=[-0.1], force=[0.1])]
     with pytest.raises(InputError, match="no support of the case moves node 2 along x"):
-        data = [ForceDisplacement(nodes=[2], displacement=[-0.1], force=[0.1])]
         problem(pressed, data, [Parameter("sheet.thickness")], {})
 
 
