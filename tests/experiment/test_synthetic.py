@@ -35,12 +35,7 @@ def test_corners_are_where_the_truth_says():
     start = (true + 0.4).astype(np.float32).reshape(-1, 1, 2).copy()
     usual = cv2.cornerSubPix(picture, start, (6, 6), (-1, -1), (3, 50, 1e-3))[:, 0]
     assert np.sqrt(np.mean((usual - true) ** 2)) > 2.0 * np.sqrt(np.nanmean(error**2) / 2.0)
-
-
-def test_refining_does_not_depend_on_where_it_starts():
-    film = make_film(1)
-    true = film.truth()["position_px"].values[0, FRONT]
-    picture = film.frame(0)
+    # where refining starts does not matter
     ways = [refine(picture, true + shift, 10.0, 5.0).position for shift in (-0.8, 0.0, 0.8)]
     assert np.nanmax(np.abs(ways[0] - ways[1])) < 0.3
     assert np.nanmedian(np.abs(ways[0] - ways[2])) < 0.03
