@@ -67,7 +67,7 @@ def test_folding_does_not_change_it():
     assert flat.vertices.tolist() == folded.vertices.tolist()
     for found in (flat, folded):
         assert len(found.vertices) == 3 * 5  # of the 5 x 7 vertices
-        assert np.abs(found.deficits).max() < 1e-12
+        assert found.developable(1e-12).all()
         assert found.kawasaki(1e-12).all()
     assert folded.maekawa.all()
 
@@ -77,6 +77,7 @@ def test_the_eggbox_has_cones_and_saddles():
     found = flat_foldability(eggbox(cells=(2, 2), panel_angle=60))
     degrees = np.degrees(found.deficits).round(9)
     assert set(degrees.tolist()) == {120.0, -120.0}
+    assert not found.developable(1.0).any()
 
 
 def test_a_reflex_corner():
