@@ -1,8 +1,21 @@
-"""Films that the tests share."""
+"""Films and case files that the tests share."""
 
 from __future__ import annotations
 
+import fit_cases
 import pytest
+
+
+@pytest.fixture(scope="session")
+def pressed(tmp_path_factory):
+    """A case file of a fold that is pressed."""
+    return fit_cases.write(tmp_path_factory.mktemp("pressed"))
+
+
+@pytest.fixture(scope="session")
+def swung(tmp_path_factory):
+    """A case file of a fold that swings."""
+    return fit_cases.write(tmp_path_factory.mktemp("swung"), fit_cases.SWUNG)
 
 
 @pytest.fixture(scope="session")

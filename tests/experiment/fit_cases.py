@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from contextlib import AbstractContextManager
 from pathlib import Path
 
+import pytest
+
 from case_texts import FOLD_TEXT
+from foldyn.errors import InputError
 
 SAME_STEPS = "ignore:.*time step is too coarse"
 """For data that the model itself has made, with the same steps: they hide what these leave out."""
@@ -55,3 +60,15 @@ def write(folder: Path, text: str = PRESSED, name: str = "case.toml") -> Path:
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def edit(folder: Path, old: str, new: str, name: str = "fit.toml") -> None:
+    """Change one place of a file."""
+    text = (folder / name).read_text()
+    assert old in text
+    (folder / name).write_text(text.replace(old, new, 1))
+
+
+def refused(message: str) -> AbstractContextManager:
+    """What raises an error whose message holds this text."""
+    return pytest.raises(InputError, match=re.escape(message))

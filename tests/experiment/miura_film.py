@@ -48,10 +48,11 @@ class Scene:
     model: Any
 
 
-def camera(**options: Any) -> Any:
+def camera(rest: Any = None, **options: Any) -> Any:
+    """A camera in front of the middle of nodes, those of the sheet at rest."""
     from foldyn.experiment import Camera
 
-    rest = moving_states(REST)[0]
+    rest = moving_states(REST)[0] if rest is None else rest
     middle = 0.5 * (rest.min(axis=0) + rest.max(axis=0))
     middle[2] = rest[:, 2].max()
     return Camera.looking_at(

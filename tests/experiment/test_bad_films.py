@@ -151,10 +151,8 @@ def test_a_reach_longer_than_the_picture(sharp):
     [
         (["--roi", "1.5,2,300,300"], "--roi 1.5,2,300,300: 1.5 is not a whole number"),
         (["--model", "herkal/specimen", "--nodes", "1,2.5"], "--nodes 1,2.5: 2.5 is not a whole"),
-        (["--reach", "-1"], "reach = -1.0: must be greater than 0"),
         (["--rate", "nan"], "--rate nan: every number must be finite"),
         (["--distance", "0"], "--distance = 0.0: must be greater than 0 m"),
-        (["--match", "middle"], "--match 'middle'"),
         (["--model", "film.mkv"], "film.mkv: is not a text file in UTF-8; give a case file"),
     ],
 )

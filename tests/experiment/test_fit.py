@@ -1,20 +1,21 @@
-"""Fits to data that a case of known parameters has made."""
+"""Fits to data that a case of known parameters has made, memory of its creases included."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
-import fit_cases
 import numpy as np
 import pytest
 import xarray as xr
+from fit_cases import PRESSED, SAME_STEPS, SWUNG, write
 
 import foldyn as fd
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment import ForceDisplacement, Parameter, Shapes, TimeHistory
 from foldyn.experiment.calibration.fit_problem import problem
 
-pytestmark = pytest.mark.filterwarnings(fit_cases.SAME_STEPS)
+pytestmark = pytest.mark.filterwarnings(SAME_STEPS)
 
 MOVED = -np.linspace(0.03, 0.3, 8)
 TIME = np.linspace(0.0, 2.0, 60)
@@ -22,24 +23,11 @@ RATIO = Parameter("sheet.length_scale_ratio", 1.6, 0.2, 5.0)
 ALPHA = Parameter("damping.alpha", 1.0, 0.0, 10.0)
 
 
-@pytest.fixture(scope="module")
-def pressed(tmp_path_factory):
-    return fit_cases.write(tmp_path_factory.mktemp("pressed"))
-
-
-@pytest.fixture(scope="module")
-def swung(tmp_path_factory):
-    return fit_cases.write(tmp_path_factory.mktemp("swung"), fit_cases.SWUNG)
-
-
 def forces(path, noise=0.0, **known) -> ForceDisplacement:
     """Forces that the case file itself gives, with noise."""
-    blank = ForceDisplacement(displacement=MOVED, force=np.zeros(8))
+    blank = ForceDisplacement(displacement=MOVED, force=np.zeros(8), **known)
     (true,) = problem(path, [blank], [RATIO], {}).predict([1.0])
-    draw = np.random.default_rng(4)
-    return ForceDisplacement(
-        displacement=MOVED, force=true + noise * draw.standard_normal(8), **known
-    )
+    return replace(blank, force=true + noise * np.random.default_rng(4).standard_normal(8))
 
 
 def histories(path, nodes, noise=0.0, **known) -> TimeHistory:
@@ -48,17 +36,13 @@ def histories(path, nodes, noise=0.0, **known) -> TimeHistory:
     blank = TimeHistory(nodes=nodes, time=TIME, values=wave)
     (true,) = problem(path, [blank], [ALPHA], {}).predict([0.4])
     true = true.reshape(len(nodes), -1).T
-    draw = np.random.default_rng(4)
-    values = true + noise * draw.standard_normal(true.shape)
+    values = true + noise * np.random.default_rng(4).standard_normal(true.shape)
     return TimeHistory(nodes=nodes, time=TIME, values=values, **known)
 
 
 def test_exact_forces_give_the_parameters_exactly(pressed) -> None:
-    found = fd.fit(
-        pressed,
-        [forces(pressed)],
-        [RATIO, Parameter("model.fold_law.theta2", 280.0, 240.0, 299.0)],
-    )
+    theta = Parameter("model.fold_law.theta2", 280.0, 240.0, 299.0)
+    found = fd.fit(pressed, [forces(pressed)], [RATIO, theta])
     assert found["sheet.length_scale_ratio"].value == pytest.approx(1.0, rel=1e-5)
     assert found["model.fold_law.theta2"].value == pytest.approx(290.0, rel=1e-5)
     assert found.descents[0].converged
@@ -66,12 +50,8 @@ def test_exact_forces_give_the_parameters_exactly(pressed) -> None:
 
 
 def test_a_tie_follows_its_parameter(pressed) -> None:
-    found = fd.fit(
-        pressed,
-        [forces(pressed, 1e-5)],
-        [RATIO],
-        ties={"sheet.thickness": "0.01 * sheet.length_scale_ratio"},
-    )
+    ties = {"sheet.thickness": "0.01 * sheet.length_scale_ratio"}
+    found = fd.fit(pressed, [forces(pressed, 1e-5)], [RATIO], ties=ties)
     document = found.document()
     ratio = found["sheet.length_scale_ratio"].value
     assert document["sheet"]["thickness"] == pytest.approx(0.01 * ratio, rel=1e-12)
@@ -154,25 +134,18 @@ def test_a_case_of_statics_and_one_of_dynamics_together(pressed, swung) -> None:
 def test_each_measurement_may_change_the_case(pressed) -> None:
     """Two specimens of one paper, the other with twice the thickness."""
     blank = ForceDisplacement(displacement=MOVED, force=np.zeros(8), sigma=1e-5)
-    thick = ForceDisplacement(
-        displacement=MOVED, force=np.zeros(8), sigma=1e-5, changes={"sheet.thickness": 0.02}
-    )
-    one, other = problem(pressed, [blank, thick], [RATIO], {}).predict([1.0])
+    both = [blank, replace(blank, changes={"sheet.thickness": 0.02})]
+    one, other = problem(pressed, both, [RATIO], {}).predict([1.0])
     assert np.abs(other / one).min() > 4.0
-    data = [
-        ForceDisplacement(displacement=MOVED, force=one, sigma=1e-5),
-        ForceDisplacement(
-            displacement=MOVED, force=other, sigma=1e-5, changes={"sheet.thickness": 0.02}
-        ),
-    ]
+    data = [replace(each, force=f) for each, f in zip(both, (one, other), strict=True)]
     found = fd.fit(pressed, data, [RATIO])
     assert found.estimates[0].value == pytest.approx(1.0, rel=1e-5)
 
 
 def test_shapes_under_a_force_give_a_stiffness(tmp_path) -> None:
-    text = fit_cases.SWUNG.replace('history = { kind = "half_sine", duration = 0.5 }', "")
+    text = SWUNG.replace('history = { kind = "half_sine", duration = 0.5 }', "")
     text = text[: text.index("[analysis]")] + '[analysis]\nkind = "statics"\n'
-    path = fit_cases.write(tmp_path, text)
+    path = write(tmp_path, text)
     state = fd.trace(fd.read_case(path).case(), load_factors=[0.5, 1.0])
     seen = state.displacement.sel(node=[0, 2], axis=["x", "z"]).values
     one = Shapes(nodes=[0, 2], load_factor=[0.5, 1.0], values=seen, axes="xz")
@@ -237,9 +210,7 @@ def test_damaged_evaluations_are_computed_again(pressed, tmp_path) -> None:
 def test_kept_evaluations_of_another_model_are_not_used(pressed, tmp_path) -> None:
     data = [forces(pressed)]
     fd.fit(pressed, data, [RATIO], folder=tmp_path)
-    thick = fit_cases.write(
-        tmp_path, fit_cases.PRESSED.replace("thickness = 0.01", "thickness = 0.011")
-    )
+    thick = write(tmp_path, PRESSED.replace("thickness = 0.01", "thickness = 0.011"))
     found = fd.fit(thick, data, [RATIO], folder=tmp_path)
     assert found.values == fd.fit(thick, data, [RATIO]).values
     assert found.estimates[0].value > 1.01
@@ -306,7 +277,55 @@ def test_arguments_that_make_no_sense(pressed, changes, message) -> None:
         fd.fit(pressed, [forces(pressed)], [RATIO], **changes)
 
 
-def test_a_parameter_that_does_not_exist(pressed) -> None:
-    for parameter in (Parameter("sheet.lenght_scale_ratio"), Parameter("sheet.thicknes", 1.0)):
-        with pytest.raises(InputError, match="did you mean"):
-            fd.fit(pressed, [forces(pressed)], [parameter])
+ELASTIC = 'fold_law = { kind = "enhanced", theta1 = 45, theta2 = 290 }'
+PRONY = 'fold_law = { kind = "prony", ratios = [0.6], times = [0.15] }'
+PLASTIC = 'fold_law = { kind = "plastic", yield_moment = 2e-3, kinematic = 0.01, law = "linear" }'
+
+
+def test_a_relaxation_is_found_in_a_motion(tmp_path):
+    """Ratio and time of a branch from the history of one node, exact and within its noise."""
+    path = write(tmp_path, SWUNG.replace(ELASTIC, PRONY))
+    time = np.arange(0.1, 2.0, 0.02)
+    parameters = [
+        Parameter("model.fold_law.ratios[0]", 0.3, 0.05, 3.0),
+        Parameter("model.fold_law.times[0]", 0.3, 0.02, 2.0),
+    ]
+    blank = TimeHistory(nodes=[0], time=time, values=np.sin(time)[:, None])
+    (exact,) = problem(path, [blank], parameters, {}).predict([0.6, 0.15])
+    exact = exact.reshape(-1, 1)
+    fit = fd.fit(path, [TimeHistory(nodes=[0], time=time, values=exact)], parameters)
+    assert fit["model.fold_law.ratios[0]"].value == pytest.approx(0.6, rel=1e-3)
+    assert fit["model.fold_law.times[0]"].value == pytest.approx(0.15, rel=1e-3)
+    noise = 1e-2 * np.ptp(exact) * np.random.default_rng(1).standard_normal(exact.shape)
+    fit = fd.fit(path, [TimeHistory(nodes=[0], time=time, values=exact + noise)], parameters)
+    for one, truth in zip(fit.estimates, (0.6, 0.15), strict=True):
+        assert one.value == pytest.approx(truth, abs=4.0 * one.standard_error)
+
+
+def cyclic(path, displacement):
+    """The test that the case itself gives."""
+    case = fd.read_case(path).case()
+    factors = displacement / -0.3
+    way = fd.statics.trace(case, load_factors=factors.tolist())
+    moved = np.isin(way.support_node, [0, 1]) & (way.support_axis == "x").values
+    force = way.reaction.values[:, moved].sum(axis=1)
+    return ForceDisplacement(displacement=displacement, force=force)
+
+
+def test_a_cyclic_test_gives_yield_moment_and_hardening(tmp_path):
+    path = write(tmp_path, PRESSED.replace(ELASTIC, PLASTIC))
+    way = np.array([0.0, 0.1, 0.2, 0.3, 0.2, 0.1, 0.0, 0.1, 0.2, 0.3])
+    test = cyclic(path, -way)
+    assert abs(test.force[4] - test.force[2]) > 0.1 * np.ptp(test.force)
+    fit = fd.fit(
+        path, [test],
+        [
+            Parameter("model.fold_law.yield_moment", 4e-3, 1e-4, 2e-2),
+            Parameter("model.fold_law.kinematic", 0.02, 1e-3, 0.2),
+        ],
+    )  # fmt: skip
+    assert fit["model.fold_law.yield_moment"].value == pytest.approx(2e-3, rel=1e-3)
+    assert fit["model.fold_law.kinematic"].value == pytest.approx(0.01, rel=1e-3)
+    test, other = (replace(one, sigma=1e-6) for one in (test, cyclic(path, -way[:3])))
+    with pytest.raises(ComputationError, match="creases that yield depend on the way"):
+        fd.fit(path, [test, other], [Parameter("model.fold_law.yield_moment", 4e-3, 1e-4, 2e-2)])

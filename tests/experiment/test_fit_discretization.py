@@ -22,11 +22,6 @@ ALPHA = Parameter("damping.alpha", 1.0, 0.0, 10.0)
 
 
 @pytest.fixture(scope="module")
-def swung(tmp_path_factory):
-    return fit_cases.write(tmp_path_factory.mktemp("swung"), fit_cases.SWUNG)
-
-
-@pytest.fixture(scope="module")
 def seen(swung):
     """What a camera with some noise sees of the motion of the true sheet, alpha = 0.4."""
     true = fd.simulate(fd.read_case(swung).case(), 2.0, "newmark", dt=5e-4, every=5e-4)

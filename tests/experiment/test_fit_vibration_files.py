@@ -5,6 +5,7 @@ from __future__ import annotations
 import fit_cases
 import numpy as np
 import pytest
+from fit_cases import edit, refused
 from test_fit_vibrations import FREE, FRF, LINES, MODES
 
 import foldyn as fd
@@ -98,12 +99,6 @@ def folder(tmp_path, results):
     return tmp_path
 
 
-def edit(folder, old: str, new: str, name: str = "fit.toml") -> None:
-    text = (folder / name).read_text()
-    assert old in text
-    (folder / name).write_text(text.replace(old, new, 1))
-
-
 def test_a_fit_file_says_what_was_measured(folder, results) -> None:
     hertz, damping, shapes, response, held = read_fit(folder / "fit.toml").data
     assert isinstance(hertz, NaturalFrequencies)
@@ -181,7 +176,6 @@ def test_magnitudes_and_other_quantities(folder) -> None:
     [
         ("modes.csv", "[Hz],frequency_sigma", "[mm],frequency_sigma", "is a length, unit = "),
         ("modes.csv", "2,0.961", "2,0.5", "0.5 Hz comes after 0.724 Hz; sort the modes"),
-        ("modes.csv", "2,0.961", "2,-0.961", "must be greater than 0 Hz"),
         ("modes.csv", "2,0.961", "1,0.961", "has mode 1 twice"),
         ("modes.csv", "2,0.961", "1.5,0.961", "modes.csv: mode = 1.5: must be a whole number"),
         ("modes.csv", "2,0.961", "2,", 'column "frequency [Hz]": is empty'),
@@ -193,7 +187,6 @@ def test_magnitudes_and_other_quantities(folder) -> None:
         ("frf.csv", "z imag", "z phase", 'no such column; did you mean'),
         ("frf.csv", "0.5;1200", "2.5;1200", "must increase from 0 Hz or more; sort the lines"),
         ("fit.toml", "modes = [1, 3]", "modes = [1, 4]", "there is no mode 4; it has 1, 2, 3"),
-        ("fit.toml", "modes = [1, 3]", "modes = [1.5]", "1.5 is not a mode number"),
         ("fit.toml", "sigma = [1e-3, 2e-3]", "sigma = [1e-3]", "must be a list of 2 numbers"),
         ("fit.toml", 'shapes = "shapes.csv"', "shapes = 3", "data[0].shapes = 3: must be the name"),
         ("fit.toml", 'shapes = "shapes.csv"', 'shapes = "no.csv"', "no.csv: there is no such"),
@@ -207,12 +200,10 @@ def test_magnitudes_and_other_quantities(folder) -> None:
         ("fit.toml", "nodes = [8]", 'nodes = [8]\nquantity = "mobility"', "its unit is of a recep"),
         ("fit.toml", "nodes = [6]", "nodes = [99]", "node 99 is out of range; it has nodes 0 to"),
         ("fit.toml", "band = [1, 2]", "band = [8, 9]", "band = [8, 9]: holds none of the freq"),
-        ("fit.toml", "band = [1, 2]", "band = 8", "band = 8: give two frequencies (Hz)"),
         ("fit.toml", 'quantity = "mobility"', 'quantity = "speed"', 'quantity = "speed"'),
     ],
 )  # fmt: skip
 def test_files_with_mistakes(folder, name, old, new, message) -> None:
     edit(folder, old, new, name)
-    with pytest.raises(InputError) as caught:
+    with refused(message):
         read_fit(folder / "fit.toml")
-    assert message in str(caught.value)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import fit_cases
 import numpy as np
 import pytest
+from fit_cases import refused
 
 import foldyn as fd
 from case_texts import HELD_FOLD_TEXT, HELD_MIURA_TEXT
@@ -248,9 +249,8 @@ def test_a_moving_base_gives_a_transmissibility(tmp_path) -> None:
     ],
 )  # fmt: skip
 def test_data_that_no_test_gives(make, message) -> None:
-    with pytest.raises(InputError) as caught:
+    with refused(message):
         make()
-    assert message in str(caught.value)
 
 
 def curve(**changes) -> FrequencyResponse:
@@ -273,9 +273,8 @@ def curve(**changes) -> FrequencyResponse:
     ],
 )
 def test_modes_that_the_model_does_not_have(folder, data, message) -> None:
-    with pytest.raises(InputError) as caught:
+    with refused(message):
         problem(folder / "modes.toml", [data], [RATIO], {})
-    assert message in str(caught.value)
 
 
 def test_shapes_that_cannot_be_told_apart(folder) -> None:
@@ -303,9 +302,8 @@ def test_shapes_that_cannot_be_told_apart(folder) -> None:
 )
 def test_responses_that_the_model_does_not_have(tmp_path, old, new, changes, message) -> None:
     path = fit_cases.write(tmp_path, FRF.replace(old, new) if old else FRF)
-    with pytest.raises(InputError) as caught:
+    with refused(message):
         problem(path, [curve(**changes)], [ALPHA], {})
-    assert message in str(caught.value)
 
 
 def test_kept_evaluations_are_of_the_same_shapes(folder, modes) -> None:

@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fit_cases import SAME_STEPS
-from miura_film import DISTANCE, SCALE, SIZE, cv2
+from miura_film import DISTANCE, SCALE, camera, cv2
 
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.experiment import (
-    Camera,
     Parameter,
     Placing,
     Sensor,
@@ -83,12 +82,6 @@ kind = "statics"
 """  # fmt: skip
 
 
-def camera(model: TrackedModel) -> Camera:
-    middle = 0.5 * (model.rest.min(axis=0) + model.rest.max(axis=0))
-    middle[2] = model.rest[:, 2].max()
-    return Camera.looking_at(middle, DISTANCE, SCALE, SIZE, turned=(1.5, -1.0, 0.8))
-
-
 def written(folder: Path, text: str, name: str) -> tuple[Path, fd.Case, dict]:
     """A case file, its case, and the arguments of its analysis."""
     path = folder / name
@@ -104,9 +97,8 @@ def filmed(tmp_path_factory):
     path, case, arguments = written(folder, SWAYS, "sways.toml")
     model = TrackedModel.of(case)
     motion = fd.simulate(case, **arguments)
-    film = film_of(
-        motion, camera(model), RATE, 0.24, sensor=Sensor(samples=8), dropped=(DROPPED,)
-    )  # fmt: skip
+    seen = camera(model.rest, k1=0.0)
+    film = film_of(motion, seen, RATE, 0.24, sensor=Sensor(samples=8), dropped=(DROPPED,))
     write_film(film, folder / "film.mkv")
     tracks = track_film(str(folder / "film.mkv"), model, HOW)
     save_tracks(tracks, folder / "film.nc")
@@ -122,7 +114,8 @@ def photographed(tmp_path_factory):
     bent = fd.trace(case, method="newton", load_factors=FACTORS)
     steps = [int(np.argmin(np.abs(bent["load_factor"].values - f))) for f in FACTORS]
     model = TrackedModel.of(bent)
-    pictures, _ = photos_of(bent, steps, camera(model), sensor=Sensor(samples=8))
+    seen = camera(model.rest, k1=0.0)
+    pictures, _ = photos_of(bent, steps, seen, sensor=Sensor(samples=8))
     files = [folder / f"load{k}.png" for k in range(len(FACTORS))]
     for file, picture in zip(files, pictures, strict=True):
         cv2.imwrite(str(file), picture)

@@ -136,12 +136,6 @@ def test_case_files(keys, panels, welds, scheme, tmp_path):
     assert made.structure.options.mass == ("condensed" if welds else "consistent")
 
 
-def test_wrong_word_in_a_case_file(tmp_path):
-    (tmp_path / "case.toml").write_text(CASE.format(pattern=INLINE + 'facets = "glue"'))
-    with pytest.raises(InputError, match=r'pattern.facets = "glue"'):
-        fd.read_case(tmp_path / "case.toml")
-
-
 DART = {
     "vertices_coords": [[0, 0], [2, 0], [0.6, 0.6], [0, 2], [0.6, -0.6], [0, -2]],
     "faces_vertices": [[0, 1, 2, 3], [0, 5, 4, 1]],

@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fold_texts import GOOD, LIFTED, assert_same
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.formats import diagnose, read_pattern, write_pattern
@@ -34,36 +32,12 @@ def test_round_trip_of_every_generator(kind, extension, tmp_path):
     assert [f.name for f in tmp_path.iterdir()] == [path.name]
 
 
-@settings(max_examples=40)
-@given(
-    vertices=st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 3), min_size=3, max_size=3),
-    name=st.text(max_size=20),
-)
-def test_round_trip_to_the_last_digit(vertices, name, tmp_path_factory):
-    try:
-        p = Pattern(vertices, [[0, 1, 2]], name=name)
-    except InputError:
-        return  # a triangle without area
-    path = tmp_path_factory.mktemp("fold") / "x.fold"
-    write_pattern(path, p)
-    assert_same(p, read_pattern(path))
-
-
-def test_round_trip_of_letters_and_flipped_faces(tmp_path):
-    base = miura(cells=(2, 1), dihedral=180)
-    letters = ["U", "M", "V", "F"] * (len(base.creases) // 4 + 1)
-    faces = [f[::-1] if n % 3 else f for n, f in enumerate(base.faces)]
-    p = Pattern(base.vertices, faces, letters[: len(base.creases)], name="mixed")
-    write_pattern(tmp_path / "x.FOLD", p)
-    assert_same(p, read_pattern(tmp_path / "x.FOLD"))
-
-
 def test_round_trip_of_coincident_panels(tmp_path):
     vertices = [[1, 0], [0, 0], [1, 0], [1, 1], [0, 1], [1, 1]]
     p = Pattern(vertices, GOOD["faces_vertices"], "M")
-    write_pattern(tmp_path / "x.fold", p)
-    assert read_pattern(tmp_path / "x.fold").dihedrals[0] == 2 * np.pi
-    assert json.loads((tmp_path / "x.fold").read_text())["edges_foldAngle"][3] == -180.0
+    write_pattern(tmp_path / "x.FOLD", p)
+    assert read_pattern(tmp_path / "x.FOLD").dihedrals[0] == 2 * np.pi
+    assert json.loads((tmp_path / "x.FOLD").read_text())["edges_foldAngle"][3] == -180.0
 
 
 SAMPLES_WITH_FACES = {
@@ -100,15 +74,6 @@ def test_real_files(name, tmp_path):
     assert_same(p, diagnose(tmp_path / "x.fold").pattern)
 
 
-def test_angles_of_origami_simulator_are_the_state_to_fold_to():
-    path = SAMPLES / "origami-code+rtori__simpleVertex_50.fold"
-    if not path.exists():
-        pytest.skip(f"{path.name} is not here")
-    p = diagnose(path).pattern
-    wanted = {"M": -np.pi, "V": np.pi, "F": 0.0}
-    assert p.fold_angles.tolist() == [wanted[letter] for letter in p.assignments]
-
-
 def test_real_file_without_faces():
     path = SAMPLES / "oriedita+oriedita__oriedita.fold"
     if not path.exists():
@@ -143,18 +108,13 @@ def test_written_fields(tmp_path):
     assert {data["edges_foldAngle"][n] for n in others} == {0.0}
 
 
-def test_flat_pattern_is_written_as_crease_pattern(tmp_path):
-    write_pattern(tmp_path / "x.fold", miura(dihedral=180))
-    data = json.loads((tmp_path / "x.fold").read_text())
-    assert data["frame_classes"] == ["creasePattern"]
-    assert data["frame_attributes"] == ["2D"]
-    assert {len(row) for row in data["vertices_coords"]} == {2}
-
-
 def test_a_flat_pattern_without_angles_has_none_in_the_file(tmp_path):
     p = miura(dihedral=180)
     write_pattern(tmp_path / "x.fold", p)
-    assert "edges_foldAngle" not in json.loads((tmp_path / "x.fold").read_text())
+    data = json.loads((tmp_path / "x.fold").read_text())
+    assert "edges_foldAngle" not in data
+    assert (data["frame_classes"], data["frame_attributes"]) == (["creasePattern"], ["2D"])
+    assert {len(row) for row in data["vertices_coords"]} == {2}
     write_pattern(tmp_path / "x.fold", p.changed(fold_angles=[0.5, None, -1.0, None]))
     data = json.loads((tmp_path / "x.fold").read_text())
     at = {
@@ -180,13 +140,6 @@ def test_families_and_data_of_others_survive(tmp_path):
     assert q.custom == p.custom
 
 
-def test_fold_angles_match_letters(tmp_path):
-    write_pattern(tmp_path / "x.fold", kresling())
-    data = json.loads((tmp_path / "x.fold").read_text())
-    for letter, angle in zip(data["edges_assignment"], data["edges_foldAngle"], strict=True):
-        assert {"V": angle > 0, "M": angle < 0, "B": angle == 0}[letter]
-
-
 # ------------------------------------------------------------------------------ what is read
 
 
@@ -200,9 +153,6 @@ def test_reads_letters(file):
 def test_reads_without_edges(file):
     p = read_pattern(file(drop=("edges_vertices", "edges_assignment")))
     assert p.assignments == ("F",)
-
-
-def test_reads_edges_without_letters(file):
     assert read_pattern(file(drop=("edges_assignment",))).assignments == ("F",)
 
 
@@ -260,18 +210,6 @@ def test_faces_are_found_where_the_file_has_none(file):
     assert len(read_pattern(empty).faces) == 2
 
 
-def test_a_cut_becomes_two_edges_aloud(file):
-    with pytest.warns(FoldynWarning, match="repaired: opened 1 cut edge"):
-        p = read_pattern(file(edges_assignment=["C", "B", "B"]))
-    assert (len(p.vertices), len(p.creases)) == (8, 0)
-
-
-def test_a_join_is_flat(file):
-    assert read_pattern(file(edges_assignment=["J", "B", "B"]), facets="hinge").assignments == (
-        "F",
-    )
-
-
 def test_lists_by_element_are_left_out_aloud(file):
     with pytest.warns(FoldynWarning, match="edges_tm:kind left out"):
         p = read_pattern(file(**{"edges_tm:kind": [1, 2, 3], "tm:x": 1}))
@@ -318,21 +256,9 @@ def test_unknown_unit_warns(file):
     assert 'frame_unit = "ell" is unknown' in said and "does not say its unit" in said
 
 
-def test_edges_of_no_face_are_ignored_aloud(file):
-    path = file(edges_vertices=[[1, 4], [0, 5], [0, 4]], edges_assignment=["M", "F", "V"])
-    with pytest.warns(FoldynWarning, match="2 lines"):
-        assert read_pattern(path).assignments == ("M",)
-
-
 def test_mountain_on_the_boundary_is_ignored_aloud(file):
     with pytest.warns(FoldynWarning, match="1 mountain or valley on the outline"):
         read_pattern(file(edges_assignment=["M", "V", "B"]))
-
-
-def test_a_letter_against_the_dihedral_turns_the_faces_aloud(file):
-    with pytest.warns(FoldynWarning, match="turned all panels over"):
-        p = read_pattern(file(vertices_coords=LIFTED))
-    assert p.dihedrals[0] == pytest.approx(np.pi / 2)
 
 
 def test_small_letters_and_nulls_are_taken_for_what_they_mean(tmp_path):

@@ -237,27 +237,3 @@ def test_an_edge_that_three_panels_would_meet_at_stays_whole():
     faces = [[0, 2, 3], [0, 2, 4], [0, 1, 5]]
     found = built(listed(vertices, faces))
     assert sorted(len(face) for face in found.pattern.faces) == [3, 3, 3]
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_patterns_with_edges_made_whole_are_found_again(seed):
-    """A folded sheet, of which some panels have lost corners in the middle of their edges."""
-    random = np.random.default_rng(seed)
-    p = miura(cells=(2, 2))
-    middles, faces = [], []
-    chosen = {tuple(edge) for edge in p.creases[random.permutation(len(p.creases))[:5]].tolist()}
-    number = {edge: len(p.vertices) + k for k, edge in enumerate(sorted(chosen))}
-    middles = [p.vertices[list(edge)].mean(axis=0) for edge in sorted(chosen)]
-    given = set()
-    for face in p.faces:
-        corners = []
-        for a, b in zip(face, (*face[1:], face[0]), strict=True):
-            edge = (min(a, b), max(a, b))
-            corners.append(a)
-            if edge in chosen and edge not in given:  # the second panel keeps the edge whole
-                corners.append(number[edge])
-                given.add(edge)
-        faces.append(corners)
-    found = built(listed([*p.vertices, *middles], faces))
-    assert len(found.pattern.creases) == len(p.creases) + 5
-    assert len(found.pattern.boundary) == len(p.boundary)

@@ -49,12 +49,6 @@ def test_ways_to_list_a_face(faces, read):
     assert read(SQUARES + faces).pattern.faces == ((0, 1, 4, 3), (1, 2, 5, 4))
 
 
-def test_polygons_of_any_size(read):
-    ring = [(np.cos(t), np.sin(t)) for t in np.arange(7) * 2 * np.pi / 7]
-    text = "".join(f"v {x} {y} 0\n" for x, y in ring) + "f 1 2 3 4 5 6 7\n"
-    assert len(read(text).pattern.faces[0]) == 7
-
-
 @pytest.mark.parametrize(
     ("line", "letter", "angle"),
     [
@@ -91,16 +85,6 @@ def test_lines_alone(read):
     p = read(SQUARES + lines).pattern
     assert (len(p.faces), p.assignments) == (2, ("M",))
     assert read(SQUARES + "l 1 2 3 6 5 4 1\nl 2 5\n").pattern.assignments == ("U",)
-
-
-@pytest.mark.parametrize("order", [(0, 2, 1), (2, 0, 1)])
-def test_lines_in_another_plane(order, read):
-    """Origami Simulator draws on the plane y = 0."""
-    points = [(x, y) for y in (0, 1) for x in (0, 1, 2)]
-    turned = [[(*point, 0)[k] for k in order] for point in points]
-    text = "".join(f"v {x} {y} {z}\n" for x, y, z in turned) + "l 1 2 3 6 5 4 1\nl 2 5\n"
-    p = read(text).pattern
-    assert (len(p.faces), float(np.ptp(p.vertices[:, 2]))) == (2, 0.0)
 
 
 def test_lines_without_a_letter_leave_the_dihedral_to_say_it(read):
@@ -142,7 +126,6 @@ def test_units(comment, meters, tmp_path):
         (SQUARES + PANELS + "#e 2 2 1\n", "line 10: #e joins vertex 2 with itself"),
         (SQUARES + PANELS + "#e 2 5 9\n", 'line 10: "9" is no kind of edge: give 0 to 5'),
         (SQUARES + PANELS + "#e 2 5 1 200\n", 'line 10: "200": give an angle from -180 to 180'),
-        (SQUARES + PANELS + "#e 2 5 1 x\n", 'line 10: "x": give an angle'),
         (SQUARES, "lines: there are none"),
     ],
 )

@@ -27,6 +27,9 @@ def l_shape() -> fd.Pattern:
     return fd.Pattern([*flat, [2.5, 0, 0.6], [2.6, 1, 0.6]], [[0, 1, 2, 3, 4, 5], [1, 6, 7, 2]])
 
 
+CUBIC = fd.CustomHingeLaw(
+    lambda t, r: 0.25 * (t - r) ** 4, lambda t, r: (t - r) ** 3, lambda t, r: 3.0 * (t - r) ** 2
+)
 ENHANCED = fd.EnhancedLinear(75, 285)
 PUBLISHED = fd.EnhancedLinear(75, 285, rest="as_published")
 
@@ -36,6 +39,10 @@ MODELS = {
     "miura n5b8 merlin2": (
         lambda: fd.patterns.miura(a=1.0, b=1.4, dihedral=60),
         {"fold_law": PUBLISHED, "calibration": "merlin2"},
+    ),
+    "miura lopsided": (
+        lambda: fd.patterns.miura(a=1.0, b=1.1, dihedral=120),
+        {"fold_law": fd.EnhancedLinear(110, 200), "bend_law": fd.PlateSuperlinear(onset=30.0)},
     ),
     "miura n4b5": (
         lambda: fd.patterns.miura(a=1.0, b=1.2, dihedral=80),

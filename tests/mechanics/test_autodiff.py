@@ -15,8 +15,7 @@ import pytest
 from samples import MODELS, relative, state, structure
 
 import foldyn as fd
-from foldyn import mechanics
-from foldyn.materials import LinearBar, LinearHinge, Ogden, Superlinear, bar_law, hinge_law
+from foldyn.materials import LinearBar, LinearHinge, Ogden, Superlinear
 
 jax = pytest.importorskip("jax")
 jnp = jax.numpy
@@ -69,11 +68,8 @@ def law_energy(law):
 
     def stress_free(theta, rest):
         moment = jax.grad(published)(rest, jax.lax.stop_gradient(rest), *limits)
-        return (
-            published(theta, rest, *limits)
-            - published(rest, rest, *limits)
-            - moment * (theta - rest)
-        )
+        change = published(theta, rest, *limits) - published(rest, rest, *limits)
+        return change - moment * (theta - rest)
 
     return stress_free
 
@@ -131,121 +127,10 @@ def assemble(n, nodes, scale, force, tangent):
     return f, k.reshape(3 * n, 3 * n)
 
 
-def bar_pairs(seed, count=200):
-    """Bars (n, 2, 3) at rest and turned, stretched by -40 to -7 or by 7 to 50 %."""
-    rng = np.random.default_rng(seed)
-    rest, now = rng.uniform(-1, 1, (2, count, 2, 3))
-    rest[:, 1, 0] += 2.5
-    now[:, 1, 1] += 2.5
-    stretch = np.concatenate(
-        [np.linspace(0.6, 0.93, count // 2), np.linspace(1.07, 1.5, count // 2)]
-    )
-    length = np.linalg.norm(rest[:, 1] - rest[:, 0], axis=1)
-    along = now[:, 1] - now[:, 0]
-    along *= (stretch * length / np.linalg.norm(along, axis=1))[:, None]
-    now[:, 1] = now[:, 0] + along
-    return rest, now
-
-
-def hinge_quads(theta, seed):
-    """Hinges (n, 4, 3) at the given angles, of generic shape and place."""
-    rng = np.random.default_rng(seed)
-    n = len(theta)
-    length, wing = rng.uniform(0.5, 2.0, n), rng.uniform(0.5, 2.0, (2, n))
-    along = rng.uniform(-0.5, 1.5, (2, n)) * length
-    zero = np.zeros(n)
-    x = np.stack(
-        [
-            np.stack([zero, zero, zero], 1),
-            np.stack([length, zero, zero], 1),
-            np.stack([along[0], wing[0], zero], 1),
-            np.stack([along[1], wing[1] * np.cos(theta), wing[1] * np.sin(theta)], 1),
-        ],
-        axis=1,
-    )
-    q = np.linalg.qr(rng.standard_normal((n, 3, 3)))[0]
-    q *= np.linalg.det(q)[:, None, None]
-    return np.einsum("nij,nvj->nvi", q, x) + rng.uniform(-1, 1, (n, 1, 3))
-
-
-def element_model(points, rest=None, law=None, bars=None):
-    """A model of separate hinges (or bars) that share no nodes."""
-    count, width = points.shape[:2]
-    nodes = np.arange(count * width).reshape(count, width)
-    flat = points.reshape(-1, 3)
-    if bars is not None:
-        unit = 1.0 / np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
-        return mechanics.build(flat, nodes, unit, bars, ())
-    group = mechanics.Hinges(nodes, np.ones(count), rest, law)
-    return mechanics.build(flat, np.zeros((0, 2), int), np.zeros(0), bar_law("linear"), (group,))
-
-
-def computed(model, u):
-    """Element-wise force and tangent of a model of separate elements, and its energies."""
-    n = len(model.rest)
-    force = np.empty((n, 3))
-    mechanics.internal_force(model, u, force, mechanics.workspace(model))
-    k = mechanics.tangent(model, mechanics.sparsity(model), u).toarray()
-    out = np.empty(2)
-    mechanics.strain_energies(model, u, out)
-    return force, k, out
-
-
-def blocks(k, count, width):
-    size = 3 * width
-    return np.stack([k[size * e : size * (e + 1), size * e : size * (e + 1)] for e in range(count)])
-
-
-def each_relative(a, b):
-    a, b = a.reshape(len(b), -1), np.asarray(b).reshape(len(b), -1)
-    return (np.linalg.norm(a - b, axis=1) / np.linalg.norm(b, axis=1)).max()
-
-
-@pytest.mark.parametrize("name", ["ogden", "linear"])
-def test_each_bar(name):
-    rest, now = bar_pairs(3)
-    length = np.linalg.norm(rest[:, 1] - rest[:, 0], axis=1)
-    law = bar_law(name)
-    energy, force, tangent = bar_oracle(law)(now, length)
-    scale = length  # E A = 1: E A L
-    model = element_model(rest, bars=law)
-    ours, k, out = computed(model, (now - rest).reshape(-1, 3))
-    assert out[0] == pytest.approx(float((scale * energy).sum()), rel=1e-12)
-    assert each_relative(ours.reshape(-1, 2, 3), scale[:, None, None] * force) < TOLERANCE
-    wanted = tangent.reshape(-1, 6, 6) * scale[:, None, None]
-    assert each_relative(blocks(k, len(rest), 2), wanted) < TOLERANCE
-
-
-HINGE_LAWS = {
-    "linear": hinge_law("linear"),
-    "superlinear": hinge_law("superlinear"),
-    "plate_superlinear": fd.PlateSuperlinear(onset=30.0),
-    "stress-free": fd.EnhancedLinear(75, 285),
-    "published": fd.EnhancedLinear(75, 285, rest="as_published"),
-    "lopsided": fd.EnhancedLinear(110, 200, rest="stress_free"),
-}
-
-
-@pytest.mark.parametrize("name", sorted(HINGE_LAWS))
-def test_each_hinge(name):
-    """Angles below theta1, between and above theta2, rest angles on all sides of them."""
-    law = HINGE_LAWS[name]
-    theta, rest = (
-        g.ravel() for g in np.meshgrid(np.linspace(0.25, 6.03, 17), np.radians([40, 120, 180, 310]))
-    )
-    now = hinge_quads(theta, seed=5)
-    energy, force, tangent = hinge_oracle(law)(now, rest)
-    model = element_model(now, rest, law)
-    ours, k, out = computed(model, np.zeros((4 * len(theta), 3)))
-    assert out[1] == pytest.approx(float(np.sum(energy)), rel=1e-12)
-    assert each_relative(ours.reshape(-1, 4, 3), force) < TOLERANCE
-    wanted = tangent.reshape(-1, 12, 12)
-    assert each_relative(blocks(k, len(theta), 4), wanted) < TOLERANCE
-
-
 @pytest.mark.parametrize("name", sorted(name for name in MODELS if "coupled" not in name))
-@pytest.mark.parametrize("amplitude", [0.02, 0.15])
+@pytest.mark.parametrize("amplitude", [0.02, 0.15, 0.4])
 def test_whole_structure(name, amplitude):
+    """Up to states in which hinges are nearly closed and bars a third longer or shorter."""
     s = structure(name)
     # creases in series with panels are held against another solution in materials/test_series.py
     s = dataclasses.replace(s, panel_softness=np.zeros(0))

@@ -19,25 +19,19 @@ def random_model(bars, folds, bends, seed=0, fold_law=None, bend_law=None):
     nodes = rng.uniform(0, 1, (60, 3))
 
     def rows(count, width):
-        return np.array([rng.choice(60, width, replace=False) for _ in range(count)]).reshape(
-            -1, width
-        )
+        chosen = [rng.choice(60, width, replace=False) for _ in range(count)]
+        return np.array(chosen).reshape(-1, width)
 
     def group(count, law):
-        return mechanics.Hinges(
-            rows(count, 4), rng.uniform(0.5, 2, count), rng.uniform(1, 5, count), law
-        )
+        stiffness, rest = rng.uniform(0.5, 2, count), rng.uniform(1, 5, count)
+        return mechanics.Hinges(rows(count, 4), stiffness, rest, law)
 
-    return mechanics.build(
-        nodes,
-        rows(bars, 2),
-        rng.uniform(0.5, 2, bars),
-        bar_law("ogden"),
-        (
-            group(folds, fold_law or EnhancedLinear()),
-            group(bends, bend_law or hinge_law("superlinear")),
-        ),
+    groups = (
+        group(folds, fold_law or EnhancedLinear()),
+        group(bends, bend_law or hinge_law("superlinear")),
     )
+    unit = rng.uniform(0.5, 2, bars)
+    return mechanics.build(nodes, rows(bars, 2), unit, bar_law("ogden"), groups)
 
 
 def force_of(model, u, work=None):
@@ -48,24 +42,13 @@ def force_of(model, u, work=None):
 
 def one_by_one(model, u):
     """The force from models of one element each."""
-    empty = {
-        "bars": model.bars[:0],
-        "bar_vector": model.bar_vector[:0],
-        "bar_per_length2": model.bar_per_length2[:0],
-        "bar_stiffness": model.bar_stiffness[:0],
-        "bar_runs": np.zeros((0, 4), np.int64),
-        "hinges": model.hinges[:0],
-        "hinge_runs": np.zeros((0, 4), np.int64),
-    }
+    none = dict.fromkeys(("bar_runs", "hinge_runs"), np.zeros((0, 4), np.int64))
     total = np.zeros_like(u)
-    for start, end, code, row in model.bar_runs:
-        for e in range(start, end):
-            run = np.array([[e, e + 1, code, row]])
-            total += force_of(model._replace(bar_runs=run, hinge_runs=empty["hinge_runs"]), u)
-    for start, end, code, row in model.hinge_runs:
-        for e in range(start, end):
-            run = np.array([[e, e + 1, code, row]])
-            total += force_of(model._replace(hinge_runs=run, bar_runs=empty["bar_runs"]), u)
+    for kind in none:
+        for start, end, code, row in getattr(model, kind):
+            for e in range(start, end):
+                one = {**none, kind: np.array([[e, e + 1, code, row]])}
+                total += force_of(model._replace(**one), u)
     return total
 
 

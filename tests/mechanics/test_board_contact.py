@@ -70,14 +70,6 @@ def test_derivatives_of_points_are_those_of_differences():
     np.testing.assert_allclose(bent, near[0] - near[1], atol=1e-8)
 
 
-def test_forces_keep_their_resultant_and_moment():
-    force = np.zeros_like(U)
-    add_back(HELD, U, PUSH, force)
-    np.testing.assert_allclose(force.sum(axis=0), PUSH.sum(axis=0), atol=1e-13)
-    moments = [np.cross(NODES + U, force), np.cross(RIDE.rest + points(U), PUSH)]
-    np.testing.assert_allclose(*(moment.sum(axis=0) for moment in moments), atol=1e-13)
-
-
 def test_a_step_moves_points_by_its_matrix_and_turns_them_about_its_middle():
     end = U + 3.0 * V
     step = step_jacobian(RIDE, U, end, U.size)

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import foldyn as fd
+from foldyn.checks import gradient_error, tangent_error
 from foldyn.mechanics.edge_gives import EdgeGivesTerm
 from foldyn.mechanics.following import following_force
 from foldyn.structures.membranes import energies
@@ -49,15 +50,10 @@ def test_every_edge_between_two_panels_gives_way_at_both_ends(structure) -> None
 
 
 def test_forces_are_the_gradient_and_the_tangent_that_of_forces(structure, state) -> None:
-    body, step = structure.body, 1e-7
-    direction = np.random.default_rng(5).standard_normal(len(state))
-    direction[structure.nodes.size :] *= 0.1
-    ahead, behind = state + step * direction, state - step * direction
-    slope = sum(body.energies(ahead)) - sum(body.energies(behind))
-    assert_allclose(body.internal(state) @ direction, slope / (2 * step), rtol=1e-6)
-    tangent = body.tangent(state)
-    change = (body.internal(ahead) - body.internal(behind)) / (2 * step)
-    assert_allclose(tangent @ direction, change, rtol=1e-6, atol=1e-7 * np.abs(change).max())
+    body, tangent = structure.body, structure.body.tangent(state)
+    error = gradient_error(lambda q: body.energies(q).sum(), body.internal, state, size=1e-5)
+    assert error < 1e-6
+    assert tangent_error(body.internal, body.tangent, state, size=1e-5) < 1e-6
     assert abs(tangent - tangent.T).max() < 1e-12 * abs(tangent).max()
 
 
@@ -90,16 +86,6 @@ def test_gives_in_balance_are_those_without_force(structure, state) -> None:
     assert_allclose(
         tangent.toarray(), structure.tangent(u).toarray(), atol=1e-9 * abs(tangent).max()
     )
-
-
-def test_mean_forces_do_the_work_of_the_energy(structure, state) -> None:
-    start = fd.State(velocity=100.0 * state[: structure.nodes.size].reshape(-1, 3))
-    case = fd.Case(structure)
-    motion = fd.simulate(case, 2e-4, "energy_momentum", dt=1e-5, initial=start)
-    strain = sum(motion[name].to_numpy() for name in case.energy_groups)
-    total = motion.kinetic.to_numpy() + strain
-    assert np.ptp(strain) > 1e-3 * total[0]
-    assert_allclose(total, total[0], rtol=1e-9)
 
 
 def test_stiffness_with_gives_is_positive_definite(structure) -> None:

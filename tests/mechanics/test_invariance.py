@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -27,17 +25,6 @@ def rigid_modes(x):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_nothing_at_rest(name):
-    s = structure(name)
-    zero = np.zeros_like(s.nodes)
-    if name in STRESSED:
-        assert np.abs(s.internal_force(zero)).max() > 1e-6 * forces_of(s)
-        return
-    assert np.abs(s.internal_force(zero)).max() < 1e-15 * forces_of(s)
-    assert all(0.0 <= e < 1e-18 for e in s.energies(zero).values())
-
-
-@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("seed", range(4))
 def test_rigid_motion_of_the_rest_state(name, seed):
     """A large rotation and translation: no force, the energy of the rest state."""
@@ -45,10 +32,16 @@ def test_rigid_motion_of_the_rest_state(name, seed):
     shift = np.random.default_rng(seed).uniform(-3, 3, 3)
     u = s.nodes @ rotation(seed).T + shift - s.nodes
     assert np.abs(u).max() > 0.5
-    rest = s.internal_force(np.zeros_like(u)) @ rotation(seed).T
+    zero = np.zeros_like(u)
+    force = np.abs(s.internal_force(zero)).max()
+    if name in STRESSED:
+        assert force > 1e-6 * forces_of(s)
+    else:
+        assert force < 1e-15 * forces_of(s)
+        assert all(0.0 <= e < 1e-18 for e in s.energies(zero).values())
+    rest = s.internal_force(zero) @ rotation(seed).T
     assert np.abs(s.internal_force(u) - rest).max() < 1e-11 * forces_of(s)
-    at_rest = s.energy(np.zeros_like(u))
-    assert s.energy(u) == pytest.approx(at_rest, rel=1e-12, abs=1e-16)
+    assert s.energy(u) == pytest.approx(s.energy(zero), rel=1e-12, abs=1e-16)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -66,23 +59,14 @@ def test_force_and_tangent_turn_with_the_structure(name, seed):
 
 @settings(max_examples=40)
 @given(name=st.sampled_from(NAMES), seed=st.integers(0, 10**6), amplitude=st.floats(1e-6, 0.15))
-def test_forces_and_moments_balance(name, seed, amplitude):
-    """At any state the internal forces have no resultant and no moment."""
-    s = structure(name)
-    u = state(s, seed, amplitude)
-    f = s.internal_force(u)
-    size = np.abs(f).max() * len(f) + 1e-12 * forces_of(s)
-    assert np.abs(f.sum(axis=0)).max() < 1e-13 * size
-    assert np.abs(np.cross(s.nodes + u, f).sum(axis=0)).max() < 1e-12 * size
-
-
-@settings(max_examples=30)
-@given(name=st.sampled_from(NAMES), seed=st.integers(0, 10**6), amplitude=st.floats(1e-3, 0.15))
-def test_tangent_on_rigid_modes(name, seed, amplitude):
-    """K times a translation is zero; K times a rotation is the rotated force, at any state."""
+def test_forces_balance_and_tangents_know_rigid_modes(name, seed, amplitude):
+    """At any state: no resultant, no moment; K times a rotation is the rotated force."""
     s = structure(name)
     u = state(s, seed, amplitude)
     k, f = s.tangent(u), s.internal_force(u)
+    size = np.abs(f).max() * len(f) + 1e-12 * forces_of(s)
+    assert np.abs(f.sum(axis=0)).max() < 1e-13 * size
+    assert np.abs(np.cross(s.nodes + u, f).sum(axis=0)).max() < 1e-12 * size
     scale = np.abs(k).sum(axis=1).max() * np.abs(s.nodes).max()
     modes = rigid_modes(s.nodes + u)
     assert np.abs(k @ modes[:, :3]).max() < 1e-12 * scale
@@ -118,38 +102,3 @@ def test_force_is_gradient_and_tangent_its_slope(name):
     coarse, fine = errors(2e-3), errors(1e-3)
     np.testing.assert_allclose(np.log2(coarse / fine), 2.0, atol=0.15)
     assert fine.max() < 1e-2
-
-
-@pytest.mark.parametrize("name", ["miura n5b8", "hexagon", "miura n4b5"])
-def test_numbering_does_not_matter(name):
-    """Nodes, bars and hinges in another order: the same energy, force and tangent."""
-    s = structure(name)
-    rng = np.random.default_rng(8)
-    n = len(s.nodes)
-    new = rng.permutation(n)  # new[i]: new number of node i
-    rows = {k: rng.permutation(len(getattr(s, k))) for k in ("bars", "folds", "bends")}
-    nodes = np.empty_like(s.nodes)
-    nodes[new] = s.nodes
-    other = dataclasses.replace(
-        s,
-        nodes=nodes,
-        pattern=None,
-        bars=new[s.bars][rows["bars"]],
-        bar_area=s.bar_area[rows["bars"]],
-        panel_softness=s.panel_softness[rows["folds"]] if len(s.panel_softness) else np.zeros(0),
-        **{
-            f"{kind}{part}": (new[value] if part == "s" else value)[rows[kind + "s"]]
-            for kind in ("fold", "bend")
-            for part in ("s", "_stiffness", "_rest")
-            for value in [getattr(s, f"{kind}{part}")]
-        },
-    )
-    u = state(s, 9)
-    moved = np.empty_like(u)
-    moved[new] = u
-    for key, value in s.energies(u).items():
-        assert other.energies(moved)[key] == pytest.approx(value, rel=1e-13)
-    assert relative(other.internal_force(moved)[new], s.internal_force(u)) < 1e-13
-    dof = (3 * new[:, None] + np.arange(3)).ravel()
-    ours = other.tangent(moved).toarray()[np.ix_(dof, dof)]
-    assert relative(ours, s.tangent(u).toarray()) < 1e-13

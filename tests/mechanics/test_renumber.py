@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from samples import MODELS, relative, state, structure
+from samples import CUBIC, MODELS, relative, state, structure
 from test_blocks import force_of, random_model
 
 import foldyn as fd
 from foldyn import mechanics
-from foldyn.materials import CustomHingeLaw
 from foldyn.mechanics.model import GROUP, node_order, renumber
 from foldyn.mechanics.strips import reach
-
-CUBIC = CustomHingeLaw(
-    lambda t, r: 0.25 * (t - r) ** 4, lambda t, r: (t - r) ** 3, lambda t, r: 3.0 * (t - r) ** 2
-)
 
 
 def shuffled(model, seed=0):
@@ -59,18 +54,6 @@ def test_renumbered_elements_of_mixed_and_user_laws_behave_alike(count):
     order, other, rows = shuffled(model, 2)
     check_same_mechanics(model, u, order, other, rows)
     assert [run[2] for run in other.hinge_runs] == [run[2] for run in model.hinge_runs]
-
-
-def test_there_and_back_is_the_model_itself():
-    """But for the order of hinges with the same lowest node."""
-    model = structure("miura n5b8").model
-    order, other, rows = shuffled(model)
-    back, rows_back = renumber(other, np.argsort(order))
-    old = rows[rows_back]
-    assert sorted(old) == list(range(len(model.hinges)))
-    np.testing.assert_array_equal(back.rest, model.rest)
-    for name in ("hinges", "hinge_stiffness", "hinge_rest", "hinge_parameters", "hinge_group"):
-        np.testing.assert_array_equal(getattr(back, name), getattr(model, name)[old], err_msg=name)
 
 
 def test_node_order_brings_neighbors_together():

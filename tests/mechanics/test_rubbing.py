@@ -97,6 +97,14 @@ class Rubbing:
         out[np.ix_(dofs, dofs)] = block
         return out
 
+    def tangent_error(self, x, size: float) -> float:
+        """Of the tangent as the derivative of the force."""
+
+        def force(u):
+            return self.force(u.reshape(10, 3)).ravel()
+
+        return tangent_error(force, lambda u: self.tangent(u.reshape(10, 3)), x.ravel(), size=size)
+
     def state(self, x) -> tuple[float, bool]:
         """Energy of the spring, and whether it slips."""
         self.kept.x[:] = x
@@ -127,18 +135,11 @@ def test_what_sticks_has_a_potential(pair):
         x = pair.touching(rng)
         weak(pair, x)
         assert not pair.state(x)[1]
-        errors.append(
-            (
-                gradient_error(
-                    lambda u: pair.state(u.reshape(10, 3))[0],
-                    lambda u: pair.force(u.reshape(10, 3)).ravel(), x.ravel(), size=1e-3,
-                ),
-                tangent_error(
-                    lambda u: pair.force(u.reshape(10, 3)).ravel(),
-                    lambda u: pair.tangent(u.reshape(10, 3)), x.ravel(), size=1e-3,
-                ),
-            )
+        gradient = gradient_error(
+            lambda u: pair.state(u.reshape(10, 3))[0],
+            lambda u: pair.force(u.reshape(10, 3)).ravel(), x.ravel(), size=1e-3,
         )  # fmt: skip
+        errors.append((gradient, pair.tangent_error(x, 1e-3)))
     assert (np.median(errors, axis=0) < [1e-8, 1e-8]).all()
 
 
@@ -152,12 +153,7 @@ def test_tangents_of_what_slips_are_exact(pair, lagged, where):
         x = pair.touching(rng, where == "beside")
         if not pair.state(x)[1]:
             continue
-        errors.append(
-            tangent_error(
-                lambda u: pair.force(u.reshape(10, 3)).ravel(),
-                lambda u: pair.tangent(u.reshape(10, 3)), x.ravel(), size=1e-2,
-            )
-        )  # fmt: skip
+        errors.append(pair.tangent_error(x, 1e-2))
         tangent = pair.tangent(x)
         uneven = np.abs(tangent - tangent.T).max() > 1e-9 * np.abs(tangent).max()
         assert uneven == (not lagged) or where == "beside"
@@ -249,10 +245,8 @@ def test_ties_stay_where_lists_are_made_anew(pair):
         pairs = kept.pairs[pair.kind, :listed]
         (place,) = np.flatnonzero((pairs == parts).all(axis=1) | (pairs == parts[::-1]).all(axis=1))
         assert (kept.tie[pair.kind, place] == tie).all()
-        assert np.count_nonzero(kept.tie[pair.kind, :listed, 2]) == 1
-        assert (
-            np.count_nonzero(kept.tie[pair.kind, :listed, 3]) == 1
-        )  # no stretch is left in other rows
+        # no stretch is left in other rows
+        assert (np.count_nonzero(kept.tie[pair.kind, :listed, 2:], axis=0) == 1).all()
 
 
 def test_ties_stay_where_no_list_can_be_made(pair):

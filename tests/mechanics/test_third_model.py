@@ -26,17 +26,6 @@ def balance(x):
     return 2.0 * K * x + 4.0 * K * (length - ARM) * x / length
 
 
-def test_forces_are_the_gradient_of_the_energy_and_tangents_theirs():
-    body = star().structure.body
-    q = 0.1 * np.random.default_rng(1).standard_normal(body.size)
-    for h in np.eye(body.size):
-        ahead, behind = q + 1e-6 * h, q - 1e-6 * h
-        rate = (body.energies(ahead) - body.energies(behind)).sum() / 2e-6
-        assert rate == pytest.approx(body.internal(q) @ h, abs=1e-7 * K)
-        turn = (body.internal(ahead) - body.internal(behind)) / 2e-6
-        np.testing.assert_allclose(body.tangent(q) @ h, turn, atol=1e-7 * K)
-
-
 @pytest.mark.parametrize("method", ["newton", "arc_length"])
 def test_statics(method):
     """Held springs give the force in closed form."""

@@ -9,14 +9,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from samples import relative
+from samples import CUBIC, relative
 from test_blocks import random_model
 
 import foldyn as fd
 from foldyn import mechanics
 from foldyn.jit.compiled import shared
 from foldyn.jit.intrinsics import borrowed
-from foldyn.materials import CustomHingeLaw
 from foldyn.mechanics import force as force_module
 from foldyn.mechanics import threads as threads_module
 from foldyn.mechanics.model import node_order, renumber
@@ -29,13 +28,7 @@ LAWS = {
     "mixed": {"fold_law": fd.EnhancedLinear(75, 285)},
     "enhanced": {"fold_law": fd.EnhancedLinear(), "bend_law": fd.EnhancedLinear()},
     "linear": {"fold_law": "linear", "bend_law": "linear", "bar_law": "linear"},
-    "own": {
-        "bend_law": CustomHingeLaw(
-            lambda t, r: 0.25 * (t - r) ** 4,
-            lambda t, r: (t - r) ** 3,
-            lambda t, r: 3.0 * (t - r) ** 2,
-        )
-    },
+    "own": {"bend_law": CUBIC},
 }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from contact_samples import T, miura, tables_of, touching
+from contact_samples import SHEET, T, miura, tables_of, touching
 
 import foldyn as fd
 from foldyn.checks import gradient_error, tangent_error
@@ -86,45 +86,23 @@ def states(count: int):
     return [2e-5 * rng.standard_normal(STACK.nodes.size) for _ in range(count)]
 
 
-def test_forces_of_a_stack_are_the_gradient(stack):
+def test_forces_of_a_stack_are_the_gradient_and_tangents_exact(stack):
+    def force(u):
+        return stack.contact(u)[1].ravel()
+
     # differences of 1e-9 m straddle kinks of a few among hundreds of pairs, hence the median
     errors = [
-        gradient_error(lambda u: stack.contact(u)[0], lambda u: stack.contact(u)[1].ravel(), u,
-                       size=2e-6)
-        for u in states(5)
-    ]  # fmt: skip
-    assert np.median(errors) < 1e-8
-    energy, force = stack.contact(states(1)[0])
-    assert energy > 0.0 and np.abs(force).max() > 0.0
-
-
-def test_tangents_of_a_stack_are_exact(stack):
-    errors = [
-        tangent_error(lambda u: stack.contact(u)[1].ravel(), stack.tangent, u, size=2e-6)
+        (
+            gradient_error(lambda u: stack.contact(u)[0], force, u, size=2e-6),
+            tangent_error(force, stack.tangent, u, size=2e-6),
+        )
         for u in states(5)
     ]
-    assert np.median(errors) < 1e-6
-    matrix = stack.tangent(states(1)[0])
-    assert abs(matrix - matrix.T).max() < 1e-9 * abs(matrix).max()
-
-
-def test_third_law_and_angular_momentum():
-    body = touching(STACK)  # the floor takes up momentum
-    for u in states(3):
-        force = body.contact(u)[1]
-        x = STACK.nodes - STACK.nodes.mean(axis=0) + u.reshape(-1, 3)
-        size = np.abs(force).max()
-        assert np.abs(force.sum(axis=0)).max() < 1e-13 * size * len(force)
-        assert np.abs(np.cross(x, force).sum(axis=0)).max() < 1e-14 * size * len(force)
-
-
-def test_the_whole_body_adds_contact_to_its_model(stack):
+    assert (np.median(errors, axis=0) < [1e-8, 1e-6]).all()
     u = states(1)[0]
-    whole = STACK.body.with_terms(stack)
-    assert list(whole.energy_groups) == [*STACK.body.energy_groups, "contact"]
-    assert whole.energies(u)[-1] == stack.contact(u)[0]
-    added = whole.internal(u) - STACK.body.internal(u)
-    np.testing.assert_allclose(added, stack.contact(u)[1].ravel(), atol=1e-12)
+    assert stack.contact(u)[0] > 0.0 and np.abs(force(u)).max() > 0.0
+    matrix = stack.tangent(u)
+    assert abs(matrix - matrix.T).max() < 1e-9 * abs(matrix).max()
 
 
 @pytest.mark.parametrize("dihedral", [1.0, 359.0])
@@ -155,12 +133,14 @@ def test_guards_keep_dihedrals_between_0_and_360(dihedral):
     assert error < 1e-8
 
 
-def test_neighbors_meet_everywhere_at_once():
+@pytest.mark.parametrize("make", [fd.discretize, fd.shell])
+def test_neighbors_meet_everywhere_at_once(make):
     """At the dihedral 2 t / w: all pairs across a crease begin to touch at the same angle."""
-    begin = np.degrees(2.0 * T / 0.02)
-    energies = []
+    begin, energies = np.degrees(2.0 * T / 0.02), []
+    options = {"scheme": "n4b5"} if make is fd.discretize else {"divisions": 4}
     for factor in (1.002, 0.998):
         pattern = fd.patterns.simple_fold(a=0.02, b=0.02, dihedral=factor * begin)
-        s = fd.discretize(pattern, miura(60.0).sheet, scheme="n4b5", fold_law="linear")
-        energies.append(touching(s).contact(np.zeros(s.nodes.size))[0])
+        s = make(pattern, SHEET, fold_law="linear", **options)
+        contact = fd.Case(s, contact=fd.Contact()).contact_term
+        energies.append(contact.contact(np.zeros(s.body.size))[0])
     assert energies[0] == 0.0 < energies[1]

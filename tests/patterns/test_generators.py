@@ -4,21 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from foldyn.errors import InputError
 from foldyn.patterns import GENERATORS, eggbox, kresling, miura, simple_fold
 
 GOLDEN = Path(__file__).resolve().parents[3] / "shared" / "golden"
 CELLS = [(1, 1), (2, 1), (1, 3), (4, 3)]
-
-
-def golden(name):
-    path = GOLDEN / f"{name}.npz"
-    if not path.exists():
-        pytest.skip(f"{path.name} is not here")
-    return np.load(path)
 
 
 def by_crease(pattern):
@@ -42,7 +33,7 @@ def grid_creases(cells):
 
 @pytest.mark.parametrize("dihedral", [1e-3, 30, 60, 120, 179, 180])
 @pytest.mark.parametrize(("a", "b"), [(1.0, 1.0), (0.3, 2.0)])
-def test_simple_fold(a, b, dihedral, edge_length, corner_angle):
+def test_simple_fold(a, b, dihedral):
     p = simple_fold(a=a, b=b, dihedral=dihedral)
     w, h = a * np.sin(np.radians(dihedral / 2)), a * np.cos(np.radians(dihedral / 2))
     expected = [[0, 0, 0], [0, b, 0], [w, 0, h], [w, b, h], [2 * w, 0, 0], [2 * w, b, 0]]
@@ -51,14 +42,6 @@ def test_simple_fold(a, b, dihedral, edge_length, corner_angle):
     assert np.degrees(p.dihedrals[0]) == pytest.approx(360 - dihedral, abs=1e-10)
     assert p.assignments == ("M",)
     assert (p.face_normals[:, 2] > 0).all()  # the front is above
-    for u, v in ((0, 2), (1, 3), (2, 4), (3, 5)):
-        assert edge_length(p, u, v) == pytest.approx(a, rel=1e-14)
-    for u, v in ((0, 1), (2, 3), (4, 5)):
-        assert edge_length(p, u, v) == pytest.approx(b, rel=1e-14)
-    for face in (0, 1):
-        for k in range(4):
-            assert corner_angle(p, face, k) == pytest.approx(90, abs=1e-10)
-    np.testing.assert_allclose(p.face_areas, a * b, rtol=1e-13)
 
 
 # ------------------------------------------------------------------------------ grids
@@ -121,19 +104,6 @@ def test_second_family_of_the_miura(cells, panel_angle, dihedral):
         assert angle[low, high] == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize("cells", [(2, 2), (3, 4)])
-def test_every_miura_vertex_has_three_creases_of_one_kind(cells):
-    p = miura(cells=cells)
-    for v in range(len(p.vertices)):
-        letters = [
-            letter
-            for pair, letter in zip(p.creases.tolist(), p.assignments, strict=True)
-            if v in pair
-        ]
-        if len(letters) == 4:
-            assert sorted((letters.count("M"), letters.count("V"))) == [1, 3]
-
-
 def test_miura_rows_keep_their_height():
     p = miura(cells=(3, 2), a=1.1, b=0.8, panel_angle=50, dihedral=100)
     z = p.vertices[:, 2].reshape(7, 5)
@@ -141,29 +111,6 @@ def test_miura_rows_keep_their_height():
     np.testing.assert_allclose(
         z[:, 1::2], 1.1 * np.sin(np.radians(50)) * np.sin(np.radians(40)), rtol=1e-13
     )
-
-
-def test_flat_miura():
-    p = miura(cells=(2, 2), dihedral=180)
-    assert not p.vertices[:, 2].any()
-    assert p.assignments == miura(cells=(2, 2), dihedral=100).assignments
-    np.testing.assert_allclose(p.dihedrals, np.pi, atol=1e-12)
-
-
-@pytest.mark.parametrize("cells", CELLS)
-@pytest.mark.parametrize(("panel_angle", "dihedral"), [(75, 60), (60, 100), (40, 30)])
-def test_second_family_of_the_eggbox(cells, panel_angle, dihedral):
-    # Across the creases along y the roles of a and b, h1 and h2 change places: the half
-    # dihedral d2 fulfils cos(y2) = cos(g)/cos(y1) with sin(y2) = sin(g) sin(d2/2).
-    p = eggbox(cells=cells, a=1.0, b=1.3, panel_angle=panel_angle, dihedral=dihedral)
-    g = np.radians(panel_angle)
-    sin_y1 = np.sin(g) * np.sin(np.radians(dihedral) / 2)
-    cos_y2 = np.cos(g) / np.sqrt(1 - sin_y1**2)
-    second = 2 * np.degrees(np.arcsin(np.sqrt(1 - cos_y2**2) / np.sin(g)))
-    angle = by_crease(p)
-    for low, high, i in grid_creases(cells)[1]:
-        expected = 360 - second if i % 2 else second
-        assert angle[low, high] == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize("dihedral", [20, 60, 140])
@@ -177,22 +124,6 @@ def test_eggbox_against_its_formulas(dihedral):
         for j in range(7):
             expected = [s * i, length * j, h1 * (j % 2) + h2 * (i % 2)]
             np.testing.assert_allclose(p.vertices[i * 7 + j], expected, atol=1e-13)
-
-
-@settings(max_examples=50)
-@given(
-    kind=st.sampled_from(["miura", "eggbox"]),
-    a=st.floats(1e-3, 1e3),
-    ratio=st.floats(0.1, 10),
-    panel_angle=st.floats(1, 89),
-    dihedral=st.floats(0.5, 179.5),
-)
-def test_any_grid_has_equal_panels(kind, a, ratio, panel_angle, dihedral):
-    b = a * ratio
-    p = GENERATORS[kind](cells=(2, 2), a=a, b=b, panel_angle=panel_angle, dihedral=dihedral)
-    np.testing.assert_allclose(p.face_areas, a * b * np.sin(np.radians(panel_angle)), rtol=1e-9)
-    low, high, _ = grid_creases((2, 2))[0][0]
-    assert by_crease(p)[low, high] == pytest.approx(360 - dihedral, abs=1e-8)
 
 
 # ------------------------------------------------------------------------------ the specimen
@@ -217,46 +148,25 @@ def test_specimen():
 # ------------------------------------------------------------------------------ golden data
 
 
-def same_faces(pattern, panels):
-    """Same panels, in order, up to the first corner."""
-    for face, row in zip(pattern.faces, panels.astype(int) - 1, strict=True):
-        corners = [v for v in row.tolist() if v >= 0]
-        k = corners.index(face[0])
-        turned = corners[k:] + corners[:k]
-        assert list(face) in (turned, [turned[0], *turned[:0:-1]])
+TILT = 100.48 / 8 / np.sqrt(25**2 - (100.48 / 8) ** 2)  # the golden nodes were made for this height
+TALL = 180 - 2 * np.degrees(np.arccos(TILT / np.tan(np.radians(60))))
 
 
-def test_miura_against_golden():
-    data = golden("static_miura11_L1_N5B8")
-    p = miura(cells=(1, 1), a=1, b=1, panel_angle=60, dihedral=60)
-    np.testing.assert_allclose(p.vertices, data["nodes_input"], atol=1e-14)
-    assert {frozenset(f) for f in p.faces} == {
-        frozenset((row - 1).astype(int).tolist()) for row in data["panels"]
-    }
-
-
-def test_specimen_against_golden():
-    data = golden("static_specimen_mm_N5B8")
-    s = 100.48 / 8  # the golden nodes were made for this height
-    t = s / np.sqrt(25**2 - s**2)
-    dihedral = 180 - 2 * np.degrees(np.arccos(t / np.tan(np.radians(60))))
-    p = miura(cells=(4, 3), a=25, b=25, panel_angle=60, dihedral=dihedral)
-    np.testing.assert_allclose(p.vertices, data["nodes_input"], atol=1e-10)
-    same_faces(p, data["panels"])
-
-
-def test_kresling_vertices_against_golden():
-    data = golden("static_kresling6_N5B8")  # cut by the other diagonal
-    p = kresling(sides=6, radius=1, height=0.9, twist=30)
-    np.testing.assert_allclose(p.vertices, data["nodes_input"], atol=1e-14)
-
-
-def test_simple_fold_against_golden():
-    # the golden fold stands on its ridge node numbers 2, 3 too, shifted by w to the left
-    data = golden("static_fold_dih60_N5B8")
-    p = simple_fold(dihedral=60)
-    nodes = data["nodes_input"][[4, 5, 0, 1, 2, 3]] - data["nodes_input"][4]
-    np.testing.assert_allclose(p.vertices, nodes, atol=1e-14)
+@pytest.mark.parametrize(
+    ("name", "pattern", "rows"),
+    [
+        ("miura11_L1", miura(a=1, b=1, panel_angle=60, dihedral=60), slice(None)),
+        ("specimen_mm", miura((4, 3), 25, 25, 60, TALL), slice(None)),
+        ("kresling6", kresling(sides=6, radius=1, height=0.9, twist=30), slice(None)),
+        # its ridge comes first, and its far edge stands in the origin
+        ("fold_dih60", simple_fold(dihedral=60).moved((-1, 0, 0)), [4, 5, 0, 1, 2, 3]),
+    ],
+)
+def test_vertices_against_golden(name, pattern, rows):
+    path = GOLDEN / f"static_{name}_N5B8.npz"
+    if not path.exists():
+        pytest.skip("needs ../shared")
+    np.testing.assert_allclose(pattern.vertices, np.load(path)["nodes_input"][rows], atol=1e-10)
 
 
 # ------------------------------------------------------------------------------ Kresling
@@ -283,33 +193,21 @@ def test_kresling(sides, radius, height, twist, storeys, edge_length, dihedral_b
             expected = [radius * np.cos(angle), radius * np.sin(angle), r * height]
             np.testing.assert_allclose(p.vertices[r * n + m], expected, atol=1e-14 * radius * n)
     for r in range(storeys):
+        low, high = r * n, (r + 1) * n
         for m in range(n):
             after = (m + 1) % n
-            bottom, bottom_next, top, top_next = (
-                r * n + m,
-                r * n + after,
-                (r + 1) * n + m,
-                (r + 1) * n + after,
-            )
-            assert p.faces[2 * (r * n + m)] == (bottom, bottom_next, top_next)
-            assert p.faces[2 * (r * n + m) + 1] == (bottom, top_next, top)
-            chord = 2 * radius * np.sin(np.radians(twist) / 2)
-            assert edge_length(p, bottom, top) == pytest.approx(np.hypot(chord, height))
-            chord = 2 * radius * np.sin(np.radians(twist + 360 / n) / 2)
-            assert edge_length(p, bottom, top_next) == pytest.approx(np.hypot(chord, height))
+            assert p.faces[2 * (low + m)] == (low + m, low + after, high + after)
+            assert p.faces[2 * (low + m) + 1] == (low + m, high + after, high + m)
+            for top, turn in ((high + m, twist), (high + after, twist + 360 / n)):
+                chord = 2 * radius * np.sin(np.radians(turn) / 2)
+                assert edge_length(p, low + m, top) == pytest.approx(np.hypot(chord, height))
     assert not any(p.flipped)
     np.testing.assert_allclose(p.dihedrals, dihedral_by_wings(p), atol=1e-11)
+    middles = np.array([p.vertices[list(face)].mean(axis=0) for face in p.faces])
+    assert ((p.face_normals * middles)[:, :2].sum(axis=1) > 0).all()  # the front is outside
     # closed around, open at both ends
     assert len(p.boundary) == 2 * n
     assert len(p.creases) == n * (3 * storeys - 1)
-
-
-@pytest.mark.parametrize("twist", [-30, 0, 20])
-def test_kresling_front_is_outside(twist):
-    p = kresling(sides=6, twist=twist)
-    for face, normal in zip(p.faces, p.face_normals, strict=True):
-        outward = p.vertices[list(face)].mean(axis=0) * [1, 1, 0]
-        assert normal @ outward > 0
 
 
 @pytest.mark.parametrize(
@@ -329,11 +227,6 @@ def test_kresling_sign_of_twist(twist, diagonal, side):
     for m in range(6):
         assert letters[m, 6 + (m + 1) % 6] == diagonal
         assert letters[m, 6 + m] == side
-
-
-def test_positive_twist_turns_counter_clockwise_from_above():
-    p = kresling(twist=30)
-    assert np.degrees(np.arctan2(*p.vertices[6, 1::-1])) == pytest.approx(30)
 
 
 # ------------------------------------------------------------------------------ arguments
@@ -379,7 +272,6 @@ def test_bad_panel_angle(kind, value):
         ((1, 0), r"cells\[1\] = 0: must be a whole number, at least 1"),
         ((-1, 1), r"cells\[0\] = -1: must be a whole number, at least 1"),
         ((1.5, 1), r"cells\[0\] = 1.5: must be a whole number, at least 1"),
-        ((True, 1), r"cells\[0\] = true: must be a whole number"),
     ],
 )
 def test_bad_cells(kind, value, message):
@@ -391,14 +283,12 @@ def test_bad_cells(kind, value, message):
     ("arguments", "message"),
     [
         ({"sides": 2}, "kresling: sides = 2: must be a whole number, at least 3"),
-        ({"sides": 6.0}, "sides = 6.0: must be a whole number, at least 3"),
         ({"storeys": 0}, "storeys = 0: must be a whole number, at least 1"),
         ({"radius": 0}, "radius = 0: must be greater than 0 m"),
         ({"height": -1}, "height = -1: must be greater than 0 m"),
         ({"twist": 120}, "twist = 120: must be between -180 and 120 degrees: beyond.*6 sides"),
         ({"twist": -180}, "twist = -180: must be between"),
         ({"sides": 3, "twist": 60}, "between -180 and 60 degrees"),
-        ({"twist": np.nan}, "twist = nan"),
         ({"twist": "30"}, 'twist = "30": must be a number'),
     ],
 )

@@ -172,9 +172,3 @@ TOUCH = fd.Pattern(
 def test_what_cannot_be_thick(make, message):
     with pytest.raises(InputError, match=message):
         make()
-
-
-def test_a_fold_file_of_thick_panels_warns(tmp_path):
-    with pytest.warns(fd.errors.FoldynWarning, match="no place for the thickness"):
-        fd.write_pattern(tmp_path / "thick.fold", fd.thicken(strip(2, fold_angle=30), T))
-    assert '"edges_foldAngle"' in (tmp_path / "thick.fold").read_text()

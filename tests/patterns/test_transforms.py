@@ -209,7 +209,6 @@ def test_parts_that_do_not_touch_are_joined_aloud():
         (lambda p: p.mirrored((0, 0, 0)), "normal = .*must not be zero"),
         (lambda p: p.repeated(3), "counts = 3: give two numbers"),
         (lambda p: p.repeated((0, 1)), r"counts\[0\] = 0"),
-        (lambda p: p.repeated((1.5, 1)), r"counts\[0\] = 1.5"),
         (lambda p: p.repeated((2, 2), [(1, 0, 0)]), "periods = .*give two translations"),
         (lambda p: p.repeated((2, 2), tolerance=0), "tolerance = 0"),
         (lambda p: p.repeated((10**5, 10**5)), "counts.*vertices"),

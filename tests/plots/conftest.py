@@ -23,15 +23,9 @@ def structure(pattern):
 @pytest.fixture(scope="session")
 def case(structure):
     """Case 2 of the paper's studies."""
-    return cases.Case(
-        structure,
-        supports=[
-            cases.Fix([0, 1, 2], "x"),
-            cases.Fix([0, 2, 6, 8], "z"),
-            cases.Fix([1], "y"),
-        ],
-        loads=[cases.Force([7], (0.01, 0.0, 0.0), cases.HalfSine(0.5))],
-    )
+    supports = [cases.Fix([0, 1, 2], "x"), cases.Fix([0, 2, 6, 8], "z"), cases.Fix([1], "y")]
+    pulse = cases.Force([7], (0.01, 0.0, 0.0), cases.HalfSine(0.5))
+    return cases.Case(structure, supports, [pulse])
 
 
 def motion(case, amplitude=0.02, frequency=2.0, dt=0.01, samples=1000):

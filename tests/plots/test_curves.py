@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pictures import keys
 
 from foldyn import cases, patterns, structures
 from foldyn.errors import InputError
@@ -19,8 +20,7 @@ def test_load_history_is_force_times_factor(case):
     assert t[0] == 0.0 and t[-1] == 2.0
     exact = np.where(t < 0.5, 0.01 * np.sin(np.pi * t / 0.5), 0.0)
     np.testing.assert_allclose(line.get_ydata(), exact, atol=1e-15)
-    (text,) = figure.legends[0].get_texts()
-    assert text.get_text() == "0.01 N along +x on node 7: half sine (duration 0.5)"
+    assert keys(figure) == ["0.01 N along +x on node 7: half sine (duration 0.5)"]
 
 
 def test_one_curve_per_history(structure):
@@ -32,9 +32,10 @@ def test_one_curve_per_history(structure):
     steady, wave = figure.axes[0].get_lines()[:2]
     np.testing.assert_allclose(steady.get_ydata(), 2.0)
     assert wave.get_ydata().max() == pytest.approx(5.0, rel=1e-4)
-    labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert labels[0] == "2 N along -z on nodes 3, 5: constant"
-    assert labels[1] == "5 N along (0.6, 0, 0.8) on node 7: harmonic (frequency 2, phase 0)"
+    assert keys(figure) == [
+        "2 N along -z on nodes 3, 5: constant",
+        "5 N along (0.6, 0, 0.8) on node 7: harmonic (frequency 2, phase 0)",
+    ]
 
 
 def test_gravity_has_axes_of_its_own(structure):
@@ -49,7 +50,7 @@ def test_gravity_has_axes_of_its_own(structure):
     assert force.get_lines()[0].get_ydata().max() == pytest.approx(0.01, rel=1e-4)
     line = gravity.get_lines()[0]
     np.testing.assert_allclose(line.get_ydata(), 9.81 * np.minimum(line.get_xdata(), 1.0))
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+    assert keys(figure) == [
         "0.01 N along +x on node 7: chirp (start 1, end 5, duration 2, phase 0)",
         "gravity 9.81 m/s2 along -z: ramp (duration 1)",
     ]
@@ -79,16 +80,9 @@ def test_load_history_needs_a_duration(case):
 def test_laws_of_a_miura_cell(structure):
     figure = plot_laws(structure)
     fold, bend, bar = figure.axes
-    assert [a.get_xlabel() for a in (fold, bend, bar)] == [
-        "dihedral (degrees)",
-        "dihedral (degrees)",
-        "stretch (-)",
-    ]
-    assert [a.get_ylabel() for a in (fold, bend, bar)] == [
-        "moment (N m)",
-        "moment (N m)",
-        "stress (Pa)",
-    ]
+    hinge = ("dihedral (degrees)", "moment (N m)")
+    labels = [(a.get_xlabel(), a.get_ylabel()) for a in (fold, bend, bar)]
+    assert labels == [hinge, hinge, ("stretch (-)", "stress (Pa)")]
     # A bend is superlinear: k sgn(d) |d|^(4/3) about the flat panel.
     curve = bend.get_lines()[0]
     d = np.radians(curve.get_xdata()) - np.pi
@@ -124,14 +118,8 @@ def test_equal_hinges_share_a_curve_and_many_are_counted(pattern):
     )
     fold = plot_laws(different).axes[0]
     assert len(fold.get_legend().get_texts()) == 4
-    flat = patterns.Pattern(
-        [(x, y) for y in range(3) for x in range(4)],
-        [
-            (i + 4 * j, i + 1 + 4 * j, i + 5 + 4 * j, i + 4 + 4 * j)
-            for j in (0, 1)
-            for i in range(3)
-        ],
-    )
+    corners = [(x, y) for y in range(3) for x in range(4)]
+    flat = patterns.Pattern(corners, [(k, k + 1, k + 5, k + 4) for k in (0, 1, 2, 4, 5, 6)])
     equal = structures.discretize(flat, sheet, preset="herkal")
     fold = plot_laws(equal).axes[0]
     (text,) = fold.get_legend().get_texts()
@@ -166,7 +154,7 @@ def test_energies_and_their_balance(trajectory):
     error = lower.get_lines()[0]
     np.testing.assert_allclose(error.get_ydata(), 1e-6 * trajectory["time"], atol=1e-14)
     assert "at most 1e-05 J" in lower.get_title(loc="right")
-    assert [text.get_text() for text in figure.legends[0].get_texts()][-1] == "work of the loads"
+    assert keys(figure)[-1] == "work of the loads"
 
 
 def test_prestress_does_not_flatter_the_balance(trajectory):

@@ -1,4 +1,4 @@
-"""Pictures of loads that follow the sheet, and of forces along edges and over panels."""
+"""Pictures of loads that follow the sheet, along edges and over panels, of heat and of dashpots."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from pictures import keys
 
 import foldyn as fd
 from foldyn.plots import draw_structure, following, plot_load_history, style
+from foldyn.plots.dashpots import REACH, dashpot_lines
+from foldyn.plots.scene import View
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 PATTERN = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
@@ -16,10 +19,6 @@ PATTERN = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
 
 def models():
     return [fd.discretize(PATTERN, SHEET), fd.shell(PATTERN, SHEET, divisions=4)]
-
-
-def keys(figure):
-    return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def heads(figure) -> int:
@@ -103,3 +102,64 @@ def test_histories_of_pressure_and_moments_have_axes_of_their_own() -> None:
     assert moment.get_ylabel() == "moment of a crease (N m)"
     assert pressure.lines[0].get_ydata()[-1] == 3.0
     assert moment.lines[0].get_ydata()[0] == -0.25
+
+
+MIURA = fd.patterns.miura(cells=(1, 1), panel_angle=60, dihedral=100)
+HEAT = [
+    fd.Temperature(20.0, 1e-4, panels=[0, 3], history=fd.Ramp(0.5)),
+    fd.Temperature(-5.0, curvature=0.1),
+]
+
+
+def heated() -> fd.Case:
+    structure = fd.discretize(MIURA, SHEET)
+    return fd.Case(structure, [fd.Fix("xmin")], HEAT)
+
+
+def test_warm_panels_have_stars_in_their_middles() -> None:
+    figure = fd.plots.draw_structure(heated())
+    assert "20 K warmer on panels 0, 3" in keys(figure)
+    assert any(text.startswith("5 K colder on panels 0, 1, 2") for text in keys(figure))
+    share, _ = following.on_panels(heated(), fd.Temperature)
+    middles = following.panel_middles(heated().structure, heated().structure.nodes, share)
+    expected = [MIURA.vertices[list(MIURA.faces[panel])].mean(axis=0) for panel in (0, 3)]
+    np.testing.assert_allclose(middles, expected)
+    (axes,) = figure.axes
+    stars = [line.get_data_3d() for line in axes.lines if line.get_marker() == "*"]
+    assert [len(x) for x, _, _ in stars] == [2, 4]
+
+
+def test_temperatures_over_time() -> None:
+    figure = fd.plots.plot_load_history(heated(), 1.0)
+    (axes,) = [axes for axes in figure.axes if axes.get_ylabel() == "temperature (K)"]
+    ramp, constant = (line.get_ydata() for line in axes.lines[:2])
+    assert ramp[-1] == 20.0
+    assert ramp[len(ramp) // 4] == 20.0 * 0.25 / 0.5
+    assert (np.asarray(constant) == -5.0).all()
+
+
+DASHPOTS = [
+    fd.Dashpot(0.1, nodes=[8]),
+    fd.Dashpot(0.2, nodes=[7], direction="x"),
+    fd.Dashpot(0.05, between=[(1, 7), (0, 6)]),
+]
+
+
+@pytest.mark.parametrize("model", ["bars", "shell"])
+def test_dashpots_have_lines_and_a_legend(model):
+    pattern = fd.patterns.miura()
+    s = fd.discretize(pattern, SHEET) if model == "bars" else fd.shell(pattern, SHEET, divisions=2)
+    case = fd.Case(s, [fd.Fix("xmin"), *DASHPOTS])
+    lines = dashpot_lines(case, s.nodes, 0.1, View(28.0, -60.0))
+    ends = {tuple(np.round(point, 9)) for point in lines.reshape(-1, 3)}
+    wanted = [s.nodes[8], s.nodes[8] - [0, 0, 0.1 * REACH], s.nodes[7] + [0.1 * REACH, 0, 0]]
+    for point in [*wanted, *s.nodes[[0, 1, 6, 7]]]:
+        assert tuple(np.round(point, 9)) in ends
+    told = keys(draw_structure(case))
+    assert "dashpot 0.1 N s/m to the ground" in told
+    assert "dashpot 0.05 N s/m between nodes" in told
+
+
+def test_none_without_dashpots():
+    case = fd.Case(fd.discretize(fd.patterns.miura(), SHEET), [fd.Fix("xmin")])
+    assert not len(dashpot_lines(case, case.structure.nodes, 0.1, View(28.0, -60.0)))

@@ -55,20 +55,10 @@ def test_global_settings_are_neither_changed_nor_followed(case, trajectory):
     before = dict(matplotlib.rcParams)
     usual = [_pixels(figure) for figure in _figures(case, trajectory)]
     assert dict(matplotlib.rcParams) == before
-    odd = {"font.family": "monospace", "font.size": 20}
-    odd |= {
-        "lines.linewidth": 9.0,
-        "lines.markersize": 1.0,
-        "axes.grid": False,
-        "grid.color": "red",
-    }
-    odd |= {
-        "figure.facecolor": "red",
-        "axes.facecolor": "yellow",
-        "figure.autolayout": True,
-        "text.color": "green",
-    }
-    odd |= {"axes.labelcolor": "green", "axes.edgecolor": "red", "legend.labelcolor": "red"}
+    odd = {"font.family": "monospace", "font.size": 20, "lines.linewidth": 9.0}
+    odd |= {"lines.markersize": 1.0, "axes.grid": False, "figure.autolayout": True}
+    colors = ("figure.facecolor", "axes.facecolor", "text.color", "grid.color", "axes.labelcolor")
+    odd |= dict.fromkeys((*colors, "axes.edgecolor", "legend.labelcolor"), "red")
     with matplotlib.rc_context(odd):
         unusual = [_pixels(figure) for figure in _figures(case, trajectory)]
     assert [a == b for a, b in zip(usual, unusual, strict=True)] == [True] * 9

@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+from pictures import assert_white_rim, keys
 
 from foldyn.errors import InputError
 from foldyn.linear import Peak, peaks_of
@@ -48,10 +49,6 @@ def response(case):
 def line(axes, label):
     (found,) = [curve for curve in axes.get_lines() if curve.get_label() == label]
     return found
-
-
-def keys(figure):
-    return [t.get_text() for legend in figure.legends for t in legend.get_texts()]
 
 
 def peak_dots(axes, label="response"):
@@ -136,13 +133,8 @@ def test_coherence_is_drawn_where_there_is_one(case, response):
 def test_models_and_nodes_are_told_apart(case, response):
     stiffer = made(case, poles=((5.0, 0.02, 1.0),))
     figure = plot_frf({"a": response, "b": stiffer}, [7, 6])
-    assert keys(figure) == [
-        "a, node 7 along x",
-        "a, node 6 along y",
-        "b, node 7 along x",
-        "b, node 6 along y",
-        "peak",
-    ]
+    ways = ("node 7 along x", "node 6 along y")
+    assert keys(figure) == [*(f"{label}, {way}" for label in "ab" for way in ways), "peak"]
     magnitude, phase = figure.axes
     np.testing.assert_allclose(
         line(magnitude, "b, node 6 along y").get_ydata(),
@@ -203,10 +195,7 @@ def test_nothing_is_cut_off(case):
         plot_frf({"a": noisy, "b": noisy}, [6, 7], title="Responses"),
         plot_nyquist(noisy, 7, "x", title="Circles"),
     ):
-        figure.canvas.draw()
-        pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]
-        for strip in (pixels[:2], pixels[-2:], pixels[:, :2], pixels[:, -2:]):
-            assert (strip == 255).all()
+        assert_white_rim(figure)
 
 
 def test_circles_go_through_the_mobility(response):
@@ -271,7 +260,6 @@ def test_without_a_circle_the_whole_curve_is_drawn(case):
         (lambda r: plot_frf({"a": r}, []), "nodes = ..: give nodes"),
         (lambda r: plot_frf(r, [7.5]), "nodes = 7.5: must be a whole number"),
         (lambda r: plot_frf({"a": r}, [13]), "13 is not in 'a', whose nodes are 0..12"),
-        (lambda r: plot_frf({"a": r}, [7], "w"), 'axes = "w"'),
         (lambda r: plot_frf({"a": r}, [7, 6], ["x", "y", "z"]), "3 directions for 2 nodes"),
         (lambda r: plot_frf({"a": r}, [7], "x", "speed"), "quantity: 'speed'; the response has"),
         (lambda r: plot_frf({"a": r}, [7], prominence=1.0), "prominence = 1.0: must be"),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from pictures import keys
 from PIL import Image
 
 import foldyn as fd
@@ -59,10 +60,6 @@ def lines(figure, label: str) -> list[np.ndarray]:
         if isinstance(item, Line3DCollection) and item.get_label() == label
     ]
     return [np.asarray(segment) for item in found for segment in item._segments3d]
-
-
-def keys(figure) -> list[str]:
-    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
 
 
 def test_edges_bend_with_the_sheet(case, path):

@@ -23,13 +23,10 @@ def frequencies(divisions, mass="lumped"):
     return angular_frequencies(s, MIURA_HELD, 3, shift=2.0) / (2 * np.pi)
 
 
-@pytest.mark.parametrize("mass", ["lumped", "consistent"])
-def test_frequencies_of_case_2(mass):
-    assert frequencies(16, mass) == pytest.approx(FREQUENCIES, rel=5e-3)
-
-
 def test_frequencies_of_case_2_converge_from_below():
+    assert frequencies(16, "consistent") == pytest.approx(FREQUENCIES, rel=5e-3)
     found = np.array([frequencies(n) for n in (4, 8, 16)])
+    assert found[-1] == pytest.approx(FREQUENCIES, rel=5e-3)
     limit = found[-1] + (found[-1] - found[-2]) / 3.0
     assert limit == pytest.approx(FREQUENCIES, rel=3e-3)
     assert found[1] == pytest.approx(limit * [0.993, 0.984, 0.989], rel=2e-3)

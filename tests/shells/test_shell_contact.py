@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 import pytest
 
 import foldyn as fd
 from contact_sheets import SHEET, crossing, strip
 from foldyn.checks import gradient_error, tangent_error
-from foldyn.errors import CrossingWarning, FoldynWarning, InputError
+from foldyn.errors import CrossingWarning, InputError
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.tangent import guard_tangents
 from foldyn.mechanics.contact.term import ContactTerm
-from foldyn.mechanics.term import nodal
 from foldyn.viewer.fields import fields
 
 T, G = SHEET.thickness, 9.81
@@ -72,17 +69,6 @@ def test_forces_are_the_gradient_and_tangents_exact():
         assert tangent_error(body.internal, body.tangent, q, size=size) < 1e-8
 
 
-def test_contact_has_no_resultant_and_no_moment():
-    shell = miura_stack(clamped=False)
-    body = touching(shell, thickness=THICK)
-    for q in states(shell.body):
-        force, x = body.contact(q)[1], body.tables.rest + nodal(q)[: len(shell.nodes)]
-        size = np.abs(force).max() * len(force)
-        assert size > 0.0
-        assert np.abs(force.sum(axis=0)).max() < 1e-13 * size
-        assert np.abs(np.cross(x, force).sum(axis=0)).max() < 1e-14 * size
-
-
 @pytest.mark.parametrize("divisions", [2, 5])
 def test_a_crease_is_guarded_from_where_its_panels_meet(divisions):
     """Whatever the mesh: at the dihedral 2 t / w, as stiff as that of bars and hinges."""
@@ -94,18 +80,6 @@ def test_a_crease_is_guarded_from_where_its_panels_meet(divisions):
     assert own.hinge_limit[pieces] == pytest.approx(2.0 * T / 0.04)
     of = np.bincount(shell.sides.piece_crease, own.hinge_stiffness[pieces])
     np.testing.assert_allclose(of, whole.hinge_stiffness[creases])
-
-
-def test_neighbors_meet_everywhere_at_once():
-    """At the dihedral 2 t / w, along the crease and across it."""
-    energies = []
-    for factor in (1.002, 0.998):
-        pattern = fd.patterns.simple_fold(
-            a=0.02, b=0.02, dihedral=factor * np.degrees(2.0 * T / 0.02)
-        )
-        shell = fd.shell(pattern, SHEET, divisions=4, fold_law="linear")
-        energies.append(touching(shell).contact(np.zeros(shell.body.size))[0])
-    assert energies[0] == 0.0 < energies[1]
 
 
 def test_an_edge_between_elements_cannot_turn_inside_out():
@@ -194,21 +168,6 @@ def lying(angle: float, friction: float, alpha: float = 0.0) -> fd.Case:
     )  # fmt: skip
 
 
-@pytest.mark.slow
-def test_a_shell_that_falls_comes_to_rest_at_half_its_thickness():
-    ground = fd.Plane((0, 0, -1.5 * T), (0, 0, 1))
-    case = fd.Case(
-        strip_shell(1, divisions=2), [], [fd.Gravity((0, 0, -G))], fd.Rayleigh(alpha=200.0),
-        contact=fd.Contact(planes=[ground]),
-    )  # fmt: skip
-    run = fd.simulate(case, 0.15, method="generalized_alpha", dt=1e-4, every=5e-3)
-    height = run.displacement.values[-1, :, 2] + 1.5 * T
-    assert 0.49 * T < height.min() < height.max() < 0.5 * T
-    weight = case.total_mass * G
-    assert float(run.plane_force[-1, 0, 2]) == pytest.approx(weight, rel=1e-3)
-    assert run.attrs["energy_error"] < 2e-2
-
-
 def test_a_shell_slides_above_the_angle_of_friction():
     case, a = lying(20.0, 0.3), np.radians(20.0)
     run = fd.simulate(case, 0.1, method="generalized_alpha", dt=2e-4, every=2e-3)
@@ -261,23 +220,6 @@ def test_colliding_shells_keep_momentum_and_energy(method):
     assert ((force > 0.0).any(axis=1) == (run.contact.values > 0.0)).all()
     shown = fields(case, run, run.displacement.values)["contact"]
     assert shown.on == "node" and shown.values.shape == (len(run.time), len(shell.nodes))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("method", IMPLICIT)
-def test_a_strip_folded_from_both_ends_stops_where_it_touches(method):
-    pytest.importorskip("ipctk")
-    shell = strip_shell(divisions=4)
-    case = fd.Case(
-        shell, [fd.Fix([2, 3, 4, 5])], [fd.Actuate([0, 1], 8.0, fd.Ramp(0.25))],
-        fd.Rayleigh(alpha=20.0), contact=fd.Contact(),
-    )  # fmt: skip
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)  # of the energy that the impact takes
-        run = fd.simulate(case, 0.35, method=method, dt=5e-5, every=2e-3)
-    assert crossing(shell, run.displacement.values) == run.attrs["crossing_samples"] == 0
-    assert float(run.contact[-1]) > 0.0
-    assert run.attrs["energy_error"] < 0.05
 
 
 def test_explicit_methods_say_why_they_do_not_take_it():

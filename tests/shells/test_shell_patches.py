@@ -5,10 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from shell_lab import (
-    EAST,
-    NORTH,
-    SOUTH,
-    WEST,
     at_rest,
     dofs,
     equilibrium,
@@ -44,14 +40,6 @@ def rim(number):
 def area_of(s):
     x = s.nodes[s.triangles]
     return 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1).sum()
-
-
-def test_the_mesh_is_irregular():
-    mesh, _ = irregular()
-    x = mesh.nodes[mesh.triangles]
-    area = 0.5 * np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])[:, 2]
-    assert area.min() > 0
-    assert area.max() > 3 * area.min()
 
 
 # ------------------------------------------------------------------ membrane
@@ -182,10 +170,3 @@ def test_a_plate_bent_by_moments_on_its_rim_is_bent_evenly():
     level = np.linalg.solve(np.c_[np.ones(3), x[held]], w[held])
     w -= np.c_[np.ones(len(x)), x] @ level
     assert np.abs(q[2 : 3 * len(x) : 3] - w).max() < 1e-10 * np.abs(w).max()
-
-
-def test_edges_of_the_grid():
-    mesh, number = irregular()
-    assert mesh.edge_points[SOUTH] == number[:, 0].tolist()
-    assert mesh.edge_points[EAST][0] == mesh.edge_points[SOUTH][-1]
-    assert mesh.edge_points[NORTH][-1] == mesh.edge_points[WEST][-1]

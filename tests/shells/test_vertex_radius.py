@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from shell_lab import SQUARE, rotation_matrix
-from test_shell_mesh import FLAT_PANELS, PATTERNS, areas
+from test_shell_mesh import FLAT_PANELS, PATTERNS, areas, assert_fits
 
 import foldyn as fd
 from foldyn.algebra.extrapolation import convergence
@@ -36,18 +34,7 @@ def at_vertices(mesh, pattern):
 
 @pytest.mark.parametrize("divisions", [4, 8])
 def test_triangles_fit_together(pattern, divisions):
-    mesh = mesh_of(pattern, divisions)
-    assert np.array_equal(mesh.nodes[: len(pattern.vertices)], pattern.vertices)
-    assert np.array_equal(np.unique(mesh.triangles), np.arange(len(mesh.nodes)))
-    ways = {(t[k], t[(k + 1) % 3]) for t in mesh.triangles.tolist() for k in range(3)}
-    assert len(ways) == mesh.triangles.size
-    alone = {(a, b) for a, b in ways if (b, a) not in ways}
-    rim = set()
-    for low, high in pattern.boundary.tolist():
-        points = mesh.edge_points[min(low, high), max(low, high)]
-        rim |= set(pairwise(points)) | set(pairwise(points[::-1]))
-    assert alone <= rim
-    assert 2 * len(alone) == len(rim)
+    assert_fits(mesh_of(pattern, divisions), pattern)
 
 
 def test_panels_keep_their_area(flat):

@@ -33,16 +33,6 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 SETS = ("documented", "drawn")
 
 
-@pytest.mark.parametrize("name", SETS)
-def test_limits_of_edge_angles(name):
-    """Median under 2 %, 95 % of modes within 5 % and with a MAC above 0.95; nothing is lost."""
-    found = summary(read(RESULTS / f"{name}.csv"), "n5b8e, condensed")
-    assert found.median < 0.02
-    assert found.near >= 0.95
-    assert found.alike >= 0.95
-    assert found.lost == 0
-
-
 def test_large_sheets_have_membranes():
     """Nineteen of twenty modes within 5 % with edges that give way, nine of ten without."""
     results = read(RESULTS / "sheets.csv")
@@ -56,13 +46,21 @@ def test_large_sheets_have_membranes():
 
 
 @pytest.mark.parametrize("name", SETS)
-@pytest.mark.parametrize("model", ["plate, consistent", "plate, bubble"])
-def test_limits(name, model):
-    """Median under 3 %, nine of ten under 10 %; the standard calibration has 30 and 50 %."""
+@pytest.mark.parametrize(
+    ("model", "median", "ninetieth", "near"),
+    [
+        ("n5b8e, condensed", 0.02, 0.05, 0.95),
+        ("plate, consistent", 0.03, 0.10, 0.0),
+        ("plate, bubble", 0.03, 0.10, 0.0),
+    ],
+)
+def test_limits(name, model, median, ninetieth, near):
+    """Nothing is lost; the standard calibration has 30 % in the median and 50 in nine of ten."""
     results = read(RESULTS / f"{name}.csv")
     found, standard = summary(results, model), summary(results, "standard, mixed_voronoi")
-    assert found.median < 0.03
-    assert found.ninetieth < 0.10
+    assert found.median < median
+    assert found.ninetieth < ninetieth
+    assert min(found.near, found.alike) >= near
     assert found.lost == 0
     assert standard.median > 0.3
     assert standard.ninetieth > 0.5

@@ -1,4 +1,4 @@
-"""Large motions of the fidelity study: how they start, what is stored, and what it says."""
+"""Large motions and stretched panels of the fidelity study: how they start, what is stored."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ from foldyn.studies.fidelity.motion_results import (
 )
 from foldyn.studies.fidelity.motions import Motion, Started, released, runs, structures
 from foldyn.studies.fidelity.release import Release, fold_of, vertex_mass
+from foldyn.studies.fidelity.stretching import pressed, sheet, stiffness, tower
 
 
 def elastic(case, structure, count):
@@ -229,3 +230,28 @@ def test_why_panels_harden():
     assert shell == pytest.approx(1.0, abs=0.02)
     assert hard > 1.08
     assert weak == pytest.approx(1.0, abs=0.04)
+
+
+def test_a_tower_is_as_stiff_as_the_shell_where_panels_are_membranes():
+    found = stiffness(tower(1e-3, (8, 12)), "z")
+    assert found["plate"][0] == pytest.approx(-0.07, abs=0.02)
+    assert found["n5b8e"][0] == pytest.approx(-0.12, abs=0.02)
+    assert found["plate, bars"][0] > 3.0
+    assert found["standard"][0] > 3.0
+
+
+@pytest.mark.thorough
+def test_the_force_at_which_a_tower_snaps():
+    found = pressed(tower(1e-3, (8, 12)))
+    for model in ("plate", "n5b8e"):
+        assert abs(found[model]).max() < 0.09
+    assert found["plate, bars"].min() > 3.0
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_sheets_between_two_rims(axis):
+    found = stiffness(sheet(3, (4, 8)), axis)
+    assert 0.0 < found["plate"][0] < 0.15
+    assert -0.12 < found["n5b8e"][0] < 0.05
+    assert found["plate, bars"][0] > 0.4

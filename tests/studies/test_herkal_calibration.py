@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.errors import InputError
 from foldyn.studies import find_case
 from foldyn.studies.herkal import calibration, coverage
 
@@ -48,15 +47,6 @@ def test_folds_from_forces_and_shapes(static_data) -> None:
     assert abs(found.correlation[0, 1]) > 0.99  # a softer crease locks earlier: hard to tell apart
 
 
-@pytest.mark.thorough
-def test_folds_from_three_weights_alone(static_data) -> None:
-    data = calibration.noisy(static_data, np.random.default_rng(7))[:1]
-    found = fd.fit(CASE, data, calibration.FOLD_RANGES, ties=calibration.MIRRORED)
-    assert found["sheet.length_scale_ratio"].value == pytest.approx(2.7, rel=0.03)
-    assert found["model.fold_law.theta1"].value == pytest.approx(75.0, abs=2.0)
-    assert found.freedom == 1
-
-
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*time step is too coarse")  # as coarse as the data's
 def test_damping_from_node_8_alone(released, release_data) -> None:
@@ -76,12 +66,6 @@ def test_damping_from_node_8_alone(released, release_data) -> None:
     assert filmed == pytest.approx(modeled, rel=0.02)  # what noise does to the estimator
     assert modeled == pytest.approx(9.5, rel=0.05)  # the paper's film: 9.5 Hz and 16 %
     assert ratio == pytest.approx(0.16, abs=0.03)
-
-
-def test_a_misspelled_parameter_of_the_specimen(static_data) -> None:
-    wrong = fd.experiment.Parameter("sheet.length_scale_ration", 2.0)
-    with pytest.raises(InputError, match="did you mean 'length_scale_ratio'"):
-        fd.fit(CASE, static_data, [wrong])
 
 
 def test_stored_intervals_contain_the_truth_in_90_of_100_draws() -> None:

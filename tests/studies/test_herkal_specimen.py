@@ -294,7 +294,6 @@ def released(motion, tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_damping_and_press_are_found_again(released) -> None:
     assert released.press == pytest.approx(calibration.PRESSED, rel=5e-3)  # it still rings
     fit = released.fits["glued"]

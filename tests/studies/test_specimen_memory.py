@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 import foldyn as fd
 from foldyn import experiment
-from foldyn.analyses import read_case
 from foldyn.experiment import Parameter, Sight, TimeHistory
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import DAMPING, FRONT, FULL
@@ -24,34 +22,6 @@ PARAMETERS = [
     Parameter("model.fold_law.ratios[0]", 0.1, 0.0, 0.5),
     Parameter("model.fold_law.times[0]", 0.3, 0.05, 3.0),
 ]
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:.*time step is too coarse")  # as coarse as the data's
-def test_drift_and_decay_are_fitted_together(tmp_path):
-    """From histories with the noise of a film; 2 minutes once compiled."""
-    duration = 0.8
-    path = calibration.released_case(
-        tmp_path, synthetic.RELAXING, support="glued", duration=duration
-    )
-    motion = read_case(path).run()
-    elastic = read_case(
-        calibration.released_case(tmp_path / "elastic", support="glued", duration=duration)
-    ).run()
-    late = [
-        float(one.displacement.sel(node=8, axis="x")[-100:].mean() / one.displacement[0, 8, 0])
-        for one in (motion, elastic)
-    ]  # 0.75 s after the release, over a period
-    assert 0.005 < late[0] - late[1] < synthetic.RATIO
-    along = motion.displacement.sel(axis="x", node=list(NODES))
-    seen = np.arange(0.004, duration - 0.02, 1.0 / calibration.RATE)
-    noise = 1e-5 * np.random.default_rng(3).standard_normal((len(seen), len(NODES)))  # m
-    values = along.interp(time=seen, method="cubic").values + noise
-    data = TimeHistory(nodes=NODES, time=seen, values=values, axis="x")
-    found = fd.fit(path, [data], PARAMETERS)
-    for one in found.estimates:
-        assert one.lower < TRUE[one.key] < one.upper, one
-        assert one.upper - one.lower < 0.2 * TRUE[one.key]
 
 
 @pytest.mark.slow

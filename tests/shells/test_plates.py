@@ -1,16 +1,17 @@
-"""Square plates under load: published deflections, with the observed order of convergence."""
+"""Square plates: published deflections and frequencies, with the observed order of convergence."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from plate_theory import DEFLECTION, navier_deflection
+from plate_theory import DEFLECTION, LEISSA, navier_deflection, ritz_frequencies
 from shell_lab import (
     EAST,
     NORTH,
     SOUTH,
     SQUARE,
     WEST,
+    angular_frequencies,
     at_rest,
     dofs,
     factor,
@@ -24,7 +25,7 @@ import foldyn as fd
 from foldyn.checks import observed_order
 from foldyn.shells import shell
 
-SHEET = fd.Sheet(1e6, 0.3, 0.01)
+SHEET = fd.Sheet(1e6, 0.3, 0.01, density=2.0)
 RIM = (SOUTH, EAST, NORTH, WEST)
 PUBLISHED_DIGITS = 1e-5  # a unit of the last digit of the tables
 DIVISIONS = np.array([8, 16, 32])
@@ -88,12 +89,6 @@ def test_plate_under_a_force_in_its_middle(plates, edge):
     assert np.ptp(with_logarithm) < 0.02 * with_logarithm.mean()
 
 
-def test_series_and_tables_agree():
-    for load in ("uniform", "center"):
-        digits = DEFLECTION["supported", load]
-        assert navier_deflection(load) == pytest.approx(digits, abs=PUBLISHED_DIGITS)
-
-
 def test_an_irregular_mesh_converges_too():
     errors = []
     for n in DIVISIONS:
@@ -103,3 +98,40 @@ def test_an_irregular_mesh_converges_too():
         errors.append(deflection(s, "uniform") / 0.00126532 - 1.0)
     assert observed_order(1.0 / DIVISIONS, errors) == pytest.approx(2.0, abs=0.2)
     assert abs(errors[-1]) < 0.03
+
+
+def frequencies(edges, divisions, mass, count=6):
+    """omega a^2 sqrt(rho t / D), of all rigid and elastic modes."""
+    clamped = [WEST] if edges == "cantilevered" else []
+    s = shell(SQUARE, SHEET, divisions=int(divisions), clamped=clamped, mass=mass)
+    held = dofs(np.flatnonzero(s.nodes[:, 0] < 1e-12)) if clamped else []
+    unit = np.sqrt(SHEET.bending_modulus / (SHEET.density * SHEET.thickness))
+    rigid = 0 if clamped else 6
+    return angular_frequencies(s, held, rigid + count, shift=unit) / unit
+
+
+@pytest.mark.parametrize("mass", ["lumped", "consistent"])
+@pytest.mark.parametrize("edges", ["free", "cantilevered"])
+def test_first_six_frequencies(edges, mass):
+    exact = ritz_frequencies(SHEET.poissons_ratio, clamped=edges == "cantilevered")[:6]
+    found = np.array([frequencies(edges, n, mass)[-6:] for n in DIVISIONS])
+    limit = found[-1] + (found[-1] - found[-2]) / 3.0
+    assert limit == pytest.approx(LEISSA[edges], rel=1.1e-2)  # his are upper bounds
+    assert limit == pytest.approx(exact, rel=1.5e-3)
+    assert (found < exact).all()  # softer than the plate, and lumping adds to it
+    assert found[-1] == pytest.approx(exact, rel=1.4e-2 if mass == "lumped" else 5e-3)
+    for mode in range(6):
+        order = observed_order(1.0 / DIVISIONS, found[:, mode] / exact[mode] - 1.0)
+        assert 1.75 < order < 2.05
+
+
+def test_frequencies_go_with_thickness_and_density():
+    """omega ~ t sqrt(E / rho): membrane stiffness has no part in bending modes."""
+    thin = fd.Sheet(3e6, 0.3, 0.001, density=5.0)
+    found = []
+    for sheet in (SHEET, thin):
+        s = shell(SQUARE, sheet, divisions=6, clamped=[WEST])
+        held = dofs(np.flatnonzero(s.nodes[:, 0] < 1e-12))
+        unit = np.sqrt(sheet.bending_modulus / (sheet.density * sheet.thickness))
+        found.append(angular_frequencies(s, held, 4, unit) / unit)
+    assert found[1] == pytest.approx(found[0], rel=1e-8)
