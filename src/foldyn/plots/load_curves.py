@@ -12,14 +12,17 @@ from numpy.typing import NDArray
 from foldyn.cases import Actuate, Case, Impose, Pressure, Temperature, resolve_nodes
 from foldyn.cases.directions import unit_vector
 from foldyn.cases.selection import resolve_creases
+from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.following import Share, moments, on_panels
 
+POINTS = 1001
+"""Of a curve."""
 _LISTED = 3
 _MOST_CURVES = 4
 """Curves of one history at most; imposed displacements and rest angles may differ at each place."""
 
 
-class LoadCurve(NamedTuple):
+class _LoadCurve(NamedTuple):
     """A quantity over time: offset + amplitude * factor."""
 
     amplitude: float
@@ -38,18 +41,18 @@ class LoadCurve(NamedTuple):
         return self.offset + self.amplitude * np.broadcast_to(factor, time.shape)
 
 
-def load_curves(case: Case) -> list[tuple[str, list[LoadCurve]]]:
-    """Curves of all loads and imposed motions, by the axis they belong to, such as "force (N)".
+def load_charts(case: Case, start: float, duration: float) -> list[Chart]:
+    """Curves of all loads and imposed motions over time (s), a chart for each of their kinds.
 
     Forces are the largest at a node, pressures, temperatures and moments the largest of their
     panels or creases.
     """
-    forces = [LoadCurve(_peak(f), describe_load(f), h) for f, h in case.force_terms]
-    gravity = [LoadCurve(_peak(g), describe_gravity(g), h) for g, h in case.gravity_terms]
+    forces = [_LoadCurve(_peak(f), describe_load(f), h) for f, h in case.force_terms]
+    gravity = [_LoadCurve(_peak(g), describe_gravity(g), h) for g, h in case.gravity_terms]
     pushed, warm = on_panels(case, Pressure), on_panels(case, Temperature)
-    pressure = [LoadCurve(_most(s.value), describe_pressure(s), s.history) for s in pushed]
-    moment = [LoadCurve(_most(s.value), describe_moment(s), s.history) for s in moments(case)]
-    warmth = [LoadCurve(_most(s.value), describe_temperature(s), s.history) for s in warm]
+    pressure = [_LoadCurve(_most(s.value), describe_pressure(s), s.history) for s in pushed]
+    moment = [_LoadCurve(_most(s.value), describe_moment(s), s.history) for s in moments(case)]
+    warmth = [_LoadCurve(_most(s.value), describe_temperature(s), s.history) for s in warm]
     panels = [
         ("force at a node (N)", forces),
         ("pressure (Pa)", pressure),
@@ -60,14 +63,20 @@ def load_curves(case: Case) -> list[tuple[str, list[LoadCurve]]]:
         ("base displacement (m)", _base_curves(case)),
         ("rest angle (degrees)", _angle_curves(case)),
     ]
-    return [panel for panel in panels if panel[1]]
+    time = np.linspace(start, start + duration, POINTS)
+    return [
+        Chart("time (s)", label, [Curve(one.label, time, one.values(time)) for one in curves],
+              zero=not any(one.offset for one in curves))
+        for label, curves in panels
+        if curves
+    ]  # fmt: skip
 
 
 def _peak(vectors: np.ndarray) -> float:
     return float(np.linalg.norm(vectors, axis=-1).max())
 
 
-def _imposed_curves(case: Case) -> list[LoadCurve]:
+def _imposed_curves(case: Case) -> list[_LoadCurve]:
     """Curves of imposed displacements, one for each history, value and axis or direction."""
     curves = []
     for _, history in case.prescribed_terms:
@@ -81,7 +90,7 @@ def _imposed_curves(case: Case) -> list[LoadCurve]:
                     groups.setdefault((along, value), []).append(node)
         curves += _some(
             [
-                LoadCurve(
+                _LoadCurve(
                     value,
                     f"moved {value:.4g} m along {along} on {_listed('node', nodes)}",
                     history,
@@ -92,10 +101,10 @@ def _imposed_curves(case: Case) -> list[LoadCurve]:
     return curves
 
 
-def _base_curves(case: Case) -> list[LoadCurve]:
+def _base_curves(case: Case) -> list[_LoadCurve]:
     """Curves of a base that moves, one for each history and axis."""
     return [
-        LoadCurve(value, f"base moved {value:.4g} m along {axis}", history)
+        _LoadCurve(value, f"base moved {value:.4g} m along {axis}", history)
         for vectors, history in case.base_terms
         for axis, value in zip(
             "xyz", signed_peak(base_vectors(case, vectors)).tolist(), strict=True
@@ -104,7 +113,7 @@ def _base_curves(case: Case) -> list[LoadCurve]:
     ]
 
 
-def _angle_curves(case: Case) -> list[LoadCurve]:
+def _angle_curves(case: Case) -> list[_LoadCurve]:
     """Curves of rest angles (degrees), one for each history and pair of first and last angle."""
     curves = []
     for change, history in case.actuation_terms:
@@ -118,7 +127,7 @@ def _angle_curves(case: Case) -> list[LoadCurve]:
                     groups.setdefault(pair, []).append(crease)
         curves += _some(
             [
-                LoadCurve(
+                _LoadCurve(
                     end - start,
                     f"rest angle {start:.4g} to {end:.4g} degrees on {_listed('crease', creases)}",
                     history,
@@ -130,7 +139,7 @@ def _angle_curves(case: Case) -> list[LoadCurve]:
     return curves
 
 
-def _some(curves: list[LoadCurve]) -> list[LoadCurve]:
+def _some(curves: list[_LoadCurve]) -> list[_LoadCurve]:
     """The first curves; the last of them says how many are left out."""
     hidden = len(curves) - _MOST_CURVES
     if hidden <= 0:

@@ -7,7 +7,7 @@ fonts, colors and widths are set one by one, so the caller's usual settings do n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -157,11 +157,13 @@ def key(label: str, **look: Any) -> Line2D:
     return Line2D([], [], label=label, **look)
 
 
-def exponents(axes: Axes, ticks: int = 6) -> None:
-    """Write small and large values of the vertical axis with one common exponent."""
-    axes.ticklabel_format(axis="y", scilimits=(-2, 4), useMathText=True)
-    axes.yaxis.get_offset_text().set(fontsize=TICK, color=BLACK)
-    axes.locator_params(axis="y", nbins=ticks)
+def exponents(axes: Axes, ticks: int = 6, which: Literal["x", "y"] = "y") -> None:
+    """Write small and large values of an axis with one common exponent."""
+    small = -2 if which == "y" else -3
+    axes.ticklabel_format(axis=which, scilimits=(small, 4), useMathText=True)
+    side = axes.yaxis if which == "y" else axes.xaxis
+    side.get_offset_text().set(fontsize=TICK, color=BLACK)
+    axes.locator_params(axis=which, nbins=ticks)
 
 
 def columns_that_fit(handles: Sequence, width: float, most: int) -> int:
