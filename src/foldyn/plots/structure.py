@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -197,15 +196,19 @@ def _supports(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[
 
 def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:
     """Return arrows of imposed displacements, and of the base at the middle of its nodes."""
-    imposed = [(points, vectors) for vectors, _ in sheet.case.prescribed_terms]
-    moved = [histories.base_vectors(sheet.case, vectors) for vectors, _ in sheet.case.base_terms]
-    base = [
-        (points[vectors.any(axis=1)].mean(axis=0)[None], histories.signed_peak(vectors)[None])
-        for vectors in moved
+    imposed = [
+        (points, vectors, f"moved {histories.describe(vectors, 'm')}")
+        for vectors, _ in sheet.case.prescribed_terms
     ]
+    base = []
+    for vectors, _ in sheet.case.base_terms:
+        moved = histories.base_vectors(sheet.case, vectors)
+        peak = histories.signed_peak(moved)
+        middle = points[moved.any(axis=1)].mean(axis=0)
+        base.append((middle[None], peak[None], histories.describe_base(peak)))
     return [
-        *_arrows(imposed, length, sight, style.IMPOSED, histories.describe_imposed),
-        *_arrows(base, length, sight, style.BASE, histories.describe_base),
+        *_arrows(imposed, length, sight, style.IMPOSED),
+        *_arrows(base, length, sight, style.BASE),
     ]
 
 
@@ -221,21 +224,19 @@ def _dashpots(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[
 
 def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:
     """Return arrows of forces, pressure and moments, and of gravity at the center of mass."""
-    case = sheet.case
-    vertices = len(sheet.pattern.vertices)
-    forces = [(points, vectors) for vectors, _ in case.force_terms]
-    pushed = [share for share in following.on_panels(case, Pressure) if share.value.any()]
-    pressure = [following.panel_arrows(case, points, share) for share in pushed]
-    told = iter([histories.describe_pressure(share) for share in pushed])
-    gravity = [
-        (_center_of_mass(sheet, points)[None], vector[None])
-        for vector, _ in sheet.case.gravity_terms
+    case, vertices = sheet.case, len(sheet.pattern.vertices)
+    forces = [(points, f, histories.describe(f, "N")) for f, _ in case.force_terms]
+    pressure = [
+        (*following.panel_arrows(case, points, share), histories.describe_pressure(share))
+        for share in following.on_panels(case, Pressure)
     ]
+    center = (case.nodal_mass @ points / case.nodal_mass.sum())[None]
+    gravity = [(center, g[None], histories.describe_gravity(g)) for g, _ in case.gravity_terms]
     return [
-        *_arrows(forces, length, sight, style.LOAD, histories.describe_load, vertices),
-        *_arrows(pressure, length, sight, style.LOAD, lambda _: next(told)),
+        *_arrows(forces, length, sight, style.LOAD, vertices),
+        *_arrows(pressure, length, sight, style.LOAD),
         *_turns(sheet, points, length, sight),
-        *_arrows(gravity, 1.5 * length, sight, style.GRAVITY, histories.describe_gravity),
+        *_arrows(gravity, 1.5 * length, sight, style.GRAVITY),
     ]
 
 
@@ -257,42 +258,31 @@ def _turns(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_
 
 
 def _arrows(
-    terms: list[tuple[Points, Points]],
+    terms: list[tuple[Points, Points, str]],
     length: float,
     sight: View,
     color: str,
-    describe: Callable[[Points], str],
     vertices: int | None = None,
 ) -> list[_Arrows]:
-    """Return arrows from points along vectors, both (k, 3) in each term, one key for each term.
+    """Return arrows from points along vectors, both (k, 3) in each term, with the term's text.
 
     vertices : of crowds of nodes beyond this number, those that stand too close have no arrow.
     """
-    terms = [(points, vectors) for points, vectors in terms if vectors.any()]
+    terms = [term for term in terms if term[1].any()]
     if not terms:
         return []
-    how = length, sight
-    longest = max(float(np.linalg.norm(vectors, axis=1).max()) for _, vectors in terms)
+    longest = max(float(np.linalg.norm(vectors, axis=1).max()) for _, vectors, _ in terms)
     drawn = [
-        marks.load_arrows(at, marks.thinned(at, vectors, length, vertices), longest, *how)
-        for at, vectors in terms
+        marks.load_arrows(at, marks.thinned(at, vectors, length, vertices), longest, length, sight)
+        for at, vectors, _ in terms
     ]
     look = {"color": color, "marker": ">", "markersize": 6.0, "linewidth": 1.8}
-    keys = [
-        style.key(describe(vectors if len(vectors) > 1 else vectors[0]), **look)
-        for _, vectors in terms[:_MOST_LOADS_LISTED]
-    ]
+    keys = [style.key(text, **look) for *_, text in terms[:_MOST_LOADS_LISTED]]
     hidden = len(terms) - _MOST_LOADS_LISTED
     if hidden > 0:
         keys.append(style.key(f"and {hidden} more", linestyle="none"))
     shafts, heads = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
     return [_Arrows(shafts, heads, color, keys)]
-
-
-def _center_of_mass(sheet: Sheet3D, points: Points) -> Points:
-    """Return the center (3,) of the nodes' masses at these positions (n, 3)."""
-    mass = sheet.case.nodal_mass
-    return mass @ points / mass.sum()
 
 
 def _write_labels(
