@@ -324,7 +324,7 @@ def test_points_that_a_path_does_not_have(workplace, slow) -> None:
     failed = workplace.call("run", "case.toml")
     assert failed.status == 1
     reason, kept = failed.err.splitlines()
-    assert reason == "foldyn: case.toml: figures: points: 7; the path has points 0 to 2"
+    assert reason == "foldyn: case.toml: figures: points: 7; there are points 0 to 2"
     assert kept.endswith("case-results/result.nc")
 
 

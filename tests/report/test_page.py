@@ -7,9 +7,11 @@ import re
 import struct
 import zlib
 from html.parser import HTMLParser
+from io import BytesIO
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from foldyn.errors import InputError
 from foldyn.report import Heading, Picture, Table, Text, write_report
@@ -67,13 +69,19 @@ def _png(width=2, height=2):
     return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts)
 
 
+def _gif(width=2, height=2):
+    buffer = BytesIO()
+    Image.new("P", (width, height)).save(buffer, "GIF")
+    return buffer.getvalue()
+
+
 def _write(tmp_path, *sections, title="Report"):
     path = write_report(tmp_path / "report.html", title, sections)
     return _Page(path.read_text(encoding="utf-8"))
 
 
 def test_pictures_are_inside_and_unchanged(tmp_path):
-    png, gif = _png(), b"GIF89a" + bytes(20)
+    png, gif = _png(), _gif()
     (tmp_path / "a.png").write_bytes(png)
     page = _write(
         tmp_path,
@@ -102,8 +110,8 @@ def test_films_are_inside_and_play(tmp_path):
 
 
 def test_wide_pictures_are_scrolled_on_a_phone(tmp_path):
-    gif = b"GIF89a" + struct.pack("<HH", 300, 200)
-    page = _write(tmp_path, Picture(_png(1350, 3)), Picture(_png(900, 3)), Picture(gif))
+    pictures = _png(1350, 3), _png(900, 3), _gif(300, 200)
+    page = _write(tmp_path, *map(Picture, pictures))
     frames = [attrs.get("class") for tag, attrs in page.tags if tag == "div"]
     assert frames == ["wide", None, None]
     sizes = [(image["width"], image["height"]) for image in page.images]
