@@ -106,7 +106,6 @@ def rows(
     title: str,
     xlabel: str,
     ylabels: Sequence[str],
-    titles: Sequence[str] = (),
     heights: Sequence[float] | None = None,
 ) -> tuple[Figure, NDArray]:
     """Return a figure of axes in rows that share the horizontal axis, named below the last one.
@@ -118,8 +117,6 @@ def rows(
     title, xlabel : str
     ylabels : sequence of str
         One for each row.
-    titles : sequence of str, optional
-        Titles of the rows.
     heights : sequence of float, optional
         Heights of the rows relative to each other.
     """
@@ -127,7 +124,7 @@ def rows(
     grid = {"height_ratios": heights}
     axes = figure.subplots(len(ylabels), 1, squeeze=False, sharex=True, gridspec_kw=grid)[:, 0]
     for k, row in enumerate(axes):
-        frame(row, xlabel if row is axes[-1] else "", ylabels[k], titles[k] if titles else "")
+        frame(row, xlabel if row is axes[-1] else "", ylabels[k])
     figure.align_ylabels(list(axes))
     return figure, axes
 
