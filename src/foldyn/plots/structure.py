@@ -204,8 +204,10 @@ def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[M
         (*following.panel_arrows(case, points, share), histories.describe_pressure(share))
         for share in following.on_panels(case, Pressure)
     ]
-    center = (case.nodal_mass @ points / case.nodal_mass.sum())[None]
-    gravity = [(center, g[None], histories.describe_gravity(g)) for g, _ in case.gravity_terms]
+    gravity = []
+    for vector, _ in case.gravity_terms:  # which needs masses, as no other load does
+        center = case.nodal_mass @ points / case.nodal_mass.sum()
+        gravity.append((center[None], vector[None], histories.describe_gravity(vector)))
     return [
         *_arrows(forces, length, sight, style.LOAD, vertices),
         *_arrows(pressure, length, sight, style.LOAD),
