@@ -229,7 +229,7 @@ def test_a_single_point_is_drawn(workplace) -> None:
 def test_points_that_a_path_does_not_have(workplace) -> None:
     workplace.write(CELL + "[output]\nshapes = [7]\n")
     reason = workplace.call("run", "case.toml").failure("case-results/result.nc")
-    assert reason == "foldyn: case.toml: figures: points: 7; the path has points 0 to 2"
+    assert reason == "foldyn: case.toml: figures: points: 7; there are points 0 to 2"
 
 
 def test_a_path_goes_on_from_a_stored_one(workplace) -> None:

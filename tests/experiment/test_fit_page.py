@@ -13,7 +13,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.experiment import ForceDisplacement, Parameter, Shapes, Spectrum, TimeHistory
-from foldyn.experiment.calibration.fit_figures import plot_correlation, plot_histories, plot_shapes
+from foldyn.experiment.calibration.fit_figures import plot_correlation, plot_measured
 from foldyn.experiment.calibration.fit_page import write_fit
 from foldyn.experiment.calibration.fit_problem import problem
 
@@ -94,13 +94,13 @@ def test_histories_are_drawn_where_they_are_compared(fitted) -> None:
     run = fitted.problem.runs[1]
     values = [*fitted.values.values()]
     case = fitted.problem.case_file(run, values).case()
-    figure = plot_histories(one, case, one.curves(fitted.problem.result(run, values), case))
+    figure = plot_measured(one, fitted.problem.result(run, values), case)
     for frame, measured in zip(figure.axes, one.values.T, strict=True):
-        seen, model, misfit = (line.get_ydata() for line in frame.get_lines())
-        np.testing.assert_allclose(seen, 1e3 * (measured - measured.mean()), atol=1e-9)
-        np.testing.assert_allclose(misfit, model - seen, atol=1e-12)
-        assert np.abs(misfit).max() < 0.05  # mm: the noise
-        assert np.mean(misfit) == pytest.approx(0.0, abs=1e-9)
+        model, seen, misfit = (line.get_ydata() for line in frame.get_lines())
+        np.testing.assert_allclose(seen, measured - measured.mean(), atol=1e-12)
+        np.testing.assert_allclose(misfit, model - seen, atol=1e-15)
+        assert np.abs(misfit).max() < 5e-5  # the noise
+        assert np.mean(misfit) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_shapes_are_drawn_as_positions(fitted) -> None:
@@ -108,7 +108,7 @@ def test_shapes_are_drawn_as_positions(fitted) -> None:
     run = fitted.problem.runs[0]
     values = [*fitted.values.values()]
     case = fitted.problem.case_file(run, values).case()
-    figure = plot_shapes(one, case, one.shapes(fitted.problem.result(run, values), case))
+    figure = plot_measured(one, fitted.problem.result(run, values), case)
     assert [frame.get_title() for frame in figure.axes] == ["load factor 0.5", "load factor 1"]
     (seen,) = [line for line in figure.axes[1].get_lines() if line.get_label() == "measured"]
     drawn = {figure.axes[1].get_xlabel()[0]: seen.get_xdata()}
@@ -117,7 +117,7 @@ def test_shapes_are_drawn_as_positions(fitted) -> None:
     rest = case.structure.nodes[:4]
     for axis, points in drawn.items():
         k = "xyz".index(axis)
-        np.testing.assert_allclose(points, 1e3 * (rest[:, k] + one.values[1, :, k]))
+        np.testing.assert_allclose(points, rest[:, k] + one.values[1, :, k])
 
 
 def test_the_correlation_names_all_parameters(fitted) -> None:

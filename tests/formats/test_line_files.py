@@ -56,7 +56,7 @@ def test_cp_types():
         ("1 0 0 1", 'line 1 = "1 0 0 1": give a type'),
         ("1 0 0 1 1\n5 0 0 1 1", "line 2"),
         ("1 0 0 1 1 1", "line 1"),
-        ("1 0 0 1 x", 'line 1 = "1 0 0 1 x": coordinates must be numbers'),
+        ("1 0 0 1 x", 'line 1 = "1 0 0 1 x": coordinates must be finite numbers'),
         ("1 0 0 1 nan", "must be finite"),
         ("1 0 0 1 1e999", "must be finite"),
         ("{}", "line 1"),
@@ -123,7 +123,10 @@ def test_opx_and_cp_agree():
     [
         (OPX.format(""), "lines: there are none"),
         (OPX.format(opx_line(type=9)), r'lines\[0\].type = "9"'),
-        (OPX.format(opx_line() + opx_line(x0="one")), r'lines\[1\].x0 = "one": must be a finite'),
+        (
+            OPX.format(opx_line() + opx_line(x0="one")),
+            r'lines\[1\].x0 = "one": coordinates must be finite',
+        ),
         (OPX.format(opx_line(y1="NaN")), r"lines\[0\].y1"),
         (OPX[:200], "is not an OPX file"),
         ("", "is not an OPX file"),

@@ -101,11 +101,11 @@ def test_laws_of_a_miura_cell(structure):
 
 def test_rest_angles_are_marked_without_moment(structure):
     fold = plot_laws(structure).axes[0]
-    dots = [line for line in fold.get_lines() if line.get_marker() == "o"]
-    shown = sorted(float(dot.get_xdata()[0]) for dot in dots)
+    (dots,) = [line for line in fold.get_lines() if line.get_marker() == "o"]
+    shown = sorted(dots.get_xdata())
     rests = np.unique(np.round(np.degrees(structure.fold_rest), 6))
     np.testing.assert_allclose(shown, rests, atol=1e-5)
-    np.testing.assert_allclose([dot.get_ydata()[0] for dot in dots], 0.0, atol=1e-12)
+    np.testing.assert_allclose(dots.get_ydata(), 0.0, atol=1e-12)
     texts = [text.get_text() for text in fold.get_legend().get_texts()]
     assert len(texts) == len(rests)
     assert all("N m/rad, rest" in text for text in texts)

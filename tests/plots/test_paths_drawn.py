@@ -353,7 +353,7 @@ def test_pictures_of_a_path_are_spread_over_its_way(case, path):
             lambda case, path: plot_reaction({"a": path}, [7], "z"),
             "no support holds node 7 along z",
         ),
-        (lambda case, path: draw_shapes(case, path, [8]), "8; the path has points 0 to 7"),
+        (lambda case, path: draw_shapes(case, path, [8]), "8; there are points 0 to 7"),
         (lambda case, path: draw_shapes(case, path, []), "points: empty"),
         (lambda case, path: draw_shapes(case, path, 0), "points: 0; give at least one"),
         (lambda case, path: draw_shapes(case, path.isel(node=slice(9))), "9 nodes, the structure"),

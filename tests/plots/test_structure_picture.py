@@ -174,7 +174,7 @@ def test_directions_and_links_are_marked(structure):
     pushed = ties.direction_triangles(case, cases.Impose, structure.nodes, 0.1, View())
     pushes = (pushed[0, 0] - pushed[0, 1:].mean(axis=0)) / 0.1
     np.testing.assert_allclose(pushes, np.array([1.0, 0.0, -1.0]) / np.sqrt(2.0), atol=1e-12)
-    drawn = ties.links(case, structure.nodes)
-    assert len(drawn.segments) == 1 + 3
+    (drawn,) = ties.links(case, structure.nodes)
+    assert len(drawn.lines[0]) == 1 + 3
     labels = [t.get_text() for t in plot_load_history(case, 1.0).legends[0].get_texts()]
     assert labels[0].startswith("moved 0.05 m along (0.707, 0, -0.707) on node 7")

@@ -62,7 +62,7 @@ def test_histories_have_gaps_and_say_how_much_was_measured():
     first, second = figure.axes
     assert "100.0%" in first.get_title() and "85.0%" in second.get_title()
     assert "x displacement" in first.get_ylabel()  # the axis in which most moves
-    (true, seen) = second.lines
+    (seen, true) = second.lines
     assert np.isnan(seen.get_ydata()[5:8]).all() and (true.get_ydata() == 0.0).all()
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import base64
-import io
 import re
 import struct
 from html.parser import HTMLParser
+from io import BytesIO
 
 import numpy as np
 import pytest
@@ -53,9 +53,15 @@ class _Page(HTMLParser):
 
 
 def _png(width=2, height=2):
-    file = io.BytesIO()
+    file = BytesIO()
     Image.new("L", (width, height), 64).save(file, "PNG")
     return file.getvalue()
+
+
+def _gif(width=2, height=2):
+    buffer = BytesIO()
+    Image.new("P", (width, height)).save(buffer, "GIF")
+    return buffer.getvalue()
 
 
 def _write(tmp_path, *sections, title="Report"):
@@ -64,7 +70,7 @@ def _write(tmp_path, *sections, title="Report"):
 
 
 def test_pictures_are_inside_and_unchanged(tmp_path):
-    png, gif = _png(), b"GIF89a" + bytes(20)
+    png, gif = _png(), _gif()
     (tmp_path / "a.png").write_bytes(png)
     sheet = Picture(tmp_path / "a.png", caption="A sheet", alt="gray square")
     page = _write(tmp_path, sheet, Picture(gif, caption="It moves"))
@@ -90,8 +96,8 @@ def test_films_are_inside_and_play(tmp_path):
 
 
 def test_wide_pictures_are_scrolled_on_a_phone(tmp_path):
-    gif = b"GIF89a" + struct.pack("<HH", 300, 200)
-    page = _write(tmp_path, Picture(_png(1350, 3)), Picture(_png(900, 3)), Picture(gif))
+    pictures = _png(1350, 3), _png(900, 3), _gif(300, 200)
+    page = _write(tmp_path, *map(Picture, pictures))
     frames = [attrs.get("class") for tag, attrs in page.tags if tag == "div"]
     assert frames == ["wide", None, None]
     sizes = [(image["width"], image["height"]) for image in page.images]

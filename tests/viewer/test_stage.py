@@ -16,7 +16,7 @@ import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.live.files import live_page
 from foldyn.plots.style import CREASE_NAMES, CREASES
-from foldyn.report import Chart, Curve
+from foldyn.report import Chart, Charts, Curve
 from foldyn.viewer import stage
 from foldyn.viewer.sheet import KINDS, edge_pieces
 from foldyn.viewer.stage import OF_SIZE
@@ -155,6 +155,7 @@ def test_no_title_can_end_a_script_element_or_open_a_comment_in_it():
     assert [about["title"] for about in scripted(text)] == [BREAKING]
     live = live_page(BREAKING, {"name": BREAKING}, "key")
     assert scripted(live) == [{"name": BREAKING, "key": "key"}]
-    chart = Chart("x", "y", [Curve(BREAKING, [0.0, 1.0], [0.0, 1.0])], BREAKING, BREAKING).html()
+    chart = Chart("x", "y", [Curve(BREAKING, [0.0, 1.0], [0.0, 1.0])], BREAKING, BREAKING)
+    chart = Charts([chart], BREAKING).html()
     for whole in (live.partition("<main")[0], chart):
         assert "<!--" not in whole

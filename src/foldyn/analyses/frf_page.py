@@ -14,8 +14,9 @@ from foldyn.analyses.casefile import CaseFile
 from foldyn.cases import BaseMotion, Case
 from foldyn.linear import Peak, peaks_of
 from foldyn.linear.frf import METHODS, PER_FORCE, quantity_of
+from foldyn.plots.charts import Chart, Curve
 from foldyn.report.album import Album, ByRule, by_mass_rule, listed, rules, shown_nodes
-from foldyn.report.charts import Chart, Charts, Curve
+from foldyn.report.charts import Charts
 from foldyn.report.sections import Heading, Section, Table, Text, cell
 
 MOST_CURVES = 8

@@ -19,21 +19,23 @@ from foldyn.dynamics import METHODS, Keeping, prepare
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.timing import check_room, check_samples
 from foldyn.errors import InputError
+from foldyn.plots.load_curves import load_charts
 from foldyn.report.album import (
-    LOADS,
     Album,
     ByRule,
     by_mass_rule,
     crossing_panels,
-    load_charts,
     rules,
     shown_nodes,
     visible_scale,
 )
+from foldyn.report.charts import Charts
 from foldyn.report.sections import Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
 from foldyn.signals.spectrum import MINIMUM_SAMPLES
 from foldyn.values import number, show, whole
+
+LOADS = "Loads and imposed motions over time."
 
 SAMPLES = 2000
 """Samples that a motion keeps when the file does not say."""
@@ -169,7 +171,7 @@ class MotionAnalysis(Analysis):
                 "load",
                 LOADS,
                 lambda: plots.plot_load_history(case, duration, start=start),
-                load_charts(case, start, duration),
+                Charts(load_charts(case, start, duration), LOADS),
             )
         yield from album.figure(
             "motion",

@@ -12,6 +12,7 @@ from foldyn.analyses.casefile import CaseFile
 from foldyn.cases import Case
 from foldyn.errors import ComputationError, InputError
 from foldyn.plots.along import CRITICAL, along, evenly, main_direction
+from foldyn.plots.charts import Chart, Curve
 from foldyn.report.album import (
     Album,
     ByRule,
@@ -20,7 +21,7 @@ from foldyn.report.album import (
     shown_nodes,
     visible_scale,
 )
-from foldyn.report.charts import Chart, Charts, Curve
+from foldyn.report.charts import Charts
 from foldyn.report.sections import Heading, Picture, Section, Table, Text, cell
 from foldyn.statics import Landscape, landscape
 

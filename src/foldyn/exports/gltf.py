@@ -1,8 +1,7 @@
 """GLB, the binary form of glTF 2.0: one JSON document, and the arrays that it refers to.
 
-Source of the format: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html. Written here, as
-the library for it (pygltflib, with which tests read it back) leaves all of this to its caller, and
-brings five more.
+Source of the format: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html. Written here,
+as the library for it leaves all of this to its caller (decision 7).
 """
 
 from __future__ import annotations

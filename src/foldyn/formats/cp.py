@@ -7,15 +7,13 @@ Each has five numbers, ``type x1 y1 x2 y2``: type 1 the outline or a cut, 2 a mo
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from foldyn.errors import InputError
-from foldyn.formats.drawing import Drawing
+from foldyn.formats.drawing import Drawing, coordinate
 from foldyn.formats.writers import flat_points, letters, warn_of_angles
 from foldyn.patterns import Pattern
-from foldyn.values import parsed, show
+from foldyn.values import show
 
 LETTERS = {"0": "F", "1": "B", "2": "M", "3": "V", "4": "F"}
 KINDS = {"B": 1, "C": 1, "M": 2, "V": 3, "F": 4, "U": 4}
@@ -54,12 +52,7 @@ def read(text: str) -> Drawing:
                 "coordinates, as `2 0 0 100 50`",
                 place,
             )
-        try:
-            x1, y1, x2, y2 = (parsed(word) for word in words[1:])
-        except ValueError:
-            raise InputError(f" = {show(line)}: coordinates must be numbers", place) from None
-        if not all(map(math.isfinite, (x1, y1, x2, y2))):
-            raise InputError(f" = {show(line)}: coordinates must be finite numbers", place)
+        x1, y1, x2, y2 = (coordinate(word, place, line) for word in words[1:])
         kinds.append(LETTERS[words[0]])
         points += [(x1, -y1), (x2, -y2)]
         places.append(place)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,11 +12,6 @@ from foldyn.patterns.topology import Edge
 ROUNDING = np.radians(0.1)
 """Departure of angles (rad) that the digits of a file leave."""
 MOST_ROWS = 30
-
-
-def _nothing() -> FlatFoldability:
-    none = np.empty(0, dtype=np.int64)
-    return FlatFoldability(none, none, none, none, np.empty(0), np.empty(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,11 +35,11 @@ class Diagnosis:
     """
 
     size: tuple[float, float, float]
-    assumptions: tuple[str, ...] = ()
-    repairs: tuple[str, ...] = ()
-    doubts: tuple[str, ...] = ()
-    vertices: FlatFoldability = field(default_factory=_nothing)
-    facets: tuple[Edge, ...] = ()
+    assumptions: tuple[str, ...]
+    repairs: tuple[str, ...]
+    doubts: tuple[str, ...]
+    vertices: FlatFoldability
+    facets: tuple[Edge, ...]
 
     def __str__(self) -> str:
         """Text of several lines."""

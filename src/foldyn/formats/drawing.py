@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from foldyn.errors import InputError
+from foldyn.values import parsed, show
 
 METERS = {
     "m": 1.0,
@@ -99,3 +103,21 @@ class Drawing:
         angles = np.array(np.broadcast_to(fold_angles, count), dtype=np.float64)
         ends = np.arange(2 * count).reshape(-1, 2)
         return cls(np.array(points), ends, tuple(letters), angles, **more)
+
+
+def coordinate(text: str, place: str, given: str = "") -> float:
+    """Coordinate that a text is.
+
+    Raises
+    ------
+    InputError
+        It is no finite number; the message names the place, and shows what is given there.
+    """
+    try:
+        value = parsed(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        shown = show(given or text)
+        raise InputError(f" = {shown}: coordinates must be finite numbers", place)
+    return value

@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError, optional
-from foldyn.formats.curves import CHORD
+from foldyn.formats.chords import Chords
 from foldyn.formats.drawing import METERS, Drawing
 from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
 from foldyn.formats.lines import MOST_LINES, too_many
-from foldyn.formats.notes import count, without_length
+from foldyn.formats.notes import count
 from foldyn.formats.svg_writer import NAMES, PER_METER
 from foldyn.formats.writers import flat_points, letters, warn_of_angles
 from foldyn.input_files import DEEPEST
@@ -80,40 +80,19 @@ def read(text: str) -> Drawing:
     every = np.concatenate(boxes)
     if not (np.abs(every) <= LONGEST).all():
         raise InputError(f": coordinates must be finite, and at most {LONGEST:g}", "lines")
-    tolerance = CHORD * float(np.linalg.norm(np.ptp(every, axis=0)))
     colors: Counter[tuple[RGB, RGB | None]] = Counter()
-    points: list[NDArray[np.float64]] = []
-    kinds: list[str] = []
-    places: list[str] = []
-    has_length: dict[str, bool] = {}
-    total, curved = 0, 0
+    chords, curved = Chords(boxes), 0
     for entity, path in paths:
         with _reading(_place(entity)):
             letter = _letter(entity, document, colors)
-            along = _along(entity, path, tolerance)
-        if letter is None:
-            continue
-        pairs = np.stack((along[:-1], along[1:]), axis=1)
-        pairs = pairs[(pairs[:, 0] != pairs[:, 1]).any(axis=1)]
-        has_length[_place(entity)] = has_length.get(_place(entity), False) or len(pairs) > 0
-        total, curved = total + len(pairs), curved + path.has_curves
-        if total > MOST_LINES:
-            raise too_many("the lines")
-        points.append(pairs.reshape(-1, 3))
-        kinds += [letter] * len(pairs)
-        places += [_place(entity)] * len(pairs)
-    if not total:
-        raise InputError(": all are points; give a file with a crease pattern", "lines")
-    repairs = [f"{count(curved, 'curve')} drawn as chords, within {tolerance:.3g} units"]
-    return Drawing.of_lines(
-        np.concatenate(points),
-        kinds,
-        meters=_meters(document),
-        assumed=1e-3,
-        places=tuple(places),
-        repairs=(*repairs[:curved], *without_length(has_length), *skipped),
-        doubts=tuple(color_doubts(colors)),
-    )
+            along = _along(entity, path, chords.tolerance)
+        if letter is not None:
+            chords.add(along, letter, _place(entity))
+            curved += path.has_curves
+    return chords.drawing(
+        curved, np.nan, skipped,
+        meters=_meters(document), assumed=1e-3, doubts=tuple(color_doubts(colors)),
+    )  # fmt: skip
 
 
 def _document(library: Any, text: str) -> Any:

@@ -8,7 +8,7 @@ what other programs have put in (keys with a colon).
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -174,41 +174,38 @@ def _list(fields: dict[str, Any], name: str) -> list[Any]:
     return value
 
 
+def _check(name: str, rows: list[Any], sound: Callable[[Any], bool], give: str) -> None:
+    """Refuse the first row that is not sound, and say what to give."""
+    for k, row in enumerate(rows):
+        if not sound(row):
+            raise InputError(f"{name}[{k}] = {show(row)}: give {give}.")
+
+
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    """Whether a value is a finite number of a size that Python can make a float of."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
+
+
+def _are_below(row: Any, count: int) -> bool:
+    """Whether a row is a list of whole numbers from 0 on, below a count."""
+    return isinstance(row, list) and all(type(n) is int and 0 <= n < count for n in row)
 
 
 def _vertices(rows: list[Any]) -> NDArray[np.float64]:
-    vertices = np.zeros((len(rows), 3))
-    for v, row in enumerate(rows):
-        if not isinstance(row, list) or len(row) not in (2, 3) or not all(map(_is_number, row)):
-            raise InputError(
-                f"vertices_coords[{v}] = {show(row)}: give 2 or 3 numbers for each vertex."
-            )
-        try:
-            vertices[v, : len(row)] = row
-        except OverflowError:
-            vertices[v] = np.inf
-        if not np.isfinite(vertices[v]).all():
-            raise InputError(
-                f"vertices_coords[{v}] = {show(row)}: coordinates must be finite numbers."
-            )
-    return vertices
+    def sound(row: Any) -> bool:
+        return isinstance(row, list) and len(row) in (2, 3) and all(map(_is_number, row))
+
+    _check("vertices_coords", rows, sound, "2 or 3 numbers for each vertex, all finite")
+    return np.array([[*row, 0.0][:3] for row in rows], np.float64).reshape(-1, 3)
 
 
 def _faces(fields: dict[str, Any], count: int) -> tuple[tuple[int, ...], ...] | None:
     if "faces_vertices" not in fields:
         return None
-    faces = []
-    for f, face in enumerate(_list(fields, "faces_vertices")):
-        known = isinstance(face, list) and all(type(v) is int and 0 <= v < count for v in face)
-        if not known or len(face) < 3:
-            raise InputError(
-                f"faces_vertices[{f}] = {show(face)}: give at least three vertex numbers from 0 to "
-                f"{count - 1}."
-            )
-        faces.append(tuple(face))
-    return tuple(faces) or None  # some programs write an empty list
+    faces = _list(fields, "faces_vertices")
+    give = f"at least three vertex numbers from 0 to {count - 1}"
+    _check("faces_vertices", faces, lambda row: _are_below(row, count) and len(row) > 2, give)
+    return tuple(map(tuple, faces)) or None  # some programs write an empty list
 
 
 def _mend_letters(fields: dict[str, Any]) -> list[str]:
@@ -246,7 +243,7 @@ def _edges(
     fields: dict[str, Any], count: int, with_faces: bool
 ) -> tuple[NDArray[np.int64], tuple[str, ...], NDArray[np.float64]]:
     """Edges with their letters and fold angles (degrees)."""
-    lists = {"edges_assignment": "U", "edges_foldAngle": None}
+    lists = "edges_assignment", "edges_foldAngle"
     if "edges_vertices" not in fields:
         orphan = next((name for name in lists if name in fields), None)
         if orphan is not None:
@@ -259,47 +256,34 @@ def _edges(
                 f"{name} has {len(fields[name])} entries for {len(edges)} in edges_vertices: "
                 "give one for each edge."
             )
-    given_letters = fields.get("edges_assignment", [None] * len(edges))
-    given_angles = fields.get("edges_foldAngle", [None] * len(edges))
-    pairs, assignments, angles = [], [], []
-    for e, edge in enumerate(edges):
-        pair, angle = _pair(f"edges_vertices[{e}]", edge, count), _angle(e, given_angles[e])
-        letter = given_letters[e]
-        if "edges_assignment" in fields:
-            letter = _letter(e, letter)
-        elif not np.isnan(angle) and angle != 0.0:
-            letter = "V" if angle > 0.0 else "M"
-        elif not with_faces:
-            letter = "U"
-        if letter is not None:
-            pairs.append(pair)
-            assignments.append(letter)
-            angles.append(angle)
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2), tuple(assignments), np.array(angles)
+    pairs = _pairs("edges_vertices", edges, count)
+    letters = [
+        choice(f"edges_assignment[{e}]", letter, ASSIGNMENTS)
+        for e, letter in enumerate(fields.get("edges_assignment", ()))
+    ]
+    given = fields.get("edges_foldAngle", [None] * len(edges))
+    give = "degrees from -180 (a closed mountain) to 180 (a closed valley), or null"
+    _check("edges_foldAngle", given, _is_angle, give)
+    angles = np.array([np.nan if angle is None else angle for angle in given], np.float64)
+    if "edges_assignment" not in fields:  # of faces: the letter of the dihedral
+        letters = ["V" if a > 0 else "M" if a < 0 else "" if with_faces else "U" for a in angles]
+    told = [e for e, letter in enumerate(letters) if letter]
+    ends = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    return ends[told], tuple(letters[e] for e in told), np.clip(angles[told], -180.0, 180.0)
 
 
-def _pair(field: str, edge: Any, count: int) -> tuple[int, int]:
-    pair = isinstance(edge, list) and len(edge) == 2 and edge[0] != edge[1]
-    if not pair or not all(type(v) is int and 0 <= v < count for v in edge):
-        raise InputError(
-            f"{field} = {show(edge)}: give two different vertex numbers from 0 to {count - 1}."
-        )
-    return edge[0], edge[1]
+def _pairs(name: str, rows: list[Any], count: int) -> list[tuple[int, int]]:
+    """Pairs of vertices."""
+
+    def sound(row: Any) -> bool:
+        return _are_below(row, count) and len(row) == 2 and row[0] != row[1]
+
+    _check(name, rows, sound, f"two different vertex numbers from 0 to {count - 1}")
+    return [(a, b) for a, b in rows]
 
 
-def _letter(e: int, letter: Any) -> str:
-    return choice(f"edges_assignment[{e}]", letter, ASSIGNMENTS)
-
-
-def _angle(e: int, angle: Any) -> float:
-    if angle is None:
-        return np.nan
-    if not _is_number(angle) or not abs(angle) <= 180.0 + 1e-9:
-        raise InputError(
-            f"edges_foldAngle[{e}] = {show(angle)}: give degrees from -180 (a closed mountain) to "
-            "180 (a closed valley), or null."
-        )
-    return min(max(float(angle), -180.0), 180.0)
+def _is_angle(angle: Any) -> bool:
+    return angle is None or (_is_number(angle) and abs(angle) <= 180.0 + 1e-9)
 
 
 def _custom(fields: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
@@ -315,13 +299,13 @@ def _custom(fields: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
 def _face_orders(fields: dict[str, Any]) -> list[list[int]]:
     """Order of the layers: rows (f, g, s), panel f above (1) or below (-1) g, 0 if unknown."""
     count, rows = len(fields.get("faces_vertices", ())), _list(fields, FACE_ORDERS)
-    for k, row in enumerate(rows):
-        known = isinstance(row, list) and len(row) == 3 and all(type(n) is int for n in row)
-        if not known or not all(0 <= f < count for f in row[:2]) or row[2] not in (-1, 0, 1):
-            raise InputError(
-                f"{FACE_ORDERS}[{k}] = {show(row)}: give two face numbers from 0 to {count - 1}, "
-                "and 1, -1 or 0."
-            )
+
+    def sound(row: Any) -> bool:
+        pair = isinstance(row, list) and len(row) == 3 and _are_below(row[:2], count)
+        return pair and type(row[2]) is int and abs(row[2]) < 2
+
+    give = f"two face numbers from 0 to {count - 1}, and 1, -1 or 0"
+    _check(FACE_ORDERS, rows, sound, give)
     return rows
 
 
@@ -330,8 +314,7 @@ def _families(given: Any, count: int) -> dict[str, list[tuple[int, int]]]:
     if not isinstance(given, dict) or not all(isinstance(pairs, list) for pairs in given.values()):
         raise InputError(f"{FAMILIES}: give a list of vertex pairs for each name.")
     return {
-        name: [_pair(f"{FAMILIES}[{show(name)}][{k}]", pair, count) for k, pair in enumerate(pairs)]
-        for name, pairs in given.items()
+        name: _pairs(f"{FAMILIES}[{show(name)}]", pairs, count) for name, pairs in given.items()
     }
 
 
@@ -339,4 +322,4 @@ def _welds(fields: dict[str, Any], count: int) -> list[tuple[int, int]] | None:
     """Vertex pairs of the welds; None in a file that says nothing of them."""
     if WELDS not in fields:
         return None
-    return [_pair(f"{WELDS}[{k}]", pair, count) for k, pair in enumerate(_list(fields, WELDS))]
+    return _pairs(WELDS, _list(fields, WELDS), count)

@@ -73,8 +73,7 @@ def single(lines: Lines) -> tuple[Lines, list[tuple[int, int]]]:
         Pairs of drawn lines, of which one is a mountain and the other a valley in one place; the
         first drawn is kept.
     """
-    rank = np.array([_RANKS[letter] for letter in "CMVUFJB"])
-    ranks = rank[[_RANKS[letter] for letter in lines.letters.tolist()]]
+    ranks = np.array([_RANKS[letter] for letter in lines.letters.tolist()], int)
     ranks = np.where(ranks == _RANKS["V"], _RANKS["M"], ranks)  # the first drawn of them
     low, high = lines.ends.min(axis=1), lines.ends.max(axis=1)
     order = np.lexsort((lines.source, ranks, high, low))

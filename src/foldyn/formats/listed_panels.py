@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.formats.lines import Lines, single, without_points
 from foldyn.formats.notes import Notes, count
-from foldyn.formats.panels import Panels, compact, with_inner_borders
+from foldyn.formats.panels import Panels, compact, components, with_inner_borders
 from foldyn.formats.t_junctions import with_corners_on_edges
 from foldyn.patterns.geometry import face_geometry, seams
 from foldyn.patterns.topology import Edge, Faces, around, build_topology, checked_faces, edge_of
@@ -126,26 +126,19 @@ def _seam_points(
     topology = build_topology(checked_faces(panels.faces, len(points)), len(points))
     normals = face_geometry(points, topology.faces).face_normals
     pairs = seams(points, topology.faces, normals, topology.boundary)
-    into = np.arange(len(points))
+    same: list[tuple[int, int]] = []
     for one, other in pairs:
         if {panels.letters.get(one), panels.letters.get(other)} & {"B", "C"}:
             continue
         c, d = other
         if np.linalg.norm(points[one[0]] - points[c]) > np.linalg.norm(points[one[0]] - points[d]):
             c, d = d, c
-        for a, b in ((one[0], c), (one[1], d)):
-            low, high = sorted((_root(into, a), _root(into, b)))
-            into[high] = low
-    if np.array_equal(into, np.arange(len(points))):
+        same += [(one[0], c), (one[1], d)]
+    if all(a == b for a, b in same):
         return None, topology.faces, points, normals
-    into = np.array([_root(into, k) for k in range(len(points))])
+    part = components(same, len(points))
+    into = np.unique(part, return_index=True)[1][part]  # the first of those that are one
     return into, topology.faces, points, normals
-
-
-def _root(into: NDArray[np.int64], point: int) -> int:
-    while into[point] != point:
-        point = int(into[point])
-    return point
 
 
 def _renumbered(panels: Panels, into: NDArray[np.int64]) -> Panels:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.formats.drawing import METERS, Drawing
+from foldyn.formats.drawing import METERS, Drawing, coordinate
 from foldyn.formats.writers import letters
 from foldyn.patterns import Pattern
 from foldyn.values import parsed, show
@@ -124,15 +124,9 @@ def _lines(text: str) -> list[str]:
 
 def _coordinates(words: list[str], place: str) -> list[float]:
     """Coordinates (3,) of a vertex; a weight or a color after them is left out."""
-    try:
-        if len(words) < 2:
-            raise ValueError
-        x, y, z = (parsed(word) for word in [*words[:3], "0"][:3])
-    except ValueError:
-        raise InputError(f": v {show(' '.join(words))}: give x y z, three numbers", place) from None
-    if not np.isfinite([x, y, z]).all():
-        raise InputError(f": v {' '.join(words[:3])}: coordinates must be finite numbers", place)
-    return [x, y, z]
+    if len(words) < 2:
+        raise InputError(f": v {show(' '.join(words))}: give x y z, three numbers", place)
+    return [coordinate(word, place, " ".join(["v", *words])) for word in [*words[:3], "0"][:3]]
 
 
 def _corners(words: list[str], known: tuple[int, int], place: str) -> tuple[int, ...]:

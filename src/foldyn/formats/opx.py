@@ -7,14 +7,13 @@ Source of the format: fold's src/oripa.coffee (https://github.com/edemaine/fold)
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from foldyn.errors import InputError
 from foldyn.formats.cp import LETTERS
-from foldyn.formats.drawing import Drawing
+from foldyn.formats.drawing import Drawing, coordinate
 from foldyn.formats.xml_text import from_xml, local
-from foldyn.values import parsed, show
+from foldyn.values import show
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -61,7 +60,7 @@ def read(text: str) -> Drawing:
             )
         letters.append(LETTERS[kind])
         x0, y0, x1, y1 = (
-            _coordinate(values.get(name, "0"), f"lines[{number}].{name}") for name in _COORDINATES
+            coordinate(values.get(name, "0"), f"lines[{number}].{name}") for name in _COORDINATES
         )
         points += [(x0, -y0), (x1, -y1)]
     return Drawing.of_lines(points, letters, assumed=1e-3, name=_title(root))
@@ -84,13 +83,3 @@ def _title(root: Element) -> str:
         for value in list(element)[:1]
     ]
     return " ".join("".join(titles[:1]).split())[:200]
-
-
-def _coordinate(text: str, place: str) -> float:
-    try:
-        value = parsed(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f" = {show(text)}: must be a finite number", place)
-    return value

@@ -7,8 +7,6 @@ Practical segment intersection with finite precision output, Comput. Geom. 13, 1
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -23,7 +21,6 @@ FINEST, COARSEST = 1e-6, 5e-4
 _SHARE = 0.1  # of the length of the shortest twentieth of the lines
 _ROUNDS = 12
 _SOME = 500
-_CHUNK = 16  # lines whose neighbors are listed at once: at most 16 * MOST_LINES pairs
 
 
 def tolerance_of(lines: Lines) -> float:
@@ -138,26 +135,14 @@ def segments(lines: Lines) -> NDArray:
     return np.asarray(shapely.linestrings(lines.points[lines.ends]))
 
 
-def _neighbors(tree: STRtree, geometries: NDArray) -> Iterator[NDArray]:
-    """Pairs (k, 2) of lines whose boxes overlap, first < second, in portions."""
-    total = 0
-    for start in range(0, len(geometries), _CHUNK):
-        one, other = tree.query(geometries[start : start + _CHUNK])
-        one = one + start
-        total += len(one)
-        if total > 2 * MOST_PAIRS:
-            raise too_many("the lines near each other")
-        yield np.column_stack((one, other))[one < other]
-
-
 def _with_crossings(lines: Lines, near_by: float, tolerance: float) -> tuple[Lines, NDArray]:
     """Lines with a point at each crossing, and (k, 2) the lines and points of these."""
     points, ends = lines.points, lines.ends
     geometries = segments(lines)
-    found = [_crossings(points, ends, near, near_by)
-             for near in _batches(_neighbors(STRtree(geometries), geometries))]  # fmt: skip
-    pairs = np.concatenate([pair for pair, _ in found]) if found else np.empty((0, 2), int)
-    places = np.concatenate([place for _, place in found]) if found else np.empty((0, 2))
+    one, other = STRtree(geometries).query(geometries, predicate="intersects")
+    if len(one) > 2 * MOST_PAIRS:
+        raise too_many("the lines near each other")
+    pairs, places = _crossings(points, ends, np.column_stack((one, other))[one < other], near_by)
     if not len(pairs):
         return lines, np.empty((0, 2), dtype=np.int64)
     if len(pairs) > MOST_LINES:
@@ -168,18 +153,6 @@ def _with_crossings(lines: Lines, near_by: float, tolerance: float) -> tuple[Lin
     hits = np.concatenate((np.column_stack((pairs[:, 0], number)),
                            np.column_stack((pairs[:, 1], number))))  # fmt: skip
     return more, hits[(ends[hits[:, 0]] != hits[:, 1:]).all(axis=1)]
-
-
-def _batches(portions: Iterator[NDArray], size: int = 200_000) -> Iterator[NDArray]:
-    """Portions put together to be worked through in fewer steps."""
-    held: list[NDArray] = []
-    for portion in portions:
-        held.append(portion)
-        if sum(map(len, held)) > size:
-            yield np.concatenate(held)
-            held = []
-    if held:
-        yield np.concatenate(held)
 
 
 def _crossings(

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.formats.curves import CHORD
+from foldyn.formats.chords import Chords
 from foldyn.formats.drawing import Drawing
 from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
 from foldyn.formats.lines import MOST_LINES, too_many
-from foldyn.formats.notes import count, without_length
+from foldyn.formats.notes import count
 from foldyn.formats.svg_shapes import (
     PIXEL,
     SHAPES,
@@ -189,50 +189,31 @@ def _drawing(
     for box, (*_, place) in zip(boxes, lines.curves, strict=True):
         if not (np.abs(box) <= LONGEST).all():
             raise InputError(f": coordinates must be finite, and at most {LONGEST:g}", place)
-    every = np.concatenate(boxes)
-    tolerance = CHORD * float(np.linalg.norm(np.ptp(every, axis=0)))
-    points: list[NDArray[np.float64]] = []
-    letters: list[str] = []
+    chords = Chords(boxes)
     opacities: list[float] = []
-    places: list[str] = []
     taken: Counter[tuple[RGB, RGB | None]] = Counter()
-    has_length: dict[str, bool] = {}
-    total = 0
     for (curve, here, style, place), box in zip(lines.curves, boxes, strict=True):
         color = style.color or (0, 0, 0)
-        taken[color, nearest(color)] += 1
-        if nearest(color) is None:
+        to = nearest(color)
+        taken[color, to] += 1
+        if to is None:
             continue
-        if curve.straight or not tolerance:
+        if curve.straight or not chords.tolerance:
             along = box[[0, -1]]
         else:
             growth = float(np.linalg.svd(here[:, :2], compute_uv=False)[0])
-            along = placed(curve.points(tolerance / growth if growth else tolerance), here)
-        pairs = np.stack((along[:-1], along[1:]), axis=1)
-        pairs = pairs[(pairs[:, 0] != pairs[:, 1]).any(axis=1)]
-        has_length[place] = has_length.get(place, False) or len(pairs) > 0
-        total += len(pairs)
-        if total > MOST_LINES:
-            raise too_many("the lines")
-        points.append(pairs.reshape(-1, 2))
-        letters += [COLORS[nearest(color) or color][0]] * len(pairs)
-        opacities += [style.opacity * style.own if style.stated else np.nan] * len(pairs)
-        places += [place] * len(pairs)
-    if not total:
-        raise InputError(": all are points, or white; give a file with a crease pattern", "lines")
-    angles, said = _fold_angles(np.array(letters), np.array(opacities))
-    curved = sum(not curve.straight for curve, *_ in lines.curves)
-    repairs = [f"{count(curved, 'curve')} drawn as chords, within {tolerance:.3g} units"]
-    return Drawing.of_lines(
-        np.concatenate(points),
-        letters,
+            along = placed(curve.points(chords.tolerance / (growth or 1.0)), here)
+        number = chords.add(along, COLORS[to][0], place)
+        opacities += [style.opacity * style.own if style.stated else np.nan] * number
+    angles, said = _fold_angles(np.array(chords.letters), np.array(opacities))
+    return chords.drawing(
+        sum(not curve.straight for curve, *_ in lines.curves),
         angles,
+        _skipped(lines.counts),
         meters=frame.pixels * PIXEL if frame.physical else None,
         assumed=frame.pixels * PIXEL,
         unit="px" if frame.pixels == 1.0 else "unit",
         name=title,
-        places=tuple(places),
-        repairs=(*repairs[:curved], *without_length(has_length), *_skipped(lines.counts)),
         assumptions=said,
         doubts=(*doubts, *color_doubts(taken)),
     )

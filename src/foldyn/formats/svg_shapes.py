@@ -109,6 +109,8 @@ def curves(element: Element, whole: tuple[float, float], place: str) -> list[Cur
     InputError
         Attributes that make no shape; the message names the place.
     """
+    from svgelements import Ellipse, Path, Rect
+
     name = local(element)
 
     def side(key: str, axis: int, default: float = 0.0) -> float:
@@ -128,13 +130,13 @@ def curves(element: Element, whole: tuple[float, float], place: str) -> list[Cur
         x, y, w, h = side("x", 0), side("y", 1), side("width", 0), side("height", 1)
         rx = side("rx", 0, side("ry", 1))
         ry = side("ry", 1, rx)
-        if w <= 0 or h <= 0:
-            return []
-        return _rectangle(x, y, w, h, min(max(rx, 0.0), w / 2), min(max(ry, 0.0), h / 2))
+        round_ = min(max(rx, 0.0), w / 2), min(max(ry, 0.0), h / 2)
+        return list(_segments(Path(Rect(x, y, w, h, *round_)))) if w > 0 and h > 0 else []
     if name in ("circle", "ellipse"):
         r = side("r", 2)
         rx, ry = (r, r) if name == "circle" else (side("rx", 0), side("ry", 1))
-        return _ellipse(side("cx", 0), side("cy", 1), rx, ry) if rx > 0 and ry > 0 else []
+        shape = Ellipse(side("cx", 0), side("cy", 1), rx, ry)
+        return list(_segments(Path(shape))) if rx > 0 and ry > 0 else []
     return list(_path(element.get("d", ""), f"{place}.d"))
 
 
@@ -146,57 +148,35 @@ def _line(ends: NDArray[np.float64]) -> Curve:
     return Curve(ends, lambda _: ends, True)
 
 
-def _rectangle(x: float, y: float, w: float, h: float, rx: float, ry: float) -> list[Curve]:
-    if not rx or not ry:
-        return _polyline([(x, y), (x + w, y), (x + w, y + h), (x, y + h), (x, y)])
-    corners = ((x + w - rx, y + ry, -90), (x + w - rx, y + h - ry, 0),
-               (x + rx, y + h - ry, 90), (x + rx, y + ry, 180))  # fmt: skip
-    arcs = [_ellipse(cx, cy, rx, ry, start, 90.0)[0] for cx, cy, start in corners]
-    links = [
-        _line(np.array([one.frame[-1], other.frame[0]]))
-        for one, other in zip(arcs, (*arcs[1:], arcs[0]), strict=True)
-    ]
-    return [piece for pair in zip(arcs, links, strict=True) for piece in pair]
-
-
-def _ellipse(
-    cx: float, cy: float, rx: float, ry: float, start: float = 0.0, sweep: float = 360.0
-) -> list[Curve]:
-    """One arc from a start (degrees) about a center; a whole ellipse ends where it begins."""
-
-    def along(count: int) -> NDArray[np.float64]:
-        angle = np.radians(start + sweep * np.linspace(0.0, 1.0, count + 1))
-        points = np.column_stack((cx + rx * np.cos(angle), cy + ry * np.sin(angle)))
-        if sweep == 360.0:
-            points[-1] = points[0]
-        return points
-
-    def points(tolerance: float) -> NDArray[np.float64]:
-        count = arc_chords(max(rx, ry), float(np.radians(sweep)), tolerance)
-        return along(4 * -(-count // 4) if sweep == 360.0 else count)
-
-    return [Curve(along(4), points, False)]
-
-
 def _path(text: str, place: str) -> Iterator[Curve]:
-    from svgelements import Arc, Close, CubicBezier, Move, Path, QuadraticBezier
+    from svgelements import Path
 
     if text.strip() in ("", "none"):
         return
     try:
         if text.strip()[0] not in "Mm" or not _is_plain(text):
             raise ValueError
-        path = Path(text)
+        yield from _segments(Path(text))
     except (ValueError, TypeError, IndexError, OverflowError, ZeroDivisionError, AttributeError):
         raise InputError(f" = {show(text)}: is no path", place) from None
+
+
+def _segments(path: Any) -> Iterator[Curve]:
+    """Pieces of a path.
+
+    Raises
+    ------
+    ValueError
+        One that does not begin or end anywhere.
+    """
+    from svgelements import Arc, Close, CubicBezier, Move, QuadraticBezier
+
     for segment in path:
-        if isinstance(segment, Move):
-            continue
         start, end = segment.start, segment.end
+        if isinstance(segment, Move) or (isinstance(segment, Close) and None in (start, end)):
+            continue
         if start is None or end is None:
-            if isinstance(segment, Close):
-                continue
-            raise InputError(f" = {show(text)}: is no path", place)
+            raise ValueError
         if isinstance(segment, CubicBezier):
             yield _bezier(start, segment.control1, segment.control2, end)
         elif isinstance(segment, QuadraticBezier):

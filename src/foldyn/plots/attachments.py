@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.patches import Patch
-from mpl_toolkits.mplot3d import Axes3D
 
 from foldyn.cases.supports import Spring
 from foldyn.mechanics.springs import GROUND
 from foldyn.patterns.topology import around, edge_of
-from foldyn.plots import scene, style
+from foldyn.plots import style
+from foldyn.plots.marks import Mark
 from foldyn.plots.scene import Points, Sheet3D, View
 
 _TURNS = (4, 14)  # of a zigzag, at least and at most
@@ -19,72 +19,43 @@ _LEAD = 0.2  # straight parts of a zigzag at its ends, as a share of its length
 _HATCHES = 8  # of a clamped edge
 
 
-class Attachments(NamedTuple):
-    """Marks of a case.
-
-    Attributes
-    ----------
-    springs, hatches : ndarray, shapes (k, p, 3), (k, 2, 3)
-        Lines of springs and of clamped edges.
-    masses : ndarray, shape (k, 3)
-        Where point masses are.
-    sizes : ndarray, shape (k,)
-        Of their dots, points.
-    keys : list
-        Legend entries.
-    """
-
-    springs: list[Points]
-    hatches: Points
-    masses: Points
-    sizes: Points
-    keys: list[Any]
-
-    @property
-    def points(self) -> Points:
-        """All points that the picture must have room for (k, 3)."""
-        return np.concatenate([*self.springs, self.hatches.reshape(-1, 3), self.masses])
-
-    def draw(self, axes: Axes3D) -> None:
-        """Draw them."""
-        for line in self.springs:
-            scene.add_segments(axes, line[None], style.SPRING, 1.1, zorder=6.5)
-        if len(self.hatches):
-            scene.add_segments(axes, self.hatches, style.SUPPORT, 1.3, zorder=6.2)
-        for size in np.unique(self.sizes):
-            look: dict[str, Any] = {"color": style.MASS, "markersize": size, "zorder": 8.0}
-            axes.plot(*self.masses[self.sizes == size].T, "o", markeredgecolor="white", **look)
-
-
 def attachments(
     sheet: Sheet3D, points: Points, size: float, view: View, supports: bool, loads: bool
-) -> Attachments:
+) -> list[Mark]:
     """Marks of a case at node positions (n, 3).
 
     size : length of a support's mark, m.
     supports, loads : whether springs and clamps, and whether masses are shown.
     """
-    case, keys, springs = sheet.case, [], []
-    hatches, masses, sizes = np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros(0)
+    case, found = sheet.case, []
     clamped = getattr(sheet.structure.options, "clamped", ()) if supports else ()
     if clamped:
         hatches = _hatched(sheet, points, clamped, 0.7 * size)
         look = {"facecolor": "white", "edgecolor": style.SUPPORT, "hatch": "////", "linewidth": 0.0}
-        keys.append(Patch(label="clamped edge", **look))
-    if supports and case is not None:
-        for i, part in enumerate(case.supports):
-            if isinstance(part, Spring):
-                springs += _of_part(sheet, points, part, f"supports[{i}]", size, view)
+        key = Patch(label="clamped edge", **look)
+        found.append(Mark(style.SUPPORT, [key], [hatches], zorder=6.2, width=1.3))
+    springs = [
+        line[None]
+        for i, part in enumerate(case.supports if supports else ())
+        if isinstance(part, Spring)
+        for line in _of_part(sheet, points, part, f"supports[{i}]", size, view)
+    ]
     if springs:
-        keys.append(style.key("spring", color=style.SPRING, linewidth=1.1))
-    if loads and case is not None and case.masses:
+        key = style.key("spring", color=style.SPRING, linewidth=1.1)
+        found.append(Mark(style.SPRING, [key], springs, zorder=6.5, width=1.1))
+    if loads and case.masses:
         there = np.flatnonzero(case.point_masses)
-        masses, own = points[there], case.point_masses[there]
+        own = case.point_masses[there]
         sizes = np.round(4.0 + 5.0 * np.cbrt(own / own.max()), 1)
         span = " to ".join(dict.fromkeys(f"{value:.3g}" for value in (own.min(), own.max())))
-        look = {"color": style.MASS, "marker": "o", "linestyle": "none", "markersize": 7.0}
-        keys.append(style.key(f"point mass, {span} kg", **look))
-    return Attachments(springs, hatches, masses, sizes, keys)
+        dot = {"marker": "o", "linestyle": "none", "markersize": 7.0}
+        keys = [style.key(f"point mass, {span} kg", color=style.MASS, **dot)]
+        for size_ in np.unique(sizes):
+            look = {"marker": "o", "markersize": size_, "markeredgecolor": "white"}
+            dots = points[there[sizes == size_]]
+            found.append(Mark(style.MASS, keys, dots=dots, zorder=8.0, look=look))
+            keys = []
+    return found
 
 
 def _of_part(

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
@@ -108,18 +109,8 @@ def _placed(solid: Sheet3D, pattern: Pattern, moved: Points) -> Points:
     first = len(moved)
     for face in pattern.faces:
         rest, now = pattern.vertices[list(face)], moved[list(face)]
-        turn, size = _rotation(rest - rest.mean(axis=0), now - now.mean(axis=0)), 2 * len(face)
-        board = slice(first, first + size)
-        out[board] = now.mean(axis=0) + (out[board] - rest.mean(axis=0)) @ turn.T
-        first += size
+        turn, _ = Rotation.align_vectors(now - now.mean(axis=0), rest - rest.mean(axis=0))
+        board = slice(first, first + 2 * len(face))
+        out[board] = now.mean(axis=0) + turn.apply(out[board] - rest.mean(axis=0))
+        first = board.stop
     return out
-
-
-def _rotation(rest: Points, now: Points) -> Points:
-    """Rotation matrix that takes points (k, 3) nearest to others.
-
-    Source: W. Kabsch, Acta Cryst. A32, 1976.
-    """
-    left, _, right = np.linalg.svd(now.T @ rest)
-    left[:, 2] *= np.sign(np.linalg.det(left) * np.linalg.det(right))
-    return left @ right

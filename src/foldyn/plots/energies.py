@@ -16,6 +16,8 @@ from foldyn.mechanics.contact.term import GROUP as CONTACT
 from foldyn.mechanics.springs import GROUP
 from foldyn.plots import style
 from foldyn.plots.along import along, asked, check_path, way
+from foldyn.plots.chart_figures import figure_of
+from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.given import alone
 from foldyn.plots.readings import energy_shares, parts_of, stacked, strain_name
 
@@ -77,25 +79,22 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     if missing:
         raise InputError(f"trajectory: no {', '.join(missing)}; give a dataset of foldyn.simulate")
     time = trajectory["time"].values
-    labels = ["energy (J)", "balance error (J)"]
-    figure, (upper, lower) = style.rows((7.5, 5.0), title, "time (s)", labels, heights=[2.6, 1.0])
-    handles = []
-    for index, (name, label) in enumerate(names.items()):
-        values = trajectory[name].values
-        handles += upper.plot(time, values, label=label, **style.line_style(index))
     error = energy_error(trajectory)
+    curves = [Curve(label, time, trajectory[name].values) for name, label in names.items()]
+    balance = Chart("time (s)", "balance error (J)", [Curve("", time, error)], zero=True)
+    charts = [Chart("time (s)", "energy (J)", curves), balance]
+    heights = {"height_ratios": [2.6, 1.0]}
+    figure = figure_of(charts, (7.5, 5.0), title, sharex=True, gridspec_kw=heights)
+    lower = figure.axes[1]
+    lower.get_lines()[0].set(color=style.BLACK, linestyle="solid", linewidth=1.0)
     worst = float(np.nanmax(np.abs(error)))
     largest = audit.energy_scale(_table(trajectory))
-    lower.plot(time, error, color=style.BLACK, linewidth=1.0, label="balance error")
-    lower.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     note = f"kinetic + strain + dissipated - work, less its start: at most {worst:.2g} J"
     if largest > 0.0:
         note += f", {worst / largest:.2g} of the energy at play"
     lower.set_title(note, **style.FINE, loc="right", y=1.0, pad=4.0)
-    upper.margins(x=0.0)
-    style.exponents(upper)
     style.exponents(lower, ticks=4)
-    return style.finish(figure, handles)
+    return style.finish(figure)
 
 
 def _table(trajectory: xr.Dataset) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import scene
+from foldyn.plots.readings import chosen
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, edge_keys, rest_keys, side_by_side
 from foldyn.plots.writers import checked_file, filmed
@@ -53,20 +54,16 @@ def draw_folding(
     """
     positions = _checked(folding).path["position"].values
     last = len(positions) - 1
-    if isinstance(states, int | np.integer):
-        if states < 1:
-            raise InputError(f"states: {states}; give at least one")
-        numbers = np.unique(np.linspace(0 if states > 1 else last, last, states).round())
-        chosen = [int(number) for number in numbers]
-    else:
-        for number in states:
-            if not -len(positions) <= number <= last:
-                raise InputError(f"states: {number}; there are states 0 to {last}")
-        chosen = [int(number) % len(positions) for number in states]
+
+    def evenly(count: int) -> list[int]:
+        places = np.linspace(0 if count > 1 else last, last, count)
+        return np.unique(places.round().astype(int)).tolist()
+
+    shown = chosen("states", states, len(positions), evenly)
     sheet = _sheet(folding, positions[0])
-    captions = [_caption(folding, number) for number in chosen]
+    captions = [_caption(folding, number) for number in shown]
     notes = rest_keys(state="first state")
-    return side_by_side(sheet, positions[chosen], captions, View(*view), notes, title)[0]
+    return side_by_side(sheet, positions[shown], captions, View(*view), notes, title)[0]
 
 
 def animate_folding(

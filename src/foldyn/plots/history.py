@@ -9,8 +9,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from foldyn.plots import style
 from foldyn.plots.along import AXES, check_nodes_of, directions
+from foldyn.plots.chart_figures import figure_of
+from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.given import by_label
 from foldyn.signals import sampling_interval, spectrum
 from foldyn.values import number
@@ -89,34 +90,24 @@ def plot_history(
     reach = max(_reach(*content, largest[row]) for (_, row), content in contents.items())
     highest = max_frequency or min(nyquist, reach) or nyquist
 
-    figure = style.new_figure(9.0, 1.15 + 1.75 * rows, title)
-    grid = figure.subplots(
-        rows, 2, squeeze=False, sharex="col", gridspec_kw={"width_ratios": [1.45, 1.0]}
-    )
-    handles = []
+    charts = []
     for row, (node, direction) in enumerate(zip(numbers, chosen, strict=True)):
-        left, right = grid[row]
-        time_label, frequency_label = (
-            ("time (s)", "frequency (Hz)") if row == rows - 1 else ("", "")
-        )
-        style.frame(left, time_label, f"{direction} displacement (m)", f"node {node}")
-        style.frame(right, frequency_label, "amplitude (m)", f"node {node}")
-        for index, (label, time) in enumerate(times.items()):
-            motion = moved[label][:, row, AXES.index(direction)]
+        axis = AXES.index(direction)
+        motions = [Curve(label, time, moved[label][:, row, axis]) for label, time in times.items()]
+        spectra = []
+        for label in times:
             frequencies, amplitude = contents[label, row]
             shown = frequencies <= highest * (1.0 + 1e-9)
-            look = style.line_style(index) | {"label": label}
-            lines = left.plot(time, motion, **look)
-            right.plot(frequencies[shown], amplitude[shown], **look)
-            handles += lines if row == 0 and label else []
-        left.margins(x=0.0)
+            spectra.append(Curve(label, frequencies[shown], amplitude[shown]))
+        charts.append(Chart("time (s)", f"{direction} displacement (m)", motions, f"node {node}"))
+        charts.append(Chart("frequency (Hz)", "amplitude (m)", spectra, f"node {node}"))
+    widths = {"width_ratios": [1.45, 1.0]}
+    size = 9.0, 1.15 + 1.75 * rows
+    figure = figure_of(charts, size, title, 2, legend=5, sharex="col", gridspec_kw=widths)
+    for right in figure.axes[1::2]:
         right.set_xlim(0.0, highest)
         right.set_ylim(bottom=0.0)
-        for frame in (left, right):
-            style.exponents(frame, ticks=5)
-    figure.align_ylabels(grid[:, 0])
-    figure.align_ylabels(grid[:, 1])
-    return style.finish(figure, handles, columns=5)
+    return figure
 
 
 def _reach(

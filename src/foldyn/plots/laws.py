@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.law_curves import LawFrame, law_frames
+from foldyn.plots.chart_figures import figure_of
+from foldyn.plots.law_charts import law_charts
 from foldyn.plots.scene import Sheet3D
 from foldyn.shells import Shell
 from foldyn.structures import Structure
@@ -52,40 +53,29 @@ def plot_laws(
     own = Sheet3D.of(structure).structure
     if own is None:
         raise InputError(": is a pattern, which has no laws; give a structure", "structure")
-    frames = law_frames(own, stretch)
-    if not frames:
+    charts = law_charts(own, stretch)
+    if not charts:
         raise InputError("structure: is a shell without folds, which has no laws to draw")
-    figure = style.new_figure(3.5 * len(frames), 3.9, title)
-    for axes, frame in zip(figure.subplots(1, len(frames), squeeze=False)[0], frames, strict=True):
-        _draw(axes, frame)
+    figure = figure_of(charts, (3.5 * len(charts), 3.9), title, len(charts), legend=0)
+    for axes, chart in zip(figure.axes, charts, strict=True):
+        *curves, rest = chart.curves
+        if chart.xlabel.startswith("stretch"):
+            axes.set_xlim(*np.asarray(curves[0].x)[[0, -1]])
+            axes.locator_params(axis="x", nbins=5)
+        else:
+            for angle in np.asarray(rest.x):
+                axes.axvline(angle, color=style.GRAY, lw=0.8, linestyle=":", zorder=1)
+            axes.set_xlim(0.0, 360.0)
+            axes.set_xticks(np.arange(0, 361, 60))
+        axes.get_lines()[len(curves)].set(color=style.BLACK, markerfacecolor=style.BLACK, zorder=4)
+        _legend_below(axes, len(curves), chart.note)
     return style.finish(figure)
 
 
-def _draw(axes: Axes, frame: LawFrame) -> None:
-    """Draw the curves of one kind of element."""
-    style.frame(axes, frame.xlabel, frame.ylabel, frame.title)
-    of_bars = frame.xlabel.startswith("stretch")
-    for index, curve in enumerate(frame.curves):
-        look = style.line_style(index)
-        axes.plot(curve.x, curve.y, label=curve.label, **look)
-        axes.plot(*curve.rest, "o", color=look["color"], markersize=5, zorder=4)
-        if not of_bars:
-            axes.axvline(curve.rest[0], color=look["color"], lw=0.8, linestyle=":", zorder=1)
-    axes.axhline(0.0, color=style.GRAY, linewidth=0.8, zorder=1)
-    if of_bars:
-        axes.set_xlim(*frame.curves[0].x[[0, -1]])
-        axes.locator_params(axis="x", nbins=5)
-    else:
-        axes.set_xlim(0.0, 360.0)
-        axes.set_xticks(np.arange(0, 361, 60))
-    if frame.reach > 0.0:
-        axes.set_ylim(-frame.reach, frame.reach)
-    style.exponents(axes)
-    _legend_below(axes, frame.note)
-
-
-def _legend_below(axes: Axes, note: str) -> None:
+def _legend_below(axes: Axes, count: int, note: str) -> None:
+    """Write what the first curves are."""
     axes.legend(
+        handles=axes.get_lines()[:count],
         loc="upper left",
         bbox_to_anchor=(-0.2, -0.19),
         borderaxespad=0.0,

@@ -3,99 +3,86 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
-from typing import Any, NamedTuple
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from foldyn.cases import Actuate, Case, Impose, Pressure, Temperature, resolve_nodes
 from foldyn.cases.directions import unit_vector
 from foldyn.cases.selection import resolve_creases
+from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.following import Share, moments, on_panels
 
+K = TypeVar("K")
+POINTS = 1001
+"""Of a curve."""
 _LISTED = 3
 _MOST_CURVES = 4
 """Curves of one history at most; imposed displacements and rest angles may differ at each place."""
 
 
-class LoadCurve(NamedTuple):
-    """A quantity over time: offset + amplitude * factor."""
-
-    amplitude: float
-    text: str
-    history: Any
-    offset: float = 0.0
-
-    @property
-    def label(self) -> str:
-        """What it is, with its history."""
-        return f"{self.text}: {history_name(self.history)}"
-
-    def values(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The quantity at times (s)."""
-        factor = np.asarray(self.history(time), dtype=np.float64)
-        return self.offset + self.amplitude * np.broadcast_to(factor, time.shape)
-
-
-def load_curves(case: Case) -> list[tuple[str, list[LoadCurve]]]:
-    """Curves of all loads and imposed motions, by the axis they belong to, such as "force (N)".
+def load_charts(case: Case, start: float, duration: float) -> list[Chart]:
+    """Curves of all loads and imposed motions over time (s), a chart for each of their kinds.
 
     Forces are the largest at a node, pressures, temperatures and moments the largest of their
     panels or creases.
     """
-    forces = [LoadCurve(_peak(f), describe_load(f), h) for f, h in case.force_terms]
-    gravity = [LoadCurve(_peak(g), describe_gravity(g), h) for g, h in case.gravity_terms]
+    time = np.linspace(start, start + duration, POINTS)
+
+    def curve(amplitude: float, text: str, history: Any, offset: float = 0.0) -> Curve:
+        factor = np.asarray(history(time), dtype=np.float64)
+        values = offset + amplitude * np.broadcast_to(factor, time.shape)
+        return Curve(f"{text}: {history_name(history)}", time, values)
+
     pushed, warm = on_panels(case, Pressure), on_panels(case, Temperature)
-    pressure = [LoadCurve(_most(s.value), describe_pressure(s), s.history) for s in pushed]
-    moment = [LoadCurve(_most(s.value), describe_moment(s), s.history) for s in moments(case)]
-    warmth = [LoadCurve(_most(s.value), describe_temperature(s), s.history) for s in warm]
-    panels = [
-        ("force at a node (N)", forces),
-        ("pressure (Pa)", pressure),
-        ("moment of a crease (N m)", moment),
-        ("temperature (K)", warmth),
-        ("gravity (m/s2)", gravity),
-        ("imposed displacement (m)", _imposed_curves(case)),
-        ("base displacement (m)", _base_curves(case)),
-        ("rest angle (degrees)", _angle_curves(case)),
+    kinds = {
+        "force at a node (N)": [(_peak(f), describe(f, "N"), h) for f, h in case.force_terms],
+        "pressure (Pa)": [(_most(s.value), describe_pressure(s), s.history) for s in pushed],
+        "moment of a crease (N m)": [
+            (_most(s.value), describe_moment(s), s.history) for s in moments(case)
+        ],
+        "temperature (K)": [(_most(s.value), describe_temperature(s), s.history) for s in warm],
+        "gravity (m/s2)": [(_peak(g), describe_gravity(g), h) for g, h in case.gravity_terms],
+        "imposed displacement (m)": _imposed(case),
+        "base displacement (m)": _of_base(case),
+    }
+    charts = [
+        Chart("time (s)", label, [curve(*one) for one in terms], zero=True)
+        for label, terms in kinds.items()
+        if terms
     ]
-    return [panel for panel in panels if panel[1]]
+    turned = [curve(*one) for one in _rest_angles(case)]
+    return [*charts, *([Chart("time (s)", "rest angle (degrees)", turned)] if turned else [])]
 
 
 def _peak(vectors: np.ndarray) -> float:
     return float(np.linalg.norm(vectors, axis=-1).max())
 
 
-def _imposed_curves(case: Case) -> list[LoadCurve]:
-    """Curves of imposed displacements, one for each history, value and axis or direction."""
-    curves = []
+def _imposed(case: Case) -> list[tuple[float, str, Any]]:
+    """Imposed displacements, one for each history, value and axis or direction."""
+    found = []
     for _, history in case.prescribed_terms:
-        groups: dict[tuple[str, float], list[int]] = {}
+        moved: dict[tuple[str, float], list[int]] = {}
         for support in case.supports:
             if isinstance(support, Impose) and support.history == history:
                 nodes = resolve_nodes(case.structure, support.nodes).tolist()
                 along = support.axis or _direction(unit_vector(support.direction))
                 values = np.broadcast_to(np.asarray(support.value, float), (len(nodes),))
                 for node, value in zip(nodes, values.tolist(), strict=True):
-                    groups.setdefault((along, value), []).append(node)
-        curves += _some(
-            [
-                LoadCurve(
-                    value,
-                    f"moved {value:.4g} m along {along} on {_listed('node', nodes)}",
-                    history,
-                )
-                for (along, value), nodes in groups.items()
-            ]
-        )
-    return curves
+                    moved.setdefault((along, value), []).append(node)
+        for (along, value), nodes, more in _some(moved):
+            text = f"moved {value:.4g} m along {along} on {_listed('node', nodes)}{more}"
+            found.append((value, text, history))
+    return found
 
 
-def _base_curves(case: Case) -> list[LoadCurve]:
-    """Curves of a base that moves, one for each history and axis."""
+def _of_base(case: Case) -> list[tuple[float, str, Any]]:
+    """Motions of the base, one for each history and axis."""
     return [
-        LoadCurve(value, f"base moved {value:.4g} m along {axis}", history)
+        (float(value), f"base moved {value:.4g} m along {axis}", history)
         for vectors, history in case.base_terms
         for axis, value in zip(
             "xyz", signed_peak(base_vectors(case, vectors)).tolist(), strict=True
@@ -104,39 +91,31 @@ def _base_curves(case: Case) -> list[LoadCurve]:
     ]
 
 
-def _angle_curves(case: Case) -> list[LoadCurve]:
-    """Curves of rest angles (degrees), one for each history and pair of first and last angle."""
-    curves = []
+def _rest_angles(case: Case) -> list[tuple[float, str, Any, float]]:
+    """Rest angles (degrees), one for each history and pair of first and last angle."""
+    found = []
+    first = np.degrees(case.structure.fold_rest).round(6)
     for change, history in case.actuation_terms:
-        first = np.degrees(case.structure.fold_rest)
-        last = first + np.degrees(change)
-        groups: dict[tuple[float, float], list[int]] = {}
+        last = np.degrees(case.structure.fold_rest + change).round(6)
+        turned: dict[tuple[float, float], list[int]] = {}
         for load in case.loads:
             if isinstance(load, Actuate) and load.history == history:
                 for crease in resolve_creases(case.structure, load.creases).tolist():
-                    pair = round(float(first[crease]), 6), round(float(last[crease]), 6)
-                    groups.setdefault(pair, []).append(crease)
-        curves += _some(
-            [
-                LoadCurve(
-                    end - start,
-                    f"rest angle {start:.4g} to {end:.4g} degrees on {_listed('crease', creases)}",
-                    history,
-                    start,
-                )
-                for (start, end), creases in groups.items()
-            ]
-        )
-    return curves
+                    pair = float(first[crease]), float(last[crease])
+                    turned.setdefault(pair, []).append(crease)
+        for (start, end), creases, more in _some(turned):
+            of = f"{_listed('crease', creases)}{more}"
+            text = f"rest angle {start:.4g} to {end:.4g} degrees on {of}"
+            found.append((end - start, text, history, start))
+    return found
 
 
-def _some(curves: list[LoadCurve]) -> list[LoadCurve]:
-    """The first curves; the last of them says how many are left out."""
-    hidden = len(curves) - _MOST_CURVES
-    if hidden <= 0:
-        return curves
-    *kept, last = curves[:_MOST_CURVES]
-    return [*kept, last._replace(text=f"{last.text} (and {hidden} more, not drawn)")]
+def _some(groups: dict[K, list[int]]) -> Iterator[tuple[K, list[int], str]]:
+    """The first groups; the last of them says how many are left out."""
+    hidden = len(groups) - _MOST_CURVES
+    for k, (key, numbers) in enumerate(list(groups.items())[:_MOST_CURVES], 1):
+        last = hidden > 0 and k == _MOST_CURVES
+        yield key, numbers, f" (and {hidden} more, not drawn)" if last else ""
 
 
 def base_vectors(case: Case, vectors: np.ndarray) -> np.ndarray:
@@ -148,11 +127,6 @@ def base_vectors(case: Case, vectors: np.ndarray) -> np.ndarray:
 def signed_peak(vectors: np.ndarray) -> np.ndarray:
     """Component (3,) of the largest magnitude along each axis of vectors (n, 3)."""
     return vectors[np.abs(vectors).argmax(axis=0), np.arange(3)]
-
-
-def describe_load(vectors: np.ndarray) -> str:
-    """Say in words where a load acts, in which direction, and how large it is at a node."""
-    return _describe(vectors, "N")
 
 
 def describe_pressure(share: Share) -> str:
@@ -180,11 +154,6 @@ def _most(values: np.ndarray) -> float:
     return float(values[np.abs(values).argmax()])
 
 
-def describe_imposed(vectors: np.ndarray) -> str:
-    """Say in words which nodes are moved, in which direction, and how far."""
-    return f"moved {_describe(vectors, 'm')}"
-
-
 def describe_base(vector: np.ndarray) -> str:
     """Say in words how far the base moves (3,) and where to."""
     return _toward("base moved", vector, "m")
@@ -201,7 +170,8 @@ def _toward(text: str, vector: np.ndarray, unit: str) -> str:
     return f"{text} along {_direction(vector / size)}" if size else text
 
 
-def _describe(vectors: np.ndarray, unit_name: str) -> str:
+def describe(vectors: np.ndarray, unit_name: str) -> str:
+    """Say in words where vectors act, in which direction, and how large they are at a node."""
     size = np.linalg.norm(vectors, axis=1)
     nodes = np.flatnonzero(size > 0.0)
     unit = vectors[nodes] / size[nodes, None]

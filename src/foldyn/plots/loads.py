@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.load_curves import load_curves
+from foldyn.plots.chart_figures import figure_of
+from foldyn.plots.charts import Chart
+from foldyn.plots.load_curves import load_charts
 from foldyn.plots.scene import Sheet3D
 from foldyn.values import number
-
-_SAMPLES = 2001
 
 
 def plot_load_history(
@@ -58,22 +57,13 @@ def plot_load_history(
     if own is None:
         raise InputError(": has no loads; give a case", "case")
     number("duration", duration, above=0.0, unit="s")
-    panels = load_curves(own) or [("force at a node (N)", [])]
-    entries = sum(len(curves) for _, curves in panels)
-    height = 2.9 + 1.7 * (len(panels) - 1) + 0.17 * max(entries - len(panels), 0)
-    ylabels = [ylabel for ylabel, _ in panels]
-    figure, rows = style.rows((6.5, height), title, "time (s)", ylabels)
-    time = np.linspace(start, start + duration, _SAMPLES)
-    handles = []
-    for axes, (_, curves) in zip(rows, panels, strict=True):
-        for curve in curves:
-            look = style.line_style(len(handles)) | {"linewidth": 1.6}
-            handles += axes.plot(time, curve.values(time), label=curve.label, **look)
-        if not any(curve.offset for curve in curves):
-            axes.axhline(0.0, color=style.GRAY, linewidth=0.8, zorder=1)
-        style.exponents(axes)
-    rows[-1].set_xlim(time[0], time[-1])
-    if not handles:
-        place = {"transform": rows[0].transAxes, "ha": "center"}
-        rows[0].text(0.5, 0.6, "no loads", **place, **style.TEXT)
-    return style.finish(figure, handles, columns=1)
+    charts = load_charts(own, start, duration)
+    entries = sum(len(chart.curves) for chart in charts)
+    height = 1.2 + 1.7 * max(len(charts), 1) + 0.17 * max(entries - len(charts), 0)
+    none = Chart("time (s)", "force at a node (N)", [])
+    figure = figure_of(charts or [none], (6.5, height), title, legend=1, sharex=True)
+    figure.axes[-1].set_xlim(start, start + duration)
+    if not charts:
+        place = {"transform": figure.axes[0].transAxes, "ha": "center"}
+        figure.axes[0].text(0.5, 0.6, "no loads", **place, **style.TEXT)
+    return style.finish(figure)

@@ -2,17 +2,68 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
 import numpy as np
 from matplotlib.patheffects import withStroke
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 
+from foldyn.plots import scene
 from foldyn.plots.scene import Points, View
 
 CROWD = 20  # arrows between the vertices of a pattern, beyond which they keep a distance,
 MANY = 100  # and arrows in all, beyond which they keep a larger one
 _DIRECTIONS = np.radians(np.arange(90.0, 450.0, 30.0))
+
+
+class Mark(NamedTuple):
+    """What a picture shows of something that acts on a sheet or is attached to it.
+
+    Attributes
+    ----------
+    color : str
+    keys : list
+        Legend entries.
+    lines : sequence of ndarray, each of shape (k, p, 3)
+        Straight from each of p points to the next.
+    triangles : ndarray, shape (m, 3, 3)
+    dots : ndarray, shape (d, 3)
+    zorder : float
+    width : float
+        Of lines, points.
+    dashes : str
+    look : mapping
+        Of dots: their marker and size.
+    """
+
+    color: str
+    keys: Sequence[Any]
+    lines: Sequence[Points] = ()
+    triangles: Points = np.zeros((0, 3, 3))
+    dots: Points = np.zeros((0, 3))
+    zorder: float = 7.0
+    width: float = 1.8
+    dashes: str = "solid"
+    look: Mapping[str, Any] = {}
+
+    @property
+    def points(self) -> Points:
+        """All points that the picture must have room for (k, 3)."""
+        parts = [*self.lines, self.triangles, self.dots]
+        return np.concatenate([part.reshape(-1, 3) for part in parts])
+
+    def draw(self, axes: Axes3D) -> None:
+        """Draw it."""
+        for lines in self.lines:
+            scene.add_segments(axes, lines, self.color, self.width, self.dashes, self.zorder)
+        if len(self.triangles):
+            add_triangles(axes, self.triangles, self.color, self.zorder + 0.5)
+        if len(self.dots):
+            look = {"linestyle": "none", "color": self.color, "zorder": self.zorder, **self.look}
+            axes.plot(*self.dots.T, **look)
 
 
 def billboard(tip: Points, along: Points, length: float, half: float, view: View) -> Points:

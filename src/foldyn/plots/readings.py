@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -80,17 +81,23 @@ def total_reaction(path: xr.Dataset, nodes: Sequence[int], direction: str) -> ND
 def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:
     """Numbers of points from 0 on, of a wanted count or of numbers, negative ones from the end."""
     check_path(path, "path")
-    count = path.sizes["step"]
-    if isinstance(points, int | np.integer):
-        if points < 1:
-            raise InputError(f"points: {points}; give at least one")
-        return evenly(path, int(points))
-    for number in points:
+    return chosen("points", points, path.sizes["step"], partial(evenly, path))
+
+
+def chosen(
+    field: str, wanted: int | Sequence[int], count: int, spread: Callable[[int], list[int]]
+) -> list[int]:
+    """Numbers of states: so many, as they are spread, or those that are named."""
+    if isinstance(wanted, int | np.integer):
+        if wanted < 1:
+            raise InputError(f"{field}: {wanted}; give at least one")
+        return spread(int(wanted))
+    for number in wanted:
         if not -count <= number < count:
-            raise InputError(f"points: {number}; the path has points 0 to {count - 1}")
-    if not len(points):
-        raise InputError("points: empty; give at least one")
-    return [int(number) % count for number in points]
+            raise InputError(f"{field}: {number}; there are {field} 0 to {count - 1}")
+    if not len(wanted):
+        raise InputError(f"{field}: empty; give at least one")
+    return [int(number) % count for number in wanted]
 
 
 def parts_of(result: xr.Dataset) -> tuple[str, ...]:

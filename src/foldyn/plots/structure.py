@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import ArrayLike
@@ -19,6 +17,7 @@ from foldyn.patterns import Pattern
 from foldyn.plots import dashpots, following, marks, scene, style, ties
 from foldyn.plots import load_curves as histories
 from foldyn.plots.attachments import attachments
+from foldyn.plots.marks import Mark
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, panel_keys, rest_keys
 from foldyn.structures import Structure
@@ -88,37 +87,27 @@ def draw_structure(
     # Marks suit the sheet's size, but not so that they cover the panels of a large sheet.
     edge = float(np.median(np.linalg.norm(np.ptp(sheet.nodes[sheet.edges], axis=1), axis=1)))
     marked = min(0.055 * size, 0.25 * edge)
-    groups = _supports(sheet, points, marked, sight) if supports else []
     length = min(0.17 * size, 0.8 * edge)
+    groups = _supports(sheet, points, marked, sight) if supports else []
+    attached = attachments(sheet, points, marked, sight, supports, loads)
     arrows = _motions(sheet, points, length, sight) if supports else []
     arrows += _dashpots(sheet, points, 0.5 * length, sight) if supports else []
     arrows += _loads(sheet, points, length, sight) if loads else []
-    attached = attachments(sheet, points, marked, sight, supports, loads)
-    triangles = np.concatenate([group.triangles for group in groups] or [np.zeros((0, 3, 3))])
-    heads = np.concatenate([group.heads for group in arrows] or [np.zeros((0, 3, 3))])
-    shafts = np.concatenate([group.shafts for group in arrows] or [np.zeros((0, 2, 3))])
-
+    others = _warm(sheet, points) if loads else []
+    others += ties.links(sheet.case, points) if supports and sheet.case else []
+    shown = [*(group.mark for group in groups), *attached, *arrows, *others]
+    triangles = np.concatenate([np.zeros((0, 3, 3)), *(group.mark.triangles for group in groups)])
     # The names of the held directions stand beyond the triangles' feet.
     feet = triangles[:, :1] + 1.6 * (triangles - triangles[:, :1])
-    everything = [points, feet.reshape(-1, 3), heads.reshape(-1, 3), attached.points]
+    everything = [points, feet.reshape(-1, 3), *(mark.points for mark in shown)]
     if numbers:  # room for the labels above the highest nodes
         everything.append(points + np.array([0.0, 0.0, 0.06 * size]))
     keys: list[Any] = []
     if displacement is not None:
         everything.append(sheet.nodes)
         keys += rest_keys(scale)
-    keys += edge_keys(sheet, elements, loads)
-    keys += panel_keys(sheet)
-    keys += [Patch(facecolor=group.color, label=group.text) for group in groups]
-    keys += attached.keys
-    keys += [key for group in arrows for key in group.keys]
-    warm = following.on_panels(sheet.case, Temperature) if loads and sheet.case else []
-    for share in warm:
-        look = {"color": style.WARM, "marker": "*", "linestyle": "none", "markersize": 8.0}
-        keys.append(style.key(histories.describe_temperature(share), **look))
-    linked = ties.links(sheet.case, points) if supports and sheet.case else None
-    if linked is not None and len(linked.nodes):
-        keys.append(linked.key)
+    keys += [*edge_keys(sheet, elements, loads), *panel_keys(sheet)]
+    keys += [key for mark in shown for key in mark.keys]
 
     columns = style.columns_that_fit(keys, scene.WIDTH, _LEGEND_COLUMNS)
     rows = -(-len(keys) // columns)
@@ -126,21 +115,12 @@ def draw_structure(
     if displacement is not None:
         add_undeformed(axes, sheet)
     DrawnSheet(axes, sheet, points, sight, elements, loads)
-    attached.draw(axes)
-    for share in warm:
-        middles = following.panel_middles(sheet.structure, points, share)
-        look = {"color": style.WARM, "markersize": 9.0, "markeredgecolor": "white", "zorder": 6.4}
-        axes.plot(*middles.T, "*", **look)
-    for group in groups:
-        marks.add_triangles(axes, group.triangles, group.color, 6.0)
-    for group in arrows:
-        scene.add_segments(axes, group.shafts, group.color, 1.8, zorder=7.0)
-        marks.add_triangles(axes, group.heads, group.color, 7.5)
-    if linked is not None and len(linked.nodes):
-        scene.add_segments(axes, linked.segments, style.LINK, 1.4, "dotted", zorder=6.5)
-        look = {"s": 22.0, "facecolors": "none", "edgecolors": style.LINK, "linewidths": 1.0}
-        axes.scatter(*linked.nodes.T, depthshade=False, zorder=6.5, **look)
-    _write_labels(axes, sheet, points, numbers, groups, (triangles, shafts, heads), sight)
+    for mark in shown:
+        mark.draw(axes)
+    obstacles = [points, marks.along_lines(points[sheet.pieces])]
+    obstacles += [marks.along_lines(line) for mark in arrows for line in mark.lines]
+    obstacles += [marks.outline(part) for part in (triangles, *(mark.triangles for mark in arrows))]
+    _write_labels(axes, sheet, points, numbers, groups, np.vstack(obstacles), sight)
     return style.finish(figure, keys, columns)
 
 
@@ -160,22 +140,11 @@ def checked_displacement(sheet: Sheet3D, displacement: ArrayLike | None) -> Poin
 
 
 class _Supports(NamedTuple):
-    """Marks of one kind of support: triangles (k, 3, 3), and the axes of each node."""
+    """Marks of one kind of support, and the axes of each node with the color of their names."""
 
-    triangles: Points
+    mark: Mark
     axes: list[tuple[int, str]]
-    color: str
-    ink: str  # of the axes' names
-    text: str
-
-
-class _Arrows(NamedTuple):
-    """Arrows of one color, and their legend entries."""
-
-    shafts: Points
-    heads: Points
-    color: str
-    keys: list[Line2D]
+    ink: str
 
 
 def _supports(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[_Supports]:
@@ -187,59 +156,67 @@ def _supports(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[
         (Impose, imposed, style.IMPOSED, style.IMPOSED_TEXT, "imposed displacement (directions)"),
     ]
     groups = []
-    for kind, mask, *look in kinds:
+    for kind, mask, color, ink, text in kinds:
         straight, axes = marks.support_triangles(points, mask, size, sight, moves)
         oblique = ties.direction_triangles(sheet.case, kind, points, size, sight)
         if len(straight) or len(oblique):
-            groups.append(_Supports(np.concatenate([straight, oblique]), axes, *look))
+            triangles, keys = (
+                np.concatenate([straight, oblique]),
+                [Patch(facecolor=color, label=text)],
+            )
+            groups.append(_Supports(Mark(color, keys, (), triangles, zorder=5.5), axes, ink))
     return groups
 
 
-def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:
+def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[Mark]:
     """Return arrows of imposed displacements, and of the base at the middle of its nodes."""
-    imposed = [(points, vectors) for vectors, _ in sheet.case.prescribed_terms]
-    moved = [histories.base_vectors(sheet.case, vectors) for vectors, _ in sheet.case.base_terms]
-    base = [
-        (points[vectors.any(axis=1)].mean(axis=0)[None], histories.signed_peak(vectors)[None])
-        for vectors in moved
+    imposed = [
+        (points, vectors, f"moved {histories.describe(vectors, 'm')}")
+        for vectors, _ in sheet.case.prescribed_terms
     ]
+    base = []
+    for vectors, _ in sheet.case.base_terms:
+        moved = histories.base_vectors(sheet.case, vectors)
+        peak = histories.signed_peak(moved)
+        middle = points[moved.any(axis=1)].mean(axis=0)
+        base.append((middle[None], peak[None], histories.describe_base(peak)))
     return [
-        *_arrows(imposed, length, sight, style.IMPOSED, histories.describe_imposed),
-        *_arrows(base, length, sight, style.BASE, histories.describe_base),
+        *_arrows(imposed, length, sight, style.IMPOSED),
+        *_arrows(base, length, sight, style.BASE),
     ]
 
 
-def _dashpots(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[_Arrows]:
+def _dashpots(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[Mark]:
     """Return the lines of the dashpots."""
     lines = dashpots.dashpot_lines(sheet.case, points, size, sight)
     if not len(lines):
         return []
     texts = dict.fromkeys(dashpots.describe_dashpot(one) for _, one in sheet.case.dashpots)
     keys = [style.key(text, color=style.DASHPOT, linewidth=1.8) for text in texts]
-    return [_Arrows(lines, np.zeros((0, 3, 3)), style.DASHPOT, keys[:_MOST_LOADS_LISTED])]
+    return [Mark(style.DASHPOT, keys[:_MOST_LOADS_LISTED], [lines])]
 
 
-def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:
+def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[Mark]:
     """Return arrows of forces, pressure and moments, and of gravity at the center of mass."""
-    case = sheet.case
-    vertices = len(sheet.pattern.vertices)
-    forces = [(points, vectors) for vectors, _ in case.force_terms]
-    pushed = [share for share in following.on_panels(case, Pressure) if share.value.any()]
-    pressure = [following.panel_arrows(case, points, share) for share in pushed]
-    told = iter([histories.describe_pressure(share) for share in pushed])
-    gravity = [
-        (_center_of_mass(sheet, points)[None], vector[None])
-        for vector, _ in sheet.case.gravity_terms
+    case, vertices = sheet.case, len(sheet.pattern.vertices)
+    forces = [(points, f, histories.describe(f, "N")) for f, _ in case.force_terms]
+    pressure = [
+        (*following.panel_arrows(case, points, share), histories.describe_pressure(share))
+        for share in following.on_panels(case, Pressure)
     ]
+    gravity = []
+    for vector, _ in case.gravity_terms:  # which needs masses, as no other load does
+        center = case.nodal_mass @ points / case.nodal_mass.sum()
+        gravity.append((center[None], vector[None], histories.describe_gravity(vector)))
     return [
-        *_arrows(forces, length, sight, style.LOAD, histories.describe_load, vertices),
-        *_arrows(pressure, length, sight, style.LOAD, lambda _: next(told)),
+        *_arrows(forces, length, sight, style.LOAD, vertices),
+        *_arrows(pressure, length, sight, style.LOAD),
         *_turns(sheet, points, length, sight),
-        *_arrows(gravity, 1.5 * length, sight, style.GRAVITY, histories.describe_gravity),
+        *_arrows(gravity, 1.5 * length, sight, style.GRAVITY),
     ]
 
 
-def _turns(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:
+def _turns(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[Mark]:
     """Return curved arrows of moments of creases."""
     shares = following.moments(sheet.case)
     if not shares:
@@ -253,46 +230,48 @@ def _turns(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_
     look = {"color": style.LOAD, "marker": ">", "markersize": 6.0, "linewidth": 1.8}
     keys = [style.key(histories.describe_moment(share), **look) for share in shares]
     pieces, heads = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
-    return [_Arrows(pieces, heads, style.LOAD, keys)]
+    return [Mark(style.LOAD, keys, [pieces], heads)]
+
+
+def _warm(sheet: Sheet3D, points: Points) -> list[Mark]:
+    """Return stars on panels that are warmed."""
+    look, found = {"marker": "*", "markersize": 9.0, "markeredgecolor": "white"}, []
+    for share in following.on_panels(sheet.case, Temperature):
+        key = style.key(
+            histories.describe_temperature(share), color=style.WARM, marker="*", linestyle="none",
+            markersize=8.0,
+        )  # fmt: skip
+        middles = following.panel_middles(sheet.structure, points, share)
+        found.append(Mark(style.WARM, [key], dots=middles, zorder=6.4, look=look))
+    return found
 
 
 def _arrows(
-    terms: list[tuple[Points, Points]],
+    terms: list[tuple[Points, Points, str]],
     length: float,
     sight: View,
     color: str,
-    describe: Callable[[Points], str],
     vertices: int | None = None,
-) -> list[_Arrows]:
-    """Return arrows from points along vectors, both (k, 3) in each term, one key for each term.
+) -> list[Mark]:
+    """Return arrows from points along vectors, both (k, 3) in each term, with the term's text.
 
     vertices : of crowds of nodes beyond this number, those that stand too close have no arrow.
     """
-    terms = [(points, vectors) for points, vectors in terms if vectors.any()]
+    terms = [term for term in terms if term[1].any()]
     if not terms:
         return []
-    how = length, sight
-    longest = max(float(np.linalg.norm(vectors, axis=1).max()) for _, vectors in terms)
+    longest = max(float(np.linalg.norm(vectors, axis=1).max()) for _, vectors, _ in terms)
     drawn = [
-        marks.load_arrows(at, marks.thinned(at, vectors, length, vertices), longest, *how)
-        for at, vectors in terms
+        marks.load_arrows(at, marks.thinned(at, vectors, length, vertices), longest, length, sight)
+        for at, vectors, _ in terms
     ]
     look = {"color": color, "marker": ">", "markersize": 6.0, "linewidth": 1.8}
-    keys = [
-        style.key(describe(vectors if len(vectors) > 1 else vectors[0]), **look)
-        for _, vectors in terms[:_MOST_LOADS_LISTED]
-    ]
+    keys = [style.key(text, **look) for *_, text in terms[:_MOST_LOADS_LISTED]]
     hidden = len(terms) - _MOST_LOADS_LISTED
     if hidden > 0:
         keys.append(style.key(f"and {hidden} more", linestyle="none"))
     shafts, heads = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
-    return [_Arrows(shafts, heads, color, keys)]
-
-
-def _center_of_mass(sheet: Sheet3D, points: Points) -> Points:
-    """Return the center (3,) of the nodes' masses at these positions (n, 3)."""
-    mass = sheet.case.nodal_mass
-    return mass @ points / mass.sum()
+    return [Mark(color, keys, [shafts], heads)]
 
 
 def _write_labels(
@@ -301,7 +280,7 @@ def _write_labels(
     points: Points,
     numbers: bool | str,
     groups: list[_Supports],
-    drawn: tuple[Points, Points, Points],
+    obstacles: Points,
     sight: View,
 ) -> None:
     """Write node numbers and the directions of supports where they hide least."""
@@ -309,16 +288,6 @@ def _write_labels(
     shown = len(points) if numbers == "all" else count if numbers else 0
     # Large sheets get smaller numbers, closer to their nodes.
     crowd = float(np.clip(np.sqrt(20.0 / max(shown, 1)), 0.6, 1.0))
-    triangles, shafts, heads = drawn
-    obstacles = np.vstack(
-        [
-            points,
-            marks.along_lines(points[sheet.pieces]),
-            marks.along_lines(shafts),
-            marks.outline(triangles),
-            marks.outline(heads),
-        ]
-    )
     labels = marks.Labels(axes, sight, 0.036 * crowd * sheet.size, obstacles)
     for node in range(shown):
         inner = node >= count
@@ -326,9 +295,9 @@ def _write_labels(
         labels.add(points[node], str(node), color, crowd * (style.TICK if inner else style.LABEL))
     for group in groups:
         for node, names in group.axes:
-            tips = group.triangles[:, 0]
-            apart = np.abs(tips - points[node]).max(axis=1)
-            corners = group.triangles[apart < 1e-6 * sheet.size]
+            triangles = group.mark.triangles
+            apart = np.abs(triangles[:, 0] - points[node]).max(axis=1)
+            corners = triangles[apart < 1e-6 * sheet.size]
             # Beside the foot of the lowest triangle, away from the node's own number.
             foot = corners[:, 1:].mean(axis=1)
             lowest = foot[np.argmin(sight.flat(foot)[:, 1])]

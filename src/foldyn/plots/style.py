@@ -7,7 +7,7 @@ fonts, colors and widths are set one by one, so the caller's usual settings do n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -106,7 +106,6 @@ def rows(
     title: str,
     xlabel: str,
     ylabels: Sequence[str],
-    titles: Sequence[str] = (),
     heights: Sequence[float] | None = None,
 ) -> tuple[Figure, NDArray]:
     """Return a figure of axes in rows that share the horizontal axis, named below the last one.
@@ -118,8 +117,6 @@ def rows(
     title, xlabel : str
     ylabels : sequence of str
         One for each row.
-    titles : sequence of str, optional
-        Titles of the rows.
     heights : sequence of float, optional
         Heights of the rows relative to each other.
     """
@@ -127,7 +124,7 @@ def rows(
     grid = {"height_ratios": heights}
     axes = figure.subplots(len(ylabels), 1, squeeze=False, sharex=True, gridspec_kw=grid)[:, 0]
     for k, row in enumerate(axes):
-        frame(row, xlabel if row is axes[-1] else "", ylabels[k], titles[k] if titles else "")
+        frame(row, xlabel if row is axes[-1] else "", ylabels[k])
     figure.align_ylabels(list(axes))
     return figure, axes
 
@@ -157,11 +154,13 @@ def key(label: str, **look: Any) -> Line2D:
     return Line2D([], [], label=label, **look)
 
 
-def exponents(axes: Axes, ticks: int = 6) -> None:
-    """Write small and large values of the vertical axis with one common exponent."""
-    axes.ticklabel_format(axis="y", scilimits=(-2, 4), useMathText=True)
-    axes.yaxis.get_offset_text().set(fontsize=TICK, color=BLACK)
-    axes.locator_params(axis="y", nbins=ticks)
+def exponents(axes: Axes, ticks: int = 6, which: Literal["x", "y"] = "y") -> None:
+    """Write small and large values of an axis with one common exponent."""
+    small = -2 if which == "y" else -3
+    axes.ticklabel_format(axis=which, scilimits=(small, 4), useMathText=True)
+    side = axes.yaxis if which == "y" else axes.xaxis
+    side.get_offset_text().set(fontsize=TICK, color=BLACK)
+    axes.locator_params(axis=which, nbins=ticks)
 
 
 def columns_that_fit(handles: Sequence, width: float, most: int) -> int:

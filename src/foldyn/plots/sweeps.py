@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -14,25 +14,28 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import style
+from foldyn.plots.chart_figures import figure_of
+from foldyn.plots.sweep_charts import (
+    by_ratio,
+    check_left,
+    check_some,
+    effect_charts,
+    line_chart,
+    named,
+    places,
+)
 from foldyn.results.sweep_dataset import (
     SobolIndices,
     is_grid,
-    keys_of,
     label,
-    main_effects,
     measured,
-    measures_of,
     parameters_of,
 )
 from foldyn.values import choice
 
-MOST_LINES = 12
-"""Curves in one figure."""
 COLUMNS = 3
 _SHADES = LinearSegmentedColormap.from_list("sweep", ["#FFFFFF", style.SKY, style.BLUE])
 _FAILED: dict[str, Any] = {"marker": "x", "color": style.VERMILLION, "linestyle": "none"}
-_RATIO = 30.0
-"""Ratio of the largest to the smallest value from which evenly spaced ratios have such an axis."""
 
 
 def plot_sweep_map(
@@ -73,7 +76,7 @@ def plot_sweep_map(
     found = measured(sweep, measure, at)
     first, second = _two(sweep, x, y, at)
     if is_grid(sweep):
-        _check_left(found, (first, second))
+        check_left(found, (first, second))
     figure = style.new_figure(6.2, 4.4, title)
     axes = figure.subplots()
     style.frame(axes, label(sweep[first]), label(sweep[second]))
@@ -82,7 +85,7 @@ def plot_sweep_map(
     if is_grid(sweep):
         values = found.transpose(second, first).values
         mesh = np.ma.masked_invalid(values)
-        _check_some(values, measure)
+        check_some(values, measure)
         drawn = axes.pcolormesh(
             across, down, mesh, cmap=_SHADES, shading="nearest", rasterized=True
         )
@@ -93,14 +96,14 @@ def plot_sweep_map(
         axes.plot(across[missing[:, 1]], down[missing[:, 0]], **_FAILED)
     else:
         values = found.values
-        _check_some(values, measure)
+        check_some(values, measure)
         there = np.isfinite(values)
         look = {"c": values[there], "cmap": _SHADES, "s": 26.0, "edgecolors": style.GRAY}
         drawn = axes.scatter(across[there], down[there], linewidths=0.5, **look)
         missing = np.flatnonzero(~there)
         axes.plot(across[missing], down[missing], **_FAILED)
     bar = figure.colorbar(drawn, ax=axes)
-    bar.set_label(_named(found), **style.TEXT)
+    bar.set_label(named(found), **style.TEXT)
     bar.ax.tick_params(labelsize=style.TICK, labelcolor=style.BLACK, color=style.GRAY)
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
     return style.finish(figure, [style.key("no value", **_FAILED)] if len(missing) else ())
@@ -143,43 +146,8 @@ def plot_sweep_lines(
         Not a sweep, no such measure or parameter, no value at any point, or a further parameter of
         a grid that `at` does not name.
     """
-    choice("measure", measure, measures_of(sweep))
-    names = [name for name in parameters_of(sweep) if name not in (at or {})]
-    along = choice("x", x, names) if x is not None else (names or parameters_of(sweep))[0]
-    others = [name for name in names if name != along]
-    own = [str(dim) for dim in sweep[measure].dims if dim not in (*keys_of(sweep), "point")]
-    if by is not None:
-        choice("by", by, [*others, *own])
-    elif is_grid(sweep) and others:
-        by = others[0]
-    figure = style.new_figure(6.2, 4.0, title)
-    axes = figure.subplots()
-    curves: list[tuple[str, xr.DataArray]] = []
-    if by is not None and by in sweep[measure].dims:
-        values = sweep[by].values.tolist()
-        chosen = np.unique(
-            np.linspace(0, len(values) - 1, min(len(values), MOST_LINES)).astype(int)
-        )
-        for k in chosen:
-            curve = measured(sweep, measure, {**(at or {}), by: values[k]})
-            curves.append((f"{label(sweep[by])} {_short(values[k])}", curve))
-    elif by is not None:
-        raise InputError(f" = {by}: samples have a value of it each; name a dimension", "by")
-    else:
-        curves.append(("", measured(sweep, measure, at)))
-    style.frame(axes, label(sweep[along]), _named(curves[0][1], by))
-    places, keys = _places(axes, sweep[along], "x"), []
-    _check_some(np.concatenate([curve.values.ravel() for _, curve in curves]), measure)
-    for index, (name, curve) in enumerate(curves):
-        look = style.line_style(index) | {"marker": "o", "markersize": 3.0}
-        if is_grid(sweep):
-            _check_left(curve, (along,))
-        else:
-            look |= {"linestyle": "none", "markersize": 4.0}
-        axes.plot(places, curve.values, **look)
-        keys += [style.key(name, **look)] if name else []
-    style.exponents(axes)
-    return style.finish(figure, keys, columns=3, width=6.0)
+    chart = line_chart(sweep, measure, x, by, at)
+    return figure_of([chart], (6.2, 4.0), title)
 
 
 def plot_main_effects(
@@ -203,23 +171,10 @@ def plot_main_effects(
     InputError
         As of `plot_sweep_map`.
     """
-    found = measured(sweep, measure, at)
-    _check_some(found.values, measure)
-    effects = main_effects(sweep, measure, at)
-    columns = min(COLUMNS, len(effects))
-    down = -(-len(effects) // columns)
-    figure = style.new_figure(0.6 + 2.8 * columns, 0.5 + 2.6 * down, title)
-    frames = figure.subplots(down, columns, squeeze=False, sharey=True).ravel()
-    for k, (axes, effect) in enumerate(zip(frames, effects, strict=False)):
-        name = _named(found) if k % columns == 0 else ""
-        style.frame(axes, label(sweep[effect.name]), name)
-        places = _places(axes, xr.DataArray(effect.values), "x")
-        low, high = effect.mean - effect.deviation, effect.mean + effect.deviation
-        axes.fill_between(places, low, high, color=style.SKY, alpha=0.3, linewidth=0.0)
-        axes.plot(places, effect.mean, **style.line_style(0), marker="o", markersize=3.0)
-    for axes in frames[len(effects) :]:
-        axes.set_visible(False)
-    style.exponents(frames[0])
+    charts = effect_charts(sweep, measure, at)
+    columns = min(COLUMNS, len(charts))
+    size = 0.6 + 2.8 * columns, 0.5 + 2.6 * -(-len(charts) // columns)
+    figure = figure_of(charts, size, title, columns, legend=0, sharey=True)
     keys = [
         style.key("mean over everything else", color=style.BLUE, marker="o", markersize=3.0),
         style.key("standard deviation", color=style.SKY, alpha=0.3, linewidth=6.0),
@@ -291,56 +246,13 @@ def _two(
     return chosen[0], chosen[1]
 
 
-def _check_left(found: xr.DataArray, shown: Sequence[str]) -> None:
-    """Refuse a further parameter without a value."""
-    left = [str(dim) for dim in found.dims if dim not in shown]
-    if left:
-        raise InputError(
-            f": {', '.join(left)}: has several values; name one, as in "
-            f"{{{left[0]!r}: {found[left[0]].values[0]!r}}}",
-            "at",
-        )
-
-
-def _check_some(values: NDArray, measure: str) -> None:
-    if not np.isfinite(values).any():
-        raise InputError(f" = {measure}: has no value at any point", "measure")
-
-
-def _named(found: xr.DataArray, by: str | None = None) -> str:
-    """Label of a measure, with where it is along its own dimensions."""
-    places = [
-        f"{one.attrs.get('long_name', name)} {_short(one.item())}"
-        for name, one in found.coords.items()
-        if one.ndim == 0 and name != by
-    ]
-    text = str(found.attrs.get("long_name", found.name))
-    return label(found, ", ".join([text, *places]))
-
-
-def _short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
 def _places(axes: Axes, one: xr.DataArray, which: Literal["x", "y"]) -> NDArray:
     """Where the values of a parameter stand along an axis, which gets its ticks or its scale."""
-    values = one.values
-    if values.dtype.kind not in "iuf":
-        words, place = np.unique(values, return_inverse=True)
-        if one.dims and one.name in one.dims:
-            words, place = values, np.arange(len(values))
-        getattr(axes, f"set_{which}ticks")(np.arange(len(words)), [str(word) for word in words])
-        return np.asarray(place, float)
-    if _by_ratio(np.unique(values)):
+    values, words = places(one.values)
+    if words:
+        getattr(axes, f"set_{which}ticks")(range(len(words)), words)
+    elif by_ratio(values):
         getattr(axes, f"set_{which}scale")("log")
-        return values.astype(float)
-    axes.ticklabel_format(axis=which, scilimits=(-2, 4), useMathText=True)
-    axes.locator_params(axis=which, nbins=6)
-    side = axes.xaxis if which == "x" else axes.yaxis
-    side.get_offset_text().set(fontsize=style.TICK, color=style.BLACK)
-    return values.astype(float)
-
-
-def _by_ratio(values: NDArray) -> bool:
-    """Whether values go by ratios."""
-    return bool(values.size > 2 and values[0] > 0.0 and values[-1] > _RATIO * values[0])
+    else:
+        style.exponents(axes, which=which)
+    return values

@@ -2,28 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from matplotlib.lines import Line2D
 
 from foldyn.cases import Case, Fix, Impose, Link, resolve_nodes
 from foldyn.cases.directions import unit_vector
 from foldyn.plots import marks, style
+from foldyn.plots.marks import Mark
 from foldyn.plots.scene import Points, View
-
-
-class Links(NamedTuple):
-    """Lines between nodes that are tied together, and the nodes."""
-
-    segments: Points  # (k, 2, 3)
-    nodes: Points  # (m, 3)
-
-    @property
-    def key(self) -> Line2D:
-        """Its legend entry."""
-        look = {"color": style.LINK, "marker": "o", "markersize": 5.0, "markerfacecolor": "none"}
-        return style.key("link (nodes tied together)", linestyle="dotted", **look)
 
 
 def direction_triangles(case: Case, kind: type, points: Points, size: float, sight: View) -> Points:
@@ -47,7 +32,7 @@ def _values(support: Fix | Impose, count: int) -> Points:
     return np.broadcast_to(getattr(support, "value", 0.0), (count,))
 
 
-def links(case: Case, points: Points) -> Links:
+def links(case: Case, points: Points) -> list[Mark]:
     """Lines from the first of some linked nodes to the others, or from riders to their carriers."""
     segments, tied = [], []
     for support in case.supports:
@@ -56,4 +41,12 @@ def links(case: Case, points: Points) -> Links:
             first, others = ([nodes[0]], nodes[1:]) if support.to is None else (support.to, nodes)
             segments += [[points[a], points[b]] for a in first for b in others]
             tied += [points[node] for node in nodes]
-    return Links(np.array(segments).reshape(-1, 2, 3), np.array(tied).reshape(-1, 3))
+    if not tied:
+        return []
+    look = {"marker": "o", "markersize": 5.0, "markerfacecolor": "none"}
+    key = style.key("link (nodes tied together)", color=style.LINK, linestyle="dotted", **look)
+    lines, dots = np.array(segments), np.array(tied)
+    return [
+        Mark(style.LINK, [key], [lines], dots=dots, zorder=6.5, width=1.4, dashes="dotted",
+             look=look)
+    ]  # fmt: skip

@@ -13,12 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.along import AXES, check_nodes_of
+from foldyn.plots.chart_figures import figure_of
+from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.given import alone
+from foldyn.plots.track_charts import dimension, track_charts
 from foldyn.values import choice
 
 _MARGIN = 0.08  # of the model's size, around it in an overlay
 _WIDTH = 8.0  # inches
-_LABELS = {"time": "time (s)", "photo": "photo", "load": "load (N)"}
 
 
 def plot_tracks(
@@ -58,39 +60,8 @@ def plot_tracks(
         size = np.nan_to_num(moved.sel(node=nodes).values)
         axis = AXES[int(np.ptp(size.reshape(-1, 3), axis=0).argmax())]
     choice("axis", axis, AXES)
-    along = _dimension(tracks)
-    shown = "load" if along == "photo" and "load" in tracks.coords else along
-    across = tracks[shown].values
-    names = [_name(tracks, node) for node in nodes]
-    size = _WIDTH, 1.1 + 1.6 * len(nodes)
-    ylabels = [f"{axis} displacement (m)"] * len(nodes)
-    figure, rows = style.rows(size, title, _LABELS[shown], ylabels, names)
-    mark = {"marker": "o", "markersize": 4} if along == "photo" else {}
-    keys = []
-    for row, (node, axes) in enumerate(zip(nodes, rows, strict=True)):
-        lines = []
-        if truth is not None and node in truth:
-            look = style.line_style(1) | {"label": "true motion"}
-            lines += axes.plot(across, np.asarray(truth[node]), **look)
-        look = style.line_style(0) | {"label": "tracked"} | mark
-        lines += axes.plot(across, moved.sel(node=node, axis=axis).values, **look)
-        keys += lines if row == 0 else []
-        axes.margins(x=0.02 if along == "photo" else 0.0)
-        style.exponents(axes, ticks=5)
-    return style.finish(figure, keys if len(keys) > 1 else [])
-
-
-def _dimension(tracks: xr.Dataset) -> str:
-    """Dimension along which pictures were taken."""
-    return "photo" if "photo" in tracks.dims else "time"
-
-
-def _name(tracks: xr.Dataset, node: int) -> str:
-    """Title of a node's history: how well it was measured."""
-    name = f"node {node}: measured in {float(tracks['tracked'].sel(node=node)):.1%}"
-    if "error" in tracks and np.isfinite(tracks["error"].sel(node=node)):
-        name += f", standard error {1e6 * float(tracks['error'].sel(node=node)):.2g} µm"
-    return name
+    charts = track_charts(tracks, nodes, [axis], truth)
+    return figure_of(charts, (_WIDTH, 1.1 + 1.6 * len(nodes)), title, sharex=True)
 
 
 def plot_steps(
@@ -116,17 +87,12 @@ def plot_steps(
     """
     if not isinstance(steps, Mapping) or not steps:
         raise InputError(": give a mapping with at least {'as measured': (time, values)}", "steps")
+    charts = [
+        Chart("time (s)", f"({unit})", [Curve(name, np.asarray(time), np.asarray(values))], name)
+        for name, (time, values) in steps.items()
+    ]
     size = 7.5, 0.8 + 1.35 * len(steps)
-    figure, rows = style.rows(size, title, "time (s)", [f"({unit})"] * len(steps), list(steps))
-    for axes, (name, (time, values)) in zip(rows, steps.items(), strict=True):
-        t: NDArray = np.asarray(time, dtype=np.float64)
-        x: NDArray = np.asarray(values, dtype=np.float64)
-        if t.shape != x.shape:
-            raise InputError(f"steps: {name!r} has {t.shape} times and {x.shape} values")
-        axes.plot(t, x, **style.line_style(0))
-        style.exponents(axes, ticks=4)
-        axes.margins(x=0.0)
-    return style.finish(figure)
+    return figure_of(charts, size, title, legend=0, sharex=True)
 
 
 def draw_overlay(
@@ -153,7 +119,7 @@ def draw_overlay(
     InputError
         There is no such frame.
     """
-    along = _dimension(alone("tracks", tracks))
+    along = dimension(alone("tracks", tracks))
     index = int(tracks.attrs.get("match_frame", 0)) if at is None else int(at)
     if not 0 <= index < tracks.sizes[along]:
         raise InputError(f"at: {index}; there are {tracks.sizes[along]} along {along}")

@@ -6,12 +6,13 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from foldyn.plots.scene import Indices, Points, View
 
 SAMPLES = 24  # pieces per edge: the ends of a hidden part are found to 1/24 of the edge, about
-_CHUNK = 1_000_000  # point-triangle pairs tested at a time (about 100 MB)
+_CHUNK = 10_000  # points tested at a time
 
 
 def hidden_points(
@@ -42,48 +43,11 @@ def hidden_points(
 
 
 def _near_pairs(points: Points, corners: Points) -> Iterator[tuple[Indices, Indices]]:
-    """Give all pairs of points (p, 2) and triangles (3, t, 2) that may overlap, some at a time.
-
-    The screen is cut into about as many cells as there are triangles: only a triangle whose
-    bounding box reaches into the cell of a point can hide it.
-    """
-    count = corners.shape[1]
-    if not count or not len(points):
-        return
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    corner, across = low.min(axis=0), np.ptp(corners.reshape(-1, 2), axis=0)
-    cells = max(1, round(np.sqrt(count)))
-    scale = cells / np.where(across > 0.0, across, 1.0)
-
-    def cell(places: Points) -> Indices:
-        return np.clip(np.floor((places - corner) * scale), 0, cells - 1).astype(np.int64)
-
-    first, last = cell(low), cell(high)
-    width, height = (last - first + 1).T
-    owner = np.repeat(np.arange(count), width * height)
-    place = _ranks(width * height)
-    row = first[owner, 0] + place % width[owner]
-    column = first[owner, 1] + place // width[owner]
-    order = np.argsort(row * cells + column, kind="stable")
-    of_cell = owner[order]
-    ends = np.cumsum(np.bincount(row * cells + column, minlength=cells**2))
-    home = cell(points) @ np.array([cells, 1])
-    many = np.diff(ends, prepend=0)[home]
-    begin = ends[home] - many
-    start = 0
-    total = np.cumsum(many)
-    while start < len(points):
-        before = total[start - 1] if start else 0
-        stop = max(start + 1, int(np.searchsorted(total, before + _CHUNK, side="right")))
-        some = slice(start, stop)
-        point = np.repeat(np.arange(start, stop), many[some])
-        yield point, of_cell[begin[point] + _ranks(many[some])]
-        start = stop
-
-
-def _ranks(counts: Indices) -> Indices:
-    """Return 0, 1, ..., count - 1 for each count, in a row."""
-    return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    """Give all pairs of points (p, 2) and triangles (3, t, 2) that may overlap, some at a time."""
+    tree = shapely.STRtree(shapely.box(*corners.min(axis=0).T, *corners.max(axis=0).T))
+    for start in range(0, len(points), _CHUNK):
+        point, triangle = tree.query(shapely.points(points[start : start + _CHUNK]))
+        yield start + point, triangle
 
 
 def split_edges(

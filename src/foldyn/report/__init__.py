@@ -1,6 +1,7 @@
 """Reports: one self-contained HTML page of text, tables and pictures."""
 
-from foldyn.report.charts import Chart, Charts, Curve
+from foldyn.plots.charts import Chart, Curve
+from foldyn.report.charts import Charts
 from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Listing, Picture, Section, Table, Text
 

@@ -11,9 +11,8 @@ import xarray
 
 from foldyn import plots
 from foldyn.cases import Case
-from foldyn.plots.law_curves import LawFrame, law_frames
-from foldyn.plots.load_curves import load_curves
-from foldyn.report.charts import Chart, Charts, Curve
+from foldyn.plots.law_charts import law_charts
+from foldyn.report.charts import Charts
 from foldyn.report.sections import Heading, Picture, Section, Table, Text
 from foldyn.shells import Shell
 from foldyn.writing import whole
@@ -21,9 +20,6 @@ from foldyn.writing import whole
 ByRule = Mapping[str, xarray.Dataset]
 """Results by mass rule."""
 DPI = 150
-LOADS = "Loads and imposed motions over time."
-CURVE_STEP, CURVE_POINTS = 4, 801
-"""Points of curves in charts: every so manieth of a law, and so many of a load."""
 MOST_NODES = 12
 """Nodes that one figure shows at most."""
 MOST_PAIRS = 24
@@ -73,37 +69,11 @@ class Album:
             "of a bar against its stretch."
         )
         if len(case.structure.folds) or not of_shell:
-            drawn = self.figure(
-                "laws", laws, lambda: plots.plot_laws(case.structure), law_charts(case, laws)
-            )
-            sections += drawn
+            charts = Charts(law_charts(case.structure), laws)
+            sections += self.figure("laws", laws, lambda: plots.plot_laws(case.structure), charts)
         if of_shell:
             sections.append(Text(described_shell(case.structure)))
         return sections
-
-
-def law_charts(case: Case, caption: str) -> Charts:
-    """Constitutive curves of a case, for a page without figures."""
-    return Charts([_law_chart(frame) for frame in law_frames(case.structure)], caption)
-
-
-def _law_chart(frame: LawFrame) -> Chart:
-    curves = [
-        Curve(curve.label, curve.x[::CURVE_STEP], curve.y[::CURVE_STEP]) for curve in frame.curves
-    ]
-    rest = [Curve("at rest", *np.transpose([curve.rest for curve in frame.curves]), dots=True)]
-    title, note = frame.title, frame.note
-    return Chart(frame.xlabel, frame.ylabel, [*curves, *rest], title, note, frame.reach)
-
-
-def load_charts(case: Case, start: float, duration: float) -> Charts:
-    """Loads and imposed motions of a case over time (s), for a page without figures."""
-    time = np.linspace(start, start + duration, CURVE_POINTS)
-    charts = [
-        Chart("time (s)", label, [Curve(one.label, time, one.values(time)) for one in curves])
-        for label, curves in load_curves(case)
-    ]
-    return Charts(charts, LOADS)
 
 
 def filled(sections: Iterable[Section]) -> list[Section]:

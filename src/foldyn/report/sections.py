@@ -17,14 +17,6 @@ from typing import Any
 from foldyn.errors import InputError
 from foldyn.report.charts import Charts
 
-_SIGNATURES = (
-    (0, b"\x89PNG\r\n\x1a\n", "image/png"),
-    (0, b"GIF87a", "image/gif"),
-    (0, b"GIF89a", "image/gif"),
-    (0, b"\xff\xd8\xff", "image/jpeg"),
-    (4, b"ftyp", "video/mp4"),
-)
-"""Places and bytes by which a file's kind is known."""
 _WIDE = 1200  # pixels; wider pictures are scrolled on a phone, as they would be too small to read
 
 
@@ -167,24 +159,30 @@ class Picture:
     def html(self) -> str:
         """Write as HTML."""
         content = self._bytes()
-        kinds = [kind for place, mark, kind in _SIGNATURES if content.startswith(mark, place)]
-        if not kinds:
-            raise InputError(f"source: {self._name()} is no PNG, GIF, JPEG or MP4")
         data = base64.b64encode(content).decode("ascii")
         alt = escape(self.alt or self.caption)
         caption = f"<figcaption>{escape(self.caption)}</figcaption>" if self.caption else ""
-        if kinds[0].startswith("video"):
+        if content[4:8] == b"ftyp":
             return (
                 f'<figure><video aria-label="{alt}" controls loop autoplay muted playsinline '
-                f'src="data:{kinds[0]};base64,{data}"></video>{caption}</figure>'
+                f'src="data:video/mp4;base64,{data}"></video>{caption}</figure>'
             )
-        width, height = _pixels(content)
-        size = f' width="{width}" height="{height}"' if width else ""
+        kind, width, height = self._picture(content)
         wide = ' class="wide"' if width > _WIDE else ""
         return (
-            f'<figure><div{wide}><img alt="{alt}"{size} '
-            f'src="data:{kinds[0]};base64,{data}"></div>{caption}</figure>'
+            f'<figure><div{wide}><img alt="{alt}" width="{width}" height="{height}" '
+            f'src="data:{kind};base64,{data}"></div>{caption}</figure>'
         )
+
+    def _picture(self, content: bytes) -> tuple[str, int, int]:
+        """Kind of a picture, its width and its height (pixels)."""
+        from PIL import Image, UnidentifiedImageError
+
+        try:
+            with Image.open(BytesIO(content), formats=("PNG", "GIF", "JPEG")) as picture:
+                return f"image/{str(picture.format).lower()}", picture.width, picture.height
+        except UnidentifiedImageError:
+            raise InputError(f"source: {self._name()} is no PNG, GIF, JPEG or MP4") from None
 
     def _bytes(self) -> bytes:
         if isinstance(self.source, bytes | bytearray):
@@ -206,15 +204,6 @@ class Picture:
 
 
 Section = Heading | Text | Table | Listing | Picture | Charts
-
-
-def _pixels(content: bytes) -> tuple[int, int]:
-    """Return width and height of a PNG or GIF; (0, 0) where the content does not say."""
-    if content.startswith(b"\x89PNG") and len(content) >= 24:
-        return int.from_bytes(content[16:20], "big"), int.from_bytes(content[20:24], "big")
-    if content.startswith(b"GIF") and len(content) >= 10:
-        return int.from_bytes(content[6:8], "little"), int.from_bytes(content[8:10], "little")
-    return 0, 0
 
 
 def rounded(value: float, digits: int) -> str:

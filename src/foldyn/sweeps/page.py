@@ -14,8 +14,9 @@ from foldyn import plots
 from foldyn.analyses import CaseFile
 from foldyn.analyses.provenance import Call, cost_rows, inputs_table
 from foldyn.errors import InputError
+from foldyn.plots.sweep_charts import effect_charts, line_chart
 from foldyn.report.album import Album
-from foldyn.report.charts import Chart, Charts, Curve
+from foldyn.report.charts import Charts
 from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Listing, Section, Table, Text, cell
 from foldyn.results.sweep_dataset import (
@@ -24,8 +25,6 @@ from foldyn.results.sweep_dataset import (
     is_grid,
     keys_of,
     label,
-    main_effects,
-    measured,
     measures_of,
     parameters_of,
     sobol_indices,
@@ -95,7 +94,7 @@ def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]
             else f"{text}: the points over each parameter, and their means."
         )
         draw = partial(plots.plot_main_effects, sweep, name, at)
-        charts = Charts([_effect(sweep, name, at, each) for each in names], caption)
+        charts = Charts(effect_charts(sweep, name, at, not is_grid(sweep)), caption)
         yield from album.figure(f"effects-{name}", caption, draw, charts)
     if is_grid(sweep) and len(names) <= 2:
         by = names[1] if len(names) == 2 else (own[0] if own else None)
@@ -103,12 +102,12 @@ def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]
         lines = text if by not in own else str(one.attrs["long_name"]).capitalize()
         caption = f"{lines}, over {sweep[names[0]].attrs['long_name']}."
         draw = partial(plots.plot_sweep_lines, sweep, name, names[0], by, kept)
-        charts = Charts([_lines(sweep, name, names[0], by, kept)], caption)
+        charts = Charts([line_chart(sweep, name, names[0], by, kept, MOST_CURVES)], caption)
         yield from album.figure(f"lines-{name}", caption, draw, charts)
     elif len(names) == 1:
         caption = f"{text}, at all points."
         draw = partial(plots.plot_sweep_lines, sweep, name, names[0], None, at)
-        charts = Charts([_effect(sweep, name, at, names[0])], caption)
+        charts = Charts(effect_charts(sweep, name, at, True), caption)
         yield from album.figure(f"lines-{name}", caption, draw, charts)
     if sweep.attrs["method"] == SALTELLI:
         yield from _indices(sweep, name, at, album, text)
@@ -135,48 +134,6 @@ def _indices(
     yield Table(header, rows, caption, digits=3)
     draw = partial(plots.plot_sobol_indices, found)
     yield from album.figure(f"indices-{name}", caption, draw)
-
-
-def _effect(sweep: xr.Dataset, name: str, at: dict[str, Any], each: str) -> Chart:
-    """Chart of a measure over one parameter."""
-    found, values = measured(sweep, name, at), sweep[each].values
-    (effect,) = (one for one in main_effects(sweep, name, at) if one.name == each)
-    curves = [Curve("mean", _numbers(effect.values, effect.values), effect.mean)]
-    if not is_grid(sweep):
-        curves.append(Curve("points", _numbers(values, effect.values), found.values, dots=True))
-    return Chart(_axis(sweep[each], effect.values), label(found), curves)
-
-
-def _lines(
-    sweep: xr.Dataset, name: str, along: str, by: str | None, at: dict[str, Any]
-) -> Chart:  # fmt: skip
-    """Chart of a measure over a parameter, a curve for each value of something else."""
-    x = _numbers(sweep[along].values, sweep[along].values)
-    values = [None] if by is None else sweep[by].values.tolist()
-    chosen = np.linspace(0, len(values) - 1, min(len(values), MOST_CURVES)).astype(int)
-    curves = []
-    for k in chosen.tolist():
-        found = measured(sweep, name, at if by is None else {**at, by: values[k]})
-        word = f"{values[k]:.4g}" if isinstance(values[k], float) else str(values[k])
-        text = name if by is None else f"{sweep[by].attrs.get('long_name', by)} {word}"
-        curves.append(Curve(text, x, found.values))
-    return Chart(_axis(sweep[along], sweep[along].values), label(sweep[name]), curves)
-
-
-def _numbers(values: np.ndarray, levels: np.ndarray) -> np.ndarray:
-    """Values as numbers: texts by their place in a list."""
-    if values.dtype.kind in "iuf":
-        return values.astype(float)
-    order = levels.tolist()
-    return np.array([order.index(value) for value in values.tolist()], float)
-
-
-def _axis(one: xr.DataArray, levels: np.ndarray) -> str:
-    """Label of an axis; of texts with what its numbers stand for."""
-    if one.values.dtype.kind in "iuf":
-        return label(one)
-    words = ", ".join(f"{k}: {word}" for k, word in enumerate(levels.tolist()))
-    return f"{label(one)}: {words}"
 
 
 def _points(sweep: xr.Dataset) -> Iterator[Section]:

@@ -9,32 +9,24 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from foldyn.analyses import CaseFile
 from foldyn.analyses.provenance import Call, computed, inputs, inputs_table
-from foldyn.cases.directions import AXES
+from foldyn.experiment.calibration.fit_charts import charts_of
 from foldyn.experiment.calibration.fitted import Fit
 from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
 from foldyn.experiment.calibration.measured import (
     MOST,
     ForceDisplacement,
-    Shapes,
     dense_curve,
-    picture_plane,
 )
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.modal import ModalParameters, ModeShapes
+from foldyn.experiment.calibration.mode_tables import modes_table, shapes_table
 from foldyn.experiment.calibration.responses import FrequencyResponse
-from foldyn.experiment.calibration.vibration_charts import (
-    modes_table,
-    response_charts,
-    shape_charts,
-    shapes_table,
-)
 from foldyn.report.album import Album
-from foldyn.report.charts import Chart, Charts, Curve
+from foldyn.report.charts import Charts
 from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Listing, Section, Table, Text, cell
 from foldyn.viewer import Stage, stage
@@ -79,21 +71,23 @@ def write_fit(
             "them apart, and their intervals are long in one direction."
         )
         table = _correlation(fit, caption)
-        sections += album.figure("correlation", caption, lambda: _drawn(fit, None, note), table)
+        draw = partial(_draw, "plot_correlation", fit, note)
+        sections += album.figure("correlation", caption, draw, table)
     if not all(one.determined for one in fit.estimates):
         sections.append(Text(_blind(fit)))
     sections += [Heading("Measured and model"), _scores(fit)]
     for i, one in enumerate(fit.problem.measurements):
         run = next(run for run in runs if i in run.members)
-        charts = _charts(fit, i, one, run)
+        model = run.result, run.case_file.case()
+        charts = charts_of(one, *model)
         if charts:
             shown = Charts(charts, _caption(one))
-            draw = partial(_drawn, fit, (one, run), note)
+            draw = partial(_draw, "plot_measured", one, *model, note)
             sections += album.figure(f"data-{i}", _caption(one), draw, shown)
         if isinstance(one, ModalParameters):
-            sections.append(modes_table(one, run.result, run.case_file.case()))
+            sections.append(modes_table(one, *model))
         elif isinstance(one, ModeShapes):
-            sections.append(shapes_table(one, run.result, run.case_file.case()))
+            sections.append(shapes_table(one, *model))
     sections += [Heading("The search"), _searches(fit), *_provenance(fit, runs, call or Call())]
     return write_report(folder / "report.html", title, sections)
 
@@ -217,72 +211,8 @@ def _caption(one: Measurement) -> str:
     return f"{text} Held out: the fit did not use it." if one.held_out else text
 
 
-def _charts(fit: Fit, number: int, one: Measurement, run: _Run) -> list[Chart]:
-    """What was measured beside the fitted model; empty where there is nothing to show."""
-    case, result = run.case_file.case(), run.result
-    if isinstance(one, ForceDisplacement):
-        curve = dense_curve(one)
-        model = Curve("model", curve.displacement, curve.predicted(result, case))
-        seen = Curve(one.label, one.displacement, one.force, dots=True)
-        return [Chart(f"{one.axis} displacement (m)", f"{one.axis} force (N)", [model, seen])]
-    if isinstance(one, Shapes):
-        return _shape_charts(one, run) if len(one.axes) > 1 else []
-    if isinstance(one, ModeShapes):
-        return shape_charts(one, result, case)
-    if isinstance(one, FrequencyResponse):
-        return response_charts(one, result, case)
-    if isinstance(one, TimeHistory):
-        curves, seen = one.curves(result, case), one.values - one.trend(one.values)
-        curves, along = curves - one.trend(curves), one.time
-        xlabel, ylabel = "time (s)", f"{one.axis} displacement (m)"
-    elif isinstance(one, Spectrum):
-        curves, seen, along = one.spectra(result, case), one.values, one.frequency
-        xlabel, ylabel = "frequency (Hz)", f"{one.axis} amplitude (m)"
-    else:
-        return []
-    return [
-        Chart(
-            xlabel,
-            ylabel,
-            [Curve("model", along, curves[:, k]), Curve(one.label, along, seen[:, k], dots=True)],
-            f"node {node}",
-        )
-        for k, node in enumerate(one.where(case)[:MOST].tolist())
-    ]
-
-
-def _shape_charts(one: Shapes, run: _Run) -> list[Chart]:
-    """Points that were measured beside those of the model, a chart for each load factor."""
-    case = run.case_file.case()
-    model, (across, up) = one.shapes(run.result, case), picture_plane(one, case)
-    letters = [AXES.index(axis) for axis in one.axes]
-    rest = case.structure.nodes[one.where(case)][:, letters]
-    origin = rest if one.quantity == "displacement" else 0.0
-    steps = np.linspace(0, len(one.load_factor) - 1, min(MOST, len(one.load_factor))).astype(int)
-    return [
-        Chart(
-            f"{one.axes[across]} (m)",
-            f"{one.axes[up]} (m)",
-            [
-                Curve(name, points[:, across], points[:, up], dots=True)
-                for name, points in (
-                    ("model", model[step] + origin), (one.label, one.values[step] + origin)
-                )
-            ],
-            f"load factor {one.load_factor[step]:.3g}",
-        )
-        for step in steps.tolist()
-    ]  # fmt: skip
-
-
-def _drawn(fit: Fit, shown: tuple[Measurement, _Run] | None, note: str) -> Any:
-    """Figure of a measurement, or of the correlation."""
+def _draw(name: str, *arguments: Any) -> Any:
+    """A figure; pages without figures do without matplotlib."""
     from foldyn.experiment.calibration import fit_figures
-    from foldyn.plots import style
 
-    if shown is None:
-        figure = fit_figures.plot_correlation(fit)
-    else:
-        figure = fit_figures.plot_measured(shown[0], shown[1].result, shown[1].case_file.case())
-    style.title_above(figure, note)
-    return style.finish(figure)
+    return getattr(fit_figures, name)(*arguments)

@@ -19,7 +19,8 @@ from foldyn.analyses.provenance import Call, cost_rows, inputs_table
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots.along import AXES, way
-from foldyn.report.charts import Chart, Charts, Curve
+from foldyn.plots.track_charts import track_charts
+from foldyn.report.charts import Charts
 from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Picture, Section, Table, Text, cell
 from foldyn.shells import shell
@@ -72,7 +73,10 @@ def write_tracks_page(
         nodes = most_moved(tracks)
         shown = _stage(tracks, footage.case, nodes, title, footage.pictures)
         sections += [shown, Heading("What was measured")]
-        sections += [Charts(_charts(tracks, nodes)), Text(FILLED.format(axis=_hidden(tracks)))]
+        sections += [
+            Charts(track_charts(tracks, nodes, AXES)),
+            Text(FILLED.format(axis=_hidden(tracks))),
+        ]
         sections.append(_nodes(tracks))
     sections += [Heading("What the camera saw"), *footage.figures] if footage.figures else []
     rows = [("seen", ", ".join(map(str, footage.files))), *footage.settings.items()]
@@ -164,28 +168,6 @@ def _stage(
         camera = projection(whole.reshape(-1, 3), seen.reshape(-1, 2))
         backdrop = Backdrop(taken, (width, height), camera)
     return stage({"tracked": result}, {"tracked": vertices}, title, nodes, backdrop)
-
-
-def _charts(tracks: xr.Dataset, nodes: list[int]) -> list[Chart]:
-    """Measured displacements of some nodes over time, photograph or load, a chart for each."""
-    along = "photo" if "photo" in tracks.dims else "time"
-    shown = "load" if along == "photo" and "load" in tracks.coords else along
-    label = {"time": "time (s)", "load": "load (N)", "photo": "photograph"}[shown]
-    across = np.asarray(tracks[shown].values, float)
-    moved = tracks["displacement"].transpose(along, "node", "axis")
-    return [
-        Chart(
-            label,
-            "displacement (m)",
-            [
-                Curve(axis, across, moved.sel(node=node, axis=axis).values, dots=True)
-                for axis in AXES
-                if np.isfinite(moved.sel(node=node, axis=axis).values).any()
-            ],
-            f"node {node}",
-        )
-        for node in nodes
-    ]
 
 
 def _hidden(tracks: xr.Dataset) -> str:

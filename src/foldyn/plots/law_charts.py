@@ -1,74 +1,57 @@
-"""Constitutive curves as numbers: moments of folds and bends, stress of bars."""
+"""Charts of constitutive curves: moments of folds and bends, stress of bars."""
 
 from __future__ import annotations
 
 from collections import Counter
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.materials.inelastic_law import memory_of
 from foldyn.materials.series import in_series
+from foldyn.plots.charts import Chart, Curve
 from foldyn.shells import Shell
 from foldyn.structures import Structure
 from foldyn.structures.discretized import HingeKind
 
 MOST_CURVES = 4
+POINTS = 359
 # A law may grow without bound towards 0 and 360 degrees: the height of the frame is taken from
 # what lies between these.
 _FRAMED = (20.0, 340.0)
 
 
-class LawCurve(NamedTuple):
-    """A curve (m,) with its state at rest."""
-
-    label: str
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    rest: tuple[float, float]
-
-
-class LawFrame(NamedTuple):
-    """Curves that share their axes.
-
-    reach : the largest value that their frame shows, in magnitude; 0: all.
-    note : what is left out.
-    """
-
-    title: str
-    xlabel: str
-    ylabel: str
-    curves: list[LawCurve]
-    reach: float = 0.0
-    note: str = ""
-
-
-def law_frames(
+def law_charts(
     structure: Structure | Shell, stretch: tuple[float, float] = (0.8, 1.2)
-) -> list[LawFrame]:
-    """Curves of the laws of a structure, a frame for each kind of element that it has.
+) -> list[Chart]:
+    """Curves of the laws of a structure, a chart for each kind of element that it has.
 
     Hinges of equal stiffness and rest angle share a curve; of each kind at most four different
     curves are shown, those of the most hinges. Moments (N m) are those of whole creases, dihedrals
-    in degrees, stresses in Pa.
+    in degrees, stresses in Pa. The last curve of a chart are the states at rest.
     """
-    frames = [_hinges(kind) for kind in structure.hinge_kinds if len(kind.nodes)]
+    charts = [_hinges(kind) for kind in structure.hinge_kinds if len(kind.nodes)]
     if structure.bar_law is not None:
-        modulus, x = structure.sheet.youngs_modulus, np.linspace(*stretch, 401)
+        modulus, x = structure.sheet.youngs_modulus, np.linspace(*stretch, POINTS)
         y = modulus * np.asarray(structure.bar_law.stress(x))
-        curve = LawCurve(f"bar: E {modulus:.4g} Pa", x, y, (1.0, 0.0))
+        curves = [Curve(f"bar: E {modulus:.4g} Pa", x, y), _at_rest([(1.0, 0.0)])]
         title = f"bars: {structure.bar_law.name} (second Piola-Kirchhoff stress)"
-        frames.append(LawFrame(title, "stretch (-)", "stress (Pa)", [curve]))
-    return frames
+        charts.append(Chart("stretch (-)", "stress (Pa)", curves, title, zero=True))
+    return charts
 
 
-def _hinges(hinges: HingeKind) -> LawFrame:
+def _at_rest(states: list[tuple[float, float]]) -> Curve:
+    return Curve("at rest", *np.transpose(states), dots=True)
+
+
+def _hinges(hinges: HingeKind) -> Chart:
     """Moment curves of one kind of hinge."""
     kind, stiffness, rest = hinges.name, hinges.stiffness, hinges.rest
-    degrees = np.linspace(1.0, 359.0, 1433)
+    degrees = np.linspace(1.0, 359.0, POINTS)
     framed = (degrees >= _FRAMED[0]) & (degrees <= _FRAMED[1])
-    groups, curves, reach = _distinct(stiffness, rest), [], 0.0
+    groups, reach = _distinct(stiffness, rest), 0.0
+    curves: list[Curve] = []
+    states: list[tuple[float, float]] = []
     for first, count in groups[:MOST_CURVES]:
         k, theta0, law = float(stiffness[first]), float(rest[first]), hinges.law_of(first)
         share = hinges.share[first]
@@ -78,15 +61,17 @@ def _hinges(hinges: HingeKind) -> LawFrame:
         label += f" and {count - 1} more" if count > 1 else ""
         angle = float(np.degrees(theta0))
         label += f": k {k:.4g} N m/rad, rest {angle:.4g}°"
-        at_rest = k * float(in_series(law, theta0, theta0, share)[1])
-        curves.append(LawCurve(label, degrees, moment, (angle, at_rest)))
+        states.append((angle, k * float(in_series(law, theta0, theta0, share)[1])))
+        curves.append(Curve(label, degrees, moment))
         reach = max(reach, float(np.abs(moment[framed]).max()))
     hidden = len(groups) - MOST_CURVES
     note = f"{hidden} other pairs of k and rest not shown" if hidden > 0 else ""
     title = f"{kind}s: {hinges.law.name}"
     if law := memory_of(hinges.law):
         title += f" (its elastic part, {law.elastic.name})"
-    return LawFrame(title, "dihedral (degrees)", "moment (N m)", curves, 1.08 * reach, note)
+    curves.append(_at_rest(states))
+    labels = "dihedral (degrees)", "moment (N m)"
+    return Chart(*labels, curves, title, note, 1.08 * reach, zero=True)
 
 
 def _distinct(stiffness: NDArray, rest: NDArray) -> list[tuple[int, int]]:

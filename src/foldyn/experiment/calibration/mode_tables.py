@@ -1,21 +1,14 @@
-"""What the page of a fit shows of modes and frequency responses beside the model."""
+"""Tables of measured modes beside those of the fitted model."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.experiment.calibration.measured import MOST
 from foldyn.experiment.calibration.modal import ModalParameters, ModeShapes, resisted
-from foldyn.experiment.calibration.responses import FrequencyResponse
-from foldyn.report.charts import Chart, Curve
 from foldyn.report.sections import Table, cell
-
-FLOOR = 1e-300
-"""Magnitude that stands for zero in decibels."""
 
 
 def modes_table(one: ModalParameters, result: Any, case: Case) -> Table:
@@ -53,43 +46,3 @@ def shapes_table(one: ModeShapes, result: Any, case: Case) -> Table:
         rows.append([mode, name, f, float(alike[k, place[k]]), float(others.max(initial=0.0))])
     header = ["mode", "model's mode", "its frequency (Hz)", "MAC", "next best MAC"]
     return Table(header, rows, f"{one.name}: paired by their shapes")
-
-
-def shape_charts(one: ModeShapes, result: Any, case: Case) -> list[Chart]:
-    """Components of measured shapes over those of the model, a chart for each mode."""
-    model = one.shapes(result, case)
-    charts = []
-    for mode, seen, said in zip(one.mode[:MOST].tolist(), one.values, model, strict=False):
-        known = np.isfinite(seen)
-        ends = np.array([said[known].min(), said[known].max()])
-        curves = [Curve("equal", ends, ends), Curve(one.label, said[known], seen[known], dots=True)]
-        charts.append(Chart("component, model", f"component, {one.label}", curves, f"mode {mode}"))
-    return charts
-
-
-def response_charts(one: FrequencyResponse, result: Any, case: Case) -> list[Chart]:
-    """Magnitude and, where it was measured, phase of responses, for each node."""
-    model, nodes = one.curves(result, case), one.where(case).tolist()
-    level = f"{one.axis} (dB{f' re 1 {one.unit}' if one.unit else ''})"
-    charts = []
-    for k, node in enumerate(nodes[:MOST]):
-        charts.append(_beside(one, level, k, node, _decibels(model), _decibels(one.values)))
-        if not one.magnitude:
-            phase = np.degrees(np.angle(model))
-            near = phase + np.degrees(np.angle(one.values * model.conj()))  # no jumps by a turn
-            charts.append(_beside(one, "phase (degrees)", k, node, phase, near))
-    return charts
-
-
-def _beside(
-    one: FrequencyResponse, ylabel: str, k: int, node: int, model: NDArray, seen: NDArray
-) -> Chart:
-    curves = [
-        Curve("model", one.frequency, model[:, k]),
-        Curve(one.label, one.frequency, seen[:, k], dots=True),
-    ]
-    return Chart("frequency (Hz)", ylabel, curves, f"node {node}, {one.quantity}")
-
-
-def _decibels(values: NDArray) -> NDArray[np.float64]:
-    return 20.0 * np.log10(np.maximum(np.abs(values), FLOOR))

@@ -1,0 +1,104 @@
+"""Charts: curves over their axes, which figures draw for papers and pages for their readers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from foldyn.errors import InputError
+
+DIGITS = 5
+"""Significant digits of the numbers in a page."""
+MOST_POINTS = 2000
+"""Points of a curve in a page at most; of longer ones every k-th."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A curve of a chart.
+
+    Parameters
+    ----------
+    name : str
+        For the key below the chart.
+    x, y : array_like, shape (m,)
+        Places along the axes; a curve may turn back. What is not finite is left out.
+    dots : bool
+        Whether it is drawn as dots, as measured values are, and not as a line.
+    spread : array_like, optional
+        How far y may be off: figures have bars about dots, and a band about a line.
+    """
+
+    name: str
+    x: ArrayLike
+    y: ArrayLike
+    dots: bool = False
+    spread: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        """Check that both have one length."""
+        if np.shape(self.x) != np.shape(self.y) or np.ndim(self.x) != 1:
+            raise InputError(
+                f"curve {self.name!r}: x {np.shape(self.x)} and y {np.shape(self.y)} must be lists "
+                "of one length"
+            )
+
+    def about(self) -> dict[str, Any]:
+        """What a page's script reads."""
+        x, y = np.asarray(self.x, float), np.asarray(self.y, float)
+        every = slice(None, None, -(-len(x) // MOST_POINTS) or 1)
+        kept = (np.isfinite(x) & np.isfinite(y))[every]
+        numbers = {name: _rounded(one[every][kept]) for name, one in (("x", x), ("y", y))}
+        return {"name": self.name, "dots": self.dots, **numbers}
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Curves over their axes.
+
+    Parameters
+    ----------
+    xlabel, ylabel : str
+        Titles of the axes, with units.
+    curves : sequence of Curve
+    title : str
+        Written above the chart.
+    note : str
+        Written below it.
+    reach : float
+        The vertical axis goes from -reach to reach; 0: as far as the curves do.
+    words : sequence of str
+        What the numbers 0, 1, 2, ... along the horizontal axis stand for.
+    zero : bool
+        Whether a figure shows where y is 0.
+    by_ratio : bool
+        Whether the horizontal axis of a figure is logarithmic.
+    """
+
+    xlabel: str
+    ylabel: str
+    curves: Sequence[Curve]
+    title: str = ""
+    note: str = ""
+    reach: float = 0.0
+    words: Sequence[str] = ()
+    zero: bool = False
+    by_ratio: bool = False
+
+    def about(self) -> dict[str, Any]:
+        """What a page's script reads."""
+        words = ", ".join(f"{k}: {word}" for k, word in enumerate(self.words))
+        return {
+            "xlabel": f"{self.xlabel}: {words}" if words else self.xlabel, "ylabel": self.ylabel,
+            "title": self.title, "reach": self.reach,
+            "curves": [curve.about() for curve in self.curves],
+        }  # fmt: skip
+
+
+def _rounded(values: np.ndarray) -> list[float]:
+    """Numbers with as many digits as a reader sees."""
+    return [float(f"{value:.{DIGITS}g}") for value in values.tolist()]
