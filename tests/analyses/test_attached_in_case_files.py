@@ -124,7 +124,7 @@ def test_modes_of_the_file_with_either_model(path):
         ("[[4, 3], [5, 2]]", "[[4, 3], [5, 5]]", r"supports\[2\]\.between\[1\] = \[5, 5\]: node 5"),
         ("[[4, 3], [5, 2]]", "[[4, 30]]", r"supports\[2\]\.between.*30"),
         ("mass = 0.25", "mass = 0", r"masses\[0\]\.mass = 0: must be greater than 0 kg"),
-        ("mass = 0.25", "", r"masses\[0\]\.mass: missing; give the mass"),
+        ("mass = 0.25", "", r"masses\[0\]\.mass: missing; give it \(kg\)"),
         ("mass = 0.25", "mass = 1\nweight = 3", r"masses\[0\]\.weight: unknown key"),
         ("[[0, 1]]", "[[0, 5]]", r"clamped: \(0, 5\) is not a boundary edge"),
         ("[[0, 1]]", "[[0, 1, 2]]", r"model\.clamped\[0\] = \[0, 1, 2\]: must be two nodes"),

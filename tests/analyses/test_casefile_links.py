@@ -107,7 +107,7 @@ def test_a_case_file_with_all_of_them(tmp_path, kind) -> None:
         ),
         (
             {"more": "[[supports]]\nnodes = [4]\ndisplacement = 0.1"},
-            r"supports\[5\].axis: missing; give the axis",
+            r"supports\[5\].axis: give the axis",
         ),
     ],
 )

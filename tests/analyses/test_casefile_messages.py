@@ -106,7 +106,7 @@ BAD = {
     ),
     "load without force": (
         [("force = [0.01, 0, 0]\n", "")],
-        "loads[0].force: missing; give its value",
+        "loads[0].force: missing; give it (N)",
     ),
     "load without nodes": (
         [("nodes = [6, 7, 8]\n", "")],

@@ -17,19 +17,19 @@ BAD = {
     ),
     "imposed without axis": (
         [('axes = "xyz"', "displacement = 0.1")],
-        "supports[0].axis: missing; give the axis of the displacement",
+        "supports[0].axis: give the axis of the displacement",
     ),
     "imposed on axes": (
         [('axes = "xyz"', 'axes = "x"\ndisplacement = 0.1')],
-        "supports[0].axes: holds nodes at rest, but displacement moves them; give either",
+        'supports[0].axes: holds nodes at rest, and axis = "x", say, moves them; leave out displ',
     ),
     "held with a history": (
         [('axes = "xyz"', 'axes = "x"\nhistory = { kind = "step" }')],
-        "supports[0].axes: holds nodes at rest, but history moves them; give either",
+        'supports[0].axes: holds nodes at rest, and axis = "x", say, moves them; leave out hist',
     ),
     "history of nothing": (
         [('axes = "xyz"', 'history = { kind = "step" }')],
-        "supports[0].axis: missing",
+        "supports[0].displacement: missing; give it (m)",
     ),
     "imposed nan": (
         [('axes = "xyz"', 'axis = "x"\ndisplacement = nan')],
@@ -76,7 +76,7 @@ BAD = {
     ),
     "base with nodes": (
         [('axes = "xyz"', 'base = "x"\nhistory = { kind = "step" }')],
-        "supports[0].base: moves all nodes that other [[supports]] hold along x; leave out nodes",
+        "supports[0].base: moves all nodes that supports hold along its axis; leave out nodes",
     ),
     "base displacement": (
         [
@@ -122,7 +122,7 @@ BAD = {
     ),
     "creases with a force": (
         [("force = [0.01, 0, 0]", "force = [0.01, 0, 0]\ncreases = [0]\nangle = 90")],
-        "loads[0].creases: creases that fold are a load of their own; leave out nodes and force",
+        "loads[0].angle: creases that fold are a load of their own; leave out nodes and force",
     ),
     "creases with gravity": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", "creases = [0]\ngravity = [0, 0, -9.81]")],

@@ -314,7 +314,7 @@ BAD_RESPONSE = {
         "drive = []: must have at least one entry",
     ),
     "drive of nothing": ([(DRIVE, "")], "drive[0]: give nodes and force, or base (the axis of a"),
-    "drive without force": ([(DRIVE, "nodes = 7")], "drive[0].force: missing; give its value"),
+    "drive without force": ([(DRIVE, "nodes = 7")], "drive[0].force: missing; give it (N)"),
     "drive without nodes": (
         [(DRIVE, "force = [1, 0, 0]")],
         "drive[0].nodes: missing; give its value",
@@ -338,7 +338,7 @@ BAD_RESPONSE = {
     "base axis": ([(DRIVE, 'base = "w"')], 'drive[0].base = "w": must be one of "x", "y" and "z"'),
     "displacement of a force": (
         [(DRIVE, DRIVE + "\ndisplacement = 1.0")],
-        'drive[0].displacement: is that of a base, as in base = "x"; leave it out, or give base',
+        "drive[0].displacement: moves all nodes that supports hold along its axis; leave out nodes",
     ),
     "base beside a force": (
         [("[[drive]]", '[[drive]]\nbase = "x"\n[[drive]]')],

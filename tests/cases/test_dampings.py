@@ -110,7 +110,7 @@ def test_case_files(text, damping, supports, tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[damping]\nmodal = -1\n", "damping.modal = -1.0: must be at least 0"),
+        ("[damping]\nmodal = -1\n", "damping.modal = -1: must be at least 0"),
         ("[damping]\nmodal = []\n", r"damping.modal = \[\]: must be a number, or a list"),
         ("[damping]\nmodal = { ratio = 1 }\n", "damping.modal.ratio: .*did you mean 'ratios'"),
         ("[damping]\nmodal = { count = 1 }\n", "damping.modal.ratios: missing"),
@@ -121,7 +121,7 @@ def test_case_files(text, damping, supports, tmp_path):
         ("[damping]\ncreases = [{ coefficient = 1 }, {}]\n", r"creases\[1\].coefficient: missing"),
         (
             "[[supports]]\nbetween = [0, 8]\n",
-            r"supports\[1\]: between is for springs and dashpots: give stiffness",
+            r"supports\[1\].stiffness: missing; give it \(N/m\) for springs, or dashpot",
         ),
         ("[[supports]]\ndashpot = 1\n", r"supports\[1\].nodes: give either nodes"),
         ("[[supports]]\ndashpot = 1\nnodes = [1]\nbetween = [1, 2]\n", "between: give either"),

@@ -22,8 +22,8 @@ from foldyn.analyses.motion import check_massless
 from foldyn.analyses.sections import Positive, Section, ShownSection, one_of, part
 from foldyn.analyses.vibration import About, Internal, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import BaseMotion, Case, Force
-from foldyn.cases.decode import check_keys, given_keys
-from foldyn.cases.directions import DIRECTIONS, check_axis
+from foldyn.cases.decode import check_keys, part_from
+from foldyn.cases.directions import DIRECTIONS
 from foldyn.cases.models import SHELL
 from foldyn.dynamics import Progress
 from foldyn.errors import InputError, within
@@ -124,22 +124,11 @@ def _keys(method: Any) -> list[str]:
 
 def _drive(table: Any, folder: Path | None) -> Force | BaseMotion:
     """A force on nodes, or a motion of the base, from its table of [[drive]]."""
-    given = given_keys(table, (Force, BaseMotion))
-    if "base" in given:
-        if given & {"nodes", "force"}:
-            raise InputError(
-                ": moves all nodes that supports hold along its axis; leave out nodes and force",
-                ".base",
-            )
-        value = number(".displacement", table.get("displacement", 1.0), above=0.0)
-        return BaseMotion(check_axis(".base", table["base"]), value=value)
-    if "displacement" in given:
-        raise InputError(
-            ': is that of a base, as in base = "x"; leave it out, or give base', ".displacement"
-        )
-    if not given:
-        raise InputError(": give nodes and force, or base (the axis of a base that moves)")
-    return Force.of(table)
+    if isinstance(table, Mapping):
+        number(".displacement", table.get("displacement", 1.0), above=0.0)
+        table = {**table, "history": {"kind": "constant"}}
+    asked = "nodes and force, or base (the axis of a base that moves)"
+    return part_from(table, (Force, BaseMotion), "drive", folder, asked)
 
 
 NO_HISTORY = (

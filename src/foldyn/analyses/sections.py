@@ -150,7 +150,7 @@ def _per_crease(value: Any) -> Any:
 Positive = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1, le=MOST)]
 Whole = Annotated[int, Field(ge=-MOST, le=MOST)]
-Nodes = Annotated[Any, PlainValidator(lambda value: check_nodes(value, ""))]
+Nodes = Annotated[Any, PlainValidator(lambda value: check_nodes("", value))]
 Vector = Annotated[Any, PlainValidator(lambda value: vector("", value))]
 BarLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, BAR_LAWS))]
 HingeLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, HINGE_LAWS))]
@@ -161,7 +161,7 @@ Animation = Annotated[str, one_of(ANIMATIONS)]
 
 
 def _edges(value: Any) -> Any:
-    return check_nodes(value, "") if isinstance(value, str) else check_pairs("", value)
+    return check_nodes("", value) if isinstance(value, str) else check_pairs("", value)
 
 
 Ratio = Annotated[float, Field(gt=-1, lt=0.5)]

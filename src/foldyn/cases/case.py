@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.arguments import brief
 from foldyn.cases.case_assembly import Damped, Loaded
 from foldyn.cases.clamped_edges import supported_points
 from foldyn.cases.contact import Contact
@@ -29,7 +30,7 @@ from foldyn.patterns.picture import picture
 from foldyn.structures.discretized import read_only
 from foldyn.structures.inelastic_hinges import Remembering, remembering
 from foldyn.structures.mass import center_of_mass, inertia_tensor, row_sums
-from foldyn.values import brief, show
+from foldyn.values import objects, show
 
 
 @brief
@@ -125,7 +126,7 @@ class Case(Loaded, Damped):
                 "structure",
             )
         for name, kinds in (("supports", SUPPORTS), ("loads", LOADS), ("masses", (PointMass,))):
-            object.__setattr__(self, name, _tuple_of(name, kinds, getattr(self, name)))
+            object.__setattr__(self, name, objects(name, getattr(self, name), kinds))
         object.__setattr__(self, "damping", dampings(self.damping))
         if self.contact is not None and not isinstance(self.contact, Contact):
             raise InputError(f"contact = {show(self.contact)}: must be a Contact")
@@ -263,13 +264,3 @@ class Case(Loaded, Damped):
     def inertia(self) -> NDArray[np.float64]:
         """Inertia tensor (3, 3) at rest about the center of mass, kg m2."""
         return inertia_tensor(self.structure.nodes, self.mass)
-
-
-def _tuple_of(name: str, kinds: tuple[type, ...], given: Any) -> tuple:
-    listed = " or ".join(kind.__name__ for kind in kinds)
-    if isinstance(given, str) or not isinstance(given, Sequence):
-        raise InputError(f"{name} = {show(given)}: must be a list of {listed}")
-    for i, item in enumerate(given):
-        if not isinstance(item, kinds):
-            raise InputError(f"{name}[{i}] = {show(item)}: must be a {listed}")
-    return tuple(given)

@@ -7,15 +7,19 @@ that the caller puts "loads[0].history" in front.
 from __future__ import annotations
 
 import inspect
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import MISSING, fields
+from dataclasses import MISSING
 from pathlib import Path
-from typing import Any, ClassVar, Self, cast, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Self, TypeVar, get_args, get_origin, get_type_hints
 
+from foldyn.arguments import Checked, arguments
 from foldyn.cases.histories import HISTORIES, History, Table
 from foldyn.errors import Faults, InputError, within
 from foldyn.mechanics.term import Term
 from foldyn.values import choice, number, plain, show, suggest, whole
+
+P = TypeVar("P", bound="Part")
 
 
 def history_from(table: Any, folder: Path | None = None) -> History:
@@ -153,30 +157,32 @@ def _checked(place: str, value: Any, hint: Any) -> Any:
     return value
 
 
-class Part:
-    """A load, a support or a kind of damping.
+class Part(Checked):
+    """A load, a support, a point mass or a kind of damping: a frozen data class.
+
+    Its arguments have the keys of its table in a case file; see `foldyn.arguments`.
 
     Attributes
     ----------
-    keys : mapping of str to str
-        Keys of its table in a case file, and the arguments that they set.
     missing : mapping of str to str
-        Remedies in messages where a key is missing that must not be: those of arguments without a
-        default, and those given here; "history" may be among them.
-    own, apart : str
-        A key that none but its tables have, and what the message says where another kind's keys
-        stand beside it.
+        Remedies in messages where a key is missing that must not be, beside those of arguments
+        without a default.
+    apart : str
+        What the message says where another kind's keys stand beside its own.
     """
 
-    keys: ClassVar[Mapping[str, str]]
     missing: ClassVar[Mapping[str, str]] = {}
-    own: ClassVar[str] = ""
     apart: ClassVar[str] = ""
 
     @classmethod
     def term(cls, parts: Sequence[tuple[str, Any]], structure: Any) -> Term | None:
         """What all of a kind, each with its place for messages, add to the energy of a case."""
         return None
+
+    @classmethod
+    def by_key(cls) -> dict[str, str]:
+        """Its arguments by the keys of its table."""
+        return {argument.key: name for name, argument in arguments(cls).items()}
 
     @classmethod
     def of(cls, table: Mapping[str, Any], folder: Path | None = None) -> Self:
@@ -188,35 +194,65 @@ class Part:
         folder : Path, optional
             Where relative paths of CSV files start; without it no file is read.
         """
-        for key in (*cls.needed(), *cls.missing):
+        for key, remedy in cls.needed().items():
             if key not in table:
-                raise InputError(f": missing; {cls.missing.get(key, 'give its value')}", f".{key}")
-        given = {argument: table[key] for key, argument in cls.keys.items() if key in table}
-        if "history" in table:
+                raise InputError(f": missing; {remedy}", f".{key}")
+        keys = cls.by_key()
+        given = {keys[key]: value for key, value in table.items()}
+        if "history" in given:
             with within(".history"):
-                given["history"] = history_from(table["history"], folder)
+                given["history"] = history_from(given["history"], folder)
         try:
             return cls(**given)
         except InputError as error:
             inside = error.field[len(error.key) :]
-            key = next((key for key, name in cls.keys.items() if name == error.key), error.key)
+            key = next((key for key, name in keys.items() if name == error.key), error.key)
             raise InputError(error.reason, f".{key}{inside}" if key else inside) from None
 
     @classmethod
-    def needed(cls) -> list[str]:
-        """Keys of the arguments without a default."""
-        names = {item.name for item in fields(cast(Any, cls)) if item.default is MISSING}
-        return [key for key, name in cls.keys.items() if name in names]
+    def needed(cls) -> dict[str, str]:
+        """Keys that its table must have, and what to do where one is missing."""
+        return {
+            one.key: f"give it ({one.unit})" if one.unit else "give its value"
+            for one in arguments(cls).values()
+            if one.default is MISSING
+        } | dict(cls.missing)
 
     def table(self) -> dict[str, Any]:
         """Its table of plain values, without the history and what is None."""
-        given = {key: getattr(self, argument) for key, argument in self.keys.items()}
+        given = {key: getattr(self, name) for key, name in self.by_key().items()}
+        given.pop("history", None)
         return {key: plain(value) for key, value in given.items() if value is not None}
 
 
-def given_keys(table: Any, kinds: Iterable[type[Part]]) -> set[str]:
-    """Keys of a table, each of which must belong to one of some kinds of parts."""
+def part_from(
+    table: Any, kinds: Sequence[type[P]], section: str, folder: Path | None = None, asked: str = ""
+) -> P:
+    """Part of one of some kinds from its table, which the keys tell; see `Part.of`.
+
+    Among the kinds of which there are keys that no other has, or if there are none among all, that
+    is the first that has all keys, or else the last.
+
+    section : where such tables stand in a case file.
+    asked : what a message asks for where there are no keys at all.
+    """
     if not isinstance(table, Mapping):
         raise InputError(f" = {show(table)}: must be a table")
-    check_keys(table, dict.fromkeys([*(key for kind in kinds for key in kind.keys), "history"]))
-    return set(table)
+    keys = {kind: kind.by_key() for kind in kinds}
+    counts = Counter(key for known in keys.values() for key in known)
+    check_keys(table, sorted(counts, key="history".__eq__))
+    given = [key for key in table if key != "history"]
+    if not given:
+        asked = asked or ", or ".join(" and ".join(kind.needed()) for kind in kinds)
+        raise InputError(f": give {asked}")
+    own = [key for key in given if counts[key] == 1] or given
+    fit = [kind for kind in kinds if keys[kind].keys() & own]
+    kind = next((kind for kind in fit if keys[kind].keys() >= table.keys()), fit[-1])
+    others = [key for key in table if key not in keys[kind]]
+    if others:
+        first = next(key for key in own if key in keys[kind])
+        raise InputError(
+            f": {kind.apart}; leave out {' and '.join(others)}, or write [[{section}]] for each",
+            f".{first}",
+        )
+    return kind.of(table, folder)

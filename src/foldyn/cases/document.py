@@ -259,7 +259,8 @@ class _Writer:
             if history != Constant():
                 table["history"] = self._history(history, True)
             planes.append(table)
-        return {**contact.table(), **({"planes": planes} if planes else {})}
+        without = {key: value for key, value in contact.table().items() if key != "planes"}
+        return {**without, **({"planes": planes} if planes else {})}
 
     def _part(self, part: Any) -> dict[str, Any]:
         section = part.table()

@@ -7,7 +7,7 @@ panels less the dihedral: 180 degrees less it, but for thick panels (`Pattern.fl
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ SIGNS: Mapping[str, float] = {"V": 1.0, "M": -1.0}
 """Sign of the fold angle of each assignment."""
 ROUNDING = 1e-9  # degrees
 Angles = float | tuple[float, ...]
+PerCrease = float | Sequence[float]
 
 
 def check_angles(name: str, value: Any) -> Angles:

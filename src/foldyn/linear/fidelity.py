@@ -13,6 +13,7 @@ import numpy as np
 import xarray
 
 from foldyn.algebra.extrapolation import convergence, limits
+from foldyn.arguments import brief
 from foldyn.cases import Case
 from foldyn.cases.clamped_edges import straightened
 from foldyn.errors import FoldynWarning, InputError, within
@@ -29,7 +30,7 @@ from foldyn.results import fidelity_dataset
 from foldyn.statics.tracing import check_movable
 from foldyn.structures import ModelOptions, Structure, discretize
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
-from foldyn.values import brief, choice, listed, number, show, whole
+from foldyn.values import choice, listed, number, show, whole
 
 MODELS: Mapping[str, Mapping[str, Any]] = {
     "standard": {

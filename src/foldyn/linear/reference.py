@@ -12,12 +12,12 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn.algebra.extrapolation import convergence, limits
+from foldyn.arguments import brief
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning
 from foldyn.linear.modes import modes
 from foldyn.linear.pairing import pairs
 from foldyn.structures.discretized import Discretized
-from foldyn.values import brief
 
 DIVISIONS = (6, 12)  # of every edge in the two meshes, beside which stands one half as fine
 SPARE = 3  # further modes of each mesh, which may change places with those that count

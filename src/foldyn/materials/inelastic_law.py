@@ -50,10 +50,14 @@ class MemoryLaw(HingeLaw):
     @cached_property
     def elastic(self) -> HingeLaw:
         """Its elastic part."""
-        law = self.lookup(self.law, f"{self.name}: law")
+        law = self.lookup(self.law, "law")
         if isinstance(law, MemoryLaw):
-            raise InputError(f"{self.name}: law = {law.name!r}: has a memory itself; give another")
+            raise InputError(f" = {law.name!r}: has a memory itself; give another", "law")
         return law
+
+    def agree(self) -> None:
+        """Refuse an elastic part that is none."""
+        _ = self.elastic
 
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
         """Its branches for hinges with stiffnesses (n,), N m/rad, and lengths (n,), m."""

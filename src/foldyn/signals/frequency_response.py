@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import brief
 from foldyn.errors import InputError
 from foldyn.signals import records
-from foldyn.values import brief, choice, whole
+from foldyn.values import choice, whole
 
 ESTIMATORS = ("h1", "h2")
 _FEWEST = 4  # samples of a segment

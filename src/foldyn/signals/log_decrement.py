@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import brief
 from foldyn.errors import InputError
 from foldyn.signals.records import checked_interval, checked_number, checked_record
 from foldyn.signals.spectrum import spectrum
-from foldyn.values import brief
 
 _FEWEST = 16
 _PADDING = 8  # the period need only be known to a tenth

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import brief
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.signals import records
-from foldyn.values import brief, choice, whole
+from foldyn.values import choice, whole
 
 _LOPSIDED = 0.1
 LOWEST = 1e-4  # of the maximum: what lies below may be the error of a simulation

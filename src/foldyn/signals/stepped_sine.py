@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import brief
 from foldyn.errors import InputError
 from foldyn.signals.records import checked_number, real_array
-from foldyn.values import brief, whole
+from foldyn.values import whole
 
 
 @brief

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import brief
 from foldyn.cases import Case
 from foldyn.errors import ComputationError, InputError
 from foldyn.results import check_result
@@ -25,7 +26,6 @@ from foldyn.statics.equilibrium import OrigamiProblem
 from foldyn.statics.newton import Settings, Solver, settings_of
 from foldyn.statics.stability import LostError, Section
 from foldyn.statics.stepping import Station
-from foldyn.values import brief
 
 if TYPE_CHECKING:
     import xarray

@@ -13,11 +13,12 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from foldyn.arguments import brief
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment.camera import Camera, opencv
 from foldyn.experiment.rendering.picture import Look, Sensor, Studio
 from foldyn.results import case_of
-from foldyn.values import brief, number
+from foldyn.values import number
 
 CODECS = {".mkv": "FFV1", ".avi": "FFV1", ".mp4": "mp4v"}
 """Codec by the end of the file's name: FFV1 loses nothing, mp4v does."""

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import brief
 from foldyn.experiment.camera import opencv
 from foldyn.experiment.tracking.corners import refine
 from foldyn.experiment.tracking.neighbors import Array, by_neighbors, distances, nearest
-from foldyn.values import brief, number, whole
+from foldyn.values import number, whole
 
 LOST, FOUND_AGAIN, TRACKED = 0, 1, 2
 
