@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import fields
 from functools import cache
 from html import escape
 from types import UnionType
@@ -81,10 +81,13 @@ class Argument(NamedTuple):
     key: str
     default: Any
 
-    @property
-    def needed(self) -> bool:
-        """Whether it must be given."""
-        return self.default is MISSING
+    def checked(self, name: str, value: Any) -> Any:
+        """The value as it is kept; None is left alone where it is the default."""
+        if value is None and self.default is None:
+            return None
+        for check in self.checks:
+            value = check(name, value)
+        return value
 
 
 @cache
@@ -130,12 +133,7 @@ class Checked:
         """Check the arguments, one by one and then with each other."""
         with within(self.place):
             for name, argument in arguments(type(self)).items():
-                value = getattr(self, name)
-                if value is None and argument.default is None:
-                    continue
-                for check in argument.checks:
-                    value = check(name, value)
-                self._set(**{name: value})
+                self._set(**{name: argument.checked(name, getattr(self, name))})
             self.agree()
 
     def agree(self) -> None:

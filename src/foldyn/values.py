@@ -336,6 +336,20 @@ def number_or_list(name: str, value: Any, what: str, **limits: Any) -> float | t
     return tuple(number(f"{name}[{i}]", each, **limits) for i, each in enumerate(array.tolist()))
 
 
+def one_or_each(name: str, value: Any, count: int, what: str) -> NDArray[np.float64]:
+    """Return what `number_or_list` gave as an array (count,): one number for all, or one for each.
+
+    what : what there are so many of, for messages: "nodes".
+    """
+    array = np.array(value)
+    if array.ndim and len(array) != count:
+        raise InputError(
+            f" = {show(value)}: {len(array)} values for {count} {what}; give one, or one for each",
+            name,
+        )
+    return np.broadcast_to(array, (count,))
+
+
 def indices(name: str, value: Any, what: str, alternative: str) -> tuple[int, ...]:
     """Return `value`, a whole number or a list of them, as a tuple of distinct whole numbers.
 

@@ -294,7 +294,7 @@ BAD_RESPONSE = {
     ),
     "burst": (
         [('"frf"', '"frf"\nmethod = "burst_random"\nburst = 1')],
-        "analysis.burst = 1.0: must be a part of the record, between 0 and 1",
+        "analysis.burst = 1: must be less than 1",
     ),
     "estimator": (
         [('"frf"', '"frf"\nmethod = "burst_random"\nestimator = "h3"')],

@@ -20,8 +20,10 @@ from foldyn.cases.damping import Damping, Rayleigh, dampings
 from foldyn.cases.history import History, as_history
 from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
+from foldyn.cases.state import State
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
 from foldyn.errors import Faults, FoldynWarning, InputError, within
+from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.board_term import BoardContactTerm
 from foldyn.mechanics.contact.boards import BoardSheets
@@ -202,6 +204,28 @@ class Case(Loaded, Damped):
                         f"{law.name!r}, which yields or creeps away from it: move its panels "
                         "instead (Impose), or take the law prony or an elastic one"
                     )
+
+    def check_movable(self) -> None:
+        """Refuse supports that hold every dof."""
+        if not len(self.free_dofs):
+            raise InputError(
+                "supports: hold every node along x, y and z, so that nothing can move: free one"
+            )
+
+    def memory_in(self, state: State | None) -> NDArray | str | None:
+        """Memory (b, 2) of a state for the branches of its laws; a word, or None for the usual."""
+        given = None if state is None else state.memory
+        if given is None or isinstance(given, str):
+            return given
+        array = np.array(given, float)
+        shape = sum(part.count for part in self.remembering), VARIABLES
+        if array.shape != shape:
+            raise InputError(
+                f"initial: memory of shape {array.shape}: the case has {shape}, branches and "
+                "variables; take the state of a result of the same case, or one without memory "
+                "(damped creases of n5b8e have branches in explicit methods alone)"
+            )
+        return array
 
     @property
     def obstacle_terms(self) -> tuple[tuple[int, History], ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -202,7 +202,7 @@ class StrainDamping(Part):
 
 
 Damping = Rayleigh | ModalDamping | CreaseDamping | StrainDamping
-DAMPINGS: tuple[type[Damping], ...] = (Rayleigh, ModalDamping, CreaseDamping, StrainDamping)
+DAMPINGS: tuple[type[Damping], ...] = get_args(Damping)
 """All kinds. In a table of damping each stands under its `key`, without one in the table itself."""
 
 

@@ -17,7 +17,7 @@ from foldyn.cases.selection import Creases, resolve_creases
 from foldyn.errors import InputError
 from foldyn.mechanics.following import Following, joined, moments, pressures, pushes
 from foldyn.mechanics.sheet_term import NO_DOF
-from foldyn.values import number, number_or_list, show
+from foldyn.values import number, number_or_list, one_or_each, show
 
 
 @dataclass(frozen=True)
@@ -87,14 +87,7 @@ class CreaseMoment(Load):
     def of_creases(self, structure: Any, place: str) -> tuple[NDArray, NDArray]:
         """Its creases (k,), and the moment (k,), N m, of each."""
         creases = resolve_creases(structure, self.creases, f"{place}.creases")
-        moment = np.array(self.moment)
-        if moment.ndim and len(moment) != len(creases):
-            raise InputError(
-                f" = {show(self.moment)}: {len(moment)} moments for {len(creases)} creases; give "
-                "one, or one for each",
-                f"{place}.moment",
-            )
-        return creases, np.broadcast_to(moment, creases.shape)
+        return creases, one_or_each(f"{place}.moment", self.moment, len(creases), "creases")
 
     def following(self, structure: Any, place: str) -> Following:
         """See `Load`; a shell's pieces of a crease take their part of it by their length."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 from foldyn.arguments import Check, Flag, Key, Unit
 from foldyn.cases.dashpots import Dashpot
@@ -15,7 +15,7 @@ from foldyn.cases.history import STEADY, Factor
 from foldyn.cases.selection import Nodes
 from foldyn.cases.springs import Spring
 from foldyn.errors import InputError
-from foldyn.values import indices, number, number_or_list, show
+from foldyn.values import indices, number, number_or_list, one_or_each, show
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ class Link(Part):
 
 
 Support = Fix | Impose | BaseMotion | Spring | Dashpot | Link
-SUPPORTS: tuple[type[Support], ...] = (Fix, Impose, BaseMotion, Spring, Dashpot, Link)
+SUPPORTS: tuple[type[Support], ...] = get_args(Support)
 
 
 ASKED = (
@@ -202,10 +202,5 @@ def check_per_node(name: str, value: Any, nodes: Any) -> float | tuple[float, ..
             f'selection "{nodes}"; give one number, or the nodes by number',
             name,
         )
-    if len(checked) != len(nodes):
-        raise InputError(
-            f" = {show(value)}: {len(checked)} values for {len(nodes)} nodes; give one, or one for "
-            "each",
-            name,
-        )
+    one_or_each(name, checked, len(nodes), "nodes")
     return checked

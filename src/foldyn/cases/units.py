@@ -14,19 +14,18 @@ from foldyn.cases.loads import LOADS
 from foldyn.cases.masses import PointMass
 from foldyn.cases.supports import SUPPORTS
 from foldyn.materials import HINGE_LAWS
-from foldyn.structures import Sheet
+from foldyn.structures import ModelOptions, Sheet
 
 OTHERS: Mapping[str, str] = {
-    "crease_stiffness": "N m/rad per m", "crease_rest": "degrees", "velocity": "m/s",
-    "dihedral": "degrees", "panel_angle": "degrees", "twist": "degrees",
+    "velocity": "m/s", "dihedral": "degrees", "panel_angle": "degrees", "twist": "degrees",
 }  # fmt: skip
-"""Of what is no argument of a data class: of patterns, models and states."""
+"""Of what is no argument of these data classes."""
 
 
 @cache
 def units() -> dict[str, str]:
     """Units by key."""
-    parts = (Sheet, *SUPPORTS, *LOADS, *DAMPINGS, PointMass, Contact, Plane)
+    parts = (Sheet, ModelOptions, *SUPPORTS, *LOADS, *DAMPINGS, PointMass, Contact, Plane)
     kinds = (*parts, *HISTORIES.values(), *HINGE_LAWS.values())
     found = {one.key: one.unit for kind in kinds for one in arguments(kind).values() if one.unit}
     return {**found, **OTHERS}

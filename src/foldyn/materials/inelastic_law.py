@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from operator import attrgetter
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -63,30 +64,11 @@ class MemoryLaw(HingeLaw):
         """Its branches for hinges with stiffnesses (n,), N m/rad, and lengths (n,), m."""
         raise NotImplementedError
 
-    @property
-    def code(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """That of the elastic part."""
-        return self.elastic.code
-
-    @property
-    def addresses(self) -> tuple[int, int, int] | None:
-        """Those of the elastic part."""
-        return self.elastic.addresses
-
-    @property
-    def linear_between(self) -> tuple[float, float] | None:  # pyright: ignore
-        """That of the elastic part."""
-        return self.elastic.linear_between
-
-    @property
-    def follows_rest(self) -> bool:  # pyright: ignore
-        """That of the elastic part."""
-        return self.elastic.follows_rest
-
-    @property
-    def closed_at_rest(self) -> bool:  # pyright: ignore
-        """That of the elastic part."""
-        return self.elastic.closed_at_rest
+    code: Any = property(attrgetter("elastic.code"))
+    addresses: Any = property(attrgetter("elastic.addresses"))
+    linear_between: Any = property(attrgetter("elastic.linear_between"))
+    follows_rest: Any = property(attrgetter("elastic.follows_rest"))
+    closed_at_rest: Any = property(attrgetter("elastic.closed_at_rest"))
 
     def parameters(self, rest: NDArray) -> NDArray:
         """Those of the elastic part."""

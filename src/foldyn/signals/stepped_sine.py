@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.arguments import brief
 from foldyn.errors import InputError
-from foldyn.signals.records import checked_number, real_array
-from foldyn.values import whole
+from foldyn.signals.records import real_array
+from foldyn.values import number, whole
 
 
 @brief
@@ -98,7 +98,7 @@ def fit_sine(
     >>> print(np.round(np.abs(fit.amplitude[0]), 12), np.round(np.angle(fit.amplitude[0]), 12))
     2.0 -1.0
     """
-    f = checked_number("frequency", frequency, above=0.0)
+    f = number("frequency", frequency, above=0.0)
     count = whole("harmonics", harmonics, least=1)
     t, samples = _steady_part(time, x, f, cycles)
     if np.diff(t).max() * f * count >= 0.5:
