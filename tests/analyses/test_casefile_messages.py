@@ -188,7 +188,7 @@ BAD = {
         [("theta1 = 45", 'theta1 = "45"')],
         'model.fold_law.theta1 = "45": must be a number',
     ),
-    "law range": ([("theta1 = 45", "theta1 = 400")], "model.fold_law: EnhancedLinear: theta1 ="),
+    "law range": ([("theta1 = 45", "theta1 = 400")], "model.fold_law: theta1 ="),
     "law key": (
         [("theta1 = 45", "thetta1 = 45")],
         "model.fold_law.thetta1: unknown key; did you mean 'theta1'? known keys: theta1",
@@ -201,7 +201,7 @@ BAD = {
         [("panel_angle", "panel_angel")],
         "pattern.panel_angel: unknown key; did you mean 'panel_angle'? known keys",
     ),
-    "pattern value": ([("panel_angle = 60", "panel_angle = 200")], "pattern: miura: panel_angle"),
+    "pattern value": ([("panel_angle = 60", "panel_angle = 200")], "pattern.panel_angle"),
     "pattern type": (
         [("panel_angle = 60", 'panel_angle = "60"')],
         'pattern.panel_angle = "60": must be a number',

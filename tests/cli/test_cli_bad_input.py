@@ -154,7 +154,7 @@ BAD = {
     ),
     "theta1 above theta2": (
         [("[damping]", 'fold_law = { kind = "enhanced", theta1 = 300, theta2 = 45 }\n[damping]')],
-        "model.fold_law: EnhancedLinear: theta1 = 300.0, theta2 = 45.0: need 0 < theta1 < theta2",
+        "model.fold_law: theta1 = 300.0, theta2 = 45.0: need 0 < theta1 < theta2",
     ),
     "pattern file that is missing": (
         [(KIND, 'file = "crane.fold"')],

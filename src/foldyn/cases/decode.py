@@ -11,13 +11,13 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING
 from pathlib import Path
-from typing import Any, ClassVar, Self, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Self, TypeVar
 
 from foldyn.arguments import Checked, arguments
 from foldyn.cases.histories import HISTORIES, History, Table
 from foldyn.errors import Faults, InputError, within
 from foldyn.mechanics.term import Term
-from foldyn.values import choice, number, plain, show, suggest, whole
+from foldyn.values import choice, plain, show, suggest
 
 P = TypeVar("P", bound="Part")
 
@@ -34,7 +34,7 @@ def history_from(table: Any, folder: Path | None = None) -> History:
     kind, arguments = _kind_of(table, HISTORIES)
     if kind == Table.kind and folder is not None and not arguments.keys() & {"times", "values"}:
         return _table_from_file(arguments, folder)
-    return call_from(HISTORIES[kind], arguments, checks_itself=True)
+    return call_from(HISTORIES[kind], arguments)
 
 
 def law_from(spec: Any, laws: Mapping[str, type]) -> Any:
@@ -49,54 +49,36 @@ def law_from(spec: Any, laws: Mapping[str, type]) -> Any:
     if isinstance(arguments.get("law"), Mapping):
         with within(".law"):
             arguments = {**arguments, "law": law_from(arguments["law"], laws)}
-    return call_from(laws[kind], arguments, skip=("name",))
+    return call_from(laws[kind], arguments, ("name",))
 
 
 def call_from(
-    function: Callable[..., Any],
-    arguments: Mapping[str, Any],
-    *,
-    skip: Iterable[str] = (),
-    checks_itself: bool = False,
+    function: Callable[..., Any], arguments: Mapping[str, Any], skip: Iterable[str] = ()
 ) -> Any:
-    """Call a function or class with a table's entries, checked against its signature.
+    """Call a function or class with a table's entries, which it checks.
 
     Parameters
     ----------
     function : callable
-        Its annotations decide: float, int, bool, str and fixed tuples of them are checked here,
-        everything else is left to the function.
     arguments : mapping
         Keyword arguments by name.
     skip : iterable of str
         Parameters that a table may not set.
-    checks_itself : bool
-        Whether the function checks the types too, with messages that begin with the name of the
-        argument.
     """
-    parameters = {
-        name: parameter
-        for name, parameter in inspect.signature(function).parameters.items()
-        if name not in skip
-    }
+    known = {n: p for n, p in inspect.signature(function).parameters.items() if n not in skip}
+    check_keys(arguments, known)
     faults = Faults()
-    with faults.collected():
-        check_keys(arguments, parameters)
-    if not faults.found:  # a misspelled key is missing, too
-        for name, parameter in parameters.items():
-            if parameter.default is parameter.empty and name not in arguments:
-                known = ", ".join(parameters)
-                faults.add(InputError(f": missing; known keys: {known}", f".{name}"))
-    values = dict(arguments)
-    if not checks_itself:
-        hints = get_type_hints(function.__init__ if isinstance(function, type) else function)
-        for name in parameters:
-            if name in values:
-                with faults.collected():
-                    values[name] = _checked(f".{name}", values[name], hints.get(name, Any))
+    for name, parameter in known.items():
+        if parameter.default is parameter.empty and name not in arguments:
+            faults.add(InputError(f": missing; known keys: {', '.join(known)}", f".{name}"))
     faults.raise_all()
-    with within("." if checks_itself else ": "):
-        return function(**values)
+    try:
+        return function(**arguments)
+    except InputError as error:
+        inside = error.field.rpartition(": ")[2]  # without the name of what was called
+        if not inside:
+            raise InputError(f": {error.reason}") from None
+        raise InputError(error.reason, f".{inside}") from None
 
 
 def check_keys(table: Mapping[str, Any], known: Iterable[str]) -> None:
@@ -134,27 +116,6 @@ def _table_from_file(arguments: Mapping[str, Any], folder: Path) -> Table:
     columns = {name: value for name, value in arguments.items() if name != "file"}
     with within(f".file = {show(file)}: "):
         return Table.from_csv(folder / file, **columns)
-
-
-def _checked(place: str, value: Any, hint: Any) -> Any:
-    if hint is float:
-        return number(place, value)
-    if hint is int:
-        return whole(place, value)
-    if hint in (str, bool):
-        if not isinstance(value, hint):
-            what = "text" if hint is str else "true or false"
-            raise InputError(f"{place} = {show(value)}: must be {what}")
-        return value
-    inner = get_args(hint)
-    if get_origin(hint) is tuple and Ellipsis not in inner:
-        if not isinstance(value, list | tuple) or len(value) != len(inner):
-            raise InputError(f"{place} = {show(value)}: must be a list of {len(inner)} entries")
-        return tuple(
-            _checked(f"{place}[{i}]", item, part)
-            for i, (item, part) in enumerate(zip(value, inner, strict=True))
-        )
-    return value
 
 
 class Part(Checked):

@@ -188,7 +188,7 @@ class Chirp(Formula):
     def agree(self) -> None:
         """Refuse what does not swing."""
         if self.start == self.end == 0.0:
-            raise InputError(f"end = {self.end}: start or end must be greater than 0")
+            raise InputError(f" = {self.end}: start or end must be greater than 0", "end")
 
     def parameters(self) -> tuple[float, ...]:
         """See `History.parameters`."""
@@ -234,17 +234,18 @@ class Table(Formula):
         """Refuse times that do not increase, and values that are not one for each."""
         times, values = self.times, self.values
         if times.ndim != 1 or times.size < 2:
-            raise InputError(f"times = {show(self.times)}: must be a list of at least two numbers")
+            raise InputError(f" = {show(times)}: must be a list of at least two numbers", "times")
         if values.shape != times.shape:
             raise InputError(
-                f"values = {show(self.values)}: must be a list of as many numbers as times "
-                f"({times.size})"
+                f" = {show(values)}: must be a list of as many numbers as times ({times.size})",
+                "values",
             )
         back = np.flatnonzero(np.diff(times) < SMALLEST)
         if back.size:
             i = int(back[0]) + 1
             raise InputError(
-                f"times[{i}] = {times[i]}: must be greater than the time before it ({times[i - 1]})"
+                f" = {times[i]}: must be greater than the time before it ({times[i - 1]})",
+                f"times[{i}]",
             )
 
     @classmethod
