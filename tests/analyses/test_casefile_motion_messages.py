@@ -43,7 +43,7 @@ BAD = {
         [
             ('nodes = [0, 1, 2]\naxes = "xyz"', 'nodes = "xmin"\naxis = "x"\ndisplacement = [0]'),
         ],
-        "supports[0].displacement = [0]: one displacement per node needs node numbers, but nodes",
+        "supports[0].displacement = [0.0]: one displacement per node needs node numbers, but",
     ),
     "imposed history": (
         [

@@ -153,12 +153,9 @@ class Case(Loaded, Damped):
             with faults.collected():
                 getattr(self, name)
         for place, load in self._loads():
-            with faults.collected():
-                load.loaded(self.structure, place)
-            with faults.collected():
-                load.rest_changes(self.structure, place)
-            with faults.collected():
-                load.following(self.structure, place)
+            for part in (load.loaded, load.rest_changes, load.following):
+                with faults.collected():
+                    part(self.structure, place)
         faults.raise_all()
 
     def altered(self, **changes: Any) -> Case:

@@ -123,10 +123,7 @@ class Supported:
             if support.axis is not None:
                 vector[nodes, AXES.index(support.axis)] = value
                 along = {}
-            yield (
-                self._carry_supports(vector, place, along),
-                support.history,
-            )
+            yield self._carry_supports(vector, place, along), support.history
 
     @cached_property
     def prescribed_terms(self) -> Terms:
@@ -167,10 +164,7 @@ class Supported:
                 )
             vector = np.zeros(base.shape)
             vector[base[:, axis], axis] = support.value
-            yield (
-                self._carry_supports(vector, place, along),
-                support.history,
-            )
+            yield self._carry_supports(vector, place, along), support.history
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:

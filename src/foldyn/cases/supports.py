@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
-from foldyn.arguments import Check, Flag, Key, Unit
+import numpy as np
+
+from foldyn.arguments import Check, Flag, Key
 from foldyn.cases.dashpots import Dashpot
 from foldyn.cases.decode import Part, part_from
 from foldyn.cases.directions import AXES, Axes, Axis, Direction
@@ -82,7 +84,11 @@ class Impose(Part):
 
     nodes: Nodes
     axis: Axis | None = None
-    value: Annotated[float | Sequence[float] | None, Unit("m"), Key("displacement")] = None
+    value: Annotated[
+        float | Sequence[float] | None,
+        Check(number_or_list, what="node", unit="m"),
+        Key("displacement"),
+    ] = None
     history: Factor = STEADY
     direction: Direction | None = None
     along: Flag = False
@@ -98,7 +104,15 @@ class Impose(Part):
                 "direction = (1, 0, 1), and only one of the two",
                 "axis",
             )
-        self._set(value=check_per_node("value", self.value, self.nodes))
+        if self.value is None:
+            raise InputError(": missing; give the displacement (m) at factor 1", "value")
+        if isinstance(self.value, tuple) and isinstance(self.nodes, str):
+            raise InputError(
+                f" = {show(self.value)}: one displacement per node needs node numbers, but nodes "
+                f'is the selection "{self.nodes}"; give one number, or the nodes by number',
+                "value",
+            )
+        one_or_each("value", self.value, np.size(self.nodes), "nodes")
 
 
 @dataclass(frozen=True)
@@ -189,18 +203,3 @@ ASKED = (
 def support_from(table: Any, folder: Path | None = None) -> Support:
     """Support from its table in a case file."""
     return part_from(table, SUPPORTS, "supports", folder, ASKED)
-
-
-def check_per_node(name: str, value: Any, nodes: Any) -> float | tuple[float, ...]:
-    """Return one finite number for all the checked `nodes`, or a tuple of one for each."""
-    checked = number_or_list(name, value, "node")
-    if not isinstance(checked, tuple):
-        return checked
-    if isinstance(nodes, str):
-        raise InputError(
-            f" = {show(value)}: one displacement per node needs node numbers, but nodes is the "
-            f'selection "{nodes}"; give one number, or the nodes by number',
-            name,
-        )
-    one_or_each(name, checked, len(nodes), "nodes")
-    return checked

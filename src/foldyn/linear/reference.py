@@ -5,14 +5,14 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
 
 from foldyn.algebra.extrapolation import convergence, limits
-from foldyn.arguments import brief
+from foldyn.arguments import Unit, brief
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning
 from foldyn.linear.modes import modes
@@ -100,7 +100,7 @@ class Reference:
         Its modes as they were computed, rigid ones included.
     """
 
-    frequency: NDArray
+    frequency: Annotated[NDArray, Unit("Hz")]
     mesh_error: NDArray
     mesh_frequency: NDArray
     shape: NDArray

@@ -7,11 +7,12 @@ taken off again.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.arguments import brief
+from foldyn.arguments import Unit, brief
 from foldyn.errors import InputError
 from foldyn.signals import records
 from foldyn.values import choice, number, whole
@@ -44,7 +45,7 @@ class FrequencyResponse:
         Number of segments averaged, over all records.
     """
 
-    frequency: NDArray[np.float64]
+    frequency: Annotated[NDArray[np.float64], Unit("Hz")]
     response: NDArray[np.complex128]
     coherence: NDArray[np.float64]
     force_density: NDArray[np.float64]

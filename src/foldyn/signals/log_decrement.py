@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.arguments import brief
+from foldyn.arguments import Unit, brief
 from foldyn.errors import InputError
 from foldyn.signals.records import checked_interval, checked_record
 from foldyn.signals.spectrum import spectrum
@@ -45,7 +46,7 @@ class LogDecrement:
     damping_ratio: float
     damped_frequency: float
     natural_frequency: float
-    time: NDArray[np.float64]
+    time: Annotated[NDArray[np.float64], Unit("s")]
     height: NDArray[np.float64]
     successive: NDArray[np.float64]
 

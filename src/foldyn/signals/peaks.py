@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.arguments import brief
+from foldyn.arguments import Unit, brief
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.signals import records
 from foldyn.values import choice, number, whole
@@ -36,7 +36,7 @@ class Peaks:
         Samples of the curve at the peaks.
     """
 
-    frequency: NDArray[np.float64]
+    frequency: Annotated[NDArray[np.float64], Unit("Hz")]
     height: NDArray[np.float64]
     prominence: NDArray[np.float64]
     index: NDArray[np.int64]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.arguments import brief
+from foldyn.arguments import Unit, brief
 from foldyn.errors import InputError
 from foldyn.signals.records import real_array
 from foldyn.values import number, whole
@@ -38,7 +39,7 @@ class SineFit:
         Number of samples fitted.
     """
 
-    frequency: float
+    frequency: Annotated[float, Unit("Hz")]
     amplitude: NDArray[np.complex128]
     offset: NDArray[np.float64]
     slope: NDArray[np.float64]

@@ -6,14 +6,14 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from foldyn.arguments import brief
+from foldyn.arguments import Unit, brief
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment.camera import Camera, opencv
 from foldyn.experiment.rendering.picture import Look, Sensor, Studio
@@ -45,7 +45,7 @@ class SyntheticFilm:
     """
 
     studio: Studio
-    time: NDArray[np.float64]
+    time: Annotated[NDArray[np.float64], Unit("s")]
     motion: Any
     rate: float
     dropped: tuple[int, ...] = ()
