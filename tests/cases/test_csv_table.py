@@ -93,13 +93,19 @@ BAD = {
     "no header": ("0,0\n1,1\n", "line 1: holds numbers, no names; begin with a line that names"),
     "header in a comment": ("# time [s],f\n0,0\n1,1\n", "line 2: holds numbers, no names"),
     "one column": ("time [s]  force\n0 0\n1 1\n", 'line 1: "time [s]  force" is one column'),
-    "no unit of time": ("time,f\n0,0\n1,1\n", 'column "time": has no unit of time; write it in'),
-    "empty unit": ("time [],f\n0,0\n1,1\n", 'column "time []": has no unit of time'),
+    "no unit of time": (
+        "time,f\n0,0\n1,1\n",
+        'column "time": has no unit, and a time in s is',
+    ),
+    "empty unit": ("time [],f\n0,0\n1,1\n", 'column "time []": has no unit, and a time in s'),
     "unit of time": (
         "time [h],f\n0,0\n1,1\n",
-        'column "time [h]": [h] is not a unit of time; use one of s, ms, us, m',
+        'column "time [h]": the unit [h] is not known; use one of s, ms, us, m',
     ),
-    "force as time": ("F [N],t [s]\n0,0\n1,1\n", 'column "F [N]": [N] is not a unit of time'),
+    "force as time": (
+        "F [N],t [s]\n0,0\n1,1\n",
+        'column "F [N]": is a force, and a time',
+    ),
     "force as factor": (
         "t [s],F [mN]\n0,0\n1,1\n",
         'column "F [mN]": is a force, but a history is a factor without unit; say unit = "mN"',
@@ -134,7 +140,7 @@ BAD = {
     ),
     "long name": (
         "t [s" + 9999 * "s" + "],f\n0,0\n1,2\n",
-        'column "t [' + 53 * "s" + ' ...": [sss',
+        'column "t [' + 53 * "s" + ' ...": the unit [sss',
     ),
     "huge cell": ("t [s],f\n0,0\n1," + 200_000 * "1", "line 3: cannot be read: field larger"),
 }
@@ -162,9 +168,9 @@ def test_a_bad_file_gets_one_message(table, tmp_path, name) -> None:
         ),
         ({"value": "time"}, 'time and value: are both the column "time [s]"'),
         ({"time": "force [N]"}, 'time and value: are both the column "force [N]"'),
-        ({"value": "no", "unit": "N"}, 'column "no": has no unit, unit = "N" asks for a force'),
-        ({"unit": "m"}, 'column "force [N]": is a force, unit = "m" asks for a length (m, cm, m'),
-        ({"unit": "m/s2"}, 'column "force [N]": is a force, unit = "m/s2" asks for an acceler'),
+        ({"value": "no", "unit": "N"}, 'column "no": has no unit, and a force in N is asked for'),
+        ({"unit": "m"}, 'column "force [N]": is a force, and a length in m is asked for (m, cm, m'),
+        ({"unit": "m/s2"}, 'column "force [N]": is a force, and an acceleration in m/s2 is asked'),
         ({"unit": "s"}, 'unit = "s": is not known; choose one of -, 1, %, N, mN, kN'),
         ({"unit": None}, "unit = None: is not known"),
         ({"time": 0}, "time = 0: must be the heading of a column"),
