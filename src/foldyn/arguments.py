@@ -105,7 +105,9 @@ def arguments(kind: type) -> Mapping[str, Argument]:
 
 def _notes(hint: Any) -> Iterator[Any]:
     """What stands beside a type, or beside one of a union."""
-    yield from getattr(hint, "__metadata__", ())
+    if hasattr(hint, "__metadata__"):
+        yield from hint.__metadata__
+        hint = hint.__origin__
     if get_origin(hint) in (Union, UnionType):
         for part in get_args(hint):
             yield from _notes(part)

@@ -106,7 +106,7 @@ BAD = {
     ),
     "angles": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", 'creases = "all"\nangle = [90, 90]')],
-        "loads[0].angle = [90.0, 90.0]: 2 angles for 4 creases; give one, or one for each",
+        "loads[0].angle = [90.0, 90.0]: 2 values for 4 creases; give one, or one for each",
     ),
     "closed crease": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", "creases = [0]\nangle = 360")],

@@ -137,9 +137,9 @@ BARE = dataclasses.replace(STRUCTURE, pattern=None)
         (
             STRUCTURE,
             [Actuate([2, 3], [90])],
-            r"loads\[0\].angle = \[90.0\]: 1 angles for 2 creases; give one, or one for each",
+            r"loads\[0\].angle = \[90.0\]: 1 values for 2 creases; give one, or one for each",
         ),
-        (STRUCTURE, [Actuate("all", [90, 90])], r"2 angles for 24 creases"),
+        (STRUCTURE, [Actuate("all", [90, 90])], r"2 values for 24 creases"),
         (PANEL, [Actuate([0], 90)], r"loads\[0\].creases = \[0\]: this structure has no folds"),
         (PANEL, [Actuate("all", 90)], r'loads\[0\].creases = "all": this structure has no folds'),
         (

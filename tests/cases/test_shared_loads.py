@@ -210,7 +210,7 @@ BAD = {
     "pressure as text": ('pressure = "1 bar"', r"loads\[0\]\.pressure = \"1 bar\""),
     "too few moments": (
         "creases = [0, 1, 2]\nmoment = [1.0, 2.0]",
-        r"loads\[0\]\.moment = .*: 2 moments for 3 creases",
+        r"loads\[0\]\.moment = .*: 2 values for 3 creases",
     ),
     "no such crease": (
         "creases = [99]\nmoment = 1.0", r"loads\[0\]\.creases = \[99\]: crease 99 is out of range"

@@ -71,7 +71,7 @@ BAD = {
         [("thickness = 0.01", "thickness = -0.01")],
         "sheet.thickness = -0.01: must be greater than 0",
     ),
-    "nu 0.5": ([("= 0.25", "= 0.5")], "sheet.poissons_ratio = 0.5: must be less than 0.5"),
+    "nu 0.5": ([("= 0.25", "= 0.5")], "sheet.poissons_ratio = 0.5: must lie between -1 and 0.5"),
     "nan in a table": (
         [('"half_sine", duration = 0.05', '"table", times = [0, 1], values = [0, nan]')],
         "loads[0].history.values[1] = nan: must be a finite number",

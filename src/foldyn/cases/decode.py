@@ -72,13 +72,23 @@ def call_from(
         if parameter.default is parameter.empty and name not in arguments:
             faults.add(InputError(f": missing; known keys: {', '.join(known)}", f".{name}"))
     faults.raise_all()
-    try:
-        return function(**arguments)
-    except InputError as error:
-        inside = error.field.rpartition(": ")[2]  # without the name of what was called
-        if not inside:
-            raise InputError(f": {error.reason}") from None
-        raise InputError(error.reason, f".{inside}") from None
+    left = dict(arguments)
+    while True:
+        try:
+            made = function(**left)
+            break
+        except InputError as error:
+            inside = error.field.rpartition(": ")[2]  # without the name of what was called
+            key = InputError("", inside).key
+            if key in left:
+                faults.add(InputError(error.reason, f".{inside}"))
+            elif not faults.found:
+                faults.add(InputError(f": {error.reason}"))
+            if key not in left or known[key].default is inspect.Parameter.empty:
+                break
+            del left[key]  # what else is wrong?
+    faults.raise_all()
+    return made
 
 
 def check_keys(table: Mapping[str, Any], known: Iterable[str]) -> None:

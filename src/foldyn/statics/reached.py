@@ -46,7 +46,7 @@ class Reached(Part):
 
 def reached_from(table: Any) -> Reached:
     """What ends a path from its table, as a case file has it."""
-    return part_from(table, (Reached,), "analysis.until")
+    return part_from(table, (Reached,), "analysis.until", asked="node, axis and displacement")
 
 
 def until_of(given: Any, structure: Any) -> Callable[[NDArray, float], bool] | None:

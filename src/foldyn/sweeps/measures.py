@@ -264,7 +264,9 @@ def _barrier(found: Landscape, case: Case) -> float:
     return found.barrier(0, 1) if len(found.stable) > 1 else np.nan
 
 
-@_measure(PATH, units="J", doc="energy from the second stable state back", through=landscape)
+@_measure(
+    PATH, units="J", doc="energy from the second stable state to the first", through=landscape
+)
 def _barrier_back(found: Landscape, case: Case) -> float:
     return found.barrier(1, 0) if len(found.stable) > 1 else np.nan
 
