@@ -209,7 +209,7 @@ def test_the_loads_page_shows_a_table_that_can_be_read(tmp_path):
 def sections() -> list[tuple[str, str]]:
     """(section, key) of the case file."""
     parts = {"supports": SUPPORTS, "loads": LOADS, "drive": (Force, BaseMotion)}
-    found = [(name, key) for name in parts for kind in parts[name] for key in kind.keys]
+    found = [(name, key) for name in parts for kind in parts[name] for key in kind.by_key()]
     found += [(name, "history") for name in ("supports", "loads")]
     for schema in (kind.schema for kind in ANALYSES.values()):
         for name, field in schema.model_fields.items():

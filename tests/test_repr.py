@@ -12,8 +12,8 @@ from foldyn import signals
 from foldyn.cases import SUPPORTS
 from foldyn.cases.histories import HISTORIES
 from foldyn.cases.loads import LOADS
+from foldyn.cases.units import unit_of
 from foldyn.linear import linearize
-from foldyn.values import unit_of
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 MANY = list(range(50))
@@ -104,4 +104,5 @@ def test_the_table_has_what_the_line_has_and_units():
 
 def test_a_unit_is_for_numbers():
     assert unit_of("thickness", 0.1) == "m" and unit_of("crease_stiffness", [0.1, 0.2])
+    assert unit_of("force", [0, 0, 1]) == "N"
     assert unit_of("thickness", "xmin") == unit_of("mass", "panel") == ""

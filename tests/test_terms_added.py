@@ -71,10 +71,9 @@ def register(package: Path, module: str, name: str) -> None:
     path = package / "cases/supports.py"
     text = path.read_text("utf-8")
     text = text.replace(
-        "\n\n\n@brief", f"\nfrom foldyn.cases.{module} import {name}\n\n\n@brief", 1
+        "\n\n\n@dataclass", f"\nfrom foldyn.cases.{module} import {name}\n\n\n@dataclass", 1
     )
-    text = text.replace("Dashpot | Link\n", f"Dashpot | Link | {name}\n")
-    path.write_text(text.replace("Dashpot, Link)", f"Dashpot, Link, {name})"), "utf-8")
+    path.write_text(text.replace("Dashpot | Link\n", f"Dashpot | Link | {name}\n"), "utf-8")
 
 
 def run(package: Path, **names: str) -> None:

@@ -10,9 +10,7 @@ import difflib
 import math
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import fields
-from html import escape
+from collections.abc import Callable, Iterable, Sequence
 from numbers import Integral, Real
 from typing import Any, TypeVar
 
@@ -33,20 +31,6 @@ PARTS = np.array([*range(1, 13), 18])
 """Such parts: multiples of 10 and of 15 degrees among them."""
 SHOWN = 60
 """Characters of a value in a message."""
-UNITS: Mapping[str, str] = {
-    "youngs_modulus": "Pa", "thickness": "m", "density": "kg/m3", "alpha": "1/s", "beta": "s",
-    "crease_stiffness": "N m/rad per m", "crease_rest": "degrees",
-    "vector": "N", "total": "N", "force_per_length": "N/m", "pressure": "Pa", "moment": "N m",
-    "acceleration": "m/s2", "change": "K", "expansion": "1/K", "curvature": "1/(m K)",
-    "angle": "degrees", "fold_angle": "degrees", "value": "m", "stiffness": "N/m",
-    "rest_length": "m", "point": "m", "motion": "m", "displacement": "m", "velocity": "m/s",
-    "duration": "s", "time": "s", "times": "s", "frequency": "Hz",
-    "theta1": "degrees", "theta2": "degrees", "dihedral": "degrees", "panel_angle": "degrees",
-    "twist": "degrees",
-}  # fmt: skip
-"""Units of arguments that mean the same wherever they occur."""
-SOME = 6
-"""Items of a list, and of an array, that a repr shows."""
 T = TypeVar("T")
 N = TypeVar("N", int, float)
 
@@ -97,62 +81,6 @@ def shortened(text: str) -> str:
     return text if len(text) <= SHOWN else f"{text[: SHOWN - 4]} ..."
 
 
-def brief(cls: type[T]) -> type[T]:
-    """Give a data class a repr of one short line, and a table for notebooks unless it has another.
-
-    Arrays are shown by their shape, lists by their ends; arguments that are None unless given are
-    left out.
-    """
-
-    def shown(self: Any) -> str:
-        given = (f"{name}={_brief(value)}" for name, value in _given(self))
-        return f"{type(self).__name__}({', '.join(given)})"
-
-    cls.__repr__ = shown  # type: ignore[method-assign]
-    if not hasattr(cls, "_repr_html_"):
-        cls._repr_html_ = _table  # type: ignore[attr-defined]
-    return cls
-
-
-def _given(self: Any) -> Iterator[tuple[str, Any]]:
-    """Fields of a data class that its repr shows."""
-    for item in fields(self):
-        value = getattr(self, item.name)
-        if item.repr and not (item.default is None and value is None):
-            yield item.name, value
-
-
-def _table(self: Any) -> str:
-    """A data class as a table in HTML, with units."""
-    left = 'style="text-align: left"'
-    rows = "".join(
-        f'<tr><th scope="row" {left}>{escape(name.replace("_", " "))}</th>'
-        f"<td {left}>{escape(f'{_brief(value)} {unit_of(name, value)}'.rstrip())}</td></tr>"
-        for name, value in _given(self)
-    )
-    return f"<table><caption><code>{type(self).__name__}</code></caption>{rows}</table>"
-
-
-def unit_of(name: str, value: Any) -> str:
-    """Unit of an argument, "" where it has none or its value is a word."""
-    return "" if isinstance(value, str) else UNITS.get(name, "")
-
-
-def _brief(value: Any) -> str:
-    if type(value).__name__ == "Dataset":
-        return f"<Dataset {dict(value.sizes)}>"
-    if isinstance(value, np.ndarray) and value.size > SOME:
-        return f"<{value.dtype.name} {value.shape}>"
-    if type(value) in (list, tuple):
-        items = [_brief(item) for item in value[:SOME]]
-        more = [f"... {len(value)} in all"] if len(value) > SOME else []
-        inside = ", ".join([*items, *more])
-        if isinstance(value, list):
-            return f"[{inside}]"
-        return f"({inside},)" if len(value) == 1 else f"({inside})"
-    return " ".join(repr(plain(value)).split())
-
-
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """Return the known word nearest to `word`, if any is near."""
     close = difflib.get_close_matches(word[:SHOWN], list(known), n=1, cutoff=0.6)
@@ -193,6 +121,17 @@ def of_kind(name: str, value: Any, *kinds: type[T]) -> T:
         return value
     known = " or ".join(kind.__name__ for kind in kinds)
     raise InputError(f": got {type(value).__name__}, give a {known}", name)
+
+
+def objects(name: str, value: Any, kinds: tuple[type[T], ...]) -> tuple[T, ...]:
+    """Return a list or tuple of objects of some classes as a tuple."""
+    what = " or ".join(kind.__name__ for kind in kinds)
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise InputError(f" = {show(value)}: must be a list of {what}", name)
+    for i, item in enumerate(value):
+        if not isinstance(item, kinds):
+            raise InputError(f" = {show(item)}: must be a {what}", f"{name}[{i}]")
+    return tuple(value)
 
 
 def function(name: str, value: Any) -> Any:
@@ -378,21 +317,37 @@ def _as_floats(array: NDArray) -> NDArray:
     return np.array(found, dtype=np.float64).reshape(array.shape)
 
 
-def number_or_list(name: str, value: Any, what: str) -> float | tuple[float, ...]:
+def number_or_list(name: str, value: Any, what: str, **limits: Any) -> float | tuple[float, ...]:
     """Return `value` as a finite float, or a list of them as a tuple.
 
     Parameters
     ----------
     what : str
         What the list has one number for, for messages: "node".
+    **limits
+        Bounds of each, as of `number`.
     """
     value = single(value)
     if not isinstance(value, list | tuple | np.ndarray):
-        return number(name, value)
+        return number(name, value, **limits)
     array = numbers(name, value)
     if array.ndim > 1 or not array.size:
         raise InputError(f" = {show(value)}: must be a number, or a list of one per {what}", name)
-    return tuple(array.tolist())
+    return tuple(number(f"{name}[{i}]", each, **limits) for i, each in enumerate(array.tolist()))
+
+
+def one_or_each(name: str, value: Any, count: int, what: str) -> NDArray[np.float64]:
+    """Return what `number_or_list` gave as an array (count,): one number for all, or one for each.
+
+    what : what there are so many of, for messages: "nodes".
+    """
+    array = np.array(value)
+    if array.ndim and len(array) != count:
+        raise InputError(
+            f" = {show(value)}: {len(array)} values for {count} {what}; give one, or one for each",
+            name,
+        )
+    return np.broadcast_to(array, (count,))
 
 
 def indices(name: str, value: Any, what: str, alternative: str) -> tuple[int, ...]:

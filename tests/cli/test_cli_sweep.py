@@ -58,7 +58,7 @@ def test_a_design_for_indices_has_them_on_its_page(sweep, workplace):
 def test_failed_points_are_told(sweep, workplace):
     done = sweep("--vary pattern.dihedral=90,500 --measure frequencies --processes 1")
     assert done.status == 0
-    said = "values are missing at 1 of 2 points:\n  1 of them: pattern: miura: dihedral = 500"
+    said = "values are missing at 1 of 2 points:\n  1 of them: pattern.dihedral = 500"
     assert said in done.out
     page = (workplace.folder / "case-sweep" / "report.html").read_text("utf-8")
     assert "Values are missing at 1 of 2 points" in page
@@ -67,7 +67,7 @@ def test_failed_points_are_told(sweep, workplace):
 def test_a_sweep_of_which_all_points_fail_fails(sweep):
     done = sweep("--vary pattern.dihedral=400,500 --measure frequencies --processes 1")
     assert done.status == 1
-    assert "all 2 points failed, the first with: pattern: miura: dihedral = 400" in done.err
+    assert "all 2 points failed, the first with: pattern.dihedral = 400" in done.err
     assert "sweep.nc" in done.err
 
 

@@ -48,7 +48,7 @@ def case():
         ({"settings": 1e-6}, "settings: got float, give statics.Settings"),
         ({"settings": {"tolerence": 1e-6}}, "did you mean 'tolerance'"),
         ({"settings": {"largest_turn": -3.0}}, "settings: largest_turn = -3.0: must be greater"),
-        ({"until": 0.1}, "until = 0.1: must be a table of node, axis, displacement"),
+        ({"until": 0.1}, "until = 0.1: must be a table"),
         ({"until": {"node": 2, "axis": "z"}}, "until.displacement: missing"),
         ({"until": {"node": 9, "axis": "z", "displacement": 1.0}}, "until.node = .*out of range"),
         ({"until": {"node": 2, "axis": "z", "displacement": 0}}, "the path begins there"),

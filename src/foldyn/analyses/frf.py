@@ -6,24 +6,24 @@ What shakes the structure stands under [[drive]].
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, Self, get_type_hints
+from typing import Annotated, Any, Self
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
-from pydantic import Field, PlainValidator, create_model, model_validator
+from pydantic import Field, PlainValidator, model_validator
 
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, movable
 from foldyn.analyses.frf_page import frf_sections
 from foldyn.analyses.motion import check_massless
-from foldyn.analyses.sections import Positive, Section, ShownSection, one_of, part
+from foldyn.analyses.sections import Positive, ShownSection, one_of, part, section_of
 from foldyn.analyses.vibration import About, Internal, Secant, VibrationSchema, about, bar_closed
+from foldyn.arguments import arguments
 from foldyn.cases import BaseMotion, Case, Force
-from foldyn.cases.decode import check_keys, given_keys
-from foldyn.cases.directions import DIRECTIONS, check_axis
+from foldyn.cases.decode import check_keys, part_from
+from foldyn.cases.directions import DIRECTIONS
 from foldyn.cases.models import SHELL
 from foldyn.dynamics import Progress
 from foldyn.errors import InputError, within
@@ -33,10 +33,8 @@ from foldyn.linear.internal_modes import check_internal
 from foldyn.values import number, show, whole
 
 MOST_FREQUENCIES = 100_000
-OPTIONS: Mapping[str, Any] = {
-    key: kind for method in METHODS.values() for key, kind in get_type_hints(method.options).items()
-}
-"""Options of all methods, and their types."""
+OPTIONS = frozenset(key for method in METHODS.values() for key in arguments(method.options))
+"""Options of all methods."""
 
 
 def _frequencies(value: Any) -> NDArray[np.float64]:
@@ -70,11 +68,7 @@ def _range(table: dict[str, Any]) -> NDArray[np.float64]:
     return np.linspace(first, last, count)
 
 
-_fields: dict[str, Any] = {key: (kind | None, None) for key, kind in OPTIONS.items()}
-_Options: Any = create_model("_Options", __base__=Section, **_fields)
-
-
-class FrfSection(_Options):
+class FrfSection(*(section_of(method.options) for method in METHODS.values())):
     """[analysis] of kind "frf"."""
 
     kind: str
@@ -88,8 +82,8 @@ class FrfSection(_Options):
     @model_validator(mode="after")
     def _fits_the_method(self) -> Self:
         given, method = self.model_fields_set, METHODS[self.method]
-        for key in sorted(given & set(OPTIONS)):
-            owners = [name for name, other in METHODS.items() if key in _keys(other)]
+        for key in sorted(given & OPTIONS):
+            owners = [name for name, other in METHODS.items() if key in arguments(other.options)]
             if self.method not in owners:
                 raise InputError(
                     f": only for method = {' or '.join(show(owner) for owner in owners)}; leave it "
@@ -118,28 +112,13 @@ class FrfSection(_Options):
         return {key: getattr(self, key) for key in OPTIONS if key in self.model_fields_set}
 
 
-def _keys(method: Any) -> list[str]:
-    return [item.name for item in fields(method.options)]
-
-
 def _drive(table: Any, folder: Path | None) -> Force | BaseMotion:
     """A force on nodes, or a motion of the base, from its table of [[drive]]."""
-    given = given_keys(table, (Force, BaseMotion))
-    if "base" in given:
-        if given & {"nodes", "force"}:
-            raise InputError(
-                ": moves all nodes that supports hold along its axis; leave out nodes and force",
-                ".base",
-            )
-        value = number(".displacement", table.get("displacement", 1.0), above=0.0)
-        return BaseMotion(check_axis(".base", table["base"]), value=value)
-    if "displacement" in given:
-        raise InputError(
-            ': is that of a base, as in base = "x"; leave it out, or give base', ".displacement"
-        )
-    if not given:
-        raise InputError(": give nodes and force, or base (the axis of a base that moves)")
-    return Force.of(table)
+    if isinstance(table, Mapping):
+        number(".displacement", table.get("displacement", 1.0), above=0.0)
+        table = {**table, "history": {"kind": "constant"}}
+    asked = "nodes and force, or base (the axis of a base that moves)"
+    return part_from(table, (Force, BaseMotion), "drive", folder, asked)
 
 
 NO_HISTORY = (
@@ -191,7 +170,7 @@ class FrfAnalysis(Analysis):
     moving = True
     schema = FrfSchema
     needs_density = "a frequency response needs"
-    takes = (*arguments_of(frf), *OPTIONS)
+    takes = (*arguments_of(frf), *sorted(OPTIONS))
     files = ("response", "nyquist")
 
     @classmethod

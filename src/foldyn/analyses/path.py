@@ -37,7 +37,7 @@ from foldyn.cases.supports import support_from
 from foldyn.errors import InputError
 from foldyn.statics import METHODS, Point, Settings, trace
 from foldyn.statics.newton import settings_of
-from foldyn.statics.reached import Reached
+from foldyn.statics.reached import Reached, reached_from
 from foldyn.values import indices, number, show
 
 SETTINGS = ("tolerance", "largest_turn", "stability")
@@ -92,7 +92,7 @@ class PathSection(Section):
     duration: Annotated[float | list[float] | None, PlainValidator(_durations)] = None
     first_step: float | None = None
     constant: Annotated[str | tuple[int, ...], PlainValidator(_constant)] = ()
-    until: Annotated[Reached | None, PlainValidator(Reached.of)] = None
+    until: Annotated[Reached | None, PlainValidator(reached_from)] = None
     inertia_relief: bool = False
     tolerance: Annotated[float, Field(ge=1e-14, le=1e-2)] = Settings.tolerance
     largest_turn: Positive = Settings.largest_turn

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, is_dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from foldyn.arguments import arguments
 from foldyn.cases import Contact, History
+from foldyn.cases.units import units
 from foldyn.linear.advice import percent
 from foldyn.materials.law import Law
 from foldyn.plots.load_curves import history_name
 from foldyn.report.album import ByRule
 from foldyn.report.sections import Heading, Listing, Section, Table
 from foldyn.structures import PanelSheet
-from foldyn.values import plain, unit_of
+from foldyn.values import plain
 
 if TYPE_CHECKING:
     import xarray
@@ -68,7 +70,7 @@ def inputs_table(rows: Iterable[tuple[str, str]]) -> Table:
 def inputs(case_file: Any, case: Case, results: ByRule) -> list[tuple[str, str]]:
     """Pattern, sheet, model, supports, loads, damping, analysis of a `CaseFile`, each in words."""
     structure = case.structure
-    model = _given(structure.options) | {"mass": ", ".join(results)}
+    model = vars(structure.options) | {"mass": ", ".join(results)}
     pattern = structure.pattern
     counts = [
         (len(pattern.vertices), "vertices"), (len(pattern.faces), "panels"),
@@ -79,7 +81,7 @@ def inputs(case_file: Any, case: Case, results: ByRule) -> list[tuple[str, str]]
     analysis = case_file.analysis
     return [
         ("pattern", f"{counted}; size {pattern.size:.6g} m"),
-        ("sheet", _listed(_given(case_file.sheet))),
+        ("sheet", _said(case_file.sheet)),
         ("model", f"{case_file.model.replace('_', ' ')}; {_listed(model)}"),
         ("mesh", mesh_error(next(iter(results.values())))),
         ("supports", _parts(case.supports)),
@@ -116,8 +118,7 @@ def cost_rows(version: str, call: Call, own: float = 0.0) -> Iterator[tuple[str,
 def _parts(parts: Iterable[Any]) -> str:
     """Supports or loads in words, each with its kind."""
     return ". ".join(
-        f"{re.sub(r'(?<=[a-z])(?=[A-Z])', ' ', type(part).__name__).capitalize()}: "
-        f"{_listed(_given(part))}"
+        f"{re.sub(r'(?<=[a-z])(?=[A-Z])', ' ', type(part).__name__).capitalize()}: {_said(part)}"
         for part in parts
     )
 
@@ -127,8 +128,8 @@ def damping_text(case: Case) -> str:
     parts = []
     for part in case.dampings:
         name = part.key or "Rayleigh"
-        parts.append(f"{name}: {_listed(_given(part))}" if part.key else _listed(_given(part)))
-    parts += [f"dashpot: {_listed(_given(dashpot))}" for _, dashpot in case.dashpots]
+        parts.append(f"{name}: {_said(part)}" if part.key else _said(part))
+    parts += [f"dashpot: {_said(dashpot)}" for _, dashpot in case.dashpots]
     return "; ".join(parts)
 
 
@@ -142,10 +143,9 @@ def _point_masses(case: Case) -> str:
 
 def _contact(contact: Contact) -> str:
     """What may touch, with how much friction, in words."""
-    given = _given(contact)
-    planes, panels = given.pop("planes"), given.pop("panels")
-    touching = "between panels" if panels else "on planes alone"
-    return ". ".join([f"{touching}; {_listed(given)}", *filter(None, [_parts(planes)])])
+    touching = "between panels" if contact.panels else "on planes alone"
+    said = f"{touching}; {_said(contact, 'planes', 'panels')}"
+    return ". ".join([said, *filter(None, [_parts(contact.planes)])])
 
 
 def mesh_error(result: xarray.Dataset) -> str:
@@ -175,15 +175,18 @@ def mesh_error(result: xarray.Dataset) -> str:
     )
 
 
-def _given(choices: Any) -> dict[str, Any]:
-    """Fields of a data class."""
-    return {item.name: getattr(choices, item.name) for item in fields(choices)}
+def _said(part: Any, *aside: str) -> str:
+    """Arguments of a data class in words, with their units."""
+    own = {name: argument.unit for name, argument in arguments(type(part)).items()}
+    return _listed({name: getattr(part, name) for name in own if name not in aside}, own)
 
 
-def _listed(values: Mapping[str, Any]) -> str:
+def _listed(values: Mapping[str, Any], own: Mapping[str, str] | None = None) -> str:
     """Names and values with their units; what was not given is left out."""
+    known = units() if own is None else own
     return "; ".join(
-        f"{name.replace('_', ' ')} {_written(value)} {unit_of(name, value)}".rstrip()
+        f"{name.replace('_', ' ')} {_written(value)} "
+        f"{'' if isinstance(value, str) else known.get(name, '')}".rstrip()
         for name, value in values.items()
         if value is not None and not (isinstance(value, tuple) and not value)
     )
@@ -191,9 +194,8 @@ def _listed(values: Mapping[str, Any]) -> str:
 
 def _written(value: Any) -> str:
     if isinstance(value, Law):
-        given = _given(value) if is_dataclass(value) else {}
-        given.pop("name", None)
-        return f"{value.name} ({_listed(given)})" if given else value.name
+        given = _said(value, "name") if is_dataclass(value) else ""
+        return f"{value.name} ({given})" if given else value.name
     if isinstance(value, History):
         return history_name(value)
     if isinstance(value, np.ndarray | list | tuple) and np.size(value) > MOST_LISTED:
@@ -201,7 +203,7 @@ def _written(value: Any) -> str:
     if isinstance(value, list) and value and all(map(is_dataclass, value)):
         return _parts(value)
     if is_dataclass(value):
-        return f"({_listed(_given(value))})"
+        return f"({_said(value)})"
     if isinstance(value, Mapping):
         return ", ".join(f"{word} {number:.6g}" for word, number in value.items())
     if isinstance(value, tuple) and all(isinstance(part, PanelSheet) for part in value):

@@ -9,17 +9,26 @@ sections. Validators raise InputError with a text that continues the key's path 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import MISSING
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    ValidationInfo,
+    create_model,
+    model_validator,
+)
 
 from foldyn.analyses.pattern_section import checked_pattern
 from foldyn.analyses.ranges import SAMPLINGS, varied
 from foldyn.analyses.ties import ties_of
+from foldyn.arguments import Argument, Checked, arguments
 from foldyn.cases.contact import contact_from
 from foldyn.cases.damping import (
-    STATES,
     CreaseDamping,
     Damping,
     ModalDamping,
@@ -38,7 +47,7 @@ from foldyn.cases.supports import support_from
 from foldyn.errors import InputError, within
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.plots import ANIMATIONS
-from foldyn.structures import PRESETS
+from foldyn.structures import PRESETS, PanelSheet, Sheet
 from foldyn.structures.creases import per_crease
 from foldyn.structures.rigid_plates import checked_panels
 from foldyn.structures.structure import CALIBRATIONS, MEMBRANES, SCHEMES
@@ -52,6 +61,19 @@ class Section(BaseModel):
     """A table of the case file: no unknown keys, no coercion, no NaN or infinity."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+
+def section_of(kind: type[Checked]) -> Any:
+    """Section whose keys are the arguments of a data class, with the checks declared there."""
+    keys: dict[str, Any] = {
+        one.key: (Annotated[Any, _validator(one)], ... if one.default is MISSING else one.default)
+        for one in arguments(kind).values()
+    }
+    return create_model(f"_{kind.__name__}", __base__=Section, **keys)
+
+
+def _validator(argument: Argument) -> PlainValidator:
+    return PlainValidator(lambda value: argument.checked("", value))
 
 
 def one_of(known: Iterable[str]) -> PlainValidator:
@@ -150,7 +172,7 @@ def _per_crease(value: Any) -> Any:
 Positive = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1, le=MOST)]
 Whole = Annotated[int, Field(ge=-MOST, le=MOST)]
-Nodes = Annotated[Any, PlainValidator(lambda value: check_nodes(value, ""))]
+Nodes = Annotated[Any, PlainValidator(lambda value: check_nodes("", value))]
 Vector = Annotated[Any, PlainValidator(lambda value: vector("", value))]
 BarLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, BAR_LAWS))]
 HingeLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, HINGE_LAWS))]
@@ -161,30 +183,16 @@ Animation = Annotated[str, one_of(ANIMATIONS)]
 
 
 def _edges(value: Any) -> Any:
-    return check_nodes(value, "") if isinstance(value, str) else check_pairs("", value)
+    return check_nodes("", value) if isinstance(value, str) else check_pairs("", value)
 
 
-Ratio = Annotated[float, Field(gt=-1, lt=0.5)]
-
-
-class PanelsSection(Section):
+class PanelsSection(section_of(PanelSheet)):
     """[[sheet.panels]]: arguments of `PanelSheet`."""
 
-    panels: Annotated[Any, PlainValidator(lambda value: indices("", value, "panel", "from 0"))]
-    youngs_modulus: Positive | None = None
-    poissons_ratio: Ratio | None = None
-    thickness: Positive | None = None
-    density: Positive | None = None
 
-
-class SheetSection(Section):
+class SheetSection(section_of(Sheet)):
     """[sheet]: arguments of `Sheet`."""
 
-    youngs_modulus: Positive
-    poissons_ratio: Ratio
-    thickness: Positive
-    density: Positive | None = None
-    length_scale_ratio: Positive = 1.0
     panels: list[PanelsSection] = []
 
 
@@ -254,13 +262,10 @@ def _dampings(kind: Any) -> PlainValidator:
     return PlainValidator(lambda value: dampings_of(kind, value))
 
 
-class DampingSection(Section):
+class DampingSection(section_of(Rayleigh)):
     """[damping]: Rayleigh coefficients, or two damping ratios; modes, creases, strain rates."""
 
-    alpha: Annotated[float, Field(ge=0)] = 0.0
-    beta: Annotated[float, Field(ge=0)] = 0.0
     ratios: Annotated[Any, PlainValidator(_ratios)] = None
-    state: Annotated[str, one_of(STATES)] = "rest"
     modal: Annotated[Any, _dampings(ModalDamping)] = ()
     creases: Annotated[Any, _dampings(CreaseDamping)] = ()
     strain: Annotated[Any, _dampings(StrainDamping)] = ()

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.arguments import brief
 from foldyn.cases.case_assembly import Damped, Loaded
 from foldyn.cases.clamped_edges import supported_points
 from foldyn.cases.contact import Contact
@@ -19,8 +20,10 @@ from foldyn.cases.damping import Damping, Rayleigh, dampings
 from foldyn.cases.history import History, as_history
 from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
+from foldyn.cases.state import State
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
 from foldyn.errors import Faults, FoldynWarning, InputError, within
+from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.board_term import BoardContactTerm
 from foldyn.mechanics.contact.boards import BoardSheets
@@ -29,7 +32,7 @@ from foldyn.patterns.picture import picture
 from foldyn.structures.discretized import read_only
 from foldyn.structures.inelastic_hinges import Remembering, remembering
 from foldyn.structures.mass import center_of_mass, inertia_tensor, row_sums
-from foldyn.values import brief, show
+from foldyn.values import objects, show
 
 
 @brief
@@ -125,7 +128,7 @@ class Case(Loaded, Damped):
                 "structure",
             )
         for name, kinds in (("supports", SUPPORTS), ("loads", LOADS), ("masses", (PointMass,))):
-            object.__setattr__(self, name, _tuple_of(name, kinds, getattr(self, name)))
+            object.__setattr__(self, name, objects(name, getattr(self, name), kinds))
         object.__setattr__(self, "damping", dampings(self.damping))
         if self.contact is not None and not isinstance(self.contact, Contact):
             raise InputError(f"contact = {show(self.contact)}: must be a Contact")
@@ -150,12 +153,9 @@ class Case(Loaded, Damped):
             with faults.collected():
                 getattr(self, name)
         for place, load in self._loads():
-            with faults.collected():
-                load.loaded(self.structure, place)
-            with faults.collected():
-                load.rest_changes(self.structure, place)
-            with faults.collected():
-                load.following(self.structure, place)
+            for part in (load.loaded, load.rest_changes, load.following):
+                with faults.collected():
+                    part(self.structure, place)
         faults.raise_all()
 
     def altered(self, **changes: Any) -> Case:
@@ -201,6 +201,28 @@ class Case(Loaded, Damped):
                         f"{law.name!r}, which yields or creeps away from it: move its panels "
                         "instead (Impose), or take the law prony or an elastic one"
                     )
+
+    def check_movable(self) -> None:
+        """Refuse supports that hold every dof."""
+        if not len(self.free_dofs):
+            raise InputError(
+                "supports: hold every node along x, y and z, so that nothing can move: free one"
+            )
+
+    def memory_in(self, state: State | None) -> NDArray | str | None:
+        """Memory (b, 2) of a state for the branches of its laws; a word, or None for the usual."""
+        given = None if state is None else state.memory
+        if given is None or isinstance(given, str):
+            return given
+        array = np.array(given, float)
+        shape = sum(part.count for part in self.remembering), VARIABLES
+        if array.shape != shape:
+            raise InputError(
+                f"initial: memory of shape {array.shape}: the case has {shape}, branches and "
+                "variables; take the state of a result of the same case, or one without memory "
+                "(damped creases of n5b8e have branches in explicit methods alone)"
+            )
+        return array
 
     @property
     def obstacle_terms(self) -> tuple[tuple[int, History], ...]:
@@ -263,13 +285,3 @@ class Case(Loaded, Damped):
     def inertia(self) -> NDArray[np.float64]:
         """Inertia tensor (3, 3) at rest about the center of mass, kg m2."""
         return inertia_tensor(self.structure.nodes, self.mass)
-
-
-def _tuple_of(name: str, kinds: tuple[type, ...], given: Any) -> tuple:
-    listed = " or ".join(kind.__name__ for kind in kinds)
-    if isinstance(given, str) or not isinstance(given, Sequence):
-        raise InputError(f"{name} = {show(given)}: must be a list of {listed}")
-    for i, item in enumerate(given):
-        if not isinstance(item, kinds):
-            raise InputError(f"{name}[{i}] = {show(item)}: must be a {listed}")
-    return tuple(given)

@@ -15,7 +15,7 @@ from foldyn.cases.constraints import Constraints
 from foldyn.cases.damping import CreaseDamping, Damping, ModalDamping, Rayleigh, StrainDamping
 from foldyn.cases.dashpots import Dashpot
 from foldyn.cases.directions import AXES, unit_vector
-from foldyn.cases.history import History, as_history
+from foldyn.cases.history import History
 from foldyn.cases.loads import Gravity, Load
 from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
 from foldyn.cases.ties import equations_of, values_of
@@ -123,10 +123,7 @@ class Supported:
             if support.axis is not None:
                 vector[nodes, AXES.index(support.axis)] = value
                 along = {}
-            yield (
-                self._carry_supports(vector, place, along),
-                support.history,
-            )
+            yield self._carry_supports(vector, place, along), support.history
 
     @cached_property
     def prescribed_terms(self) -> Terms:
@@ -167,10 +164,7 @@ class Supported:
                 )
             vector = np.zeros(base.shape)
             vector[base[:, axis], axis] = support.value
-            yield (
-                self._carry_supports(vector, place, along),
-                support.history,
-            )
+            yield self._carry_supports(vector, place, along), support.history
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
@@ -251,7 +245,7 @@ class Loaded:
     def following_terms(self) -> tuple[tuple[Following, History], ...]:
         """Forces that depend on the displacement, of each load that has them, with its history."""
         found = ((load.following(self.structure, place), load) for place, load in self._loads())
-        return tuple((part, as_history(load.history)) for part, load in found if part is not None)
+        return tuple((part, load.history) for part, load in found if part is not None)
 
     @cached_property
     def gravity_terms(self) -> Terms:
@@ -400,8 +394,7 @@ def _union(numbers: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
 def _sum_by_history(parts: Summands) -> Terms:
     """Vectors with their histories, those with equal histories added."""
     terms: list[tuple[NDArray[np.float64], History]] = []
-    for vector, given in parts:
-        history = as_history(given)
+    for vector, history in parts:
         same = next((total for total, other in terms if other == history), None)
         if same is None:
             terms.append((vector, history))

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.decode import Part
-from foldyn.cases.directions import check_direction, check_pairs, unit_vector
-from foldyn.cases.selection import check_nodes, resolve_nodes
+from foldyn.cases.directions import Direction, Pairs, unit_vector
+from foldyn.cases.selection import Nodes, resolve_nodes
 from foldyn.errors import InputError
 from foldyn.mechanics.springs import GROUND
 
@@ -30,23 +29,17 @@ class Connector(Part):
         pair k are in one place and have no direction.
     """
 
-    nodes: int | str | Sequence[int] | None
-    between: Sequence[int] | Sequence[Sequence[int]] | None
-    direction: str | Sequence[float] | None
+    nodes: Nodes | None
+    between: Pairs | None
+    direction: Direction | None
 
     asked: ClassVar[str]
     no_line: ClassVar[str]
 
-    def _check_ends(self) -> None:
-        """Check what it ties, and its direction."""
+    def agree(self) -> None:
+        """Ask for one of what it may tie."""
         if (self.nodes is None) == (self.between is None):
             raise InputError(f": give {self.asked}", "nodes" if self.between is None else "between")
-        if self.nodes is not None:
-            object.__setattr__(self, "nodes", check_nodes(self.nodes))
-        else:
-            object.__setattr__(self, "between", check_pairs("between", self.between))
-        if self.direction is not None:
-            object.__setattr__(self, "direction", check_direction("direction", self.direction))
 
     def ends(self, structure: Any, place: str) -> NDArray[np.int64]:
         """Ends (k, 2); `GROUND` in place of the second.

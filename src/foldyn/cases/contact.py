@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.decode import Part, check_keys
-from foldyn.cases.history import History, as_history
+from foldyn.arguments import Check, Flag
+from foldyn.cases.decode import Part, check_keys, part_from
+from foldyn.cases.history import Factor, as_history
 from foldyn.errors import InputError, within
 from foldyn.mechanics.contact.boards import BoardSheets
 from foldyn.mechanics.contact.candidates import (
@@ -24,10 +25,9 @@ from foldyn.mechanics.contact.candidates import (
     Sheets,
 )
 from foldyn.mechanics.contact.potential import STIFFNESS
-from foldyn.values import brief, flag, length, number, show, vector
+from foldyn.values import length, number, objects, show, vector
 
 
-@brief
 @dataclass(frozen=True)
 class Plane(Part):
     """A plane that the sheet cannot pass: the ground, the plate of a press; fixed or moving.
@@ -56,33 +56,22 @@ class Plane(Part):
     Plane(point=(0.0, 0.0, -0.001), normal=(0.0, 0.0, 1.0), friction=0.3)
     """
 
-    point: Sequence[float]
-    normal: Sequence[float]
-    friction: float | None = None
-    motion: Sequence[float] | None = None
-    history: History | Callable[[Any], Any] | None = None
+    point: Annotated[Sequence[float], Check(vector, unit="m")]
+    normal: Annotated[Sequence[float], Check(vector, nonzero=True)]
+    friction: Annotated[float | None, Check(number, least=0.0)] = None
+    motion: Annotated[Sequence[float] | None, Check(vector, unit="m")] = None
+    history: Factor = None
 
-    keys = {"point": "point", "normal": "normal", "friction": "friction", "motion": "motion"}
-    missing = {
-        "point": "give a point (m) of the plane",
-        "normal": "give its normal, on the side of the sheet",
-    }
+    missing = {"normal": "give its normal, on the side of the sheet"}
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "point", vector("point", self.point))
-        object.__setattr__(self, "normal", vector("normal", self.normal, nonzero=True))
-        if self.friction is not None:
-            object.__setattr__(self, "friction", number("friction", self.friction, least=0.0))
+    def agree(self) -> None:
+        """Refuse a history of no motion."""
         if self.motion is not None:
-            object.__setattr__(self, "motion", vector("motion", self.motion))
-        if self.motion is None and self.history is not None:
+            self._set(history=as_history(self.history))
+        elif self.history is not None:
             raise InputError(": a history needs the motion (m) at its factor 1", "motion")
-        if self.motion is not None:
-            object.__setattr__(self, "history", as_history(self.history))
 
 
-@brief
 @dataclass(frozen=True)
 class Contact(Part):
     """Panels that touch each other where they come nearer than the sheet's thickness, and planes.
@@ -110,34 +99,14 @@ class Contact(Part):
     Contact(friction=0.3, panels=True, planes=())
     """
 
-    thickness: float | None = None
-    friction: float = 0.0
-    stiffness: float | None = None
-    panels: bool = True
-    planes: Sequence[Plane] = ()
+    thickness: Annotated[float | None, Check(length, unit="m")] = None
+    friction: Annotated[float, Check(number, least=0.0)] = 0.0
+    stiffness: Annotated[float | None, Check(number, above=0.0, unit="N/m")] = None
+    panels: Flag = True
+    planes: Annotated[Sequence[Plane], Check(objects, kinds=(Plane,))] = ()
 
-    keys = {
-        "thickness": "thickness",
-        "friction": "friction",
-        "stiffness": "stiffness",
-        "panels": "panels",
-    }
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        if self.thickness is not None:
-            object.__setattr__(self, "thickness", length("thickness", self.thickness))
-        object.__setattr__(self, "friction", number("friction", self.friction, least=0.0))
-        if self.stiffness is not None:
-            given = number("stiffness", self.stiffness, above=0.0, unit="N/m")
-            object.__setattr__(self, "stiffness", given)
-        object.__setattr__(self, "panels", flag("panels", self.panels))
-        if isinstance(self.planes, str) or not isinstance(self.planes, Sequence):
-            raise InputError(f" = {show(self.planes)}: must be a list of Plane", "planes")
-        for i, plane in enumerate(self.planes):
-            if not isinstance(plane, Plane):
-                raise InputError(f" = {show(plane)}: must be a Plane", f"planes[{i}]")
-        object.__setattr__(self, "planes", tuple(self.planes))
+    def agree(self) -> None:
+        """Ask for something that touches."""
         if not self.panels and not self.planes:
             raise InputError(": without planes nothing touches; give planes, or True", "panels")
 
@@ -193,22 +162,15 @@ class Contact(Part):
 
 
 def contact_from(table: Any, folder: Path | None = None) -> Contact:
-    """Contact from its table in a case file; see `Part.of`."""
+    """Contact from its table in a case file."""
     if not isinstance(table, Mapping):
         raise InputError(f" = {show(table)}: must be a table, written [contact]")
-    check_keys(table, [*Contact.keys, "planes"])
+    check_keys(table, Contact.by_key())
     given = table.get("planes", [])
     if not isinstance(given, list):
         raise InputError(f" = {show(given)}: must be tables, written [[contact.planes]]", ".planes")
     planes = []
     for i, plane in enumerate(given):
         with within(f".planes[{i}]"):
-            if not isinstance(plane, Mapping):
-                raise InputError(f" = {show(plane)}: must be a table")
-            check_keys(plane, [*Plane.keys, "history"])
-            planes.append(Plane.of(plane, folder))
-    values = {key: value for key, value in table.items() if key != "planes"}
-    try:
-        return Contact(**values, planes=planes)
-    except InputError as error:
-        raise InputError(error.reason, f".{error.field}") from None
+            planes.append(part_from(plane, (Plane,), "contact.planes", folder))
+    return Contact.of({**table, "planes": planes})

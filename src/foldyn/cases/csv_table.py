@@ -18,15 +18,13 @@ from foldyn.errors import InputError, within
 from foldyn.input_files import path_of, read_text
 from foldyn.values import parsed, shortened, show, suggest
 
-TIME_UNITS: Mapping[str, Fraction] = {
-    "s": Fraction(1),
-    "ms": Fraction(1, 10**3),
-    "us": Fraction(1, 10**6),
-    "min": Fraction(60),
-}
-"""Units of the time column, each with its size in seconds."""
-
 UNITS: Mapping[str, Mapping[str, Fraction]] = {
+    "time": {
+        "s": Fraction(1),
+        "ms": Fraction(1, 10**3),
+        "us": Fraction(1, 10**6),
+        "min": Fraction(60),
+    },
     "number without unit": {"-": Fraction(1), "1": Fraction(1), "%": Fraction(1, 100)},
     "force": {"N": Fraction(1), "mN": Fraction(1, 10**3), "kN": Fraction(10**3)},
     "length": {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 10**3)},
@@ -36,7 +34,7 @@ UNITS: Mapping[str, Mapping[str, Fraction]] = {
     "mobility": {"m/(N s)": Fraction(1), "mm/(N s)": Fraction(1, 10**3)},
     "accelerance": {"m/(N s2)": Fraction(1), "mm/(N s2)": Fraction(1, 10**3)},
 }
-"""Units of the value column by quantity, each with its size in the SI unit."""
+"""Units by quantity, each with its size in the SI unit."""
 
 _NUMBER = "number without unit"
 _SPELLINGS = {
@@ -75,14 +73,14 @@ def read_columns(
                 f"{name} = {show(given)}: must be the heading of a column, or its name"
             )
     wanted = _SPELLINGS.get(unit, unit) if isinstance(unit, str) else ""
-    if _quantity(wanted) is None:
-        known = ", ".join(known for units in UNITS.values() for known in units)
+    if _quantity(wanted) in (None, "time"):
+        known = ", ".join(one for what, units in UNITS.items() if what != "time" for one in units)
         raise InputError(f"unit = {show(unit)}: is not known; choose one of {known}")
     with _opened(path_of(path)) as (columns, lines):
         chosen = _find("time", time, columns, 0), _find("value", value, columns, 1)
         if chosen[0] == chosen[1]:
             raise InputError(f'time and value: are both the column "{chosen[0].shown}"; name two')
-        ratios = _time_ratio(chosen[0]), _value_ratio(chosen[1], wanted)
+        ratios = _ratio(chosen[0], "s"), _ratio(chosen[1], wanted)
         rows = [
             [_number(number, cells, item, r) for item, r in zip(chosen, ratios, strict=True)]
             for number, cells in lines
@@ -137,10 +135,8 @@ def read_numbers(
     """
     with _opened(path_of(path)) as (columns, rows):
         chosen = [_find(field, heading, columns, 0) for field, (heading, _) in wanted.items()]
-        ratios = [
-            _time_ratio(item) if unit == "s" else _value_ratio(item, unit)
-            for item, (_, unit) in zip(chosen, wanted.values(), strict=True)
-        ]
+        units = [unit for _, unit in wanted.values()]
+        ratios = [_ratio(item, unit) for item, unit in zip(chosen, units, strict=True)]
         empty = [field in gaps for field in wanted]
         values = np.array([[_number(n, row, c, r, gap)
                             for c, r, gap in zip(chosen, ratios, empty, strict=True)]
@@ -229,30 +225,15 @@ def _quantity(unit: str) -> str | None:
     return next((quantity for quantity, units in UNITS.items() if unit in units), None)
 
 
-def _time_ratio(column: _Column) -> Fraction:
-    listed = ", ".join(TIME_UNITS)
-    if column.unit is None:
-        raise InputError(
-            f'column "{column.shown}": has no unit of time; write it in the header, as in '
-            f'"{shortened(column.name) or "time"} [s]" (known: {listed})'
-        )
-    if column.unit not in TIME_UNITS:
-        raise InputError(
-            f'column "{column.shown}": [{shortened(column.unit)}] is not a unit of time; use one '
-            f"of {listed}"
-        )
-    return TIME_UNITS[column.unit]
-
-
-def _value_ratio(column: _Column, wanted: str) -> Fraction:
+def _ratio(column: _Column, wanted: str) -> Fraction:
     """Size of the column's unit in the unit that the caller wants."""
     quantity = _quantity(wanted) or _NUMBER
     listed = ", ".join(UNITS[quantity])
     place = f'column "{column.shown}"'
     if column.unit is None and quantity != _NUMBER:
         raise InputError(
-            f'{place}: has no unit, unit = "{wanted}" asks for {_article(quantity)}; write the '
-            f'unit in the header, as in "{shortened(column.name)} [{wanted}]"'
+            f"{place}: has no unit, and {_article(quantity)} in {wanted} is asked for; write the "
+            f'unit in the header, as in "{shortened(column.name) or quantity} [{wanted}]"'
         )
     unit = column.unit or "-"
     own = _quantity(unit)
@@ -266,7 +247,7 @@ def _value_ratio(column: _Column, wanted: str) -> Fraction:
         )
     if own != quantity:
         raise InputError(
-            f'{place}: is {_article(own)}, unit = "{wanted}" asks for {_article(quantity)} '
+            f"{place}: is {_article(own)}, and {_article(quantity)} in {wanted} is asked for "
             f"({listed})"
         )
     return UNITS[own][unit] / UNITS[quantity][wanted]

@@ -7,23 +7,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.decode import Part, check_keys
-from foldyn.cases.selection import check_creases, resolve_creases
+from foldyn.arguments import Check
+from foldyn.cases.decode import Part, part_from
+from foldyn.cases.selection import Creases, resolve_creases
 from foldyn.errors import InputError, within
-from foldyn.values import brief, choice, number, number_or_list, show, whole
+from foldyn.values import choice, number, number_or_list, show, whole
 
 STATES = ("rest", "start")
 
 
-@brief
 @dataclass(frozen=True)
-class Rayleigh:
+class Rayleigh(Part):
     """Damping matrix C = alpha M + beta K0, K0 the tangent stiffness at a stated state.
 
     A motion of angular frequency w is damped with the ratio alpha / (2 w) + beta w / 2. K0 is
@@ -40,18 +40,12 @@ class Rayleigh:
         frequency responses: the state about which it vibrates).
     """
 
-    alpha: float = 0.0
-    beta: float = 0.0
-    state: str = "rest"
+    alpha: Annotated[float, Check(number, least=0.0, unit="1/s")] = 0.0
+    beta: Annotated[float, Check(number, least=0.0, unit="s")] = 0.0
+    state: Annotated[str, Check(choice, known=STATES)] = "rest"
 
     key: ClassVar[str] = ""
     several: ClassVar[bool] = False
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "alpha", number("alpha", self.alpha, least=0.0))
-        object.__setattr__(self, "beta", number("beta", self.beta, least=0.0))
-        choice("state", self.state, STATES)
 
     @classmethod
     def from_ratios(
@@ -101,15 +95,6 @@ class Rayleigh:
         beta = (z2 * f2 - z1 * f1) / (math.pi * apart)
         return cls(max(alpha, 0.0), max(beta, 0.0), state)
 
-    @classmethod
-    def of(cls, table: Mapping[str, Any]) -> Rayleigh:
-        """Make it from its table."""
-        return cls(**table)
-
-    def table(self) -> dict[str, Any]:
-        """Its table of plain values."""
-        return asdict(self)
-
     def matrix(self, mass: Any, stiffness: Any) -> Any:
         """C from M (kg) and K0 (N/m)."""
         damping = mass * self.alpha
@@ -120,7 +105,6 @@ class Rayleigh:
         return self.alpha + self.beta * omega**2
 
 
-@brief
 @dataclass(frozen=True)
 class ModalDamping(Part):
     """Damping ratios of the lowest modes, C = M Phi diag(2 zeta omega) Phi' M, phi' M phi = 1.
@@ -143,31 +127,21 @@ class ModalDamping(Part):
         responses: those of the state about which it vibrates).
     """
 
-    ratios: float | Sequence[float]
-    count: int | None = None
-    state: str = "rest"
+    ratios: Annotated[float | Sequence[float], Check(number_or_list, what="mode", least=0.0)]
+    count: Annotated[int | None, Check(whole, least=1, what="modes")] = None
+    state: Annotated[str, Check(choice, known=STATES)] = "rest"
 
-    keys = {"ratios": "ratios", "count": "count", "state": "state"}
     key: ClassVar[str] = "modal"
     several: ClassVar[bool] = False
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        ratios = number_or_list("ratios", self.ratios, "mode")
-        listed = isinstance(ratios, tuple)
-        for i, ratio in enumerate(ratios if listed else (ratios,)):
-            number(f"ratios[{i}]" if listed else "ratios", ratio, least=0.0)
-        object.__setattr__(self, "ratios", ratios)
-        choice("state", self.state, STATES)
-        if self.count is None:
-            return
-        if listed:
+    def agree(self) -> None:
+        """Refuse a number of modes beside ratios of each."""
+        if self.count is not None and isinstance(self.ratios, tuple):
             raise InputError(
-                f" = {show(self.count)}: {len(ratios)} ratios are those of {len(ratios)} modes; "
-                "leave count out, or give one ratio",
+                f" = {self.count}: {len(self.ratios)} ratios are those of {len(self.ratios)} "
+                "modes; leave count out, or give one ratio",
                 "count",
             )
-        object.__setattr__(self, "count", whole("count", self.count, least=1, what="modes"))
 
     @property
     def modes(self) -> int | None:
@@ -175,7 +149,6 @@ class ModalDamping(Part):
         return len(self.ratios) if isinstance(self.ratios, tuple) else self.count
 
 
-@brief
 @dataclass(frozen=True)
 class CreaseDamping(Part):
     """A moment against the rate at which creases fold: M = c L d theta / dt on each, nothing else.
@@ -192,18 +165,11 @@ class CreaseDamping(Part):
         are all but the flat ones, or a family of the pattern (`Pattern.families`), as "zigzag".
     """
 
-    coefficient: float
-    creases: int | str | Sequence[int] = "all"
+    coefficient: Annotated[float, Check(number, least=0.0, unit="N m s/rad per m")]
+    creases: Creases = "all"
 
-    keys = {"coefficient": "coefficient", "creases": "creases"}
     key: ClassVar[str] = "creases"
     several: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        coefficient = number("coefficient", self.coefficient, least=0.0)
-        object.__setattr__(self, "coefficient", coefficient)
-        object.__setattr__(self, "creases", check_creases("creases", self.creases))
 
     def per_length(self, structure: Any, place: str) -> NDArray[np.float64]:
         """Coefficients (nf,) of all folds, N m s/rad per m."""
@@ -212,7 +178,6 @@ class CreaseDamping(Part):
         return damped
 
 
-@brief
 @dataclass(frozen=True)
 class StrainDamping(Part):
     """Damping of the rates at which bars stretch and hinges turn, each by beta times its stiffness.
@@ -230,19 +195,14 @@ class StrainDamping(Part):
         Coefficient (s), at least 0.
     """
 
-    beta: float
+    beta: Annotated[float, Check(number, least=0.0, unit="s")]
 
-    keys = {"beta": "beta"}
     key: ClassVar[str] = "strain"
     several: ClassVar[bool] = False
 
-    def __post_init__(self) -> None:
-        """Check the argument."""
-        object.__setattr__(self, "beta", number("beta", self.beta, least=0.0))
-
 
 Damping = Rayleigh | ModalDamping | CreaseDamping | StrainDamping
-DAMPINGS: tuple[type[Damping], ...] = (Rayleigh, ModalDamping, CreaseDamping, StrainDamping)
+DAMPINGS: tuple[type[Damping], ...] = get_args(Damping)
 """All kinds. In a table of damping each stands under its `key`, without one in the table itself."""
 
 
@@ -304,9 +264,8 @@ def dampings_of(kind: Any, value: Any) -> list[Damping]:
 
 def _damping_of(kind: Any, value: Any) -> Damping:
     if isinstance(value, Mapping):
-        check_keys(value, kind.keys)
-        return kind.of(value)
-    first = next(iter(kind.keys))
+        return part_from(value, (kind,), f"damping.{kind.key}")
+    first = next(iter(kind.by_key()))
     try:
         return kind.of({first: value})
     except InputError as error:  # the value stands in the place of its table

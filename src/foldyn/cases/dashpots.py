@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
+from foldyn.arguments import Check, Key
 from foldyn.cases.connectors import Connector
-from foldyn.values import brief, number
+from foldyn.cases.directions import Direction, Pairs
+from foldyn.cases.selection import Nodes
+from foldyn.values import number
 
 
-@brief
 @dataclass(frozen=True)
 class Dashpot(Connector):
     """Viscous dampers: a force c times a velocity, against it.
@@ -31,27 +33,14 @@ class Dashpot(Connector):
         as it is now.
     """
 
-    coefficient: float
-    nodes: int | str | Sequence[int] | None = None
-    between: Sequence[int] | Sequence[Sequence[int]] | None = None
-    direction: str | Sequence[float] | None = None
+    coefficient: Annotated[float, Check(number, least=0.0, unit="N s/m"), Key("dashpot")]
+    nodes: Nodes | None = None
+    between: Pairs | None = None
+    direction: Direction | None = None
 
-    keys = {
-        "dashpot": "coefficient",
-        "nodes": "nodes",
-        "between": "between",
-        "direction": "direction",
-    }
-    own = "dashpot"
     apart = "dashpots are a support of their own"
     asked = (
         "either nodes, which it ties to the ground, or between, the two nodes that it ties to each "
         "other"
     )
     no_line = ": nodes {a} and {b} are in one place, with no line between them; give a direction"
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        coefficient = number("coefficient", self.coefficient, least=0.0)
-        object.__setattr__(self, "coefficient", coefficient)
-        self._check_ends()

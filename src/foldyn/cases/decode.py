@@ -7,15 +7,19 @@ that the caller puts "loads[0].history" in front.
 from __future__ import annotations
 
 import inspect
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import MISSING, fields
+from dataclasses import MISSING
 from pathlib import Path
-from typing import Any, ClassVar, Self, cast, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Self, TypeVar
 
+from foldyn.arguments import Checked, arguments
 from foldyn.cases.histories import HISTORIES, History, Table
 from foldyn.errors import Faults, InputError, within
 from foldyn.mechanics.term import Term
-from foldyn.values import choice, number, plain, show, suggest, whole
+from foldyn.values import choice, plain, show, suggest
+
+P = TypeVar("P", bound="Part")
 
 
 def history_from(table: Any, folder: Path | None = None) -> History:
@@ -30,7 +34,7 @@ def history_from(table: Any, folder: Path | None = None) -> History:
     kind, arguments = _kind_of(table, HISTORIES)
     if kind == Table.kind and folder is not None and not arguments.keys() & {"times", "values"}:
         return _table_from_file(arguments, folder)
-    return call_from(HISTORIES[kind], arguments, checks_itself=True)
+    return call_from(HISTORIES[kind], arguments)
 
 
 def law_from(spec: Any, laws: Mapping[str, type]) -> Any:
@@ -45,54 +49,46 @@ def law_from(spec: Any, laws: Mapping[str, type]) -> Any:
     if isinstance(arguments.get("law"), Mapping):
         with within(".law"):
             arguments = {**arguments, "law": law_from(arguments["law"], laws)}
-    return call_from(laws[kind], arguments, skip=("name",))
+    return call_from(laws[kind], arguments, ("name",))
 
 
 def call_from(
-    function: Callable[..., Any],
-    arguments: Mapping[str, Any],
-    *,
-    skip: Iterable[str] = (),
-    checks_itself: bool = False,
+    function: Callable[..., Any], arguments: Mapping[str, Any], skip: Iterable[str] = ()
 ) -> Any:
-    """Call a function or class with a table's entries, checked against its signature.
+    """Call a function or class with a table's entries, which it checks.
 
     Parameters
     ----------
     function : callable
-        Its annotations decide: float, int, bool, str and fixed tuples of them are checked here,
-        everything else is left to the function.
     arguments : mapping
         Keyword arguments by name.
     skip : iterable of str
         Parameters that a table may not set.
-    checks_itself : bool
-        Whether the function checks the types too, with messages that begin with the name of the
-        argument.
     """
-    parameters = {
-        name: parameter
-        for name, parameter in inspect.signature(function).parameters.items()
-        if name not in skip
-    }
+    known = {n: p for n, p in inspect.signature(function).parameters.items() if n not in skip}
+    check_keys(arguments, known)
     faults = Faults()
-    with faults.collected():
-        check_keys(arguments, parameters)
-    if not faults.found:  # a misspelled key is missing, too
-        for name, parameter in parameters.items():
-            if parameter.default is parameter.empty and name not in arguments:
-                known = ", ".join(parameters)
-                faults.add(InputError(f": missing; known keys: {known}", f".{name}"))
-    values = dict(arguments)
-    if not checks_itself:
-        hints = get_type_hints(function.__init__ if isinstance(function, type) else function)
-        for name in parameters:
-            if name in values:
-                with faults.collected():
-                    values[name] = _checked(f".{name}", values[name], hints.get(name, Any))
+    for name, parameter in known.items():
+        if parameter.default is parameter.empty and name not in arguments:
+            faults.add(InputError(f": missing; known keys: {', '.join(known)}", f".{name}"))
     faults.raise_all()
-    with within("." if checks_itself else ": "):
-        return function(**values)
+    left = dict(arguments)
+    while True:
+        try:
+            made = function(**left)
+            break
+        except InputError as error:
+            inside = error.field.rpartition(": ")[2]  # without the name of what was called
+            key = InputError("", inside).key
+            if key in left:
+                faults.add(InputError(error.reason, f".{inside}"))
+            elif not faults.found:
+                faults.add(InputError(f": {error.reason}"))
+            if key not in left or known[key].default is inspect.Parameter.empty:
+                break
+            del left[key]  # what else is wrong?
+    faults.raise_all()
+    return made
 
 
 def check_keys(table: Mapping[str, Any], known: Iterable[str]) -> None:
@@ -132,51 +128,32 @@ def _table_from_file(arguments: Mapping[str, Any], folder: Path) -> Table:
         return Table.from_csv(folder / file, **columns)
 
 
-def _checked(place: str, value: Any, hint: Any) -> Any:
-    if hint is float:
-        return number(place, value)
-    if hint is int:
-        return whole(place, value)
-    if hint in (str, bool):
-        if not isinstance(value, hint):
-            what = "text" if hint is str else "true or false"
-            raise InputError(f"{place} = {show(value)}: must be {what}")
-        return value
-    inner = get_args(hint)
-    if get_origin(hint) is tuple and Ellipsis not in inner:
-        if not isinstance(value, list | tuple) or len(value) != len(inner):
-            raise InputError(f"{place} = {show(value)}: must be a list of {len(inner)} entries")
-        return tuple(
-            _checked(f"{place}[{i}]", item, part)
-            for i, (item, part) in enumerate(zip(value, inner, strict=True))
-        )
-    return value
+class Part(Checked):
+    """A load, a support, a point mass or a kind of damping: a frozen data class.
 
-
-class Part:
-    """A load, a support or a kind of damping.
+    Its arguments have the keys of its table in a case file; see `foldyn.arguments`.
 
     Attributes
     ----------
-    keys : mapping of str to str
-        Keys of its table in a case file, and the arguments that they set.
     missing : mapping of str to str
-        Remedies in messages where a key is missing that must not be: those of arguments without a
-        default, and those given here; "history" may be among them.
-    own, apart : str
-        A key that none but its tables have, and what the message says where another kind's keys
-        stand beside it.
+        Remedies in messages where a key is missing that must not be, beside those of arguments
+        without a default.
+    apart : str
+        What the message says where another kind's keys stand beside its own.
     """
 
-    keys: ClassVar[Mapping[str, str]]
     missing: ClassVar[Mapping[str, str]] = {}
-    own: ClassVar[str] = ""
     apart: ClassVar[str] = ""
 
     @classmethod
     def term(cls, parts: Sequence[tuple[str, Any]], structure: Any) -> Term | None:
         """What all of a kind, each with its place for messages, add to the energy of a case."""
         return None
+
+    @classmethod
+    def by_key(cls) -> dict[str, str]:
+        """Its arguments by the keys of its table."""
+        return {argument.key: name for name, argument in arguments(cls).items()}
 
     @classmethod
     def of(cls, table: Mapping[str, Any], folder: Path | None = None) -> Self:
@@ -188,35 +165,65 @@ class Part:
         folder : Path, optional
             Where relative paths of CSV files start; without it no file is read.
         """
-        for key in (*cls.needed(), *cls.missing):
+        for key, remedy in cls.needed().items():
             if key not in table:
-                raise InputError(f": missing; {cls.missing.get(key, 'give its value')}", f".{key}")
-        given = {argument: table[key] for key, argument in cls.keys.items() if key in table}
-        if "history" in table:
+                raise InputError(f": missing; {remedy}", f".{key}")
+        keys = cls.by_key()
+        given = {keys[key]: value for key, value in table.items()}
+        if "history" in given:
             with within(".history"):
-                given["history"] = history_from(table["history"], folder)
+                given["history"] = history_from(given["history"], folder)
         try:
             return cls(**given)
         except InputError as error:
             inside = error.field[len(error.key) :]
-            key = next((key for key, name in cls.keys.items() if name == error.key), error.key)
+            key = next((key for key, name in keys.items() if name == error.key), error.key)
             raise InputError(error.reason, f".{key}{inside}" if key else inside) from None
 
     @classmethod
-    def needed(cls) -> list[str]:
-        """Keys of the arguments without a default."""
-        names = {item.name for item in fields(cast(Any, cls)) if item.default is MISSING}
-        return [key for key, name in cls.keys.items() if name in names]
+    def needed(cls) -> dict[str, str]:
+        """Keys that its table must have, and what to do where one is missing."""
+        return {
+            one.key: f"give it ({one.unit})" if one.unit else "give its value"
+            for one in arguments(cls).values()
+            if one.default is MISSING
+        } | dict(cls.missing)
 
     def table(self) -> dict[str, Any]:
         """Its table of plain values, without the history and what is None."""
-        given = {key: getattr(self, argument) for key, argument in self.keys.items()}
+        given = {key: getattr(self, name) for key, name in self.by_key().items()}
+        given.pop("history", None)
         return {key: plain(value) for key, value in given.items() if value is not None}
 
 
-def given_keys(table: Any, kinds: Iterable[type[Part]]) -> set[str]:
-    """Keys of a table, each of which must belong to one of some kinds of parts."""
+def part_from(
+    table: Any, kinds: Sequence[type[P]], section: str, folder: Path | None = None, asked: str = ""
+) -> P:
+    """Part of one of some kinds from its table, which the keys tell; see `Part.of`.
+
+    Among the kinds of which there are keys that no other has, or if there are none among all, that
+    is the first that has all keys, or else the last.
+
+    section : where such tables stand in a case file.
+    asked : what a message asks for where there are no keys at all.
+    """
     if not isinstance(table, Mapping):
         raise InputError(f" = {show(table)}: must be a table")
-    check_keys(table, dict.fromkeys([*(key for kind in kinds for key in kind.keys), "history"]))
-    return set(table)
+    keys = {kind: kind.by_key() for kind in kinds}
+    counts = Counter(key for known in keys.values() for key in known)
+    check_keys(table, sorted(counts, key="history".__eq__))
+    given = [key for key in table if key != "history"]
+    if not given:
+        asked = asked or ", or ".join(" and ".join(kind.needed()) for kind in kinds)
+        raise InputError(f": give {asked}")
+    own = [key for key in given if counts[key] == 1] or given
+    fit = [kind for kind in kinds if keys[kind].keys() & own]
+    kind = next((kind for kind in fit if keys[kind].keys() >= table.keys()), fit[-1])
+    others = [key for key in table if key not in keys[kind]]
+    if others:
+        first = next(key for key in own if key in keys[kind])
+        raise InputError(
+            f": {kind.apart}; leave out {' and '.join(others)}, or write [[{section}]] for each",
+            f".{first}",
+        )
+    return kind.of(table, folder)

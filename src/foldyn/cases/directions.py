@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import Check
 from foldyn.errors import InputError
 from foldyn.values import choice, indices, show, single, vector
 
@@ -35,6 +37,11 @@ def check_direction(name: str, direction: Any) -> str | tuple[float, ...]:
     if isinstance(direction, str):
         return choice(name, direction, DIRECTIONS)
     return vector(name, direction, nonzero=True)
+
+
+Axis = Annotated[str, Check(check_axis)]
+Axes = Annotated[str, Check(check_axes)]
+Direction = Annotated[str | Sequence[float], Check(check_direction)]
 
 
 def unit_vector(direction: Any) -> NDArray[np.float64]:
@@ -66,3 +73,6 @@ def check_pairs(name: str, value: Any) -> tuple[tuple[int, int], ...]:
             )
         pairs.append((numbers[0], numbers[1]))
     return tuple(pairs)
+
+
+Pairs = Annotated[Sequence[int] | Sequence[Sequence[int]], Check(check_pairs)]

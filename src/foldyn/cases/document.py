@@ -22,8 +22,8 @@ from foldyn.cases.case import Case
 from foldyn.cases.contact import Contact, contact_from
 from foldyn.cases.damping import damping_from, damping_table
 from foldyn.cases.decode import law_from
-from foldyn.cases.histories import HISTORIES, Constant, History, Table
-from foldyn.cases.history import as_history
+from foldyn.cases.histories import HISTORIES, History, Table
+from foldyn.cases.history import STEADY, as_history
 from foldyn.cases.loads import Load, load_from
 from foldyn.cases.masses import mass_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
@@ -256,15 +256,16 @@ class _Writer:
         for plane in contact.planes:
             table = plane.table()
             history = as_history(plane.history)
-            if history != Constant():
+            if history != STEADY:
                 table["history"] = self._history(history, True)
             planes.append(table)
-        return {**contact.table(), **({"planes": planes} if planes else {})}
+        without = {key: value for key, value in contact.table().items() if key != "planes"}
+        return {**without, **({"planes": planes} if planes else {})}
 
     def _part(self, part: Any) -> dict[str, Any]:
         section = part.table()
-        history = as_history(getattr(part, "history", None))
-        if history != Constant() or "history" in part.missing:
+        history = getattr(part, "history", STEADY)
+        if history != STEADY or "history" in part.missing:
             moves = not isinstance(part, Load) or part.moves
             section["history"] = self._history(history, moves)
         return section
@@ -323,22 +324,23 @@ def _structure(sections: Mapping[str, Any]) -> Any:
         sheet = sheet_from(sections["sheet"])
         kind = model.pop("kind", BARS_AND_HINGES)
         least = len(pattern.vertices) + len(pattern.edges) * (model.get("divisions", 1) - 1)
-        if least > len(nodes):  # before a mesh of any size is made
-            raise InputError(
-                f"the result holds rest positions of {len(nodes)} nodes, its structure has at "
-                f"least {least}: use the whole result, not a selection of its nodes"
-            )
+        _check_whole(least <= len(nodes), nodes, f"at least {least} nodes")  # before it is meshed
         structure = MODELS[kind].make(pattern, sheet, **model)
-        if nodes.shape != structure.nodes.shape:
-            raise InputError(
-                f"the result holds rest positions of shape {nodes.shape}, its structure has "
-                f"{structure.nodes.shape}: use the whole result, not a selection of its nodes"
-            )
+        shape = structure.nodes.shape
+        _check_whole(nodes.shape == shape, nodes, f"the shape {shape}")
         centers = {k: nodes[c] for k, c in enumerate(structure.centers) if c >= 0}
         if centers and not np.array_equal(nodes, structure.nodes):
             # panel centers given by hand, or computed to other last digits on another machine
             structure = discretize(pattern, sheet, **model, centers=centers)
     return structure
+
+
+def _check_whole(whole: bool, nodes: NDArray, own: str) -> None:
+    if not whole:
+        raise InputError(
+            f"the result holds rest positions of shape {nodes.shape}, its structure has {own}: use "
+            "the whole result, not a selection of its nodes"
+        )
 
 
 def _stored_pattern(table: Mapping[str, Any]) -> Pattern:

@@ -7,19 +7,20 @@ panels less the dihedral: 180 degrees less it, but for thick panels (`Pattern.fl
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.values import doubt_degrees, number, number_or_list, parsed, show
+from foldyn.values import doubt_degrees, number, number_or_list, one_or_each, parsed, show
 
 SIGNS: Mapping[str, float] = {"V": 1.0, "M": -1.0}
 """Sign of the fold angle of each assignment."""
 ROUNDING = 1e-9  # degrees
 Angles = float | tuple[float, ...]
+PerCrease = float | Sequence[float]
 
 
 def check_angles(name: str, value: Any) -> Angles:
@@ -75,10 +76,10 @@ def dihedrals(
         of them is a size, and each folds the way it is assigned.
     """
     if angle is not None:
-        return _each("angle", angle, len(letters))
+        return one_or_each("angle", angle, len(letters), "creases")
     if fraction is not None:
         return flat - 180.0 * fraction * _signs("fraction", letters)
-    folded = _each("fold_angle", fold_angle, len(letters))
+    folded = one_or_each("fold_angle", fold_angle, len(letters), "creases")
     if not assigned or isinstance(fold_angle, tuple):
         return flat - folded
     if folded[0] < 0.0:
@@ -99,16 +100,6 @@ def within_reach(angles: NDArray[np.float64], creases: NDArray[np.int64]) -> NDA
             "side; fold it less, or give its hinge another offset",
         )
     return np.clip(angles, 0.0, 360.0)
-
-
-def _each(name: str, value: Any, count: int) -> NDArray[np.float64]:
-    array = np.array(value)
-    if array.ndim and len(array) != count:
-        raise InputError(
-            f" = {show(value)}: {len(array)} angles for {count} creases; give one, or one for each",
-            name,
-        )
-    return np.broadcast_to(array, (count,))
 
 
 def _signs(name: str, letters: NDArray[np.str_]) -> NDArray[np.float64]:

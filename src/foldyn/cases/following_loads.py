@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.history import History, as_history
+from foldyn.arguments import Check
+from foldyn.cases.history import STEADY, Factor
 from foldyn.cases.load import Load
-from foldyn.cases.regions import check_panels, resolve_panels
-from foldyn.cases.selection import check_creases, resolve_creases
+from foldyn.cases.regions import Panels, resolve_panels
+from foldyn.cases.selection import Creases, resolve_creases
 from foldyn.errors import InputError
 from foldyn.mechanics.following import Following, joined, moments, pressures, pushes
 from foldyn.mechanics.sheet_term import NO_DOF
-from foldyn.values import brief, number, number_or_list, show
+from foldyn.values import number, number_or_list, one_or_each, show
 
 
-@brief
 @dataclass(frozen=True)
 class Pressure(Load):
     """Pressure on panels, which stays normal to them as they move, times a history.
@@ -37,18 +37,11 @@ class Pressure(Load):
         Factor of time; constant by default.
     """
 
-    pressure: float
-    panels: int | str | Sequence[int] = "all"
-    history: History | Callable[[Any], Any] | None = None
+    pressure: Annotated[float, Check(number, unit="Pa")]
+    panels: Panels = "all"
+    history: Factor = STEADY
 
-    keys = {"pressure": "pressure", "panels": "panels"}
     apart = "a pressure acts on panels"
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "pressure", number("pressure", self.pressure, unit="Pa"))
-        object.__setattr__(self, "panels", check_panels("panels", self.panels))
-        object.__setattr__(self, "history", as_history(self.history))
 
     def following(self, structure: Any, place: str) -> Following:
         """See `Load`."""
@@ -67,7 +60,6 @@ class Pressure(Load):
             )
 
 
-@brief
 @dataclass(frozen=True)
 class CreaseMoment(Load):
     """Moments of creases, times a history: pairs of equal and opposite moments on their panels.
@@ -86,30 +78,16 @@ class CreaseMoment(Load):
         Factor of time; constant by default.
     """
 
-    creases: int | str | Sequence[int]
-    moment: float | Sequence[float]
-    history: History | Callable[[Any], Any] | None = None
+    creases: Creases
+    moment: Annotated[float | Sequence[float], Check(number_or_list, what="crease", unit="N m")]
+    history: Factor = STEADY
 
-    keys = {"creases": "creases", "moment": "moment"}
     apart = "acts on creases"
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "creases", check_creases("creases", self.creases))
-        object.__setattr__(self, "moment", number_or_list("moment", self.moment, "crease"))
-        object.__setattr__(self, "history", as_history(self.history))
 
     def of_creases(self, structure: Any, place: str) -> tuple[NDArray, NDArray]:
         """Its creases (k,), and the moment (k,), N m, of each."""
         creases = resolve_creases(structure, self.creases, f"{place}.creases")
-        moment = np.array(self.moment)
-        if moment.ndim and len(moment) != len(creases):
-            raise InputError(
-                f" = {show(self.moment)}: {len(moment)} moments for {len(creases)} creases; give "
-                "one, or one for each",
-                f"{place}.moment",
-            )
-        return creases, np.broadcast_to(moment, creases.shape)
+        return creases, one_or_each(f"{place}.moment", self.moment, len(creases), "creases")
 
     def following(self, structure: Any, place: str) -> Following:
         """See `Load`; a shell's pieces of a crease take their part of it by their length."""

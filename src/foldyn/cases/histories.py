@@ -10,16 +10,17 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import Check, Flag
 from foldyn.cases import waveforms
 from foldyn.cases.csv_table import read_columns
-from foldyn.cases.history import Constant, Formula, History, set_field
+from foldyn.cases.history import Constant, Formula, History
 from foldyn.errors import InputError
-from foldyn.values import SMALLEST, brief, flag, number, numbers, show
+from foldyn.values import SMALLEST, number, numbers, show
 
 __all__ = [
     "HISTORIES", "Chirp", "Constant", "HalfSine", "Harmonic", "History", "Pulse", "Ramp", "Step",
@@ -33,11 +34,7 @@ SHARP = 0.01  # of the range of a table: how far a sharp corner leads away from 
 class _Lasting(Formula):
     """A history that begins at t = 0 and changes until `duration` (s)."""
 
-    duration: float
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        set_field(self, "duration", number("duration", self.duration, above=0.0))
+    duration: Annotated[float, Check(number, above=0.0, unit="s")]
 
     def parameters(self) -> tuple[float, ...]:
         """See `History.parameters`."""
@@ -48,7 +45,6 @@ class _Lasting(Formula):
         return 0.0, self.duration
 
 
-@brief
 @dataclass(frozen=True)
 class Pulse(_Lasting):
     """Factor 1 for 0 <= t < duration, else 0.
@@ -72,7 +68,6 @@ class Pulse(_Lasting):
         return 0.0, self.duration
 
 
-@brief
 @dataclass(frozen=True)
 class HalfSine(_Lasting):
     """Factor sin(pi t / duration) for 0 <= t < duration, else 0.
@@ -87,7 +82,6 @@ class HalfSine(_Lasting):
     code: ClassVar[int] = waveforms.HALF_SINE
 
 
-@brief
 @dataclass(frozen=True)
 class Ramp(_Lasting):
     """Factor t / duration, held at 0 before t = 0 and at 1 from t = duration on.
@@ -108,13 +102,8 @@ class Ramp(_Lasting):
     array([0.10351562, 0.5       , 1.        ])
     """
 
-    smooth: bool = False
+    smooth: Flag = False
     kind: ClassVar[str] = "ramp"
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        super().__post_init__()
-        set_field(self, "smooth", flag("smooth", self.smooth))
 
     @property
     def code(self) -> int:  # type: ignore[override]
@@ -122,7 +111,6 @@ class Ramp(_Lasting):
         return waveforms.SMOOTH_RAMP if self.smooth else waveforms.RAMP
 
 
-@brief
 @dataclass(frozen=True)
 class Step(Formula):
     """Factor 0 before `time`, 1 from then on.
@@ -133,13 +121,9 @@ class Step(Formula):
         Time of the step (s).
     """
 
-    time: float = 0.0
+    time: Annotated[float, Check(number, unit="s")] = 0.0
     kind: ClassVar[str] = "step"
     code: ClassVar[int] = waveforms.STEP
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        set_field(self, "time", number("time", self.time))
 
     def parameters(self) -> tuple[float, ...]:
         """See `History.parameters`."""
@@ -150,7 +134,6 @@ class Step(Formula):
         return (self.time,)
 
 
-@brief
 @dataclass(frozen=True)
 class Harmonic(Formula):
     """Factor sin(2 pi frequency t + phase).
@@ -163,22 +146,16 @@ class Harmonic(Formula):
         Phase at t = 0 (degrees).
     """
 
-    frequency: float
-    phase: float = 0.0
+    frequency: Annotated[float, Check(number, above=0.0, unit="Hz")]
+    phase: Annotated[float, Check(number, unit="degrees")] = 0.0
     kind: ClassVar[str] = "harmonic"
     code: ClassVar[int] = waveforms.HARMONIC
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        set_field(self, "frequency", number("frequency", self.frequency, above=0.0))
-        set_field(self, "phase", number("phase", self.phase))
 
     def parameters(self) -> tuple[float, ...]:
         """See `History.parameters`."""
         return self.frequency, math.radians(self.phase)
 
 
-@brief
 @dataclass(frozen=True)
 class Chirp(Formula):
     """Factor sin(2 pi (start t + (end - start) t^2 / (2 duration)) + phase), 0 <= t < duration.
@@ -201,21 +178,17 @@ class Chirp(Formula):
     array([0., 1., 0.])
     """
 
-    start: float
-    end: float
-    duration: float
-    phase: float = 0.0
+    start: Annotated[float, Check(number, least=0.0, unit="Hz")]
+    end: Annotated[float, Check(number, least=0.0, unit="Hz")]
+    duration: Annotated[float, Check(number, above=0.0, unit="s")]
+    phase: Annotated[float, Check(number, unit="degrees")] = 0.0
     kind: ClassVar[str] = "chirp"
     code: ClassVar[int] = waveforms.CHIRP
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        for name in ("start", "end"):
-            set_field(self, name, number(name, getattr(self, name), least=0.0))
+    def agree(self) -> None:
+        """Refuse what does not swing."""
         if self.start == self.end == 0.0:
-            raise InputError(f"end = {self.end}: start or end must be greater than 0")
-        set_field(self, "duration", number("duration", self.duration, above=0.0))
-        set_field(self, "phase", number("phase", self.phase))
+            raise InputError(f" = {self.end}: start or end must be greater than 0", "end")
 
     def parameters(self) -> tuple[float, ...]:
         """See `History.parameters`."""
@@ -236,7 +209,6 @@ class Chirp(Formula):
         return 0.0, self.duration
 
 
-@brief
 @dataclass(frozen=True, eq=False)
 class Table(Formula):
     """Factors given at times, linear between them, the first and the last held outside.
@@ -252,31 +224,29 @@ class Table(Formula):
         that a support follows, whose velocity must not jump at every value.
     """
 
-    times: Any
-    values: Any
-    smooth: bool = False
+    times: Annotated[Any, Check(numbers, unit="s")]
+    values: Annotated[Any, Check(numbers)]
+    smooth: Flag = False
     kind: ClassVar[str] = "table"
     code: ClassVar[int] = waveforms.TABLE
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        times, values = numbers("times", self.times), numbers("values", self.values)
+    def agree(self) -> None:
+        """Refuse times that do not increase, and values that are not one for each."""
+        times, values = self.times, self.values
         if times.ndim != 1 or times.size < 2:
-            raise InputError(f"times = {show(self.times)}: must be a list of at least two numbers")
+            raise InputError(f" = {show(times)}: must be a list of at least two numbers", "times")
         if values.shape != times.shape:
             raise InputError(
-                f"values = {show(self.values)}: must be a list of as many numbers as times "
-                f"({times.size})"
+                f" = {show(values)}: must be a list of as many numbers as times ({times.size})",
+                "values",
             )
         back = np.flatnonzero(np.diff(times) < SMALLEST)
         if back.size:
             i = int(back[0]) + 1
             raise InputError(
-                f"times[{i}] = {times[i]}: must be greater than the time before it ({times[i - 1]})"
+                f" = {times[i]}: must be greater than the time before it ({times[i - 1]})",
+                f"times[{i}]",
             )
-        set_field(self, "smooth", flag("smooth", self.smooth))
-        set_field(self, "times", times)
-        set_field(self, "values", values)
 
     @classmethod
     def from_csv(

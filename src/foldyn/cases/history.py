@@ -9,17 +9,18 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import Check, Checked
 from foldyn.cases import waveforms
 from foldyn.errors import InputError
-from foldyn.values import brief, numbers, show
+from foldyn.values import numbers, show
 
 
-class History(ABC):
+class History(Checked, ABC):
     """A factor of time.
 
     A subclass computes `factor` for an array of times (s) and, as a frozen dataclass, compares
@@ -71,13 +72,17 @@ class Formula(History):
         return waveforms.waveform_table(packed, 0, flat).reshape((3, *times.shape))
 
 
-@brief
 @dataclass(frozen=True)
 class Constant(Formula):
     """Factor 1 at all times."""
 
     kind: ClassVar[str] = "constant"
     code: ClassVar[int] = waveforms.CONSTANT
+
+
+def _times(name: str, value: Any) -> tuple[float, ...]:
+    """Return times in order, each once."""
+    return tuple(np.unique(numbers(name, value)).tolist())
 
 
 @dataclass(frozen=True)
@@ -105,14 +110,8 @@ class Function(History):
     """
 
     function: Callable[[Any], Any]
-    at: Sequence[float] | None = None
+    at: Annotated[Sequence[float] | None, Check(_times, unit="s")] = None
     kind: ClassVar[str] = "function"
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        if self.at is not None:
-            times = np.atleast_1d(numbers("at", self.at))
-            set_field(self, "at", tuple(np.unique(times).tolist()))
 
     def knots(self) -> tuple[float, ...] | None:
         """See `History.knots`."""
@@ -152,21 +151,22 @@ class Function(History):
 def as_history(history: History | Callable[[Any], Any] | None) -> History:
     """Turn None (a constant), a history or any callable into a history."""
     if history is None:
-        return Constant()
+        return STEADY
     if isinstance(history, History):
         return history
     if isinstance(history, type) and issubclass(history, History):
         raise InputError(
-            f"history = {history.__name__}: give an object, as in {history.__name__}(...)"
+            f" = {history.__name__}: give an object, as in {history.__name__}(...)", "history"
         )
     if callable(history):
         return Function(history)
     raise InputError(
-        f"history = {show(history)}: must be a history such as Pulse(duration=1.0), or a function "
-        "of time"
+        f" = {show(history)}: must be a history such as Pulse(duration=1.0), or a function of time",
+        "history",
     )
 
 
-def set_field(instance: Any, name: str, value: Any) -> None:
-    """Set a checked value of a history: the dataclasses are frozen."""
-    object.__setattr__(instance, name, value)
+STEADY = Constant()
+Factor = Annotated[
+    History | Callable[[Any], Any] | None, Check(lambda _, history: as_history(history))
+]

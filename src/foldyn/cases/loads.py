@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.decode import given_keys
+from foldyn.arguments import Check, Key
+from foldyn.cases.decode import part_from
 from foldyn.cases.directions import signed
 from foldyn.cases.folding import (
+    PerCrease,
     check_angles,
     check_fold_angles,
     check_fraction,
@@ -21,13 +22,13 @@ from foldyn.cases.folding import (
     within_reach,
 )
 from foldyn.cases.following_loads import CreaseMoment, Pressure
-from foldyn.cases.history import History, as_history
+from foldyn.cases.history import STEADY, Factor
 from foldyn.cases.load import Load, check_held
-from foldyn.cases.selection import check_creases, check_nodes, resolve_creases, resolve_nodes
+from foldyn.cases.selection import Creases, Nodes, resolve_creases, resolve_nodes
 from foldyn.cases.shared_loads import LineLoad, TotalForce
 from foldyn.cases.temperature import Temperature
 from foldyn.errors import InputError, within
-from foldyn.values import brief, show, vector
+from foldyn.values import show, vector
 
 __all__ = [
     "LOADS",
@@ -42,10 +43,10 @@ __all__ = [
     "TotalForce",
 ]
 
+FOLDED = ("angle", "fold_angle", "fraction")  # arguments of `Actuate` of which one is given
 STANDARD = 9.80665  # m/s2, standard gravity (3rd CGPM, 1901)
 
 
-@brief
 @dataclass(frozen=True)
 class Force(Load):
     """The same force on each of some nodes, times a history.
@@ -60,19 +61,12 @@ class Force(Load):
         Factor of time; constant by default.
     """
 
-    nodes: int | str | Sequence[int]
-    vector: Sequence[float]
-    history: History | Callable[[Any], Any] | None = None
+    nodes: Nodes
+    vector: Annotated[Sequence[float], Check(vector, unit="N"), Key("force")]
+    history: Factor = STEADY
 
-    keys = {"nodes": "nodes", "force": "vector"}
     apart = "acts on some nodes"
     arrows = True
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "nodes", check_nodes(self.nodes))
-        object.__setattr__(self, "vector", vector("vector", self.vector))
-        object.__setattr__(self, "history", as_history(self.history))
 
     def loaded(self, structure: Any, place: str) -> NDArray[np.int64]:
         """See `Load`."""
@@ -90,7 +84,14 @@ class Force(Load):
         check_held(f"the force {show(self.vector)}", nodes, acts, fixed, place)
 
 
-@brief
+def _acceleration(name: str, value: Any) -> tuple[float, ...]:
+    """Return an acceleration that is not zero, or standard gravity along a direction."""
+    if isinstance(value, str):
+        axis, sign = signed(name, value)
+        return tuple(sign * STANDARD * (k == axis) + 0.0 for k in range(3))
+    return vector(name, value, nonzero=True)
+
+
 @dataclass(frozen=True)
 class Gravity(Load):
     """Gravity on the whole structure, times a history.
@@ -109,28 +110,18 @@ class Gravity(Load):
         Factor of time; constant by default.
     """
 
-    acceleration: Sequence[float] | str
-    history: History | Callable[[Any], Any] | None = None
+    acceleration: Annotated[
+        Sequence[float] | str, Check(_acceleration, unit="m/s2"), Key("gravity")
+    ]
+    history: Factor = STEADY
 
-    keys = {"gravity": "acceleration"}
     apart = "acts on the whole structure"
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        if isinstance(self.acceleration, str):
-            axis, sign = signed("acceleration", self.acceleration)
-            given = tuple(sign * STANDARD * (k == axis) + 0.0 for k in range(3))
-        else:
-            given = vector("acceleration", self.acceleration, nonzero=True)
-        object.__setattr__(self, "acceleration", given)
-        object.__setattr__(self, "history", as_history(self.history))
 
     def weight(self, mass: NDArray[np.float64]) -> NDArray[np.float64]:
         """Forces (n, 3), N, on nodes with masses (n,), kg."""
         return mass[:, None] * np.array(self.acceleration)
 
 
-@brief
 @dataclass(frozen=True)
 class Actuate(Load):
     """Creases that fold or unfold by themselves.
@@ -157,28 +148,22 @@ class Actuate(Load):
         it, mountains to -180 degrees times it.
     """
 
-    creases: int | str | Sequence[int]
-    angle: float | Sequence[float] | None = None
-    history: History | Callable[[Any], Any] | None = None
-    fold_angle: float | Sequence[float] | None = None
-    fraction: float | str | None = None
+    creases: Creases
+    angle: Annotated[PerCrease | None, Check(check_angles, unit="degrees")] = None
+    history: Factor = STEADY
+    fold_angle: Annotated[PerCrease | None, Check(check_fold_angles, unit="degrees")] = None
+    fraction: Annotated[float | str | None, Check(check_fraction)] = None
 
-    keys = {
-        "creases": "creases", "angle": "angle", "fold_angle": "fold_angle", "fraction": "fraction",
-    }  # fmt: skip
     apart = "creases that fold are a load of their own"
     moves = True
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "creases", check_creases("creases", self.creases))
-        given = [name for name in FOLDED if getattr(self, name) is not None]
+    def agree(self) -> None:
+        """Ask for one of the three that say how far."""
+        given = self.given(*FOLDED)
         if not given:
             raise InputError(": missing; give it (degrees), or fold_angle or fraction", "angle")
         if len(given) > 1:
             raise InputError(f": give only one of {' and '.join(given)}", given[1])
-        object.__setattr__(self, given[0], FOLDED[given[0]](given[0], getattr(self, given[0])))
-        object.__setattr__(self, "history", as_history(self.history))
 
     def rest_changes(
         self, structure: Any, place: str
@@ -190,7 +175,7 @@ class Actuate(Load):
                 cast(Any, self.angle), cast(Any, self.fold_angle), cast(Any, self.fraction),
                 isinstance(self.creases, str), *_of_creases(structure, creases),
             )  # fmt: skip
-        name = next(name for name in FOLDED if getattr(self, name) is not None)
+        (name,) = self.given(*FOLDED)
         with within(f"{place}.{name}"):
             angles = within_reach(angles, creases)
         closed = angles[(angles == 0.0) | (angles == 360.0)]
@@ -204,14 +189,6 @@ class Actuate(Load):
                 "another fold_law"
             )
         return creases, np.radians(angles) - structure.fold_rest[creases]
-
-
-FOLDED: Mapping[str, Callable[[str, Any], Any]] = {
-    "angle": check_angles,
-    "fold_angle": check_fold_angles,
-    "fraction": check_fraction,
-}
-"""Arguments of `Actuate` that say how far creases fold, and their checks."""
 
 
 def _of_creases(structure: Any, creases: NDArray[np.int64]) -> tuple[NDArray, NDArray]:
@@ -233,24 +210,9 @@ LOADS: tuple[type[Load], ...] = (
     CreaseMoment,
     Temperature,
 )
-"""All kinds. Which one a table of a case file means, its keys that no other kind has tell: where it
-has those of several, the last kind, where it has none, the first."""
+"""All kinds. Which one a table of a case file means, its keys tell (`part_from`)."""
 
 
 def load_from(table: Any, folder: Path | None = None) -> Load:
-    """Load from its table in a case file; see `Part.of`."""
-    given = given_keys(table, LOADS) - {"history"}
-    if not given:
-        raise InputError(f": give {', or '.join(' and '.join(kind.needed()) for kind in LOADS)}")
-    counts = Counter(key for kind in LOADS for key in kind.keys)
-    own = {key for key in given if counts[key] == 1}
-    kinds = [kind for kind in LOADS if own & set(kind.keys)]
-    kind = kinds[-1] if kinds else next(kind for kind in LOADS if given & set(kind.keys))
-    others = [key for key in table if key in given and key not in kind.keys]
-    if others:
-        first = next(key for key in kind.keys if key in given)
-        raise InputError(
-            f": {kind.apart}; leave out {' and '.join(others)}, or write [[loads]] for each load",
-            f".{first}",
-        )
-    return kind.of(table, folder)
+    """Load from its table in a case file."""
+    return part_from(table, LOADS, "loads", folder)

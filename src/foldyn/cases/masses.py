@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.decode import Part, check_keys
-from foldyn.cases.selection import check_nodes, resolve_nodes
-from foldyn.errors import InputError
-from foldyn.values import brief, number, show
+from foldyn.arguments import Check
+from foldyn.cases.decode import Part, part_from
+from foldyn.cases.selection import Nodes, resolve_nodes
+from foldyn.values import number
 
 
-@brief
 @dataclass(frozen=True)
 class PointMass(Part):
     """The same mass on each of some nodes, without a size of its own.
@@ -32,16 +31,8 @@ class PointMass(Part):
         Mass (kg) on each of these nodes, above 0.
     """
 
-    nodes: int | str | Sequence[int]
-    mass: float
-
-    keys = {"nodes": "nodes", "mass": "mass"}
-    missing = {"mass": "give the mass (kg) on each of these nodes"}
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "nodes", check_nodes(self.nodes))
-        object.__setattr__(self, "mass", number("mass", self.mass, above=0.0, unit="kg"))
+    nodes: Nodes
+    mass: Annotated[float, Check(number, above=0.0, unit="kg")]
 
 
 def nodal_masses(masses: Sequence[PointMass], structure: Any) -> NDArray[np.float64]:
@@ -53,8 +44,5 @@ def nodal_masses(masses: Sequence[PointMass], structure: Any) -> NDArray[np.floa
 
 
 def mass_from(table: Any, folder: Path | None = None) -> PointMass:
-    """Point mass from its table in a case file; see `Part.of`."""
-    if not isinstance(table, Mapping):
-        raise InputError(f" = {show(table)}: must be a table")
-    check_keys(table, PointMass.keys)
-    return PointMass.of(table, folder)
+    """Point mass from its table in a case file."""
+    return part_from(table, (PointMass,), "masses", folder)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import Check
 from foldyn.cases.selection import check_nodes, in_range, resolve_nodes
 from foldyn.errors import InputError
 from foldyn.patterns.topology import edge_lookup, edge_of
@@ -19,7 +21,7 @@ PAIRS = 'pairs of vertices, as in [[0, 1], [1, 2]], or a selection such as "xmin
 def check_edges(name: str, edges: Any) -> str | tuple[tuple[int, int], ...]:
     """Return a selection as text, or edges as a tuple of (low, high); but for their range."""
     if isinstance(edges, str):
-        return str(check_nodes(edges, name))
+        return str(check_nodes(name, edges))
     given = listed(name, edges, PAIRS)
     if not given:
         raise InputError(f" = {show(edges)}: give {PAIRS}", name)
@@ -89,6 +91,10 @@ def resolve_panels(structure: Any, panels: Any, name: str) -> NDArray[np.int64]:
         return np.arange(len(structure.triangles))
     chosen = in_range(name, panels, int(structure.triangle_panel.max()) + 1, "panel")
     return np.flatnonzero(np.isin(structure.triangle_panel, chosen))
+
+
+Edges = Annotated[str | Sequence[Sequence[int]], Check(check_edges)]
+Panels = Annotated[int | str | Sequence[int], Check(check_panels)]
 
 
 def length_at_nodes(structure: Any, along: NDArray) -> NDArray[np.float64]:

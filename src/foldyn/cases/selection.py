@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import Check
 from foldyn.errors import InputError
 from foldyn.patterns.crease_data import crease_rows
 from foldyn.patterns.selection import check_expression, given_as, select
@@ -39,7 +40,7 @@ def resolve_nodes(
         pattern = structure.pattern  # None for a structure made by hand: all nodes are vertices
         with given_as(field):
             return select(structure.nodes if pattern is None else pattern, nodes)
-    check_nodes(nodes, field)
+    check_nodes(field, nodes)
     return in_range(field, nodes, len(structure.nodes), "node")
 
 
@@ -56,12 +57,12 @@ def in_range(field: str, given: Any, count: int, what: str) -> NDArray[np.int64]
     return chosen
 
 
-def check_nodes(nodes: Any, field: str = "nodes") -> str | tuple[int, ...]:
+def check_nodes(name: str, nodes: Any) -> str | tuple[int, ...]:
     """Return a node selection as text or as a tuple of numbers, checked but for its range."""
     if isinstance(nodes, str):
-        with given_as(field):
+        with given_as(name):
             return check_expression(nodes)
-    return indices(field, nodes, "node", 'or a selection such as "xmin"')
+    return indices(name, nodes, "node", 'or a selection such as "xmin"')
 
 
 def check_creases(name: str, creases: Any) -> str | tuple[int, ...]:
@@ -105,3 +106,7 @@ def resolve_creases(structure: Any, creases: Any, name: str = "creases") -> NDAr
             "numbers"
         )
     return crease_rows(name, creases, structure.pattern)
+
+
+Nodes = Annotated[int | str | Sequence[int], Check(check_nodes)]
+Creases = Annotated[int | str | Sequence[int], Check(check_creases)]

@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.history import History, as_history
+from foldyn.arguments import Check, Key
+from foldyn.cases.history import STEADY, Factor
 from foldyn.cases.load import Load, check_held
 from foldyn.cases.regions import (
+    Edges,
+    Panels,
     area_at_nodes,
-    check_edges,
-    check_panels,
     length_at_nodes,
     resolve_edges,
     resolve_panels,
     tributary_area,
 )
-from foldyn.cases.selection import check_nodes, resolve_nodes
+from foldyn.cases.selection import Nodes, resolve_nodes
 from foldyn.errors import InputError
-from foldyn.values import brief, show, vector
-
-PLACES = ("nodes", "edges", "panels")
+from foldyn.values import show, vector
 
 
 class Spread(Load):
@@ -53,7 +52,6 @@ class Spread(Load):
         return (measure / whole)[:, None] * self.total_of(whole)
 
 
-@brief
 @dataclass(frozen=True)
 class TotalForce(Spread):
     """A total force, shared by nodes, edges or panels, times a history.
@@ -86,31 +84,22 @@ class TotalForce(Spread):
     TotalForce(total=(0.0, 0.0, -2.0), edges='xmax', history=Constant())
     """
 
-    total: Sequence[float]
-    nodes: int | str | Sequence[int] | None = None
-    edges: str | Sequence[Sequence[int]] | None = None
-    panels: int | str | Sequence[int] | None = None
-    history: History | Callable[[Any], Any] | None = None
+    total: Annotated[Sequence[float], Check(vector, unit="N")]
+    nodes: Nodes | None = None
+    edges: Edges | None = None
+    panels: Panels | None = None
+    history: Factor = STEADY
 
-    keys = {"total": "total", "nodes": "nodes", "edges": "edges", "panels": "panels"}
     apart = "a total force is a load of its own"
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "total", vector("total", self.total))
-        given = [name for name in PLACES if getattr(self, name) is not None]
+    def agree(self) -> None:
+        """Ask for one place where it acts."""
+        given = self.given("nodes", "edges", "panels")
         if len(given) != 1:
             what = "is given" if not given else f"are given, {' and '.join(given)}"
             raise InputError(
                 f": give one of nodes, edges and panels; {len(given) or 'none'} {what}", "total"
             )
-        if self.nodes is not None:
-            object.__setattr__(self, "nodes", check_nodes(self.nodes))
-        elif self.edges is not None:
-            object.__setattr__(self, "edges", check_edges("edges", self.edges))
-        else:
-            object.__setattr__(self, "panels", check_panels("panels", self.panels))
-        object.__setattr__(self, "history", as_history(self.history))
 
     def measure(self, structure: Any, place: str) -> NDArray[np.float64]:
         """See `Spread`."""
@@ -143,7 +132,6 @@ class TotalForce(Spread):
         check_held(what, nodes, acts, fixed, place, told=self.nodes is not None)
 
 
-@brief
 @dataclass(frozen=True)
 class LineLoad(Spread):
     """A force per length along edges, times a history.
@@ -164,19 +152,11 @@ class LineLoad(Spread):
     LineLoad(edges=((0, 1),), force_per_length=(0.0, 0.0, -5.0), history=Constant())
     """
 
-    edges: str | Sequence[Sequence[int]]
-    force_per_length: Sequence[float]
-    history: History | Callable[[Any], Any] | None = None
+    edges: Edges
+    force_per_length: Annotated[Sequence[float], Check(vector, unit="N/m"), Key("per_length")]
+    history: Factor = STEADY
 
-    keys = {"edges": "edges", "per_length": "force_per_length"}
     apart = "acts along edges"
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "edges", check_edges("edges", self.edges))
-        given = vector("force_per_length", self.force_per_length)
-        object.__setattr__(self, "force_per_length", given)
-        object.__setattr__(self, "history", as_history(self.history))
 
     def measure(self, structure: Any, place: str) -> NDArray[np.float64]:
         """See `Spread`."""

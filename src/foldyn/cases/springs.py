@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from foldyn.arguments import Check
 from foldyn.cases.connectors import Connector
+from foldyn.cases.directions import Direction, Pairs
+from foldyn.cases.selection import Nodes
 from foldyn.errors import InputError
 from foldyn.mechanics.springs import Springs, SpringsTerm
-from foldyn.values import brief, number
+from foldyn.values import number
 
 
-@brief
 @dataclass(frozen=True)
 class Spring(Connector):
     """Linear springs: from nodes to the ground, or between nodes.
@@ -40,21 +42,13 @@ class Spring(Connector):
         l0 of springs between nodes without a direction (m); their distance at rest by default.
     """
 
-    stiffness: float
-    nodes: int | str | Sequence[int] | None = None
-    between: Sequence[Sequence[int]] | None = None
-    direction: str | Sequence[float] | None = None
-    rest_length: float | None = None
+    stiffness: Annotated[float, Check(number, above=0.0, unit="N/m")]
+    nodes: Nodes | None = None
+    between: Pairs | None = None
+    direction: Direction | None = None
+    rest_length: Annotated[float | None, Check(number, least=0.0, unit="m")] = None
 
-    keys = {
-        "nodes": "nodes",
-        "between": "between",
-        "stiffness": "stiffness",
-        "direction": "direction",
-        "rest_length": "rest_length",
-    }
-    missing = {"stiffness": "give it (N/m) for each spring"}
-    own = "stiffness"
+    missing = {"stiffness": "give it (N/m) for springs, or dashpot (N s/m)"}
     apart = "springs are a support of their own"
     asked = "nodes, for springs to the ground, or between, for springs between nodes"
     no_line = (
@@ -62,16 +56,11 @@ class Spring(Connector):
         'give direction, as in direction = "x"'
     )
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        stiffness = number("stiffness", self.stiffness, above=0.0, unit="N/m")
-        object.__setattr__(self, "stiffness", stiffness)
-        self._check_ends()
-        if self.rest_length is None:
-            return
-        rest = number("rest_length", self.rest_length, least=0.0, unit="m")
-        object.__setattr__(self, "rest_length", rest)
-        if self.between is None or self.direction is not None:
+    def agree(self) -> None:
+        """Refuse a length of springs that have none."""
+        super().agree()
+        rest = self.rest_length
+        if rest is not None and (self.between is None or self.direction is not None):
             raise InputError(
                 f" = {rest:g}: only for springs along the line between nodes; leave it out, or "
                 "give between and no direction",

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, Any
 
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import Check, Checked, brief
 from foldyn.errors import InputError
-from foldyn.values import brief, choice, numbers
+from foldyn.values import choice, numbers
 
 
 @brief
@@ -27,9 +29,28 @@ class Continuation:
     values: NDArray
 
 
-@brief
+def _vectors(name: str, value: Any) -> NDArray:
+    """Return a vector of every node."""
+    array = numbers(name, value)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InputError(f": shape {array.shape}: must be (nodes, 3)", name)
+    return array
+
+
+def _memory(name: str, value: Any) -> NDArray | str:
+    """Return a state of branches, or the word for a fresh one."""
+    return choice(name, value, ("fresh",)) if isinstance(value, str) else numbers(name, value)
+
+
+def _continuation(name: str, value: Any) -> Continuation:
+    """Return what is one."""
+    if isinstance(value, Continuation):
+        return value
+    raise InputError(f": got {type(value).__name__}; it comes from fd.initial_state(result)", name)
+
+
 @dataclass(frozen=True, eq=False)
-class State:
+class State(Checked):
     """Displacement and velocity of every node, for example to start a motion from.
 
     Parameters
@@ -48,31 +69,13 @@ class State:
         end; otherwise the motion starts as without it.
     """
 
-    displacement: ArrayLike | None = None
-    velocity: ArrayLike | None = None
-    memory: ArrayLike | str | None = None
-    continuation: Continuation | None = None
+    displacement: Annotated[ArrayLike | None, Check(_vectors, unit="m")] = None
+    velocity: Annotated[ArrayLike | None, Check(_vectors, unit="m/s")] = None
+    memory: Annotated[ArrayLike | str | None, Check(_memory)] = None
+    continuation: Annotated[Continuation | None, Check(_continuation)] = None
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        shapes = set()
-        for name in ("displacement", "velocity"):
-            value = getattr(self, name)
-            if value is None:
-                continue
-            array = numbers(name, value)
-            if array.ndim != 2 or array.shape[1] != 3:
-                raise InputError(f"{name}: shape {array.shape}: must be (nodes, 3)")
-            shapes.add(array.shape)
-            object.__setattr__(self, name, array)
-        if isinstance(self.memory, str):
-            choice("memory", self.memory, ("fresh",))
-        elif self.memory is not None:
-            object.__setattr__(self, "memory", numbers("memory", self.memory))
-        if not isinstance(self.continuation, Continuation | None):
-            raise InputError(
-                f"continuation: got {type(self.continuation).__name__}; it comes from "
-                "fd.initial_state(result)"
-            )
-        if len(shapes) == 2:
+    def agree(self) -> None:
+        """Refuse displacements and velocities of different numbers of nodes."""
+        both = [getattr(self, name) for name in self.given("displacement", "velocity")]
+        if len({array.shape for array in both}) > 1:
             raise InputError("displacement and velocity: must have the same shape")

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, get_args
 
+import numpy as np
+
+from foldyn.arguments import Check, Flag, Key
 from foldyn.cases.dashpots import Dashpot
-from foldyn.cases.decode import Part, given_keys
-from foldyn.cases.directions import check_axes, check_axis, check_direction
-from foldyn.cases.history import History, as_history
-from foldyn.cases.selection import check_nodes
+from foldyn.cases.decode import Part, part_from
+from foldyn.cases.directions import AXES, Axes, Axis, Direction
+from foldyn.cases.history import STEADY, Factor
+from foldyn.cases.selection import Nodes
 from foldyn.cases.springs import Spring
 from foldyn.errors import InputError
-from foldyn.values import brief, flag, indices, number, number_or_list, show
+from foldyn.values import indices, number, number_or_list, one_or_each, show
 
 
-@brief
 @dataclass(frozen=True)
 class Fix(Part):
     """Nodes held along some axes, or along one direction.
@@ -36,31 +38,25 @@ class Fix(Part):
         hinges whose edges may bow need those edges among the `straight` ones of `discretize`.
     """
 
-    nodes: int | str | Sequence[int]
-    axes: str | None = None
-    direction: Sequence[float] | str | None = None
-    along: bool = False
+    nodes: Nodes
+    axes: Axes | None = None
+    direction: Direction | None = None
+    along: Flag = False
 
-    keys = {"nodes": "nodes", "axes": "axes", "direction": "direction", "along": "along"}
+    apart = 'holds nodes at rest, and axis = "x", say, moves them'
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "nodes", check_nodes(self.nodes))
-        object.__setattr__(self, "along", flag("along", self.along))
+    def agree(self) -> None:
+        """Hold all axes where nothing else is said."""
         if self.direction is None:
-            axes = "xyz" if self.axes is None else self.axes
-            object.__setattr__(self, "axes", check_axes("axes", axes))
-            return
-        if self.axes is not None:
+            self._set(axes=self.axes or AXES)
+        elif self.axes is not None:
             raise InputError(
                 f" = {show(self.direction)}: holds one direction, axes hold others; give one of "
                 "the two, and a support for each",
                 "direction",
             )
-        object.__setattr__(self, "direction", check_direction("direction", self.direction))
 
 
-@brief
 @dataclass(frozen=True)
 class Impose(Part):
     """Nodes moved along one axis or direction as prescribed, whatever force that takes.
@@ -86,40 +82,39 @@ class Impose(Part):
         `Fix`.
     """
 
-    nodes: int | str | Sequence[int]
-    axis: str | None = None
-    value: float | Sequence[float] | None = None
-    history: History | Callable[[Any], Any] | None = None
-    direction: Sequence[float] | str | None = None
-    along: bool = False
+    nodes: Nodes
+    axis: Axis | None = None
+    value: Annotated[
+        float | Sequence[float] | None,
+        Check(number_or_list, what="node", unit="m"),
+        Key("displacement"),
+    ] = None
+    history: Factor = STEADY
+    direction: Direction | None = None
+    along: Flag = False
 
-    keys = {
-        "nodes": "nodes", "axis": "axis", "direction": "direction", "displacement": "value",
-        "along": "along",
-    }  # fmt: skip
-    missing = {
-        "displacement": "give it (m), or write axes instead of axis to hold nodes",
-    }
+    missing = {"displacement": "give it (m), or write axes instead of axis to hold nodes"}
+    apart = "moves nodes"
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "nodes", check_nodes(self.nodes))
-        object.__setattr__(self, "along", flag("along", self.along))
+    def agree(self) -> None:
+        """Ask for one direction, and for a value of each node."""
         if (self.axis is None) == (self.direction is None):
             raise InputError(
                 ': give the axis of the displacement, as in axis = "x", or its direction, as in '
                 "direction = (1, 0, 1), and only one of the two",
                 "axis",
             )
-        if self.axis is not None:
-            object.__setattr__(self, "axis", check_axis("axis", self.axis))
-        else:
-            object.__setattr__(self, "direction", check_direction("direction", self.direction))
-        object.__setattr__(self, "value", check_per_node("value", self.value, self.nodes))
-        object.__setattr__(self, "history", as_history(self.history))
+        if self.value is None:
+            raise InputError(": missing; give the displacement (m) at factor 1", "value")
+        if isinstance(self.value, tuple) and isinstance(self.nodes, str):
+            raise InputError(
+                f" = {show(self.value)}: one displacement per node needs node numbers, but nodes "
+                f'is the selection "{self.nodes}"; give one number, or the nodes by number',
+                "value",
+            )
+        one_or_each("value", self.value, np.size(self.nodes), "nodes")
 
 
-@brief
 @dataclass(frozen=True)
 class BaseMotion(Part):
     """The base moves along one axis: all that `Fix` holds along it moves together.
@@ -138,21 +133,21 @@ class BaseMotion(Part):
         Displacement (m) at factor 1.
     """
 
-    axis: str
-    history: History | Callable[[Any], Any] | None = None
-    value: float = 1.0
+    axis: Annotated[Axis, Key("base")]
+    history: Factor = STEADY
+    value: Annotated[float, Check(number, unit="m"), Key("displacement")] = 1.0
 
-    keys = {"base": "axis", "displacement": "value"}
     missing = {"history": "give the motion of the base over time"}
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "axis", check_axis("axis", self.axis))
-        object.__setattr__(self, "history", as_history(self.history))
-        object.__setattr__(self, "value", number("value", self.value))
+    apart = "moves all nodes that supports hold along its axis"
 
 
-@brief
+def _corners(name: str, value: Any) -> tuple[int, ...]:
+    corners = indices(name, value, "node", "the three that carry")
+    if len(corners) != 3:
+        raise InputError(f" = {show(value)}: must be three nodes", name)
+    return corners
+
+
 @dataclass(frozen=True)
 class Link(Part):
     """Nodes tied together, exactly: by equal displacements, or to three others.
@@ -170,113 +165,41 @@ class Link(Part):
         exact for any motion of a plate that stays flat.
     """
 
-    nodes: int | str | Sequence[int]
-    axes: str | None = None
-    to: Sequence[int] | None = None
+    nodes: Nodes
+    axes: Annotated[Axes | None, Key("link")] = None
+    to: Annotated[Sequence[int] | None, Check(_corners)] = None
 
-    keys = {"nodes": "nodes", "link": "axes", "to": "to"}
+    apart = "ties nodes together"
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "nodes", check_nodes(self.nodes))
+    def agree(self) -> None:
+        """Tie along all axes where nothing else is said."""
         if self.to is None:
-            axes = "xyz" if self.axes is None else self.axes
-            object.__setattr__(self, "axes", check_axes("axes", axes))
+            self._set(axes=self.axes or AXES)
             if isinstance(self.nodes, tuple) and len(self.nodes) < 2:
                 raise InputError(
                     f" = {show(self.nodes)}: a link ties at least two nodes; give them all, or the "
                     "three nodes on which one rides, as in to = (0, 1, 2)",
                     "nodes",
                 )
-            return
-        if self.axes is not None:
+        elif self.axes is not None:
             raise InputError(
                 f" = {show(self.to)}: nodes that ride on others do so along all axes; leave out "
                 "the axes, or to",
                 "to",
             )
-        corners = indices("to", self.to, "node", "the three that carry")
-        if len(corners) != 3:
-            raise InputError(f" = {show(self.to)}: must be three nodes", "to")
-        object.__setattr__(self, "to", corners)
 
 
 Support = Fix | Impose | BaseMotion | Spring | Dashpot | Link
-SUPPORTS: tuple[type[Support], ...] = (Fix, Impose, BaseMotion, Spring, Dashpot, Link)
+SUPPORTS: tuple[type[Support], ...] = get_args(Support)
+
+
+ASKED = (
+    "nodes and axes or direction (held), nodes, axis and displacement (moved), base and history (a "
+    "base that moves), nodes and link or to (tied together), or nodes or between with stiffness "
+    "(springs) or dashpot (damped)"
+)
 
 
 def support_from(table: Any, folder: Path | None = None) -> Support:
-    """Support from its table in a case file; see `Part.of`."""
-    given = given_keys(table, SUPPORTS)
-    if not given:
-        raise InputError(
-            ": give nodes and axes or direction (held), nodes, axis and displacement (moved), base "
-            "and history (a base that moves), nodes and link or to (tied together), or nodes or "
-            "between with stiffness (springs) or dashpot (damped)"
-        )
-    for kind in SUPPORTS:
-        if not kind.own or kind.own not in given:
-            continue
-        strange = [key for key in table if key in given and key not in kind.keys]
-        if strange:
-            raise InputError(
-                f": {kind.apart}; leave out {' and '.join(strange)}, or write [[supports]] for "
-                "each",
-                f".{kind.own}",
-            )
-        return kind.of(table, folder)
-    if left := [key for key in table if key in ("between", "rest_length")]:
-        raise InputError(
-            f": {left[0]} is for springs and dashpots: give stiffness (N/m) or dashpot (N s/m)"
-        )
-    if "base" in given:
-        strange = [key for key in ("nodes", "axes", "axis") if key in given]
-        check_axis(".base", table["base"])
-        if strange:
-            raise InputError(
-                f": moves all nodes that other [[supports]] hold along {table['base']}; leave out "
-                f"{strange[0]}, and give nodes their own [[supports]]",
-                ".base",
-            )
-        return BaseMotion.of(table, folder)
-    if given & {"link", "to"}:
-        own = "link" if "link" in given else "to"
-        strange = [key for key in ("axes", "axis", "direction", "displacement", "history")]
-        strange = [key for key in strange if key in given]
-        if strange:
-            raise InputError(
-                f": ties nodes together; leave out {strange[0]}, and write [[supports]] for what "
-                "holds or moves them",
-                f".{own}",
-            )
-        return Link.of(table, folder)
-    moved = [key for key in ("displacement", "history", "axis") if key in given]
-    if moved and "axes" in given and "nodes" in given:
-        raise InputError(
-            f": holds nodes at rest, but {moved[0]} moves them; give either axes alone, or axis, "
-            'as in axis = "x", with displacement',
-            ".axes",
-        )
-    if moved and not given & {"axis", "direction"}:
-        raise InputError(': missing; give the axis of the displacement, as in axis = "x"', ".axis")
-    return (Impose if moved else Fix).of(table, folder)
-
-
-def check_per_node(name: str, value: Any, nodes: Any) -> float | tuple[float, ...]:
-    """Return one finite number for all the checked `nodes`, or a tuple of one for each."""
-    checked = number_or_list(name, value, "node")
-    if not isinstance(checked, tuple):
-        return checked
-    if isinstance(nodes, str):
-        raise InputError(
-            f" = {show(value)}: one displacement per node needs node numbers, but nodes is the "
-            f'selection "{nodes}"; give one number, or the nodes by number',
-            name,
-        )
-    if len(checked) != len(nodes):
-        raise InputError(
-            f" = {show(value)}: {len(checked)} values for {len(nodes)} nodes; give one, or one for "
-            "each",
-            name,
-        )
-    return checked
+    """Support from its table in a case file."""
+    return part_from(table, SUPPORTS, "supports", folder, ASKED)

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.history import History, as_history
+from foldyn.arguments import Check, Key
+from foldyn.cases.history import STEADY, Factor
 from foldyn.cases.load import Load
-from foldyn.cases.regions import check_panels, resolve_panels
+from foldyn.cases.regions import Panels, resolve_panels
 from foldyn.errors import InputError
 from foldyn.mechanics.following import Following
 from foldyn.structures import Laminate
 from foldyn.structures.laminate import check_layers
 from foldyn.structures.swelling import Swelling
-from foldyn.values import brief, number
+from foldyn.values import number
 
 MOST_STRAIN = 0.2  # free strain beyond which the laws of the sheet say nothing
 
 
-@brief
 @dataclass(frozen=True)
 class Temperature(Load):
     """Panels that are warmer than at rest, times a history.
@@ -53,35 +53,21 @@ class Temperature(Load):
         Factor of time; constant by default.
     """
 
-    change: float
-    expansion: float | None = None
-    curvature: float | None = None
-    panels: int | str | Sequence[int] = "all"
-    layers: Sequence[Sequence[float]] | None = None
-    history: History | Callable[[Any], Any] | None = None
+    change: Annotated[float, Check(number, unit="K"), Key("temperature")]
+    expansion: Annotated[float | None, Check(number, unit="1/K")] = None
+    curvature: Annotated[float | None, Check(number, unit="1/(m K)")] = None
+    panels: Panels = "all"
+    layers: Annotated[Sequence[Sequence[float]] | None, Check(check_layers)] = None
+    history: Factor = STEADY
 
-    keys = {
-        "temperature": "change",
-        "expansion": "expansion",
-        "curvature": "curvature",
-        "panels": "panels",
-        "layers": "layers",
-    }
     apart = "a temperature acts on panels"
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "change", number("change", self.change, unit="K"))
-        object.__setattr__(self, "panels", check_panels("panels", self.panels))
-        object.__setattr__(self, "history", as_history(self.history))
-        given = [name for name in ("expansion", "curvature") if getattr(self, name) is not None]
-        for name in given:
-            object.__setattr__(self, name, number(name, getattr(self, name)))
-        if self.layers is not None:
-            object.__setattr__(self, "layers", check_layers("layers", self.layers))
-            if given:
-                raise InputError(f": the layers give the {given[0]}; leave it out", given[0])
-        elif not given:
+    def agree(self) -> None:
+        """Ask for what says how the panels deform, and refuse strains that are too large."""
+        given = self.given("expansion", "curvature")
+        if self.layers is not None and given:
+            raise InputError(f": the layers give the {given[0]}; leave it out", given[0])
+        if self.layers is None and not given:
             raise InputError(
                 ": give expansion (1/K), curvature (1/(m K)), or both, or the layers", "expansion"
             )

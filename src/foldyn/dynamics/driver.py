@@ -16,7 +16,6 @@ from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Dashpot, Rayleigh, State
 from foldyn.dynamics import generalized_alpha, timing
 from foldyn.dynamics.checkpoint import SECONDS, check_keeping
-from foldyn.dynamics.hereditary import check_state
 from foldyn.dynamics.inertia import check_mass, is_lumped
 from foldyn.dynamics.initial import (
     check_start,
@@ -187,14 +186,11 @@ def prepare(
         case = with_mass(integrator, case)
     duration = number("duration", duration, above=0.0)
     force = flag("force", force)
-    if not len(case.free_dofs):
-        raise InputError(
-            "supports: hold every node along x, y and z, so that nothing can move: free one"
-        )
+    case.check_movable()
     start = number("start", start, unit="s")
     u, v = check_start(case, initial)
     check_touching(case, u, float(start), float(start) + duration)
-    remembered = check_state(case, initial.memory if initial else None)
+    remembered = case.memory_in(initial)
     modal = modal_rows(case, u)
     chosen = Choice(integrator.name, "")
     if method == AUTO:

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case
-from foldyn.errors import InputError
-from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.inelastic_balance import BalancedMemory
 from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.structures.condensed_plates import CondensedPlatesTerm
 from foldyn.structures.inelastic_hinges import memory
-from foldyn.values import show
 
 
 def with_memory(case: Case, body: Assembly, by: Numbering) -> Assembly:
@@ -44,27 +39,6 @@ def with_memory(case: Case, body: Assembly, by: Numbering) -> Assembly:
 def memory_of_case(case: Case) -> HingeMemory:
     """State of the branches of a case, which begins at rest; dofs in the order of the structure."""
     return memory(case.remembering, case.body)
-
-
-def check_state(case: Case, given: Any) -> NDArray | str | None:
-    """State (b, 2) of the branches with which a motion starts, "fresh", or None for the default.
-
-    Raises
-    ------
-    InputError
-        Another shape than the case's.
-    """
-    if given is None or isinstance(given, str):
-        return given
-    array = np.array(given, float)
-    count = sum(part.count for part in case.remembering)
-    if array.shape != (count, VARIABLES):
-        raise InputError(
-            f"initial: memory of shape {show(array.shape)}: the case has {(count, VARIABLES)}, "
-            "branches and variables; take the state of a result of the same case, or one without "
-            "memory (damped creases of n5b8e have branches in explicit methods alone)"
-        )
-    return array
 
 
 def instant_stiffness(case: Case, u: NDArray) -> sparse.csr_array | None:

@@ -12,8 +12,9 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from foldyn.arguments import brief
 from foldyn.errors import InputError, optional
-from foldyn.values import brief, choice, number
+from foldyn.values import choice, number
 
 _TERMS = 6  # of the polynomial in r^2 that inverts the distortion
 _REACH = 1.08  # part of the half diagonal, up to which it is fitted

@@ -13,6 +13,7 @@ import numpy as np
 import xarray
 
 from foldyn.algebra.extrapolation import convergence, limits
+from foldyn.arguments import brief
 from foldyn.cases import Case
 from foldyn.cases.clamped_edges import straightened
 from foldyn.errors import FoldynWarning, InputError, within
@@ -26,10 +27,9 @@ from foldyn.linear.small_loads import forces_alone, rest_forces, small_loads
 from foldyn.materials import Superlinear
 from foldyn.materials.law import Law
 from foldyn.results import fidelity_dataset
-from foldyn.statics.tracing import check_movable
 from foldyn.structures import ModelOptions, Structure, discretize
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
-from foldyn.values import brief, choice, listed, number, show, whole
+from foldyn.values import choice, listed, number, show, whole
 
 MODELS: Mapping[str, Mapping[str, Any]] = {
     "standard": {
@@ -250,7 +250,7 @@ def comparison(
     compared = _compared(forces, models)
     for name, held in compared.items():
         with within("" if name == OWN else f"models: {name}: "):
-            check_movable(held)
+            held.check_movable()
     if vertex_radius is None:
         coarse, fine = meshes(case.structure.pattern, divisions)
     else:

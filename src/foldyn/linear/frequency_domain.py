@@ -6,6 +6,7 @@ The static response of the modes left out completes those superposed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +14,13 @@ from scipy import sparse
 
 from foldyn.algebra.complex_symmetric import solve
 from foldyn.algebra.eigen import Pencil, Spectrum, lowest
+from foldyn.arguments import Check, Checked, Flag
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
 from foldyn.linear.excitation import Answer, Drive, drive_terms, warn_at
 from foldyn.linear.linearized import Linearized
 from foldyn.linear.modes import rigid_space, unresisted
-from foldyn.values import flag, whole
+from foldyn.values import whole
 
 DIAGONAL = 1e-12  # of the modal damping: couplings of modes that are rounding
 BESIDE = 0.01  # of the lowest eigenvalue above 0: how far below 0 a free body is held up
@@ -29,7 +31,7 @@ RESONANCE = (
 
 
 @dataclass(frozen=True)
-class Direct:
+class Direct(Checked):
     """Options of the direct method: none."""
 
 
@@ -66,7 +68,7 @@ def dynamic_stiffness(system: Linearized, omega: float) -> sparse.csc_array:
 
 
 @dataclass(frozen=True)
-class Modal:
+class Modal(Checked):
     """Options of the modal method.
 
     Parameters
@@ -78,14 +80,8 @@ class Modal:
         power of the highest frequency kept instead of as the second.
     """
 
-    count: int | None = None
-    static_correction: bool = True
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        if self.count is not None:
-            whole("count", self.count, least=1, what="modes")
-        flag("static_correction", self.static_correction)
+    count: Annotated[int | None, Check(whole, least=1, what="modes")] = None
+    static_correction: Flag = True
 
 
 def modal(

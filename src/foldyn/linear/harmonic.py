@@ -13,12 +13,14 @@ Problems, 2019). Displacements are taken as small against the structure, but for
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.algebra.complex_symmetric import solve
+from foldyn.arguments import Check, Checked
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import InputError
@@ -37,7 +39,7 @@ LEAST = 1e-12  # rad: a swing is never taken as smaller
 
 
 @dataclass(frozen=True)
-class HarmonicBalance:
+class HarmonicBalance(Checked):
     """Options of the harmonic method.
 
     Parameters
@@ -48,13 +50,8 @@ class HarmonicBalance:
         At a frequency, at most.
     """
 
-    tolerance: float = 1e-6
-    iterations: int = 300
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        number("tolerance", self.tolerance, above=0.0)
-        whole("iterations", self.iterations, least=2)
+    tolerance: Annotated[float, Check(number, above=0.0)] = 1e-6
+    iterations: Annotated[int, Check(whole, least=2)] = 300
 
 
 def harmonic(

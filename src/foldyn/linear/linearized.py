@@ -32,6 +32,7 @@ from scipy import sparse
 
 from foldyn.algebra.complex_symmetric import Gram
 from foldyn.algebra.solvers import check_fill
+from foldyn.arguments import brief
 from foldyn.cases import Case, State
 from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics.dampers import damping_matrix
@@ -45,7 +46,7 @@ from foldyn.materials import Superlinear
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
-from foldyn.values import brief, number
+from foldyn.values import number
 
 POWER = 4.0 / 3.0
 AT_REST = 0.9411457706782074

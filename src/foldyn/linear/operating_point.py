@@ -19,7 +19,7 @@ from foldyn.statics.equilibrium import drives, is_actuated
 from foldyn.statics.path_memory import AT_REST, REFUSED
 from foldyn.statics.problem import Balance, balance
 from foldyn.statics.rigid import free_rigid_motions
-from foldyn.statics.tracing import check_movable, displacement_of
+from foldyn.statics.tracing import displacement_of
 
 BALANCED = 1e-6  # of the forces at play: the largest residual of a state taken for an equilibrium
 PLACES = "None (the rest state), 'equilibrium' or a State, as fd.initial_state(path)"
@@ -65,7 +65,7 @@ def operating_point(
     FoldynWarning
         It is no equilibrium, or the case has loads, which do not act at rest.
     """
-    check_movable(case)
+    case.check_movable()
     if state is None:
         point = _judge(case, np.zeros_like(case.structure.nodes), 0.0, "rest")
         if case.loads:

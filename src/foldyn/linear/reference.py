@@ -5,19 +5,19 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
 
 from foldyn.algebra.extrapolation import convergence, limits
+from foldyn.arguments import Unit, brief
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning
 from foldyn.linear.modes import modes
 from foldyn.linear.pairing import pairs
 from foldyn.structures.discretized import Discretized
-from foldyn.values import brief
 
 DIVISIONS = (6, 12)  # of every edge in the two meshes, beside which stands one half as fine
 SPARE = 3  # further modes of each mesh, which may change places with those that count
@@ -100,7 +100,7 @@ class Reference:
         Its modes as they were computed, rigid ones included.
     """
 
-    frequency: NDArray
+    frequency: Annotated[NDArray, Unit("Hz")]
     mesh_error: NDArray
     mesh_frequency: NDArray
     shape: NDArray

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import Check
 from foldyn.cases import Harmonic, State
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import InputError
@@ -37,18 +39,14 @@ class SteppedSine(Integration):
         Whether frequencies rise or fall; each motion starts from the end of the one before.
     """
 
-    cycles: int = 4
-    settled: float = 1e-3
-    most_cycles: int = 400
-    sweep: str = "up"
+    cycles: Annotated[int, Check(whole, least=2)] = 4
+    settled: Annotated[float, Check(number, above=0.0)] = 1e-3
+    most_cycles: Annotated[int, Check(whole)] = 400
+    sweep: Annotated[str, Check(choice, known=("up", "down"))] = "up"
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        super().__post_init__()
-        for name, least in (("cycles", 2), ("most_cycles", 3 * self.cycles)):
-            whole(name, getattr(self, name), least=least)
-        number("settled", self.settled, above=0.0)
-        choice("sweep", self.sweep, ("up", "down"))
+    def agree(self) -> None:
+        """Refuse fewer cycles than show whether a motion has settled."""
+        whole("most_cycles", self.most_cycles, least=3 * self.cycles)
 
 
 def stepped_sine(rig: Rig, frequency: NDArray, options: SteppedSine, report: Reporter) -> Answer:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import Check, Checked
 from foldyn.cases import (
     Actuate,
     BaseMotion,
@@ -30,9 +31,11 @@ from foldyn.linear.excitation import Drive
 from foldyn.linear.operating_point import operating_point
 from foldyn.values import choice, number
 
+Duration = Annotated[float, Check(number, above=0.0, unit="s")]
+
 
 @dataclass(frozen=True)
-class Integration:
+class Integration(Checked):
     """How the motions of a frequency response are integrated.
 
     Parameters
@@ -46,22 +49,9 @@ class Integration:
         As of `simulate`.
     """
 
-    integrator: str | None = None
-    dt: float | None = None
-    tolerance: float | None = None
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        if self.integrator is not None:
-            choice("integrator", self.integrator, METHODS)
-        check_positive(self, "dt", "tolerance")
-
-
-def check_positive(options: Integration, *names: str) -> None:
-    """Refuse options that are given and not positive numbers."""
-    for name in names:
-        if getattr(options, name) is not None:
-            number(name, getattr(options, name), above=0.0)
+    integrator: Annotated[str | None, Check(choice, known=METHODS)] = None
+    dt: Duration | None = None
+    tolerance: Annotated[float | None, Check(number, above=0.0)] = None
 
 
 class Rig:

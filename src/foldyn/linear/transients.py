@@ -6,15 +6,17 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import Check
 from foldyn.cases import Table
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.excitation import Answer
-from foldyn.linear.time_domain import Integration, Rig, check_positive, overall
+from foldyn.linear.time_domain import Duration, Integration, Rig, overall
 from foldyn.ram_limit import check_memory
 from foldyn.signals import exponential_window, frequency_response
 from foldyn.values import choice, number, whole
@@ -54,16 +56,10 @@ class Impulse(Integration):
         It adds its damping to the response, which `peaks_of` takes off again.
     """
 
-    pulse: float | None = None
-    duration: float | None = None
-    every: float | None = None
-    window_rate: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        super().__post_init__()
-        check_positive(self, "pulse", "duration", "every")
-        number("window_rate", self.window_rate, least=0.0)
+    pulse: Duration | None = None
+    duration: Duration | None = None
+    every: Duration | None = None
+    window_rate: Annotated[float, Check(number, least=0.0)] = 0.0
 
 
 @dataclass(frozen=True)
@@ -89,24 +85,13 @@ class BurstRandom(Integration):
         As of the impulse method.
     """
 
-    averages: int = 8
-    seed: int = 0
-    burst: float = 0.5
-    estimator: str = "h1"
-    duration: float | None = None
-    every: float | None = None
-    window_rate: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        super().__post_init__()
-        for name, least in (("averages", 2), ("seed", 0)):
-            whole(name, getattr(self, name), least=least)
-        if not 0.0 < number("burst", self.burst) < 1.0:
-            raise InputError(f"burst = {self.burst}: must be a part of the record, between 0 and 1")
-        choice("estimator", self.estimator, ("h1", "h2"))
-        check_positive(self, "duration", "every")
-        number("window_rate", self.window_rate, least=0.0)
+    averages: Annotated[int, Check(whole, least=2)] = 8
+    seed: Annotated[int, Check(whole, least=0)] = 0
+    burst: Annotated[float, Check(number, above=0.0, below=1.0)] = 0.5
+    estimator: Annotated[str, Check(choice, known=("h1", "h2"))] = "h1"
+    duration: Duration | None = None
+    every: Duration | None = None
+    window_rate: Annotated[float, Check(number, least=0.0)] = 0.0
 
 
 def impulse(rig: Rig, frequency: NDArray, options: Impulse, report: Reporter) -> Answer:

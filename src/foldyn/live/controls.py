@@ -11,6 +11,7 @@ from typing import Any
 
 from foldyn.analyses.messages import dotted
 from foldyn.analyses.sections import DampingSection, SheetSection
+from foldyn.cases.units import unit_of
 from foldyn.errors import InputError
 from foldyn.patterns import GENERATORS
 from foldyn.values import choice, number, whole
@@ -20,9 +21,6 @@ ANGLES: Mapping[str, tuple[float, float]] = {
     "twist": (0.0, 120.0), "arc": (1.0, 360.0),
 }  # fmt: skip
 """Arguments of patterns in degrees, and how far sliders take them; other ones are lengths (m)."""
-UNITS: Mapping[str, str] = {
-    "youngs_modulus": "Pa", "thickness": "m", "density": "kg/m³", "alpha": "1/s", "beta": "s",
-}  # fmt: skip
 SPAN: Mapping[str, float] = {"pattern": 4.0, "sheet": 10.0, "damping": 10.0}
 """Factor by which a positive number can be changed, either way."""
 UNDAMPED: Mapping[str, float] = {"alpha": 10.0, "beta": 0.01}
@@ -161,7 +159,7 @@ def _of_sheet(table: Mapping[str, Any]) -> Iterator[Control]:
         if name == "poissons_ratio":
             yield Control(("sheet", name), value, min(0.0, value), max(0.49, value))
         else:
-            yield _positive(("sheet", name), value, UNITS.get(name, ""))
+            yield _positive(("sheet", name), value, unit_of(name, value))
 
 
 def _of_damping(document: Mapping[str, Any]) -> Iterator[Control]:
@@ -174,7 +172,7 @@ def _of_damping(document: Mapping[str, Any]) -> Iterator[Control]:
     for name, end in UNDAMPED.items():
         value = table.get(name, DampingSection.model_fields[name].default)
         most = SPAN["damping"] * value or end
-        yield Control(("damping", name), value, 0.0, most, UNITS[name])
+        yield Control(("damping", name), value, 0.0, most, unit_of(name, value))
 
 
 def _positive(place: tuple[str | int, ...], value: float, unit: str = "") -> Control:

@@ -44,16 +44,13 @@ __all__ = [
 
 BarLaw.compiled, HingeLaw.compiled = staticmethod(bar_table), staticmethod(hinge_table)
 
-BAR_LAWS: Mapping[str, type[BarLaw]] = {"ogden": Ogden, "linear": LinearBar}
+BAR_LAWS: Mapping[str, type[BarLaw]] = {law.name: law for law in (Ogden, LinearBar)}
 HINGE_LAWS: Mapping[str, type[HingeLaw]] = {
-    "linear": LinearHinge,
-    "superlinear": Superlinear,
-    "enhanced": EnhancedLinear,
-    "plate_superlinear": PlateSuperlinear,
-    "prony": Prony,
-    "plastic": Plastic,
-    "eyring": Eyring,
-}
+    law.name: law
+    for law in (
+        LinearHinge, Superlinear, EnhancedLinear, PlateSuperlinear, Prony, Plastic, Eyring,
+    )
+}  # fmt: skip
 
 
 def bar_law(spec: str | BarLaw) -> BarLaw:

@@ -13,11 +13,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import Check
 from foldyn.errors import InputError
 from foldyn.jit.compiled import inner_scalar, kernel, scalar
 from foldyn.materials.law import PARAMETERS, HingeLaw
@@ -110,21 +111,18 @@ class EnhancedLinear(HingeLaw):
     0.5236
     """
 
-    theta1: float = 45.0
-    theta2: float = 315.0
-    rest: Literal["stress_free", "as_published"] = "stress_free"
+    theta1: Annotated[float, Check(number, unit="degrees")] = 45.0
+    theta2: Annotated[float, Check(number, unit="degrees")] = 315.0
+    rest: Annotated[str, Check(choice, known=("stress_free", "as_published"))] = "stress_free"
     name: str = "enhanced"
 
-    def __post_init__(self) -> None:
-        for name in ("theta1", "theta2"):
-            given = number(f"EnhancedLinear: {name}", getattr(self, name), unit="degrees")
-            object.__setattr__(self, name, given)
+    def agree(self) -> None:
+        """Refuse angles that are not in order."""
         if not 0.0 < self.theta1 < self.theta2 < 360.0:
             raise InputError(
-                f"EnhancedLinear: theta1 = {self.theta1}, theta2 = {self.theta2}: need "
+                f"theta1 = {self.theta1}, theta2 = {self.theta2}: need "
                 "0 < theta1 < theta2 < 360 (degrees)"
             )
-        choice("EnhancedLinear: rest", self.rest, ("stress_free", "as_published"))
 
     @property
     def code(self) -> int:

@@ -19,9 +19,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from numpy.typing import NDArray
 
+from foldyn.arguments import Check
 from foldyn.jit.compiled import inner_scalar, scalar
 from foldyn.materials.inelastic_law import Branch, MemoryLaw, columns
 from foldyn.materials.law import HingeLaw
@@ -93,19 +95,12 @@ class Eyring(MemoryLaw):
     1e-09
     """
 
-    barrier_moment: float
-    rate: float
+    barrier_moment: Annotated[float, Check(number, above=0.0, unit="N m per m")]
+    rate: Annotated[float, Check(number, above=0.0, unit="rad/s")]
     law: str | HingeLaw = "enhanced"
     name: str = "eyring"
 
     rate_dependent = True
-
-    def __post_init__(self) -> None:
-        moment = number("Eyring: barrier_moment", self.barrier_moment, above=0.0)
-        object.__setattr__(self, "barrier_moment", moment)
-        rate = number("Eyring: rate", self.rate, above=0.0, unit="rad/s")
-        object.__setattr__(self, "rate", rate)
-        _ = self.elastic
 
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
         """See `MemoryLaw`; small moments flow as a dashpot lets them."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from operator import attrgetter
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -50,39 +51,24 @@ class MemoryLaw(HingeLaw):
     @cached_property
     def elastic(self) -> HingeLaw:
         """Its elastic part."""
-        law = self.lookup(self.law, f"{self.name}: law")
+        law = self.lookup(self.law, "law")
         if isinstance(law, MemoryLaw):
-            raise InputError(f"{self.name}: law = {law.name!r}: has a memory itself; give another")
+            raise InputError(f" = {law.name!r}: has a memory itself; give another", "law")
         return law
+
+    def agree(self) -> None:
+        """Refuse an elastic part that is none."""
+        _ = self.elastic
 
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
         """Its branches for hinges with stiffnesses (n,), N m/rad, and lengths (n,), m."""
         raise NotImplementedError
 
-    @property
-    def code(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """That of the elastic part."""
-        return self.elastic.code
-
-    @property
-    def addresses(self) -> tuple[int, int, int] | None:
-        """Those of the elastic part."""
-        return self.elastic.addresses
-
-    @property
-    def linear_between(self) -> tuple[float, float] | None:  # pyright: ignore
-        """That of the elastic part."""
-        return self.elastic.linear_between
-
-    @property
-    def follows_rest(self) -> bool:  # pyright: ignore
-        """That of the elastic part."""
-        return self.elastic.follows_rest
-
-    @property
-    def closed_at_rest(self) -> bool:  # pyright: ignore
-        """That of the elastic part."""
-        return self.elastic.closed_at_rest
+    code: Any = property(attrgetter("elastic.code"))
+    addresses: Any = property(attrgetter("elastic.addresses"))
+    linear_between: Any = property(attrgetter("elastic.linear_between"))
+    follows_rest: Any = property(attrgetter("elastic.follows_rest"))
+    closed_at_rest: Any = property(attrgetter("elastic.closed_at_rest"))
 
     def parameters(self, rest: NDArray) -> NDArray:
         """Those of the elastic part."""

@@ -11,18 +11,19 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import Checked
 from foldyn.errors import InputError
 
 PARAMETERS = 4
 CALLED = -1  # code of laws whose functions are called at their addresses
 
 
-class Law(ABC):
+class Law(Checked, ABC):
     """A scalar law with a name and the integer code of its compiled form."""
 
     name: str
@@ -30,6 +31,11 @@ class Law(ABC):
     rest_state: tuple[float, ...]
     compiled: ClassVar[Callable[..., NDArray]]
     """All functions of a law by its code; the switch, which knows the laws, gives it to them."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Let messages begin with the name of the class."""
+        super().__init_subclass__(**options)
+        cls.place = f"{cls.__name__}: "
 
     @property
     def addresses(self) -> tuple[int, int, int] | None:

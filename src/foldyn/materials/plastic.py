@@ -16,10 +16,12 @@ k (H + C) / (k + H + C).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import Check
 from foldyn.jit.compiled import scalar
 from foldyn.materials.inelastic_law import Branch, MemoryLaw, columns
 from foldyn.materials.law import HingeLaw
@@ -79,21 +81,13 @@ class Plastic(MemoryLaw):
     0.05
     """
 
-    yield_moment: float
-    isotropic: float = 0.0
-    kinematic: float = 0.0
+    yield_moment: Annotated[float, Check(number, above=0.0, unit="N m per m")]
+    isotropic: Annotated[float, Check(number, least=0.0, unit="N m/rad per m")] = 0.0
+    kinematic: Annotated[float, Check(number, least=0.0, unit="N m/rad per m")] = 0.0
     law: str | HingeLaw = "enhanced"
     name: str = "plastic"
 
     rate_dependent = False
-
-    def __post_init__(self) -> None:
-        moment = number("Plastic: yield_moment", self.yield_moment, above=0.0)
-        object.__setattr__(self, "yield_moment", moment)
-        for name in ("isotropic", "kinematic"):
-            given = number(f"Plastic: {name}", getattr(self, name), least=0.0)
-            object.__setattr__(self, name, given)
-        _ = self.elastic
 
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
         """See `MemoryLaw`."""

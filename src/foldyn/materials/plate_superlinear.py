@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import Check
 from foldyn.errors import InputError
 from foldyn.jit.compiled import scalar
 from foldyn.materials.law import PARAMETERS, HingeLaw
@@ -81,17 +83,11 @@ class PlateSuperlinear(HingeLaw):
     1.0
     """
 
-    onset: float | None = None
+    onset: Annotated[float | None, Check(number, above=0.0, most=360.0, unit="degrees")] = None
     name: str = "plate_superlinear"
 
     code = CODE
     follows_rest = False
-
-    def __post_init__(self) -> None:
-        if self.onset is not None:
-            place = "PlateSuperlinear: onset"
-            onset = number(place, self.onset, above=0.0, most=360.0, unit="degrees")
-            object.__setattr__(self, "onset", onset)
 
     def check(self, field: str) -> None:
         """Refuse it for creases without an onset: only bends have one of their own."""

@@ -25,15 +25,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import Check
 from foldyn.errors import InputError
 from foldyn.jit.compiled import scalar
 from foldyn.materials.inelastic_law import Branch, MemoryLaw, columns
 from foldyn.materials.law import HingeLaw
-from foldyn.values import number, number_or_list, show
+from foldyn.values import number_or_list, show
 
 CODE = 0  # among branches
 FEW = 0.02  # of a relaxation time: below, the loss under a constant rate is its series
@@ -66,6 +68,12 @@ def mean_moment(before, after, dt, spring, share, rate):
     return share * (mean * spring + rise * (after - before)), share * rise, 0.0
 
 
+def _branches(name: str, value: Any) -> tuple[float, ...]:
+    """Return positive numbers, one for each branch."""
+    given = number_or_list(name, value, "branch", above=0.0)
+    return given if isinstance(given, tuple) else (given,)
+
+
 @dataclass(frozen=True)
 class Prony(MemoryLaw):
     """Viscoelastic law: an elastic law and Maxwell branches beside it.
@@ -85,27 +93,23 @@ class Prony(MemoryLaw):
     [1.4, 1.0]
     """
 
-    ratios: float | Sequence[float]
-    times: float | Sequence[float]
+    ratios: Annotated[float | Sequence[float], Check(_branches)]
+    times: Annotated[float | Sequence[float], Check(_branches, unit="s")]
     law: str | HingeLaw = "enhanced"
     name: str = "prony"
 
     rate_dependent = True
     relaxes = True
 
-    def __post_init__(self) -> None:
-        lists = []
-        for field in ("ratios", "times"):
-            given = number_or_list(f"Prony: {field}", getattr(self, field), "branch")
-            given = given if isinstance(given, tuple) else (given,)
-            lists.append(tuple(number(f"Prony: {field}", one, above=0.0) for one in given))
-            object.__setattr__(self, field, lists[-1])
-        if len(lists[0]) != len(lists[1]):
+    def agree(self) -> None:
+        """Ask for one of each per branch."""
+        super().agree()
+        ratios, times = np.atleast_1d(self.ratios), np.atleast_1d(self.times)
+        if len(ratios) != len(times):
             raise InputError(
-                f"Prony: {len(lists[0])} ratios = {show(lists[0])} and {len(lists[1])} times = "
-                f"{show(lists[1])}: give one of each per branch"
+                f"{len(ratios)} ratios = {show(ratios)} and {len(times)} times = {show(times)}: "
+                "give one of each per branch"
             )
-        _ = self.elastic
 
     @property
     def series(self) -> tuple[NDArray, NDArray]:

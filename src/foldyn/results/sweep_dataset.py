@@ -10,13 +10,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from foldyn.arguments import brief
 from foldyn.cases import Case
 from foldyn.cases.document import to_document
 from foldyn.errors import InputError
 from foldyn.results.attributes import facts, own_attributes
 from foldyn.results.contents import check_result
 from foldyn.results.dataset import case_variables
-from foldyn.values import brief, choice, number, whole
+from foldyn.values import choice, number, whole
 
 POINT = "point"
 """Dimension of sampled points."""

@@ -7,13 +7,15 @@ taken off again.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import Unit, brief
 from foldyn.errors import InputError
 from foldyn.signals import records
-from foldyn.values import brief, choice, whole
+from foldyn.values import choice, number, whole
 
 ESTIMATORS = ("h1", "h2")
 _FEWEST = 4  # samples of a segment
@@ -43,7 +45,7 @@ class FrequencyResponse:
         Number of segments averaged, over all records.
     """
 
-    frequency: NDArray[np.float64]
+    frequency: Annotated[NDArray[np.float64], Unit("Hz")]
     response: NDArray[np.complex128]
     coherence: NDArray[np.float64]
     force_density: NDArray[np.float64]
@@ -139,7 +141,7 @@ def frequency_response(
             f"segment: {length} samples, but a record has {forces.shape[1]}; a segment has from "
             f"{_FEWEST} samples to all of a record"
         )
-    shared = int(records.checked_number("overlap", overlap, least=0.0, below=1.0) * length)
+    shared = int(number("overlap", overlap, least=0.0, below=1.0) * length)
     weights = records.checked_window(window, length)
 
     channels = responses.shape[2:]
@@ -225,7 +227,7 @@ def exponential_window(n: int, dt: float, rate: float) -> NDArray[np.float64]:
     ndarray, shape (n,)
         The window, 1 at its start.
     """
-    rate = records.checked_number("rate", rate, above=0.0)
+    rate = number("rate", rate, above=0.0)
     return np.exp(-rate * records.checked_interval(dt) * np.arange(whole("n", n, least=1)))
 
 
@@ -254,7 +256,7 @@ def without_window(
     >>> print(f"{frequency:.4f} {damping_ratio:.6f}")
     9.9891 0.018189
     """
-    rate = records.checked_number("rate", rate, above=0.0)
+    rate = number("rate", rate, above=0.0)
     natural = 2.0 * np.pi * records.real_array("frequency", frequency)
     damping = records.real_array("damping_ratio", damping_ratio)
     if (np.abs(damping) >= 1.0).any():

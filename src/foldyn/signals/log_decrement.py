@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import Unit, brief
 from foldyn.errors import InputError
-from foldyn.signals.records import checked_interval, checked_number, checked_record
+from foldyn.signals.records import checked_interval, checked_record
 from foldyn.signals.spectrum import spectrum
-from foldyn.values import brief
+from foldyn.values import number
 
 _FEWEST = 16
 _PADDING = 8  # the period need only be known to a tenth
@@ -44,7 +46,7 @@ class LogDecrement:
     damping_ratio: float
     damped_frequency: float
     natural_frequency: float
-    time: NDArray[np.float64]
+    time: Annotated[NDArray[np.float64], Unit("s")]
     height: NDArray[np.float64]
     successive: NDArray[np.float64]
 
@@ -108,7 +110,7 @@ def log_decrement(
     """
     samples = checked_record("x", x, _FEWEST)
     interval = checked_interval(dt)
-    least = checked_number("floor", floor, least=0.0, below=1.0)
+    least = number("floor", floor, least=0.0, below=1.0)
     per_cycle = _samples_per_cycle(samples, interval, frequency)
     place, height = _heights(samples, per_cycle, rest)
     place, height = _decaying(place, height, least)
@@ -141,7 +143,7 @@ def _samples_per_cycle(x: NDArray[np.float64], dt: float, frequency: float | Non
         lines, amplitude = spectrum(x, dt, detrend="linear", pad=_PADDING)
         f = float(lines[1 + np.argmax(amplitude[1:])])
     else:
-        f = checked_number("frequency", frequency, above=0.0)
+        f = number("frequency", frequency, above=0.0)
     per_cycle = 1.0 / (f * dt)
     if per_cycle < _FEWEST_PER_CYCLE:
         raise InputError(
@@ -158,7 +160,7 @@ def _heights(
     """Places (in samples) of the maxima and their heights above the rest position."""
     place, value = _maxima(x, per_cycle)
     if rest is not None:
-        return place, value - checked_number("rest", rest)
+        return place, value - number("rest", rest)
     low_place, low_value = _maxima(-x, per_cycle)
     if low_place.size == 0:
         return place[:0], value[:0]

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import brief
 from foldyn.errors import InputError
-from foldyn.signals.records import checked_interval, checked_number, real_array
-from foldyn.values import brief, whole
+from foldyn.signals.records import checked_interval, real_array
+from foldyn.values import number, whole
 
 _FEWEST = 8
 _WIDEST = 500  # of a window: the singular value decomposition costs n width^2
@@ -183,7 +184,7 @@ def _order(values: NDArray[np.float64], n: int, threshold: float | None) -> int:
         noise = float(np.quantile(values, 0.25))
         level = max(_ABOVE_NOISE * noise, n * np.finfo(np.float64).eps * float(values[0]))
     else:
-        level = checked_number("threshold", threshold, above=0.0, below=1.0) * float(values[0])
+        level = number("threshold", threshold, above=0.0, below=1.0) * float(values[0])
     count = int(np.sum(values > level))
     if count == 0:
         raise InputError(

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import Unit, brief
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.signals import records
-from foldyn.values import brief, choice, whole
+from foldyn.values import choice, number, whole
 
 _LOPSIDED = 0.1
 LOWEST = 1e-4  # of the maximum: what lies below may be the error of a simulation
@@ -35,7 +36,7 @@ class Peaks:
         Samples of the curve at the peaks.
     """
 
-    frequency: NDArray[np.float64]
+    frequency: Annotated[NDArray[np.float64], Unit("Hz")]
     height: NDArray[np.float64]
     prominence: NDArray[np.float64]
     index: NDArray[np.int64]
@@ -95,7 +96,7 @@ def find_peaks(
     [9.97496867] 9.974968671630002
     """
     curve = magnitude_curve(frequency, magnitude, quantity)
-    share = records.checked_number("prominence", prominence, least=0.0, below=1.0)
+    share = number("prominence", prominence, least=0.0, below=1.0)
     from scipy.signal import find_peaks as search  # slow to import
     from scipy.signal import peak_prominences
 
@@ -103,7 +104,7 @@ def find_peaks(
     least = max(share, np.finfo(np.float64).eps) * curve.size.max()
     index, _ = search(curve.size, prominence=least)
     if rise is not None and curve.size.any():
-        step = np.log(records.checked_number("rise", rise, above=1.0))
+        step = np.log(number("rise", rise, above=1.0))
         decibel = np.log(np.maximum(curve.size, LOWEST * curve.size.max()))
         index = np.union1d(index, search(decibel, prominence=step)[0])
     height = peak_prominences(curve.size, index)[0]
@@ -267,7 +268,7 @@ def half_power(
     0.1402 0.1350
     """
     curve = magnitude_curve(frequency, magnitude, quantity)
-    bumps = records.checked_number("ripple", ripple, least=0.0)
+    bumps = number("ripple", ripple, least=0.0)
     index = _peak_index(curve, quantity, near, bumps)
     peak, height = curve.peak(index)
 
@@ -317,7 +318,7 @@ def _peak_index(curve: Curve, quantity: str, near: float | None, ripple: float) 
         )
     if near is None:
         return int(peaks.index[np.argmax(peaks.height)])
-    distance = np.abs(peaks.frequency - records.checked_number("near", near, least=0.0))
+    distance = np.abs(peaks.frequency - number("near", near, least=0.0))
     bump = peaks.prominence < ripple * curve.size[peaks.index]
     return int(peaks.index[np.argmin(np.where(bump, np.inf, distance))])
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.signals import records
-from foldyn.values import whole
+from foldyn.values import number, whole
 
 _FEWEST = 4
 
@@ -98,7 +98,7 @@ def first_turning_point(x: ArrayLike, least: float = 0.1) -> int:
         The record does not turn.
     """
     values = records.checked_record("x", x, _FEWEST)
-    part = records.checked_number("least", least, above=0.0, below=1.0)
+    part = number("least", least, above=0.0, below=1.0)
     from scipy.signal import find_peaks  # slow to import
 
     limit = part * float(np.ptp(values))
@@ -124,7 +124,7 @@ def subtract_final(x: ArrayLike, part: float = 0.1) -> NDArray[np.float64]:
         Share of the record whose mean is the final position.
     """
     values = records.checked_record("x", x, _FEWEST)
-    share = records.checked_number("part", part, above=0.0, below=1.0)
+    share = number("part", part, above=0.0, below=1.0)
     count = max(1, round(share * values.size))
     return values - values[-count:].mean()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,7 +63,7 @@ def checked_interval(dt: float) -> float:
     """Return the sampling interval as a positive float."""
     if np.ndim(dt):
         raise InputError("dt: is not one number; for sample times use signals.sampling_interval")
-    return checked_number("dt", dt, above=0.0)
+    return number("dt", dt, above=0.0)
 
 
 def checked_window(window: Window, n: int) -> NDArray[np.float64]:
@@ -95,11 +95,6 @@ def detrended(x: NDArray[np.float64], kind: str | None, axis: int = 0) -> NDArra
     from scipy.signal import detrend  # slow to import, and seldom needed
 
     return detrend(x, axis=axis, type=kind)
-
-
-def checked_number(name: str, value: Any, **bounds: Any) -> float:
-    """Return a number, or an array without dimensions, as a float within bounds of `number`."""
-    return number(name, value.item() if getattr(value, "shape", None) == () else value, **bounds)
 
 
 def checked_frequencies(frequency: ArrayLike, fewest: int) -> NDArray[np.float64]:

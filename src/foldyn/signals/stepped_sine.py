@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import Unit, brief
 from foldyn.errors import InputError
-from foldyn.signals.records import checked_number, real_array
-from foldyn.values import brief, whole
+from foldyn.signals.records import real_array
+from foldyn.values import number, whole
 
 
 @brief
@@ -37,7 +39,7 @@ class SineFit:
         Number of samples fitted.
     """
 
-    frequency: float
+    frequency: Annotated[float, Unit("Hz")]
     amplitude: NDArray[np.complex128]
     offset: NDArray[np.float64]
     slope: NDArray[np.float64]
@@ -97,7 +99,7 @@ def fit_sine(
     >>> print(np.round(np.abs(fit.amplitude[0]), 12), np.round(np.angle(fit.amplitude[0]), 12))
     2.0 -1.0
     """
-    f = checked_number("frequency", frequency, above=0.0)
+    f = number("frequency", frequency, above=0.0)
     count = whole("harmonics", harmonics, least=1)
     t, samples = _steady_part(time, x, f, cycles)
     if np.diff(t).max() * f * count >= 0.5:

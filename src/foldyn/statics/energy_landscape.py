@@ -12,11 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import Unit, brief
 from foldyn.cases import Case
 from foldyn.errors import ComputationError, InputError
 from foldyn.results import check_result
@@ -25,7 +26,6 @@ from foldyn.statics.equilibrium import OrigamiProblem
 from foldyn.statics.newton import Settings, Solver, settings_of
 from foldyn.statics.stability import LostError, Section
 from foldyn.statics.stepping import Station
-from foldyn.values import brief
 
 if TYPE_CHECKING:
     import xarray
@@ -50,7 +50,7 @@ class Equilibrium:
         Whether it stays there when released.
     """
 
-    displacement: NDArray
+    displacement: Annotated[NDArray, Unit("m")]
     stroke: float
     energy: float
     stable: bool

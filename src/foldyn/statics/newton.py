@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,10 @@ from scipy import sparse
 from foldyn.algebra.reduction import Reduction
 from foldyn.algebra.solvers import factorizer
 from foldyn.algebra.superlu import Factorization, SingularTangentError, Solution, Unsymmetric
+from foldyn.arguments import Check, Checked, Flag
 from foldyn.errors import InputError
 from foldyn.statics.problem import Balance, Problem, balance, clear_share, converged
-from foldyn.values import choice, flag, number, whole
+from foldyn.values import choice, number, whole
 
 COLLIDES = "panel would pass through panel"
 MOST_TURN = 0.2  # rad, of any part within one iteration
@@ -43,7 +44,7 @@ Rule = Callable[[NDArray, NDArray, NDArray], float]
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Checked):
     """How equilibria are solved for and how steps are chosen.
 
     Parameters
@@ -73,25 +74,17 @@ class Settings:
         "auto", or one of `statics.SOLVERS`.
     """
 
-    tolerance: float = 1e-9
-    iterations: int = 25
-    target: int = 6
-    cuts: int = 15
-    largest_turn: float = 10.0
-    jump: float = 3.0
-    stability: bool = True
-    locate: bool = True
+    tolerance: Annotated[float, Check(number, least=1e-14, most=1e-2)] = 1e-9
+    iterations: Annotated[int, Check(whole, least=1)] = 25
+    target: Annotated[int, Check(whole, least=1)] = 6
+    cuts: Annotated[int, Check(whole, least=1)] = 15
+    largest_turn: Annotated[float, Check(number, above=0.0)] = 10.0
+    jump: Annotated[float, Check(number, above=1.0)] = 3.0
+    stability: Flag = True
+    locate: Flag = True
     solver: str = "auto"
 
-    def __post_init__(self) -> None:
-        """Check the values."""
-        number("settings: tolerance", self.tolerance, least=1e-14, most=1e-2)
-        number("settings: largest_turn", self.largest_turn, above=0.0)
-        number("settings: jump", self.jump, above=1.0)
-        for name in ("iterations", "target", "cuts"):
-            whole(f"settings: {name}", getattr(self, name), least=1)
-        for name in ("stability", "locate"):
-            flag(f"settings: {name}", getattr(self, name))
+    place = "settings: "
 
 
 def settings_of(given: Any) -> Settings:

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from numpy.typing import NDArray
 
-from foldyn.cases.decode import check_keys
-from foldyn.cases.directions import AXES, check_axis
+from foldyn.arguments import Check
+from foldyn.cases.decode import Part, part_from
+from foldyn.cases.directions import AXES, Axis
 from foldyn.cases.selection import resolve_nodes
 from foldyn.errors import InputError, within
-from foldyn.values import number, show, whole
-
-KEYS = ("node", "axis", "displacement")
+from foldyn.values import number, whole
 
 
 @dataclass(frozen=True)
-class Reached:
+class Reached(Part):
     """Whether a node has moved so far along an axis.
 
     Parameters
@@ -30,15 +29,12 @@ class Reached:
         from zero on the same side.
     """
 
-    node: int
-    axis: str
-    displacement: float
+    node: Annotated[int, Check(whole)]
+    axis: Axis
+    displacement: Annotated[float, Check(number, unit="m")]
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "node", whole("node", self.node))
-        check_axis("axis", self.axis)
-        object.__setattr__(self, "displacement", number("displacement", self.displacement))
+    def agree(self) -> None:
+        """Refuse the place at which the path begins."""
         if self.displacement == 0.0:
             raise InputError(" = 0: the path begins there; say where it ends", "displacement")
 
@@ -47,17 +43,10 @@ class Reached:
         moved = displacement[self.node, AXES.index(self.axis)]
         return bool(moved / self.displacement >= 1.0)
 
-    @classmethod
-    def of(cls, table: Any) -> Reached:
-        """Make it from its table, as a case file has it."""
-        if not isinstance(table, Mapping):
-            raise InputError(f" = {show(table)}: must be a table of {', '.join(KEYS)}")
-        check_keys(table, KEYS)
-        missing = [key for key in KEYS if key not in table]
-        if missing:
-            raise InputError(f": missing; give {', '.join(KEYS)}", f".{missing[0]}")
-        with within("."):
-            return cls(**table)
+
+def reached_from(table: Any) -> Reached:
+    """What ends a path from its table, as a case file has it."""
+    return part_from(table, (Reached,), "analysis.until", asked="node, axis and displacement")
 
 
 def until_of(given: Any, structure: Any) -> Callable[[NDArray, float], bool] | None:
@@ -67,6 +56,6 @@ def until_of(given: Any, structure: Any) -> Callable[[NDArray, float], bool] | N
     if callable(given) and not isinstance(given, Reached):
         return given  # type: ignore[return-value]
     with within("until"):
-        end = given if isinstance(given, Reached) else Reached.of(given)
+        end = given if isinstance(given, Reached) else reached_from(given)
     resolve_nodes(structure, (end.node,), "until.node")
     return end

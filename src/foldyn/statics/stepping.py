@@ -22,9 +22,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import brief
 from foldyn.statics.newton import COLLIDES, Attempt, Solver, Stiffness
 from foldyn.statics.problem import Problem, balance, clear_share, is_counted
-from foldyn.values import brief
 
 NEGLIGIBLE = 1e-6  # of the structure's size: motions below are never a snap
 SNAPS = "the structure snaps to a state off its path"

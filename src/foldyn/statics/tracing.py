@@ -14,7 +14,6 @@ from foldyn.cases import Case, Gravity, State
 from foldyn.cases.contact_checks import check_contact, check_driven
 from foldyn.cases.ties import check_tied
 from foldyn.errors import InputError
-from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.ram_limit import check_memory
 from foldyn.statics.equilibrium import AdaptiveLoad, OrigamiProblem, drives, is_actuated
 from foldyn.statics.mechanism import refuse_mechanisms
@@ -180,16 +179,8 @@ def trace(
 
 def _flowed(case: Case, initial: State | None, timed: bool) -> NDArray | str | None:
     """State in which branches begin that the path moves on, of that of all (b, 2)."""
-    given = None if initial is None else initial.memory
-    if given is None or isinstance(given, str):
-        return given
-    state, flows = np.array(given, float), flowing(case, timed)
-    if state.shape != (len(flows), VARIABLES):
-        raise InputError(
-            f"initial: memory of shape {state.shape}: the case has {(len(flows), VARIABLES)}, "
-            "branches and variables; take the state of a result of the same case"
-        )
-    return state[flows]
+    state = case.memory_in(initial)
+    return state[flowing(case, timed)] if isinstance(state, np.ndarray) else state
 
 
 def on_nodes(
@@ -251,17 +242,9 @@ def displacement_of(
     return displacement
 
 
-def check_movable(case: Case) -> None:
-    """Refuse a case whose supports hold every dof."""
-    if not len(case.free_dofs):
-        raise InputError(
-            "supports: hold every node along x, y and z, so that nothing can move: free one"
-        )
-
-
 def _check_case(case: Case, plan: PathPlan, constant: Sequence[int], adaptive: bool) -> None:
     """Refuse a case in which nothing happens along the path."""
-    check_movable(case)
+    case.check_movable()
     moves = bool(case.imposed_terms) or is_actuated(case) or bool(case.obstacle_terms)
     if plan.method.name == "displacement" and not moves:
         raise InputError(

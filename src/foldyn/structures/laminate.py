@@ -5,19 +5,48 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import Check, Checked
 from foldyn.errors import InputError
 from foldyn.structures.sheet import Sheet
-from foldyn.values import brief, length, number, show, single
+from foldyn.values import length, number, show, single
 
 
-@brief
+def check_layers(name: str, layers: Sequence[Sequence[float]]) -> tuple[tuple[float, ...], ...]:
+    """Layers of a laminate as tuples of numbers, checked."""
+    layers = single(layers)
+    listed = isinstance(layers, Sequence | np.ndarray) and not isinstance(layers, str)
+    if not listed or not len(layers):
+        raise InputError(
+            f" = {show(layers)}: give a row [thickness (m), Young's modulus (Pa), expansion (1/K)] "
+            "for each layer, from the back to the front",
+            name,
+        )
+    rows = []
+    for i, row in enumerate(layers):
+        place = f"{name}[{i}]"
+        if isinstance(row, str) or not hasattr(row, "__len__") or len(row) != 3:
+            raise InputError(
+                f" = {show(row)}: must be [thickness (m), Young's modulus (Pa), expansion (1/K)]",
+                place,
+            )
+        t, modulus, expansion = row
+        rows.append(
+            (
+                length(f"{place}[0]", t),
+                number(f"{place}[1]", modulus, above=0.0),
+                number(f"{place}[2]", expansion),
+            )
+        )
+    return tuple(rows)
+
+
 @dataclass(frozen=True)
-class Laminate:
+class Laminate(Checked):
     """Layers of isotropic materials, bonded face to face.
 
     With z_i the distance of the middle of a layer from the neutral surface, sum E_i t_i z_i = 0,
@@ -52,11 +81,7 @@ class Laminate:
     -0.0285
     """
 
-    layers: Sequence[Sequence[float]]
-
-    def __post_init__(self) -> None:
-        """Check the layers."""
-        object.__setattr__(self, "layers", check_layers("layers", self.layers))
+    layers: Annotated[Sequence[Sequence[float]], Check(check_layers)]
 
     @property
     def _columns(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:
@@ -102,32 +127,3 @@ class Laminate:
         thickness = math.sqrt(12.0 * self._bending / stretching)
         density = None if areal_density is None else areal_density / thickness
         return Sheet(stretching / thickness, poissons_ratio, thickness, density, **others)
-
-
-def check_layers(name: str, layers: Sequence[Sequence[float]]) -> tuple[tuple[float, ...], ...]:
-    """Layers of a laminate as tuples of numbers, checked."""
-    layers = single(layers)
-    listed = isinstance(layers, Sequence | np.ndarray) and not isinstance(layers, str)
-    if not listed or not len(layers):
-        raise InputError(
-            f" = {show(layers)}: give a row [thickness (m), Young's modulus (Pa), expansion (1/K)] "
-            "for each layer, from the back to the front",
-            name,
-        )
-    rows = []
-    for i, row in enumerate(layers):
-        place = f"{name}[{i}]"
-        if isinstance(row, str) or not hasattr(row, "__len__") or len(row) != 3:
-            raise InputError(
-                f" = {show(row)}: must be [thickness (m), Young's modulus (Pa), expansion (1/K)]",
-                place,
-            )
-        t, modulus, expansion = row
-        rows.append(
-            (
-                length(f"{place}[0]", t),
-                number(f"{place}[1]", modulus, above=0.0),
-                number(f"{place}[2]", expansion),
-            )
-        )
-    return tuple(rows)

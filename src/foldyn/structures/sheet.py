@@ -5,21 +5,46 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import Check, Checked
 from foldyn.errors import InputError, within
-from foldyn.values import brief, indices, length, number, show
+from foldyn.values import indices, length, number, objects, show
 
+
+def _ratio(name: str, value: Any) -> float:
+    """Return a Poisson's ratio."""
+    checked = number(name, value)
+    if not -1.0 < checked < 0.5:
+        raise InputError(
+            f" = {checked}: must lie between -1 and 0.5, both excluded (0.5 makes the bar areas "
+            "infinite)",
+            name,
+        )
+    return checked
+
+
+def _panels(name: str, value: Any) -> tuple[int, ...]:
+    """Return numbers of panels."""
+    chosen = indices(name, value, "panel", "as in [0, 1]")
+    if min(chosen) < 0:
+        raise InputError(f" = {show(list(chosen))}: panels are counted from 0", name)
+    return chosen
+
+
+Modulus = Annotated[float, Check(number, above=0.0, unit="Pa")]
+Ratio = Annotated[float, Check(_ratio)]
+Length = Annotated[float, Check(length, unit="m")]
+Density = Annotated[float, Check(number, above=0.0, unit="kg/m3")]
 MATERIAL = ("youngs_modulus", "poissons_ratio", "thickness", "density")
 """What panels may have of their own."""
 
 
-@brief
 @dataclass(frozen=True)
-class PanelSheet:
+class PanelSheet(Checked):
     """Panels whose thickness or material differs from the rest of the sheet.
 
     Parameters
@@ -35,32 +60,25 @@ class PanelSheet:
         A value out of its range, or none at all.
     """
 
-    panels: Sequence[int] | int
-    youngs_modulus: float | None = None
-    poissons_ratio: float | None = None
-    thickness: float | None = None
-    density: float | None = None
+    panels: Annotated[Sequence[int] | int, Check(_panels)]
+    youngs_modulus: Modulus | None = None
+    poissons_ratio: Ratio | None = None
+    thickness: Length | None = None
+    density: Density | None = None
 
-    def __post_init__(self) -> None:
-        chosen = indices("panels", self.panels, "panel", "as in [0, 1]")
-        if min(chosen) < 0:
-            raise InputError(f" = {show(list(chosen))}: panels are counted from 0", "panels")
-        object.__setattr__(self, "panels", chosen)
+    def agree(self) -> None:
+        """Ask for something that differs."""
         if not self.own:
             raise InputError(f": give what differs there: {', '.join(MATERIAL)}", "panels")
-        for name, value in self.own.items():
-            object.__setattr__(self, name, _checked(name, value))
 
     @property
     def own(self) -> dict[str, float]:
         """What differs from the rest of the sheet."""
-        given = {name: getattr(self, name) for name in MATERIAL}
-        return {name: value for name, value in given.items() if value is not None}
+        return {name: getattr(self, name) for name in self.given(*MATERIAL)}
 
 
-@brief
 @dataclass(frozen=True)
-class Sheet:
+class Sheet(Checked):
     """An isotropic elastic sheet.
 
     Parameters
@@ -92,31 +110,19 @@ class Sheet:
     0.02
     """
 
-    youngs_modulus: float
-    poissons_ratio: float
-    thickness: float
-    density: float | None = None
-    length_scale_ratio: float = 1.0
-    panels: Sequence[PanelSheet] = ()
+    youngs_modulus: Modulus
+    poissons_ratio: Ratio
+    thickness: Length
+    density: Density | None = None
+    length_scale_ratio: Annotated[float, Check(number, above=0.0)] = 1.0
+    panels: Annotated[Sequence[PanelSheet], Check(objects, kinds=(PanelSheet,))] = ()
 
-    def __post_init__(self) -> None:
-        for name in (*MATERIAL, "length_scale_ratio"):
-            value = getattr(self, name)
-            if value is None and name == "density":
-                continue
-            with within("sheet: "):
-                object.__setattr__(self, name, _checked(name, value))  # in double precision
-        with within("sheet: "):
-            object.__setattr__(self, "panels", self._checked_panels())
+    place = "sheet: "
 
-    def _checked_panels(self) -> tuple[PanelSheet, ...]:
-        given: Any = self.panels
-        if isinstance(given, PanelSheet) or not isinstance(given, Sequence):
-            raise InputError(f" = {show(given)}: must be a list of PanelSheet", "panels")
+    def agree(self) -> None:
+        """Refuse panels that are named twice, and densities of some of them alone."""
         before: dict[int, int] = {}
-        for i, part in enumerate(given):
-            if not isinstance(part, PanelSheet):
-                raise InputError(f" = {show(part)}: must be a PanelSheet", f"panels[{i}]")
+        for i, part in enumerate(self.panels):
             if part.density is not None and self.density is None:
                 raise InputError(
                     f" = {part.density:g}: the rest of the sheet has none; give sheet.density",
@@ -130,7 +136,6 @@ class Sheet:
                         f"panels[{i}].panels",
                     )
                 before[panel] = i
-        return tuple(given)
 
     @property
     def bending_modulus(self) -> float:
@@ -183,19 +188,3 @@ def sheet_from(table: Mapping[str, Any]) -> Sheet:
 
 def _numbers(part: PanelSheet) -> tuple[int, ...]:
     return part.panels  # type: ignore[return-value]  # checked
-
-
-def _checked(name: str, value: Any) -> float:
-    """Return a value of a sheet in its range."""
-    if name == "thickness":
-        return length(name, value)
-    if name != "poissons_ratio":
-        return number(name, value, above=0.0)
-    checked = number(name, value)
-    if not -1.0 < checked < 0.5:
-        raise InputError(
-            f" = {checked}: must lie between -1 and 0.5, both excluded (0.5 makes the bar areas "
-            "infinite)",
-            name,
-        )
-    return checked

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,7 @@ from scipy import sparse
 
 from foldyn import mechanics
 from foldyn.algebra.solvers import Fill
+from foldyn.arguments import Check, Checked
 from foldyn.materials import (
     BarLaw,
     EnhancedLinear,
@@ -54,28 +55,21 @@ MEMBRANES = ("bars", "panel")
 
 
 @dataclass(frozen=True)
-class ModelOptions:
+class ModelOptions(Checked):
     """Options of a structure, all of them; see `discretize` and `foldyn.structures.presets`."""
 
-    scheme: Literal["n5b8", "n4b5", "n5b8e"] = "n5b8"
+    scheme: Annotated[str, Check(choice, known=SCHEMES)] = "n5b8"
     mass: str = "consistent"
     bar_law: str | BarLaw = "ogden"
     fold_law: str | HingeLaw = EnhancedLinear()
     bend_law: str | HingeLaw = "linear"
-    calibration: Literal["standard", "merlin2", "plate"] = "plate"
-    crease_stiffness: PerCrease = None
-    crease_rest: PerCrease = None
+    calibration: Annotated[str, Check(choice, known=CALIBRATIONS)] = "plate"
+    crease_stiffness: Annotated[PerCrease, Check(per_crease, unit="N m/rad per m")] = None
+    crease_rest: Annotated[PerCrease, Check(per_crease, unit="degrees")] = None
     clamped: tuple[Edge, ...] = ()
     rigid: str | tuple[int, ...] | None = None
     straight: tuple[Edge, ...] = ()
-    membrane: Literal["bars", "panel"] = "bars"
-
-    def __post_init__(self) -> None:
-        for name in ("crease_stiffness", "crease_rest"):
-            object.__setattr__(self, name, per_crease(name, getattr(self, name)))
-        choice("scheme", self.scheme, SCHEMES)
-        choice("calibration", self.calibration, CALIBRATIONS)
-        choice("membrane", self.membrane, MEMBRANES)
+    membrane: Annotated[str, Check(choice, known=MEMBRANES)] = "bars"
 
     @property
     def bowed(self) -> bool:

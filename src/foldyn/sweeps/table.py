@@ -14,13 +14,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.analyses.keys import parts
+from foldyn.cases.units import unit_of
 from foldyn.results.dataset import DOCUMENT
 from foldyn.results.sweep_dataset import POINT, sweep_dataset
 from foldyn.sweeps.evaluations import Evaluation
 from foldyn.sweeps.measure import Asked
 from foldyn.sweeps.plan import Plan
 from foldyn.sweeps.points import GRID
-from foldyn.values import unit_of
 
 ABOUT: Mapping[str, str] = {
     "failure": "why the point lacks values",

@@ -16,12 +16,12 @@ from scipy.stats import chi2
 
 import foldyn
 from foldyn.analyses.keys import replaced
+from foldyn.arguments import brief
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.fit_problem import Problem
 from foldyn.experiment.calibration.measurement import Measurement, spread
 from foldyn.experiment.calibration.uncertainty import Estimate
 from foldyn.results import netcdf
-from foldyn.values import brief
 from foldyn.writing import write_text
 
 RARE = 0.01

@@ -125,7 +125,7 @@ class AtNodes(Measurement):
         """Check the nodes."""
         super().__post_init__()
         if not (isinstance(self.nodes, str) and self.nodes == self.word):
-            self._set(nodes=check_nodes(self.nodes, self._of("nodes")))
+            self._set(nodes=check_nodes(self._of("nodes"), self.nodes))
 
     def where(self, case: Case) -> NDArray[np.int64]:
         """Numbers of the nodes."""

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from foldyn.analyses.keys import number_keys, parts, value_at
 from foldyn.analyses.ties import Tie
+from foldyn.arguments import brief
 from foldyn.errors import InputError
-from foldyn.values import brief, number, show, suggest, whole
+from foldyn.values import number, show, suggest, whole
 
 MOST_STARTS = 100_000
 """Searches: a larger number is a typing error."""

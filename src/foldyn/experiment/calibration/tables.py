@@ -25,7 +25,7 @@ def made(kind: Any, file: Path, **known: Any) -> Any:
 def listed_nodes(file: Path, nodes: Any) -> list[int]:
     """Numbers of nodes: expressions over a pattern mean nothing to a file."""
     empty = isinstance(nodes, Sized) and not len(nodes)
-    chosen = "" if empty else check_nodes(nodes)
+    chosen = "" if empty else check_nodes("nodes", nodes)
     if isinstance(chosen, str):
         raise InputError(f"nodes = {show(nodes)}: give the numbers of the nodes in {file.name}")
     return list(chosen)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from foldyn.values import brief
+from foldyn.arguments import brief
 
 WEAK = 1e-5
 """Singular value, relative to the largest, below which a direction is not seen at all."""

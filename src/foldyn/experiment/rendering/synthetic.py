@@ -6,18 +6,19 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from foldyn.arguments import Unit, brief
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment.camera import Camera, opencv
 from foldyn.experiment.rendering.picture import Look, Sensor, Studio
 from foldyn.results import case_of
-from foldyn.values import brief, number
+from foldyn.values import number
 
 CODECS = {".mkv": "FFV1", ".avi": "FFV1", ".mp4": "mp4v"}
 """Codec by the end of the file's name: FFV1 loses nothing, mp4v does."""
@@ -44,7 +45,7 @@ class SyntheticFilm:
     """
 
     studio: Studio
-    time: NDArray[np.float64]
+    time: Annotated[NDArray[np.float64], Unit("s")]
     motion: Any
     rate: float
     dropped: tuple[int, ...] = ()

@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.arguments import brief
 from foldyn.errors import InputError
 from foldyn.experiment.camera import opencv
 from foldyn.jit.compiled import strict
-from foldyn.values import brief, number
+from foldyn.values import number
 
 _CANDIDATES = 5  # of Harris's measure for each corner that is asked for
 _DIRECTIONS = 120  # around a point, in which edges are looked for

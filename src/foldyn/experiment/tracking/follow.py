@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.arguments import Unit, brief
 from foldyn.experiment.camera import opencv
 from foldyn.experiment.tracking.corners import refine
 from foldyn.experiment.tracking.neighbors import Array, by_neighbors, distances, nearest
-from foldyn.values import brief, number, whole
+from foldyn.values import number, whole
 
 LOST, FOUND_AGAIN, TRACKED = 0, 1, 2
 
@@ -85,7 +87,7 @@ class Step:
         The frame repeats the one before it: nothing is measured in it.
     """
 
-    time: float
+    time: Annotated[float, Unit("s")]
     position: Array
     error: Array
     status: NDArray[np.int8]

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
+from foldyn.arguments import brief
 from foldyn.errors import InputError
 from foldyn.experiment.camera import axes_of_view
 from foldyn.experiment.tracking.corners import refine
 from foldyn.experiment.tracking.neighbors import Array, by_neighbors, distances
 from foldyn.experiment.tracking.view import View, fit_view, hidden_nodes
-from foldyn.values import brief, number
+from foldyn.values import number
 
 _TURNS = np.radians(np.arange(-12.0, 12.1, 4.0))  # of the image about the line of sight
 _SCALES = np.exp(np.linspace(-0.35, 0.35, 15))  # about the scale by size, where it is not known

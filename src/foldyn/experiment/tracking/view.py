@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from foldyn.arguments import brief
 from foldyn.errors import InputError
 from foldyn.results import case_of
 from foldyn.results.contents import check_variable
-from foldyn.values import brief
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,36 @@
+"""Units of the keys of a case file, which their arguments declare."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+from foldyn.arguments import arguments
+from foldyn.cases.contact import Contact, Plane
+from foldyn.cases.damping import DAMPINGS
+from foldyn.cases.histories import HISTORIES
+from foldyn.cases.loads import LOADS
+from foldyn.cases.masses import PointMass
+from foldyn.cases.supports import SUPPORTS
+from foldyn.materials import HINGE_LAWS
+from foldyn.structures import ModelOptions, Sheet
+
+OTHERS: Mapping[str, str] = {
+    "velocity": "m/s", "dihedral": "degrees", "panel_angle": "degrees", "twist": "degrees",
+}  # fmt: skip
+"""Of what is no argument of these data classes."""
+
+
+@cache
+def units() -> dict[str, str]:
+    """Units by key."""
+    parts = (Sheet, ModelOptions, *SUPPORTS, *LOADS, *DAMPINGS, PointMass, Contact, Plane)
+    kinds = (*parts, *HISTORIES.values(), *HINGE_LAWS.values())
+    found = {one.key: one.unit for kind in kinds for one in arguments(kind).values() if one.unit}
+    return {**found, **OTHERS}
+
+
+def unit_of(key: str, value: Any) -> str:
+    """Unit of a value of a key, "" where it has none or is a word."""
+    return "" if isinstance(value, str) else units().get(key, "")
