@@ -344,7 +344,8 @@ def one_or_each(name: str, value: Any, count: int, what: str) -> NDArray[np.floa
     array = np.array(value)
     if array.ndim and len(array) != count:
         raise InputError(
-            f" = {show(value)}: {len(array)} values for {count} {what}; give one, or one for each",
+            f" = {show(value)}: {len(array)} value{'s' * (len(array) != 1)} for {count} {what}; "
+            "give one, or one for each",
             name,
         )
     return np.broadcast_to(array, (count,))

@@ -111,7 +111,7 @@ supports[1].direction = "up": choose one of
 supports[2].between = [[4, 3], [5, 5]] | supports[2].between[1] = [5, 5]: node 5
 supports[2].between = [[4, 30]] | supports[2].between ... 30
 masses[0].mass = 0: must be greater than 0 kg
-masses[0].mass = | masses[0].mass: missing; give the mass
+masses[0].mass = | masses[0].mass: missing; give it (kg)
 masses[0].weight = 3 | masses[0].weight: unknown key
 model.clamped = [[0, 5]] | model: clamped: (0, 5) is not a boundary edge
 model.clamped = [[0, 1, 2]] | model.clamped[0] = [0, 1, 2]: must be two nodes

@@ -72,7 +72,7 @@ supports[5] = { nodes = [4, 5], link = "x", axes = "x" } | supports[5].link: tie
 supports[5] = { nodes = [4], to = [0, 1] } | supports[5].to = [0, 1]: must be three nodes
 supports[5] = { nodes = [4], to = [0, 1, 2] } | supports[5].nodes: node 4 lies off the plane of
     nodes [0, 1, 2]
-supports[5] = { nodes = [4], displacement = 0.1 } | supports[5].axis: missing; give the axis
+supports[5] = { nodes = [4], displacement = 0.1 } | supports[5].axis: give the axis
 """
 
 

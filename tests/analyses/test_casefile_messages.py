@@ -11,7 +11,7 @@ from foldyn.errors import FoldynWarning, InputError
 # edits of the example, and how the message begins
 BAD = """
 sheet.thickness = -0.01: must be greater than 0
-sheet.poissons_ratio = 0.5: must be less than 0.5
+sheet.poissons_ratio = 0.5: must lie between
 sheet.thickness =; sheet.thicknes = 0.01 | sheet.thicknes: unknown key; did you mean 'thickness'?
     known keys: youngs
 sheet.thickness = | sheet.thickness: missing
@@ -45,7 +45,7 @@ loads[0].force =; loads[0].gravity = [0, 0, -9.81] | loads[0].gravity: acts on t
     structure; leave out nodes, or write [[loads]] for
 loads[0] = { gravity = [0, 0, 0] } | loads[0].gravity = [0, 0, 0]: must not be zero
 loads[0] = { gravity = [0, 0, inf] } | loads[0].gravity[2] = inf: must be a finite number
-loads[0].force = | loads[0].force: missing; give its value
+loads[0].force = | loads[0].force: missing; give it (N)
 loads[0].nodes = | loads[0].nodes: missing; give its value
 loads[0].nodes =; loads[0].force = | loads[0]: give nodes and force, or gravity, or creases
 loads[0].force =; loads[0].forces = [0.01, 0, 0] | loads[0].forces: unknown key; did you mean
@@ -81,14 +81,14 @@ model.mass = 1: choose one of
 model.scheme = "n6b8": did you mean 'n5b8'?
 model.bend_law = "superliner": did you mean 'superlinear'?
 model.fold_law.theta1 = "45": must be a number
-model.fold_law.theta1 = 400 | model.fold_law: EnhancedLinear: theta1 = 400.0, theta2 = 315.0: need
+model.fold_law.theta1 = 400 | model.fold_law: theta1 = 400.0, theta2 = 315.0: need
     0 < theta1 < theta2
 model.fold_law.theta1 =; model.fold_law.thetta1 = 45 | model.fold_law.thetta1: unknown key; did
     you mean 'theta1'? known keys: theta1
 pattern.kind = "muira": did you mean 'miura'? choose one of simple_fold
 pattern.panel_angle =; pattern.panel_angel = 60 | pattern.panel_angel: unknown key; did you mean
     'panel_angle'? known keys
-pattern.panel_angle = 200 | pattern: miura: panel_angle
+pattern.panel_angle = 200 | pattern.panel_angle = 200
 pattern.panel_angle = "60": must be a number
 pattern.panel_angle = nan: must be a finite number
 pattern.file = "a.fold" | pattern: give only one of kind and file

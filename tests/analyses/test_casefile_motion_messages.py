@@ -13,19 +13,20 @@ supports[0].axes =; supports[0].axis = "xyz" | supports[0].displacement: missing
     write axes instead of axis to hold
 supports[0] = { nodes = [0, 1, 2], axis = "xyz", displacement = 0.1 } | supports[0].axis = "xyz":
     must be one of "x", "y" and "z"
-supports[0].axes =; supports[0].displacement = 0.1 | supports[0].axis: missing; give the axis of
+supports[0].axes =; supports[0].displacement = 0.1 | supports[0].axis: give the axis of
     the displacement
 supports[0].axes = "x"; supports[0].displacement = 0.1 | supports[0].axes: holds nodes at rest,
-    but displacement moves them; give either
+    and axis = "x", say, moves them; leave out displacement
 supports[0].axes = "x"; supports[0].history = { kind = "step" } | supports[0].axes: holds nodes at
-    rest, but history moves them; give either
-supports[0].axes =; supports[0].history = { kind = "step" } | supports[0].axis: missing
+    rest, and axis = "x", say, moves them; leave out history
+supports[0].axes =; supports[0].history = { kind = "step" } | supports[0].displacement:
+    missing; give it (m), or write axes
 supports[0] = { nodes = [0, 1, 2], axis = "x", displacement = nan } | supports[0].displacement =
     nan: must be a finite number
 supports[0] = { nodes = [0, 1, 2], axis = "x", displacement = [0.1, 0.2] } |
     supports[0].displacement = [0.1, 0.2]: 2 values for 3 nodes; give one, or one for each
-supports[0] = { nodes = "xmin", axis = "x", displacement = [0] } | supports[0].displacement = [0]:
-    one displacement per node needs node numbers, but nodes
+supports[0] = { nodes = "xmin", axis = "x", displacement = [0] } | supports[0].displacement =
+    [0.0]: one displacement per node needs node numbers, but nodes
 supports[0] = { nodes = [0, 1, 2], axis = "x", displacement = 1, history = { kind = "ramp",
     duration = 0 } } | supports[0].history.duration = 0: must be greater than 0
 supports[1] = { nodes = [2, 3], axis = "y", displacement = 0 } | supports[1]: node 2 is held and
@@ -37,7 +38,7 @@ supports[1] = { base = "xy", history = { kind = "step" } } | supports[1].base = 
     of "x", "y" and "z"
 supports[1] = { base = "x" } | supports[1].history: missing; give the motion of the base over time
 supports[0].axes =; supports[0].base = "x"; supports[0].history = { kind = "step" } |
-    supports[0].base: moves all nodes that other [[supports]] hold along x; leave out nodes
+    supports[0].base: moves all nodes that supports hold along its axis; leave out nodes
 supports[1] = { base = "x", displacement = [1], history = { kind = "step" } } |
     supports[1].displacement = [1]: must be a number
 supports[0].axes = "yz"; supports[1] = { base = "x", history = { kind = "step" } } | supports[1]:
@@ -48,14 +49,14 @@ loads[0] = { creases = [0, 4], angle = 90 } | loads[0].creases = [0, 4]: crease 
     this structure has creases 0 to 3
 loads[0] = { creases = [0], angle = 400 } | loads[0].angle = 400: must lie between 0 and 360
     degrees (flat: 180)
-loads[0] = { creases = "all", angle = [90, 90] } | loads[0].angle = [90.0, 90.0]: 2 angles for 4
+loads[0] = { creases = "all", angle = [90, 90] } | loads[0].angle = [90.0, 90.0]: 2 values for 4
     creases; give one, or one for each
 loads[0] = { creases = [0], angle = 360 } | loads[0].angle = 360: this fold law, free of stress at
     rest, has an infinite moment there
 loads[0] = { creases = [0] } | loads[0].angle: missing; give it (degrees), or fold_angle or
     fraction
 loads[0] = { angle = 90 } | loads[0].creases: missing; give its value
-loads[0].creases = [0]; loads[0].angle = 90 | loads[0].creases: creases that fold are a load of
+loads[0].creases = [0]; loads[0].angle = 90 | loads[0].angle: creases that fold are a load of
     their own; leave out nodes and force
 loads[0] = { creases = [0], gravity = [0, 0, -9.81] } | loads[0].gravity: acts on the whole
     structure; leave out creases, or write

@@ -164,8 +164,7 @@ analysis.method = "impulse"; analysis.integrator = "rk5" | analysis.integrator =
     mean 'rk4'? choose one of rk4
 analysis.method = "burst_random"; analysis.averages = 1 | analysis.averages = 1: must be a whole
     number, at least 2
-analysis.method = "burst_random"; analysis.burst = 1 | analysis.burst = 1.0: must be a part of the
-    record, between 0 and 1
+analysis.method = "burst_random"; analysis.burst = 1 | analysis.burst = 1: must be less than 1
 analysis.method = "burst_random"; analysis.estimator = "h3" | analysis.estimator = "h3": choose
     one of h1, h2
 analysis.method = "stepped_sine"; analysis.sweep = "upp" | analysis.sweep = "upp": did you mean
@@ -174,7 +173,7 @@ drive = | drive: missing; give its value
 drive = { nodes = [7, 6], force = [1, 0, 0] }: must
 drive = []: must have at least one entry
 drive[0].nodes =; drive[0].force = | drive[0]: give nodes and force, or base (the axis of a
-drive[0].force =; drive[0].nodes = 7 | drive[0].force: missing; give its value
+drive[0].force =; drive[0].nodes = 7 | drive[0].force: missing; give it (N)
 drive[0].nodes = | drive[0].nodes: missing; give its value
 drive[0].nodes =; drive[0].node = 7 | drive[0].node: unknown key; did you mean 'nodes'? known
     keys: nodes, force, base, disp
@@ -184,8 +183,8 @@ drive[0].nodes = 99 | drive[0].nodes = [99]: node 99 is out of range; this struc
 drive[0].base = "x" | drive[0].base: moves all nodes that supports hold along its axis; leave out
     nodes and
 drive[0] = { base = "w" } | drive[0].base = "w": must be one of "x", "y" and "z"
-drive[0].displacement = 1.0 | drive[0].displacement: is that of a base, as in base = "x"; leave it
-    out, or give base
+drive[0].displacement = 1.0 | drive[0].displacement: moves all nodes that
+    supports hold along its axis; leave out nodes
 drive[0] = { base = "x" }; drive[1] = { nodes = [7, 6], force = [1, 0, 0] } | drive[0]: a base
     drives alone, along one axis; run a case file for each
 drive[0] = { base = "x" }; output = { quantity = "mobility" } | output.quantity = "mobility": a

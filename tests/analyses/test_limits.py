@@ -97,7 +97,7 @@ def test_every_number_of_a_case_file_is_checked(text, word, tmp_path):
         ("every = 0.01", "every = " + "9" * 4400, "is not valid TOML: "),
         ("thickness = 0.01", "thickness = 1e103",
          "sheet.thickness = 1e+103: must be in size at most 1e+50"),
-        ("thickness = 0.01", "thickness = 1e31", "sheet: thickness = 1e+31: must be in size"),
+        ("thickness = 0.01", "thickness = 1e31", "sheet.thickness = 1e+31: must be in size"),
     ],
     ids=range(7),
 )  # fmt: skip

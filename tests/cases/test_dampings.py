@@ -101,7 +101,7 @@ direction = "-x"
 @pytest.mark.parametrize(
     ("section", "text", "words"),
     [
-        ("[damping]", "modal = -1", "damping.modal = -1.0: must be at least 0"),
+        ("[damping]", "modal = -1", "damping.modal = -1: must be at least 0"),
         ("[damping]", "modal = []", r"damping.modal = \[\]: must be a number, or a list"),
         ("[damping]", "modal = { ratio = 1 }", "damping.modal.ratio: .*did you mean 'ratios'"),
         ("[damping]", "modal = { count = 1 }", "damping.modal.ratios: missing"),
@@ -109,11 +109,11 @@ direction = "-x"
         ("[damping]", "strain = -1", "damping.strain = -1: must be at least 0"),
         ("[damping]", "creases = [99]", r"damping.creases = \[99\]: must be a number"),
         ("[damping]", "creases = { coefficient = 1, creases = [99] }", "crease 99 is out of range"),
-        ("[damping]", "creases = [{ coefficient = 1 }, {}]", r"\[1\].coefficient: missing"),
+        ("[damping]", "creases = [{ coefficient = 1 }, {}]", r"\[1\]: give coefficient"),
         (
             "[[supports]]",
             "between = [0, 8]",
-            r"\[1\]: between is for springs and dashpots: give st",
+            r"\[1\].stiffness: missing; give it",
         ),
         ("[[supports]]", "dashpot = 1", r"supports\[1\].nodes: give either nodes"),
         ("[[supports]]", "dashpot = 1\nnodes = [1]\nbetween = [1, 2]", "between: give either"),

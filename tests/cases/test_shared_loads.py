@@ -153,7 +153,7 @@ BAD = [
         r"\.pressure: a pressure acts on panels; leave out force and nodes",
     ),
     ('pressure = "1 bar"', r"\.pressure = \"1 bar\""),
-    ("creases = [0, 1, 2]\nmoment = [1.0, 2.0]", r"\.moment = .*: 2 moments for 3 creases"),
+    ("creases = [0, 1, 2]\nmoment = [1.0, 2.0]", r"\.moment = .*: 2 values for 3 creases"),
     ("creases = [99]\nmoment = 1.0", r"\.creases = \[99\]: crease 99 is out of range"),
     ("creases = [0]\nangle = 90\nmoment = 1.0", "leave out angle"),
     (
