@@ -116,6 +116,7 @@ def test_late_starts_and_small_tails_of_a_table_pass(tmp_path):
     read_case(file)
 
 
+MANY = ", ".join(f"k{i} = 1" for i in range(9000))
 LONG = {
     "keys": "".join(f"key{i} = 1\n" for i in range(3000)),
     "a key": "k" * 90_000 + " = 1\n",
@@ -123,7 +124,7 @@ LONG = {
     "nodes twice": f"[[supports]]\nnodes = {[5] * 20_000}\n",
     "a selection": f'[[supports]]\nnodes = "{"x" * 90_000}"\n',
     "sections": "[[supports]]\naxes = 3\n" * 2000,
-    "a table": f"[[loads]]\nforce = {{ {', '.join(f'k{i} = 1' for i in range(9000))} }}\n",
+    "a table": f"[[loads]]\nnodes = 7\nforce = {{ {MANY} }}\n",
     "a word": f'[[loads]]\nnodes = 7\nforce = "{"z" * 90_000}"\n',
 }
 
