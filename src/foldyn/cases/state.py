@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any
 
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.arguments import Check, Checked, brief
@@ -73,6 +74,14 @@ class State(Checked):
     velocity: Annotated[ArrayLike | None, Check(_vectors, unit="m/s")] = None
     memory: Annotated[ArrayLike | str | None, Check(_memory)] = None
     continuation: Annotated[Continuation | None, Check(_continuation)] = None
+
+    def of_nodes(self, name: str, shape: tuple[int, ...], field: str = "initial") -> NDArray:
+        """Its displacement or velocity of the nodes of a case (n, 3), zero where it has none."""
+        value = getattr(self, name)
+        array = np.zeros(shape) if value is None else np.array(value)
+        if array.shape != shape:
+            raise InputError(f": {name} of shape {array.shape}: the case has {shape}", field)
+        return array
 
     def agree(self) -> None:
         """Refuse displacements and velocities of different numbers of nodes."""

@@ -86,20 +86,16 @@ def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
             f"initial: got {type(initial).__name__}; give a State: fd.State(displacement=..., "
             "velocity=...) or fd.initial_state(result)"
         )
-    shape = case.structure.nodes.shape
-    pair = []
-    for name in ("displacement", "velocity"):
-        value = getattr(initial, name, None)
-        array = np.zeros(shape) if value is None else np.array(value, float)
-        if array.shape != shape:
-            raise InputError(f"initial: {name} of shape {array.shape}: the case has {shape}")
-        pair.append(np.ascontiguousarray(array))
-    if (pair[1][case.still] != 0.0).any():
-        node = int(np.argwhere((pair[1] != 0.0) & case.still)[0][0])
+    u, v = (
+        np.ascontiguousarray((initial or State()).of_nodes(name, case.structure.nodes.shape))
+        for name in ("displacement", "velocity")
+    )
+    if (v[case.still] != 0.0).any():
+        node = int(np.argwhere((v != 0.0) & case.still)[0][0])
         raise InputError(f"initial: velocity of node {node} is not zero along a supported axis")
-    check_tied(case, pair[0], "initial")
-    _check_tied_velocity(case, pair[1])
-    return pair[0], pair[1]
+    check_tied(case, u, "initial")
+    _check_tied_velocity(case, v)
+    return u, v
 
 
 def check_touching(case: Case, u: NDArray, start: float, end: float) -> None:

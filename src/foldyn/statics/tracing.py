@@ -230,14 +230,7 @@ def displacement_of(
     """Displacements (n, 3) of a case in a state, zero where it has none."""
     if not isinstance(state, State):
         raise InputError(f": got {type(state).__name__}; give {expected}", field)
-    shape = case.structure.nodes.shape
-    if state.displacement is None:
-        return np.zeros(shape)
-    displacement = np.array(state.displacement, float)
-    if displacement.shape != shape:
-        raise InputError(
-            f": displacement of shape {displacement.shape}: the case has {shape}", field
-        )
+    displacement = state.of_nodes("displacement", case.structure.nodes.shape, field)
     check_tied(case, displacement, field)
     return displacement
 
