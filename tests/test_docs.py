@@ -64,7 +64,7 @@ def test_the_case_file_of_the_tutorial_is_its_python_case(tutorial):
     )
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_the_error_that_the_tutorial_states(tutorial):
     worst = float(abs(fd.fidelity(tutorial[0]["case"], count=4).result.error[:, 0]).max())
     page = (DOCS / "tutorial.md").read_text("utf-8")

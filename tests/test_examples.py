@@ -21,7 +21,7 @@ def load(path: Path):
     return module
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
 def test_example(path):
     example = load(path)

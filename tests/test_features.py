@@ -7,7 +7,7 @@ import pytest
 import features
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_the_page_has_the_table():
     text = features.PAGE.read_text("utf-8")
     assert features.table() in text, "python tests/features.py writes it anew"

@@ -39,7 +39,7 @@ def tracked_files() -> list[Path]:
 def test_layers_contract():
     script = Path(sys.executable).with_name("lint-imports")
     if not script.exists():
-        pytest.skip("import-linter is not installed")
+        pytest.skip("needs import-linter")
     done = subprocess.run(
         [script, "--no-cache"], cwd=ROOT, capture_output=True, text=True, check=False
     )

@@ -71,7 +71,7 @@ def test_energies_and_forces_are_those_of_the_formulas(model):
     assert inner[4:].any() == np.False_
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_compiled_loops_see_the_same_forces_as_statics(model):
     s = structure(model, FOLD)
     body, q = fd.Case(s, SOME).body, moved(s, 0.05)
@@ -234,8 +234,8 @@ def test_a_pendulum_on_a_spring_keeps_its_energy():
     "method",
     [
         "rk4",
-        pytest.param("central_difference", marks=pytest.mark.thorough),
-        pytest.param("dormand_prince", marks=pytest.mark.thorough),
+        pytest.param("central_difference", marks=pytest.mark.matrix),
+        pytest.param("dormand_prince", marks=pytest.mark.matrix),
         "newmark",
     ],
 )
@@ -249,7 +249,7 @@ def test_the_energy_balance_closes_with_springs_and_damping(method):
     assert float(motion.strain_springs.max()) > 0.01 * float(motion.work.max())
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_the_energy_balance_of_a_shell_closes_with_springs():
     s = structure("shell", FOLD, HEAVY)
     case = fd.Case(s, SOME, [fd.Force([2], (3.0, 1.0, 2.0), fd.HalfSine(0.05))])

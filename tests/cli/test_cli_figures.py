@@ -54,7 +54,7 @@ def test_figures_of_a_tiny_case(workplace, edited) -> None:
     assert f"figures and {Path('r/report.html')}" in done.out
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_a_film_where_it_is_asked_for(workplace, edited) -> None:
     workplace.write(edited(("every = 0.01", "every = 0.02")))
     done = workplace.call("run", "case.toml", "--out", "r", "--film", "gif")
@@ -68,7 +68,7 @@ def test_a_film_instead_of_a_gif(workplace, edited) -> None:
     try:
         find_ffmpeg()
     except InputError:
-        pytest.skip("needs ffmpeg on the PATH or imageio-ffmpeg")
+        pytest.skip("needs ffmpeg or imageio-ffmpeg")
     workplace.write(edited(("every = 0.01", 'every = 0.02\nanimation = "mp4"')))
     done = workplace.call("run", "case.toml", "--out", "r")
     assert (done.status, done.err) == (0, "")
@@ -139,7 +139,7 @@ def test_a_page_without_figures(workplace, edited) -> None:
     assert "The structure" in page and "The motion" in page
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("form", ["svg", "pdf"])
 def test_figures_for_a_paper_stand_beside_the_page(workplace, edited, form) -> None:
     workplace.write(edited(("every = 0.01", "every = 0.02")))

@@ -42,7 +42,7 @@ def limited(size: int):
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_signals_keep_what_was_computed_and_four_at_once_are_one(tmp_path, edited) -> None:
     (tmp_path / "case.toml").write_text(edited())
     fd.read_case(tmp_path / "case.toml").run()  # compiles, which would take each of them minutes
@@ -96,7 +96,7 @@ def test_a_kill_between_rules_leaves_no_old_result(workplace, tmp_path, edited) 
     assert names(folder) == [stamp.NAME, "result-centroid.nc", "result-panel.nc"]
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_ctrl_c_and_a_full_disk_while_figures_are_drawn(workplace, tmp_path, edited) -> None:
     workplace.run(edited(("every = 0.01", "every = 0.001")), "--out", "before")  # compiles
     stopped = start(tmp_path, "run", "case.toml", "--out", "stopped", "--figures", "png")
@@ -231,11 +231,9 @@ def watched(process: subprocess.Popen[str], folder: Path, kind: str) -> list[int
 FORCES = "displacement [mm],force [mN]\n-75,1.6\n-150,4.4\n-225,8.1\n-300,13.0\n"
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-@pytest.mark.parametrize(
-    "number", [signal.SIGTERM, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 9))]
-)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_a_fit_that_is_ended_keeps_its_evaluations_and_no_workers(tmp_path, number) -> None:
     for name, text in (("case.toml", CASE), ("fit.toml", FIT), ("forces.csv", FORCES)):
         (tmp_path / name).write_text(text)
@@ -258,23 +256,21 @@ def test_a_fit_that_is_ended_keeps_its_evaluations_and_no_workers(tmp_path, numb
     assert set(kept.iterdir()) == there
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-def test_a_study_that_is_ended_goes_on(tmp_path) -> None:
+def test_a_study_that_is_ended_keeps_its_runs(tmp_path) -> None:
     runs = tmp_path / "herkal-quick" / "runs"
-    for number in (signal.SIGKILL, signal.SIGINT, signal.SIGTERM):
-        one = start(tmp_path, "study", "herkal", "--quick")
-        workers = watched(one, runs, "*.nc")
-        assert len(workers) == 2
-        one.send_signal(number)
-        one.wait(timeout=10)
-        wait_for(lambda: not any(map(running, workers)), 5.0)  # noqa: B023
-        there = set(runs.rglob("*"))
-        out, err = one.communicate()
-        if number != signal.SIGKILL:
-            assert one.returncode == 128 + number
-            assert "Traceback" not in err
-            named = f"{KEPT}herkal-quick/runs; the same command goes on from there"
-            assert err.splitlines()[-2:] == ["foldyn: interrupted", named]
-            assert not [path for path in there if ".tmp" in path.name]
-        assert set(runs.rglob("*")) == there, out
+    one = start(tmp_path, "study", "herkal", "--quick")
+    workers = watched(one, runs, "*.nc")
+    assert len(workers) == 2
+    one.send_signal(signal.SIGTERM)
+    one.wait(timeout=10)
+    wait_for(lambda: not any(map(running, workers)), 5.0)
+    there = set(runs.rglob("*"))
+    out, err = one.communicate()
+    assert one.returncode == 128 + signal.SIGTERM
+    assert "Traceback" not in err
+    named = f"{KEPT}herkal-quick/runs; the same command goes on from there"
+    assert err.splitlines()[-2:] == ["foldyn: interrupted", named]
+    assert not [path for path in there if ".tmp" in path.name]
+    assert set(runs.rglob("*")) == there, out

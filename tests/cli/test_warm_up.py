@@ -56,7 +56,7 @@ def test_names_are_unique() -> None:
     assert use(names[0]) == 0
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_nothing_is_left_to_compile(tmp_path) -> None:
     """Neither for a second call nor for computations of other cases."""
     where = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}

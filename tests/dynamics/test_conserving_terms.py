@@ -59,7 +59,7 @@ def test_a_free_sheet_with_springs_keeps_energy_and_both_momenta(model, dt):
     assert max(drift(total), drift(h), drift(p.sum(axis=1))) < 1e-10
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("model", MODELS)
 def test_nothing_adds_up_over_1e4_steps(model):
     case = fd.Case(sheet(model), AXIAL)

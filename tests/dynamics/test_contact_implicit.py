@@ -47,7 +47,7 @@ def conserved(structure: fd.Structure, run) -> dict[str, float]:
     return {k: np.abs(v - v[0]).max() / np.abs(v[0]).max() for k, v in kept.items()}
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("options", [{"dt": 1e-4, "every": 1}, {"tolerance": 1e-3, "every": 1e-4}])
 def test_the_conserving_method_keeps_all_in_a_collision(options):
     """With steps that do not resolve what bars do, fixed or not: energy and both momenta."""
@@ -60,7 +60,7 @@ def test_the_conserving_method_keeps_all_in_a_collision(options):
     assert crossing(s, run.displacement.values) == 0
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", [*METHODS, "energy_momentum"])
 def test_a_rebound_converges_with_order_two(method):
     """Of displacements, which steps resolve that are far above the period of a bar."""
@@ -86,7 +86,7 @@ def test_a_strip_folded_from_both_ends_stops_where_it_touches():
     assert run.attrs["contact_lists"] > 1
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_a_conserving_strip_loses_no_energy_where_it_touches():
     """The same with actuators, damping, guards of hinges and friction, also on a plane beneath."""
     pytest.importorskip("ipctk")
@@ -119,7 +119,7 @@ def test_no_step_is_too_long_to_see_what_is_in_its_way(monkeypatch):
     assert speed == 0.0 and facts["energy_error"] < 1e-9  # through it, without a trace
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_an_impact_too_violent_for_the_step_is_told():
     """A snap at some m/s, with a step that is far too long for it."""
     with pytest.raises(ComputationError, match=r"use a step below|no equilibrium was found"):

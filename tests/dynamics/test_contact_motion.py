@@ -171,7 +171,7 @@ def test_samples_tell_where_a_sheet_touches():
     assert shown.on == "node" and shown.values.shape == (len(run.time), len(s.nodes))
 
 
-@pytest.mark.thorough  # compiles the loop with contact around laws with memory
+@pytest.mark.matrix  # compiles the loop with contact around laws with memory
 def test_a_relaxing_fold_falls_on_a_plane_and_its_energies_balance():
     """Contact and memory together."""
     pattern = fd.patterns.simple_fold(a=0.05, b=0.05, dihedral=90)

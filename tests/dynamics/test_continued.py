@@ -78,7 +78,7 @@ def driven(**options):
     return fd.Case(structure, supports, loads, fd.Rayleigh(0.1, 1e-3))
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the energy balance", "ignore:damping. beta resists")
 @pytest.mark.parametrize("method", ["generalized_alpha", "energy_momentum"])
 def test_supports_loads_and_folds_that_move(method, tmp_path):
@@ -89,7 +89,7 @@ def test_supports_loads_and_folds_that_move(method, tmp_path):
     assert "continued_from" in again and "continued_from" not in part
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["generalized_alpha", "energy_momentum"])
 def test_rotations_of_a_shell(method, tmp_path):
     """They have no mass, and where they are is no part of a displacement; 2 minutes, compiling."""

@@ -42,10 +42,8 @@ def energy(motion) -> np.ndarray:
     return total.to_numpy()
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    "mass", ["mixed_voronoi", pytest.param("consistent", marks=pytest.mark.slow)]
-)
+@pytest.mark.matrix
+@pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
 def test_free_flight_over_1e4_steps(mass):
     """Energy and angular momentum to 1e-8 (found: 1e-12), linear momentum to rounding.
 

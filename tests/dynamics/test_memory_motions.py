@@ -16,7 +16,7 @@ LAWS = {
     "plastic": fd.Plastic(2e-4, isotropic=1e-3, kinematic=2e-3, law="linear"),
     "eyring": fd.Eyring(2e-5, 1e-5, law="linear"),
 }
-EXPLICIT = ["rk4", pytest.param("central_difference", marks=pytest.mark.thorough)]
+EXPLICIT = ["rk4", pytest.param("central_difference", marks=pytest.mark.matrix)]
 METHODS = [*EXPLICIT, "generalized_alpha", "energy_momentum"]
 
 

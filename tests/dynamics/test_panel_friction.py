@@ -35,7 +35,7 @@ def slid(case: fd.Case, strip: list[int], run) -> tuple[np.ndarray, float]:
     return run.displacement.values[:, strip, 0] @ mass / mass.sum(), mass.sum()
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:contact. at rest panels are nearer")
 @pytest.mark.parametrize("method", METHODS)
 def test_a_strip_slides_above_the_angle_of_friction(method):
@@ -49,7 +49,7 @@ def test_a_strip_slides_above_the_angle_of_friction(method):
     assert run.attrs["energy_error"] < 1e-2
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:contact. at rest panels are nearer")
 @pytest.mark.parametrize("method", METHODS)
 def test_a_strip_sticks_below_the_angle_of_friction(method):

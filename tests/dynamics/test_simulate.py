@@ -40,7 +40,7 @@ def test_motion_of_the_golden_miura():
     """RK4 on MERLIN2's forces, 2000 steps: the stored motion to 1e-6 (found: 4e-10)."""
     file = GOLDEN / "rk4_miura11_L1_N5B8.npz"
     if not file.is_file():
-        pytest.skip("no golden data here")
+        pytest.skip("needs ../shared")
     golden = np.load(file)
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
     np.testing.assert_allclose(pattern.vertices, golden["nodes"][:9], atol=1e-12)

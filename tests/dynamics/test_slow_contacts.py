@@ -115,7 +115,7 @@ def test_a_tower_that_is_pressed_flat_takes_few_steps():
     assert float(carried) == pytest.approx(6 * 38.0, rel=1e-4)
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_a_tower_that_rattles_takes_few_steps_that_conserve():
     """With little damping, which leaves `dormand_prince` most of the steps.
 
@@ -156,7 +156,7 @@ class Killed(BaseException):
     """What ends a run without a word."""
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_a_motion_with_slow_contacts_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path):
     monkeypatch.setattr(os, "fsync", lambda _: None)
     monkeypatch.setattr(motion, "CHUNK", 256)

@@ -53,7 +53,7 @@ def compare(found, alone, accuracy):
             assert float(np.abs(found[name] - alone[name]).max()) <= accuracy * scale, name
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", METHODS)
 def test_threads_share_what_touches(monkeypatch, method):
     case, start = closing()
@@ -113,7 +113,7 @@ class Killed(BaseException):
     """What ends a run without a word."""
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", METHODS)
 def test_a_motion_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path, method):
     monkeypatch.setattr(os, "fsync", lambda _: None)

@@ -26,7 +26,7 @@ def names():
     return found
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_the_examples_run(names):
     weak, full = names["first"]
     assert 0.3 < weak < full < 1.5

@@ -162,7 +162,7 @@ def test_a_motion_that_does_not_settle_is_told():
     assert found.unsteadiness.values[0] > 1e-3
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 # ------------------------------------------------------------------------ base motion
 @pytest.mark.parametrize("method", TIMED)
 def test_transmissibility_from_motions(method):

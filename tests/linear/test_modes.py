@@ -57,7 +57,7 @@ def test_the_specimen_against_a_dense_solver():
             .diagonal() > 1 - 1e-9).all()  # fmt: skip
 
 
-@pytest.mark.skipif(not SOLVERS["pardiso"].found(), reason="mkl is not installed")
+@pytest.mark.skipif(not SOLVERS["pardiso"].found(), reason="needs mkl")
 def test_backends_agree():
     case = paper_specimen()
     one, other = (modes(case, 8, secant=1.0, solver=name) for name in ("superlu", "pardiso"))

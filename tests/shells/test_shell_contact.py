@@ -194,7 +194,7 @@ def lying(angle: float, friction: float, alpha: float = 0.0) -> fd.Case:
     )  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_a_shell_that_falls_comes_to_rest_at_half_its_thickness():
     ground = fd.Plane((0, 0, -1.5 * T), (0, 0, 1))
     case = fd.Case(
@@ -263,7 +263,7 @@ def test_colliding_shells_keep_momentum_and_energy(method):
     assert shown.on == "node" and shown.values.shape == (len(run.time), len(shell.nodes))
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_a_strip_folded_from_both_ends_stops_where_it_touches(method):
     pytest.importorskip("ipctk")

@@ -179,7 +179,7 @@ def test_modes_of_a_tower_come_in_pairs():
     assert twisting < 0.9 * one
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_frequencies_of_a_tower_converge():
     """They fall with every even mesh, and with graded ones with the order of the elements."""
     meshes = [8, 12, 16]

@@ -106,7 +106,7 @@ def test_tangents_with_friction_are_exact(aside, slips):
     assert error < 1e-5  # of the differences
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_layers_that_rub_make_a_stiffer_block():
     """A folded Miura sheet between smooth plates: its layers slide on each other."""
     case, layers = press()

@@ -185,7 +185,7 @@ def test_statics_and_actuation():
 
 @pytest.mark.filterwarnings("ignore:damping. beta resists rotations")
 @pytest.mark.parametrize(
-    "method", ["generalized_alpha", "newmark", pytest.param("rk4", marks=pytest.mark.thorough)]
+    "method", ["generalized_alpha", "newmark", pytest.param("rk4", marks=pytest.mark.matrix)]
 )
 def test_motions_close_their_energy_audit(method):
     load = fd.Force([6, 7, 8], (0, 0, 1e-3), fd.HalfSine(0.5))
@@ -250,8 +250,8 @@ def test_what_it_does_not_go_with(options, message):
     [
         ("linear", "rk4"),
         ("enhanced", "rk4"),
-        pytest.param("linear", "dormand_prince", marks=pytest.mark.thorough),
-        pytest.param("enhanced", "dormand_prince", marks=pytest.mark.thorough),
+        pytest.param("linear", "dormand_prince", marks=pytest.mark.matrix),
+        pytest.param("enhanced", "dormand_prince", marks=pytest.mark.matrix),
     ],
 )
 def test_explicit_methods_balance_the_edges(law, method):

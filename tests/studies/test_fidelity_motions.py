@@ -95,7 +95,7 @@ def test_the_loads_are_scaled_by_the_linear_shell(fold):
     assert release.largest(made[SHELL], small) >= small
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_an_amplitude_beyond_the_path_is_left_out():
     case = documented()[39]  # an eggbox that gives way at 12 degrees
     made = structures(case.pattern(), case.sheet, 4)
@@ -108,7 +108,7 @@ def test_an_amplitude_beyond_the_path_is_left_out():
     assert len(held) < len(within) + 1
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_stored_results_are_what_the_code_gives():
     case = documented()[1]
     again = runs(next(iter(released(case))))

@@ -15,7 +15,7 @@ def test_a_tower_is_as_stiff_as_the_shell_where_panels_are_membranes():
     assert found["standard"][0] > 3.0
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_the_force_at_which_a_tower_snaps():
     found = pressed(tower(1e-3, (8, 12)))
     for model in ("plate", "n5b8e"):
@@ -23,7 +23,7 @@ def test_the_force_at_which_a_tower_snaps():
     assert found["plate, bars"].min() > 3.0
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 def test_sheets_between_two_rims(axis):
     found = stiffness(sheet(3, (4, 8)), axis)

@@ -117,7 +117,7 @@ def tumbling(tmp_path_factory):
     return names["case_file"].case(), names["motion"], folder
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_free_flight_keeps_the_momenta(tumbling):
     case, motion, _ = tumbling
     s, t = case.structure, motion.time.to_numpy()

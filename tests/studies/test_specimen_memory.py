@@ -26,7 +26,7 @@ PARAMETERS = [
 ]
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:.*time step is too coarse")  # as coarse as the data's
 def test_drift_and_decay_are_fitted_together(tmp_path):
     """From histories with the noise of a film; 2 minutes once compiled."""
@@ -54,7 +54,7 @@ def test_drift_and_decay_are_fitted_together(tmp_path):
         assert one.upper - one.lower < 0.2 * TRUE[one.key]
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:.*time step is too coarse")  # as coarse as the data's
 def test_a_film_tells_drift_and_decay(tmp_path):
     """From the film of a sheet that is the model but for its creases; 3 minutes once compiled.

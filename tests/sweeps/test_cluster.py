@@ -41,7 +41,7 @@ def cluster(monkeypatch):
         yield made
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_a_cluster_gives_the_same(tmp_path, cluster):
     (tmp_path / "case.toml").write_text(MODES)
     address = cluster.scheduler_address
@@ -52,7 +52,7 @@ def test_a_cluster_gives_the_same(tmp_path, cluster):
     assert len(list((tmp_path / "points").iterdir())) == 24
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_a_worker_that_is_killed_loses_nothing(tmp_path, cluster):
     from swept_cases import slow_measure
 
@@ -81,7 +81,7 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path, cluster):
     assert len(list(folder.iterdir())) == 24
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_a_scheduler_that_is_not_there_is_told(tmp_path):
     pytest.importorskip("distributed")
     (tmp_path / "case.toml").write_text(MODES)
@@ -89,7 +89,7 @@ def test_a_scheduler_that_is_not_there_is_told(tmp_path):
         fd.sweep(tmp_path / "case.toml", VARY, ["frequencies"], scheduler="tcp://127.0.0.1:1")
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_workers_of_several_threads_are_refused(tmp_path):
     dask = pytest.importorskip("distributed")
     (tmp_path / "case.toml").write_text(MODES)
