@@ -10,6 +10,7 @@ from test_conserving_terms import AXIAL, GROUNDED, MODELS, drift, energy, sheet,
 
 import foldyn as fd
 from foldyn.checks import observed_order
+from pairwise import in_pairs
 
 ELASTIC = fd.EnhancedLinear(70, 290)
 LAWS = {
@@ -28,9 +29,7 @@ def moved(model: str, law: str, *loads: fd.CreaseMoment, **parts: Any) -> fd.Cas
     return fd.Case(s, [fd.Fix([0, 1, 2])], [turned, *loads], **parts)
 
 
-@pytest.mark.parametrize("dt", [4e-3, 5e-2])
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(("model", "law", "dt"), in_pairs(MODELS, LAWS, [4e-3, 5e-2]))
 def test_a_free_sheet_keeps_both_momenta_and_loses_what_creases_take(model, law, dt):
     case = fd.Case(sheet(model, fold_law=LAWS[law]), AXIAL)
     motion = fd.simulate(case, 100 * dt, METHOD, dt=dt, every=10, initial=thrown(case))

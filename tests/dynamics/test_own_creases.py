@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import foldyn as fd
 from foldyn.structures.mesh import hinge_angles
+from pairwise import in_pairs
 
 SHEET = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.25, thickness=0.01, density=1.0)
 FLAT = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=120)
@@ -40,9 +41,9 @@ def balance(result):
     return float(abs(left - left[0]).max() / abs(result.work).max())
 
 
-@pytest.mark.parametrize("turned", [False, True], ids=["", "turned"])
-@pytest.mark.parametrize("rigid", [None, "all", [0]])
-@pytest.mark.parametrize("kind", PRESETS)
+@pytest.mark.parametrize(
+    ("kind", "rigid", "turned"), in_pairs(PRESETS, [None, "all", [0]], [False, True])
+)
 def test_a_moment_opens_a_crease_by_its_own_stiffness(kind, rigid, turned):
     for k in (6e-4, 0.06, 6.0):
         structure = model(kind, k, rigid=rigid, turned=turned)

@@ -19,6 +19,7 @@ from foldyn.mechanics.discrete_gradient import (
     mean_stress,
 )
 from foldyn.mechanics.step_tangent import expected_stress
+from pairwise import in_pairs
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 CUBIC = fd.CustomHingeLaw(
@@ -58,9 +59,9 @@ def forces(s: fd.Structure, u0: np.ndarray, u1: np.ndarray) -> np.ndarray:
     return force
 
 
-@pytest.mark.parametrize("turn", [0.0, 1e-3, 0.3, 1.5])
-@pytest.mark.parametrize("deform", [1e-9, 1e-4, 0.02])
-@pytest.mark.parametrize("laws", LAWS)
+@pytest.mark.parametrize(
+    ("laws", "deform", "turn"), in_pairs(LAWS, [1e-9, 1e-4, 0.02], [0.0, 1e-3, 0.3, 1.5])
+)
 def test_work_is_the_change_of_the_energy(laws, deform, turn):
     """Exactly, for each law, however far the step goes; without resultant and moment."""
     s = miura(laws)
