@@ -132,7 +132,9 @@ def test_creases_with_memory_move_as_with_edge_angles_as_dofs(method, kind):
 
 
 @pytest.mark.parametrize("method", EXPLICIT)
-@pytest.mark.parametrize("kind", DAMPED)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=[pytest.mark.matrix] * (kind == "strong")) for kind in DAMPED]
+)
 def test_damped_creases_move_as_with_edge_angles_as_dofs(method, kind):
     """generalized_alpha is of order 1 where dofs without mass are damped: it is extrapolated."""
     law, damping = DAMPED[kind]
@@ -170,6 +172,7 @@ def test_a_state_holds_what_damped_creases_remember(method, kind):
     np.testing.assert_allclose(rest.displacement[-1], end, atol=1e-6 * np.abs(end).max())
 
 
+@pytest.mark.matrix
 def test_dampers_take_what_jumps():
     """The moment of a damped crease that jumps turns it at a finite rate."""
     made = case([moment(fd.Pulse(0.1))]).altered(damping=fd.CreaseDamping(0.5))

@@ -193,6 +193,7 @@ def test_frequencies_of_a_tower_converge():
 # ------------------------------------------------------------------ analyses and refusals
 
 
+@pytest.mark.matrix
 def test_statics_motions_and_clamps():
     pattern = fd.patterns.simple_fold(a=0.05, b=0.05, dihedral=120)
     s = shell(pattern, STEEL[1e-3], 4, vertex_radius=1e-3, clamped="xmin")
