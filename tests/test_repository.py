@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import foldyn as fd
+from pairwise import in_pairs
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = sorted((ROOT / "src").glob("**/*.py"))
@@ -113,3 +115,20 @@ def test_no_module_imports_itself_by_way_of_others():
         for module in free:
             del left[module]
     assert not left, sorted(left)
+
+
+def test_lines_of_code_are_neither_blank_nor_comments_nor_docstrings(tmp_path):
+    file = tmp_path / "some.py"
+    file.write_text(
+        '"""A\n\nB."""\n\nx = """a\n\nb"""  # c\n# d\ndef f():\n    """F."""\n    return x\n'
+    )
+    assert runpy.run_path(str(ROOT / "tools/size.py"))["code_lines"](file) == 5
+
+
+def test_a_few_of_a_product_hold_each_pair():
+    whole = in_pairs("abcd", {"x": 0, "y": 0}, [1, 2, 3])
+    few = [row.values for row in whole if not row.marks]
+    assert (len(whole), len(few)) == (24, 12)
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        every = {(row.values[i], row.values[j]) for row in whole}
+        assert {(row[i], row[j]) for row in few} == every

@@ -16,11 +16,11 @@ EMPTY = {"ENCODING", "COMMENT", "NL", "NEWLINE", "INDENT", "DEDENT", "ENDMARKER"
 
 def docstrings(tree: ast.AST) -> set[int]:
     """Lines that docstrings stand on."""
-    owners = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
     found = [
         node.body[0]
         for node in ast.walk(tree)
-        if isinstance(node, owners) and ast.get_docstring(node, clean=False) is not None
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef))
+        and ast.get_docstring(node, clean=False) is not None
     ]
     return {line for one in found for line in range(one.lineno, (one.end_lineno or 0) + 1)}
 
