@@ -209,10 +209,10 @@ def lifted_ring(across, around):
 @pytest.mark.matrix
 def test_slit_ring_lifted():
     table = np.array(list(SLIT_RING.values()))
-    cells = np.array([4, 8])
+    cells = np.array([4, 8, 12])
     errors = np.array([lifted_ring(int(n), 8 * int(n)) / table - 1.0 for n in cells])
     assert (errors < 0.0).all()  # stiff: strains in the plane are constant in each triangle
-    assert np.abs(errors[-1]).max() < 0.029
+    assert np.abs(errors[-1]).max() < 0.017
     assert np.abs(errors[:, 0]).max() < 0.02
-    for case in np.abs(errors).reshape(2, -1).T:
+    for case in np.abs(errors).reshape(3, -1).T:
         assert observed_order(1.0 / cells, case) > 1.1

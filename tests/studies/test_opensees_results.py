@@ -101,8 +101,8 @@ def test_a_coarse_shell_is_near(name):
 @pytest.mark.matrix
 @pytest.mark.parametrize("name", CASES)
 def test_a_fine_shell_agrees(name):
-    """With 16 divisions; with 32 at worst 0.73 % (case 3) and 0.40 % (case 1, second frequency)."""
-    moved, frequency = compare.away(ours(name, 16), stored(name))
+    """At worst 0.73 % (case 3, statics) and 0.40 % (case 1, second frequency)."""
+    moved, frequency = compare.away(ours(name, FINEST), stored(name))
     assert moved < 0.01
     assert np.abs(frequency[:3]).max() < 0.01
 
@@ -111,6 +111,14 @@ def test_a_coarse_shell_moves_alike():
     """Case 1 with 8 divisions, relative L2 over 10 s: 4.6 %; 16 change ours by 4.4 %."""
     motion = compare.our_motion("case1", 8, 0.01)
     assert compare.motion_away(motion, read_motion("case1", 8, 0.0025)) < 0.05
+
+
+@pytest.mark.matrix
+def test_a_fine_shell_moves_alike():
+    """With 32 divisions 0.06 % from the finest of OpenSees; 64 change it by 0.29 %."""
+    motion = compare.our_motion("case1", 32, 0.01)
+    finest = read_motion("case1", *stored_motions("case1")[-1])
+    assert compare.motion_away(motion, finest) < 0.005
 
 
 @pytest.mark.matrix
