@@ -279,6 +279,7 @@ def test_figures_of_a_loaded_path(workplace, slow) -> None:
     assert full[-2:] == ["stable", ""]
 
 
+@pytest.mark.matrix
 def test_figures_of_moved_supports(workplace, edited) -> None:
     """Their force over their displacement; the load factor over it would say nothing."""
     factors = "load_factors = [0, 10, 20, 30, 40, 50]"

@@ -77,6 +77,7 @@ def test_signals_keep_what_was_computed_and_four_at_once_are_one(tmp_path, edite
         assert "interrupted" in fd.load(folder / "result.nc").attrs["stopped_because"]
 
 
+@pytest.mark.matrix
 def test_a_kill_between_rules_leaves_no_old_result(workplace, tmp_path, edited) -> None:
     """Then the next run takes the folder over, and clears what the dead one left."""
     folder = tmp_path / "case-results"

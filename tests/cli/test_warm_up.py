@@ -31,6 +31,7 @@ for name, compute in list(reference.cases(""))[::10]:
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
+@pytest.mark.matrix
 def test_what_is_there_is_not_compiled_again(workplace, monkeypatch) -> None:
     few = ("bars and hinges", "several motions at once")
     monkeypatch.setattr("foldyn.cli.first_uses.STAGES", [{name: ()} for name in few])

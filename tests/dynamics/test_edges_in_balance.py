@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -131,9 +133,17 @@ def test_creases_with_memory_move_as_with_edge_angles_as_dofs(method, kind):
     assert balance(found) < 1e-6
 
 
-@pytest.mark.parametrize("method", EXPLICIT)
 @pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=[pytest.mark.matrix] * (kind == "strong")) for kind in DAMPED]
+    ("kind", "method"),
+    [
+        *(("weak", method) for method in EXPLICIT),
+        *((kind, "rk4") for kind in ("nonlinear", "prony", "eyring")),
+        *(
+            pytest.param(kind, method, marks=pytest.mark.matrix)
+            for kind, method in product(DAMPED, EXPLICIT)
+            if kind == "strong" or (kind != "weak" and method != "rk4")
+        ),
+    ],
 )
 def test_damped_creases_move_as_with_edge_angles_as_dofs(method, kind):
     """generalized_alpha is of order 1 where dofs without mass are damped: it is extrapolated."""
@@ -192,7 +202,9 @@ JUMPS = (
 
 
 @pytest.mark.parametrize("jump", JUMPS)
-@pytest.mark.parametrize("method", ["generalized_alpha", "energy_momentum"])
+@pytest.mark.parametrize(
+    "method", [pytest.param("generalized_alpha", marks=pytest.mark.matrix), "energy_momentum"]
+)
 def test_edge_angles_jump_beside_damped_creases(method, jump):
     """But for the turn of these; if they did not, they would ring from step to step."""
     sheet = fd.discretize(fd.patterns.miura(), SHEET, preset="n5b8e", crease_stiffness=K)

@@ -49,7 +49,9 @@ def test_simulated_motions_write_no_document_and_discretize_nothing(monkeypatch)
 
 # ------------------------------------------------------------------------ linear structures
 @pytest.mark.parametrize("method", TIMED)
-@pytest.mark.parametrize("integrator", ["rk4", "dormand_prince"])
+@pytest.mark.parametrize(
+    "integrator", [pytest.param("rk4", marks=pytest.mark.matrix), "dormand_prince"]
+)
 def test_the_response_of_the_matrices(method, integrator):
     """Alpha and beta both; at the default step, half the critical one, and at a smaller one."""
     assert error_of(method, integrator=integrator, **TIMED[method]) < 5e-4
@@ -82,6 +84,7 @@ def test_the_error_falls_with_the_duration():
     assert rate == pytest.approx((2 * np.pi * ratio * frequency).min(), rel=0.1)
 
 
+@pytest.mark.matrix
 def test_the_error_falls_with_the_steadiness():
     errors = [error_of("stepped_sine", settled=s, dt=0.004) for s in (1e-2, 1e-4)]
     assert errors[0] < 2e-2
@@ -172,7 +175,9 @@ def test_transmissibility_from_motions(method):
     assert largest_error(found.transmissibility.values, exact) < 3e-5
 
 
-@pytest.mark.parametrize("mass", ["circumcenter", "consistent"])
+@pytest.mark.parametrize(
+    "mass", ["circumcenter", pytest.param("consistent", marks=pytest.mark.matrix)]
+)
 def test_transmissibility_of_a_miura_cell(mass):
     case, f = miura_case(mass=mass, alpha=2.0, beta=1e-3), np.arange(0.25, 3.01, 0.25)
     base = fd.BaseMotion("z", value=1e-6)

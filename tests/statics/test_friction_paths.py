@@ -141,6 +141,7 @@ def test_the_energy_of_a_rough_press_closes(cycles):
     assert lost[-1] > 0.1 * path.work.values.max()
 
 
+@pytest.mark.matrix
 def test_friction_converges_with_the_steps_of_a_path():
     ends = []
     for steps in (8, 16, 32):
