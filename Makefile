@@ -16,8 +16,7 @@ OLDEST ?= .venv-oldest
 # without those of contact, which compile longest and ask nothing else of the oldest versions
 OLDEST_TESTS := tests/jit tests/materials tests/mechanics tests/results --ignore-glob='*contact*' \
   --ignore-glob='*touching*' --ignore-glob='*rubbing*' $(addprefix tests/analyses/test_,casefile.py casefile_messages.py limits.py)
-# the tests of a file on one worker, so that two seldom compile the same
-WORKERS ?= -n auto --maxprocesses 4 --dist loadfile
+WORKERS ?= -n auto --maxprocesses 4 --dist worksteal
 
 .PHONY: help demo test test-all test-oldest lint format docs wheel-check clean setup
 .DEFAULT_GOAL := help
@@ -63,10 +62,11 @@ demo: $(STAMP)  ## run the four shipped case studies; pages and figures in demo-
 	@find $(DEMO_OUT) -name '*.png' -o -name 'report.html' | sort | sed 's/^/  /'
 
 test: $(STAMP)  ## run the tests that a change can plausibly break
+	@$(BIN)/foldyn warm-up  # first, so that no two workers compile the same
 	@$(BIN)/python -m pytest $(WORKERS) $(PYTEST_FLAGS)
 
-test-all: test  ## run these, and then those that are long or one of many of a kind
-	@DRAWS=$(DRAWS) $(BIN)/python -m pytest $(WORKERS) $(PYTEST_FLAGS) -m "thorough and not slow"
+test-all: test  ## run these, and then the matrix: whole products of options, and long runs
+	@DRAWS=$(DRAWS) $(BIN)/python -m pytest $(WORKERS) $(PYTEST_FLAGS) -m matrix
 
 test-oldest: $(BIN)/python  ## run the tests of compiling, laws and results with the oldest versions that pyproject.toml allows
 	@rm -rf $(OLDEST) && $(BIN)/python -m venv $(OLDEST)

@@ -17,7 +17,7 @@ def browser():
     """A headless Chromium; tests that need it skip where there is none."""
     playwright = pytest.importorskip("playwright.sync_api")
     if BROWSER is None:
-        pytest.skip("no Chromium on the PATH")
+        pytest.skip("needs Chromium")
     with playwright.sync_playwright() as started:
         arguments = ["--no-sandbox", "--enable-unsafe-swiftshader"]
         chromium = started.chromium.launch(executable_path=BROWSER, args=arguments)

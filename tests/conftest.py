@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -34,5 +36,15 @@ def shared() -> Path:
     """Folder of reference data beside the repository; tests that need it skip without it."""
     folder = REPOSITORY.parent / "shared"
     if not folder.is_dir():
-        pytest.skip("needs the reference data in ../shared")
+        pytest.skip("needs ../shared")
     return folder
+
+
+def pytest_terminal_summary(terminalreporter) -> None:
+    """Say what would run the tests that were skipped for lack of it."""
+    reasons = [report.longrepr[2] for report in terminalreporter.stats.get("skipped", ())]
+    found = [re.search(r"needs (.+)|could not import '(\w+)", reason) for reason in reasons]
+    lacking = Counter(one[1] or one[2] for one in found if one)
+    if lacking:
+        told = ", ".join(f"{name} ({count})" for name, count in lacking.most_common())
+        terminalreporter.write_line(f"{lacking.total()} tests skipped for lack of {told}")

@@ -54,7 +54,7 @@ SOLVED = (
 NAMES = (*DATA, *PATTERNS, *SOLVED)
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_every_public_name_and_parameter_has_a_call(calls):
     assert tuple(calls) == NAMES
     public = {n for n in fd.__all__ if callable(getattr(fd, n)) and n not in MADE | OWN}

@@ -82,7 +82,7 @@ def test_the_case_file_of_the_tutorial_is_its_python_case(tutorial):
     )
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_the_error_that_the_tutorial_states(tutorial):
     worst = float(abs(fd.fidelity(tutorial[0]["case"], count=4).result.error[:, 0]).max())
     page = (DOCS / "tutorial.md").read_text("utf-8")
@@ -271,7 +271,7 @@ def test_what_a_swinging_panel_and_a_twisting_one_make_of_a_rule():
         assert f"m w^2/{twist}$" in page
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_the_page_on_features_has_the_table_of_what_goes_with_what():
     text = features.PAGE.read_text("utf-8")
     assert features.table() in text, "python tests/features.py writes it anew"

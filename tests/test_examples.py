@@ -148,7 +148,7 @@ CHECKS = (
 )  # fmt: skip
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore::foldyn.errors.CrossingWarning")
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_example(check, tmp_path, monkeypatch, capsys):
@@ -166,7 +166,7 @@ def test_examples_are_twelve_short_scripts_with_a_picture_each():
         assert f"examples/{path.name}" in gallery, path.name
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda p: p.stem)
 def test_figures(path):
     spec = importlib.util.spec_from_file_location(path.stem, path)

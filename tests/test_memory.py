@@ -102,7 +102,7 @@ def _peak(make) -> float:
         tracemalloc.stop()
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_estimates_are_right_within_a_factor_of_two():
     """Of what Python and NumPy allocate; the constants are of the whole process."""
     from foldyn.patterns.generators.arguments import PER_VERTEX

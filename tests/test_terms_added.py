@@ -84,7 +84,7 @@ def run(package: Path, **names: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_springs_with_a_cubic_force(copy):
     kernels, support, _ = blocks("A term")
     (copy / "mechanics/cubic_springs.py").write_text(kernels, "utf-8")
@@ -97,7 +97,7 @@ def test_springs_with_a_cubic_force(copy):
     )  # fmt: skip
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_a_sphere(copy):
     (copy / "cases/spheres.py").write_text(blocks("A term")[2], "utf-8")
     register(copy, "spheres", "Sphere")

@@ -111,7 +111,7 @@ for count in (3, 300, 30000):
 """
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
 def test_hdf5_stands_a_full_disk_wherever_it_comes(tmp_path) -> None:
     """HDF5 itself ends the process with a segmentation fault."""

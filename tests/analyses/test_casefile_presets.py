@@ -70,7 +70,7 @@ def test_a_shell_keeps_the_folds_of_the_preset(tmp_path: Path):
         assert shell.fold_law == fd.EnhancedLinear(rest=rest)
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_results_state_their_model_whole(read, tmp_path: Path):
     """Not by the name of a preset, whose meaning may change."""
     for name in PRESETS:

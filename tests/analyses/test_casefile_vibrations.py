@@ -60,7 +60,7 @@ def test_everything_that_can_be_said_of_modes(read) -> None:
     assert found.case().loads == (Gravity((0, 0, -9.81)),)
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_internal_amplitudes_belong_to_one_scheme(read) -> None:
     plates = '[model]\npreset = "n5b8e"\n[analysis]'
     found = read(MODES.replace("[analysis]", plates) + "internal = 3\n").run(count=4)

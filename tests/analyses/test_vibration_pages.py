@@ -47,7 +47,7 @@ def test_modes_about_an_equilibrium(write):
     assert "no equilibrium" not in page
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_internal_amplitudes_are_told(write):
     plates = '[model]\npreset = "n5b8e"\n[analysis]\ninternal = 3\n'
     found, page = write(plates + 'kind = "modes"\ncount = 3\n[output]\nshapes = [1]\n')
@@ -60,7 +60,7 @@ def test_internal_amplitudes_are_told(write):
     assert "internal amplitudes</th>" in page
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_which_modes_are_shown(write):
     found, _ = write('[analysis]\nkind = "modes"\ncount = 5\nsecant = 1\n[output]\nshapes = [2]\n')
     assert shown_modes(found, 3) == [1, 2, 3]

@@ -127,7 +127,7 @@ def test_errors_of_a_clamped_panel(preset, frequency, deflection):
 # ------------------------------------------------------------------ supports that move
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", ["rk4", "generalized_alpha"])
 def test_a_clamp_rides_on_a_moving_base(model, method):
     """Seen from the base, a cantilever answers to the inertia alone, wherever it starts."""

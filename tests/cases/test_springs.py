@@ -51,7 +51,7 @@ def test_energies_and_forces_are_those_of_the_formulas(model):
     assert not inner[4:].any()
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_compiled_loops_see_the_same_forces_as_statics(model):
     s = structure(model, FOLD)
     case = fd.Case(s, SOME, masses=[fd.PointMass(everywhere(s), 1.0)])
@@ -168,10 +168,10 @@ def test_a_spring_stops_an_internal_mechanism():
     ("model", "method", "most"),
     [
         ("bars and hinges", "rk4", 1e-3),
-        pytest.param("bars and hinges", "central_difference", 1e-2, marks=pytest.mark.thorough),
-        pytest.param("bars and hinges", "dormand_prince", 1e-3, marks=pytest.mark.thorough),
+        pytest.param("bars and hinges", "central_difference", 1e-2, marks=pytest.mark.matrix),
+        pytest.param("bars and hinges", "dormand_prince", 1e-3, marks=pytest.mark.matrix),
         ("bars and hinges", "newmark", 1e-3),
-        pytest.param("shell", "generalized_alpha", 1e-3, marks=pytest.mark.thorough),
+        pytest.param("shell", "generalized_alpha", 1e-3, marks=pytest.mark.matrix),
     ],
 )
 def test_the_energy_balance_closes_with_springs_and_damping(model, method, most):

@@ -48,7 +48,7 @@ def test_figures_of_a_tiny_case(workplace, edited) -> None:
         assert told in page, told
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_a_film_where_it_is_asked_for(workplace, edited) -> None:
     workplace.write(edited(FEW))
     done = workplace.good("run", "case.toml", "--out", "r", "--film", "gif")
@@ -61,7 +61,7 @@ def test_a_film_instead_of_a_gif(workplace, edited) -> None:
     try:
         find_ffmpeg()
     except InputError:
-        pytest.skip("needs ffmpeg on the PATH or imageio-ffmpeg")
+        pytest.skip("needs ffmpeg or imageio-ffmpeg")
     workplace.write(edited(f'{FEW}; output.animation = "mp4"'))
     done = workplace.good("run", "case.toml", "--out", "r")
     assert "r/motion.mp4" in done.new and "r/motion.gif" not in done.new
@@ -121,7 +121,7 @@ def test_a_page_without_figures(workplace, edited) -> None:
     assert "The structure" in page and "The motion" in page
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("form", ["svg", "pdf"])
 def test_figures_for_a_paper_stand_beside_the_page(workplace, edited, form) -> None:
     workplace.write(edited(FEW))

@@ -18,7 +18,7 @@ def pattern(tmp_path):
     return tmp_path
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
 def test_it_serves_the_page_until_it_is_ended(pattern, number, status):
     process = start(pattern, "view", "fold.fold", "--no-browser")
@@ -43,7 +43,7 @@ def test_quiet_prints_the_address_alone(pattern):
     assert ended(process) == (0, "", "")
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -35,7 +35,7 @@ def test_the_page_has_commands_for_each_pattern_of_its_table():
         "square-twist",
         "bird-base",
         *(
-            pytest.param(name, marks=pytest.mark.thorough)
+            pytest.param(name, marks=pytest.mark.matrix)
             for name in ("miura", "waterbomb", "resch", "crane")
         ),
     ],

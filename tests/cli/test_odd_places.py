@@ -29,7 +29,7 @@ def close_streams() -> None:
         os.close(number)
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_all_that_is_odd_at_once(tmp_path, edited) -> None:
     """Letters that the terminal lacks, names that are no UTF-8, no HOME, a backend that is none."""
     file = os.fsencode(tmp_path) + b"/" + ODD + b".toml"
@@ -47,7 +47,7 @@ def test_all_that_is_odd_at_once(tmp_path, edited) -> None:
     assert os.path.exists(folder + b"/motion.png")
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_streams_that_are_closed_or_full(tmp_path, miura) -> None:
     (tmp_path / "case.toml").write_text(miura)
     run = ("run", "case.toml", "--no-figures", "--out")
@@ -63,7 +63,7 @@ def test_streams_that_are_closed_or_full(tmp_path, miura) -> None:
     assert result_of(os.fsencode(tmp_path / "lost")) == 11
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_a_working_folder_that_is_gone(tmp_path, miura) -> None:
     (tmp_path / "case.toml").write_text(miura)
     gone = tmp_path / "gone"

@@ -80,14 +80,9 @@ def killed_and_resumed(folder: Path, count: int, kills: int, seconds: float) -> 
     assert found.attrs["failed"] == 0
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_a_sweep_that_is_killed_goes_on(tmp_path):
     killed_and_resumed(tmp_path, 20, 2, 0.1)
-
-
-@pytest.mark.slow
-def test_a_sweep_of_200_points_killed_ten_times(tmp_path):
-    killed_and_resumed(tmp_path, 200, 10, 0.1)
 
 
 DEADLY = """
@@ -101,7 +96,7 @@ def deadly(result, case):
 """
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_a_point_that_ends_its_process_does_not_stop_the_rest(tmp_path):
     (tmp_path / "case.toml").write_text(MODES_TEXT)
     (tmp_path / "mine.py").write_text(DEADLY)

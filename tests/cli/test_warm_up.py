@@ -31,6 +31,7 @@ for name, compute in list(reference.cases(""))[::10]:
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
+@pytest.mark.matrix
 def test_what_is_there_is_not_compiled_again(workplace, monkeypatch) -> None:
     few = ("bars and hinges", "several motions at once")
     monkeypatch.setattr("foldyn.cli.first_uses.STAGES", [{name: ()} for name in few])
@@ -56,7 +57,7 @@ def test_names_are_unique() -> None:
     assert use(names[0]) == 0
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_nothing_is_left_to_compile(tmp_path) -> None:
     """Neither for a second call nor for computations of other cases."""
     where = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}

@@ -65,6 +65,7 @@ def test_boards_rebound_and_keep_energy_and_momenta(method, dt, balance, turn):
     assert angular < turn
 
 
+@pytest.mark.matrix
 def test_nothing_is_lost_but_by_friction_while_a_plane_lifts_boards():
     """Work of the plane and of friction, of the boards on each other and on it, balance exactly."""
     case, initial = slammed()

@@ -54,7 +54,7 @@ def test_colliding_sheets_keep_momentum_and_energy(method, turning, error):
     assert run.velocity[-1, 6, 2] > -1.9  # it has been slowed down
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("options", [{"dt": 1e-4, "every": 1}, {"tolerance": 1e-3}])
 def test_the_conserving_method_keeps_all_in_a_collision(options):
     """With steps that do not resolve what bars do, fixed or not: energy and both momenta."""
@@ -72,7 +72,7 @@ REBOUNDS = [
     ("rk4", [1600, 3200, 6400], 25600, 3.9),
     ("central_difference", [1600, 3200, 6400], 25600, 1.9),
     *(
-        pytest.param(method, [200, 400], 1600, 1.9, marks=pytest.mark.thorough)
+        pytest.param(method, [200, 400], 1600, 1.9, marks=pytest.mark.matrix)
         for method in ("newmark", ALPHA, CONSERVING)
     ),
 ]
@@ -107,7 +107,7 @@ def test_a_strip_folded_from_both_ends_stops_where_it_touches(method, options):
     assert method in EXPLICIT or run.attrs["energy_error"] < 0.05
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_a_conserving_strip_loses_no_energy_where_it_touches():
     """The same with actuators, damping, guards of hinges and friction, also on a plane beneath."""
     pytest.importorskip("ipctk")
@@ -157,7 +157,7 @@ def test_no_step_is_too_long_to_see_what_is_in_its_way(monkeypatch):
     thrown.cache_clear()
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_an_impact_too_violent_for_the_step_is_told():
     """A snap at some m/s, with a step that is far too long for it."""
     with pytest.raises(ComputationError, match=r"use a step below|no equilibrium was found"):
@@ -211,7 +211,7 @@ RUBBING = [
         ("plane", ALPHA, 0.1, 2e-4, 0.02, 0.01, 1e-3),
         ("plane", ALPHA, 0.1, 1e-4, 0.01, 0.01, 1e-3),  # the normal force lags by a step
         ("plane", CONSERVING, 0.1, 1e-4, 0.02, 0.01, 1e-9),  # all that is taken is counted
-        *(pytest.param(*each, marks=pytest.mark.thorough) for each in RUBBING),
+        *(pytest.param(*each, marks=pytest.mark.matrix) for each in RUBBING),
     ],
 )
 def test_a_strip_slides_above_the_angle_of_friction(kind, method, duration, dt, near, lost, error):
@@ -234,7 +234,7 @@ def test_a_strip_slides_above_the_angle_of_friction(kind, method, duration, dt, 
         ("plane", ALPHA, 0.2, 2e-4, 5e-12, 1e-3),
         ("plane", ALPHA, 0.2, None, 5e-12, 1e-3),
         *(
-            pytest.param("panel", method, 0.4, dt, 1e-11, 1e-5, marks=pytest.mark.thorough)
+            pytest.param("panel", method, 0.4, dt, 1e-11, 1e-5, marks=pytest.mark.matrix)
             for _, method, _, dt, *_ in RUBBING
         ),
     ],
@@ -308,7 +308,7 @@ def test_samples_tell_where_a_sheet_touches():
     assert shown.on == "node" and shown.values.shape == (len(run.time), len(s.nodes))
 
 
-@pytest.mark.thorough  # compiles the loop with contact around laws with memory
+@pytest.mark.matrix  # compiles the loop with contact around laws with memory
 def test_a_relaxing_fold_falls_on_a_plane_and_its_energies_balance():
     """Contact and memory together."""
     pattern = fd.patterns.simple_fold(a=0.05, b=0.05, dihedral=90)

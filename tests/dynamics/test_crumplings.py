@@ -126,10 +126,8 @@ def test_nothing_crosses(seed):
     assert check(seed)
 
 
-@pytest.mark.slow  # half an hour
-@pytest.mark.parametrize("half", [0, 1], ids=["explicit", "implicit"])
-def test_nothing_crosses_in_50_crumplings(half):
+@pytest.mark.matrix
+def test_nothing_crosses_in_more_crumplings():
     pytest.importorskip("ipctk")
-    count = len(SEEDS) // 2
-    touched = [check(seed) for seed in SEEDS[half * count : (half + 1) * count]]
-    assert sum(touched) >= count // 2
+    touched = [check(seed) for seed in SEEDS[::9]]
+    assert sum(touched) >= len(touched) // 2

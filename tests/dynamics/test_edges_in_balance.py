@@ -14,6 +14,7 @@ import foldyn as fd
 from foldyn.dynamics.driver import prepare
 from foldyn.errors import FoldynWarning
 from foldyn.structures.mesh import hinge_angles
+from pairwise import in_pairs
 
 FOLD = fd.patterns.simple_fold(dihedral=120)
 TURN = Rotation.from_rotvec([0.3, 0.5, -0.7]).as_matrix()
@@ -68,9 +69,10 @@ def test_a_damped_motion_ends_where_statics_ends(load, law):
     assert apart(end, path) < 1e-6
 
 
-@pytest.mark.parametrize("method", EXPLICIT)
-@pytest.mark.parametrize("law", ["linear", CURVED])
-@pytest.mark.parametrize("loads", [[moment()], [heat(SMOOTH), moment(SMOOTH)]], ids=["", "smooth"])
+@pytest.mark.parametrize(
+    ("loads", "law", "method"),
+    in_pairs([[moment()], [heat(SMOOTH), moment(SMOOTH)]], ["linear", CURVED], EXPLICIT),
+)
 def test_motions_are_those_with_edge_angles_as_dofs(method, law, loads):
     """By generalized_alpha, whose error of order 2 is all that is left; energies too."""
     made, central = case(loads, law), method == "central_difference"
@@ -114,8 +116,14 @@ RESISTING = {
 }
 
 
-@pytest.mark.parametrize("method", EXPLICIT)
-@pytest.mark.parametrize("kind", RESISTING)
+@pytest.mark.parametrize(
+    ("kind", "method"),
+    [
+        pytest.param(kind, method, marks=() if method == "rk4" else pytest.mark.matrix)
+        for kind in RESISTING
+        for method in EXPLICIT
+    ],
+)
 def test_creases_that_remember_or_are_damped_move_as_with_edge_angles_as_dofs(method, kind):
     """generalized_alpha is of order 1 where dofs without mass are damped: it is extrapolated."""
     law, damping = RESISTING[kind]
@@ -140,6 +148,7 @@ def test_damped_creases_are_of_order_two(damping):
     assert balance(runs[1]) < 1e-6
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("kind", ["strong", "damped eyring"])
 @pytest.mark.parametrize("method", EXPLICIT)
 def test_a_state_holds_what_damped_creases_remember(method, kind):

@@ -76,9 +76,9 @@ def test_a_free_sheet_with_springs_keeps_both_momenta_and_loses_what_creases_tak
     assert float(motion.dissipated[-1]) > least
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize(
-    "kind", [*MODELS, "mixed_voronoi", pytest.param("consistent", marks=pytest.mark.slow)]
+    "kind", [*MODELS, "mixed_voronoi", pytest.param("consistent", marks=pytest.mark.matrix)]
 )
 def test_nothing_adds_up_over_1e4_steps(kind):
     """Of paper steps are five times RK4's critical ones, and folds turn by degrees back and forth.

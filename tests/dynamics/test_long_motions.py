@@ -83,19 +83,10 @@ KINDS = {  # name of the case, its arguments, and what of the methods
     "sliding": (["newmark", "energy_momentum"], {"duration": 0.02, "every": 0.001}),
     "touching": (["dormand_prince"], {"duration": 0.24, "every": 0.01}),
 }
-# what compiles long for one run: memory and contact have others here
-LONG = [
-    ("touching", "dormand_prince"), ("creeping", "generalized_alpha"),
-    ("sliding", "energy_momentum"),
-]  # fmt: skip
-RUNS = [
-    pytest.param(kind, method, marks=[pytest.mark.slow] if (kind, method) in LONG else [])
-    for kind, (methods, _) in KINDS.items()
-    for method in methods
-]
+RUNS = [(kind, method) for kind, (methods, _) in KINDS.items() for method in methods]
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize(("kind", "method"), RUNS)
 def test_a_run_that_is_killed_again_and_again_gives_the_same_bits(tmp_path, kind, method):
     options = {"method": method, **KINDS[kind][1]}
@@ -262,14 +253,13 @@ def refused(other: int, options) -> None:
         simulated(**options)
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("kills", [3, pytest.param(10, marks=pytest.mark.slow)])
-def test_sigkill_at_random_moments_with_a_second_process(tmp_path, kills):
-    file, chance = tmp_path / "run.nc", random.Random(kills)
+@pytest.mark.matrix
+def test_sigkill_at_random_moments_with_a_second_process(tmp_path):
+    file, chance = tmp_path / "run.nc", random.Random(3)
     options = {**LONG, "store": str(file), "resume": True}
     checkpoint = tmp_path / "run.nc.unfinished" / CHECKPOINT
     killed, reached = 0, [0.0]
-    while killed < kills:
+    while killed < 3:
         process = started(options)
         made = set()  # so far, the one before among them
         while process.poll() is None:
@@ -321,11 +311,11 @@ def test_a_disk_that_is_full_from_the_beginning(kept, monkeypatch):
         simulated("sheet", **kept)
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_memory_does_not_grow_with_the_length(tmp_path):
-    """A run 100 times longer takes at most 5 % more memory at its peak."""
+    """A run 20 times longer takes at most 5 % more memory at its peak."""
     peaks = []
-    for k, duration in enumerate((20.0, 2000.0)):
+    for k, duration in enumerate((20.0, 400.0)):
         options = {**LONG, "checkpoint": 5.0, "every": 0.005, "duration": duration}
         process = started({**options, "store": str(tmp_path / f"{k}.nc")})
         _, status, used = os.wait4(process.pid, 0)

@@ -24,7 +24,7 @@ LAWS = {
     "eyring": fd.Eyring(2e-5, 1e-5, law="linear"),
 }
 DP, ALPHA = "dormand_prince", "generalized_alpha"
-EXPLICIT = ["rk4", pytest.param("central_difference", marks=pytest.mark.thorough)]
+EXPLICIT = ["rk4", pytest.param("central_difference", marks=pytest.mark.matrix)]
 METHODS = [*EXPLICIT, ALPHA, "energy_momentum"]
 
 
@@ -301,7 +301,7 @@ def driven() -> fd.Case:
     return fd.Case(structure, [*CELL_HELD, *supports], loads, fd.Rayleigh(0.1, 1e-3))
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the energy balance", "ignore:damping. beta resists")
 @pytest.mark.parametrize("method", [ALPHA, "energy_momentum"])
 def test_supports_loads_and_folds_that_move_go_on(method, tmp_path):
@@ -311,7 +311,7 @@ def test_supports_loads_and_folds_that_move_go_on(method, tmp_path):
     assert "continued_from" in again and "continued_from" not in part
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", [ALPHA, "energy_momentum"])
 def test_rotations_of_a_shell_go_on(method, tmp_path):
     """They have no mass, and where they are is no part of a displacement; 2 minutes, compiling."""

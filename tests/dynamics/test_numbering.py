@@ -32,7 +32,7 @@ def everything(mass: str) -> fd.Case:
 @pytest.mark.filterwarnings("ignore:steps of")  # the stiff bars alone need small ones
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(
-    "mass", [pytest.param("mixed_voronoi", marks=pytest.mark.thorough), "consistent"]
+    "mass", [pytest.param("mixed_voronoi", marks=pytest.mark.matrix), "consistent"]
 )
 def test_a_motion_in_another_order(mass, method, monkeypatch):
     case = everything(mass)

@@ -80,7 +80,7 @@ def random_pulses(count: int, seed: int):
         yield pulse(str(rng.choice([*SHAPES])), float(rng.uniform(0.0, 2.0)), length)
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", [*METHODS, "auto"])
 def test_random_pulses_on_an_oscillator_at_rest(method):
     """The response is Duhamel's integral to the tolerance, or the method says that it is not."""

@@ -21,7 +21,7 @@ def test_motion_of_the_golden_miura():
     """RK4 on MERLIN2's forces, 2000 steps: the stored motion to 1e-6 (found: 4e-10)."""
     file = GOLDEN / "rk4_miura11_L1_N5B8.npz"
     if not file.is_file():
-        pytest.skip("no golden data here")
+        pytest.skip("needs ../shared")
     golden = np.load(file)
     sheet = fd.Sheet(1e6, 0.25, float(golden["thickness"]), float(golden["rho"]))
     s = cell(sheet=sheet, mass="circumcenter", calibration="merlin2")

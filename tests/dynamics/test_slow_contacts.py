@@ -109,7 +109,7 @@ def test_a_tower_that_is_pressed_flat_takes_few_steps():
     assert float(carried) == pytest.approx(6 * 38.0, rel=1e-4)
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_a_tower_that_rattles_takes_few_steps_that_conserve():
     """With little damping, which leaves `dormand_prince` most of the steps.
 
@@ -146,7 +146,7 @@ def test_steps_overrun_no_gap_where_they_resolve_no_contact():
     assert longest(1e-3, 0.0) < longest(1e-3, 1e-9) < longest(1e-3, 4e-9) < closing
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_a_motion_with_slow_contacts_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path):
     look_often(monkeypatch, 256)
     case = tower(38.0, fd.Contact(), fd.Ramp(0.005, smooth=True), alpha=2000.0)

@@ -70,7 +70,7 @@ def half_steps(what, method, steps, every):
     return {"duration": steps * dt, "dt": dt, "every": every}
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("method", METHODS)
 def test_threads_share_a_motion(monkeypatch, method, kind):
@@ -95,7 +95,7 @@ def closing(contact: fd.Contact | None = None, dihedral: float = 1.6) -> tuple[f
     return fd.Case(s, supports, [weight], slowed, contact=contact), fd.State(velocity=v)
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", METHODS)
 def test_threads_share_what_touches(monkeypatch, method):
     what, start = closing()
@@ -167,7 +167,7 @@ def test_a_load_that_is_not_finite_stops_all_threads(monkeypatch, method, what):
             on(monkeypatch, threads, what.altered(loads=[blow]), method, duration=0.1)
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", METHODS)
 def test_a_motion_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path, method):
     look_often(monkeypatch)

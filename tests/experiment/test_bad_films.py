@@ -56,7 +56,7 @@ def test_a_rate_is_positive(sharp):
     assert open_film(sharp.path, rate=960.0).rate == 960.0
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("kind", ["black", "noise"])
 def test_pictures_without_corners(kind):
     picture = np.zeros((200, 200), np.uint8)
@@ -166,7 +166,7 @@ def test_options_that_cannot_be(sharp, tmp_path, monkeypatch, capsys, arguments,
     assert [path.name for path in tmp_path.iterdir()] == ["film.mkv"]
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("kind", ["text", "cut", "folder"])
 def test_a_broken_film_gets_one_line_decoders_included(sharp, tmp_path, kind):
     film = tmp_path / "film.mp4"

@@ -77,7 +77,7 @@ def test_what_the_data_cannot_tell_is_said(pressed) -> None:
     assert found["sheet.density"].note == "the data do not determine it"
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_parameters_of_which_only_quotients_count(swung) -> None:
     """Mass, stiffness and force times the same number make the same motion."""
     data = histories(swung, [0], 1e-6)
@@ -216,7 +216,7 @@ def test_kept_evaluations_of_another_model_are_not_used(pressed, tmp_path) -> No
     assert found.estimates[0].value > 1.01
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_processes_change_nothing(pressed) -> None:
     data = [forces(pressed, 1e-5)]
     alone = fd.fit(pressed, data, [RATIO], starts=2)

@@ -57,7 +57,7 @@ def fitted(tmp_path_factory):
     return fd.fit(pressed, data, parameters)
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_the_page_says_what_was_found_and_what_was_not(fitted, tmp_path) -> None:
     assert not fitted["model.fold_law.theta1"].determined
     page = write_fit(fitted, tmp_path, "A fold", figures="png").read_text("utf-8")

@@ -97,7 +97,7 @@ def kinds(modes, response, seed):
     }  # fmt: skip
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     "kind", ["frequencies", "damping_ratios", "mode_shapes", "frf", "magnitudes"]
 )

@@ -73,7 +73,7 @@ def test_without_a_model_corners_are_followed(sharp):
     assert np.isfinite(ds["position_px"].values[-1, :, 0]).sum() >= 12
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_the_region_of_interest_shifts_nothing(sharp, tracked):
     from foldyn.experiment import open_film
 
@@ -106,7 +106,7 @@ def test_a_covered_corner_is_lost_and_found_again():
     assert 1 in [step.status[point] for step in steps[16:]]
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_blur_and_noise_cost_little(tmp_path):
     film = make_film(24, seed=3, exposure=1 / 1000, read_noise=1.5, shot_noise=3.0)
     write_film(film, tmp_path / "blurred.mkv")
@@ -117,7 +117,7 @@ def test_blur_and_noise_cost_little(tmp_path):
     assert np.nanmax(error) < 3.0
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_a_model_may_be_recognized_in_the_last_frame(sharp):
     ds = track_film(str(sharp.path), sharp.model, Tracking(match="last"))
     assert ds.attrs["match_frame"] == 79

@@ -25,7 +25,7 @@ def photos(tmp_path_factory):
     return paths, states
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_every_node_is_recognized_in_every_photograph(photos):
     paths, states = photos
     true = camera().project(states[:, :25])
@@ -44,7 +44,7 @@ def test_every_node_is_recognized_in_every_photograph(photos):
     assert np.sqrt(np.nanmean(moved[..., 0] ** 2)) < 2e-4
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_the_region_of_interest_shifts_nothing(photos):
     paths, states = photos
     ds = track_photos(paths[:2], model(), roi=(10, 20, 560, 590))

@@ -132,7 +132,7 @@ def same(one, other) -> None:
     np.testing.assert_allclose(one.values, other.values, rtol=DIGITS)
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_both_files_of_a_film_hold_the_same_histories(filmed):
     nodes = [0, 6, 7, 8]
     binary = history(filmed.with_name("film.nc"), nodes)
@@ -146,7 +146,7 @@ def test_both_files_of_a_film_hold_the_same_histories(filmed):
     same(recognize(filmed.with_name("film.nc")), recognize(filmed.with_name("film.csv")))
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_damping_from_the_table_of_a_film(filmed):
     seen = history(filmed.with_name("film.csv"), [6, 8])
     found = fd.fit(filmed, [seen], [Parameter("damping.alpha", 8.0, 1.0, 50.0)])
@@ -168,7 +168,7 @@ def test_a_spectrum_wants_no_gaps_and_a_window_leaves_them_out(filmed):
     assert np.isfinite(read_fit(plan).data[0].observed()).all()
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_both_files_of_photographs_hold_the_same_shapes(photographed):
     known = {"load_factor": FACTORS}
     binary = shapes(photographed.with_name("photos.nc"), **known)

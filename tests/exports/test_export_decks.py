@@ -246,7 +246,7 @@ def away(found, true):
     return float(np.linalg.norm(found[: len(true)] - true) / np.linalg.norm(true))
 
 
-@pytest.mark.skipif(not HAS_OPENSEES, reason="needs the extra opensees")
+@pytest.mark.skipif(not HAS_OPENSEES, reason="needs opensees")
 @pytest.mark.parametrize("name", RUN)
 def test_opensees_finds_what_the_shell_does(name, tmp_path):
     """At worst 0.82 % in a frequency and 1.24 % in displacements, with 8 divisions."""

@@ -156,7 +156,7 @@ def node() -> str:
     program = shutil.which("node")
     find = [program or "", "-e", "require.resolve('gltf-validator')"]
     if program is None or subprocess.run(find, capture_output=True, check=False).returncode:
-        pytest.skip("needs node, and gltf-validator in a folder of NODE_PATH")
+        pytest.skip("needs node and gltf-validator")
     return program
 
 

@@ -32,7 +32,7 @@ def tree(path: Path) -> ast.Module:
 
 @pytest.mark.parametrize(
     "named",
-    [True, pytest.param(False, marks=pytest.mark.slow)],
+    [True, pytest.param(False, marks=pytest.mark.matrix)],
     ids=["NUMBA_CACHE_DIR", "beside the sources"],
 )
 def test_kernels_follow_the_sources_of_what_they_call(tmp_path, named):
@@ -184,7 +184,7 @@ def test_a_message_compiles_nothing_anew(tmp_path):
     assert ask(copy, **where)[2] == 1
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_imports_are_read_as_python_reads_them():
     for path in FILES:
         wanted = set()
@@ -267,7 +267,7 @@ for kind in kinds[turn:] + kinds[:turn]:
 """
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_processes_that_compile_the_same_at_once(tmp_path):
     package = copy_package(tmp_path)
     (package / "probes" / "sums.py").write_text(
@@ -309,7 +309,7 @@ def motions(package: Path, *words: str, **variables: str) -> dict[str, tuple[str
     return {word: (bits, float(largest)) for word, bits, largest in lines}
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_compiled_and_loaded_kernels_give_the_same_bits(tmp_path):
     package = copy_package(tmp_path)
     methods = ("shell-newmark", "bars-rk4", "bars-energy_momentum", "bars-dormand_prince")
@@ -323,7 +323,7 @@ def test_compiled_and_loaded_kernels_give_the_same_bits(tmp_path):
         assert motions(package, word, NUMBA_CACHE_DIR=kept)[word] == compiled[word]
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_motions_follow_histories_and_shells_follow_laws(tmp_path):
     package = copy_package(tmp_path)
     bars, shell = "bars-rk4-linear", "shell-newmark-linear"

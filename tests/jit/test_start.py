@@ -60,7 +60,7 @@ def test_python_is_told_the_same_whatever_is_imported_first():
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_a_variable_that_numba_ignores_is_one_warning():
     done = run("-m", "foldyn.cli.main", "info", NUMBA_OPT="9", NUMBA_CACHE_LOCATOR_CLASSES="none")
     assert done.returncode == 0

@@ -13,6 +13,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.algebra.extrapolation import convergence
+from pairwise import in_pairs
 
 SHEET = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.25, thickness=0.01, density=1.0)
 PATTERNS = {
@@ -61,9 +62,9 @@ def test_between_rigid_panels(pattern, times):
     assert share == pytest.approx(1.0, abs=2e-3)
 
 
-@pytest.mark.parametrize("times", [0.01, 0.1])
-@pytest.mark.parametrize("held", [True, False], ids=["held", "free"])
-@pytest.mark.parametrize("pattern", PATTERNS)
+@pytest.mark.parametrize(
+    ("pattern", "held", "times"), in_pairs(PATTERNS, [True, False], [0.01, 0.1])
+)
 def test_where_creases_have_most_of_the_energy(pattern, held, times):
     wanted, share = of_shell(pattern, times * CALIBRATED, held)
     assert share > 0.945

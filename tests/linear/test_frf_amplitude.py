@@ -114,7 +114,7 @@ def specimen(alpha, beta=0.0, **options):
     return paper_specimen(**options).altered(damping=fd.Rayleigh(alpha, beta))
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("alpha", "beta", "mass", "within"),
     [
@@ -134,7 +134,7 @@ def test_peaks_of_the_specimen(alpha, beta, mass, within):
         assert peaks[2].textbook == pytest.approx(0.09, abs=0.005)
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_a_simulated_motion_of_the_specimen_agrees():
     """At the drive of the paper the middle row moves by millimeters: one harmonic is enough."""
     case, f = specimen(15.8), [9.5]

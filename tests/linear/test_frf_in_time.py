@@ -143,7 +143,7 @@ def test_a_motion_that_has_not_died_away_or_settled_is_told():
 
 
 # ------------------------------------------------------------------------ base motion
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("method", TIMED)
 def test_transmissibility_from_motions(method):
     case, base = chain(**DAMPING), fd.BaseMotion("x", value=1e-6)

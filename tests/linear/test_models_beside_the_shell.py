@@ -64,7 +64,7 @@ def quick():
     return case, fd.fidelity(case, 5, (3, 6))
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("support", SUPPORTS)
 def test_errors_are_those_of_the_study(support, miura):
     """The same shell, models and pairing as the stored tables, on which nothing of this ran."""

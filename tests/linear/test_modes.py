@@ -15,6 +15,7 @@ from foldyn.algebra import eigen
 from foldyn.algebra.solvers import SOLVERS
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import linearize, modes
+from pairwise import in_pairs
 
 STRAIGHT = {"fold_law": "linear", "bend_law": "linear"}
 
@@ -24,10 +25,10 @@ STRAIGHT = {"fold_law": "linear", "bend_law": "linear"}
 SUPPORTS = {"free": [], "hinged": [fd.Fix([0, 1], "xyz")], "held": [fd.Fix([0, 1, 2], "xyz")]}
 
 
-@pytest.mark.parametrize("held", SUPPORTS)
-@pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
-@pytest.mark.parametrize("scheme", ["n5b8", "n4b5"])
-@pytest.mark.parametrize("pattern", PATTERNS)
+@pytest.mark.parametrize(
+    ("pattern", "scheme", "mass", "held"),
+    in_pairs(PATTERNS, ["n5b8", "n4b5"], ["mixed_voronoi", "consistent"], SUPPORTS),
+)
 def test_frequencies_are_those_of_a_dense_solver(pattern, scheme, mass, held, monkeypatch):
     monkeypatch.setattr(eigen, "DENSE", 0)
     case = fd.Case(body(pattern, scheme, mass, **STRAIGHT), SUPPORTS[held])
@@ -57,7 +58,7 @@ def test_the_specimen_against_a_dense_solver():
             .diagonal() > 1 - 1e-9).all()  # fmt: skip
 
 
-@pytest.mark.skipif(not SOLVERS["pardiso"].found(), reason="mkl is not installed")
+@pytest.mark.skipif(not SOLVERS["pardiso"].found(), reason="needs mkl")
 def test_backends_agree():
     case = paper_specimen()
     one, other = (modes(case, 8, secant=1.0, solver=name) for name in ("superlu", "pardiso"))

@@ -96,7 +96,7 @@ def names():
     return ran(TEXT)
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_the_examples_run(names):
     weak, full = names["first"]
     assert 0.3 < weak < full < 1.5

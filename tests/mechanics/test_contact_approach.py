@@ -191,7 +191,7 @@ def moved(count: int, growth: float):
     return force, np.array(ends), kept
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("growth", [1e-4, 0.03])  # with the first list, and with others
 @pytest.mark.parametrize("count", [2, 3])
 def test_members_find_what_one_finds(count, growth):

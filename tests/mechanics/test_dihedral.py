@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from foldyn.mechanics import angles
 from foldyn.mechanics.dihedral import branch_free_atan2
+from pairwise import in_pairs
 
 TWO_PI = 2 * math.pi
 ROW = np.array([[0, 1, 2, 3]], np.int32)
@@ -35,10 +36,15 @@ ANGLES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("theta", ANGLES)
-@pytest.mark.parametrize("length", [1.0, 1e-3, 1e3])
-@pytest.mark.parametrize("width", [(1.0, 1.0), (0.2, 3.0), (1e-6, 1.0), (1e-7, 1e-8)])
-@pytest.mark.parametrize("along", [(0.3, 0.6), (-1.0, 2.0)])
+@pytest.mark.parametrize(
+    ("along", "width", "length", "theta"),
+    in_pairs(
+        [(0.3, 0.6), (-1.0, 2.0)],
+        [(1.0, 1.0), (0.2, 3.0), (1e-6, 1.0), (1e-7, 1e-8)],
+        [1.0, 1e-3, 1e3],
+        ANGLES,
+    ),
+)
 def test_known_angle(theta, length, width, along):
     """Also nearly collapsed triangles: wings 1e-8 of the axis wide."""
     assert angle(wings(theta, length, along, width)) == pytest.approx(theta, rel=0, abs=1e-12)

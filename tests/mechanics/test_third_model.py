@@ -38,7 +38,7 @@ def test_statics(method):
 
 
 @pytest.mark.parametrize(
-    "method", [pytest.param("rk4", marks=pytest.mark.thorough), "generalized_alpha"]
+    "method", [pytest.param("rk4", marks=pytest.mark.matrix), "generalized_alpha"]
 )
 def test_motions(method):
     """A small vibration of known frequency, lightly damped by the mass."""

@@ -7,6 +7,7 @@ import pytest
 
 from foldyn.errors import InputError
 from foldyn.patterns import GENERATORS, eggbox, kresling, miura, simple_fold
+from pairwise import in_pairs
 
 GOLDEN = Path(__file__).resolve().parents[3] / "shared" / "golden"
 CELLS = [(1, 1), (2, 1), (1, 3), (4, 3)]
@@ -232,9 +233,14 @@ def test_kresling_sign_of_twist(twist, diagonal, side):
 # ------------------------------------------------------------------------------ arguments
 
 
-@pytest.mark.parametrize("kind", ["simple_fold", "miura", "eggbox"])
-@pytest.mark.parametrize("name", ["a", "b"])
-@pytest.mark.parametrize("value", [0, -1.0, np.nan, np.inf, "1", None, True, [1.0]])
+@pytest.mark.parametrize(
+    ("value", "name", "kind"),
+    in_pairs(
+        [0, -1.0, np.nan, np.inf, "1", None, True, [1.0]],
+        ["a", "b"],
+        ["simple_fold", "miura", "eggbox"],
+    ),
+)
 def test_bad_lengths(kind, name, value):
     told = "must be (a number|a finite number|greater than 0 m)"
     with pytest.raises(InputError, match=f"^{kind}: {name} = .*{told}"):

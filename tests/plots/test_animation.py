@@ -175,7 +175,7 @@ def ffmpeg() -> str:
     try:
         return writers.find_ffmpeg()
     except InputError:
-        pytest.skip("needs ffmpeg on the PATH or imageio-ffmpeg")
+        pytest.skip("needs ffmpeg or imageio-ffmpeg")
 
 
 def test_a_film_has_the_asked_frames_and_rate(ffmpeg, case, trajectory, tmp_path):
@@ -205,7 +205,7 @@ with open(arguments[-1], "w") as file:
 def fake(tmp_path, monkeypatch):
     """Put a program on the PATH that only notes what ffmpeg would get."""
     if sys.platform == "win32":
-        pytest.skip("needs a script that runs as a program")
+        pytest.skip("scripts are no programs here")
 
     def put(fail: bool) -> None:
         program = tmp_path / "bin" / "ffmpeg"

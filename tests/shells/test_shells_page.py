@@ -21,6 +21,7 @@ def names():
     return found
 
 
+@pytest.mark.matrix
 def test_shell_and_reduced_model_side_by_side(names):
     shell, reduced = names["displacement"]["shell"], names["displacement"]["bars and hinges"]
     assert shell == pytest.approx([0.0271, 0.0225, 0.0103], rel=0.04)

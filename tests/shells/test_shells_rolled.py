@@ -189,7 +189,7 @@ def lifted_ring(across, around):
     return np.array(found)
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_slit_ring_lifted():
     table = np.array(list(SLIT_RING.values()))
     cells = np.array([4, 8, 12])

@@ -166,7 +166,7 @@ def test_modes_of_a_tower_come_in_pairs():
     assert twisting < 0.9 * one
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_frequencies_of_a_tower_converge():
     """They fall with every even mesh, and with graded ones with the order of the elements."""
     meshes = [8, 12, 16]
@@ -180,6 +180,7 @@ def test_frequencies_of_a_tower_converge():
 # ------------------------------------------------------------------ analyses and refusals
 
 
+@pytest.mark.matrix
 def test_statics_motions_and_clamps():
     pattern = fd.patterns.simple_fold(a=0.05, b=0.05, dihedral=120)
     s = shell(pattern, STEEL[1e-3], 4, vertex_radius=1e-3, clamped="xmin")

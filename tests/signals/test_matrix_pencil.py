@@ -77,7 +77,7 @@ def test_the_order_by_a_threshold():
     assert (np.diff(ratios) <= 0).all()
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("n", [100, 300, 900])
 @pytest.mark.parametrize("noise", [1e-4, 1e-2])
 def test_the_order_is_found_in_white_noise(n, noise):
@@ -86,7 +86,7 @@ def test_the_order_is_found_in_white_noise(n, noise):
         assert matrix_pencil(record(n) + noise * rng.normal(size=n), DT).order == 6
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_scatter_over_seeds_is_near_the_least_possible():
     """Noise of 1 % of the largest amplitude, 240 samples, 100 seeds.
 

@@ -81,7 +81,7 @@ def test_a_sheet_pressed_to_a_block_carries_load_as_its_layers_say(pressed):
     assert soft < 0.3 < 50.0 * soft < float(np.interp(-1.1, -over, force))
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_steps_are_cut_anew_from_each_point():
     """A press needs steps far below the first one: few halvings in a row, many in all."""
     case, layers = press()

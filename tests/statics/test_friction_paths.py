@@ -182,6 +182,7 @@ def test_the_energy_of_a_rough_press_closes(cycles):
     assert lost[-1] > 0.1 * path.work.values.max()
 
 
+@pytest.mark.matrix
 def test_friction_converges_with_the_steps_of_a_path():
     ends = []
     for steps in (8, 16, 32):
@@ -241,7 +242,7 @@ def test_a_path_that_goes_on_from_the_same_point_takes_the_same_way():
     np.testing.assert_allclose(problem.residual(ahead, 0.3), first, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_layers_that_rub_make_a_stiffer_block():
     """A folded Miura sheet between smooth plates: its layers slide on each other."""
     case, layers = press()

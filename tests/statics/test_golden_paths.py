@@ -22,7 +22,7 @@ STABLE = ("fold_dih120", "miura11_L1")
 TOLERANCE = 1e-5  # of the range of each curve
 
 pytestmark = [
-    pytest.mark.skipif(not list(GOLDEN.glob("path_*.npz")), reason="needs ../shared/golden"),
+    pytest.mark.skipif(not list(GOLDEN.glob("path_*.npz")), reason="needs ../shared"),
     pytest.mark.filterwarnings("ignore:the path loses stability"),
 ]
 

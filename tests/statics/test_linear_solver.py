@@ -74,7 +74,7 @@ def test_factors_keep_their_matrix(name):
         assert factors.negative() == (np.linalg.eigvalsh(matrix.toarray()) < 0).sum()
 
 
-@pytest.mark.skipif("pardiso" not in PRESENT, reason="mkl is not installed")
+@pytest.mark.skipif("pardiso" not in PRESENT, reason="needs mkl")
 def test_a_pattern_is_ordered_once(monkeypatch):
     """Factors that follow each other take the order of the first; two at a time need two."""
     phases, real = [], pardiso._call
@@ -97,7 +97,7 @@ def test_a_pattern_is_ordered_once(monkeypatch):
     assert phases.count(pardiso.ANALYSIS) == 3
 
 
-@pytest.mark.skipif("pardiso" not in PRESENT, reason="mkl is not installed")
+@pytest.mark.skipif("pardiso" not in PRESENT, reason="needs mkl")
 def test_the_same_bits_again():
     matrix, b = symmetric(3000, 0), np.ones(3000)
     found = [pardiso.Pardiso()(matrix).solve(b) for _ in range(3)]

@@ -24,7 +24,7 @@ def sheet(cells, thickness=1e-3):
         (5, 9),
         (15, 9),
         # 241,203 dofs: 13 iterations, 4 minutes, 5.6 GB
-        pytest.param(100, 20, marks=pytest.mark.thorough),
+        pytest.param(100, 20, marks=pytest.mark.matrix),
     ],
 )
 def test_one_load_step(cells, most):

@@ -63,7 +63,7 @@ def test_letters_that_plane_panels_forbid_fold_by_bending():
     assert not bent.wrong and math.degrees(bent.bend) > 5.0
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:panels pass through")
 def test_a_crane_opens_from_its_folded_state_with_every_crease_its_way():
     flat = fd.read_pattern(CRANE)

@@ -58,7 +58,7 @@ def test_a_clamped_panel_bends_as_the_shell(form):
     assert deflection(clamped(pattern, [edge])) == pytest.approx(float(shell), rel=3e-3)
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("thickness", [1e-3, 3e-4])
 @pytest.mark.parametrize("dihedral", [60, 110, 150])
 def test_a_clamped_miura_sheet_vibrates_as_the_shell(dihedral, thickness):

@@ -18,7 +18,7 @@ GOLDEN = Path(__file__).resolve().parents[3] / "shared" / "golden"
 FILES = sorted(GOLDEN.glob("static_*.npz"))
 TOLERANCE = 1e-9
 
-pytestmark = pytest.mark.skipif(not FILES, reason="needs ../shared/golden")
+pytestmark = pytest.mark.skipif(not FILES, reason="needs ../shared")
 
 
 def relative(a, b):

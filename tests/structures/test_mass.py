@@ -24,11 +24,12 @@ import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.patterns import GENERATORS
 from foldyn.structures.mass import _circumcentric_shares
+from pairwise import in_pairs
 
 
-@pytest.mark.parametrize("scheme", ["n5b8", "n4b5"])
-@pytest.mark.parametrize("rule", RULES)
-@pytest.mark.parametrize("name", sorted(GENERATORS))
+@pytest.mark.parametrize(
+    ("name", "scheme", "rule"), in_pairs(sorted(GENERATORS), ["n5b8", "n4b5"], RULES)
+)
 def test_every_rule_on_every_pattern(name, scheme, rule):
     pattern = GENERATORS[name]()
     s = fd.discretize(pattern, SHEET, scheme=scheme, mass=rule)
@@ -66,9 +67,10 @@ def check(s, m):
         assert (m >= 0).all()
 
 
-@pytest.mark.parametrize("panel", sorted(PANELS))
-@pytest.mark.parametrize("scheme", ["n5b8", "n4b5"])
-@pytest.mark.parametrize("rule", sorted(set(RULES) - QUADS_ONLY - {"circumcenter"}))
+@pytest.mark.parametrize(
+    ("panel", "scheme", "rule"),
+    in_pairs(sorted(PANELS), ["n5b8", "n4b5"], sorted(set(RULES) - QUADS_ONLY - {"circumcenter"})),
+)
 def test_safe_rules_on_single_panels(panel, scheme, rule):
     s = one(PANELS[panel], rule, scheme=scheme)
     check(s, s.mass.toarray())

@@ -116,7 +116,7 @@ def test_both_sides_of_a_weld_share_turn_and_bow():
 
 
 @pytest.mark.parametrize(
-    "method", [pytest.param("rk4", marks=pytest.mark.thorough), "generalized_alpha"]
+    "method", [pytest.param("rk4", marks=pytest.mark.matrix), "generalized_alpha"]
 )
 def test_motion_keeps_its_energy(method):
     made = fd.discretize(fd.welded(half_pipe(3)), STEEL)

@@ -61,7 +61,7 @@ def test_irregular_panels_are_planar_and_no_parallelograms():
     assert apart.min() > 1e-3
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_stored_shell_is_what_the_code_gives(sets):
     case = sets["mixed_1"][0]
     kept, again = (
@@ -107,7 +107,7 @@ def test_sets_are_stored_whole(sets):
     assert gaps == [case.name for case in case_sets()["gaps"]]
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", [*SETS, "gaps"])
 def test_stored_models_are_what_the_code_gives(name):
     """Of the smallest cases."""

@@ -96,7 +96,7 @@ def test_the_loads_are_scaled_by_the_linear_shell(fold):
     assert release.largest(made[SHELL], small) >= small
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_an_amplitude_beyond_the_path_is_left_out():
     case = documented()[39]  # an eggbox that gives way at 12 degrees
     made = structures(case.pattern(), case.sheet, 4)
@@ -109,7 +109,7 @@ def test_an_amplitude_beyond_the_path_is_left_out():
     assert len(held) < len(within) + 1
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_stored_results_are_what_the_code_gives():
     case = documented()[1]
     again = runs(next(iter(released(case))))
@@ -240,7 +240,7 @@ def test_a_tower_is_as_stiff_as_the_shell_where_panels_are_membranes():
     assert found["standard"][0] > 3.0
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_the_force_at_which_a_tower_snaps():
     found = pressed(tower(1e-3, (8, 12)))
     for model in ("plate", "n5b8e"):
@@ -248,7 +248,7 @@ def test_the_force_at_which_a_tower_snaps():
     assert found["plate, bars"].min() > 3.0
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 def test_sheets_between_two_rims(axis):
     found = stiffness(sheet(3, (4, 8)), axis)

@@ -32,7 +32,7 @@ def test_the_weights_are_those_of_the_paper(static_data) -> None:
     assert (np.diff(static_data[0].displacement) > 0.0).all()
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_folds_from_forces_and_shapes(static_data) -> None:
     """The issue asks for 3 % and 2 degrees."""
     data = calibration.noisy(static_data, np.random.default_rng(7))
@@ -47,7 +47,7 @@ def test_folds_from_forces_and_shapes(static_data) -> None:
     assert abs(found.correlation[0, 1]) > 0.99  # a softer crease locks earlier: hard to tell apart
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:.*time step is too coarse")  # as coarse as the data's
 def test_damping_from_node_8_alone(released, release_data) -> None:
     """The issue asks for 10 %; all other front nodes are held out, and follow."""

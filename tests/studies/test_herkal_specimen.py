@@ -244,7 +244,7 @@ def test_folds_from_tracked_photographs() -> None:
         evaluation.static_test(photographs().drop_vars("load"), "")
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_a_specimen_that_slid_along_y() -> None:
     """It stands on the plate unglued."""
     straight, slid = photographs(), photographs()
@@ -268,7 +268,7 @@ def test_tracks_that_are_not_of_the_specimen(change, message) -> None:
         evaluation.static_test(change(photographs()), "")
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_a_softer_sheet_is_taken_for_softer_folds() -> None:
     """What the model cannot say goes into the parameters: bends are softer, too."""
     found = calibration.fit_folds(evaluation.static_test(photographs(synthetic.SOFTER), ""))
@@ -293,7 +293,7 @@ def released(motion, tmp_path_factory):
     return evaluation.fit_release(history, folder, {}, COARSER)
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_damping_and_press_are_found_again(released) -> None:
     assert released.press == pytest.approx(calibration.PRESSED, rel=5e-3)  # it still rings
     fit = released.fits["glued"]
@@ -307,7 +307,7 @@ def test_damping_and_press_are_found_again(released) -> None:
     ]  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_the_support_decides_frequency_and_damping(released) -> None:
     """Held on the plate near the paper's 9.5 Hz, by the glue alone far below."""
     motions = evaluation.motions(released)
@@ -443,7 +443,7 @@ def test_a_table_of_weights_alone(tables, monkeypatch) -> None:
 
 
 # ---------------------------------------------------------------------- the whole chain
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_from_photographs_and_a_film_to_a_calibrated_model(tmp_path) -> None:
     """The model is wrong in mass, stiffness and memory; parameters come out near all the same."""
     pytest.importorskip("cv2")
@@ -508,7 +508,7 @@ def test_what_is_said_of_the_supports_is_what_was_found() -> None:
     assert "no peak" in told(flat)
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_true_motion_is_taken_at_the_times_of_the_film(released, motion) -> None:
     """The film began 32.1 ms before the release."""
     positions = np.zeros((240, 63, 3))
@@ -527,7 +527,7 @@ def test_true_motion_is_taken_at_the_times_of_the_film(released, motion) -> None
     assert page._tracked(front)[0].text.startswith("The front nodes were measured in 100.0%")
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_a_fit_that_is_none_says_so(released) -> None:
     summary = released.fits["glued"].summary()
     assert page._doubt(summary, "node 8") == []

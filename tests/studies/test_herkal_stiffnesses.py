@@ -32,7 +32,7 @@ def test_tasks_are_each_known_by_what_they_depend_on():
     assert peaks[0].settings() == peaks[1].settings()  # they have no shell
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_small_loads_and_the_papers(tmp_path):
     """Case 1: at small loads and at the paper's, plate and n5b8e are within 1 % of the shell."""
     plan = StudyPlan(Numerics(divisions=8), ("case1",))
@@ -64,7 +64,7 @@ def test_small_loads_and_the_papers(tmp_path):
     assert "Models beyond the paper" in page
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_modes_of_the_specimen_are_those_of_the_shell():
     """Linear folds: the shell (finer: 4.67, 6.58, 8.70, 14.8 and 19.1 Hz) within 1.7 and 2 %."""
     rows = specimen_modes(COARSE, fold_law="linear")

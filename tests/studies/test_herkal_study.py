@@ -331,7 +331,7 @@ def test_claims_of_one_case(small):
     assert {v.target.key for v in table1(small)} == {f"case1_{m}" for m in paper_rules()}
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 # ---------------------------------------------------------------------- page and command
 def test_page_of_a_study(small):
     page = report.write(small).read_text("utf-8")
@@ -376,7 +376,7 @@ def test_command_refuses_bad_input(tmp_path, capsys):
     assert stop.value.code == 2
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_the_command_runs_and_goes_on(tmp_path, capsys):
     """Quick study: shell and all rules; case 1 has the paper's best; a second call skips all."""
     pytest.importorskip("cv2")

@@ -98,23 +98,13 @@ def test_a_coarse_shell_is_near(name):
     assert np.abs(frequency[:3]).max() < 0.022
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("divisions", [16, 32])
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", CASES)
-def test_a_fine_shell_agrees(name, divisions):
-    """At worst 0.73 % (case 3, statics) and 0.40 % (case 1, second frequency), 32 divisions."""
-    moved, frequency = compare.away(ours(name, divisions), stored(name))
+def test_a_fine_shell_agrees(name):
+    """At worst 0.73 % (case 3, statics) and 0.40 % (case 1, second frequency)."""
+    moved, frequency = compare.away(ours(name, FINEST), stored(name))
     assert moved < 0.01
     assert np.abs(frequency[:3]).max() < 0.01
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", CASES)
-def test_half_our_mesh_changes_little(name):
-    """From 32 to 64 divisions, at worst 0.14 % (case 2, statics) and 0.10 % (case 1, third)."""
-    moved, frequency = compare.away(ours(name, 32), ours(name, 64))
-    assert moved < 0.002
-    assert np.abs(frequency[:3]).max() < 0.002
 
 
 def test_a_coarse_shell_moves_alike():
@@ -123,7 +113,7 @@ def test_a_coarse_shell_moves_alike():
     assert compare.motion_away(motion, read_motion("case1", 8, 0.0025)) < 0.05
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_a_fine_shell_moves_alike():
     """With 32 divisions 0.06 % from the finest of OpenSees; 64 change it by 0.29 %."""
     motion = compare.our_motion("case1", 32, 0.01)
@@ -131,7 +121,7 @@ def test_a_fine_shell_moves_alike():
     assert compare.motion_away(motion, finest) < 0.005
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", [name for name in CASES if stored_motions(name)])
 def test_motions_of_all_cases_begin_alike(name):
     """The first 2 s with 10 divisions: at worst 4.8 % (case 2); see docs/opensees.md for 10 s."""

@@ -24,7 +24,7 @@ PARAMETERS = [
 ]
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:.*time step is too coarse")  # as coarse as the data's
 def test_a_film_tells_drift_and_decay(tmp_path):
     """From the film of a sheet that is the model but for its creases; 3 minutes once compiled.

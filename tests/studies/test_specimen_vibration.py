@@ -96,7 +96,7 @@ def test_the_first_wobble_is_driven_at_a_corner_not_in_the_middle():
     assert min(middle) > 8.0
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_release_of_the_specimen():
     """Free vibration: the paper has 9.5 Hz and a logarithmic decrement of 16 %."""
     found = vibration.released()

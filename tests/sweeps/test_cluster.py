@@ -47,7 +47,7 @@ def cluster(monkeypatch):
         yield made
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_a_worker_that_is_killed_loses_nothing(tmp_path, sweep, cluster):
     killed: list[int] = []
 
@@ -69,14 +69,14 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path, sweep, cluster):
     assert len(list((tmp_path / "points").iterdir())) == 24
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_a_scheduler_that_is_not_there_is_told(sweep):
     pytest.importorskip("distributed")
     with pytest.raises(InputError, match=r"scheduler = tcp://127\.0\.0\.1:1: no Dask scheduler"):
         sweep(scheduler="tcp://127.0.0.1:1")
 
 
-@pytest.mark.slow
+@pytest.mark.matrix
 def test_workers_of_several_threads_are_refused(sweep):
     dask = pytest.importorskip("distributed")
     with (

@@ -40,7 +40,7 @@ def take(results, kind: str, text: str):
 EVERY = [(one, kind) for one in MEASURES.values() for kind in one.kinds if kind in TEXTS]
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize(("one", "kind"), EVERY, ids=lambda one: getattr(one, "name", one))
 def test_every_measure_can_be_taken_of_all_its_kinds(results, one, kind):
     words = [GIVEN[what] if kind != "statics" else {"node": "0", "axis": "x"}[what]
@@ -122,7 +122,7 @@ def test_what_a_path_carries(results):
     assert take(results, "statics", "strain") == pytest.approx(np.abs(strain).max(), rel=1e-12)
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_the_barriers_of_a_tower_that_snaps(tmp_path):
     case = fd.studies.find_case("gallery/kresling-displacement")
     names = ["stable_states", "barrier", "barrier_back", "state_strokes", "state_energies"]

@@ -130,7 +130,7 @@ def test_copies_move_alike(seed):
     check(seed, draw(seed, QUICK))
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 @pytest.mark.parametrize("seed", range(1000, 1000 + int(os.environ.get("DRAWS", "500"))))
 def test_many_copies_move_alike(seed):
     check(seed, draw(seed, ALL))

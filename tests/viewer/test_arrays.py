@@ -40,7 +40,7 @@ def test_values_over_time_come_back_to_the_tolerance(name, tolerance):
     assert np.abs(found - values).max() <= max(tolerance, 2.0 / LARGEST) * largest * (1 + 1e-6)
 
 
-@pytest.mark.thorough
+@pytest.mark.matrix
 def test_a_motion_of_few_shapes_takes_little_room():
     t = np.linspace(0.0, 10.0, 2000)
     shapes = np.random.default_rng(3).normal(size=(3, 900))
