@@ -10,6 +10,7 @@ from measured import apart, drift, energy, momenta, order, strain
 from moving_sheets import CELL_HELD, HEAVY, cell, spinning
 
 import foldyn as fd
+from pairwise import in_pairs
 
 MODELS = ("plate", "n5b8e", "shell")
 ELASTIC = fd.EnhancedLinear(70, 290)
@@ -62,9 +63,7 @@ def drifts(case: fd.Case, motion: Any) -> float:
     return max(drift(energy(motion) + motion.dissipated.values), drift(h))
 
 
-@pytest.mark.parametrize("dt", [4e-3, 5e-2])
-@pytest.mark.parametrize("law", [None, *LAWS])
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(("model", "law", "dt"), in_pairs(MODELS, [None, *LAWS], [4e-3, 5e-2]))
 def test_a_free_sheet_with_springs_keeps_both_momenta_and_loses_what_creases_take(model, law, dt):
     """Also with steps in which it turns by 3 degrees, hundreds of times RK4's critical one."""
     case = fd.Case(sheet(model, fold_law=LAWS.get(law, ELASTIC)), AXIAL)
@@ -77,9 +76,7 @@ def test_a_free_sheet_with_springs_keeps_both_momenta_and_loses_what_creases_tak
 
 
 @pytest.mark.matrix
-@pytest.mark.parametrize(
-    "kind", [*MODELS, "mixed_voronoi", pytest.param("consistent", marks=pytest.mark.matrix)]
-)
+@pytest.mark.parametrize("kind", [*MODELS, "mixed_voronoi", "consistent"])
 def test_nothing_adds_up_over_1e4_steps(kind):
     """Of paper steps are five times RK4's critical ones, and folds turn by degrees back and forth.
 
