@@ -364,7 +364,7 @@ CENTER = r"nodes: node {} is the center of panel {}"
 )
 def test_cases_that_are_refused(change, message):
     with pytest.raises(InputError, match=message):
-        fd.fidelity(change(held()))
+        fd.fidelity(change(held()), models=[])
 
 
 @pytest.mark.parametrize(
