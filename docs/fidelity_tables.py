@@ -44,7 +44,7 @@ TABLES = {
     "mixed": lambda: without(mixed_table(counted()), "`n5b8e, bars`"),
     "gaps": lambda: gap_table(of("gaps")),
     "internal": lambda: without(
-        first_table(of("documented_internal") + of("drawn_internal")), "| 1 |"
+        first_table(of("documented_internal") + of("drawn_internal")), "| 1 | "
     ),
     "motions": lambda: without(
         motions.summaries(motions.read()), "| n5b8e, linear |", "| plate, plate_superlinear |"

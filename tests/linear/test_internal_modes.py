@@ -271,7 +271,9 @@ def test_creases_that_remember_turn_unevenly_too():
     f = float(one.frequency[6]) * np.array([0.9, 1.0, 1.1])
     force = fd.Force([8], (0.3, 0.1, 1.0))
     responses = [
-        fd.frf(fd.Case(case.structure, [fd.Fix("xmin")], damping=case.damping), force, f, internal=1)
+        fd.frf(
+            fd.Case(case.structure, [fd.Fix("xmin")], damping=case.damping), force, f, internal=1
+        )
         for case in (damped, relaxing)
     ]
     size = np.abs(responses[0].receptance.values).max()

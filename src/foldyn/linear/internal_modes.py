@@ -7,8 +7,12 @@ of that of the rule condensed:
 
 n the normal of the panel in the state; F also couples the heights of its nodes with the turns of
 its creased edges, which thereby have mass, and with the amplitudes. Amplitudes are dofs behind
-those of the body, m, each with a stiffness of its own and no other. What stresses in a panel do to
-it is left out.
+those of the body, m. They share stiffness with these in the creases alone: a crease of length L
+that turns by theta_k P_k along it, k = 1 and on, adds
+
+    1/2 (stiffness per length) L / (2 k + 1) theta_k^2,    theta_k the sum of both edges' turns,
+
+and is damped likewise. What stresses in a panel do to amplitudes is left out.
 """
 
 from __future__ import annotations
@@ -23,6 +27,7 @@ from scipy.linalg import block_diag
 from foldyn.errors import InputError
 from foldyn.mechanics.assembly import Assembly
 from foldyn.structures import Structure
+from foldyn.structures.bars_plates import BarsPlatesTerm
 from foldyn.structures.mass import condensed_panels
 from foldyn.structures.panel_modes import TURNS, panel_modes
 from foldyn.structures.panel_plate import TRIANGLE_MASS
@@ -137,12 +142,13 @@ def amplitudes(structure: Any, body: Assembly, q: NDArray, count: int) -> Amplit
     """
     size = body.size
     if not count:
-        none, empty = _matrix([], size, size), np.zeros(0)
-        rows = _matrix([], 0, size)
-        return Amplitudes(none, none, np.zeros((0, 3)), rows, rows, empty.astype(int), empty, 0)
+        none, rows = _matrix([], size, size), _matrix([], 0, size)
+        whose, share = np.zeros(0, np.int64), np.zeros(0)
+        return Amplitudes(none, none, np.zeros((0, 3)), rows, rows, whose, share, 0)
     displacement = q[: structure.nodes.size].reshape(-1, 3)
     plates, surface, sheet = structure.edge_plates, structure.surface, structure.sheet
     assert plates is not None
+    assert isinstance(body.sheet, BarsPlatesTerm)
     kinds, kind = sheet.kinds(len(surface.faces))
     rule, total = condensed_panels(surface), surface.panel_mass
     angles, slope = body.sheet.turns(q)
