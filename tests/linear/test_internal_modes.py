@@ -12,6 +12,7 @@ from foldyn.errors import InputError
 from foldyn.linear import linearize
 from foldyn.linear.matched import matched
 from foldyn.linear.reference import elastic, modes_at_rest, reference_modes
+from foldyn.structures.bars_plates import BarsPlatesTerm
 from foldyn.structures.panel_modes import TURNS
 
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=1000.0)
@@ -156,6 +157,7 @@ def test_gradients_of_turns(q):
     """Of all angles of plates, and slopes of folds, beside differences; an edge is clamped."""
     s = edged(FOLD, fold_law="enhanced", clamped=[(0, 1)])
     sheet, rng = s.body.sheet, np.random.default_rng(1)
+    assert isinstance(sheet, BarsPlatesTerm)
     state = q * rng.standard_normal(sheet.size)
     found, slope = sheet.turns(state)
     model, step = sheet.model, 1e-6

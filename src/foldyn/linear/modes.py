@@ -75,7 +75,8 @@ def modes(
     internal : int
         How many internal amplitudes (Craig and Bampton) each panel has beside its nodes, 0 to 6:
         what its plate does between corners, center and creased edges. One comes with each edge
-        without a crease, and with each crease three uneven turns along it. With the scheme "n5b8e" and the mass "condensed" alone; see
+        without a crease, and three with each of the others, by which creases turn unevenly along
+        their length. With the scheme "n5b8e" and the mass "condensed" alone; see
         `foldyn.linear.internal_modes`.
     verify : bool
         Whether to prove by one more factorization that no mode was missed. It costs about as much
