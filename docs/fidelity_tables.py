@@ -51,7 +51,7 @@ TABLES = {
     "gaps": lambda: gap_table(of("gaps")),
     "internal": lambda: without(
         first_table(of("documented_internal") + of("drawn_internal")),
-        "| 1 |",
+        "| 1 | ",
         "| below 0.6 |",
         "| 0.6 to 1 |",
         "| above 1 |",

@@ -13,6 +13,8 @@ from foldyn.errors import InputError
 from foldyn.linear import linearize
 from foldyn.linear.matched import matched
 from foldyn.linear.reference import elastic, modes_at_rest, reference_modes
+from foldyn.structures.bars_plates import BarsPlatesTerm
+from foldyn.structures.panel_modes import TURNS
 
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=1000.0)
 SQUARE = fd.Pattern([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2, 3)])
@@ -110,13 +112,63 @@ def test_matrices(internal):
     assert (~moves).sum() == case.structure.edge_gives.count
     assert np.linalg.eigvalsh(mass[np.ix_(moves, moves)]).min() > 0.0
     size = len(plain.free)
-    np.testing.assert_array_equal(stiffness[:size, :size], plain.stiffness.toarray())
-    assert not stiffness[:size, size:].any()
-    inner = stiffness[size:, size:]
-    assert (np.diag(inner) > 0.0).all()
-    np.testing.assert_array_equal(inner, np.diag(np.diag(inner)))
-    # two free edges of each of the four panels
-    assert len(inner) == 4 * (internal + 2)
+    # two free edges of each of the four panels, and two that turn
+    assert len(stiffness) - size == 4 * (internal + 2 + 2 * TURNS)
+    more = condensed(linear, size) - plain.stiffness.toarray()
+    assert np.linalg.eigvalsh(more).min() > -1e-9 * np.abs(more).max()
+
+
+def condensed(linear, size):
+    """Stiffness of the first dofs, the amplitudes in balance."""
+    own = linear.stiffness.toarray()
+    across = own[:size, size:]
+    return own[:size, :size] - across @ np.linalg.solve(own[size:, size:], across.T)
+
+
+def test_creases_without_stiffness_do_not_resist_uneven_turns():
+    case = fd.Case(edged(fd.patterns.miura(cells=(1, 1), dihedral=80), crease_stiffness=1e-12))
+    plain = linearize(case).stiffness.toarray()
+    found = condensed(linearize(case, internal=1), len(plain))
+    np.testing.assert_allclose(found, plain, atol=1e-9 * np.abs(plain).max())
+
+
+@pytest.mark.parametrize("times", [1e-2, 1.0, 1e2, 1e4])
+@pytest.mark.parametrize("internal", [0, 1])
+@pytest.mark.parametrize("rigid", [None, [0], "all"])
+def test_a_moment_opens_a_crease_by_its_stiffness(times, internal, rigid):
+    """Whatever its panels do; the turn of the crease is the one that its damper resists."""
+    k = times * 0.06
+    s = edged(FOLD, crease_stiffness=k, rigid=rigid)
+    case = fd.Case(s, [fd.Fix([0, 1, 2, 3])], damping=fd.CreaseDamping(1.0))
+    own, linear = linearize(case).damping.toarray(), linearize(case, internal=internal)
+    turn = np.zeros(len(linear.free))
+    turn[: len(own)] = own[own.diagonal().argmax()] / np.sqrt(own.diagonal().max())  # L = 1
+    opened = turn @ np.linalg.solve(linear.stiffness.toarray(), turn)
+    assert opened == pytest.approx(1.0 / k, rel=1e-6)
+
+
+@pytest.mark.parametrize("q", [0.0, 0.05])
+def test_gradients_of_turns(q):
+    """Of all angles of plates, and slopes of folds, beside differences; an edge is clamped."""
+    s = edged(FOLD, fold_law="enhanced", clamped=[(0, 1)])
+    sheet, rng = s.body.sheet, np.random.default_rng(1)
+    assert isinstance(sheet, BarsPlatesTerm)
+    state = q * rng.standard_normal(sheet.size)
+    found, slope = sheet.turns(state)
+    model, step = sheet.model, 1e-6
+
+    def angles(where):
+        hinges, x = sheet.angles(where), model.per_reach * where[sheet.hidden]
+        fold = hinges[: len(slope)] - x[model.fold_rotations].sum(axis=1)
+        rows = np.where(model.angle < 0, len(hinges) - 1 - model.angle, model.angle)
+        return np.concatenate([hinges, x])[rows], fold
+
+    for way in rng.standard_normal((5, sheet.size)):
+        (more, _), (less, _) = (angles(state + sign * step * way) for sign in (1, -1))
+        np.testing.assert_allclose(found @ way, (more - less) / (2 * step), rtol=1e-6, atol=1e-7)
+    law = sheet.rest_law(0)
+    expected = model.fold_stiffness * law.slope(angles(state)[1], model.fold_rest)
+    np.testing.assert_allclose(slope, expected, rtol=1e-12)
 
 
 def test_translations_and_rotations_have_their_mass():
@@ -173,9 +225,50 @@ def test_a_turned_state():
     np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9)
 
 
+def test_other_numbers_and_a_mirror_image():
+    pattern = fd.patterns.miura(cells=(1, 1), panel_angle=60, dihedral=80)
+    order = np.random.default_rng(2).permutation(len(pattern.vertices))
+    place = np.argsort(order)
+    faces = [[int(place[k]) for k in face] for face in pattern.faces]
+    others = [
+        fd.Pattern(pattern.vertices[order], [face[1:] + face[:1] for face in reversed(faces)]),
+        fd.Pattern(pattern.vertices * [1, 1, -1], [list(face)[::-1] for face in pattern.faces]),
+    ]
+    damping = fd.CreaseDamping(1e-3)
+    one, *rest = (
+        fd.modes(fd.Case(edged(each, crease_stiffness=1.0), damping=damping), 14, internal=1)
+        for each in (pattern, *others)
+    )
+    for other in rest:
+        for name in ("frequency", "damping_ratio", "internal_share"):
+            np.testing.assert_allclose(other[name][6:], one[name][6:], rtol=1e-5)
+
+
+def test_creases_that_remember_turn_unevenly_too():
+    """A branch that relaxes at once is a damper: the ratios of both are alike."""
+    pattern, k, time = fd.patterns.miura(cells=(1, 1), panel_angle=60, dihedral=80), 1.0, 1e-3
+    law = fd.materials.Prony(ratios=[1.0], times=[time], law="linear")
+    options = {"crease_stiffness": k, "mass": "condensed"}
+    damped = fd.Case(edged(pattern, **options), damping=fd.CreaseDamping(k * time))
+    relaxing = fd.Case(edged(pattern, **options, fold_law=law))
+    one, other = (fd.modes(case, 9, internal=1) for case in (damped, relaxing))
+    np.testing.assert_allclose(other.damping_ratio[6:], one.damping_ratio[6:], rtol=1e-3)
+    np.testing.assert_allclose(other.frequency[6:], one.frequency[6:], rtol=1e-4)
+    f = float(one.frequency[6]) * np.array([0.9, 1.0, 1.1])
+    force = fd.Force([8], (0.3, 0.1, 1.0))
+    responses = [
+        fd.frf(
+            fd.Case(case.structure, [fd.Fix("xmin")], damping=case.damping), force, f, internal=1
+        )
+        for case in (damped, relaxing)
+    ]
+    size = np.abs(responses[0].receptance.values).max()
+    np.testing.assert_allclose(*(r.receptance.values for r in responses), atol=1e-3 * size)
+
+
 def test_effective_masses_add_up():
     held = miura(supports=[fd.Fix("xmin")])
-    size = len(held.free_dofs) + 8 + 20  # edges that turn, amplitudes
+    size = len(held.free_dofs) + 8 + 20 + 8 * TURNS  # edges that turn, amplitudes
     found = fd.modes(held, size, internal=3)
     assert (found.effective_mass.sum("mode") <= found.free_mass * (1.0 + 1e-9)).all()
     np.testing.assert_allclose(found.effective_mass.sum("mode"), found.free_mass, rtol=1e-6)

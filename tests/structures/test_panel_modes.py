@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mass_samples import PANELS
+from numpy.polynomial import Legendre
 
-from foldyn.structures.condensed_panel import heights_and_slopes
-from foldyn.structures.panel_modes import _basis, _held_modes, panel_modes
+from foldyn.structures.condensed_panel import _spoke_turns, heights_and_slopes
+from foldyn.structures.panel_modes import TURNS, _basis, _held_modes, panel_modes
 from foldyn.structures.panel_plate import PanelPlate, outline
 
 NU = 0.3
@@ -23,14 +24,15 @@ def panel(x, creased=(), straight=None):
 
 @pytest.mark.parametrize("creased", CREASED)
 def test_shapes_hold_what_is_held(creased):
-    """Corners, center, mean slopes of creased edges, and all of the straight ones."""
+    """Corners, center, slopes of creased edges to the third power, and all of the straight ones."""
     plate = PanelPlate(panel(PANELS["parallelogram"], creased), NU, 6)
     _, shapes = _held_modes(plate, 4)
-    for held in (*plate.heights, *plate.slopes, *plate.lines):
+    uneven = plate.uneven(TURNS)
+    for held in (*plate.heights, *plate.slopes, *uneven, *plate.lines):
         value = sum(factor * shapes[k] for k, factor in held.items())
         np.testing.assert_allclose(value, 0.0, atol=1e-10 * np.abs(shapes).max())
     basis = _basis(plate)
-    held = len(plate.heights) + len(plate.slopes) + len(plate.lines)
+    held = len(plate.heights) + len(plate.slopes) + len(uneven) + len(plate.lines)
     assert basis.shape[1] == basis.shape[0] - held
 
 
@@ -38,7 +40,7 @@ def test_shapes_hold_what_is_held(creased):
 def test_static_shapes_and_modes_share_no_stiffness(creased):
     plate = PanelPlate(panel(PANELS["trapezoid"], creased), NU, 6)
     value, shapes = _held_modes(plate, 4)
-    static, stiffness = plate.solved([*plate.heights, *plate.slopes])
+    static, stiffness = plate.solved([*plate.heights, *plate.slopes, *plate.uneven(TURNS)])
     coupling = shapes.T @ (plate.stiffness @ static)
     np.testing.assert_allclose(coupling, 0.0, atol=1e-8 * np.abs(stiffness).max())
     np.testing.assert_allclose(shapes.T @ (plate.stiffness @ shapes), np.diag(value), rtol=1e-6,
@@ -52,10 +54,11 @@ def test_masses(name):
     x = np.asarray(PANELS[name], float)
     shape = panel(x, (0, 2))
     found = panel_modes(shape, NU, 3)
-    mass, inner = found.mass, len(found.stiffness)
+    mass, inner = found.mass, len(found.stiffness) - len(found.turns)
     assert inner in (3, 4)
+    assert len(found.turns) == 2 * TURNS
     np.testing.assert_array_equal(mass, mass.T)
-    assert np.linalg.eigvalsh(mass).min() > 1e-6
+    assert np.linalg.eigvalsh(mass).min() > 1e-7
     np.testing.assert_allclose(mass[-inner:, -inner:], np.eye(inner), atol=1e-9)
     points = np.array([*shape.corners, shape.center] if shape.center else shape.corners)
     linear = np.zeros((len(mass), 3))
@@ -85,16 +88,42 @@ def test_static_shapes_are_those_of_the_stiffness():
 
 def test_equal_modes_are_taken_together():
     """A free square has two alike among its first: a mode and the same turned by 90 degrees."""
-    first = panel_modes(panel(PANELS["square"]), NU, 1).stiffness
+    first = np.diag(panel_modes(panel(PANELS["square"]), NU, 1).stiffness)
     assert len(first) == 2
     assert first[0] == pytest.approx(first[1], rel=1e-4)
     assert len(panel_modes(panel(PANELS["rectangle"]), NU, 1).stiffness) == 1
 
 
+def test_parts_of_slopes_are_those_of_legendre():
+    """A cubic slope along an edge has the parts that it is made of, up to the mesh."""
+    plate = PanelPlate(panel(PANELS["square"], (0,)), NU, 16)
+    (mean,), uneven = plate.slopes, plate.uneven(TURNS)
+    ends = np.linspace(-1.0, 1.0, 17)
+    for parts in np.eye(TURNS + 1):
+        cubic = Legendre(parts)
+        across = 8.0 * np.diff(cubic.integ()(ends))  # mean of each side
+        slopes = dict(zip(mean, across * np.sign(list(mean.values())), strict=True))
+        found = [sum(f * slopes[k] for k, f in row.items()) for row in (mean, *uneven)]
+        np.testing.assert_allclose(found, parts, atol=0.1)
+
+
+def test_a_twist_turns_edges_unevenly():
+    """w = x y needs no moments at the edges of a square: they turn by half a side at their ends."""
+    shape = panel(PANELS["square"], (0, 2))
+    points = np.array([*shape.corners, shape.center])
+    arms = points - shape.center
+    spokes = _spoke_turns(points, 4) @ arms.prod(axis=1)
+    found = panel_modes(shape, NU, 1)
+    expected = np.zeros((2, TURNS))
+    expected[:, 0] = 0.5 * np.linalg.norm(points[1] - points[0])
+    np.testing.assert_allclose(found.turns @ [*spokes, 0, 0], expected.ravel(), atol=1e-4)
+    assert np.linalg.eigvalsh(found.stiffness).min() > 0.1
+
+
 def test_frequencies_of_meshes_that_rank_modes_otherwise():
     """The first mode of a square with four creases is another one in the coarse mesh."""
     shape = panel(PANELS["square"], (0, 1, 2, 3))
-    found = panel_modes(shape, NU, 3).stiffness
+    found = np.diag(panel_modes(shape, NU, 3).stiffness)[4 * TURNS :]
     (low, _), (high, _) = (_held_modes(PanelPlate(shape, NU, n), 3) for n in (8, 16))
     assert low[1] == pytest.approx(low[2], rel=1e-4)  # the pair comes last there,
     assert high[0] == pytest.approx(high[1], rel=1e-4)  # and first here

@@ -66,16 +66,17 @@ def test_limits(name, model, median, ninetieth, near):
     assert standard.ninetieth > 0.5
 
 
-@pytest.mark.parametrize(("name", "near"), [("documented", 0.95), ("drawn", 0.84)])
+@pytest.mark.parametrize(("name", "near"), [("documented", 0.99), ("drawn", 0.90)])
 def test_limits_of_internal_amplitudes(name, near):
-    """Of the first five modes: 95 % within 5 %, of all random cases only below the plate's."""
+    """Of the first five modes within 5 %; below the plate's frequency nearly all within 1 %."""
     results = read(RESULTS / f"{name}_internal.csv")
     found, without = summary(results, "3"), summary(results, "none")
     assert found.median < 0.01
     assert found.near >= near
     assert without.near < 0.7
     low = [row for modes in results for row in modes.rows["3"] if row.over_plate < 1.0]
-    assert summary_of(low).near >= 0.98
+    assert summary_of(low).near == 1.0
+    assert np.mean([abs(row.error) < 0.01 for row in low]) >= 0.98
 
 
 def test_stored_first_modes_are_what_the_code_gives():

@@ -265,7 +265,8 @@ def _notes(modes: xarray.Dataset, case: Case) -> str:
         share = modes["internal_share"].values
         notes.append(
             f"Each panel has {modes.attrs['internal']} internal amplitudes beside its nodes, and "
-            "one for each edge without a crease. Shapes are drawn at nodes, which do not show "
+            "one for each edge without a crease; creases turn unevenly. Shapes are drawn at nodes, "
+            "which do not show "
             f"them; they have up to {100.0 * np.nanmax(share):.0f} % of a mode's strain energy "
             f"(mode {int(modes['mode'].values[np.nanargmax(share)])})."
         )

@@ -21,6 +21,7 @@ from scipy import sparse
 from foldyn.algebra.superlu import SingularTangentError, factorize
 from foldyn.cases import Case
 from foldyn.errors import ComputationError
+from foldyn.linear.internal_modes import Amplitudes
 from foldyn.structures.inelastic_hinges import memory, remembering
 
 MOST = 40  # iterations for a mode
@@ -74,10 +75,11 @@ class Branches:
 
 
 def branches_of(
-    case: Case, q: NDArray, free: NDArray, size: int, dampers: bool = False
+    case: Case, q: NDArray, free: NDArray, inner: Amplitudes, dampers: bool = False
 ) -> Branches | None:
-    """Branches of a case about the dofs q (m,), on the free ones of so many unknowns.
+    """Branches of a case about the dofs q (m,), on the free ones of all unknowns.
 
+    inner : its internal amplitudes, with which creases turn unevenly, too.
     dampers : whether those of damped creases are among them, less what `dynamics.dampers` counts
         of these as quasi-static.
     """
@@ -88,7 +90,9 @@ def branches_of(
         return None
     gradient = memory(parts, case.body).gradients(q, case.body.size)
     gradient = sparse.csr_array((gradient.data, gradient.indices, gradient.indptr))
+    size = inner.mass.shape[0]
     gradient.resize((gradient.shape[0], size))
+    gradient = sparse.vstack([gradient, inner.turns], format="csr")
     if ties := case.constraints:
         gradient = sparse.csr_array(gradient @ ties.extended(size))
     most = max(len(part.branches) for part in parts)
@@ -103,10 +107,14 @@ def branches_of(
         share.append(np.stack([*rows, *[0.0 * stiffness] * missing], axis=1))
         rows = [branch.rate for branch in branches]
         rate.append(np.stack([*rows, *[np.ones(len(stiffness))] * missing], axis=1))
+    relaxed, share, rate, viscous = map(np.concatenate, (relaxed, share, rate, viscous))
     return Branches(
-        sparse.csr_array(gradient[:, free]), np.concatenate(relaxed), np.concatenate(share),
-        np.concatenate(rate), np.concatenate(viscous),
-    )  # fmt: skip
+        sparse.csr_array(gradient[:, free]),
+        np.concatenate([relaxed, relaxed[inner.fold] * inner.share]),
+        np.concatenate([share, share[inner.fold] * inner.share[:, None]]),
+        np.concatenate([rate, rate[inner.fold]]),
+        np.concatenate([viscous, viscous[inner.fold] * inner.share]),
+    )
 
 
 def damped_mode(

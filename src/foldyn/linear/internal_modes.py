@@ -7,8 +7,12 @@ of that of the rule condensed:
 
 n the normal of the panel in the state; F also couples the heights of its nodes with the turns of
 its creased edges, which thereby have mass, and with the amplitudes. Amplitudes are dofs behind
-those of the body, m, each with a stiffness of its own and no other. What stresses in a panel do to
-it is left out.
+those of the body, m. They share stiffness with these in the creases alone: a crease of length L
+that turns by theta_k P_k along it, k = 1 and on, adds
+
+    1/2 (stiffness per length) L / (2 k + 1) theta_k^2,    theta_k the sum of both edges' turns,
+
+and is damped likewise. What stresses in a panel do to amplitudes is left out.
 """
 
 from __future__ import annotations
@@ -21,9 +25,11 @@ from scipy import sparse
 from scipy.linalg import block_diag
 
 from foldyn.errors import InputError
+from foldyn.mechanics.assembly import Assembly
 from foldyn.structures import Structure
+from foldyn.structures.bars_plates import BarsPlatesTerm
 from foldyn.structures.mass import condensed_panels
-from foldyn.structures.panel_modes import panel_modes
+from foldyn.structures.panel_modes import TURNS, panel_modes
 from foldyn.structures.panel_plate import TRIANGLE_MASS
 from foldyn.values import show, whole
 
@@ -35,46 +41,57 @@ class Amplitudes(NamedTuple):
 
     Attributes
     ----------
-    stiffness : (k,)
-        N/m.
+    stiffness : (m + k, m + k)
+        What comes to the stiffness: of themselves, and of creases that turn unevenly, N/m.
     mass : (m + k, m + k)
         What comes to the mass of the nodes, kg.
     points : (q, 3)
         Middles of the edges and of the spokes of all panels at rest, one after the other, m.
     between : (3 q, m + k)
         Their displacements by all dofs.
+    turns : (r, m + k)
+        Uneven turns of the creases: by each times P_k along it, 1/m.
+    fold, share : (r,)
+        Whose they are, and the mean square of P_k: what a fold has of stiffness and damping
+        against each.
+    count : int
+        k.
     """
 
-    stiffness: NDArray
+    stiffness: sparse.csr_array
     mass: sparse.csr_array
     points: NDArray
     between: sparse.csr_array
+    turns: sparse.csr_array
+    fold: NDArray
+    share: NDArray
+    count: int
 
     @property
     def dofs(self) -> NDArray[np.int64]:
         """Their numbers (k,)."""
         size = self.mass.shape[0]
-        return np.arange(size - len(self.stiffness), size)
+        return np.arange(size - self.count, size)
 
     def behind(self, matrix: sparse.csr_array) -> sparse.csr_array:
         """A matrix (m, m) with rows and columns of zeros for them."""
-        if not len(self.stiffness):
+        if not self.count:
             return matrix
-        none = sparse.csr_array((len(self.stiffness), len(self.stiffness)))
+        none = sparse.csr_array((self.count, self.count))
         return sparse.csr_array(sparse.block_diag([matrix, none], format="csr"))
 
     def stiffened(self, matrix: sparse.csr_array) -> sparse.csr_array:
         """A stiffness (m, m), N/m, with theirs."""
-        if not len(self.stiffness):
-            return matrix
-        own = sparse.diags_array(self.stiffness)
-        return sparse.csr_array(sparse.block_diag([matrix, own], format="csr"))
+        return sparse.csr_array(self.behind(matrix) + self.stiffness) if self.count else matrix
+
+    def damped(self, matrix: sparse.csr_array, damping: NDArray) -> sparse.csr_array:
+        """A damping (m + k, m + k), N s/m, and that of folds of so much (nf,), N m s/rad."""
+        uneven = self.turns.T @ (self.turns * (damping[self.fold] * self.share)[:, None])
+        return sparse.csr_array(matrix + uneven)
 
     def massed(self, matrix: sparse.csr_array) -> sparse.csr_array:
         """A mass (m, m), kg, with theirs."""
-        if not len(self.stiffness):
-            return matrix
-        return sparse.csr_array(self.behind(matrix) + self.mass)
+        return sparse.csr_array(self.behind(matrix) + self.mass) if self.count else matrix
 
 
 def check_internal(structure: Any, internal: Any) -> int:
@@ -110,52 +127,65 @@ def check_internal(structure: Any, internal: Any) -> int:
     return count
 
 
-def amplitudes(structure: Any, displacement: NDArray, size: int, count: int) -> Amplitudes:
-    """Internal amplitudes of a structure, if any, whose nodes are displaced by (n, 3), m.
+def amplitudes(structure: Any, body: Assembly, q: NDArray, count: int) -> Amplitudes:
+    """Internal amplitudes of a structure, if any, in the state q (m,).
 
     Parameters
     ----------
     structure : Structure
         Of the scheme n5b8e and the mass rule condensed.
-    displacement : (n, 3)
-        The state.
-    size : int
-        Number of the dofs of its body.
+    body : Assembly
+        Its own, or one with other rest angles and further terms.
     count : int
         How many of each panel beside one for each edge without a crease; one more where symmetry
         makes two alike.
     """
+    size = body.size
     if not count:
-        none = np.zeros((0, 3))
-        return Amplitudes(none[:, 0], _matrix([], size, size), none, _matrix([], 0, size))
+        none, rows = _matrix([], size, size), _matrix([], 0, size)
+        whose, share = np.zeros(0, np.int64), np.zeros(0)
+        return Amplitudes(none, none, np.zeros((0, 3)), rows, rows, whose, share, 0)
+    displacement = q[: structure.nodes.size].reshape(-1, 3)
     plates, surface, sheet = structure.edge_plates, structure.surface, structure.sheet
     assert plates is not None
+    assert isinstance(body.sheet, BarsPlatesTerm)
     kinds, kind = sheet.kinds(len(surface.faces))
     rule, total = condensed_panels(surface), surface.panel_mass
-    per_hidden = structure.body.sheet.fold_hinges().per_hidden
-    first, stiffness, masses, points, between = size, [np.zeros(0)], [], [np.zeros((0, 3))], []
+    angles, slope = body.sheet.turns(q)
+    beside, side = _sides(body.sheet.model.fold_rotations)
+    order = np.arange(1, TURNS + 1)
+    stiffness, masses, between, uneven = [], [], [], []
+    first, points = size, [np.zeros((0, 3))]
     for p, panel in enumerate(structure.outlines):
         if panel is None:
             continue
         own, corners = kinds[kind[p]], list(surface.faces[p])
         modes = panel_modes(panel, own.poissons_ratio, count + panel.creased.count(False))
         length2 = float(np.linalg.norm(_double_area(structure.nodes[corners])))  # an outline's is 1
-        stiffness.append(own.bending_modulus / length2 * modes.stiffness)
         normal = _double_area(structure.nodes[corners] + displacement[corners])
         normal = normal / np.linalg.norm(normal)
         nodes = np.array(surface.nodes_of(p))
-        angle = plates.angle[plates.start[p] : plates.start[p + 1]]
-        turns = structure.nodes.size - 1 - angle[angle < 0]
+        rows = slice(plates.start[p], plates.start[p + 1])
+        edges = -1 - plates.angle[rows][plates.angle[rows] < 0]
+        turns = structure.nodes.size + edges
         inner = np.arange(first, first + len(modes.stiffness))
         first += len(inner)
         # heights of the nodes, turns of the edges and amplitudes by the dofs
         height = np.kron(np.eye(len(nodes)), normal)
-        turned = np.sqrt(length2) * per_hidden * np.eye(len(turns))
+        turned = np.sqrt(length2) * body.sheet.per_hidden * np.eye(len(turns))
         by = block_diag(height, turned, np.eye(len(inner)))
         mass = total[p] * modes.mass
         mass[: len(nodes), : len(nodes)] -= rule.get(p, total[p] * TRIANGLE_MASS)
         dofs = np.concatenate([(3 * nodes[:, None] + np.arange(3)).ravel(), turns, inner])
         masses.append(_entries(dofs, dofs, by.T @ mass @ by))
+        stiff = own.bending_modulus / length2 * modes.stiffness
+        stiffness.append(_entries(inner, inner, stiff))
+        # neighbors count along their edge from opposite ends
+        own_turns = modes.turns @ angles[rows][:, dofs[: -len(inner)]].toarray()
+        more = np.eye(len(own_turns), len(inner)) / np.sqrt(length2)
+        sign = np.where(side[edges, None], (-1.0) ** order, 1.0).ravel()
+        row = (TURNS * beside[edges, None] + order - 1).ravel()
+        uneven.append(_entries(row, dofs, sign[:, None] * np.column_stack([own_turns, more])))
         ends = _ends(nodes, len(corners))
         along = np.kron(0.5 * ends, np.eye(3) - np.outer(normal, normal))
         across = np.kron(modes.between @ by, normal[:, None])
@@ -163,13 +193,23 @@ def amplitudes(structure: Any, displacement: NDArray, size: int, count: int) -> 
         row = 3 * sum(map(len, points)) + np.arange(len(across))
         between.append(_entries(row, dofs, across))
         points.append(0.5 * ends @ structure.nodes[nodes])
-    middle = np.concatenate(points)
+    middle, fold = np.concatenate(points), np.repeat(np.arange(len(slope)), TURNS)
+    share, turns = np.tile(1.0 / (2 * order + 1), len(slope)), _matrix(uneven, len(fold), first)
+    creases = turns.T @ (turns * (slope[fold] * share)[:, None])
     return Amplitudes(
-        np.concatenate(stiffness),
+        sparse.csr_array(_matrix(stiffness, first, first) + creases),
         _matrix(masses, first, first),
         middle,
         _matrix(between, middle.size, first),
-    )
+        turns, fold, share, first - size,
+    )  # fmt: skip
+
+
+def _sides(rotations: NDArray) -> tuple[NDArray, NDArray]:
+    """Fold (r,) at which each rotation is, and the side of it (r,), by rotations (nf, 2)."""
+    fold, side = np.nonzero(rotations >= 0)
+    order = np.argsort(rotations[fold, side])
+    return fold[order], side[order]
 
 
 def _ends(nodes: NDArray, corners: int) -> NDArray:

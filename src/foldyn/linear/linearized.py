@@ -136,9 +136,13 @@ class Linearized:
 
     def between(self, motions: NDArray) -> NDArray:
         """Displacements (3q, k) of the points `inner.points` in motions (nf, k)."""
-        full = np.zeros((self.inner.between.shape[1], motions.shape[1]), motions.dtype)
+        return self.inner.between @ self.whole(motions)
+
+    def whole(self, motions: NDArray) -> NDArray:
+        """Motions (m, k) of all unknowns in motions (nf, k)."""
+        full = np.zeros((self.inner.mass.shape[0], motions.shape[1]), motions.dtype)
         full[self.free] = motions
-        return self.inner.between @ self.case.constraints.displacement(full)
+        return self.case.constraints.displacement(full)
 
     def projected(self, force: NDArray) -> NDArray:
         """Forces (nf,) on the free dofs, N, of forces (3n,) on all nodes."""
@@ -203,7 +207,7 @@ def linearize(
     point = operating_point(case, state, load_factor)
     check_contact(case, point.displacement, point.planes)
     body, contact = point.body.parted(ContactTerm)
-    inner = amplitudes(case.structure, point.displacement, body.size, internal)
+    inner = amplitudes(case.structure, body, point.dofs, internal)
     free = np.concatenate([case.free_dofs, body.hidden, inner.dofs])
     exact = body.tangent(point.dofs)
     change, soft = _slope_change(case, body, point.dofs, amplitude)
@@ -222,7 +226,9 @@ def linearize(
         stiffness = sparse.csr_array(stiffness + _symmetric(loads, free))
     stiffness, mass = inner.stiffened(stiffness), inner.massed(mass_of(case))
     ties, more = case.constraints, inner.behind(damping_matrix(case, point.dofs, True))
-    damping = case.rayleigh.matrix(mass, inner.stiffened(_reference(case, exact)))
+    if internal:
+        more = inner.damped(more, case.crease_damping * body.sheet.fold_hinges().length)
+    damping = case.rayleigh.matrix(mass, _reference(case, inner.stiffened(exact), internal))
     modal = _modal_rows(case, point.displacement, stiffness, mass, internal)
     if contact is not None:  # it damps nothing
         stiffness = sparse.csr_array(stiffness + inner.behind(contact.tangent(point.dofs)))
@@ -245,8 +251,8 @@ def linearize(
         unbalanced=point.balance.residual,
         internal=internal,
         inner=inner,
-        branches=branches_of(case, point.dofs, free, stiffness.shape[0]),
-        responding=branches_of(case, point.dofs, free, stiffness.shape[0], dampers=True),
+        branches=branches_of(case, point.dofs, free, inner),
+        responding=branches_of(case, point.dofs, free, inner, dampers=True),
     )
 
 
@@ -307,19 +313,20 @@ def _modal_rows(
         modal = modal_rows(case)
     else:
         body, rest = case.elastic_body, np.zeros_like(state)
-        inner = amplitudes(case.structure, rest, body.size, internal)
+        inner = amplitudes(case.structure, body, body.dofs(rest), internal)
         stiffness = inner.stiffened(body.tangent(body.dofs(rest)))
         modal = rows_of(damping, case, stiffness, inner.massed(mass_of(case)), rest)
     modal.warn()
     return np.pad(modal.rows, ((0, 0), (0, stiffness.shape[0] - modal.rows.shape[1])))
 
 
-def _reference(case: Case, exact: sparse.csr_array) -> sparse.csr_array:
+def _reference(case: Case, exact: sparse.csr_array, internal: int) -> sparse.csr_array:
     """K0 of the damping (m, m), N/m: the exact tangent in the state, or that at rest."""
     if case.rayleigh.state != "rest" or case.rayleigh.beta == 0.0:
         return exact
     body = case.elastic_body
-    return body.tangent(body.dofs(np.zeros_like(case.structure.nodes)))
+    rest = body.dofs(np.zeros_like(case.structure.nodes))
+    return amplitudes(case.structure, body, rest, internal).stiffened(body.tangent(rest))
 
 
 def _block(matrix: sparse.sparray, free: NDArray) -> sparse.csc_array:

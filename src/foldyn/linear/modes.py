@@ -75,7 +75,8 @@ def modes(
     internal : int
         How many internal amplitudes (Craig and Bampton) each panel has beside its nodes, 0 to 6:
         what its plate does between corners, center and creased edges. One comes with each edge
-        without a crease. With the scheme "n5b8e" and the mass "condensed" alone; see
+        without a crease, and three with each of the others, by which creases turn unevenly along
+        their length. With the scheme "n5b8e" and the mass "condensed" alone; see
         `foldyn.linear.internal_modes`.
     verify : bool
         Whether to prove by one more factorization that no mode was missed. It costs about as much
@@ -159,7 +160,7 @@ def _variables(
     factors = shapes.T @ (linear.mass @ along)
     full = linear.expanded(shapes).T
     return {
-        **(_internal(linear, shapes) if linear.internal else {}),
+        **(_internal(linear, values, shapes) if linear.internal else {}),
         "frequency": omega / (2.0 * np.pi),
         "eigenvalue": values,
         "shape": full.reshape(-1, *linear.displacement.shape),
@@ -200,13 +201,12 @@ def _warn_of_twins(linear: Linearized, values: NDArray, shapes: NDArray) -> None
             )
 
 
-def _internal(linear: Linearized, shapes: NDArray) -> dict[str, Any]:
+def _internal(linear: Linearized, values: NDArray, shapes: NDArray) -> dict[str, Any]:
     """What shapes (nf, k) do between the nodes of panels with internal amplitudes."""
-    inner = linear.free >= linear.case.body.size
-    strain = shapes * (linear.stiffness @ shapes)
-    whole, part = strain.sum(axis=0), strain[inner].sum(axis=0)
-    share = np.divide(part, whole, out=np.zeros_like(whole), where=np.abs(whole) > part)
-    points = linear.inner.points
+    strain = np.einsum("ik,ik->k", shapes, linear.stiffness @ shapes)
+    whole, points = linear.whole(shapes), linear.inner.points
+    part = np.einsum("ik,ik->k", whole, linear.inner.stiffness @ whole)
+    share = np.divide(part, strain, out=np.zeros_like(strain), where=values != 0.0)
     return {
         "internal_share": share,
         "between_shape": linear.between(shapes).T.reshape(shapes.shape[1], *points.shape),

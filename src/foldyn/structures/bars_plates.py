@@ -18,6 +18,7 @@ from foldyn.mechanics.plates import (
     PlatesWork,
     plates_kernels,
     plates_work,
+    turn_folds,
     turn_hinges,
 )
 from foldyn.mechanics.plates_tangent import PlatesPattern, add_plates_tangent, plates_pattern
@@ -189,6 +190,21 @@ class BarsPlatesTerm(SheetTerm):
                 "fold_law",
             )
         return super().soft_hinges(q)
+
+    def turns(self, q: NDArray) -> tuple[sparse.csr_array, NDArray]:
+        """Gradients (nq, m), 1/m, of the plates' angles, and slopes (nf,) of the folds, N m/rad."""
+        model, work, hinges = self.model, plates_work(self.model), len(self.model.hinges)
+        displacement, rotation = self._split(q)
+        turn_hinges(model, displacement, work)
+        turn_folds(model, rotation, work)
+        columns = 3 * model.hinges[:, :, None] + np.arange(3)
+        places = (np.repeat(np.arange(hinges), 12), columns.ravel())
+        nodal = sparse.coo_array((work.gradient.ravel(), places), shape=(hinges, self.size))
+        edges = self.per_hidden * sparse.eye_array(model.rotations, self.size, k=self._nodal)
+        rows = np.where(model.angle < 0, hinges - 1 - model.angle, model.angle)
+        slope = self._laws[0].slope(work.fold_angle, model.fold_rest)
+        all_turns = sparse.csr_array(sparse.vstack([nodal, edges], format="csr"))
+        return all_turns[rows], model.fold_stiffness * slope
 
     # ------------------------------------------------------------------ rest angles
     @property

@@ -37,7 +37,7 @@ def panel_stiffness(panel: Outline, poissons_ratio: float) -> NDArray:
     stiffness = extrapolated(coarse, fine, FINE / COARSE)
     held = heights_and_slopes(panel)
     stiffness = held.T @ stiffness @ held
-    turned = _heights(panel, len(stiffness))
+    turned = least_heights(panel, len(stiffness))
     out = turned.T @ stiffness @ turned
     out = 0.5 * (out + out.T)
     out.setflags(write=False)
@@ -56,10 +56,10 @@ def panel_moments(panel: Outline, poissons_ratio: float) -> NDArray:
         extrapolated(a, b, FINE / COARSE) for a, b in zip(coarse, fine, strict=True)
     )
     moments = heights_and_slopes(panel).T @ (stiffness @ _paraboloid(panel) - held_back)
-    return _heights(panel, len(moments)).T @ moments
+    return least_heights(panel, len(moments)).T @ moments
 
 
-def _heights(panel: Outline, size: int) -> NDArray:
+def least_heights(panel: Outline, size: int) -> NDArray:
     """Matrix (size, q): the least heights with these turns of spokes, the other angles as are."""
     points, corners = _points(panel), len(panel.corners)
     spokes = _spoke_turns(points, corners) if panel.center else np.zeros((0, len(points)))

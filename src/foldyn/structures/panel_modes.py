@@ -4,11 +4,16 @@ A panel of the scheme n5b8e moves as the plate that follows the heights of its c
 and the turns beta of its creased edges statically (`structures.condensed_panel`). The lowest modes
 of the plate with all these held add what it does besides: heights
 
-    w = Psi_h h + Psi_beta beta + Phi a,
+    w = Psi_h h + Psi_beta beta + Psi_gamma gamma + Phi a,
 
 Psi the static shapes, Phi the modes with the amplitudes a. Static shapes and modes with held ends
 have no stiffness in common; their masses have. (R. R. Craig and M. C. C. Bampton, AIAA Journal 6,
 1968.)
+
+Edges also turn unevenly: by beta_k P_k(s), P_k the Legendre polynomials of the place s from -1 to 1
+along the edge. Without moments of that shape a panel has beta_k = T phi of its angles phi (spokes
+and mean turns beta); gamma, amplitudes as well, are what comes to it. They have no stiffness in
+common with phi and are held in the modes.
 """
 
 from __future__ import annotations
@@ -19,12 +24,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg import block_diag, null_space
 
 from foldyn.algebra.eigen import Pencil, Spectrum, lowest
 from foldyn.algebra.extrapolation import extrapolated
-from foldyn.structures.condensed_panel import COARSE, FINE, heights_and_slopes
+from foldyn.structures.condensed_panel import (
+    COARSE,
+    FINE,
+    heights_and_slopes,
+    least_heights,
+)
 from foldyn.structures.panel_plate import Outline, PanelPlate
 
+TURNS = 3  # uneven turns of an edge, P_1 and on
 SPARE = 4  # modes beyond those asked for, whose order finer meshes may change
 EQUAL = 1e-3  # relative distance of eigenvalues that belong together: neither is taken alone
 
@@ -34,18 +46,21 @@ class PanelModes(NamedTuple):
 
     Attributes
     ----------
-    stiffness : (k,)
-        Of the amplitudes, whose mass is 1.
+    stiffness : (k, k)
+        Of the amplitudes: gamma of each edge that turns, then those of modes, whose mass is 1.
     mass : (b + k, b + k)
         Of all its heights w: the heights of corners and center, the turns of creased edges that
         are not clamped, the amplitudes.
     between : (q, b + k)
         Heights by these in the middles of the edges, then of the spokes.
+    turns : (t, q)
+        T: uneven turns by the angles of the panel, see `structures.condensed_panel`.
     """
 
     stiffness: NDArray
     mass: NDArray
     between: NDArray
+    turns: NDArray
 
 
 @lru_cache(maxsize=4096)
@@ -67,11 +82,21 @@ def panel_modes(panel: Outline, poissons_ratio: float, count: int) -> PanelModes
     value, shapes = value[kept], shapes[:, kept]
     if value[count] < (1.0 + EQUAL) * value[count - 1]:
         count += 1
-    static = fine.solved([*fine.heights, *fine.slopes])[0] @ turning(panel)
-    heights = np.column_stack([static, shapes[:, :count]])
+    solved = [p.solved([*p.heights, *p.slopes, *p.uneven(TURNS)]) for p in (coarse, fine)]
+    static, all_held = solved[1][0], extrapolated(solved[0][1], solved[1][1], FINE / COARSE)
+    first = len(fine.heights) + len(fine.slopes)
+    own = all_held[first:, first:]
+    turns = np.linalg.solve(own, all_held[first:, :first])  # less the slopes
+    natural = static[:, :first] - static[:, first:] @ turns
+    heights = np.column_stack([natural @ turning(panel), -static[:, first:], shapes[:, :count]])
     mass = heights.T @ (fine.mass @ heights)
     _, middle = cKDTree(fine.points).query(middles(panel))
-    out = PanelModes(value[:count].copy(), 0.5 * (mass + mass.T), heights[middle])
+    out = PanelModes(
+        block_diag(0.5 * (own + own.T), np.diag(value[:count])),
+        0.5 * (mass + mass.T),
+        heights[middle],
+        turns @ heights_and_slopes(panel) @ least_heights(panel, first),
+    )
     for array in out:
         array.setflags(write=False)
     return out
@@ -120,15 +145,19 @@ def _basis(plate: PanelPlate) -> sparse.csc_array:
     """Unknowns of a plate by those that are left when corners, center and edges are held.
 
     Held heights are zero; those along straight edges, too, since their ends are, and slopes along
-    clamped ones. Of the slopes of an edge the last is the one that makes their mean zero.
+    clamped ones. Those along others have no part that is held.
     """
     size = plate.stiffness.shape[0]
     still = {next(iter(entries)) for entries in (*plate.heights, *plate.lines)}
-    last = {next(reversed(entries)): entries for entries in plate.slopes}
-    free = [k for k in range(size) if k not in still and k not in last]
-    column = {k: j for j, k in enumerate(free)}
-    entries = [(k, j, 1.0) for k, j in column.items()]
-    for k, mean in last.items():
-        entries += [(k, column[other], -mean[other] / mean[k]) for other in mean if other in column]
-    row, place, value = (np.array(each) for each in zip(*entries, strict=True))
-    return sparse.csc_array((value, (row, place)), shape=(size, len(free)))
+    held: dict[tuple[int, ...], list[list[float]]] = {}
+    for entries in (*plate.slopes, *plate.uneven(TURNS)):
+        held.setdefault(tuple(entries), []).append(list(entries.values()))
+    rest = sorted(set(range(size)) - still - {side for edge in held for side in edge})
+    places, blocks = rest, [sparse.eye_array(len(rest))]
+    for edge, rows in held.items():
+        free = [j for j, side in enumerate(edge) if side not in still]
+        places = places + [edge[j] for j in free]
+        blocks.append(null_space(np.array(rows)[:, free]))
+    found = sparse.coo_array(sparse.block_diag(blocks))
+    row, column = found.coords
+    return sparse.csc_array((found.data, (np.array(places)[row], column)), (size, found.shape[1]))

@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial import Legendre
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
@@ -92,6 +93,7 @@ class PanelPlate:
         number = {pair: len(self.points) + k for k, pair in enumerate(map(tuple, ends.tolist()))}
         self.heights = [{node: 1.0} for node in at.tolist()]
         self.slopes, self.bows, self.lines = [], [], []
+        self._turning = []  # the slopes of edges that are not clamped
         for k, nodes in enumerate(edge.tolist() for edge in edges):
             if panel.creased[k]:
                 mean = {
@@ -99,6 +101,7 @@ class PanelPlate:
                     for a, b in pairwise(nodes)
                 }
                 self.slopes.append(mean)
+                self._turning += [] if panel.clamped[k] else [mean]
                 *others, (last, share) = mean.items()
                 for side, part in others if panel.clamped[k] else ():
                     self.lines.append({side: n * part, last: -n * share})
@@ -111,6 +114,20 @@ class PanelPlate:
                 for step in range(1, n):
                     part = step / n
                     self.lines.append({nodes[step]: 1.0, nodes[0]: part - 1.0, nodes[-1]: -part})
+
+    def uneven(self, count: int) -> list[dict[int, float]]:
+        """Parts P_1 to P_count (Legendre) of the slopes along each creased edge not clamped.
+
+        Linear functions of the unknowns, as `slopes` is of the part P_0, the mean.
+        """
+        found = []
+        for mean in self._turning:
+            ends = np.linspace(-1.0, 1.0, len(mean) + 1)
+            for k in range(1, count + 1):
+                integral = Legendre.basis(k + 1)(ends) - Legendre.basis(k - 1)(ends)
+                factor = 0.5 * len(mean) * np.diff(integral)
+                found.append(dict(zip(mean, factor * list(mean.values()), strict=True)))
+        return found
 
     def solved(self, held: list[dict[int, float]]) -> tuple[NDArray, NDArray]:
         """Unknowns (size, k) where one of the k held functions is 1; the stiffness (k, k).
