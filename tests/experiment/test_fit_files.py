@@ -145,7 +145,7 @@ def test_fit_files_with_mistakes(folder, old, new, message) -> None:
         ("-200,-17", "-200,", 'line 3, column "force [mN]": is empty'),
         ("-200,-17", "-200,x", 'line 3, column "force [mN]": "x" is not a number'),
         ("force [mN]", "force", 'column "force": has no unit'),
-        ("force [mN]", "force [mm]", 'column "force [mm]": is a length, unit = "N" asks'),
+        ("force [mN]", "force [mm]", 'column "force [mm]": is a length, and a force in N'),
         ("force [mN]", "load [mN]", 'force = "force": no such column'),
     ],
 )

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.arguments import Check
-from foldyn.cases.decode import Part, part_from
+from foldyn.cases.decode import Part, check_keys
 from foldyn.cases.selection import Creases, resolve_creases
 from foldyn.errors import InputError, within
 from foldyn.values import choice, number, number_or_list, show, whole
@@ -264,7 +264,8 @@ def dampings_of(kind: Any, value: Any) -> list[Damping]:
 
 def _damping_of(kind: Any, value: Any) -> Damping:
     if isinstance(value, Mapping):
-        return part_from(value, (kind,), f"damping.{kind.key}")
+        check_keys(value, kind.by_key())
+        return kind.of(value)
     first = next(iter(kind.by_key()))
     try:
         return kind.of({first: value})
