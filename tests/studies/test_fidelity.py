@@ -100,7 +100,7 @@ def test_sets_are_large_enough():
     assert [c.name for c in drawn(seed=1)] != names["drawn"]
 
 
-@pytest.mark.parametrize("number", [0, 19, 34, 47])
+@pytest.mark.parametrize("number", [0, 19, pytest.param(34, marks=pytest.mark.matrix), 47])
 def test_stored_results_are_what_the_code_gives(number):
     case = documented()[number]
     (stored,) = [m for m in read(RESULTS / "documented.csv") if m.case == case.name]
@@ -248,6 +248,7 @@ def test_polygons_meet_at_their_dihedral(sides):
     assert min(angle, 360 - angle) == pytest.approx(70)
 
 
+@pytest.mark.matrix
 def test_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(command, "documented", lambda: documented()[:1])
     monkeypatch.setattr(command, "statics_table", lambda: "small loads")

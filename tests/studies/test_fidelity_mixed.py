@@ -93,6 +93,7 @@ def shares(models, low):
     return {name: np.mean(np.abs(values) < NEAR) for name, values in errors.items()}
 
 
+@pytest.mark.matrix
 def test_shares_of_the_mixed_sets():
     low = shares(("plate", "n5b8e"), low=True)
     assert low["n5b8e"] >= 0.95 and low["plate"] >= 0.90
