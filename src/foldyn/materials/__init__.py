@@ -8,6 +8,8 @@ from typing import Any
 
 import foldyn.jit  # noqa: F401 - asks for what Numba needs, before anything imports Numba
 from foldyn.errors import InputError
+from foldyn.materials import switch
+from foldyn.materials.branch_switch import MEMORY_LAWS
 from foldyn.materials.custom import CustomBarLaw, CustomHingeLaw
 from foldyn.materials.enhanced_linear import EnhancedLinear
 from foldyn.materials.eyring import Eyring
@@ -19,7 +21,6 @@ from foldyn.materials.plastic import Plastic
 from foldyn.materials.plate_superlinear import PlateSuperlinear
 from foldyn.materials.prony import Prony
 from foldyn.materials.superlinear import Superlinear
-from foldyn.materials.switch import bar_table, hinge_table
 
 __all__ = [
     "BAR_LAWS",
@@ -42,15 +43,13 @@ __all__ = [
     "hinge_law",
 ]
 
-BarLaw.compiled, HingeLaw.compiled = staticmethod(bar_table), staticmethod(hinge_table)
+BarLaw.compiled = staticmethod(switch.bar_table)
+HingeLaw.compiled = staticmethod(switch.hinge_table)
 
-BAR_LAWS: Mapping[str, type[BarLaw]] = {law.name: law for law in (Ogden, LinearBar)}
+BAR_LAWS: Mapping[str, type[BarLaw]] = {law.name: law for law in switch.BAR_LAWS}
 HINGE_LAWS: Mapping[str, type[HingeLaw]] = {
-    law.name: law
-    for law in (
-        LinearHinge, Superlinear, EnhancedLinear, PlateSuperlinear, Prony, Plastic, Eyring,
-    )
-}  # fmt: skip
+    law.name: law for law in (*switch.HINGE_LAWS, *MEMORY_LAWS)
+}
 
 
 def bar_law(spec: str | BarLaw) -> BarLaw:

@@ -7,6 +7,8 @@ import numpy as np
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.materials import crease_damper, eyring, plastic, prony
 
+MEMORY_LAWS = (prony.Prony, plastic.Plastic, eyring.Eyring)
+
 
 @scalar
 def update(code, p, before, after, dt, one, other):

@@ -1,8 +1,8 @@
 """The one compiled switch from a law's integer code to its formulas.
 
-A new built-in law adds its line to each function of its kind. A user's law is called at
-`address`; an unknown code, which has none, gives nan (`Law.check` refuses it earlier). Hinge
-parameters a, b, c, d are the four columns of `HingeLaw.parameters`.
+A new built-in law has its place in the list of its kind and a line in each function of it. A
+user's law is called at `address`; an unknown code, which has none, gives nan (`Law.check` refuses
+it earlier). Hinge parameters a, b, c, d are the four columns of `HingeLaw.parameters`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,12 @@ from foldyn.jit.compiled import inner_scalar, kernel, scalar
 from foldyn.jit.intrinsics import call1, call2
 from foldyn.materials import enhanced_linear, linear, ogden, plate_superlinear, superlinear
 from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
+
+BAR_LAWS = (ogden.Ogden, linear.LinearBar)
+HINGE_LAWS = (
+    linear.LinearHinge, superlinear.Superlinear, enhanced_linear.EnhancedLinear,
+    plate_superlinear.PlateSuperlinear,
+)  # fmt: skip
 
 
 @inner_scalar
