@@ -199,7 +199,7 @@ def test_contradictions(supports, text) -> None:
         (lambda: BaseMotion(["x"]), r'axis = \["x"\]: must be one of'),
         (lambda: Impose([0, 0], "x", [1, 2]), "nodes = .*: node 0 is listed twice"),
         (lambda: Impose([0], "x", [np.inf]), r"value\[0\] = inf: must be a finite number"),
-        (lambda: Impose([0, 1], "x", [1.0]), r"value = \[1.0\]: 1 values for 2 nodes; give one"),
+        (lambda: Impose([0, 1], "x", [1.0]), r"value = \[1.0\]: 1 value for 2 nodes; give one"),
         (lambda: Impose([0, 1], "x", []), r"= \[\]: must be a number, or a list of one per node"),
         (lambda: Impose("xmin", "x", [1.0]), 'value = .* but nodes is the selection "xmin"; give'),
         (lambda: BaseMotion("x", value=[1, 2]), r"value = \[1, 2\]: must be a number"),

@@ -109,7 +109,7 @@ direction = "-x"
         ("[damping]", "strain = -1", "damping.strain = -1: must be at least 0"),
         ("[damping]", "creases = [99]", r"damping.creases = \[99\]: must be a number"),
         ("[damping]", "creases = { coefficient = 1, creases = [99] }", "crease 99 is out of range"),
-        ("[damping]", "creases = [{ coefficient = 1 }, {}]", r"\[1\]: give coefficient"),
+        ("[damping]", "creases = [{ coefficient = 1 }, {}]", r"\[1\].coefficient: missing"),
         (
             "[[supports]]",
             "between = [0, 8]",

@@ -81,6 +81,7 @@ def test_mp4_without_ffmpeg_is_refused_at_once(workplace, edited, monkeypatch) -
     assert workplace.call("run", "case.toml", "--out", "r", "--no-figures").status == 0
 
 
+@pytest.mark.matrix
 def test_figures_of_many_nodes_and_no_load(workplace, monkeypatch) -> None:
     """A sheet without loads shows some of its vertices, not hundreds of rows."""
     shown = []

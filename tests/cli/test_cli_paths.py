@@ -194,6 +194,7 @@ def test_figures_of_a_loaded_path(workplace) -> None:
     assert full[-2:] == ["stable", ""]
 
 
+@pytest.mark.matrix
 def test_figures_of_moved_supports(workplace) -> None:
     """Their force over their displacement; the load factor over it would say nothing."""
     workplace.write(PRESSED)

@@ -41,6 +41,7 @@ def deepest(case: fd.Case, motion) -> float:
     )
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the energy balance")
 @pytest.mark.parametrize(
     ("method", "dt", "balance", "turn"),

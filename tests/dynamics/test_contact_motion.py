@@ -203,6 +203,7 @@ RUBBING = [
 ]
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:contact. at rest panels are nearer")
 @pytest.mark.parametrize(
     ("kind", "method", "duration", "dt", "near", "lost", "error"),

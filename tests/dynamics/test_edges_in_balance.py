@@ -161,6 +161,7 @@ def test_a_state_holds_what_damped_creases_remember(method, kind):
     assert apart(rest.displacement.values[-1], whole.displacement.values[-1]) < 1e-6
 
 
+@pytest.mark.matrix
 def test_dampers_take_what_jumps():
     """The moment of a damped crease that jumps turns it at a finite rate."""
     made = case([moment(fd.Pulse(0.1))], damping=fd.CreaseDamping(0.5))
@@ -178,6 +179,7 @@ JUMPS = (
 MIURA = fd.patterns.miura()
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("jump", JUMPS)
 @pytest.mark.parametrize(("method", "error"), [(ALPHA, 1e-2), ("energy_momentum", 1e-3)])
 def test_edge_angles_jump_beside_damped_creases(method, error, jump):

@@ -87,6 +87,7 @@ def test_histories_are_evaluated_at_stage_times():
     assert np.isin(wanted, np.concatenate(seen)).all()
 
 
+@pytest.mark.matrix
 def test_superlinear_law_lowers_the_order_to_seven_thirds():
     """A restoring force |u|^(4/3) is not smooth where u crosses zero.
 

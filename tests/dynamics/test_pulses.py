@@ -105,7 +105,10 @@ def test_random_pulses_on_a_moving_oscillator(method):
 
 @pytest.mark.parametrize(
     ("kind", "method"),
-    [*(("bars", name) for name in METHODS), *(("shell", name) for name in SHELLS)],
+    [
+        *(("bars", name) for name in METHODS),
+        *(pytest.param("shell", name, marks=pytest.mark.matrix) for name in SHELLS),
+    ],
 )
 def test_the_impulse_arrives_on_a_free_sheet(kind, method):
     """Momentum after the pulse = the pulse's integral, whatever bends and swings meanwhile."""

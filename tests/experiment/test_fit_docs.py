@@ -27,6 +27,7 @@ def digest(*arguments: str) -> str:
     return problem(plan.case, plan.data, plan.parameters, plan.ties).digest()
 
 
+@pytest.mark.matrix
 def test_the_fit_file_the_command_line_and_python_say_the_same(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     weights, _, command, *_ = blocks("")

@@ -174,7 +174,7 @@ def test_magnitudes_and_other_quantities(folder) -> None:
 @pytest.mark.parametrize(
     ("name", "old", "new", "message"),
     [
-        ("modes.csv", "[Hz],frequency_sigma", "[mm],frequency_sigma", "is a length, unit = "),
+        ("modes.csv", "[Hz],frequency_sigma", "[mm],frequency_sigma", "is a length, and a freq"),
         ("modes.csv", "2,0.961", "2,0.5", "0.5 Hz comes after 0.724 Hz; sort the modes"),
         ("modes.csv", "2,0.961", "1,0.961", "has mode 1 twice"),
         ("modes.csv", "2,0.961", "1.5,0.961", "modes.csv: mode = 1.5: must be a whole number"),
@@ -183,7 +183,7 @@ def test_magnitudes_and_other_quantities(folder) -> None:
         ("shapes.csv", "\n3,3,", "\n2,3,", "has two lines for node 3 at the mode 2"),
         ("shapes.csv", "mode,", "modes,", '"mode": no such column; did you mean'),
         ("frf.csv", "real [mm/N]", "real [kg]", "the unit [kg] is none of a response; use one"),
-        ("frf.csv", "imag [mm/N]", "imag [m/(N s)]", "is a mobility, unit = "),
+        ("frf.csv", "imag [mm/N]", "imag [m/(N s)]", "is a mobility, and a rec"),
         ("frf.csv", "z imag", "z phase", 'no such column; did you mean'),
         ("frf.csv", "0.5;1200", "2.5;1200", "must increase from 0 Hz or more; sort the lines"),
         ("fit.toml", "modes = [1, 3]", "modes = [1, 4]", "there is no mode 4; it has 1, 2, 3"),

@@ -241,6 +241,7 @@ def test_nowhere_to_keep_kernels(folders, kernels, monkeypatch):
     assert not ready(function) and function.stats.cache_path is None
 
 
+@pytest.mark.matrix
 def test_a_package_and_a_home_that_cannot_be_written(tmp_path):
     package = copy_package(tmp_path)
     for folder in [package, *(path for path in package.rglob("*") if path.is_dir())]:

@@ -30,6 +30,7 @@ def tree(path: Path) -> ast.Module:
     return ast.parse(path.read_text("utf-8"))
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     "named",
     [True, pytest.param(False, marks=pytest.mark.matrix)],

@@ -74,6 +74,7 @@ def test_one_hinge_balances_with_its_own_slope():
     assert largest_error(found.receptance, secant.receptance.values) < 1e-8
 
 
+@pytest.mark.matrix
 def test_rising_and_falling_sweeps_differ_where_there_are_two_branches():
     """Hardening: rising frequencies follow the upper branch to its end, as the balance does."""
     case, f = flap(alpha=0.1), np.arange(0.44, 0.581, 0.02)

@@ -47,7 +47,9 @@ def test_simulated_motions_write_no_document_and_discretize_nothing(monkeypatch)
 
 # ------------------------------------------------------------------------ linear structures
 @pytest.mark.parametrize("method", TIMED)
-@pytest.mark.parametrize("integrator", ["rk4", "dormand_prince"])
+@pytest.mark.parametrize(
+    "integrator", [pytest.param("rk4", marks=pytest.mark.matrix), "dormand_prince"]
+)
 def test_the_response_of_the_matrices(method, integrator):
     """Alpha and beta both; at the default step, half the critical one, and at a smaller one."""
     assert error_of(method, integrator=integrator, **TIMED[method]) < 5e-4
@@ -65,6 +67,7 @@ def test_the_error_falls_with_the_sampling(method):
     assert observed_order(intervals, errors) == pytest.approx(4.0, abs=0.5)
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")  # of the motion much is left
 def test_the_error_falls_with_the_duration_and_with_the_steadiness():
     """As the motion does, exp(-z w t) for the slower mode."""
@@ -80,6 +83,7 @@ def test_the_error_falls_with_the_duration_and_with_the_steadiness():
 LIFT = fd.Force([7], (1e-6, 0, 0))
 
 
+@pytest.mark.matrix
 def test_a_miura_cell():
     case, f = miura_case(alpha=2.0), np.arange(0.2, 4.01, 0.2)
     exact = frf(case, LIFT, f).receptance.values

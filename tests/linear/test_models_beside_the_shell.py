@@ -407,6 +407,7 @@ def test_only_comparisons_are_shown(quick):
         found.table("plates")
 
 
+@pytest.mark.matrix
 def test_graded_shells_agree_with_even_ones():
     """A free sheet has the same limits, within what both say they are off."""
     pattern = fd.patterns.miura(cells=(1, 1), a=0.05, b=0.05, panel_angle=60, dihedral=90)

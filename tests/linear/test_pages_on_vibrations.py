@@ -119,6 +119,7 @@ def test_every_method_and_option_has_a_row():
     assert all(f"`{name}`" in TEXT for name in shared)
 
 
+@pytest.mark.matrix
 def test_the_warning_that_the_page_speaks_of(names):
     with pytest.warns(FoldynWarning, match="secant"):
         frf(names["soft"], names["drive"], [1.0])

@@ -111,6 +111,7 @@ def test_threads_agree_to_rounding_and_repeat_to_the_bit(monkeypatch, count, win
         np.testing.assert_array_equal(together(model, u, works), first)
 
 
+@pytest.mark.matrix
 def test_evaluations_in_a_compiled_loop_do_not_overtake_each_other():
     """200 evaluations in which every thread moves its own nodes along the force."""
     model, u = sheet((60, 2))
@@ -218,6 +219,7 @@ def test_parts_of_a_count_follow_each_other():
         assert all(a[1] == b[0] for a, b in pairwise(parts))
 
 
+@pytest.mark.matrix
 def test_a_forked_process_can_use_threads_too():
     """Pools of threads that outlive a call would not survive this."""
     if not hasattr(__import__("os"), "fork"):

@@ -51,6 +51,7 @@ def _figures(case, trajectory):
     yield plots.plot_nyquist(response, 7)
 
 
+@pytest.mark.matrix
 def test_global_settings_are_neither_changed_nor_followed(case, trajectory):
     before = dict(matplotlib.rcParams)
     usual = [_pixels(figure) for figure in _figures(case, trajectory)]

@@ -119,6 +119,7 @@ def push_of_panels(case: fd.Case, path) -> np.ndarray:
     return force[case.structure.nodes[:, 0] < 0.04 - 1e-9].sum(axis=0)
 
 
+@pytest.mark.matrix
 def test_a_strip_folded_onto_itself_rests_as_bars_and_hinges_do():
     pytest.importorskip("ipctk")
     push, ends = [], []

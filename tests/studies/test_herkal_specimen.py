@@ -230,6 +230,7 @@ def photographs(changes=None):
     ).assign(rest_position=there.rest_position[:63].drop_vars(["node", "axis"]))
 
 
+@pytest.mark.matrix
 def test_folds_from_tracked_photographs() -> None:
     forces, shapes = evaluation.static_test(photographs(), "synthetic")
     np.testing.assert_allclose(forces.force, calibration.WEIGHTS)
@@ -409,6 +410,7 @@ def test_parts_need_those_before_them(tables) -> None:
     assert not fit.there(tables) and page.sections(tables, [fit, response], Album(tables)) == []
 
 
+@pytest.mark.matrix
 def test_a_table_of_weights_alone(tables, monkeypatch) -> None:
     """Folds are fitted, no damping; other data are computed anew."""
     (_, (fit, response)) = tasks.parts(synthetic.COARSE, data_of([str(tables / "weights.csv")]))

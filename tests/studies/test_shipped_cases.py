@@ -88,6 +88,7 @@ def tumbling(tmp_path_factory):
     return names["case_file"].case(), names["motion"], folder
 
 
+@pytest.mark.matrix
 def test_free_flight_keeps_the_energy(tumbling):
     _, motion, _ = tumbling
     strain = motion.strain_bars + motion.strain_folds + motion.strain_bends

@@ -7,6 +7,7 @@ that the caller puts "loads[0].history" in front.
 from __future__ import annotations
 
 import inspect
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING
@@ -79,11 +80,11 @@ def call_from(
             break
         except InputError as error:
             inside = error.field.rpartition(": ")[2]  # without the name of what was called
-            key = InputError("", inside).key
+            key = next(iter(re.findall(r"\w+", inside)), "")
             if key in left:
                 faults.add(InputError(error.reason, f".{inside}"))
             elif not faults.found:
-                faults.add(InputError(f": {error.reason}"))
+                faults.add(InputError(f": {f'{inside}{error.reason}'.removeprefix(': ')}"))
             if key not in left or known[key].default is inspect.Parameter.empty:
                 break
             del left[key]  # what else is wrong?
