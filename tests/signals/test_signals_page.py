@@ -11,7 +11,8 @@ from known_poles import Mode, receptance
 
 from foldyn import signals
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "signals.md").read_text("utf-8")
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGE, API = ((DOCS / name).read_text("utf-8") for name in ("signals.md", "api.md"))
 
 
 def test_the_example_runs():
@@ -20,6 +21,11 @@ def test_the_example_runs():
         exec(compile(block, "signals.md", "exec"), names)
     assert names["fit"].damping_ratio == pytest.approx(0.135, abs=4 * names["fit"].damping_error)
     assert names["rough"].damping_ratio == pytest.approx(0.135, rel=0.05)
+
+
+def test_the_reference_lists_every_function():
+    (members,) = re.findall(r"automodule:: foldyn\.signals\n +:members: (.*?)\n\n", API, re.S)
+    assert set(signals.__all__) - set(re.findall(r"\w+", members)) == set()
 
 
 def test_the_table_of_the_textbook_bias():
