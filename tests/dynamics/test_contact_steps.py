@@ -96,6 +96,7 @@ def turned(x, angle):
     return x @ rotation.T + np.array([0.3, -0.2, 0.1])
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("angle", [0.0, 0.5])
 @pytest.mark.parametrize("kind", KINDS)
 def test_work_is_the_change_of_the_energy(kind, angle):

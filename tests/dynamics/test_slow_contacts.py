@@ -126,6 +126,7 @@ def test_a_tower_that_rattles_takes_few_steps_that_conserve():
     assert u[-1, 6:12, 2].mean() == pytest.approx(-59.4106e-3, rel=1e-3)
 
 
+@pytest.mark.matrix
 def test_steps_overrun_no_gap_where_they_resolve_no_contact():
     """Only the stiffness of what touches may be left unresolved, not how fast a gap closes."""
     packed = pressed("centroid")

@@ -44,6 +44,7 @@ def test_files_that_are_no_films(tmp_path):
         load_tracks(text)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("roi", [(0, 0, 10, 10), (-1, 0, 100, 100), (500, 500, 100, 500)])
 def test_regions_outside_the_picture(sharp, roi):
     with pytest.raises(InputError, match="--roi"):

@@ -156,6 +156,7 @@ def test_damping_from_the_table_of_a_film(filmed):
     assert found.scores[0].count == np.isfinite(seen.values).sum()
 
 
+@pytest.mark.matrix
 def test_a_spectrum_wants_no_gaps_and_a_window_leaves_them_out(filmed):
     text = 'case = "sways.toml"\n[[parameters]]\nkey = "damping.alpha"\n[[data]]\n'
     text += 'kind = "spectrum"\nfile = "film.csv"\nnodes = [6]\nband = [5, 40]\n'

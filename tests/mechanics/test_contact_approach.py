@@ -123,6 +123,7 @@ def test_no_hinge_passes_zero():
         assert (np.abs(angles - before) < np.pi).all() and (near >= KEEP * was).all()
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("stretch", [1e-7, 1e-4])
 def test_the_tangent_of_lagged_friction_is_exact(stretch):
     """Sticking with a small stretch, slipping with a large one."""

@@ -34,6 +34,7 @@ def apart(case, u) -> np.ndarray:
     return places[upper, 2] - places[held, 2].mean()
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("model", ["bars", "shell"])
 def test_a_fold_pressed_shut_carries_the_load_at_its_thickness(model):
     case, path = pressed_shut(model)
