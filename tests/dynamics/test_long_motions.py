@@ -81,7 +81,6 @@ KINDS = {  # name of the case, its arguments, and what of the methods
     "actuated": (["rk4", "generalized_alpha"], {"duration": 0.6, "every": 0.01}),
     "creeping": (["rk4", "dormand_prince", "generalized_alpha"], {**SECOND, "dt": 0.002}),
     "sliding": (["newmark", "energy_momentum"], {"duration": 0.02, "every": 0.001}),
-    "touching": (["dormand_prince"], {"duration": 0.24, "every": 0.01}),
 }
 RUNS = [(kind, method) for kind, (methods, _) in KINDS.items() for method in methods]
 

@@ -31,7 +31,7 @@ print(*probe(pack([fd.HalfSine(1.0)], Callbacks()), 0.5), sum(probe.stats.cache_
 
 def copy_package(folder: Path) -> Path:
     """Copy of the package below `folder`; returns its folder."""
-    package, without = folder / "foldyn", shutil.ignore_patterns("__pycache__", "studies")
+    package, without = folder / "foldyn", shutil.ignore_patterns("__pycache__")
     shutil.copytree(Path(foldyn.__file__).parent, package, ignore=without)
     (package / "probes").mkdir()
     (package / "probes" / "__init__.py").touch()

@@ -49,6 +49,7 @@ def test_folds_from_forces_and_shapes(static_data) -> None:
 
 @pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:.*time step is too coarse")  # as coarse as the data's
+@pytest.mark.filterwarnings("ignore:damping. beta resists rotations")  # as the paper has it
 def test_damping_from_node_8_alone(released, release_data) -> None:
     """The issue asks for 10 %; all other front nodes are held out, and follow."""
     data = calibration.noisy(release_data, np.random.default_rng(7))

@@ -32,7 +32,6 @@ from foldyn.studies.herkal.sheet_models import (
     paper_rules,
     rules,
 )
-from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.study import LINEAR, Study, StudyPlan, mean_ranks, second_table
 from foldyn.studies.targets import Target, Verdict, read_targets
 
@@ -374,25 +373,6 @@ def test_command_refuses_bad_input(tmp_path, capsys):
     with pytest.raises(SystemExit) as stop:
         main(["study", "unknown"])
     assert stop.value.code == 2
-
-
-@pytest.mark.matrix
-def test_the_command_runs_and_goes_on(tmp_path, capsys):
-    """Quick study: shell and all rules; case 1 has the paper's best; a second call skips all."""
-    pytest.importorskip("cv2")
-    out = str(tmp_path / "study")
-    assert main(["study", "herkal", "--quick", "--out", out]) == 0
-    study = Study(studies.QUICK, tmp_path / "study", Data())
-    assert "The paper specimen: from photographs" in (tmp_path / "study/report.html").read_text()
-    row = study.table()["case1"]
-    assert all(0.0 < value < 1.0 for value in row.values())
-    assert study.frequencies("case2", "consistent").deviation[0] == pytest.approx(0.0, abs=0.15)
-    capsys.readouterr()
-    assert main(["study", "herkal", "--quick", "--out", out]) == 0
-    count = study.count
-    assert count == len(study.plan.jobs()) + 8 + 4  # other stiffnesses, the specimen
-    assert study.error("case2", "n5b8e") < study.error("case2", "consistent")
-    assert f"skipped {count} of {count} runs" in capsys.readouterr().out
 
 
 def test_the_specimen_is_left_out_without_opencv(tmp_path, monkeypatch, capsys):
