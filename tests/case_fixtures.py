@@ -1,4 +1,4 @@
-"""Fixtures of case files that are read and of results that are stored; for conftest.py."""
+"""Fixtures of case files that are read and of results that are stored."""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import settings
 
 from browsers import browser  # noqa: F401 - a fixture
+from case_fixtures import kept, read  # noqa: F401 - fixtures
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import pytest
 from attached_cases import MODELS
 
-from case_fixtures import kept, read  # noqa: F401 - fixtures
-
 
 @pytest.fixture(params=MODELS)
 def model(request):

@@ -9,13 +9,8 @@ from measured import apart, order
 from moving_sheets import SHEET
 
 import foldyn as fd
+from custom_laws import CUBIC
 
-CUBIC = fd.CustomHingeLaw(
-    energy_of=lambda t, r: 0.5 * (t - r) ** 2 + 0.25 * (t - r) ** 4,
-    moment_of=lambda t, r: (t - r) + (t - r) ** 3,
-    slope_of=lambda t, r: 1.0 + 3.0 * (t - r) ** 2,
-    name="cubic",
-)
 # theta1 and theta2 such that rest angles of 60 and 300 degrees lie in the locking range
 LAWS = {
     "linear": "linear",

@@ -212,7 +212,7 @@ RUBBING = [
         ("plane", ALPHA, 0.1, 2e-4, 0.02, 0.01, 1e-3),
         ("plane", ALPHA, 0.1, 1e-4, 0.01, 0.01, 1e-3),  # the normal force lags by a step
         ("plane", CONSERVING, 0.1, 1e-4, 0.02, 0.01, 1e-9),  # all that is taken is counted
-        *(pytest.param(*each, marks=pytest.mark.matrix) for each in RUBBING),
+        *RUBBING,
     ],
 )
 def test_a_strip_slides_above_the_angle_of_friction(kind, method, duration, dt, near, lost, error):

@@ -33,7 +33,7 @@ def tree(path: Path) -> ast.Module:
 @pytest.mark.matrix
 @pytest.mark.parametrize(
     "named",
-    [True, pytest.param(False, marks=pytest.mark.matrix)],
+    [True, False],
     ids=["NUMBA_CACHE_DIR", "beside the sources"],
 )
 def test_kernels_follow_the_sources_of_what_they_call(tmp_path, named):

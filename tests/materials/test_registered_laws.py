@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from custom_laws import CUBIC
 from foldyn.errors import InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS, BarLaw, HingeLaw, MemoryLaw, bar_law, hinge_law
 from foldyn.materials.switch import move_rest
@@ -22,11 +23,7 @@ HINGES = {
     # limits within the rest angles below: locked at rest
     "locked, stress-free": fd.EnhancedLinear(90, 270),
     "locked, as published": fd.EnhancedLinear(90, 270, rest="as_published"),
-    "custom": fd.CustomHingeLaw(
-        energy_of=lambda t, r: 0.5 * (t - r) ** 2 + 0.25 * (t - r) ** 4,
-        moment_of=lambda t, r: (t - r) + (t - r) ** 3,
-        slope_of=lambda t, r: 1.0 + 3.0 * (t - r) ** 2,
-    ),
+    "custom": CUBIC,
 }
 THETA, REST = np.meshgrid(
     np.radians([30.0, 120.0, 250.0, 330.0]), np.radians([40.0, 100.0, 200.0, 320.0])

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from springs import Net
 
 import foldyn as fd
+from custom_laws import CUBIC
 from foldyn.checks import observed_order
 from foldyn.dynamics.system import pack
 from foldyn.jit.compiled import kernel
@@ -31,12 +32,6 @@ from pairwise import in_pairs
 SHEET = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.3, thickness=0.01, density=1.0)
 FOLD = fd.patterns.simple_fold(a=1.0, b=1.3, dihedral=100)
 MODELS = ("plate", "herkal", "n5b8e", "shell")
-CUBIC = fd.CustomHingeLaw(
-    energy_of=lambda t, r: 0.5 * (t - r) ** 2 + 0.25 * (t - r) ** 4,
-    moment_of=lambda t, r: (t - r) + (t - r) ** 3,
-    slope_of=lambda t, r: 1.0 + 3.0 * (t - r) ** 2,
-    name="cubic",
-)
 OTHER_LAWS = {
     "superlinear": {"fold_law": "superlinear", "bend_law": "superlinear"},
     "locking": {"fold_law": fd.EnhancedLinear(110, 285), "bend_law": "linear"},

@@ -80,11 +80,12 @@ def call_from(
             break
         except InputError as error:
             inside = error.field.rpartition(": ")[2]  # without the name of what was called
-            key = next(iter(re.findall(r"\w+", inside)), "")
+            key = re.split(r"\W", inside)[0]
             if key in left:
                 faults.add(InputError(error.reason, f".{inside}"))
             elif not faults.found:
-                faults.add(InputError(f": {f'{inside}{error.reason}'.removeprefix(': ')}"))
+                reason = f"{inside}{error.reason}".removeprefix(": ")
+                faults.add(InputError(f": {reason}"))
             if key not in left or known[key].default is inspect.Parameter.empty:
                 break
             del left[key]  # what else is wrong?
