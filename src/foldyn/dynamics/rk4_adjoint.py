@@ -188,10 +188,9 @@ class RK4Adjoint:
         self._gradient = self._pullback.gradient | self._by._asdict()
         zero = {name: np.zeros_like(array) for name, array in self._gradient.items()}
         self.totals = [{name: out.copy() for name, out in zero.items()} for _ in range(count)]
-        self._memory, self._none = (
-            np.zeros((9, system.rows, 3)),
-            np.empty((0, 4, 3, system.rows, 3)),
-        )
+        shape = (4, 3, system.rows, 3)
+        self._memory, self._none = np.zeros((9, *shape[2:])), np.empty((0, *shape))
+        self._stages = np.empty((max(1, int(ROOM[0] / (8 * np.prod(shape)))), *shape))
 
     def backward(
         self, first: int, last: int, u: NDArray, v: NDArray, by: Sequence[tuple[NDArray, NDArray]]
