@@ -45,9 +45,9 @@ class Slope(NamedTuple):
         """Derivatives (count,) of a number with this gradient."""
         out = np.zeros(self.count)
         for name, by in self.by.items():
-            if name in gradient:
-                here = self.entry[name] >= 0
-                product = (np.asarray(gradient[name]) * by)[here]
+            here = self.entry[name] >= 0
+            if here.any():
+                product = (_known(gradient, name) * by)[here]
                 out += np.bincount(self.entry[name][here], product, self.count)
         return out
 
@@ -121,14 +121,13 @@ class Parameters:
 
             near, far = (at(STEP), at(-STEP)), (at(2 * STEP), at(-2 * STEP))
             return {
-                key: (8.0 * (near[0][key] - near[1][key]) - (far[0][key] - far[1][key]))
-                / (12.0 * STEP)
+                key: _difference(*(each[key] for each in (*near, *far, here.numbers)))
                 for key in here.numbers
             }
 
         by = change(size)
         if value.ndim == 0:
-            entry = {key: np.zeros(each.shape, np.int64) for key, each in by.items()}
+            entry = {key: np.where(each != 0.0, 0, -1) for key, each in by.items()}
             return Slope({key: each / size for key, each in by.items()}, entry, 1)
         count = value.size
         marked = change(size * (1.0 + np.arange(count) / count))
@@ -136,8 +135,7 @@ class Parameters:
         tried = change(size * chance)
         entry = {}
         for key, each in by.items():
-            number = np.abs(here.numbers[key])
-            moves = np.abs(each) > SILENT[0] * number + SILENT[1] * number.max(initial=0.0)
+            moves = each != 0.0
             part = np.divide(marked[key], each, out=np.zeros_like(each), where=moves) - 1.0
             number = np.where(moves, np.rint(part * count), -1).astype(np.int64)
             apart = np.abs(part * count - number)[moves].max(initial=0.0)
@@ -165,6 +163,16 @@ class Parameters:
         return Columns(columns)
 
 
+def _difference(
+    ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDArray, here: NDArray
+) -> NDArray:
+    """Rate of numbers from those a step and two steps ahead and behind; 0 for their rounding."""
+    rate = (8.0 * (ahead - behind) - (far_ahead - far_behind)) / (12.0 * STEP)
+    size = np.abs(here)
+    rounding = SILENT[0] * size + SILENT[1] * size.max(initial=0.0)
+    return np.where(np.abs(rate) > rounding, rate, 0.0)
+
+
 class Columns(NamedTuple):
     """The same where numbers depend on several entries: of each entry how all numbers change."""
 
@@ -175,13 +183,23 @@ class Columns(NamedTuple):
         return np.array(
             [
                 sum(
-                    float((gradient[key] * each).sum())
-                    for key, each in by.items()
-                    if key in gradient
+                    float((_known(gradient, k) * each).sum())
+                    for k, each in by.items()
+                    if each.any()
                 )
                 for by in self.by
             ]
         )
+
+
+def _known(gradient: Gradient, name: str) -> NDArray:
+    """Derivative by the numbers of a name."""
+    if name not in gradient:
+        raise InputError(
+            f"the design changes numbers of the case ({name}) by which there are no derivatives; "
+            "keep them fixed, or vary the parameters by fd.sweep"
+        )
+    return gradient[name]
 
 
 def checked(values: Values) -> dict[str, NDArray]:

@@ -23,6 +23,7 @@ from foldyn.gradients.modes import ModesGradient
 from foldyn.gradients.motion import MotionGradient
 from foldyn.gradients.numbers import Gradient
 from foldyn.gradients.parameters import Parameters, Slope, Values, checked
+from foldyn.gradients.path import PathGradient
 from foldyn.input_files import path_of
 from foldyn.mechanics.pullback import Arrays
 from foldyn.sweeps.job import ASIDE
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
 KINDS: Mapping[str, Callable[[Case, Mapping[str, Any]], Differentiated]] = {
     "modes": ModesGradient,
     "dynamics": MotionGradient,
+    "statics": PathGradient,
 }
 """Analyses with gradients, by their kind in case files."""
 ARRAYS = ("fold_stiffness", "fold_rest", "bend_stiffness", "bend_rest", "bar_area", "node_mass")
@@ -287,6 +289,16 @@ def _own_of(function: Callable[..., float]) -> Callable[..., Callable[[Case], fl
     return lambda result, case: lambda other: float(function(result, other))
 
 
+def _add(seeds: dict[Any, Any], variable: Any, seed: Any, share: float) -> None:
+    """Add a share of derivatives by a variable of a result to others."""
+    if isinstance(seed, Mapping):  # by what a variable takes: see `path.PathGradient`
+        own = seeds.setdefault(variable, {})
+        for key, each in seed.items():
+            _add(own, key, each, share)
+    else:
+        seeds[variable] = seeds.get(variable, 0.0) + share * np.asarray(seed)
+
+
 class _Parts(NamedTuple):
     """All that values and gradients of measures are made of."""
 
@@ -311,7 +323,7 @@ class _Parts(NamedTuple):
             with said_of(measure.text):
                 own = derivative.seeds(result, self.case, **measure.arguments)
             for variable, seed in own.items():
-                seeds[variable] = seeds.get(variable, 0.0) + parts[name] * np.asarray(seed)
+                _add(seeds, variable, seed, parts[name])
             if derivative.frozen:
                 frozen = derivative.frozen(result, self.case, **measure.arguments)
                 for key, slope in self._explicit(frozen).items():
@@ -319,8 +331,10 @@ class _Parts(NamedTuple):
         with said_of(one.text):
             gradient = dict(self.found.backward(seeds)) if seeds else {}
         for name, (_, derivative) in one.measures.items():
-            for key, by in (derivative.numbers(self.case) if derivative.numbers else {}).items():
-                gradient[key] = gradient.get(key, 0.0) + parts[name] * by
+            if derivative.numbers:
+                own = derivative.numbers(result, self.case, **measure.arguments)
+                for key, by in own.items():
+                    _add(gradient, key, by, parts[name])
         return value, {
             name: slope.pulled(gradient) + explicit[name] for name, slope in self.slopes.items()
         }
