@@ -329,7 +329,7 @@ class _Parts(NamedTuple):
                 for key, slope in self._explicit(frozen).items():
                     explicit[key] += parts[name] * slope
         with said_of(one.text):
-            gradient = dict(self.found.backward(seeds)) if seeds else {}
+            gradient = dict(self.found.backward(seeds)) if seeds else self._nothing
         for name, (_, derivative) in one.measures.items():
             if derivative.numbers:
                 own = derivative.numbers(result, self.case, **measure.arguments)
@@ -338,6 +338,12 @@ class _Parts(NamedTuple):
         return value, {
             name: slope.pulled(gradient) + explicit[name] for name, slope in self.slopes.items()
         }
+
+    @property
+    def _nothing(self) -> dict[str, NDArray]:
+        """Gradient of nothing."""
+        numbers = self.found.numbers(self.case).numbers
+        return {name: np.zeros_like(array) for name, array in numbers.items()}
 
     def _explicit(self, frozen: Callable[[Case], float]) -> dict[str, NDArray]:
         """Derivatives of a measure where the result stays as it is."""
