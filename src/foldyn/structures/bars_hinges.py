@@ -13,8 +13,10 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.materials import BarLaw, HingeLaw, Superlinear
 from foldyn.mechanics.bars_hinges import bars_hinges_kernels
+from foldyn.mechanics.bars_hinges_pullback import bars_hinges_pulled
 from foldyn.mechanics.energy import gradients
 from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of
 from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges, SheetTerm, SoftHinges, largest_turn
 from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_mean_tangent, put_tangent
 from foldyn.mechanics.term import Compiled, Folds, Strains, Unstrained
@@ -104,6 +106,14 @@ class BarsHingesTerm(SheetTerm):
     def compiled(self, work: Any, kept: mechanics.Workspace, group: int) -> Compiled:
         """See `Term`."""
         return bars_hinges_kernels(self.model, kept, len(GROUPS))
+
+    def arrays(self) -> Arrays:
+        """See `Term`."""
+        return arrays_of(self.model, "addresses")
+
+    def pulled(self) -> Pulled:
+        """See `Term`."""
+        return bars_hinges_pulled(self.model)
 
     @property
     def hinges(self) -> NDArray:
