@@ -15,6 +15,8 @@ from foldyn.mechanics.threads import team
 
 MODELS = {
     "MembranesTerm": "membranes",
+    "EdgeGivesTerm": "gives",
+    "BalancedGivesTerm": "gives",
 }
 """The attribute with the arrays of each term."""
 
