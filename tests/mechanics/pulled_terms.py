@@ -17,6 +17,8 @@ MODELS = {
     "MembranesTerm": "membranes",
     "EdgeGivesTerm": "gives",
     "BalancedGivesTerm": "gives",
+    "BarsPlatesTerm": "model",
+    "CondensedPlatesTerm": "model",
 }
 """The attribute with the arrays of each term."""
 
@@ -34,6 +36,10 @@ class Lone(NamedTuple):
 
     def changed(self, name: str, array: NDArray) -> Lone:
         """The same with another array."""
+        if name == "push":
+            sheet = self.term._with(self.model)
+            sheet._push[:] = array
+            return self._replace(term=sheet)
         model = _replaced(self.model, name.split("."), array)
         if isinstance(self.term, SheetTerm):
             return self._replace(term=self.term._with(model))

@@ -5,8 +5,8 @@ weights of the gives g,
 
     w . F = r^T A g + h^T A^T E + h^T K g.
 
-Gives in balance have the same derivatives, with h = -K^-1 A^T r: what their own change adds. K stays
-symmetric there.
+Gives in balance have the same derivatives, with h = -K^-1 A^T r: what their own change adds. K
+stays symmetric there.
 """
 
 from __future__ import annotations
