@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.mechanics.assembly import Assembly, Work
+from foldyn.mechanics.constant_damping import DampingMatrix, DampingRows
 from foldyn.mechanics.pullback import Pullbacks, pull_all
 from foldyn.mechanics.sheet_term import SheetTerm
 from foldyn.mechanics.term import FORCES, Term, Terms, Whole, evaluate
@@ -19,6 +20,10 @@ MODELS = {
     "BalancedGivesTerm": "gives",
     "BarsPlatesTerm": "model",
     "CondensedPlatesTerm": "model",
+    "SpringsTerm": "springs",
+    "ClampsTerm": "clamps",
+    "ViscousTerm": "elements",
+    "ViscousPanelsTerm": "panels",
 }
 """The attribute with the arrays of each term."""
 
@@ -40,6 +45,12 @@ class Lone(NamedTuple):
             sheet = self.term._with(self.model)
             sheet._push[:] = array
             return self._replace(term=sheet)
+        if isinstance(self.term, DampingRows):
+            return self._replace(term=DampingRows(array))
+        if isinstance(self.term, DampingMatrix):
+            matrix = self.term.matrix.copy()
+            matrix.data = array
+            return self._replace(term=DampingMatrix(matrix))
         model = _replaced(self.model, name.split("."), array)
         if isinstance(self.term, SheetTerm):
             return self._replace(term=self.term._with(model))

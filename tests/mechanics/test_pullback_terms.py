@@ -12,12 +12,19 @@ import pytest
 from numpy.typing import NDArray
 from pulled_terms import Lone, lone
 from samples import CUBIC, structure
+from scipy import sparse
 
 import foldyn as fd
 from foldyn.checks import gradient_error, observed_order
+from foldyn.dynamics.dampers import dampers
 from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.clamps import ClampsTerm
+from foldyn.mechanics.constant_damping import DampingMatrix, DampingRows
 from foldyn.mechanics.edge_gives_term import BalancedGivesTerm, EdgeGivesTerm
 from foldyn.mechanics.membranes import MembranesTerm
+from foldyn.mechanics.springs import SpringsTerm
+from foldyn.mechanics.viscous import ViscousTerm
+from foldyn.mechanics.viscous_panels import ViscousPanelsTerm
 from foldyn.structures.bars_plates import BarsPlatesTerm
 from foldyn.structures.condensed_plates import CondensedPlatesTerm
 
@@ -39,11 +46,58 @@ def plates(pattern: fd.Pattern, condensed: bool = False, **options: Any) -> Asse
     return body
 
 
+def supported(*supports: fd.Spring, **options: Any) -> Assembly:
+    """A fold of bars and hinges, with springs."""
+    made = fd.discretize(fd.patterns.simple_fold(1.0, 1.3, 60), THICK, preset="herkal", **options)
+    return fd.Case(made, supports).body
+
+
+def damped(model: Any, damping: Any, *dashpots: fd.Dashpot, **options: Any) -> Assembly:
+    """A fold with damping in the place of its other terms."""
+    fold = fd.patterns.simple_fold(1.0, 1.3, 60)
+    if model == "shell":
+        made = fd.shell(fold, THICK, divisions=2)
+    else:
+        made = fd.discretize(fold, THICK, preset=model, **options)
+    case = fd.Case(made, dashpots, damping=damping)
+    return Assembly(case.elastic_body.sheet, *dampers(case))
+
+
+def constant(kind: type[DampingRows] | type[DampingMatrix]) -> Lone:
+    """A matrix, or full rows."""
+    values = np.random.default_rng(5).standard_normal((6, 6))
+    values[0, 1:4] = 0.0
+    matrix = values[:2] if kind is DampingRows else sparse.csr_array(values)
+    return Lone(kind(matrix), 6, 2)
+
+
+SPRINGS = [
+    fd.Spring(40.0, between=[(0, 2), (1, 3)]),
+    fd.Spring(25.0, between=[(3, 0)], rest_length=0.4),
+    fd.Spring(300.0, nodes=[0, 2]),
+    fd.Spring(55.0, between=[(0, 3)], direction=(1, 2, -1)),
+]
+AXIAL = fd.Dashpot(0.7, between=[(0, 2), (1, 3)])
 TERMS: dict[str, Callable[[], Lone]] = {
     "membranes": lambda: lone(structure("miura, coupled").body, MembranesTerm),
     "membranes of hexagons": lambda: lone(structure("hexagon, coupled").body, MembranesTerm, 2),
     "gives": lambda: lone(plates(MIXED), EdgeGivesTerm),
     "gives in balance": lambda: lone(plates(MIXED, True), BalancedGivesTerm),
+    "springs": lambda: lone(supported(*SPRINGS), SpringsTerm),
+    "springs without length": lambda: lone(
+        supported(fd.Spring(35.0, between=[(1, 2)], rest_length=0.0)), SpringsTerm
+    ),
+    "clamps": lambda: lone(supported(clamped=[(0, 1)]), ClampsTerm),
+    "dashpots": lambda: lone(damped("herkal", fd.CreaseDamping(0.3), AXIAL), ViscousTerm),
+    "damped sides": lambda: lone(damped("shell", fd.CreaseDamping(0.3)), ViscousTerm),
+    "damped strains": lambda: lone(
+        damped("herkal", fd.StrainDamping(0.1), clamped=[(0, 1)]), ViscousTerm
+    ),
+    "damped panels": lambda: lone(
+        damped("herkal", fd.StrainDamping(0.1), membrane="panel"), ViscousPanelsTerm
+    ),
+    "damping matrix": lambda: constant(DampingMatrix),
+    "damping rows": lambda: constant(DampingRows),
     "plates": lambda: lone(plates(MIXED, clamped=[(2, 3)]), BarsPlatesTerm),
     "plates that lock": lambda: lone(
         plates(MIURA, fold_law=LOCKING, membrane="bars"), BarsPlatesTerm
@@ -60,11 +114,21 @@ OF_MEMBRANES = "vector per_length2 *stiffness"
 OF_BARS = " bars.bar_vector bars.bar_per_length2 *bars.bar_stiffness"
 OF_PLATES = "bars.rest per_reach *fold_stiffness *bend_rest *stiffness"
 IN_BALANCE = "bars.rest per_reach fold_stiffness stiffness"
-ARRAYS = {  # that count, with a star where forces are linear
+ARRAYS = {  # that count, with a star where forces are linear, with a minus where there is no
+    # difference: of a spring without length at rest, or of dofs that are not there
     "membranes": OF_MEMBRANES,
     "membranes of hexagons": OF_MEMBRANES,
     "gives": "*vector *per_length2 *across *stiffness",
     "gives in balance": "vector per_length2 across stiffness",
+    "springs": "direction *stiffness vector length *stretch *axial_stiffness",
+    "springs without length": "*vector *axial_stiffness -length -stretch",
+    "clamps": "points *rest *stiffness",
+    "dashpots": "axial corners *coefficient -hidden_turn",
+    "damped sides": "corners hidden_turn *coefficient",
+    "damped strains": "axial corners *coefficient -hidden_turn",
+    "damped panels": "vector per_length2 *resistance",
+    "damping matrix": "*data",
+    "damping rows": "rows",
     "plates": f"{OF_PLATES} *fold_rest *fold_parameters wings",
     "plates that lock": f"{OF_PLATES} *fold_rest fold_parameters {OF_BARS}",
     "plates of a user's law": f"{OF_PLATES} fold_rest",
@@ -72,7 +136,7 @@ ARRAYS = {  # that count, with a star where forces are linear
     "locked in balance": f"{IN_BALANCE} bend_rest push fold_rest fold_parameters {OF_BARS}",
 }
 SYMMETRIC = {("gives in balance", "stiffness")}  # matrices that are factorized
-EACH = [(term, name) for term, names in ARRAYS.items() for name in names.split()]
+EACH = [(t, n) for t, names in ARRAYS.items() for n in names.split() if n[0] != "-"]
 SEEDS = (1, 2)
 made = cache(lambda name: TERMS[name]())
 
@@ -91,7 +155,7 @@ def test_every_array_is_there(name) -> None:
         key: array.shape for key, array in numbers.items()
     }
     counts = {key for key, out in gradient.items() if np.any(out)}
-    assert counts == {*ARRAYS[name].replace("*", "").split()}
+    assert counts == {key.strip("*-") for key in ARRAYS[name].split()}
 
 
 @pytest.mark.parametrize(("name", "seed"), [*product(TERMS, SEEDS)])
@@ -104,9 +168,12 @@ def test_the_derivatives_by_the_state(name, seed) -> None:
         assert np.abs(by_q - exact).max() < 1e-12 * np.abs(exact).max()
         assert not by_v.any()
         return
-    exact = own.term.damping(q).T @ w
+    exact = np.array([w @ own.force(q, unit) for unit in np.eye(own.size)])
     assert np.abs(by_v - exact).max() < 1e-12 * np.abs(exact).max()
-    error = gradient_error(lambda q: w @ own.force(q, v), lambda _: by_q, q, seed)
+    if isinstance(own.term, DampingMatrix | DampingRows):
+        assert not by_q.any()
+        return
+    error = gradient_error(lambda q: float(w @ own.force(q, v)), lambda _: by_q, q, seed)
     assert error < 1e-8
 
 
