@@ -20,6 +20,7 @@ MODELS = {
     "BalancedGivesTerm": "gives",
     "BarsPlatesTerm": "model",
     "CondensedPlatesTerm": "model",
+    "ShellTerm": "model",
     "SpringsTerm": "springs",
     "ClampsTerm": "clamps",
     "ViscousTerm": "elements",

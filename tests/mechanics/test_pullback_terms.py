@@ -25,6 +25,7 @@ from foldyn.mechanics.membranes import MembranesTerm
 from foldyn.mechanics.springs import SpringsTerm
 from foldyn.mechanics.viscous import ViscousTerm
 from foldyn.mechanics.viscous_panels import ViscousPanelsTerm
+from foldyn.shells.term import ShellTerm
 from foldyn.structures.bars_plates import BarsPlatesTerm
 from foldyn.structures.condensed_plates import CondensedPlatesTerm
 
@@ -32,7 +33,7 @@ THICK = fd.Sheet(1e6, 0.25, 0.1, density=1000.0, length_scale_ratio=2.0)
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.3], [0, 1, 0.3], [0.5, -0.8, 0.4]])
 MIXED = fd.Pattern(CORNERS, [[0, 1, 2, 3], [1, 0, 4]])
 MIURA = fd.patterns.miura(cells=(1, 1), panel_angle=60, dihedral=110)
-LOCKING = fd.EnhancedLinear(120, 200)
+LOCKING = fd.EnhancedLinear(150, 200)
 
 
 def plates(pattern: fd.Pattern, condensed: bool = False, **options: Any) -> Assembly:
@@ -44,6 +45,10 @@ def plates(pattern: fd.Pattern, condensed: bool = False, **options: Any) -> Asse
     push = body.sheet._push
     push[:] = 30.0 * np.random.default_rng(3).standard_normal(push.size)
     return body
+
+
+def shell(**options: Any) -> Assembly:
+    return fd.shell(MIXED, THICK, divisions=1, **options).body
 
 
 def supported(*supports: fd.Spring, **options: Any) -> Assembly:
@@ -98,6 +103,9 @@ TERMS: dict[str, Callable[[], Lone]] = {
     ),
     "damping matrix": lambda: constant(DampingMatrix),
     "damping rows": lambda: constant(DampingRows),
+    "shell": lambda: lone(shell(), ShellTerm),
+    "shell that locks": lambda: lone(shell(fold_law=LOCKING), ShellTerm),
+    "clamped shell": lambda: lone(shell(clamped=[(2, 3)], fold_law="linear"), ShellTerm),
     "plates": lambda: lone(plates(MIXED, clamped=[(2, 3)]), BarsPlatesTerm),
     "plates that lock": lambda: lone(
         plates(MIURA, fold_law=LOCKING, membrane="bars"), BarsPlatesTerm
@@ -114,6 +122,10 @@ OF_MEMBRANES = "vector per_length2 *stiffness"
 OF_BARS = " bars.bar_vector bars.bar_per_length2 *bars.bar_stiffness"
 OF_PLATES = "bars.rest per_reach *fold_stiffness *bend_rest *stiffness"
 IN_BALANCE = "bars.rest per_reach fold_stiffness stiffness"
+OF_SHELLS = (
+    "per_reach rest side per_length2 *membrane *bending *hinge_rest weight sign "
+    "*piece_stiffness *piece_rest"
+)
 ARRAYS = {  # that count, with a star where forces are linear, with a minus where there is no
     # difference: of a spring without length at rest, or of dofs that are not there
     "membranes": OF_MEMBRANES,
@@ -129,6 +141,9 @@ ARRAYS = {  # that count, with a star where forces are linear, with a minus wher
     "damped panels": "vector per_length2 *resistance",
     "damping matrix": "*data",
     "damping rows": "rows",
+    "shell": f"{OF_SHELLS} *piece_parameters",
+    "shell that locks": f"{OF_SHELLS} piece_parameters",
+    "clamped shell": OF_SHELLS,
     "plates": f"{OF_PLATES} *fold_rest *fold_parameters wings",
     "plates that lock": f"{OF_PLATES} *fold_rest fold_parameters {OF_BARS}",
     "plates of a user's law": f"{OF_PLATES} fold_rest",

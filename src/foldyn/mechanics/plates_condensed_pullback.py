@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner
 from foldyn.jit.context import Context, rows_at
+from foldyn.materials.switch import hinge_slope
 from foldyn.mechanics.bars_hinges_pullback import pull_bars_hinges
 from foldyn.mechanics.plates import turn_folds
 from foldyn.mechanics.plates_condensed import (
@@ -27,7 +28,6 @@ from foldyn.mechanics.plates_condensed import (
 from foldyn.mechanics.plates_pullback import (
     Back,
     back_of,
-    fold_slope,
     gradients,
     pull_turns,
     rate_hinges,
@@ -38,9 +38,11 @@ from foldyn.mechanics.pullback import Pulled, pullback
 @inner
 def rate_couples(model, work, back, out):
     """Rates of the forces on rotations with those of the dihedrals alone, to out (r,)."""
-    out[:] = 0.0
+    out[:], p = 0.0, model.fold_parameters
     for f in range(model.fold_rest.size):
-        work.slope[f] = fold_slope(model, work, f)
+        work.slope[f] = model.fold_stiffness[f] * hinge_slope(
+            model.code, work.fold_angle[f], model.fold_rest[f], p[f, 0], p[f, 1], model.addresses[2]
+        )
         for rotation in model.fold_rotations[f]:
             if rotation >= 0:
                 out[rotation] -= model.per_reach * work.slope[f] * back.rate[f]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner
 from foldyn.jit.context import Context, rows_at
-from foldyn.materials.switch import hinge_moment, hinge_moment_by, hinge_slope
+from foldyn.materials.series import series_derivatives
 from foldyn.mechanics import bars_hinges_pullback as of_bars
 from foldyn.mechanics.bars_hinges_pullback import PullbackWork, pull_bars_hinges, pullback_work
 from foldyn.mechanics.dihedral import dihedral_rates
@@ -120,37 +120,25 @@ def rate_plate(model, y, back, p):
 
 
 @inner
-def fold_slope(model, work, f):
-    """Derivative (N m/rad) of the moment of a fold by its angle."""
-    p = model.fold_parameters
-    return model.fold_stiffness[f] * hinge_slope(
-        model.code, work.fold_angle[f], model.fold_rest[f], p[f, 0], p[f, 1], model.addresses[2]
-    )
-
-
-@inner
 def pull_folds(model, x, y, work, back, by_x):
     """Moments of folds, and what is their share in the gradients, `moment` and by_x (r,)."""
     turn_folds(model, x, work)
     out, p = back.out, model.fold_parameters
     for f in range(model.fold_rest.size):
         stiffness, rate = model.fold_stiffness[f], back.rate[f]
-        moment = hinge_moment(
+        moment, slope, by_rest, by_a, by_b, by_c, _ = series_derivatives(
             model.code, work.fold_angle[f], model.fold_rest[f],
-            p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[1],
+            p[f, 0], p[f, 1], p[f, 2], p[f, 3], 1.0, model.addresses,
         )  # fmt: skip
         work.moment[f] = stiffness * moment
         for rotation in model.fold_rotations[f]:
             if rotation >= 0:
                 rate -= model.per_reach * y[rotation]
-        back.moment[f] = fold_slope(model, work, f) * rate
+        back.moment[f] = stiffness * slope * rate
         for rotation in model.fold_rotations[f]:
             if rotation >= 0:
                 by_x[rotation] -= model.per_reach * back.moment[f]
                 out.per_reach[0] -= back.moment[f] * x[rotation] + work.moment[f] * y[rotation]
-        by_rest, by_a, by_b, by_c = hinge_moment_by(
-            model.code, work.fold_angle[f], model.fold_rest[f], p[f, 0], p[f, 1], model.addresses[1]
-        )
         out.fold_stiffness[f] += moment * rate
         rate *= stiffness
         out.fold_rest[f] += by_rest * rate
