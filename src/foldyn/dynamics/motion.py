@@ -80,6 +80,11 @@ class Motion:
         self.at_rest = not (self.course.u.any() or self.course.v.any())
 
     @property
+    def start(self) -> tuple[NDArray, NDArray]:
+        """Displacement and velocity (n, 3) where it starts."""
+        return self._state[0], self._state[1]
+
+    @property
     def expected_samples(self) -> int:
         """Number of samples; where steps vary and are counted, the least."""
         return expected_samples(self.plan)

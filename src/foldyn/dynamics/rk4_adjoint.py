@@ -16,14 +16,15 @@ states at every stage (Griewank and Walther, Evaluating Derivatives, 2008, chapt
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.equation import EquationOfMotion, acceleration
-from foldyn.dynamics.system import scratches
+from foldyn.dynamics.motion_state import StepPlan
+from foldyn.dynamics.system import carried, scratches
 from foldyn.errors import InputError
 from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.jit.context import Context, run_at
@@ -158,54 +159,77 @@ def pull_steps(balance, pulls, plan, first, stages, by_u, by_v, memory, mass, mo
 
 
 class RK4Adjoint:
-    """Backward through a motion by RK4, segment by segment.
+    """Backward through a motion by RK4.
 
     Parameters
     ----------
     motion : Motion
         Ready to be computed, by `dynamics.driver.prepare`.
-    count : int
-        How many numbers are differentiated.
 
     Attributes
     ----------
-    totals : list of dict of ndarray
-        Of each number, its derivatives by the arrays of the terms (`pullback.arrays_of_body`), and
-        by "loads", "moved", "mass" and "alpha" as `ByMotion` says.
+    total : dict of ndarray
+        Derivatives of the number by the arrays of the terms (`pullback.arrays_of_body`), and by
+        "loads", "moved", "mass" and "alpha" as `ByMotion` says.
     """
 
-    def __init__(self, motion: Any, count: int) -> None:
-        packed, system = motion.packed, motion.packed.system
+    def __init__(self, motion: Any) -> None:
         refuse(motion)
+        packed, system = motion.packed, motion.packed.system
         self._plan, self._mass = Context(motion.plan), Context(packed.mass)
         self._moved, self._pullback = Context(system.moved), Pullback(packed.body)
         self._work = packed.body.workspaces(1)
-        (memory,) = scratches(system, self._work)
-        self._equation = EquationOfMotion(packed, self._work[0], memory, motion.course, None)
+        self._system, (self._scratch,) = system, scratches(system, self._work)
+        self._equation = EquationOfMotion(packed, self._work[0], self._scratch, motion.course, None)
         sizes = len(system.loads.dof), len(system.moved.dof), len(packed.mass.data), 1
         self._by = ByMotion(*map(np.zeros, sizes))
         self._out = Context(self._by)
-        self._gradient = self._pullback.gradient | self._by._asdict()
-        zero = {name: np.zeros_like(array) for name, array in self._gradient.items()}
-        self.totals = [{name: out.copy() for name, out in zero.items()} for _ in range(count)]
         shape = (4, 3, system.rows, 3)
         self._memory, self._none = np.zeros((9, *shape[2:])), np.empty((0, *shape))
-        self._stages = np.empty((max(1, int(ROOM[0] / (8 * np.prod(shape)))), *shape))
+        self._stages = np.empty((steps_at_once(system.rows), *shape))
+
+    @property
+    def total(self) -> dict[str, NDArray]:
+        """See the class."""
+        # forces of terms resist: they stand with a minus in the acceleration
+        terms = {name: -out for name, out in self._pullback.gradient.items()}
+        return terms | self._by._asdict()
+
+    def without_supports(self, t: float, u: NDArray, v: NDArray) -> tuple[NDArray, NDArray]:
+        """State (n, 3) at a time (s) without what supports move: as steps have it."""
+        self._evaluate(t)
+        moved, factor = self._system.moved, self._scratch.factor
+        return u - carried(moved, factor[:, 0], 0.0 * u), v - carried(moved, factor[:, 1], 0.0 * v)
+
+    def add_supports(self, t: float, by_u: NDArray, by_v: NDArray) -> None:
+        """Add to `total` what a number that has these derivatives by a sample has by supports."""
+        self._evaluate(t)
+        moved, factor = self._system.moved, self._scratch.factor
+        rate = factor[moved.row]
+        self._by.moved[:] += by_u.ravel()[moved.dof] * rate[:, 0]
+        self._by.moved[:] += by_v.ravel()[moved.dof] * rate[:, 1]
+
+    def _evaluate(self, t: float) -> None:
+        if self._system.varies:
+            evaluate(self._system.waves, t, True, self._scratch.factor)
+        self._scratch.time[0] = t
 
     def backward(
-        self, first: int, last: int, u: NDArray, v: NDArray, by: Sequence[tuple[NDArray, NDArray]]
+        self, first: int, last: int, u: NDArray, v: NDArray, by_u: NDArray, by_v: NDArray
     ) -> None:
         """Go back over the steps from `first` to `last`, from the state (n, 3) at the first.
 
-        by : of each number the derivatives (n, 3) by displacement and velocity at the last; they
-            become, in place, those at the first.
+        by_u, by_v : derivatives (n, 3) of the number by the state at the last; they become, in
+            place, those by the state at the first.
         """
         count, most = last - first, len(self._stages)
         if count <= most:
             stages = self._stages[:count]
             retrace(self._equation.still, u.copy(), v.copy(), self._plan, first, count, stages)
-            for number, (by_u, by_v) in enumerate(by):
-                self._pull(number, first, stages, by_u, by_v)
+            pull_steps(
+                self._equation.balance, self._pullback.terms, self._plan, first, stages, by_u,
+                by_v, self._memory, self._mass, self._moved, self._out,
+            )  # fmt: skip
             return
         # states are kept as far apart as there is room for them: most often once through is enough
         apart = max(most, -(-count // max(2, int(ROOM[1] / (2 * 8 * u.size)))))
@@ -215,18 +239,25 @@ class RK4Adjoint:
             if at + apart < last:
                 retrace(self._equation.still, q, w, self._plan, at, apart, self._none)
         for at, q, w in reversed(kept):
-            self.backward(at, min(at + apart, last), q, w, by)
+            self.backward(at, min(at + apart, last), q, w, by_u, by_v)
 
-    def _pull(self, number: int, first: int, stages: NDArray, by_u: NDArray, by_v: NDArray) -> None:
-        for out in self._gradient.values():
-            out[...] = 0.0
-        pull_steps(
-            self._equation.balance, self._pullback.terms, self._plan, first, stages, by_u, by_v,
-            self._memory, self._mass, self._moved, self._out,
-        )  # fmt: skip
-        for name, out in self._gradient.items():
-            # forces of terms resist: they stand with a minus in the acceleration
-            self.totals[number][name] += out if name in ByMotion._fields else -out
+
+def steps_at_once(rows: int) -> int:
+    """Steps whose stages are kept, of a motion with so many rows of three dofs."""
+    return max(1, int(ROOM[0] / (4 * 3 * rows * 3 * 8)))
+
+
+def segment(plan: StepPlan, rows: int) -> int:
+    """Steps between samples from which a motion goes back: those that are asked for, or fewer.
+
+    So many that all can be kept at once, if there is room for so many samples.
+    """
+    most = max(steps_at_once(rows), int(plan.steps * 2 * 3 * 8 * rows / ROOM[1]))
+    parts = next(
+        k for k in range(1, plan.every + 1) if plan.every % k == 0 <= most - plan.every // k
+    )
+    shorter = plan.every // parts
+    return shorter if 4 * shorter > min(most, plan.every) else plan.every
 
 
 def refuse(motion: Any) -> None:

@@ -180,6 +180,11 @@ class BarsHingesTerm(SheetTerm):
         stiffness[self._soft] = alone.hinge_stiffness[self._soft] * slope
         return self._with(alone._replace(hinge_stiffness=stiffness)).tangent(q)
 
+    def weakened(self, hinges: NDArray) -> BarsHingesTerm:
+        """The sheet without the stiffness of some of its hinges, a mask (nh,)."""
+        stiffness = np.where(hinges, 0.0, self.model.hinge_stiffness)
+        return self._with(self.model._replace(hinge_stiffness=stiffness))
+
     @property
     def rest_angles(self) -> NDArray:
         """See `SheetTerm`: of the folds, of the bends, and offsets."""

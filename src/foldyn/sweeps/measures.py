@@ -50,6 +50,11 @@ def _measure(*kinds: str, **about: Any) -> Callable[[F], F]:
     return registered
 
 
+@_measure(units="kg", doc="mass of the sheet and of point masses")
+def _mass(result: xr.Dataset, case: Case) -> float:
+    return float(case.mass.sum())
+
+
 # ------------------------------------------------------------------------- modes
 @_measure(MODES, units="Hz", doc="frequency", dims=(MODE,))
 def _frequencies(result: xr.Dataset, case: Case) -> NDArray:
@@ -157,6 +162,50 @@ def _decay(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
 @_measure(*MOVED, units="m", doc="displacement at the end")
 def _displacement(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
     return float(_sampled(result, "displacement")[-1].sel(node=node, axis=axis))
+
+
+@_measure(MOTION, units="m", doc="displacement at a time (s)")
+def _displacement_at(
+    result: xr.Dataset, case: Case, node: int, axis: str, time: float
+) -> float:  # fmt: skip
+    moved = _sampled(result, "displacement")[time_of(result, time)]
+    return float(moved.sel(node=node, axis=axis))
+
+
+def time_of(result: xr.Dataset, time: float) -> int:
+    """Number of the sample at a time (s), half a sampling interval off at most."""
+    times = result["time"].values
+    k = int(np.abs(times - time).argmin())
+    if abs(times[k] - time) > 0.5 * np.diff(times).max():
+        raise InputError(f"the motion lasts from {times[0]:g} to {times[-1]:g} s")
+    return k
+
+
+@_measure(MOTION, units="m/s", doc="velocity at the end")
+def _velocity(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
+    return float(_sampled(result, "velocity")[-1].sel(node=node, axis=axis))
+
+
+@_measure(MOTION, units="m", doc="highest displacement")
+def _maximum(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
+    return float(result["displacement"].sel(node=node, axis=axis).max())
+
+
+@_measure(MOTION, units="m", doc="lowest displacement")
+def _minimum(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
+    return float(result["displacement"].sel(node=node, axis=axis).min())
+
+
+@_measure(MOTION, units="m s", doc="integral of a displacement over time")
+def _integral(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
+    moved = result["displacement"].sel(node=node, axis=axis)
+    return float(moved.integrate("time"))
+
+
+@_measure(MOTION, units="m2", doc="mean square of a displacement over time")
+def _mean_square(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
+    square, times = result["displacement"].sel(node=node, axis=axis) ** 2, result["time"].values
+    return float(square.integrate("time")) / float(times[-1] - times[0])
 
 
 @_measure(*MOVED, units="m", doc="largest displacement")

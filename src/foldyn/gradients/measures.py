@@ -1,0 +1,212 @@
+"""Derivatives of measures: what a number that is taken of a result changes with, in the result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.cases.directions import AXES
+from foldyn.errors import InputError
+from foldyn.gradients.numbers import Gradient
+from foldyn.sweeps.measure import Asked
+from foldyn.sweeps.measures import time_of
+from foldyn.viewer.fields import bar_strain
+
+Seeds = dict[str, NDArray]
+"""Derivatives of a number by variables of a result, of their shapes, by name."""
+
+
+class Derivative(NamedTuple):
+    """The derivative of a measure.
+
+    seeds : of a result and a case, with the measure's arguments.
+    frozen : of a measure that also takes numbers of the case itself: of the result and the case,
+        the measure as a function of another case, where the result stays as it is.
+    numbers : of the case, the derivatives of such a measure by numbers of the case.
+    """
+
+    seeds: Callable[..., Seeds]
+    frozen: Callable[..., Callable[[Case], float]] | None = None
+    numbers: Callable[[Case], Gradient] | None = None
+
+
+def _of_mode(variable: str) -> Derivative:
+    def seeds(result: xr.Dataset, case: Case, mode: int, **axis: str) -> Seeds:
+        chosen = {"mode": mode, **axis}
+        return _at(result, variable, {name: [value] for name, value in chosen.items()}, 1.0)
+
+    return Derivative(seeds)
+
+
+def _at(result: xr.Dataset, variable: str, place: Mapping[str, Any], value: Any) -> Seeds:
+    """Seeds of one variable, zero but at a place."""
+    array = xr.zeros_like(result[variable], dtype=float)
+    order = [dim for dim in ("time", "step", "mode", "node", "axis") if dim in array.dims]
+    array.loc[dict(place)] = value
+    return {variable: array.transpose(*order).values}
+
+
+def _moved(result: xr.Dataset, node: int, axis: str) -> NDArray:
+    return result["displacement"].sel(node=node, axis=axis).values
+
+
+def _samples(result: xr.Dataset, node: int, axis: str, weights: NDArray) -> Seeds:
+    """Seeds of a weighted sum of the displacements of a node, sample by sample."""
+    array = np.zeros((len(weights), result.sizes["node"], result.sizes["axis"]))
+    array[:, node, AXES.index(axis)] = weights
+    return {"displacement": array}
+
+
+def _one(count: int, k: int) -> NDArray:
+    out = np.zeros(count)
+    out[k] = 1.0
+    return out
+
+
+def _displacement(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
+    count = len(_moved(result, node, axis))
+    return _samples(result, node, axis, _one(count, count - 1))
+
+
+def _displacement_at(result: xr.Dataset, case: Case, node: int, axis: str, time: float) -> Seeds:
+    motion = _moved(result, node, axis)
+    return _samples(result, node, axis, _one(len(motion), time_of(result, time)))
+
+
+def _velocity(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
+    count = len(_moved(result, node, axis))
+    seeds = _samples(result, node, axis, _one(count, count - 1))
+    return {"velocity": seeds["displacement"]}
+
+
+def _extreme(which: Callable[[NDArray], Any]) -> Callable[..., Seeds]:
+    def seeds(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
+        motion = _moved(result, node, axis)
+        k = int(which(motion))
+        rivals = np.flatnonzero(motion == motion[k])
+        if len(rivals) > 1 and motion.any():
+            raise InputError(
+                f"is reached at {len(rivals)} samples at once, which part as the design changes: "
+                "it has no derivative; take displacement_at of one of them, or mean_square"
+            )
+        return _samples(result, node, axis, _one(len(motion), k))
+
+    return seeds
+
+
+def _trapezoid(result: xr.Dataset) -> NDArray:
+    """Weights (k,) of samples in an integral over time, s."""
+    step = np.diff(result["time"].values)
+    weights = np.zeros(len(step) + 1)
+    weights[:-1] += 0.5 * step
+    weights[1:] += 0.5 * step
+    return weights
+
+
+def _integral(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
+    return _samples(result, node, axis, _trapezoid(result))
+
+
+def _mean_square(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
+    weights = _trapezoid(result)
+    motion = _moved(result, node, axis)
+    return _samples(result, node, axis, 2.0 * weights * motion / weights.sum())
+
+
+def _largest_displacement(result: xr.Dataset, case: Case, node: int | None = None) -> Seeds:
+    along = "time" if "time" in result.dims else "step"
+    moved = result["displacement"].transpose(along, "node", "axis").values
+    size = np.linalg.norm(moved, axis=-1)
+    if node is not None:
+        size = np.where(np.arange(size.shape[1]) == node, size, -1.0)
+    k, i = np.unravel_index(size.argmax(), size.shape)
+    out = np.zeros_like(moved)
+    if not size[k, i] > 0.0:
+        raise InputError("is 0, where a size has no derivative")
+    out[k, i] = moved[k, i] / size[k, i]
+    return {"displacement": out}
+
+
+class _Strained(NamedTuple):
+    """The bar that is strained most: its number, its ends, how they move, and the sample."""
+
+    bar: int
+    ends: NDArray  # (2,)
+    apart: NDArray  # (3,) displacement of the second less that of the first, m
+    sample: int
+    moved: NDArray  # (samples, n, 3)
+
+    def strain(self, case: Case) -> tuple[NDArray, float]:
+        """Its vector, m, and its strain in a case."""
+        a, b = case.structure.nodes[self.ends]
+        vector = b - a + self.apart
+        return vector, float(np.linalg.norm(vector) / case.structure.bar_length[self.bar] - 1.0)
+
+
+def _strained(result: xr.Dataset, case: Case) -> _Strained:
+    along = "time" if "time" in result.dims else "step"
+    moved = result["displacement"].transpose(along, "node", "axis").values
+    size = np.stack([np.abs(bar_strain(case.structure, u[None])[0]) for u in moved])
+    k, e = (int(i) for i in np.unravel_index(size.argmax(), size.shape))
+    ends = case.structure.bars[e]
+    return _Strained(e, ends, moved[k, ends[1]] - moved[k, ends[0]], k, moved)
+
+
+def _strain(result: xr.Dataset, case: Case) -> Seeds:
+    found = _strained(result, case)
+    vector, strain = found.strain(case)
+    length = np.linalg.norm(vector) * case.structure.bar_length[found.bar]
+    out = np.zeros_like(found.moved)
+    out[found.sample, found.ends[1]] = np.sign(strain) * vector / length
+    out[found.sample, found.ends[0]] = -out[found.sample, found.ends[1]]
+    return {"displacement": out}
+
+
+def _strain_of(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
+    found = _strained(result, case)
+    return lambda other: abs(found.strain(other)[1])
+
+
+def _nothing(result: xr.Dataset, case: Case) -> Seeds:
+    return {}
+
+
+DERIVATIVES: Mapping[str, Derivative] = {
+    "mass": Derivative(_nothing, numbers=lambda case: {"mass": np.ones(case.mass.nnz)}),
+    "frequency": _of_mode("frequency"),
+    "damping_ratio": _of_mode("damping_ratio"),
+    "effective_mass": _of_mode("effective_mass"),
+    "displacement": Derivative(_displacement),
+    "displacement_at": Derivative(_displacement_at),
+    "velocity": Derivative(_velocity),
+    "maximum": Derivative(_extreme(np.argmax)),
+    "minimum": Derivative(_extreme(np.argmin)),
+    "integral": Derivative(_integral),
+    "mean_square": Derivative(_mean_square),
+    "largest_displacement": Derivative(_largest_displacement),
+    "strain": Derivative(_strain, frozen=_strain_of),
+}
+"""By the name of the measure."""
+
+
+def derivative_of(asked: Asked) -> Derivative:
+    """Derivative of a measure.
+
+    Raises
+    ------
+    InputError
+        It has none.
+    """
+    found = DERIVATIVES.get(asked.measure.name)
+    if found is None:
+        raise InputError(
+            f"{asked.text}: has no derivative; those that have one are {', '.join(DERIVATIVES)}. "
+            'Give your own with its derivative, as {"tip": (function, derivative)}, or use '
+            'method = "cma", which needs none'
+        )
+    return found
