@@ -20,6 +20,7 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.block_matrix import blocks_of_ends, pairs_of_ends, places_of
 from foldyn.mechanics.model import ranks
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
 from foldyn.mechanics.sheet_term import unit_rows
 from foldyn.mechanics.term import (
     ENERGIES,
@@ -155,6 +156,76 @@ def axial_blocks(springs, u, loose):
     return out
 
 
+class Gradient(NamedTuple):
+    """Derivatives by arrays of `Springs` of the same names."""
+
+    direction: NDArray
+    stiffness: NDArray
+    vector: NDArray
+    length: NDArray
+    stretch: NDArray
+    axial_stiffness: NDArray
+
+
+@inner
+def pull_directed(springs, u, weight, out, product):
+    """Add the derivatives of weight . F of directed springs to `product` and the gradients."""
+    for s in range(springs.stiffness.size):
+        a, b, k = springs.ends[s, 0], springs.ends[s, 1], springs.stiffness[s]
+        extension, rate = directed_extension(springs, u, s), directed_extension(springs, weight, s)
+        out.stiffness[s] += extension * rate
+        add_directed(springs, s, k * rate, product)
+        for c in range(3):
+            moved = u[a, c] - (u[b, c] if b >= 0 else 0.0)
+            weighs = weight[a, c] - (weight[b, c] if b >= 0 else 0.0)
+            out.direction[s, c] += k * (moved * rate + weighs * extension)
+
+
+@inner
+def pull_axial(springs, u, weight, out, product):
+    """The same of axial springs, those without length at rest as they are if that grows."""
+    for s in range(springs.axial_stiffness.size):
+        a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
+        extension, length = axial_extension(springs, u, s)
+        share = 1.0  # force over k l
+        if springs.stretch[s] < springs.length[s]:
+            share = extension / length
+        grown = 0.0  # what the ends part by where they move by the weights, times l
+        for c in range(3):
+            x = springs.vector[s, c] + u[b, c] - u[a, c]
+            grown += (weight[b, c] - weight[a, c]) * x
+        k = springs.axial_stiffness[s]
+        by_extension = k * grown / length if length > 0.0 else 0.0
+        by_length = by_extension * (1.0 - share)  # l, of which the extension is a part
+        out.axial_stiffness[s] += share * grown
+        out.stretch[s] += by_extension
+        if length > 0.0:
+            out.length[s] += by_length * springs.length[s] / length - by_extension
+            by_length /= length
+        for c in range(3):
+            moved = u[b, c] - u[a, c]
+            by = k * share * (weight[b, c] - weight[a, c]) + by_length * moved
+            out.vector[s, c] += by
+            by += by_length * springs.vector[s, c]
+            product[b, c] += by
+            product[a, c] -= by
+
+
+class _Backward(NamedTuple):
+    springs: Springs
+    out: Gradient
+    rows: int  # up to the last node
+
+
+@pullback
+def _pullback(own, u, v, t, weight, product, rate):
+    moved, weights, out = (
+        rows_at(u, own.rows), rows_at(weight, own.rows), rows_at(product, own.rows)
+    )  # fmt: skip
+    pull_directed(own.springs, moved, weights, own.out, out)
+    pull_axial(own.springs, moved, weights, own.out, out)
+
+
 class _Context(NamedTuple):
     springs: Springs
     group: int  # of the energies
@@ -194,6 +265,17 @@ class SpringsTerm(Term):
         """See `Term`."""
         own = Context(_Context(self.springs, group, int(work.strips.own[1])))
         return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
+
+    def arrays(self) -> Arrays:
+        """See `Term`."""
+        return arrays_of(self.springs)
+
+    def pulled(self) -> Pulled:
+        """See `Term`."""
+        rows = 1 + int(self._ends.max(initial=GROUND))
+        out = Gradient(*(np.zeros_like(getattr(self.springs, name)) for name in Gradient._fields))
+        own = Context(_Backward(self.springs, out, rows))
+        return Pulled(own, _pullback, out._asdict())
 
     @cached_property
     def _ends(self) -> NDArray:
