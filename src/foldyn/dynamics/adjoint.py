@@ -89,8 +89,8 @@ def refuse(motion: Any) -> None:
         "rest angles that turn in time (Actuate, Temperature)": system.turns,
         "loads that depend on the displacement (Pressure, CreaseMoment)": system.follows,
         "constraints (Link, rigid panels)": len(system.ties.slave) > 0,
-        "supports that move with a mass matrix that is not diagonal": (
-            system.moves and not packed.mass.lumped
+        "supports that move at the start, and a mass matrix that is not diagonal": (
+            not packed.mass.lumped and bool(motion.start[1][motion.case.fixed].any())
         ),
     }
     for what, here in lacks.items():

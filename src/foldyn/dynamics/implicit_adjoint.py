@@ -111,6 +111,10 @@ class Retraced(Implicit):
                 low, high = (bisect_left(self._taken, k, key=_number) for k in (first, last))
                 yield from reversed(self._taken[low:high])
 
+    def _parts(self) -> dict[str, Any]:
+        """See `Implicit`, without its own: that counts, and what is kept here."""
+        return {name: part for name, part in super()._parts().items() if name != "engine"}
+
     def _reached(self, t: float) -> State:
         old = self._scheme.old
         return State(t, old.q.copy(), old.w.copy(), old.a.copy())
