@@ -51,7 +51,10 @@ class PullbackWork(NamedTuple):
 
 
 class Gradient(NamedTuple):
-    """Derivatives by arrays of `BarsHinges` of the same names."""
+    """Derivatives by arrays of `BarsHinges` of the same names, and by the excess of bars.
+
+    That is lambda^2 - 1 at rest, by which a bar is longer than it was cut: 0 in a model.
+    """
 
     rest: NDArray
     bar_vector: NDArray
@@ -62,6 +65,7 @@ class Gradient(NamedTuple):
     hinge_parameters: NDArray
     hinge_share: NDArray
     hinge_offset: NDArray
+    bar_excess: NDArray  # (nb,)
 
 
 def pullback_work(nodes: int) -> PullbackWork:
@@ -133,6 +137,7 @@ def pull_bars(model, work, out):
                 k = stiffness[e]
                 out.bar_stiffness[e] += stress[q] * wd[q]
                 rise = k * slope[q] * wd[q]  # s' = slope / 2
+                out.bar_excess[e] += 0.5 * rise
                 out.bar_per_length2[e] += 0.5 * rise * s[q] / per_length2[e]
                 stress[q], slope[q] = k * stress[q], rise * per_length2[e]
             for q in range(m):
@@ -279,7 +284,8 @@ def _pullback(own, u, v, t, weight, product, rate):
 
 def gradient_of(model: BarsHinges) -> Gradient:
     """Room for the derivatives by the arrays of a model."""
-    return Gradient(*(np.zeros_like(getattr(model, name)) for name in Gradient._fields))
+    arrays = model._asdict() | {"bar_excess": model.bar_stiffness}
+    return Gradient(*(np.zeros_like(arrays[name]) for name in Gradient._fields))
 
 
 def bars_hinges_pulled(model: BarsHinges) -> Pulled:
