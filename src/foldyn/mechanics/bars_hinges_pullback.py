@@ -140,11 +140,14 @@ def pull_bars(model, work, out):
                 out.bar_excess[e] += 0.5 * rise
                 out.bar_per_length2[e] += 0.5 * rise * s[q] / per_length2[e]
                 stress[q], slope[q] = k * stress[q], rise * per_length2[e]
+            for c in range(3):
+                for q in range(whole_lanes(m)):
+                    by = stress[q] * w[c * BLOCK + q]
+                    dx[c * BLOCK + q] = by + slope[q] * dx[c * BLOCK + q]
+                    x[c * BLOCK + q] = by + slope[q] * d[c * BLOCK + q]
             for q in range(m):
                 for c in range(3):
-                    by = stress[q] * w[c * BLOCK + q]
-                    by_vector[3 * (first + q) + c] += by + slope[q] * dx[c * BLOCK + q]
-                    x[c * BLOCK + q] = by + slope[q] * d[c * BLOCK + q]
+                    by_vector[3 * (first + q) + c] += dx[c * BLOCK + q]
             scatter(sums, ALL, bars, 2, 0, first, m, x, 0, ones, BLOCK)
             scatter(sums, ALL, bars, 2, 1, first, m, x, 0, ones, 0)
 
