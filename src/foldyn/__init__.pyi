@@ -4,6 +4,7 @@ from foldyn import (
     analyses as analyses,
     cases as cases,
     checks as checks,
+    designs as designs,
     dynamics as dynamics,
     errors as errors,
     experiment as experiment,
@@ -59,6 +60,7 @@ from foldyn.cases import (
     Temperature as Temperature,
     TotalForce as TotalForce,
 )
+from foldyn.designs import Design as Design, design as design
 from foldyn.dynamics import (
     critical_step as critical_step,
     initial_state as initial_state,
