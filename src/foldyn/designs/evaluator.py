@@ -7,7 +7,6 @@ import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -51,7 +50,8 @@ class Evaluator(Protocol):
         All that they depend on, as JSON holds it.
     """
 
-    stamp: list[Any]
+    @property
+    def stamp(self) -> list[Any]: ...
 
     def __call__(self, values: Mapping[str, Any], gradient: bool) -> tuple[NDArray, NDArray | None]:
         """Measures (m,) of a design, and if asked their derivatives (m, n) by its entries."""

@@ -162,8 +162,9 @@ def history_of(
         told = {"long_name": "left minus right side"}
         data["constraints"] = ((along, "constraint"), numbers[:, 1:], told)
         coordinates["constraint"] = [one.text for one in problem.constraints]
-    ends = zip(*(space.parts(each).items() for each in (entries, space.lower, space.upper)))
-    for (name, values), (_, lower), (_, upper) in ends:
+    lowers, uppers = space.parts(space.lower), space.parts(space.upper)
+    for name, values in space.parts(entries).items():
+        lower, upper = lowers[name], uppers[name]
         array = bool(space.shapes[name])
         dims = (along, f"{name}_entry") if array else (along,)
         one = lower.size == 1 or (np.ptp(lower) == np.ptp(upper) == 0.0)

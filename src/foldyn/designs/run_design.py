@@ -23,7 +23,6 @@ from foldyn.sweeps.evaluations import Evaluation, Evaluations
 from foldyn.sweeps.pool import Here
 from foldyn.values import MOST, choice, number, whole
 
-
 MOST_DRAWN = 20
 """Designs that are drawn for a start until one can be computed."""
 
