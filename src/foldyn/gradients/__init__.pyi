@@ -1,3 +1,3 @@
-from foldyn.gradients.sensitivity import sensitivity as sensitivity
+from foldyn.gradients.run_sensitivity import sensitivity as sensitivity
 
 __all__: list[str]
