@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from foldyn.checks import observed_order
 from foldyn.gradients import sensitivity
-from foldyn.gradients.sensitivity import KINDS
+from foldyn.gradients.run_sensitivity import KINDS
 from foldyn.sweeps.measure import asked
 from foldyn.sweeps.measures import MEASURES
 

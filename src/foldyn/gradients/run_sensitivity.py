@@ -26,6 +26,7 @@ from foldyn.gradients.parameters import Parameters, Slope, Values, checked
 from foldyn.gradients.path import PathGradient
 from foldyn.input_files import path_of
 from foldyn.mechanics.pullback import Arrays
+from foldyn.structures import Structure
 from foldyn.sweeps.job import ASIDE
 from foldyn.sweeps.measure import Asked, asked, of_callable
 from foldyn.sweeps.measures import MEASURES
@@ -54,7 +55,11 @@ KINDS: Mapping[str, Callable[[Case, Mapping[str, Any]], Differentiated]] = {
     "statics": PathGradient,
 }
 """Analyses with gradients, by their kind in case files."""
-ARRAYS = ("fold_stiffness", "fold_rest", "bend_stiffness", "bend_rest", "bar_area", "node_mass")
+LENGTH = "bar_length"
+ARRAYS = (
+    "fold_stiffness", "fold_rest", "bend_stiffness", "bend_rest", "bar_area", LENGTH,
+    "node_mass",
+)  # fmt: skip
 """Arrays of a structure that can be parameters as they are."""
 Source = Callable[..., Case] | Case | str | os.PathLike[str]
 Own = tuple[Callable[..., float], Callable[..., Seeds]]
@@ -77,7 +82,8 @@ def sensitivity(
         ``build(**parameters)`` returns the case; or a case file, whose parameters are keys, as
         "pattern.panel_angle"; or a case, whose parameters are arrays of its structure:
         `fold_stiffness` and `bend_stiffness` (N m/rad, of whole hinges), `fold_rest` and
-        `bend_rest` (rad), `bar_area` (m2), `node_mass` (kg).
+        `bend_rest` (rad), `bar_area` (m2), `bar_length` (m, to which bars were cut: those that do
+        not fit are strained at rest), `node_mass` (kg).
     parameters : mapping, or names of arrays of a case
         Where the gradient is taken: numbers, or arrays of one dimension, whose entries count one by
         one. Arrays of a case are taken where they stand.
@@ -136,6 +142,8 @@ def sensitivity(
     case = design.case()
     found = source.analyse(case)
     slopes = design.slopes(found.numbers)
+    if isinstance(build, Case) and LENGTH in slopes:
+        slopes[LENGTH] = _by_lengths(slopes[LENGTH], found.numbers(case).numbers)
     direction = None if along is None else _direction(along, design)
     if direction is not None and isinstance(found, ModesGradient):
         found = found.along(lambda gradient: _rate(slopes, direction, gradient))
@@ -201,6 +209,22 @@ def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None
     return Sourced(build, values, kind, arguments)
 
 
+def _by_lengths(areas: Slope, numbers: Gradient) -> Slope:
+    """How numbers change with the lengths to which bars are cut, from how they do with EA / L0.
+
+    With x = (l^2 - L^2) / L^2 the excess of a bar of the length l, and its stiffness EA / L.
+    """
+    name = next(key for key in numbers if key.endswith("bar_stiffness"))
+    prefix = name.removesuffix("bar_stiffness")
+    length = numbers[f"{prefix}bar_per_length2"] ** -0.5
+    by = {
+        name: -numbers[name] / length,
+        f"{prefix}bar_per_length2": -2.0 / length**3,
+        f"{prefix}bar_excess": -2.0 / length,
+    }
+    return Slope(by, dict.fromkeys(by, areas.entry[name]), areas.count)
+
+
 def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, NDArray]]:
     """A case whose structure has other arrays."""
     given = (
@@ -211,6 +235,7 @@ def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, N
     values = {}
     for name, value in given.items():
         choice("parameters", name, ARRAYS)
+        _check_acts(case.structure, name)
         own = getattr(case.structure, name)
         if own is None:  # masses by a rule
             own = case.structure.mass.sum(axis=1)
@@ -222,9 +247,30 @@ def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, N
             )
 
     def build(**arrays: NDArray) -> Case:
+        if LENGTH in arrays:  # no structure has bars that do not fit: see `by_lengths`
+            share = arrays.pop(LENGTH) / case.structure.bar_length
+            arrays["bar_area"] = arrays.get("bar_area", case.structure.bar_area) * share
         return replace(case, structure=replace(case.structure, **arrays))
 
     return build, checked(values)
+
+
+def _check_acts(structure: Any, name: str) -> None:
+    """Refuse arrays that a structure does not work with."""
+    if not isinstance(structure, Structure):
+        raise InputError(": a shell has no such arrays; give a function that builds it", name)
+    if name.startswith("bar") and structure.membranes:
+        raise InputError(
+            ": the panels of this structure resist as membranes, and its bars do not; give a "
+            'function that builds it, or take membrane = "bars"',
+            name,
+        )
+    if name.startswith("bend") and structure.edge_plates is not None:
+        raise InputError(
+            ": panels of the scheme n5b8e bend as plates, without hinges; give a function that "
+            "builds it",
+            name,
+        )
 
 
 def _of_file(
