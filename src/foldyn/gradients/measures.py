@@ -13,9 +13,11 @@ from foldyn.cases import Case
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.gradients.numbers import Gradient
+from foldyn.linear.frf import quantity_of
+from foldyn.signals.peaks import magnitude_curve
 from foldyn.statics import Equilibrium, Landscape, landscape
 from foldyn.sweeps.measure import Asked
-from foldyn.sweeps.measures import time_of
+from foldyn.sweeps.measures import curve_of, frequency_of, highest, time_of
 from foldyn.viewer.fields import bar_strain
 
 Seeds = dict[str, NDArray]
@@ -243,6 +245,54 @@ def _climb(found: Landscape, start: int, end: int) -> tuple[Equilibrium, Equilib
     return max(between, key=lambda state: state.energy), stable[start]
 
 
+# ------------------------------------------------------------------ frequency responses
+def _response(result: xr.Dataset, case: Case, node: int, axis: str, frequency: float) -> Seeds:
+    k = frequency_of(result, frequency)
+    return _sizes(result, node, [AXES.index(axis)], {k: 1.0})
+
+
+def _sizes(result: xr.Dataset, node: int, axes: list[int], weights: Mapping[int, float]) -> Seeds:
+    """Seeds of a weighted sum of the magnitudes of the response of a node along some axes."""
+    name = quantity_of(result)
+    response = result[name].transpose("frequency", "node", "axis").values
+    out = np.zeros_like(response)
+    for k, weight in weights.items():
+        own = response[k, node, axes]
+        size = float(np.linalg.norm(own))
+        if not size > 0.0:
+            raise InputError("is 0 or none, where a magnitude has no derivative")
+        out[k, node, axes] = weight * own.conj() / size
+    return {name: out}
+
+
+def _peak(which: int) -> Callable[..., Seeds]:
+    """Of the frequency (0) or the height (1) of the highest peak, from the samples around it."""
+
+    def seeds(result: xr.Dataset, case: Case, node: int, axis: str | None = None) -> Seeds:
+        if "frequency" not in result.dims:
+            raise InputError("of a spectrum of a motion has no derivative; take that of an frf")
+        f, size, peaks, kind = curve_of(result, node, axis)
+        best = highest(peaks)
+        if best is None:
+            raise InputError("there is no peak among these frequencies; take others")
+        at = int(peaks.index[best])
+        if (peaks.frequency[best], peaks.height[best]) == (f[at], size[at]):
+            raise InputError("the peak has not the shape of a mode; take closer frequencies")
+        near, weights = np.arange(at - 1, at + 2), {}
+        for k in near:
+            change = 1e-3 * size[k] * (np.arange(len(size)) == k)
+            there = [
+                magnitude_curve(f, size + share * change, kind).peak(at)[which]
+                for share in (1.0, -1.0, 2.0, -2.0)
+            ]
+            slope = (8.0 * (there[0] - there[1]) - (there[2] - there[3])) / (12e-3 * size[k])
+            weights[int(np.searchsorted(result["frequency"].values, f[k]))] = slope
+        axes = list(range(len(AXES))) if axis is None else [AXES.index(axis)]
+        return _sizes(result, node, axes, weights)
+
+    return seeds
+
+
 def _nothing(result: xr.Dataset, case: Case) -> Seeds:
     return {}
 
@@ -265,6 +315,9 @@ DERIVATIVES: Mapping[str, Derivative] = {
     "reaction": Derivative(_reaction),
     "limit_load": Derivative(_limit_load),
     "load_at": Derivative(_load_at),
+    "response": Derivative(_response),
+    "peak_frequency": Derivative(_peak(0)),
+    "peak_height": Derivative(_peak(1)),
     "barrier": _between_states(lambda found: _climb(found, 0, 1)),
     "barrier_back": _between_states(lambda found: _climb(found, 1, 0)),
 }

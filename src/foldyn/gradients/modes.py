@@ -1,8 +1,7 @@
 """Gradients of natural frequencies, and of all that follows from modes.
 
 With phi' M phi = 1 an eigenvalue has d lambda = phi' (dK - lambda dM) phi (Nelson, AIAA Journal 14,
-1976). Of K, the derivative of forces, what is needed is the pullback of the forces with the weights
-phi, differentiated along phi: by differences over turns so small that their error is 1e-12.
+1976): products of `gradients.linearized`.
 
 A shape has d phi from (K - lambda M) d phi = -(dK - lambda dM - d lambda M) phi with
 phi' M d phi = -phi' dM phi / 2. The derivatives s of a number by the shape give, with the solution
@@ -28,20 +27,14 @@ from scipy.sparse.linalg import splu
 
 from foldyn.cases import Case, Rayleigh
 from foldyn.errors import InputError
-from foldyn.gradients.equilibrium import equilibrium_seen
-from foldyn.gradients.numbers import Gradient, nothing, numbers_of
-from foldyn.linear.modes import Found, spectrum_of, unit_translations
-from foldyn.materials import Superlinear
-from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.pullback import Arrays, Pullback
+from foldyn.gradients.linearized import Products, refuse
+from foldyn.gradients.numbers import Gradient, numbers_of
+from foldyn.linear.modes import spectrum_of, unit_translations
+from foldyn.mechanics.pullback import Arrays
 from foldyn.statics.stability import oriented
-from foldyn.structures.bars_hinges import BarsHingesTerm
 
-TURN = 1e-3  # rad: of the largest turn in a difference along a shape
-SMALL = 1e-6  # of the longest bar: a motion by which turns are measured
 ALONE = 1e-6  # relative distance of eigenvalues below which they are one
 SAME = 1e-12  # relative difference of derivatives that are one
-AT_REST = 1e-9  # rad: superlinear hinges that stand nearer to their rest angle have no slope
 KNOWN = ("frequency", "eigenvalue", "shape", "damping_ratio", "effective_mass", "participation")
 
 
@@ -62,14 +55,11 @@ class ModesGradient:
 
     def __init__(self, case: Case, arguments: Mapping[str, Any]) -> None:
         found = spectrum_of(case, **arguments)
-        _refuse(case, found)
+        refuse(found.linear, "modes")
         self.case, self.result, self._linear = case, found.result, found.linear
         self._values, self._shapes = found.spectrum.values, oriented(found.spectrum.shapes)
         self._equilibrium = arguments.get("state") == "equilibrium"
-        self._q = case.body.dofs(self._linear.displacement)
-        self._pullback = Pullback(_without_soft(case.body, self._q))
-        self._mass = sparse.csr_array(case.mass)
-        self._mass.sort_indices()
+        self._products = Products(found.linear)
         self._parted = False
 
     def numbers(self, case: Case) -> Arrays:
@@ -89,7 +79,7 @@ class ModesGradient:
             split = np.zeros((count, count))
             for i in range(count):
                 for j in range(i + 1):
-                    total = self._nothing()
+                    total = self._products.nothing()
                     self._add(part[:, i], part[:, j], 1.0, self._values[first], total)
                     split[i, j] = split[j, i] = rate(total)
             other._shapes[:, first:last] = part @ np.linalg.eigh(split)[1]
@@ -105,7 +95,7 @@ class ModesGradient:
                 f"there are no derivatives through {', '.join(unknown)} of modes, but through "
                 f"{', '.join(KNOWN)}"
             )
-        total, state = self._nothing(), np.zeros(len(self._q))
+        total, state = self._products.nothing(), np.zeros(len(self._products.q))
         by_value, by_shape = self._seeds(seeds, total)
         self._check_alone(by_value, by_shape)
         for k in np.flatnonzero((by_value != 0.0) | by_shape.any(axis=0)):
@@ -115,16 +105,12 @@ class ModesGradient:
             if by_shape[:, k].any():
                 z, c = self._nelson(k, by_shape[:, k])
                 state += self._add(z, shape, -1.0, -value, total)
-                self._add_mass(shape, shape, -0.5 * c, total)
+                self._products.add_mass(shape, shape, -0.5 * c, total)
         if self._equilibrium:
-            equilibrium_seen(self.case, self._q, state, self._pullback, total)
+            self._products.add_equilibrium(state, total)
         return total
 
     # ------------------------------------------------------------------ parts
-    def _nothing(self) -> dict[str, NDArray]:
-        """Gradient of nothing."""
-        return nothing(self.case, self._pullback)
-
     def _seeds(
         self, seeds: Mapping[str, NDArray], total: dict[str, NDArray]
     ) -> tuple[NDArray, NDArray]:
@@ -147,7 +133,7 @@ class ModesGradient:
         along = unit_translations(linear)
         by_shape += linear.mass @ (along @ by_factor.T)
         for k, a in np.argwhere(by_factor != 0.0):
-            self._add_mass(shapes[:, k], along[:, a], by_factor[k, a], total)
+            self._products.add_mass(shapes[:, k], along[:, a], by_factor[k, a], total)
         by_ratio = np.asarray(seeds.get("damping_ratio", zeros), float)
         self._check_vibrates(by_ratio)
         for k in np.flatnonzero(by_ratio):
@@ -166,27 +152,8 @@ class ModesGradient:
         total: dict[str, NDArray],
     ) -> NDArray:  # fmt: skip
         """Add the gradient of by_stiffness z' K shape - by_mass z' M shape; returns that by q."""
-        self._add_mass(z, shape, -by_mass, total)
-        weight, motion = (self._linear.whole(each[:, None])[:, 0] for each in (z, shape))
-        if by_stiffness == 0.0 or not motion.any():
-            return np.zeros(len(self._q))
-        scale = SMALL * self.case.body.sheet.longest() / np.abs(motion).max()
-        turn = self.case.body.turn(self._q, self._q + scale * motion)
-        step = TURN * scale / turn
-        state = np.zeros(len(self._q))
-        for place, share in ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0)):
-            factor = by_stiffness * share / (12.0 * step)
-            self._pullback.clear()
-            state += factor * self._pullback.at(self._q + place * step * motion, weight)
-            for name, out in self._pullback.gradient.items():
-                total[name] += factor * out
-        return state
-
-    def _add_mass(self, z: NDArray, shape: NDArray, by: float, total: dict[str, NDArray]) -> None:
-        """Add the gradient of by z' M shape."""
-        one, other = (self._linear.expanded(each[:, None]).reshape(-1, 3) for each in (z, shape))
-        rows = np.repeat(np.arange(len(one)), np.diff(self._mass.indptr))
-        total["mass"] += by * np.einsum("ea,ea->e", one[rows], other[self._mass.indices])
+        self._products.add_mass(z, shape, -by_mass, total)
+        return self._products.add_stiffness(z, shape, by_stiffness, total)
 
     def _nelson(self, k: int, by_shape: NDArray) -> tuple[NDArray, float]:
         """See the module's text."""
@@ -239,39 +206,3 @@ class ModesGradient:
                 "there are derivatives of damping ratios for alpha and beta about rest alone; "
                 "leave out other dampers, or vary the parameters by fd.sweep"
             )
-
-
-def _refuse(case: Case, found: Found) -> None:
-    """Refuse linearizations that have no derivatives yet, with a remedy."""
-    linear = found.linear
-    lacks = {
-        "contact": case.contact is not None,
-        "creases that yield, creep or relax": linear.branches is not None,
-        "internal amplitudes (internal)": linear.internal > 0,
-        "slopes of finite amplitude (secant)": linear.secant is not None,
-        "folds that are actuated about an equilibrium (Actuate, Temperature)": (
-            bool(case.rest_terms) and bool(linear.displacement.any())
-        ),
-        "loads that depend on the displacement (Pressure, CreaseMoment)": bool(
-            case.following_terms
-        ),
-    }
-    for what, here in lacks.items():
-        if here:
-            raise InputError(
-                f"there are no gradients of modes with {what}; leave that out, or vary the "
-                "parameters by fd.sweep"
-            )
-
-
-def _without_soft(body: Assembly, q: NDArray) -> Assembly:
-    """The body without superlinear hinges at their rest angle, which have no slope in modes."""
-    sheet = body.sheet
-    if not isinstance(sheet, BarsHingesTerm):
-        return body
-    model, angle = sheet.model, sheet.angles(q)
-    code = np.repeat(model.hinge_runs[:, 2], model.hinge_runs[:, 1] - model.hinge_runs[:, 0])
-    soft = (code == Superlinear.code) & (np.abs(angle - model.hinge_rest) < AT_REST)
-    if not soft.any():
-        return body
-    return body.on(sheet.weakened(soft))

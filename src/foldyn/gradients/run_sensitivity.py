@@ -18,6 +18,7 @@ from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.cases import Case
 from foldyn.errors import InputError, within
 from foldyn.gradients.expressions import Expression, parse
+from foldyn.gradients.frf import FrfGradient
 from foldyn.gradients.measures import Derivative, Seeds, derivative_of
 from foldyn.gradients.modes import ModesGradient
 from foldyn.gradients.motion import MotionGradient
@@ -53,6 +54,7 @@ KINDS: Mapping[str, Callable[[Case, Mapping[str, Any]], Differentiated]] = {
     "modes": ModesGradient,
     "dynamics": MotionGradient,
     "statics": PathGradient,
+    "frf": FrfGradient,
 }
 """Analyses with gradients, by their kind in case files."""
 LENGTH = "bar_length"

@@ -21,7 +21,7 @@ from foldyn.errors import FoldynError, InputError
 from foldyn.values import choice, number, show, suggest
 
 NODE, AXIS, MODE, MODEL = "node", "axis", "mode", "model"
-REALS = {"time": "s", "displacement": "m"}
+REALS = {"time": "s", "displacement": "m", "frequency": "Hz"}
 """Arguments that a measure may have."""
 _ASKED = re.compile(r"([A-Za-z_]\w*)(?:\[([^\[\]]*)\])?\Z")
 _NAME = re.compile(r"[A-Za-z_]\w*\Z")
@@ -47,7 +47,8 @@ class Measure:
     dims : tuple of str
         Dimensions of an array; their lengths may differ from point to point.
     takes : tuple of str
-        Arguments, in their order: "node", "axis", "mode", "model", "time", "displacement".
+        Arguments, in their order: "node", "axis", "mode", "model", "time", "displacement",
+        "frequency".
     needs : int
         How many of them must be given.
     through : callable, optional

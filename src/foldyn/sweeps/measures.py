@@ -99,7 +99,7 @@ def _rigid_modes(result: xr.Dataset, case: Case) -> int:
 
 
 # ------------------------------------------------------- responses, and spectra of motions
-def _curve(result: xr.Dataset, node: int, axis: str | None) -> tuple[NDArray, NDArray, Peaks, str]:
+def curve_of(result: xr.Dataset, node: int, axis: str | None) -> tuple[NDArray, NDArray, Peaks, str]:
     """Frequencies, magnitudes at a node (of the vector where no axis is named), and their peaks."""
     along = list(AXES) if axis is None else [axis]
     if "time" in result:
@@ -119,21 +119,38 @@ def _curve(result: xr.Dataset, node: int, axis: str | None) -> tuple[NDArray, ND
     return f, size, peaks, kind_of(shown)
 
 
-def _highest(peaks: Peaks) -> int | None:
+def highest(peaks: Peaks) -> int | None:
     return int(np.argmax(peaks.height)) if peaks.height.size else None
+
+
+def frequency_of(result: xr.Dataset, frequency: float) -> int:
+    """Number of the frequency (Hz) of a response that is nearest, half their distance off at most."""
+    known = result["frequency"].values
+    k = int(np.abs(known - frequency).argmin())
+    if abs(known[k] - frequency) > 0.5 * np.diff(known).max(initial=0.0):
+        raise InputError(f"the response has frequencies from {known[0]:g} to {known[-1]:g} Hz")
+    return k
+
+
+@_measure(FRF, units="", doc="magnitude of the response at a frequency (unit of the response)")
+def _response(
+    result: xr.Dataset, case: Case, node: int, axis: str, frequency: float
+) -> float:  # fmt: skip
+    response = result[quantity_of(result)].transpose("frequency", ...).sel(node=node, axis=axis)
+    return float(np.abs(response.values[frequency_of(result, frequency)]))
 
 
 @_measure(*CURVES, units="Hz", doc="frequency of the highest peak")
 def _peak_frequency(result: xr.Dataset, case: Case, node: int, axis: str | None = None) -> float:
-    peaks = _curve(result, node, axis)[2]
-    k = _highest(peaks)
+    peaks = curve_of(result, node, axis)[2]
+    k = highest(peaks)
     return np.nan if k is None else float(peaks.frequency[k])
 
 
 @_measure(*CURVES, units="", doc="height of the highest peak (unit of the response)")
 def _peak_height(result: xr.Dataset, case: Case, node: int, axis: str | None = None) -> float:
-    peaks = _curve(result, node, axis)[2]
-    k = _highest(peaks)
+    peaks = curve_of(result, node, axis)[2]
+    k = highest(peaks)
     return np.nan if k is None else float(peaks.height[k])
 
 
@@ -141,13 +158,13 @@ def _peak_height(result: xr.Dataset, case: Case, node: int, axis: str | None = N
 def _peak_frequencies(
     result: xr.Dataset, case: Case, node: int, axis: str | None = None
 ) -> NDArray:  # fmt: skip
-    return _curve(result, node, axis)[2].frequency
+    return curve_of(result, node, axis)[2].frequency
 
 
 @_measure(FRF, doc="damping ratio of the highest peak, by half power")
 def _peak_damping(result: xr.Dataset, case: Case, node: int, axis: str | None = None) -> float:
-    f, size, peaks, kind = _curve(result, node, axis)
-    k = _highest(peaks)
+    f, size, peaks, kind = curve_of(result, node, axis)
+    k = highest(peaks)
     if k is None:
         return np.nan
     return half_power(f, size, float(peaks.frequency[k]), kind).damping_ratio
