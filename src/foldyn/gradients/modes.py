@@ -67,7 +67,8 @@ class ModesGradient:
         self._values, self._shapes = found.spectrum.values, oriented(found.spectrum.shapes)
         self._equilibrium = arguments.get("state") == "equilibrium"
         self._q = case.body.dofs(self._linear.displacement)
-        self._pullback = Pullback(_without_soft(case.body, self._q))
+        self._soft = _soft(case.body.sheet, self._q)
+        self._pullback = Pullback(_without(case.body, self._soft))
         self._mass = sparse.csr_array(case.mass)
         self._mass.sort_indices()
         self._parted = False
@@ -178,6 +179,8 @@ class ModesGradient:
             factor = by_stiffness * share / (12.0 * step)
             self._pullback.clear()
             state += factor * self._pullback.at(self._q + place * step * motion, weight)
+            if self._soft.any():
+                self._pullback.gradient["0.hinge_stiffness"][self._soft] = 0.0
             for name, out in self._pullback.gradient.items():
                 total[name] += factor * out
         return state
@@ -264,14 +267,16 @@ def _refuse(case: Case, found: Found) -> None:
             )
 
 
-def _without_soft(body: Assembly, q: NDArray) -> Assembly:
-    """The body without superlinear hinges at their rest angle, which have no slope in modes."""
-    sheet = body.sheet
+def _soft(sheet: Any, q: NDArray) -> NDArray:
+    """Mask (nh,) of superlinear hinges at their rest angle, which have no slope in modes."""
     if not isinstance(sheet, BarsHingesTerm):
-        return body
-    model, angle = sheet.model, sheet.angles(q)
+        return np.zeros(0, bool)
+    model = sheet.model
     code = np.repeat(model.hinge_runs[:, 2], model.hinge_runs[:, 1] - model.hinge_runs[:, 0])
-    soft = (code == Superlinear.code) & (np.abs(angle - model.hinge_rest) < AT_REST)
-    if not soft.any():
-        return body
-    return body.on(sheet.weakened(soft))
+    return (code == Superlinear.code) & (np.abs(sheet.angles(q) - model.hinge_rest) < AT_REST)
+
+
+def _without(body: Assembly, soft: NDArray) -> Assembly:
+    """The body without the stiffness of these hinges."""
+    sheet: Any = body.sheet
+    return body.on(sheet.weakened(soft)) if soft.any() else body
