@@ -40,7 +40,7 @@ def seen_through(
     size = case.structure.nodes.size
     for k in range(len(case.load_terms)):
         pushed = factor * adjoint[:size].reshape(-1, 3)
-        total[f"load.{k}"] = total.get(f"load.{k}", 0.0) + pushed
+        total[f"load.{k}"] += pushed
     for k in range(len(case.imposed_terms)):
         moved = factor * (by_state - product)[:size].reshape(-1, 3) * case.imposed
-        total[f"imposed.{k}"] = total.get(f"imposed.{k}", 0.0) + moved
+        total[f"imposed.{k}"] += moved

@@ -13,6 +13,7 @@ from foldyn.cases import Case
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.gradients.numbers import Gradient
+from foldyn.statics import Equilibrium, Landscape, landscape
 from foldyn.sweeps.measure import Asked
 from foldyn.sweeps.measures import time_of
 from foldyn.viewer.fields import bar_strain
@@ -27,12 +28,12 @@ class Derivative(NamedTuple):
     seeds : of a result and a case, with the measure's arguments.
     frozen : of a measure that also takes numbers of the case itself: of the result and the case,
         the measure as a function of another case, where the result stays as it is.
-    numbers : of the case, the derivatives of such a measure by numbers of the case.
+    numbers : of the result and the case, the derivatives of such a measure by numbers of the case.
     """
 
     seeds: Callable[..., Seeds]
     frozen: Callable[..., Callable[[Case], float]] | None = None
-    numbers: Callable[[Case], Gradient] | None = None
+    numbers: Callable[..., Gradient] | None = None
 
 
 def _of_mode(variable: str) -> Derivative:
@@ -172,12 +173,82 @@ def _strain_of(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
     return lambda other: abs(found.strain(other)[1])
 
 
+def _reaction(result: xr.Dataset, case: Case, axis: str) -> Seeds:
+    out = np.zeros((result.sizes["step"], len(case.reaction_dofs)))
+    out[-1, (result["support_axis"] == axis).values] = 1.0
+    return {"reaction": out}
+
+
+def _strain_energy(result: xr.Dataset, case: Case) -> Seeds:
+    u, k = _strained_most(result, case)
+    out = np.zeros((len(u), *u[0].shape))
+    out[k] = case.structure.internal_force(u[k])
+    return {"displacement": out}
+
+
+def _strained_most(result: xr.Dataset, case: Case) -> tuple[NDArray, int]:
+    along = "time" if "time" in result.dims else "step"
+    energy = sum(result[name].values for name in case.energy_groups)
+    return result["displacement"].transpose(along, "node", "axis").values, int(np.argmax(energy))
+
+
+def _strain_energy_of(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
+    u, k = _strained_most(result, case)
+    return lambda other: _energy(other, u[k])
+
+
+def _energy(case: Case, u: NDArray) -> float:
+    return float(case.body.energies(case.body.dofs(u)).sum())
+
+
+def _limit_load(result: xr.Dataset, case: Case) -> Seeds:
+    at = np.flatnonzero(result["point"].values == "limit")
+    if not len(at):
+        raise InputError("the path has no limit point; trace it by arc_length, and farther")
+    return {"load_factor": _one(result.sizes["step"], int(at[0]))}
+
+
+def _load_at(result: xr.Dataset, case: Case, node: int, axis: str, displacement: float) -> Any:
+    return {"load_at": {(3 * node + AXES.index(axis), displacement): 1.0}}
+
+
+def _between_states(pair: Callable[[Landscape], tuple[Equilibrium, Equilibrium]]) -> Derivative:
+    """Energy of a state above that of another, both without force: it has no other derivative."""
+
+    def frozen(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
+        high, low = (state.displacement for state in pair(landscape(result, case)))
+        return lambda other: _energy(other, high) - _energy(other, low)
+
+    def numbers(result: xr.Dataset, case: Case) -> Gradient:
+        high, low = pair(landscape(result, case))
+        motion = sum((vector for vector, _ in case.imposed_terms), np.zeros_like(high.displacement))
+        size = np.abs(motion).max()
+        found = {}
+        for k in range(len(case.imposed_terms)):  # forces of supports that move farther
+            found[f"imposed.{k}"] = case.imposed * sum(
+                sign * state.stroke / size * case.structure.internal_force(state.displacement)
+                for sign, state in ((1.0, high), (-1.0, low))
+            )
+        return found
+
+    return Derivative(_nothing, frozen, numbers)
+
+
+def _climb(found: Landscape, start: int, end: int) -> tuple[Equilibrium, Equilibrium]:
+    stable = found.stable
+    if len(stable) < 2:
+        raise InputError("there are no two stable states, and so no barrier between them")
+    places = sorted(found.states.index(stable[k]) for k in (start, end))
+    between = found.states[places[0] : places[1] + 1]
+    return max(between, key=lambda state: state.energy), stable[start]
+
+
 def _nothing(result: xr.Dataset, case: Case) -> Seeds:
     return {}
 
 
 DERIVATIVES: Mapping[str, Derivative] = {
-    "mass": Derivative(_nothing, numbers=lambda case: {"mass": np.ones(case.mass.nnz)}),
+    "mass": Derivative(_nothing, numbers=lambda result, case: {"mass": np.ones(case.mass.nnz)}),
     "frequency": _of_mode("frequency"),
     "damping_ratio": _of_mode("damping_ratio"),
     "effective_mass": _of_mode("effective_mass"),
@@ -190,6 +261,12 @@ DERIVATIVES: Mapping[str, Derivative] = {
     "mean_square": Derivative(_mean_square),
     "largest_displacement": Derivative(_largest_displacement),
     "strain": Derivative(_strain, frozen=_strain_of),
+    "strain_energy": Derivative(_strain_energy, frozen=_strain_energy_of),
+    "reaction": Derivative(_reaction),
+    "limit_load": Derivative(_limit_load),
+    "load_at": Derivative(_load_at),
+    "barrier": _between_states(lambda found: _climb(found, 0, 1)),
+    "barrier_back": _between_states(lambda found: _climb(found, 1, 0)),
 }
 """By the name of the measure."""
 

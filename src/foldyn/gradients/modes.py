@@ -29,7 +29,7 @@ from scipy.sparse.linalg import splu
 from foldyn.cases import Case, Rayleigh
 from foldyn.errors import InputError
 from foldyn.gradients.equilibrium import equilibrium_seen
-from foldyn.gradients.numbers import Gradient, numbers_of
+from foldyn.gradients.numbers import Gradient, nothing, numbers_of
 from foldyn.linear.modes import Found, spectrum_of, unit_translations
 from foldyn.materials import Superlinear
 from foldyn.mechanics.assembly import Assembly
@@ -123,9 +123,7 @@ class ModesGradient:
     # ------------------------------------------------------------------ parts
     def _nothing(self) -> dict[str, NDArray]:
         """Gradient of nothing."""
-        total = {name: np.zeros_like(out) for name, out in self._pullback.gradient.items()}
-        total |= {"mass": np.zeros(len(self._mass.data)), "alpha": np.zeros(1), "beta": np.zeros(1)}
-        return total
+        return nothing(self.case, self._pullback)
 
     def _seeds(
         self, seeds: Mapping[str, NDArray], total: dict[str, NDArray]
@@ -251,6 +249,9 @@ def _refuse(case: Case, found: Found) -> None:
         "creases that yield, creep or relax": linear.branches is not None,
         "internal amplitudes (internal)": linear.internal > 0,
         "slopes of finite amplitude (secant)": linear.secant is not None,
+        "folds that are actuated about an equilibrium (Actuate, Temperature)": (
+            bool(case.rest_terms) and bool(linear.displacement.any())
+        ),
         "loads that depend on the displacement (Pressure, CreaseMoment)": bool(
             case.following_terms
         ),

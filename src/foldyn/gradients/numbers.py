@@ -17,7 +17,7 @@ from scipy import sparse
 from foldyn.cases import Case
 from foldyn.dynamics.system import Packed
 from foldyn.errors import InputError
-from foldyn.mechanics.pullback import Arrays, arrays_of_body
+from foldyn.mechanics.pullback import Arrays, Pullback, arrays_of_body
 
 Gradient = Mapping[str, NDArray]
 """Derivatives of a number by arrays of numbers, by the name of these."""
@@ -66,3 +66,14 @@ def numbers_of_motion(packed: Packed, start: tuple[NDArray, NDArray]) -> Arrays:
         }
     )
     return Arrays(numbers, layout)
+
+
+def nothing(case: Case, pullback: Pullback) -> dict[str, NDArray]:
+    """Gradient of nothing by the numbers of a case whose body's forces are differentiated."""
+    total = {name: np.zeros_like(out) for name, out in pullback.gradient.items()}
+    for kind in ("load", "imposed"):
+        for k, (vector, _) in enumerate(getattr(case, f"{kind}_terms")):
+            total[f"{kind}.{k}"] = np.zeros_like(vector)
+    with suppress(InputError):
+        total["mass"] = np.zeros(case.mass.nnz)
+    return total | {"alpha": np.zeros(1), "beta": np.zeros(1)}

@@ -24,7 +24,7 @@ from foldyn.mechanics.pullback import Arrays
 from foldyn.values import show
 
 STEP = 1e-3  # of the size of a parameter
-MATCHES = 1e-6  # relative: how well the entries are told apart, and the check holds
+MATCHES = 1e-4  # relative: how well the entries are told apart, and the check holds
 SILENT = 1e-11, 1e-12  # of a number, and of the largest of its array: rounding of a change
 Values = Mapping[str, Any]
 Build = Callable[..., Any]
@@ -45,9 +45,9 @@ class Slope(NamedTuple):
         """Derivatives (count,) of a number with this gradient."""
         out = np.zeros(self.count)
         for name, by in self.by.items():
-            if name in gradient:
-                here = self.entry[name] >= 0
-                product = (np.asarray(gradient[name]) * by)[here]
+            here = self.entry[name] >= 0
+            if here.any():
+                product = (_known(gradient, name) * by)[here]
                 out += np.bincount(self.entry[name][here], product, self.count)
         return out
 
@@ -113,56 +113,95 @@ class Parameters:
     def _slope(self, name: str, numbers_of: Callable[[Any], Arrays], here: Arrays) -> Slope:
         value, size = self.values[name], self.size(name)
 
-        def change(direction: NDArray) -> dict[str, NDArray]:
-            def at(by: float) -> Mapping[str, NDArray]:
-                found = numbers_of(self.moved(name, direction, by))
-                check_layout(name, here, found)
-                return found.numbers
+        def at(direction: NDArray, by: float) -> Mapping[str, NDArray]:
+            found = numbers_of(self.moved(name, direction, by))
+            check_layout(name, here, found)
+            return found.numbers
 
-            near, far = (at(STEP), at(-STEP)), (at(2 * STEP), at(-2 * STEP))
+        def roughly(direction: NDArray) -> dict[str, NDArray]:
+            ahead, behind = at(direction, STEP), at(direction, -STEP)
             return {
-                key: (8.0 * (near[0][key] - near[1][key]) - (far[0][key] - far[1][key]))
-                / (12.0 * STEP)
+                key: _seen((ahead[key] - behind[key]) / (2.0 * STEP), here.numbers[key])
+                for key in here.numbers
+            }
+
+        def change(direction: NDArray) -> dict[str, NDArray]:
+            near = at(direction, STEP), at(direction, -STEP)
+            far = at(direction, 2.0 * STEP), at(direction, -2.0 * STEP)
+            return {
+                key: _difference(*(each[key] for each in (*near, *far, here.numbers)))
                 for key in here.numbers
             }
 
         by = change(size)
         if value.ndim == 0:
-            entry = {key: np.zeros(each.shape, np.int64) for key, each in by.items()}
+            entry = {key: np.where(each != 0.0, 0, -1) for key, each in by.items()}
             return Slope({key: each / size for key, each in by.items()}, entry, 1)
-        count = value.size
-        marked = change(size * (1.0 + np.arange(count) / count))
-        chance = np.random.default_rng(0).uniform(0.5, 1.5, count)
-        tried = change(size * chance)
-        entry = {}
-        for key, each in by.items():
-            number = np.abs(here.numbers[key])
-            moves = np.abs(each) > SILENT[0] * number + SILENT[1] * number.max(initial=0.0)
-            part = np.divide(marked[key], each, out=np.zeros_like(each), where=moves) - 1.0
-            number = np.where(moves, np.rint(part * count), -1).astype(np.int64)
-            apart = np.abs(part * count - number)[moves].max(initial=0.0)
-            inside = (number < count).all() and (number[moves] >= 0).all()
-            expected = np.where(moves, each * chance[np.clip(number, 0, count - 1)], 0.0)
-            scale = np.abs(tried[key]).max(initial=0.0)
-            wrong = np.abs(tried[key] - expected).max(initial=0.0) > MATCHES * scale
-            if apart > 0.1 or not inside or wrong:
-                return self._one_by_one(name, change, size)
-            entry[key] = number
-        own = {
-            key: np.divide(each, size[entry[key]], out=np.zeros_like(each), where=entry[key] >= 0)
-            for key, each in by.items()
-        }
-        return Slope(own, entry, count)
+        for changed in (roughly, change):  # the first is cheaper, and most often enough
+            marks = 1.0 + np.arange(value.size) / value.size
+            chance = np.random.default_rng(0).uniform(0.5, 1.5, value.size)
+            entry = _told_apart(by, changed(size * marks), changed(size * chance), chance)
+            if entry is not None:
+                own = {key: _over(each, size, entry[key]) for key, each in by.items()}
+                return Slope(own, entry, value.size)
+        return self._one_by_one(change, size)
 
     def _one_by_one(
-        self, name: str, change: Callable[[NDArray], dict[str, NDArray]], size: NDArray
-    ) -> Any:
+        self, change: Callable[[NDArray], dict[str, NDArray]], size: NDArray
+    ) -> Columns:
         columns = []
         for k in range(len(size)):
             alone = np.zeros_like(size)
             alone[k] = size[k]
             columns.append({key: each / size[k] for key, each in change(alone).items()})
         return Columns(columns)
+
+
+def _told_apart(
+    by: Mapping[str, NDArray], marked: Mapping[str, NDArray], tried: Mapping[str, NDArray],
+    chance: NDArray,
+) -> dict[str, NDArray] | None:  # fmt: skip
+    """Entry to which each number belongs; None where one belongs to several.
+
+    by, marked, tried : rates of the numbers where all entries change alike, by marks that tell them
+        apart, and by chance.
+    """
+    count, entry = len(chance), {}
+    for key, each in by.items():
+        moves = each != 0.0
+        part = np.divide(marked[key], each, out=np.ones_like(each), where=moves) - 1.0
+        number = np.where(moves, np.rint(part * count), -1).astype(np.int64)
+        apart = np.abs(part * count - number)[moves].max(initial=0.0)
+        inside = (number < count).all() and (number[moves] >= 0).all()
+        expected = np.where(moves, each * chance[np.clip(number, 0, count - 1)], 0.0)
+        scale = np.abs(tried[key]).max(initial=0.0)
+        if (
+            apart > 0.1
+            or not inside
+            or np.abs(tried[key] - expected).max(initial=0.0) > (MATCHES * scale)
+        ):
+            return None
+        entry[key] = number
+    return entry
+
+
+def _over(rate: NDArray, size: NDArray, entry: NDArray) -> NDArray:
+    """Rates over the sizes of their entries; 0 of those that have none."""
+    return np.divide(rate, size[entry], out=np.zeros_like(rate), where=entry >= 0)
+
+
+def _difference(
+    ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDArray, here: NDArray
+) -> NDArray:
+    """Rate of numbers from those a step and two steps ahead and behind."""
+    return _seen((8.0 * (ahead - behind) - (far_ahead - far_behind)) / (12.0 * STEP), here)
+
+
+def _seen(rate: NDArray, here: NDArray) -> NDArray:
+    """Rate of numbers, 0 where it is but their rounding."""
+    size = np.abs(here)
+    rounding = SILENT[0] * size + SILENT[1] * size.max(initial=0.0)
+    return np.where(np.abs(rate) > rounding, rate, 0.0)
 
 
 class Columns(NamedTuple):
@@ -175,13 +214,23 @@ class Columns(NamedTuple):
         return np.array(
             [
                 sum(
-                    float((gradient[key] * each).sum())
-                    for key, each in by.items()
-                    if key in gradient
+                    float((_known(gradient, k) * each).sum())
+                    for k, each in by.items()
+                    if each.any()
                 )
                 for by in self.by
             ]
         )
+
+
+def _known(gradient: Gradient, name: str) -> NDArray:
+    """Derivative by the numbers of a name."""
+    if name not in gradient:
+        raise InputError(
+            f"the design changes numbers of the case ({name}) by which there are no derivatives; "
+            "keep them fixed, or vary the parameters by fd.sweep"
+        )
+    return gradient[name]
 
 
 def checked(values: Values) -> dict[str, NDArray]:

@@ -51,7 +51,10 @@ class PullbackWork(NamedTuple):
 
 
 class Gradient(NamedTuple):
-    """Derivatives by arrays of `BarsHinges` of the same names."""
+    """Derivatives by arrays of `BarsHinges` of the same names, and by the excess of bars.
+
+    That is lambda^2 - 1 at rest, by which a bar is longer than it was cut: 0 in a model.
+    """
 
     rest: NDArray
     bar_vector: NDArray
@@ -62,6 +65,7 @@ class Gradient(NamedTuple):
     hinge_parameters: NDArray
     hinge_share: NDArray
     hinge_offset: NDArray
+    bar_excess: NDArray  # (nb,)
 
 
 def pullback_work(nodes: int) -> PullbackWork:
@@ -133,13 +137,17 @@ def pull_bars(model, work, out):
                 k = stiffness[e]
                 out.bar_stiffness[e] += stress[q] * wd[q]
                 rise = k * slope[q] * wd[q]  # s' = slope / 2
+                out.bar_excess[e] += 0.5 * rise
                 out.bar_per_length2[e] += 0.5 * rise * s[q] / per_length2[e]
                 stress[q], slope[q] = k * stress[q], rise * per_length2[e]
+            for c in range(3):
+                for q in range(whole_lanes(m)):
+                    by = stress[q] * w[c * BLOCK + q]
+                    dx[c * BLOCK + q] = by + slope[q] * dx[c * BLOCK + q]
+                    x[c * BLOCK + q] = by + slope[q] * d[c * BLOCK + q]
             for q in range(m):
                 for c in range(3):
-                    by = stress[q] * w[c * BLOCK + q]
-                    by_vector[3 * (first + q) + c] += by + slope[q] * dx[c * BLOCK + q]
-                    x[c * BLOCK + q] = by + slope[q] * d[c * BLOCK + q]
+                    by_vector[3 * (first + q) + c] += dx[c * BLOCK + q]
             scatter(sums, ALL, bars, 2, 0, first, m, x, 0, ones, BLOCK)
             scatter(sums, ALL, bars, 2, 1, first, m, x, 0, ones, 0)
 
@@ -279,7 +287,8 @@ def _pullback(own, u, v, t, weight, product, rate):
 
 def gradient_of(model: BarsHinges) -> Gradient:
     """Room for the derivatives by the arrays of a model."""
-    return Gradient(*(np.zeros_like(getattr(model, name)) for name in Gradient._fields))
+    arrays = model._asdict() | {"bar_excess": model.bar_stiffness}
+    return Gradient(*(np.zeros_like(arrays[name]) for name in Gradient._fields))
 
 
 def bars_hinges_pulled(model: BarsHinges) -> Pulled:

@@ -24,6 +24,7 @@ from foldyn.signals import (
     spectrum,
 )
 from foldyn.statics import Landscape, landscape
+from foldyn.statics.load_at import load_at
 from foldyn.sweeps.measure import MODE, Measure
 from foldyn.viewer.fields import bar_strain
 
@@ -271,6 +272,13 @@ def _limit_loads(result: xr.Dataset, case: Case) -> NDArray:
 def _limit_load(result: xr.Dataset, case: Case) -> float:
     found = _loads_at(result, "limit")
     return float(found[0]) if found.size else np.nan
+
+
+@_measure(PATH, doc="load factor where a node has moved so far (m)")
+def _load_at(
+    result: xr.Dataset, case: Case, node: int, axis: str, displacement: float
+) -> float:  # fmt: skip
+    return load_at(result, 3 * node + AXES.index(axis), displacement, case).factor
 
 
 @_measure(PATH, doc="load factor of the first bifurcation")

@@ -23,8 +23,10 @@ from foldyn.gradients.modes import ModesGradient
 from foldyn.gradients.motion import MotionGradient
 from foldyn.gradients.numbers import Gradient
 from foldyn.gradients.parameters import Parameters, Slope, Values, checked
+from foldyn.gradients.path import PathGradient
 from foldyn.input_files import path_of
 from foldyn.mechanics.pullback import Arrays
+from foldyn.structures import Structure
 from foldyn.sweeps.job import ASIDE
 from foldyn.sweeps.measure import Asked, asked, of_callable
 from foldyn.sweeps.measures import MEASURES
@@ -50,9 +52,14 @@ if TYPE_CHECKING:
 KINDS: Mapping[str, Callable[[Case, Mapping[str, Any]], Differentiated]] = {
     "modes": ModesGradient,
     "dynamics": MotionGradient,
+    "statics": PathGradient,
 }
 """Analyses with gradients, by their kind in case files."""
-ARRAYS = ("fold_stiffness", "fold_rest", "bend_stiffness", "bend_rest", "bar_area", "node_mass")
+LENGTH = "bar_length"
+ARRAYS = (
+    "fold_stiffness", "fold_rest", "bend_stiffness", "bend_rest", "bar_area", LENGTH,
+    "node_mass",
+)  # fmt: skip
 """Arrays of a structure that can be parameters as they are."""
 Source = Callable[..., Case] | Case | str | os.PathLike[str]
 Own = tuple[Callable[..., float], Callable[..., Seeds]]
@@ -75,7 +82,8 @@ def sensitivity(
         ``build(**parameters)`` returns the case; or a case file, whose parameters are keys, as
         "pattern.panel_angle"; or a case, whose parameters are arrays of its structure:
         `fold_stiffness` and `bend_stiffness` (N m/rad, of whole hinges), `fold_rest` and
-        `bend_rest` (rad), `bar_area` (m2), `node_mass` (kg).
+        `bend_rest` (rad), `bar_area` (m2), `bar_length` (m, to which bars were cut: those that do
+        not fit are strained at rest), `node_mass` (kg).
     parameters : mapping, or names of arrays of a case
         Where the gradient is taken: numbers, or arrays of one dimension, whose entries count one by
         one. Arrays of a case are taken where they stand.
@@ -134,6 +142,8 @@ def sensitivity(
     case = design.case()
     found = source.analyse(case)
     slopes = design.slopes(found.numbers)
+    if isinstance(build, Case) and LENGTH in slopes:
+        slopes[LENGTH] = _by_lengths(slopes[LENGTH], found.numbers(case).numbers)
     direction = None if along is None else _direction(along, design)
     if direction is not None and isinstance(found, ModesGradient):
         found = found.along(lambda gradient: _rate(slopes, direction, gradient))
@@ -195,6 +205,22 @@ def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None
     return Sourced(build, values, kind, arguments)
 
 
+def _by_lengths(areas: Slope, numbers: Gradient) -> Slope:
+    """How numbers change with the lengths to which bars are cut, from how they do with EA / L0.
+
+    With x = (l^2 - L^2) / L^2 the excess of a bar of the length l, and its stiffness EA / L.
+    """
+    name = next(key for key in numbers if key.endswith("bar_stiffness"))
+    prefix = name.removesuffix("bar_stiffness")
+    length = numbers[f"{prefix}bar_per_length2"] ** -0.5
+    by = {
+        name: -numbers[name] / length,
+        f"{prefix}bar_per_length2": -2.0 / length**3,
+        f"{prefix}bar_excess": -2.0 / length,
+    }
+    return Slope(by, dict.fromkeys(by, areas.entry[name]), areas.count)
+
+
 def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, NDArray]]:
     """A case whose structure has other arrays."""
     given = (
@@ -205,6 +231,7 @@ def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, N
     values = {}
     for name, value in given.items():
         choice("parameters", name, ARRAYS)
+        _check_acts(case.structure, name)
         own = getattr(case.structure, name)
         if own is None:  # masses by a rule
             own = case.structure.mass.sum(axis=1)
@@ -216,9 +243,30 @@ def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, N
             )
 
     def build(**arrays: NDArray) -> Case:
+        if LENGTH in arrays:  # no structure has bars that do not fit: see `by_lengths`
+            share = arrays.pop(LENGTH) / case.structure.bar_length
+            arrays["bar_area"] = arrays.get("bar_area", case.structure.bar_area) * share
         return replace(case, structure=replace(case.structure, **arrays))
 
     return build, checked(values)
+
+
+def _check_acts(structure: Any, name: str) -> None:
+    """Refuse arrays that a structure does not work with."""
+    if not isinstance(structure, Structure):
+        raise InputError(": a shell has no such arrays; give a function that builds it", name)
+    if name.startswith("bar") and structure.membranes:
+        raise InputError(
+            ": the panels of this structure resist as membranes, and its bars do not; give a "
+            'function that builds it, or take membrane = "bars"',
+            name,
+        )
+    if name.startswith("bend") and structure.edge_plates is not None:
+        raise InputError(
+            ": panels of the scheme n5b8e bend as plates, without hinges; give a function that "
+            "builds it",
+            name,
+        )
 
 
 def _of_file(
@@ -287,6 +335,16 @@ def _own_of(function: Callable[..., float]) -> Callable[..., Callable[[Case], fl
     return lambda result, case: lambda other: float(function(result, other))
 
 
+def _add(seeds: dict[Any, Any], variable: Any, seed: Any, share: float) -> None:
+    """Add a share of derivatives by a variable of a result to others."""
+    if isinstance(seed, Mapping):  # by what a variable takes: see `path.PathGradient`
+        own = seeds.setdefault(variable, {})
+        for key, each in seed.items():
+            _add(own, key, each, share)
+    else:
+        seeds[variable] = seeds.get(variable, 0.0) + share * np.asarray(seed)
+
+
 class _Parts(NamedTuple):
     """All that values and gradients of measures are made of."""
 
@@ -311,19 +369,27 @@ class _Parts(NamedTuple):
             with said_of(measure.text):
                 own = derivative.seeds(result, self.case, **measure.arguments)
             for variable, seed in own.items():
-                seeds[variable] = seeds.get(variable, 0.0) + parts[name] * np.asarray(seed)
+                _add(seeds, variable, seed, parts[name])
             if derivative.frozen:
                 frozen = derivative.frozen(result, self.case, **measure.arguments)
                 for key, slope in self._explicit(frozen).items():
                     explicit[key] += parts[name] * slope
         with said_of(one.text):
-            gradient = dict(self.found.backward(seeds)) if seeds else {}
+            gradient = dict(self.found.backward(seeds)) if seeds else self._nothing
         for name, (_, derivative) in one.measures.items():
-            for key, by in (derivative.numbers(self.case) if derivative.numbers else {}).items():
-                gradient[key] = gradient.get(key, 0.0) + parts[name] * by
+            if derivative.numbers:
+                own = derivative.numbers(result, self.case, **measure.arguments)
+                for key, by in own.items():
+                    _add(gradient, key, by, parts[name])
         return value, {
             name: slope.pulled(gradient) + explicit[name] for name, slope in self.slopes.items()
         }
+
+    @property
+    def _nothing(self) -> dict[str, NDArray]:
+        """Gradient of nothing."""
+        numbers = self.found.numbers(self.case).numbers
+        return {name: np.zeros_like(array) for name, array in numbers.items()}
 
     def _explicit(self, frozen: Callable[[Case], float]) -> dict[str, NDArray]:
         """Derivatives of a measure where the result stays as it is."""
