@@ -169,10 +169,9 @@ def drawn(own: Lone, seed: int, size: float = 0.05) -> tuple[NDArray, NDArray, N
 def test_every_array_is_there(name) -> None:
     own = made(name)
     numbers, (*_, gradient) = own.term.arrays().numbers, own.pulled(*drawn(own, 1))
-    assert {key: out.shape for key, out in gradient.items()} == {
-        key: array.shape for key, array in numbers.items()
-    }
-    counts = {key for key, out in gradient.items() if np.any(out)}
+    for key, array in numbers.items():
+        assert gradient[key].shape == array.shape
+    counts = {key for key in numbers if np.any(gradient[key])}
     assert counts == {key.strip("*-") for key in ARRAYS[name].split()}
 
 
@@ -203,7 +202,7 @@ def test_a_body_adds_up_its_terms(preset) -> None:
     exact, own = body.tangent(0.05 * q) @ w, Pullback(body)
     assert np.abs(own.at(0.05 * q, w) - exact).max() < 1e-12 * np.abs(exact).max()
     once = {key: out.copy() for key, out in own.gradient.items()}
-    assert once.keys() == arrays_of_body(body).numbers.keys()
+    assert once.keys() >= arrays_of_body(body).numbers.keys()
     own.at(0.05 * q, w)
     assert all(np.allclose(out, 2.0 * once[key]) for key, out in own.gradient.items())
     own.clear()
