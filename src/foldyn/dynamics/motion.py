@@ -18,7 +18,7 @@ from foldyn.dynamics.diagnostics import INACCURATE, doubts, is_off
 from foldyn.dynamics.failures import failure, smaller_step
 from foldyn.dynamics.initial import begin
 from foldyn.dynamics.methods import Compiled, Implicit, Integrator
-from foldyn.dynamics.motion_state import Outcome, Samples, StepPlan
+from foldyn.dynamics.motion_state import Course, Outcome, Samples, StepPlan
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
@@ -83,6 +83,16 @@ class Motion:
     def start(self) -> tuple[NDArray, NDArray]:
         """Displacement and velocity (n, 3) where it starts."""
         return self._state[0], self._state[1]
+
+    @property
+    def beginning(self) -> Course:
+        """Where it starts, anew."""
+        return begin(self.case, *self._state, self.plan, self.packed)
+
+    @property
+    def continues(self) -> bool:
+        """Whether it may go on with what a motion before it knew beside its state."""
+        return self._state[3] is not None
 
     @property
     def expected_samples(self) -> int:
@@ -247,7 +257,7 @@ class Motion:
 
     def _start(self) -> None:
         """Go back to the start."""
-        self.course = begin(self.case, *self._state, self.plan, self.packed)
+        self.course = self.beginning
         self.output = Output(self.case, self.plan, self._sampler, self._branches, self._keeping)
 
     def _advance(self, engine: Compiled | Implicit, report: Reporter) -> None:

@@ -16,31 +16,24 @@ states at every stage (Griewank and Walther, Evaluating Derivatives, 2008, chapt
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.waveforms import evaluate
+from foldyn.dynamics.adjoint import Adjoint
 from foldyn.dynamics.equation import EquationOfMotion, acceleration
 from foldyn.dynamics.motion_state import StepPlan
-from foldyn.dynamics.system import carried, scratches
-from foldyn.errors import InputError
+from foldyn.dynamics.system import carried
 from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.jit.context import Context, run_at
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.pullback import Pullback, pulled_back
+from foldyn.mechanics.pullback import pulled_back
+
+if TYPE_CHECKING:
+    import xarray
 
 ROOM = 1e6, 4e6  # bytes of the states at the stages of a segment, and of the states that are kept
-
-
-class ByMotion(NamedTuple):
-    """Derivatives by what a motion has beside its terms."""
-
-    loads: NDArray  # (l,) by `System.loads`
-    moved: NDArray  # (s,) by `System.moved`
-    mass: NDArray  # (entries,) by those of the nodal mass matrix
-    alpha: NDArray  # (1,)
 
 
 @inner_scalar
@@ -158,77 +151,55 @@ def pull_steps(balance, pulls, plan, first, stages, by_u, by_v, memory, mass, mo
                     out.mass[e] += both[3 * i] + both[3 * i + 1] + both[3 * i + 2]
 
 
-class RK4Adjoint:
-    """Backward through a motion by RK4.
+class RK4Adjoint(Adjoint):
+    """Backward through a motion by RK4; see `Adjoint`.
 
     Parameters
     ----------
     motion : Motion
         Ready to be computed, by `dynamics.driver.prepare`.
-
-    Attributes
-    ----------
-    total : dict of ndarray
-        Derivatives of the number by the arrays of the terms (`pullback.arrays_of_body`), and by
-        "loads", "moved", "mass" and "alpha" as `ByMotion` says.
+    samples : xarray.Dataset
+        Its result: where steps are taken again from.
     """
 
-    def __init__(self, motion: Any) -> None:
-        refuse(motion)
-        packed, system = motion.packed, motion.packed.system
-        self._plan, self._mass = Context(motion.plan), Context(packed.mass)
-        self._moved, self._pullback = Context(system.moved), Pullback(packed.body)
-        self._work = packed.body.workspaces(1)
-        self._system, (self._scratch,) = system, scratches(system, self._work)
-        self._equation = EquationOfMotion(packed, self._work[0], self._scratch, motion.course, None)
-        sizes = len(system.loads.dof), len(system.moved.dof), len(packed.mass.data), 1
-        self._by = ByMotion(*map(np.zeros, sizes))
-        self._out = Context(self._by)
+    def __init__(self, motion: Any, samples: xarray.Dataset) -> None:
+        super().__init__(motion)
+        packed, system = self._packed, self._system
+        self._steps, self._inertia = Context(self._plan), Context(packed.mass)
+        self._moved, self._out = Context(system.moved), Context(self._by)
+        self._work = packed.body.workspaces(1)[0]
+        self._equation = EquationOfMotion(packed, self._work, self._scratch, motion.course, None)
+        self._times = samples["time"].values
+        self._states = tuple(
+            samples[name].transpose("time", "node", "axis").values
+            for name in ("displacement", "velocity")
+        )
         shape = (4, 3, system.rows, 3)
         self._memory, self._none = np.zeros((9, *shape[2:])), np.empty((0, *shape))
         self._stages = np.empty((steps_at_once(system.rows), *shape))
 
-    @property
-    def total(self) -> dict[str, NDArray]:
-        """See the class."""
-        # forces of terms resist: they stand with a minus in the acceleration
-        terms = {name: -out for name, out in self._pullback.gradient.items()}
-        return terms | self._by._asdict()
+    def backward(self, first: int, last: int, by_u: NDArray, by_v: NDArray) -> None:
+        """See `Adjoint`; a sample is at the first."""
+        self._backward(first, last, *self._state(first // self._plan.every), by_u, by_v)
 
-    def without_supports(self, t: float, u: NDArray, v: NDArray) -> tuple[NDArray, NDArray]:
-        """State (n, 3) at a time (s) without what supports move: as steps have it."""
-        self._evaluate(t)
+    def _state(self, k: int) -> list[NDArray]:
+        """State (n, 3) at a sample without what supports move: as steps have it."""
+        self._evaluate(self._times[k])
         moved, factor = self._system.moved, self._scratch.factor
-        return u - carried(moved, factor[:, 0], 0.0 * u), v - carried(moved, factor[:, 1], 0.0 * v)
+        whole = [self._packed.numbering.inward(each[k]) for each in self._states]
+        return [u - carried(moved, factor[:, d], 0.0 * u) for d, u in enumerate(whole)]
 
-    def add_supports(self, t: float, by_u: NDArray, by_v: NDArray) -> None:
-        """Add to `total` what a number that has these derivatives by a sample has by supports."""
-        self._evaluate(t)
-        moved, factor = self._system.moved, self._scratch.factor
-        rate = factor[moved.row]
-        self._by.moved[:] += by_u.ravel()[moved.dof] * rate[:, 0]
-        self._by.moved[:] += by_v.ravel()[moved.dof] * rate[:, 1]
-
-    def _evaluate(self, t: float) -> None:
-        if self._system.varies:
-            evaluate(self._system.waves, t, True, self._scratch.factor)
-        self._scratch.time[0] = t
-
-    def backward(
+    def _backward(
         self, first: int, last: int, u: NDArray, v: NDArray, by_u: NDArray, by_v: NDArray
     ) -> None:
-        """Go back over the steps from `first` to `last`, from the state (n, 3) at the first.
-
-        by_u, by_v : derivatives (n, 3) of the number by the state at the last; they become, in
-            place, those by the state at the first.
-        """
+        """The same from the state (n, 3) at the first."""
         count, most = last - first, len(self._stages)
         if count <= most:
             stages = self._stages[:count]
-            retrace(self._equation.still, u.copy(), v.copy(), self._plan, first, count, stages)
+            retrace(self._equation.still, u.copy(), v.copy(), self._steps, first, count, stages)
             pull_steps(
-                self._equation.balance, self._pullback.terms, self._plan, first, stages, by_u,
-                by_v, self._memory, self._mass, self._moved, self._out,
+                self._equation.balance, self._pullback.terms, self._steps, first, stages, by_u,
+                by_v, self._memory, self._inertia, self._moved, self._out,
             )  # fmt: skip
             return
         # states are kept as far apart as there is room for them: most often once through is enough
@@ -237,9 +208,9 @@ class RK4Adjoint:
         for at in range(first, last, apart):
             kept.append((at, q.copy(), w.copy()))
             if at + apart < last:
-                retrace(self._equation.still, q, w, self._plan, at, apart, self._none)
+                retrace(self._equation.still, q, w, self._steps, at, apart, self._none)
         for at, q, w in reversed(kept):
-            self.backward(at, min(at + apart, last), q, w, by_u, by_v)
+            self._backward(at, min(at + apart, last), q, w, by_u, by_v)
 
 
 def steps_at_once(rows: int) -> int:
@@ -258,23 +229,3 @@ def segment(plan: StepPlan, rows: int) -> int:
     )
     shorter = plan.every // parts
     return shorter if 4 * shorter > min(most, plan.every) else plan.every
-
-
-def refuse(motion: Any) -> None:
-    """Refuse motions that have no adjoint yet, with a remedy."""
-    packed, system = motion.packed, motion.packed.system
-    lacks = {
-        "contact, which switches on and off": system.touches,
-        "rest angles that turn in time (Actuate, Temperature)": system.turns,
-        "loads that depend on the displacement (Pressure, CreaseMoment)": system.follows,
-        "constraints (Link, rigid panels)": len(system.ties.slave) > 0,
-        "supports that move with a mass matrix that is not diagonal": (
-            system.moves and not packed.mass.lumped
-        ),
-    }
-    for what, here in lacks.items():
-        if here:
-            raise InputError(
-                f"there are no gradients of motions with {what}; leave that out, or vary the "
-                "parameters by fd.sweep"
-            )

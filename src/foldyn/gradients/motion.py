@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
+from foldyn.dynamics.adjoint import Adjoint, refuse
 from foldyn.dynamics.driver import prepare
+from foldyn.dynamics.implicit_adjoint import ImplicitAdjoint, Retraced
 from foldyn.dynamics.methods import with_mass
 from foldyn.dynamics.rk4_adjoint import RK4Adjoint, segment
 from foldyn.dynamics.system import pack
@@ -39,19 +41,21 @@ class MotionGradient:
         given = dict(arguments)
         progress = given.pop("progress", None)
         motion = prepare(case, **given)
-        if motion.method.name != "rk4":
-            raise InputError(
-                f" = {motion.method.name!r}: there are gradients of motions by rk4 alone so far",
-                "method",
-            )
-        self._motion, self._arguments = motion, given
+        refuse(motion)
         wanted = motion.plan.every
-        apart = segment(motion.plan, motion.packed.system.rows)
-        if apart < wanted:  # samples between serve as states to go back from
-            motion = prepare(case, **{**given, "dt": motion.plan.dt, "every": apart})
-        self._all = motion.run(progress)
+        if motion.method.name == "rk4":
+            if (apart := segment(motion.plan, motion.packed.system.rows)) < wanted:
+                # samples between serve as states to go back from
+                motion = prepare(case, **{**given, "dt": motion.plan.dt, "every": apart})
+            samples = motion.run(progress)
+            self._adjoint: Callable[[], Adjoint] = lambda: RK4Adjoint(motion, samples)
+        else:
+            steps = Retraced(motion)
+            samples = motion.run(progress)
+            self._adjoint = lambda: ImplicitAdjoint(motion, steps)
+        self._motion, self._times = motion, samples["time"].values
         self._every, self._stride = motion.plan.every, wanted // motion.plan.every
-        self.result = self._all.isel(time=slice(None, None, self._stride))
+        self.result = samples.isel(time=slice(None, None, self._stride))
 
     def numbers(self, case: Case) -> Arrays:
         """Numbers of a case by which gradients are taken."""
@@ -70,22 +74,18 @@ class MotionGradient:
                 f"there are no derivatives through {', '.join(unknown)} of motions, but through "
                 f"{', '.join(KNOWN)}"
             )
-        adjoint, by = RK4Adjoint(self._motion), self._motion.packed.numbering
-        u, v = (self._all[name].transpose("time", "node", "axis").values for name in KNOWN)
-        none, by_u, by_v = np.zeros((3, *by.inward(u[0]).shape))
-        times = self._all["time"].values
-        for k in range(len(u) - 1, -1, -1):
+        adjoint, by = self._adjoint(), self._motion.packed.numbering
+        by_u, by_v = np.zeros((2, self._motion.packed.system.rows, 3))
+        for k in range(len(self._times) - 1, -1, -1):
             sample, between = divmod(k, self._stride)
             if not between:
-                own = [by.inward(seeds[name][sample]) if name in seeds else none for name in KNOWN]
-                adjoint.add_supports(times[k], *own)
+                own = [
+                    by.inward(seeds[name][sample]) if name in seeds else np.zeros_like(by_u)
+                    for name in KNOWN
+                ]
+                adjoint.add_supports(self._times[k], *own)
                 by_u += own[0]
                 by_v += own[1]
             if k:
-                ends = (k - 1) * self._every, k * self._every
-                state = adjoint.without_supports(
-                    times[k - 1], by.inward(u[k - 1]), by.inward(v[k - 1])
-                )
-                adjoint.backward(*ends, *state, by_u, by_v)
-        start = {"start.displacement": by.outward(by_u), "start.velocity": by.outward(by_v)}
-        return adjoint.total | start
+                adjoint.backward((k - 1) * self._every, k * self._every, by_u, by_v)
+        return adjoint.gradient(by_u, by_v)

@@ -181,8 +181,12 @@ class Sourced(NamedTuple):
 
     def analyse(self, case: Case) -> Differentiated:
         """The result, ready to be differentiated."""
-        with within("analysis"):
+        try:
             return KINDS[self.kind](case, self.arguments)
+        except InputError as error:
+            if error.field:
+                raise error.within("analysis.") from None
+            raise InputError(f": {error}", "analysis") from None
 
 
 def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None) -> Sourced:
