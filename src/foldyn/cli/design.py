@@ -33,8 +33,8 @@ def add_design(commands: Any) -> None:
     design = commands.add_parser(
         "design",
         help="the best design of a case file, within bounds and constraints",
-        description="Search for the values of some keys of a case file that make a measure as small "
-        "or large as possible, as its table [design] asks for. Every evaluation is kept, so that a "
+        description="Search for values of some keys of a case file that make a measure as small or "
+        "large as possible, as its table [design] asks for. Every evaluation is kept, so that a "
         "search that was cut off goes on. The history, the case file with the best values, figures "
         "and report.html go to a folder.",
     )
@@ -113,8 +113,11 @@ def _tell(found: Design, say: Any) -> None:
     import numpy as np
 
     for name, value in found.parameters.items():
-        say(f"  {name} = {value:.6g}" if np.ndim(value) == 0 else
-            f"  {name}: {np.size(value)} values from {np.min(value):.4g} to {np.max(value):.4g}")  # fmt: skip
+        if np.ndim(value) == 0:
+            say(f"  {name} = {value:.6g}")
+        else:
+            low, high = np.min(value), np.max(value)
+            say(f"  {name}: {np.size(value)} values from {low:.4g} to {high:.4g}")
     sound = "" if found.feasible else ", not feasible"
     say(f"  objective {found.objective:.6g}{sound}")
     for text, amount in found.constraints.items():
