@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from foldyn.plots.charts import Chart, Curve
 
@@ -33,12 +33,12 @@ def convergence_charts(history: xr.Dataset) -> list[Chart]:
         with np.errstate(divide="ignore"):
             decades = np.log10(np.maximum(violation, 0.1 * history.attrs["slack"]))
         slack = np.full(2, np.log10(history.attrs["slack"]))
-        allowed = Curve("counts as none", number[[0, -1]], slack)
-        charts.append(Chart(along, "log10 of the violation", [*curves(decades), allowed]))
+        allowed = Curve("slack", number[[0, -1]], slack)
+        charts.append(Chart(along, "log10 of the largest violation", [*curves(decades), allowed]))
     return charts
 
 
-def slope_chart(slopes: Mapping[str, NDArray], objective: str) -> Chart:
+def slope_chart(slopes: Mapping[str, ArrayLike], objective: str) -> Chart:
     """How an objective changes over the whole range of each parameter, arrays by their norms."""
     names: Sequence[str] = list(slopes)
     sizes = np.array(
