@@ -23,6 +23,8 @@ Build = Callable[..., Any]
 class Design:
     """Numbers of an analysis of a case that is built from parameters."""
 
+    step = STEP
+
     def __init__(
         self, build: Build, values: Mapping[str, Any], measures: list[str], analysis: dict[str, Any]
     ) -> None:
@@ -52,14 +54,15 @@ class Design:
         def at(by: float) -> NDArray:
             return self.numbers({name: by * rate for name, rate in direction.items()})
 
-        near, far = at(STEP) - at(-STEP), at(2 * STEP) - at(-2 * STEP)
-        return (8.0 * near - far) / (12.0 * STEP)
+        h = self.step
+        near, far = at(h) - at(-h), at(2.0 * h) - at(-2.0 * h)
+        return (8.0 * near - far) / (12.0 * h)
 
     def directions(self) -> list[dict[str, Any]]:
         """One along each parameter, and one at random of entries of arrays."""
         chance = np.random.default_rng(len(self.values))
         return [
-            {name: value * (chance.uniform(-1.0, 1.0, value.shape) if value.ndim else 1.0)}
+            {name: value * (chance.uniform(0.2, 1.8, value.shape) if value.ndim else 1.0)}
             for name, value in self.values.items()
         ]
 
@@ -74,7 +77,7 @@ class Design:
             found[name] = float(np.abs(error).max())
         return found
 
-    def order(self, seed: int) -> NDArray:
+    def order(self, seed: int, lengths: tuple[float, ...] = LENGTHS) -> NDArray:
         """Order (measure,) with which the remainder of Taylor's formula falls, at random."""
         chance = np.random.default_rng(seed)
         self.values = {
@@ -88,9 +91,9 @@ class Design:
         here, rate = self.numbers({}), self.along(direction)
         left = [
             self.numbers({name: h * one for name, one in direction.items()}) - here - h * rate
-            for h in LENGTHS
+            for h in lengths
         ]
-        return np.array([observed_order(LENGTHS, each) for each in np.array(left).T])
+        return np.array([observed_order(lengths, each) for each in np.array(left).T])
 
 
 def _along(gradient: Mapping[str, NDArray], direction: Mapping[str, Any]) -> NDArray:

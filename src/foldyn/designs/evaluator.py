@@ -42,16 +42,12 @@ Source = Callable[..., Case] | str | os.PathLike[str]
 
 
 class Evaluator(Protocol):
-    """Measures of designs.
-
-    Attributes
-    ----------
-    stamp : list
-        All that they depend on, as JSON holds it.
-    """
+    """Measures of designs."""
 
     @property
-    def stamp(self) -> list[Any]: ...
+    def stamp(self) -> list[Any]:
+        """All that they depend on, as JSON holds it."""
+        ...
 
     def __call__(self, values: Mapping[str, Any], gradient: bool) -> tuple[NDArray, NDArray | None]:
         """Measures (m,) of a design, and if asked their derivatives (m, n) by its entries."""

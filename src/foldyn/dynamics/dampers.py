@@ -21,6 +21,8 @@ from foldyn.mechanics.term import Term
 from foldyn.mechanics.viscous import Viscous, ViscousTerm, viscous
 from foldyn.mechanics.viscous_panels import ViscousPanelsTerm, viscous_panels
 
+ROUNDING = 1e-14  # of the diagonal: entries of a matrix that cancel
+
 
 def damping_terms(case: Case, start: NDArray | None, modal: ModalRows) -> list[Term]:
     """All terms that damp a motion from `start` (n, 3), or from rest; `modal` is its damping."""
@@ -28,9 +30,17 @@ def damping_terms(case: Case, start: NDArray | None, modal: ModalRows) -> list[T
     if rayleigh.beta > 0.0:
         state = start if rayleigh.state == "start" else None
         state = np.zeros_like(case.structure.nodes) if state is None else state
-        terms.insert(0, DampingMatrix(body.tangent(body.dofs(state)) * rayleigh.beta))
+        terms.insert(0, DampingMatrix(_cleared(body.tangent(body.dofs(state))) * rayleigh.beta))
     modal.warn()
     return [*terms, DampingRows(modal.rows)] if len(modal.rows) else terms
+
+
+def _cleared(matrix: sparse.csr_array) -> sparse.csr_array:
+    """A matrix without entries that are but rounding: its pattern is that of the model."""
+    out, size = matrix.tocoo(), np.sqrt(np.abs(matrix.diagonal()))
+    own = np.abs(out.data) > ROUNDING * size[out.row] * size[out.col]
+    places = (out.row[own], out.col[own])
+    return sparse.csr_array(sparse.coo_array((out.data[own], places), matrix.shape))
 
 
 def damping_matrix(case: Case, q: NDArray, quasi_static: bool = False) -> sparse.csr_array:

@@ -184,7 +184,7 @@ def _reaction(result: xr.Dataset, case: Case, axis: str) -> Seeds:
 def _strain_energy(result: xr.Dataset, case: Case) -> Seeds:
     u, k = _strained_most(result, case)
     out = np.zeros((len(u), *u[0].shape))
-    out[k] = case.structure.internal_force(u[k])
+    out[k] = _forces(case, u[k])
     return {"displacement": out}
 
 
@@ -197,6 +197,10 @@ def _strained_most(result: xr.Dataset, case: Case) -> tuple[NDArray, int]:
 def _strain_energy_of(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
     u, k = _strained_most(result, case)
     return lambda other: _energy(other, u[k])
+
+
+def _forces(case: Case, u: NDArray) -> NDArray:
+    return case.body.internal(case.body.dofs(u))[: u.size].reshape(-1, 3)
 
 
 def _energy(case: Case, u: NDArray) -> float:
@@ -228,7 +232,7 @@ def _between_states(pair: Callable[[Landscape], tuple[Equilibrium, Equilibrium]]
         found = {}
         for k in range(len(case.imposed_terms)):  # forces of supports that move farther
             found[f"imposed.{k}"] = case.imposed * sum(
-                sign * state.stroke / size * case.structure.internal_force(state.displacement)
+                sign * state.stroke / size * _forces(case, state.displacement)
                 for sign, state in ((1.0, high), (-1.0, low))
             )
         return found

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from foldyn.analyses.keys import replaced
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.cases import Case
+from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import InputError, within
 from foldyn.gradients.expressions import Expression, parse
 from foldyn.gradients.frf import FrfGradient
@@ -261,6 +262,12 @@ def _check_acts(structure: Any, name: str) -> None:
     """Refuse arrays that a structure does not work with."""
     if not isinstance(structure, Structure):
         raise InputError(": a shell has no such arrays; give a function that builds it", name)
+    if name == "node_mass" and not is_lumped(structure.mass):
+        raise InputError(
+            f": the mass rule {show(structure.options.mass)} couples nodes; take a rule that lumps "
+            'the mass, as mass = "mixed_voronoi"',
+            name,
+        )
     if name.startswith("bar") and structure.membranes:
         raise InputError(
             ": the panels of this structure resist as membranes, and its bars do not; give a "

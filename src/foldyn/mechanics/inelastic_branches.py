@@ -37,7 +37,7 @@ class HingeMemory(Term):
     sheet : SheetTerm
     """
 
-    undifferentiated = "creases that yield, creep or relax"
+    undifferentiated = "creases that yield, creep, relax or, beside panels that give way, damp"
 
     def __init__(self, own: MemoryHinges, settles: NDArray, sheet: SheetTerm) -> None:
         self.own, self.settles = own, settles

@@ -33,7 +33,7 @@ from foldyn.structures.bars_plates import BarsPlatesTerm
 class CondensedPlatesTerm(BarsPlatesTerm):
     """Bars, folds and plates by their displacements alone; see `mechanics.sheet_term.SheetTerm`."""
 
-    undifferentiated = "creases that yield, creep or relax"
+    undifferentiated = "creases that yield, creep, relax or, beside panels that give way, damp"
     _held: Context  # of branches of its folds
 
     def __init__(

@@ -1,0 +1,98 @@
+"""Figures of a search for a design: how it went, and what its entries matter on the sheet."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.errors import InputError
+from foldyn.plots import scene
+from foldyn.plots.chart_figures import figure_of
+from foldyn.plots.design_charts import convergence_charts
+from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.sheet import DrawnSheet
+
+COLORS = "coolwarm"
+WIDE = 3.5  # points; of colored creases
+
+
+def plot_convergence(history: xr.Dataset) -> Figure:
+    """Draw the objective and the largest violation over the evaluations.
+
+    Parameters
+    ----------
+    history : xarray.Dataset
+        Of a `foldyn.Design`.
+    """
+    charts = convergence_charts(history)
+    return figure_of(charts, (4.5 * len(charts), 3.4), columns=len(charts))
+
+
+def draw_sensitivity(
+    case_or_structure: Any,
+    values: ArrayLike,
+    label: str = "",
+    view: tuple[float, float] = (28.0, -60.0),
+    title: str = "",
+) -> Figure:
+    """Draw a sheet with a color for each crease or panel, as by the gradient of a frequency.
+
+    Parameters
+    ----------
+    case_or_structure : Case, Structure or Pattern, or a result with its case
+    values : array_like, shape (creases,) or (panels,)
+        What is colored is known by the length; red is above 0, blue below.
+    label : str
+        Title of the color bar, with its unit.
+    view : tuple of float
+        Elevation above the xy plane and azimuth around z (degrees).
+    title : str
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        There is another number of values.
+    """
+    sheet, sight = Sheet3D.of(case_or_structure), View(*view)
+    shown = np.asarray(values, float)
+    creases, panels = np.asarray(sheet.pattern.creases), sheet.pattern.faces
+    if shown.shape not in ((len(creases),), (len(panels),)):
+        raise InputError(
+            f": shape {shown.shape}; give one value for each of the {len(creases)} creases or "
+            f"{len(panels)} panels",
+            "values",
+        )
+    reach = float(np.abs(shown).max(initial=0.0)) or 1.0
+    scale = ScalarMappable(Normalize(-reach, reach), colormaps[COLORS])
+    figure, axes = scene.view_figure(sheet.nodes, sight, title)
+    DrawnSheet(axes, sheet, sheet.nodes, sight)
+    if len(shown) == len(creases):
+        lines = scene.add_segments(
+            axes, sheet.nodes[sheet.edges[: len(creases)]], "k", WIDE, zorder=3.0
+        )
+        lines.set_color(scale.to_rgba(shown))
+    else:
+        own = scale.to_rgba(shown[_panels(sheet)])[:, :3]
+        colors = scene.shades(sheet.nodes, sheet.triangles, own)
+        scene.add_panels(axes, sheet.nodes[sheet.triangles], colors, zorder=1.2)
+    bar = figure.colorbar(scale, ax=axes, fraction=0.03, pad=0.0, shrink=0.6)
+    bar.set_label(label)
+    return figure
+
+
+def _panels(sheet: Sheet3D) -> NDArray:
+    """Panel of each triangle."""
+    if sheet.structure is not None:
+        return sheet.structure.triangle_panel
+    return np.repeat(np.arange(len(sheet.pattern.faces)), [len(f) - 2 for f in sheet.pattern.faces])
