@@ -12,8 +12,9 @@ the multipliers z' of the balance of the next step, which sees b1 too, those of 
 
 A the matrix of the step at its end, P' and R' the derivatives of af z' . b1 by q1 and w1: the
 pullback of the forces (`mechanics.pullback`) has the weights W = (1 - af) z + af z' in all. Factors
-of the matrix that steps use, which leaves out how dampers turn, serve to iterate: what is left of
-the balance of z comes from the pullback itself, and so does the gradient.
+of the matrix that steps use, which leaves out how dampers turn, serve to iterate, also those of an
+earlier step: what is left of the balance of z comes from the pullback itself, and so does the
+gradient.
 
 The gradient is that of steps which are solved exactly. Newton's method stops at a residual of
 `Scheme.tolerance`, mostly far below: so near is it to that of what was computed.
@@ -37,18 +38,21 @@ from foldyn.algebra.banded import one_thread
 from foldyn.dynamics.adjoint import Adjoint
 from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.implicit.matrix import StepMatrix
+from foldyn.dynamics.implicit.newton import SAME_STEP
 from foldyn.dynamics.inertia import substitute, times_mass
 from foldyn.dynamics.motion_state import samples
 from foldyn.dynamics.system import carried
 from foldyn.dynamics.timing import jumps
-from foldyn.errors import InputError
+from foldyn.errors import ComputationError, InputError
 from foldyn.mechanics.pullback import pull_all
 
 METHODS = ("newmark", "generalized_alpha")
 ROOM = 16e6  # bytes of the states of a segment
 ITERATIONS = 30
-TOLERANCE = 1e-13  # of what is left of the balance of z
-STALL = 0.5  # share that an iteration leaves, above which it does not
+TOLERANCE = 1e-12  # of what is left of the balance of z
+ENOUGH = 1e-7  # the same where it falls no more
+FAST = 0.1  # share that an iteration leaves, above which an older matrix is made anew
+STALL = 0.5  # the same, above which it falls no more
 
 
 class State(NamedTuple):
@@ -154,6 +158,7 @@ class ImplicitAdjoint(Adjoint):
         self._kinds = free, free & ~self._scheme.massless[:, None]  # and with mass
         # derivatives by the acceleration where it has come to, and z of the step after that
         self._by_a, self._z = np.zeros((2, *shape))
+        self._made = 0.0  # step of the matrix that is factorized
         self._forget()
         self._rows = np.repeat(np.arange(shape[0]), np.diff(self._mass.indptr))
 
@@ -187,23 +192,32 @@ class ImplicitAdjoint(Adjoint):
         (_, _, w0, a0), (t, q, w1, a1) = taken.start, taken.end
         curvature, alpha, free, heavy = 1.0 / (beta * h * h), self._system.alpha, *self._kinds
         u, v = self._whole(t, q, w1)
-        mass = self._factorize(u, h)
+        mass, kept = self._scheme.weights(h).mass, abs(h - self._made) <= SAME_STEP * h
+        if not kept:
+            self._factorize(u, h)
         self._forget()
         self._pull(u, v, af * self._z)
         z, inertia, change = np.zeros((3, *u.shape))
-        first = last = np.inf
+        first, last, norm = 0.0, np.inf, 0.0
         for _ in range(ITERATIONS):
             by_w = by_v - self._rate
             by_shift = np.where(heavy, curvature * (self._by_a + h * gamma * by_w), by_w / h)
             left = free * (by_u - self._product + by_shift - mass * inertia)
             norm = float(np.linalg.norm(left))
-            first = min(first, norm)
-            if norm <= TOLERANCE * first or norm > STALL * last:
+            first = first or norm
+            if norm <= TOLERANCE * first or (norm > STALL * last and not kept):
                 break
+            if norm > FAST * last and kept:
+                self._factorize(u, h)
+                kept = False
             z += self._matrix.solve(left, change)
             times_mass(self._mass, z, inertia)
             self._pull(u, v, (1.0 - af) * change)
             last = norm
+        if not norm <= ENOUGH * first:
+            raise ComputationError(
+                f"the gradient of the step to t = {t:.6g} s was not found: take shorter steps"
+            )
         self._add_supports()
         self._add_mass(z, (1.0 - am) * a1 + am * a0, (1.0 - af) * w1 + af * w0)
         by_u -= self._product
@@ -239,13 +253,13 @@ class ImplicitAdjoint(Adjoint):
         moved, factor = self._system.moved, self._scratch.factor
         return carried(moved, factor[:, 0], q), carried(moved, factor[:, 1], w)
 
-    def _factorize(self, u: NDArray, h: float) -> float:
-        """Factorize the matrix of a step that ends at u; returns the weight of the mass in it."""
-        matrix, weights = self._matrix, self._scheme.weights(h)
+    def _factorize(self, u: NDArray, h: float) -> None:
+        """Factorize the matrix of a step that ends at u."""
+        matrix = self._matrix
         matrix.blocks.put(self._packed.body, matrix.pattern, u, u, False, matrix.stiffness)
         matrix.follow(u, 0.5)
-        matrix.factorize(weights)
-        return weights.mass
+        matrix.factorize(self._scheme.weights(h))
+        self._made = h
 
     def _forget(self) -> None:
         self._weight, self._product, self._rate = np.zeros((3, *self._by_a.shape))

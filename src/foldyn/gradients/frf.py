@@ -178,5 +178,3 @@ def _check_damping(case: Case) -> None:
             "of modes change with the modes; give Rayleigh.from_ratios, leave out other dampers, "
             "or vary the parameters by fd.sweep"
         )
-
-

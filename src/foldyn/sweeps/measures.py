@@ -99,7 +99,9 @@ def _rigid_modes(result: xr.Dataset, case: Case) -> int:
 
 
 # ------------------------------------------------------- responses, and spectra of motions
-def curve_of(result: xr.Dataset, node: int, axis: str | None) -> tuple[NDArray, NDArray, Peaks, str]:
+def curve_of(
+    result: xr.Dataset, node: int, axis: str | None
+) -> tuple[NDArray, NDArray, Peaks, str]:
     """Frequencies, magnitudes at a node (of the vector where no axis is named), and their peaks."""
     along = list(AXES) if axis is None else [axis]
     if "time" in result:
