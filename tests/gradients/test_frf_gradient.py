@@ -22,7 +22,7 @@ LOADED = PUSH | {"state": "equilibrium"}
 
 def case(
     dihedral: float = 70.0, thickness: float = 0.05, alpha: float = 4.0, beta: float = 1e-3,
-    force: float = 0.0, model: str = "plate", state: str = "rest", **options: Any,
+    force: float = 0.0, model: Any = "plate", state: str = "rest", **options: Any,
 ) -> fd.Case:  # fmt: skip
     """A fold with one side held."""
     pattern = fd.patterns.simple_fold(a=1.0, b=1.3, dihedral=dihedral)
@@ -30,7 +30,8 @@ def case(
     if model == "shell":
         made = fd.shell(pattern, sheet, divisions=2)
     else:
-        made = fd.discretize(pattern, sheet, preset=model, **{"membrane": "bars"} | options)
+        given: dict[str, Any] = {"membrane": "bars"} | options
+        made = fd.discretize(pattern, sheet, preset=model, **given)
     loads = [fd.Force([4, 5], (0.0, 0.0, force))] if force else []
     return fd.Case(made, [fd.Fix([0, 1, 2, 3])], loads, fd.Rayleigh(alpha, beta, state))
 

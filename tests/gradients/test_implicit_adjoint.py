@@ -17,6 +17,7 @@ from foldyn.gradients import sensitivity
 
 FOLD = {"a": 1.0, "b": 1.3}
 TIP = ["displacement[4,z]", "velocity[5,x]", "mean_square[4,z]"]
+PULSE = fd.HalfSine(0.05)
 METHODS = ("newmark", "generalized_alpha")
 MOTION = {"kind": "dynamics", "duration": 0.06, "dt": 0.003, "every": 2}
 
@@ -29,7 +30,7 @@ def _exact(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def case(
     dihedral: float = 70.0, thickness: float = 0.05, force: float = 3.0, alpha: float = 2.0,
-    beta: float = 1e-3, history: fd.History = fd.HalfSine(0.05), model: str = "plate",
+    beta: float = 1e-3, history: Any = PULSE, model: Any = "plate",
     extra: tuple[Any, ...] = (), damping: tuple[Any, ...] = (), pushed: tuple[int, ...] = (4, 5),
     **options: Any,
 ) -> fd.Case:  # fmt: skip
@@ -39,7 +40,8 @@ def case(
     if model == "shell":
         made = fd.shell(pattern, sheet, divisions=2)
     else:
-        made = fd.discretize(pattern, sheet, preset=model, **{"membrane": "bars"} | options)
+        given: dict[str, Any] = {"membrane": "bars"} | options
+        made = fd.discretize(pattern, sheet, preset=model, **given)
     return fd.Case(
         made,
         [fd.Fix([0, 1, 2, 3]), *extra],

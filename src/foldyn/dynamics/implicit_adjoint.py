@@ -74,6 +74,15 @@ class Taken(NamedTuple):
     begins: bool  # whether its start was made by `Scheme.begin`
 
 
+class Place(NamedTuple):
+    """Where a segment of steps starts, and all that an engine needs to go on from there."""
+
+    number: int  # of the step
+    state: State
+    begins: bool
+    engine: dict[str, NDArray]
+
+
 class Retraced(Implicit):
     """A motion by fixed implicit steps, taken again: its steps, from the last one back."""
 
@@ -91,12 +100,13 @@ class Retraced(Implicit):
         self._at, self._begins = self._reached(plan.start), True
         self._taken: list[Taken] = []
         apart = max(1, int(ROOM / (3 * self._at.q.nbytes)))
-        self._places: list[tuple[int, State, bool, dict[str, NDArray]]] = []
+        self._places: list[Place] = []
         for first in range(0, plan.steps, apart):
-            self._places.append((first, self._at, self._begins, self.checkpoint_arrays()))
+            arrays = self.checkpoint_arrays()
+            self._places.append(Place(first, self._at, self._begins, arrays))
             self._taken.clear()
             self.advance(self._room, min(apart, plan.steps - first))
-        self._ends = [*(first for first, *_ in self._places[1:]), plan.steps]
+        self._ends = [*(place.number for place in self._places[1:]), plan.steps]
 
     @property
     def scheme(self) -> Any:
@@ -105,13 +115,13 @@ class Retraced(Implicit):
 
     def back(self, first: int, last: int) -> Iterator[Taken]:
         """All steps from number `first` to `last`, the last one first."""
-        for (start, *place), end in zip(reversed(self._places), reversed(self._ends), strict=True):
-            if start < last and end > first:
-                if self._taken[0].number != start:
-                    self._at, self._begins, arrays = place
-                    self.resume_from(arrays)
+        for place, end in zip(reversed(self._places), reversed(self._ends), strict=True):
+            if place.number < last and end > first:
+                if self._taken[0].number != place.number:
+                    self._at, self._begins = place.state, place.begins
+                    self.resume_from(place.engine)
                     self._taken.clear()
-                    self.advance(self._room, end - start)
+                    self.advance(self._room, end - place.number)
                 low, high = (bisect_left(self._taken, k, key=_number) for k in (first, last))
                 yield from reversed(self._taken[low:high])
 
@@ -157,7 +167,7 @@ class ImplicitAdjoint(Adjoint):
         free.ravel()[self._matrix.free] = True
         self._kinds = free, free & ~self._scheme.massless[:, None]  # and with mass
         # derivatives by the acceleration where it has come to, and z of the step after that
-        self._by_a, self._z = np.zeros((2, *shape))
+        self._by_a, self._z = np.zeros(shape), np.zeros(shape)
         self._made = 0.0  # step of the matrix that is factorized
         self._forget()
         self._rows = np.repeat(np.arange(shape[0]), np.diff(self._mass.indptr))
@@ -197,7 +207,7 @@ class ImplicitAdjoint(Adjoint):
             self._factorize(u, h)
         self._forget()
         self._pull(u, v, af * self._z)
-        z, inertia, change = np.zeros((3, *u.shape))
+        z, inertia, change = (np.zeros_like(u) for _ in range(3))
         first, last, norm = 0.0, np.inf, 0.0
         for _ in range(ITERATIONS):
             by_w = by_v - self._rate

@@ -182,12 +182,13 @@ class RK4Adjoint(Adjoint):
         """See `Adjoint`; a sample is at the first."""
         self._backward(first, last, *self._state(first // self._plan.every), by_u, by_v)
 
-    def _state(self, k: int) -> list[NDArray]:
+    def _state(self, k: int) -> tuple[NDArray, NDArray]:
         """State (n, 3) at a sample without what supports move: as steps have it."""
         self._evaluate(self._times[k])
         moved, factor = self._system.moved, self._scratch.factor
-        whole = [self._packed.numbering.inward(each[k]) for each in self._states]
-        return [u - carried(moved, factor[:, d], 0.0 * u) for d, u in enumerate(whole)]
+        u, v = (self._packed.numbering.inward(each[k]) for each in self._states)
+        still = np.zeros_like(u)
+        return u - carried(moved, factor[:, 0], still), v - carried(moved, factor[:, 1], still)
 
     def _backward(
         self, first: int, last: int, u: NDArray, v: NDArray, by_u: NDArray, by_v: NDArray

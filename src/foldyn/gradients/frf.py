@@ -33,6 +33,8 @@ from foldyn.linear.frf import frf, quantity_of
 from foldyn.linear.linearized import linearize
 from foldyn.mechanics.pullback import Arrays
 
+Complex = NDArray[np.complex128]
+
 
 class FrfGradient:
     """A frequency response of a case, and gradients of numbers that are functions of it.
@@ -90,7 +92,7 @@ class FrfGradient:
                 f"response, but through {known}"
             )
         total, state = self._products.nothing(), np.zeros(len(self._products.q))
-        by_response = np.asarray(seeds[known], complex)
+        by_response = np.asarray(seeds[known], np.complex128)
         for k in np.flatnonzero(by_response.any(axis=(1, 2))):
             frequency = float(self.result["frequency"].values[k])
             state += self._add(frequency, by_response[k].ravel(), total)
@@ -98,7 +100,7 @@ class FrfGradient:
             self._products.add_equilibrium(state, total)
         return total
 
-    def _add(self, frequency: float, by: NDArray, total: dict[str, NDArray]) -> NDArray:
+    def _add(self, frequency: float, by: Complex, total: dict[str, NDArray]) -> NDArray:
         """Add what a number has at a frequency (Hz); returns its derivatives by the state (m,).
 
         by : its derivatives (3n,) by the response.
@@ -131,13 +133,13 @@ class FrfGradient:
         return state
 
     def _add_products(
-        self, products: Products, z: NDArray, x: NDArray, total: dict[str, NDArray]
+        self, products: Products, z: Complex, x: Complex, total: dict[str, NDArray]
     ) -> NDArray:
         """Add the gradient of Re(z' K x), for complex z and x; returns that by the dofs (m,)."""
         real = products.add_stiffness(z.real, x.real, 1.0, total)
         return real + products.add_stiffness(z.imag, x.imag, -1.0, total)
 
-    def _add_inertia(self, z: NDArray, x: NDArray, total: dict[str, NDArray]) -> None:
+    def _add_inertia(self, z: Complex, x: Complex, total: dict[str, NDArray]) -> None:
         """Add the gradient of Re(z' M x)."""
         self._products.add_mass(z.real, x.real, 1.0, total)
         self._products.add_mass(z.imag, x.imag, -1.0, total)

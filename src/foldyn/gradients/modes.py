@@ -133,7 +133,7 @@ class ModesGradient:
         along = unit_translations(linear)
         by_shape += linear.mass @ (along @ by_factor.T)
         for k, a in np.argwhere(by_factor != 0.0):
-            self._products.add_mass(shapes[:, k], along[:, a], by_factor[k, a], total)
+            self._products.add_mass(shapes[:, k], along[:, a], float(by_factor[k, a]), total)
         by_ratio = np.asarray(seeds.get("damping_ratio", zeros), float)
         self._check_vibrates(by_ratio)
         for k in np.flatnonzero(by_ratio):

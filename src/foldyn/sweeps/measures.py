@@ -122,11 +122,12 @@ def curve_of(
 
 
 def highest(peaks: Peaks) -> int | None:
+    """Number of the highest peak, if there is one."""
     return int(np.argmax(peaks.height)) if peaks.height.size else None
 
 
 def frequency_of(result: xr.Dataset, frequency: float) -> int:
-    """Number of the frequency (Hz) of a response that is nearest, half their distance off at most."""
+    """Number of the nearest frequency (Hz) of a response, half their distance off at most."""
     known = result["frequency"].values
     k = int(np.abs(known - frequency).argmin())
     if abs(known[k] - frequency) > 0.5 * np.diff(known).max(initial=0.0):
