@@ -31,7 +31,7 @@ def test_results_page_and_evaluations_stand_in_one_folder(workplace):
     assert done.status == 0, done.err
     names = [name.removeprefix("case-design/") for name in done.new]
     assert [name for name in names if "evaluations" not in name] == [
-        "after.png", "before.png", "case-design", "convergence.png", "design.nc", "designed.toml",
+        "case-design", "after.png", "before.png", "convergence.png", "design.nc", "designed.toml",
         "history.csv", "report.html",
     ]  # fmt: skip
     folder = workplace.folder / "case-design"

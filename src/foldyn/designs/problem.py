@@ -36,8 +36,8 @@ class Problem:
         goal = "minimize" if self.sign > 0.0 else "maximize"
         found = dict.fromkeys(self.objective.measures, goal)
         for k, one in enumerate(self.constraints):
-            found = dict.fromkeys(one.measures, f"subject_to[{k}]") | found
-        return dict(sorted(found.items(), key=lambda pair: pair[1]))
+            found |= {name: f"subject_to[{k}]" for name in one.measures if name not in found}
+        return found
 
     @property
     def measures(self) -> tuple[str, ...]:
