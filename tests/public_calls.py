@@ -238,6 +238,11 @@ def solved(folder: Path) -> Calls:
             "measures": ["frequency"], "samples": None, "method": None, "seed": None, "ties": None,
             "processes": 1, "scheduler": None, "folder": None, "progress": None,
         }),
+        "sensitivity": (fd.sensitivity, {
+            "build": folder / "case.toml", "parameters": {"sheet.thickness": 0.01},
+            "measures": "mass", "analysis": None, "sizes": {"sheet.thickness": 0.01},
+            "along": None,
+        }),
         "fit": (fd.fit, {  # refused: nothing to fit to
             "case": folder / "case.toml", "data": [], "parameters": [], "ties": None, "starts": 1,
             "seed": 0, "processes": 1, "confidence": 0.95, "folder": None, "progress": None,

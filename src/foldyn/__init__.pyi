@@ -61,7 +61,7 @@ from foldyn.cases import (
     Temperature as Temperature,
     TotalForce as TotalForce,
 )
-from foldyn.designs import Design as Design, design as design
+from foldyn.designs import design as design
 from foldyn.dynamics import (
     critical_step as critical_step,
     initial_state as initial_state,

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import time
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,12 +15,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.analyses import CaseFile
-from foldyn.analyses.keys import replaced
-from foldyn.analyses.reading import case_of_document, read_document
+from foldyn.analyses.keys import parts, replaced
+from foldyn.analyses.reading import case_of_document, read_document, validated
 from foldyn.cases import Case
 from foldyn.designs.space import Space
 from foldyn.dynamics import simulate
-from foldyn.errors import ComputationError, FoldynError, FoldynWarning, InputError
+from foldyn.errors import ComputationError, FoldynError, FoldynWarning, InputError, within
 from foldyn.input_files import path_of
 from foldyn.linear import frf, modes
 from foldyn.program import program
@@ -123,9 +124,11 @@ class Measured:
 
 
 def measured(
-    build: Source, analysis: Mapping[str, Any] | None, names: Sequence[str], space: Space
+    build: Source, analysis: Mapping[str, Any] | None, places: Mapping[str, str], space: Space
 ) -> Measured:
     """Check what is to be computed of each design.
+
+    places : measures, each with the argument that asks for it.
 
     Raises
     ------
@@ -139,6 +142,7 @@ def measured(
         build = path_of(build, "build")
         document = read_document(build)
         kind = document.get("analysis", {}).get("kind")
+        _check_keys(build, document, space)
     elif callable(build):
         if not isinstance(analysis, Mapping) or "kind" not in analysis:
             raise InputError(
@@ -149,16 +153,32 @@ def measured(
         analysis = dict(analysis)
     else:
         raise InputError(f" = {show(build)}: give a function or a case file", "build")
-    measures = tuple(asked(name, MEASURES) for name in names)
-    for one in measures:
-        kinds = one.measure.kinds
-        if kinds and kind not in kinds:
-            raise InputError(f"{one.text}: is of results of kind {' or '.join(kinds)}, not {kind}")
-        if one.measure.dims:
-            raise InputError(
-                f"{one.text}: is an array; ask for one of its numbers, as frequency[1]"
-            )
-    return Measured(build, analysis, measures, space, document)
+    measures = []
+    for name, place in places.items():
+        with within(place):
+            measures.append(_measure(name, kind))
+    return Measured(build, analysis, tuple(measures), space, document)
+
+
+def _measure(name: str, kind: Any) -> Asked:
+    """A measure that is one number of results of a kind."""
+    one = asked(name, MEASURES)
+    kinds = one.measure.kinds
+    if kinds and kind not in kinds:
+        raise InputError(f": {name} is of results of kind {' or '.join(kinds)}, not {kind}")
+    if one.measure.dims:
+        raise InputError(f": {name} is an array; ask for one of its numbers, as frequency[1]")
+    return one
+
+
+def _check_keys(path: Path, document: Mapping[str, Any], space: Space) -> None:
+    """Refuse keys that no case file of this kind has, and bounds that it cannot hold."""
+    for ends in (space.lower, space.upper):
+        for name, part in space.parts(ends).items():
+            if parts(name)[0] in ASIDE:
+                raise InputError(f": {name} changes no result; leave it out", "bounds")
+            value = part.tolist() if space.shapes[name] else float(part[0])
+            validated(path, replaced(document, {name: value}))
 
 
 def _single(one: Asked, result: xr.Dataset, case: Case, shared: dict[Any, Any]) -> float:

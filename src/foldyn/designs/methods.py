@@ -112,13 +112,8 @@ def _trust_constr(search: Search, x: NDArray, settings: Settings) -> tuple[str, 
 
 
 def _mma(search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
-    """NLopt's method of moving asymptotes, with equalities as narrow bands."""
+    """NLopt's method of moving asymptotes; equalities are left to an augmented Lagrangian."""
     nlopt = optional("nlopt", "MMA needs nlopt", "foldyn[design]")
-    solver = nlopt.opt(nlopt.LD_MMA, len(x))
-    solver.set_lower_bounds(0.0)
-    solver.set_upper_bounds(1.0)
-    solver.set_ftol_rel(settings.tolerance)
-    solver.set_xtol_rel(settings.tolerance)
     last: list[Trial] = []
 
     def objective(x: NDArray, slope: NDArray) -> float:
@@ -126,31 +121,43 @@ def _mma(search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
         if not last or found is not last[0]:
             search.step()
         last[:] = [found]
-        slope[:] = found.slope
+        slope[:] = found.slope[: slope.size]  # empty where it wants the value alone
         return found.objective
 
-    def bounded(k: int, sign: float, width: float) -> Callable[[NDArray, NDArray], float]:
-        def excess(x: NDArray, slope: NDArray) -> float:
+    def excess(k: int) -> Callable[[NDArray, NDArray], float]:
+        def one(x: NDArray, slope: NDArray) -> float:
             found = search.at(x)
-            slope[:] = sign * found.slopes[k]
-            return float(sign * found.excess[k] - width)
+            slope[:] = found.slopes[k][: slope.size]
+            return float(found.excess[k])
 
-        return excess
+        return one
 
-    solver.set_min_objective(objective)
+    def solver(algorithm: int) -> Any:
+        made = nlopt.opt(algorithm, len(x))
+        made.set_lower_bounds(0.0)
+        made.set_upper_bounds(1.0)
+        made.set_ftol_rel(settings.tolerance)
+        made.set_xtol_rel(settings.tolerance)
+        return made
+
+    whole = solver(nlopt.LD_MMA)
+    if search.problem.equal.any():
+        inner, whole = whole, solver(nlopt.AUGLAG_EQ)
+        inner.set_ftol_rel(1e2 * settings.tolerance)
+        whole.set_local_optimizer(inner)
+    whole.set_min_objective(objective)
     for k, equal in enumerate(search.problem.equal):
-        width = 0.5 * settings.slack if equal else 0.0
-        for sign in (1.0, -1.0)[: 1 + equal]:
-            solver.add_inequality_constraint(bounded(k, sign, width), 0.5 * settings.slack)
+        add = whole.add_equality_constraint if equal else whole.add_inequality_constraint
+        add(excess(k), 0.5 * settings.slack)
     try:
-        solver.optimize(x)
+        whole.optimize(x)
     except nlopt.RoundoffLimited:
         return "progress is limited by rounding", True
     reasons = {
         nlopt.FTOL_REACHED: "the objective no longer changes",
         nlopt.XTOL_REACHED: "the design no longer changes",
     }
-    reason = solver.last_optimize_result()
+    reason = whole.last_optimize_result()
     return reasons.get(reason, f"NLopt's result {reason}"), reason in reasons
 
 
@@ -163,15 +170,17 @@ def _cma(search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
         "bounds": [0.0, 1.0], "randn": drawn.randn, "seed": np.nan, "verbose": -9,
         "verb_log": 0, "tolfun": settings.tolerance, "tolx": 1e-2 * settings.tolerance,
     }  # fmt: skip
-    strategy = cma.CMAEvolutionStrategy(x, SPREAD, options)
+    n = len(x)
+    first = x if n > 1 else np.append(x, 0.5)  # it cannot do with one number
+    strategy = cma.CMAEvolutionStrategy(first, SPREAD, options)
     count = len(search.problem.constraints)
-    lagrangian = handler.AugmentedLagrangian(len(x), search.problem.equal)
+    lagrangian = handler.AugmentedLagrangian(len(first), search.problem.equal)
     lagrangian.logging = 0
     while not strategy.stop():
         designs = strategy.ask()
-        found = [search.at(one) for one in designs]
+        found = [search.at(one[:n]) for one in designs]
         if count:
-            mean = search.at(np.clip(strategy.mean, 0.0, 1.0))
+            mean = search.at(np.clip(strategy.mean[:n], 0.0, 1.0))
             sound = [one for one in found if one.objective < BAD] or [mean]
             excess = [one.excess for one in sound]
             lagrangian.set_coefficients([one.objective for one in sound], excess)
@@ -196,6 +205,7 @@ METHODS: Mapping[str, Method] = {
 def searched(method: str, search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
     """Search from a start; returns why it ended, and whether that is an optimum."""
     try:
+        search.at(x)
         return METHODS[method].run(search, x, settings)
     except Ended as end:
         return str(end), False

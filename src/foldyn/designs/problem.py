@@ -31,10 +31,18 @@ class Problem:
     constraints: tuple[Constraint, ...]
 
     @property
+    def places(self) -> dict[str, str]:
+        """All that is measured, each with the argument that first asks for it."""
+        goal = "minimize" if self.sign > 0.0 else "maximize"
+        found = dict.fromkeys(self.objective.measures, goal)
+        for k, one in enumerate(self.constraints):
+            found |= {name: f"subject_to[{k}]" for name in one.measures if name not in found}
+        return found
+
+    @property
     def measures(self) -> tuple[str, ...]:
         """All that is measured."""
-        every = [*self.objective.measures, *(m for one in self.constraints for m in one.measures)]
-        return tuple(dict.fromkeys(every))
+        return tuple(self.places)
 
     @property
     def equal(self) -> NDArray:

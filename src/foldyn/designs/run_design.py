@@ -151,8 +151,7 @@ def design(
     Notes
     -----
     A design that cannot be computed does not end a search: the method takes a shorter step, and the
-    history says why. CMA-ES holds constraints by an augmented Lagrangian, MMA equalities as
-    inequalities half the slack apart.
+    history says why. CMA-ES holds constraints by an augmented Lagrangian, MMA equalities.
     """
     plan = plan_of(
         build, bounds, minimize, maximize, subject_to, analysis, start, method, starts, seed,
@@ -177,7 +176,7 @@ def plan_of(
         whole("seed", seed, least=0, most=2**31),
     )
     whole("starts", starts, least=1, most=MOST)
-    evaluator = measured(build, analysis, problem.measures, space)
+    evaluator = measured(build, analysis, problem.places, space)
     return Plan(problem, space, first, evaluator, method, settings, starts)
 
 

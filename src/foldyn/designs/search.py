@@ -16,8 +16,9 @@ from foldyn.sweeps.evaluations import Evaluations
 
 BAD = 1e6
 """Objective of a design that cannot be computed, over the size of the objective."""
-MOST_FAILED = 20
-"""Designs in a row that cannot be computed, after which a search is given up."""
+MOST_FAILED = 20, 200
+"""Designs in a row that cannot be computed, after which a search is given up: of a method with
+gradients, and of one that draws designs."""
 
 
 class Ended(Exception):  # noqa: N818
@@ -142,8 +143,9 @@ class Search:
         self._failed += 1
         if self._last is None:
             raise Ended(f"the first design cannot be computed: {self.rows[-1].failure}")
-        if self._failed > MOST_FAILED:
-            raise Ended(f"{MOST_FAILED} designs in a row failed: {self.rows[-1].failure}")
+        most = MOST_FAILED[not self.gradient]
+        if self._failed > most:
+            raise Ended(f"{most} designs in a row failed: {self.rows[-1].failure}")
         last = self._last
         return Trial(np.asarray(x), BAD, last.excess, last.slope, last.slopes, np.inf)
 

@@ -21,8 +21,6 @@ from foldyn.mechanics.term import Term
 from foldyn.mechanics.viscous import Viscous, ViscousTerm, viscous
 from foldyn.mechanics.viscous_panels import ViscousPanelsTerm, viscous_panels
 
-ROUNDING = 1e-14  # of the diagonal: entries of a matrix that cancel
-
 
 def damping_terms(case: Case, start: NDArray | None, modal: ModalRows) -> list[Term]:
     """All terms that damp a motion from `start` (n, 3), or from rest; `modal` is its damping."""
@@ -30,17 +28,21 @@ def damping_terms(case: Case, start: NDArray | None, modal: ModalRows) -> list[T
     if rayleigh.beta > 0.0:
         state = start if rayleigh.state == "start" else None
         state = np.zeros_like(case.structure.nodes) if state is None else state
-        terms.insert(0, DampingMatrix(_cleared(body.tangent(body.dofs(state))) * rayleigh.beta))
+        terms.insert(0, DampingMatrix(_tangent(body, body.dofs(state)) * rayleigh.beta))
     modal.warn()
     return [*terms, DampingRows(modal.rows)] if len(modal.rows) else terms
 
 
-def _cleared(matrix: sparse.csr_array) -> sparse.csr_array:
-    """A matrix without entries that are but rounding: its pattern is that of the model."""
-    out, size = matrix.tocoo(), np.sqrt(np.abs(matrix.diagonal()))
-    own = np.abs(out.data) > ROUNDING * size[out.row] * size[out.col]
-    places = (out.row[own], out.col[own])
-    return sparse.csr_array(sparse.coo_array((out.data[own], places), matrix.shape))
+def _tangent(body: Assembly, q: NDArray) -> sparse.csr_array:
+    """Tangent (m, m) at the dofs q (m,) with all places that the model couples.
+
+    Zeros among them stay, so that the places are the same for all numbers of the model.
+    """
+    parts = [term.tangent(q).tocoo() for term in body.terms]
+    data, rows, columns = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("data", "row", "col")
+    )
+    return sparse.csr_array(sparse.coo_array((data, (rows, columns)), (q.size, q.size)))
 
 
 def damping_matrix(case: Case, q: NDArray, quasi_static: bool = False) -> sparse.csr_array:

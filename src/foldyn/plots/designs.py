@@ -13,14 +13,16 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
-from foldyn.plots import scene
+from foldyn.plots import scene, style
 from foldyn.plots.chart_figures import figure_of
 from foldyn.plots.design_charts import convergence_charts
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet
+from foldyn.plots.visibility import split_edges
 
 COLORS = "coolwarm"
-WIDE = 3.5  # points; of colored creases
+WIDE, HIDDEN = 3.5, 0.25  # points, and opacity behind panels; of colored creases
+ROWS = 4  # of a legend: room for the color bar
 
 
 def plot_convergence(history: xr.Dataset) -> Figure:
@@ -75,20 +77,30 @@ def draw_sensitivity(
         )
     reach = float(np.abs(shown).max(initial=0.0)) or 1.0
     scale = ScalarMappable(Normalize(-reach, reach), colormaps[COLORS])
-    figure, axes = scene.view_figure(sheet.nodes, sight, title)
+    figure, axes = scene.view_figure(sheet.nodes, sight, title, legend_rows=ROWS)
     DrawnSheet(axes, sheet, sheet.nodes, sight)
     if len(shown) == len(creases):
-        lines = scene.add_segments(
-            axes, sheet.nodes[sheet.edges[: len(creases)]], "k", WIDE, zorder=3.0
-        )
-        lines.set_color(scale.to_rgba(shown))
+        _color_creases(axes, sheet, sight, scale.to_rgba(shown))
     else:
         own = scale.to_rgba(shown[_panels(sheet)])[:, :3]
         colors = scene.shades(sheet.nodes, sheet.triangles, own)
         scene.add_panels(axes, sheet.nodes[sheet.triangles], colors, zorder=1.2)
-    bar = figure.colorbar(scale, ax=axes, fraction=0.03, pad=0.0, shrink=0.6)
-    bar.set_label(label)
+    high = figure.get_size_inches()[1]
+    bar = figure.colorbar(
+        scale, cax=figure.add_axes((0.2, 0.5 / high, 0.6, 0.1 / high)), orientation="horizontal"
+    )
+    bar.set_label(label, **style.TEXT)
+    bar.ax.tick_params(labelsize=style.TICK, labelcolor=style.BLACK, color=style.GRAY)
+    bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
     return figure
+
+
+def _color_creases(axes: Any, sheet: Sheet3D, view: View, colors: NDArray) -> None:
+    """Creases in colors of their own, pale where a panel hides them."""
+    for crease, color in zip(sheet.edges, colors, strict=False):
+        seen, hidden = split_edges(crease[None], sheet.nodes, sheet.triangles, view, sheet.size)
+        scene.add_segments(axes, seen, color, WIDE, zorder=3.0)
+        scene.add_segments(axes, hidden, color, WIDE, zorder=1.6, alpha=HIDDEN)
 
 
 def _panels(sheet: Sheet3D) -> NDArray:
