@@ -157,8 +157,8 @@ def test_gradient_of_what_was_computed_with_the_usual_tolerance(
 
 
 WRONG = {
-    "energy_momentum": (case, {"method": "energy_momentum"}, "newmark and generalized_alpha"),
-    "dormand_prince": (case, {"method": "dormand_prince"}, "choose one of those"),
+    "energy_momentum": (case, {"method": "energy_momentum"}, "take rk4, newmark or generalized_alpha"),
+    "dormand_prince": (case, {"method": "dormand_prince"}, "take rk4, newmark or generalized_alpha"),
     "steps by error": (case, {"tolerance": 1e-4}, "give dt, and no tolerance"),
     "no dt": (case, {"dt": None}, "give dt"),
     "contact": (

@@ -299,9 +299,8 @@ def _refuse(motion: Any) -> None:
     """Refuse steps that have no adjoint, with a remedy."""
     if motion.method.name not in METHODS:
         raise InputError(
-            f" = {motion.method.name!r}: there are gradients of motions by rk4, "
-            f"{' and '.join(METHODS)}, not by dormand_prince, central_difference and "
-            "energy_momentum; choose one of those",
+            f" = {motion.method.name!r}: motions by it have no gradients; take rk4, "
+            f"{' or '.join(METHODS)}",
             "method",
         )
     if not motion.plan.steps:
