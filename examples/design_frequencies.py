@@ -29,7 +29,12 @@ print(best)
 
 found = fd.sensitivity(build, {"stiffness": equal}, "frequency[1]", modes)
 matters = equal * found["gradient_stiffness"].values[0]
-figure = fd.plots.draw_sensitivity(build(equal), matters, "Hz, to first order", title="Gain of the first frequency from twice the stiffness")
+figure = fd.plots.draw_sensitivity(
+    build(equal),
+    matters,
+    "Hz, to first order",
+    title="Gain of the first frequency from twice the stiffness",
+)
 figure.savefig("design-which-crease.png", dpi=90)
 change = np.log2(best["parameters"]["stiffness"] / equal)
 figure = fd.plots.draw_sensitivity(build(equal), change, "log2 of the stiffness over 0.02 N/rad")
