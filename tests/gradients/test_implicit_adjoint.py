@@ -156,9 +156,10 @@ def test_gradient_of_what_was_computed_with_the_usual_tolerance(
     assert max(design.errors().values()) < 1e-4  # differences show the tolerance of steps
 
 
+TAKE = "take rk4, newmark or generalized_alpha"
 WRONG = {
-    "energy_momentum": (case, {"method": "energy_momentum"}, "take rk4, newmark or generalized_alpha"),
-    "dormand_prince": (case, {"method": "dormand_prince"}, "take rk4, newmark or generalized_alpha"),
+    "energy_momentum": (case, {"method": "energy_momentum"}, TAKE),
+    "dormand_prince": (case, {"method": "dormand_prince"}, TAKE),
     "steps by error": (case, {"tolerance": 1e-4}, "give dt, and no tolerance"),
     "no dt": (case, {"dt": None}, "give dt"),
     "contact": (
