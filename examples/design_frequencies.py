@@ -11,10 +11,8 @@ WANTED = {1: 26.0, 2: 30.0, 3: 42.0}  # Hz; those of equal creases are 24.9, 28.
 
 def build(stiffness):
     """Sheet with these stiffnesses of its creases, N/rad."""
-    made = fd.discretize(
-        PATTERN, PAPER, preset="merlin2", bend_law="linear", crease_stiffness=stiffness
-    )
-    return fd.Case(made, [fd.Fix("xmin")])
+    options = {"preset": "merlin2", "bend_law": "linear", "crease_stiffness": stiffness}
+    return fd.Case(fd.discretize(PATTERN, PAPER, **options), [fd.Fix("xmin")])
 
 
 equal, modes = np.full(len(PATTERN.creases), 0.02), {"kind": "modes", "count": 4}
@@ -27,7 +25,6 @@ best = fd.design(
     tolerance=1e-12,
 )
 print(best)
-
 found = fd.sensitivity(build, {"stiffness": equal}, "frequency[1]", modes)
 matters = equal * found["gradient_stiffness"].values[0]
 figure = fd.plots.draw_sensitivity(
