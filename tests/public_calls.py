@@ -243,6 +243,13 @@ def solved(folder: Path) -> Calls:
             "measures": "mass", "analysis": None, "sizes": {"sheet.thickness": 0.01},
             "along": None,
         }),
+        "design": (fd.design, {  # refused: nothing to make small
+            "build": folder / "case.toml", "bounds": {"sheet.thickness": (0.01, 0.02)},
+            "minimize": None, "maximize": None, "subject_to": ["mass <= 1"], "analysis": None,
+            "start": {"sheet.thickness": 0.015}, "method": "slsqp", "starts": 1, "seed": 0,
+            "tolerance": 1e-6, "slack": 1e-4, "max_evaluations": 2, "folder": None,
+            "progress": None,
+        }),
         "fit": (fd.fit, {  # refused: nothing to fit to
             "case": folder / "case.toml", "data": [], "parameters": [], "ties": None, "starts": 1,
             "seed": 0, "processes": 1, "confidence": 0.95, "folder": None, "progress": None,

@@ -5,13 +5,14 @@ from __future__ import annotations
 import tomllib
 
 import pytest
+import xarray as xr
 
 import foldyn as fd
 from case_texts import MODES_TEXT
 
 ASKED = """[design]
 minimize = "mass"
-subject_to = ["frequency[1] >= 3.0"]
+subject_to = ["frequency[1] >= 1.0"]
 [design.bounds]
 "sheet.thickness" = [0.005, 0.02]
 """
@@ -35,20 +36,21 @@ def test_results_page_and_evaluations_stand_in_one_folder(workplace):
         "history.csv", "report.html",
     ]  # fmt: skip
     folder = workplace.folder / "case-design"
-    history = fd.load(folder / "design.nc")
+    history = xr.load_dataset(folder / "design.nc")
     count = history.sizes["evaluation"]
     assert sum(name.endswith(".npz") for name in names) == count
     assert bool(history["feasible"][int(history["best"])])
     designed = fd.read_case(folder / "designed.toml")
-    assert float(designed.run()["frequency"][0]) == pytest.approx(3.0, rel=2e-4)
+    assert float(designed.run()["frequency"][0]) == pytest.approx(1.0, rel=2e-4)
     page = (folder / "report.html").read_text("utf-8")
-    for text in ("frequency[1] &gt;= 3.0", "sheet.thickness", "What matters", "foldyn design"):
+    for text in ("frequency[1] &gt;= 1.0", "sheet.thickness", "What matters", "foldyn design"):
         assert text in page
-    assert "minimize mass (slsqp, 1 number" in done.out and "frequency[1] >= 3.0: holds" in done.out
+    assert "case: minimize mass by 1 number (slsqp)" in done.out
+    assert "frequency[1] >= 1.0: holds" in done.out
     again = workplace.call("design", "case.toml", "--out", "case-design", "--no-figures")
     assert again.status == 0
     assert not [name for name in again.new if name.endswith(".npz")]
-    later = fd.load(folder / "design.nc")
+    later = xr.load_dataset(folder / "design.nc")
     assert later.drop_vars("seconds").equals(history.drop_vars("seconds"))
 
 
@@ -62,7 +64,7 @@ def test_creases_are_colored_by_what_they_matter(workplace):
 
 
 def test_no_feasible_design_is_said(workplace):
-    workplace.write(MODES_TEXT + ASKED.replace(">= 3.0", ">= 300.0"))
+    workplace.write(MODES_TEXT + ASKED.replace(">= 1.0", ">= 300.0"))
     done = workplace.call("design", "case.toml")
     assert done.status == 0
     assert "designs is feasible; the nearest one violates frequency[1] >= 300.0 by" in done.err
@@ -84,12 +86,12 @@ def test_the_table_is_aside_for_other_commands(workplace):
     [
         ("", "case.toml: design: missing; say what may change"),
         ('[design]\nminimize = "mass"\n', "design.bounds"),
-        (ASKED.replace("minimize", "minimise"), "design.minimise: unknown key; did you mean 'minimize'"),
-        (ASKED.replace("[0.005, 0.02]", "[0.02, 0.005]"), "design.bounds.sheet.thickness: from 0.02"),
+        (ASKED.replace("minimize", "minimise"), "design.minimise: unknown key"),
+        (ASKED.replace("[0.005, 0.02]", "[0.02, 0.005]"), "bounds.sheet.thickness: from 0.02"),
         (ASKED.replace('"mass"', '"max(mass"'), 'design.minimize = "max(mass": cannot be read'),
-        (ASKED.replace(">= 3.0", "> 3.0"), "design.subject_to[0] = "),
+        (ASKED.replace(">= 1.0", "> 1.0"), "design.subject_to[0] = "),
         (ASKED.replace("sheet.thickness", "sheet.thicknes"), "sheet.thicknes: unknown key"),
-        (ASKED.replace("frequency[1]", "reaction[x]"), "design.subject_to[0]: reaction[x] is of results of"),
+        (ASKED.replace("frequency[1]", "reaction[x]"), "design.subject_to[0]: reaction[x] is"),
         (ASKED + '[design.start]\n"sheet.thickness" = 7\n', "must be within its bounds"),
     ],
 )  # fmt: skip

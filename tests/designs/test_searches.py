@@ -189,7 +189,7 @@ MODES = {"kind": "modes", "count": 3}
         ({"minimize": "frequency(1)"}, r"minimize = \"frequency\(1\)\": .*measures have brackets"),
         ({"minimize": "frequencies"}, "minimize: frequencies is an array; ask for one"),
         ({"minimize": "frequensy[1]"}, "no measure frequensy; did you mean 'frequency'"),
-        ({"minimize": "limit_load"}, "minimize: limit_load is of results of kind statics, not modes"),
+        ({"minimize": "limit_load"}, "limit_load is of results of kind statics, not modes"),
         ({"subject_to": ["frequency[1]"]}, r"subject_to\[0\] = .*compares nothing"),
         ({"subject_to": 3}, "subject_to = 3"),
         ({"bounds": {}}, "bounds = .*: give each parameter its bounds"),

@@ -67,8 +67,9 @@ def run_design(given: argparse.Namespace) -> Path:
     owner = Owner.of("design", path, folder)
     say = speech(given.quiet)
     goal = "minimize" if plan.problem.sign > 0.0 else "maximize"
-    say(f"{case_file.heading}: {goal} {plan.problem.objective.text} ({plan.method}, "
-        f"{len(plan.space.lower)} numbers)")  # fmt: skip
+    count = len(plan.space.lower)
+    say(f"{case_file.heading}: {goal} {plan.problem.objective.text} by {count} "
+        f"number{'s' * (count > 1)} ({plan.method})")  # fmt: skip
     with held(folder, given.out, names, owner, given.replace, DRAWN, [KEPT]) as results:
         with noted_warnings() as noted:
             found = _searched(plan, results, given.quiet)
@@ -121,7 +122,7 @@ def _tell(found: Design, say: Any) -> None:
     sound = "" if found.feasible else ", not feasible"
     say(f"  objective {found.objective:.6g}{sound}")
     for text, amount in found.constraints.items():
-        say(f"  {text}: {f'off by {amount:.3g}' if amount else 'holds'}")
+        say(f"  {text}: {f'violated by {amount:.3g}' if amount else 'holds'}")
     for end in found.ends:
         count = f"{end.evaluations} evaluation{'s' * (end.evaluations != 1)}"
         say(f"  start {end.start + 1}: {end.objective:.6g} after {count}: {end.message}")

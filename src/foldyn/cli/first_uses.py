@@ -130,6 +130,8 @@ def vibrating(**parts: Any) -> None:
 
 Uses = Mapping[str, Sequence[Callable[[], None]]]
 TOUCHING: dict[str, Any] = {"pattern": sheets(), "start": (-0.6, 0.2, -1.0)}
+
+
 def differentiated(*methods: str, **parts: Any) -> None:
     """Gradients of motions, and of a frequency, by the stiffness of the creases."""
     made, given = case(**parts), {"duration": STEPS * SHORT, "dt": SHORT}

@@ -68,7 +68,7 @@ class Design:
     feasible : bool
         Whether all constraints hold, up to the slack.
     constraints : dict of str to float
-        By how much each constraint is violated, in the unit of its sides; 0 where it holds.
+        By how much each constraint is violated, in the unit of its sides; 0 up to the slack.
     measures : dict of str to float
         All that was measured of this design.
     gradient : dict

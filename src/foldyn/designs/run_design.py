@@ -244,14 +244,14 @@ def _found(
 ) -> Design:  # fmt: skip
     """The result of a search, with a warning where no design is feasible."""
     problem, space = plan.problem, plan.space
-    pairs = zip(problem.constraints, best.numbers[1:].tolist(), strict=True)
-    violations = {one.text: one.violation(difference) for one, difference in pairs}
+    violations = {}
+    slacks = (plan.settings.slack * np.asarray(search.sizes)[1:]).tolist()
+    for one, difference, slack in zip(problem.constraints, best.numbers[1:], slacks, strict=True):
+        amount = one.violation(float(difference))
+        violations[one.text] = amount if amount > slack else 0.0
     if not best.feasible:
-        sizes = dict(zip(violations, np.asarray(search.sizes)[1:], strict=True))
         violated = ", ".join(
-            f"{text} by {amount:.3g}"
-            for text, amount in violations.items()
-            if amount > plan.settings.slack * sizes[text]
+            f"{text} by {amount:.3g}" for text, amount in violations.items() if amount
         )
         warnings.warn(
             f"none of {len(search.rows)} designs is feasible; the nearest one violates {violated}. "

@@ -19,6 +19,7 @@ from foldyn.plots.design_charts import convergence_charts
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet
 from foldyn.plots.visibility import split_edges
+from foldyn.values import choice
 
 COLORS = "coolwarm"
 WIDE, HIDDEN = 3.5, 0.25  # points, and opacity behind panels; of colored creases
@@ -41,6 +42,7 @@ def draw_sensitivity(
     case_or_structure: Any,
     values: ArrayLike,
     label: str = "",
+    on: str | None = None,
     view: tuple[float, float] = (28.0, -60.0),
     title: str = "",
 ) -> Figure:
@@ -50,9 +52,11 @@ def draw_sensitivity(
     ----------
     case_or_structure : Case, Structure or Pattern, or a result with its case
     values : array_like, shape (creases,) or (panels,)
-        What is colored is known by the length; red is above 0, blue below.
+        Red is above 0, blue below.
     label : str
         Title of the color bar, with its unit.
+    on : {"crease", "panel"}, optional
+        What is colored; by default what there are so many of, creases first.
     view : tuple of float
         Elevation above the xy plane and azimuth around z (degrees).
     title : str
@@ -68,18 +72,18 @@ def draw_sensitivity(
     """
     sheet, sight = Sheet3D.of(case_or_structure), View(*view)
     shown = np.asarray(values, float)
-    creases, panels = np.asarray(sheet.pattern.creases), sheet.pattern.faces
-    if shown.shape not in ((len(creases),), (len(panels),)):
-        raise InputError(
-            f": shape {shown.shape}; give one value for each of the {len(creases)} creases or "
-            f"{len(panels)} panels",
-            "values",
-        )
+    counts = {"crease": len(sheet.pattern.creases), "panel": len(sheet.pattern.faces)}
+    if on is not None:
+        counts = {choice("on", on, counts): counts[on]}
+    fits = [name for name, count in counts.items() if shown.shape == (count,)]
+    if not fits:
+        known = " or ".join(f"{count} {name}s" for name, count in counts.items())
+        raise InputError(f": shape {shown.shape}; give one value for each of the {known}", "values")
     reach = float(np.abs(shown).max(initial=0.0)) or 1.0
     scale = ScalarMappable(Normalize(-reach, reach), colormaps[COLORS])
     figure, axes = scene.view_figure(sheet.nodes, sight, title, legend_rows=ROWS)
     DrawnSheet(axes, sheet, sheet.nodes, sight)
-    if len(shown) == len(creases):
+    if fits[0] == "crease":
         _color_creases(axes, sheet, sight, scale.to_rgba(shown))
     else:
         own = scale.to_rgba(shown[_panels(sheet)])[:, :3]
