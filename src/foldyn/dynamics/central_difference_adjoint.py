@@ -1,4 +1,4 @@
-"""The discrete adjoint of central differences: exact gradients of what `central_difference` does.
+"""The discrete adjoint of central differences: exact gradients of what it computes.
 
 A step takes displacement u, velocity v and the acceleration a that it keeps to
 
@@ -82,7 +82,7 @@ class CentralDifferenceAdjoint(Adjoint):
     ) -> tuple[tuple[NDArray, NDArray, NDArray], list[Evaluated]]:
         """The state after the steps from `first` to `last`, and where they evaluate forces.
 
-        The arithmetic is that of `central_difference.advance`, to the bit.
+        The arithmetic is that of the method itself, to the bit.
         """
         dt, taken = self._plan.dt, []
         for step in range(first + 1, last + 1):
