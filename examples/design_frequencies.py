@@ -10,6 +10,7 @@ WANTED = {1: 26.0, 2: 30.0, 3: 42.0}  # Hz; those of equal creases are 24.9, 28.
 
 
 def build(stiffness):
+    """Sheet with these stiffnesses of its creases, N/rad."""
     made = fd.discretize(
         PATTERN, PAPER, preset="merlin2", bend_law="linear", crease_stiffness=stiffness
     )

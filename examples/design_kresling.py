@@ -4,6 +4,7 @@ import foldyn as fd
 
 
 def build(height, twist, thickness):
+    """Tower under 1 N on each corner of its top."""
     pattern = fd.patterns.kresling(6, 0.04, height, twist)
     paper = fd.Sheet(1.219e9, 0.2, thickness, 667.0, length_scale_ratio=2.7)
     tower = fd.discretize(pattern, paper, preset="merlin2")

@@ -97,5 +97,8 @@ class Design:
 
 
 def _along(gradient: Mapping[str, NDArray], direction: Mapping[str, Any]) -> NDArray:
-    return sum(gradient[name] @ np.atleast_1d(rate) if gradient[name].ndim > 1
-               else gradient[name] * rate for name, rate in direction.items())  # fmt: skip
+    rates = [
+        gradient[name] @ np.atleast_1d(rate) if gradient[name].ndim > 1 else gradient[name] * rate
+        for name, rate in direction.items()
+    ]
+    return np.sum(rates, axis=0)

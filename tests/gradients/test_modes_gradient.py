@@ -18,7 +18,7 @@ MODES = {"kind": "modes", "count": 4}
 
 def cell(
     panel_angle: float = 63.0, thickness: float = 0.02, stiffness: Any = 0.02, density: float = 900,
-    preset: str = "plate", supports: Any = ("xmin",), **options: Any,
+    preset: Any = "plate", supports: Any = ("xmin",), **options: Any,
 ) -> fd.Case:  # fmt: skip
     pattern = fd.patterns.miura(panel_angle=panel_angle)
     sheet = fd.Sheet(1e6, 0.25, thickness, density)
@@ -26,7 +26,7 @@ def cell(
     return fd.Case(made, [fd.Fix(part) for part in supports], damping=[fd.Rayleigh(0.3, 2e-4)])
 
 
-def build(preset: str) -> Any:
+def build(preset: Any) -> Any:
     options = {} if preset != "merlin2" else {"bend_law": "linear"}
     return lambda **given: cell(preset=preset, **options, **given)
 
@@ -115,7 +115,7 @@ def square(one: float = 0.02, other: float = 0.02, thickness: float = 0.02) -> f
     pattern = fd.Pattern(grid, faces)
     along = np.ptp(pattern.vertices[pattern.creases][..., 0], axis=1) > 0.5
     sheet = fd.Sheet(1e6, 0.25, thickness, 900.0)
-    stiffness = np.where(along, one, other)
+    stiffness = np.where(along, one, other).tolist()
     made = fd.discretize(pattern, sheet, preset="plate", crease_stiffness=stiffness)
     return fd.Case(made, [fd.Fix([4]), fd.Fix([1, 3, 5, 7], "xy")])
 

@@ -24,7 +24,7 @@ MEASURES = (
 
 def cell(
     force: float = 0.4, alpha: float = 0.5, stiffness: Any = 0.5, youngs: float = 1e5,
-    lift: float = 0.0, beta: float = 0.0, preset: str = "plate", **options: Any,
+    lift: float = 0.0, beta: float = 0.0, preset: Any = "plate", **options: Any,
 ) -> fd.Case:  # fmt: skip
     pattern = fd.patterns.miura()
     sheet = fd.Sheet(youngs, 0.25, 0.03, 400.0)
@@ -37,7 +37,7 @@ def cell(
     return fd.Case(made, supports, [push], [fd.Rayleigh(alpha, beta)])
 
 
-def built(preset: str, **fixed: Any) -> Any:
+def built(preset: Any, **fixed: Any) -> Any:
     return lambda **given: cell(preset=preset, **fixed, **given)
 
 

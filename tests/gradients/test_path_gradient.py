@@ -16,7 +16,7 @@ TIP = 8  # on the upper ring
 
 def tower(
     height: float = 0.06, twist: float = 30.0, thickness: float = 2.4e-4, force: float = 1.0,
-    stiffness: Any = 6e-3, drop: float = 0.0, preset: str = "merlin2", spring: float = 0.0,
+    stiffness: Any = 6e-3, drop: float = 0.0, preset: Any = "merlin2", spring: float = 0.0,
 ) -> fd.Case:  # fmt: skip
     """A Kresling tower, pressed from above by forces, or by a plate that moves down."""
     pattern = fd.patterns.kresling(6, 0.04, height, twist)

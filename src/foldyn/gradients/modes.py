@@ -98,7 +98,7 @@ class ModesGradient:
         total, state = self._products.nothing(), np.zeros(len(self._products.q))
         by_value, by_shape = self._seeds(seeds, total)
         self._check_alone(by_value, by_shape)
-        for k in np.flatnonzero((by_value != 0.0) | by_shape.any(axis=0)):
+        for k in np.flatnonzero((by_value != 0.0) | by_shape.any(axis=0)).tolist():
             value, shape = self._values[k], self._shapes[:, k]
             by = by_value[k]
             state += self._add(shape, shape, by, by * value, total)

@@ -46,7 +46,8 @@ def numbers_of(case: Case, body: Any = None) -> Arrays:
 def numbers_of_motion(packed: Packed, start: tuple[NDArray, NDArray]) -> Arrays:
     """Numbers of a case as motions have it in memory, and its state at the start."""
     arrays, system, mass = arrays_of_body(packed.body), packed.system, packed.mass
-    numbers = arrays.numbers | {
+    numbers = {
+        **arrays.numbers,
         "loads": system.loads.value,
         "moved": system.moved.value,
         "mass": mass.data,
@@ -56,10 +57,8 @@ def numbers_of_motion(packed: Packed, start: tuple[NDArray, NDArray]) -> Arrays:
     }
     waves = system.waves._asdict()
     waves = {f"histories.{key}": np.asarray(waves[key]) for key in waves if key != "address"}
-    layout = (
-        arrays.layout
-        | waves
-        | {
+    layout = {**arrays.layout, **waves} | (
+        {
             "loads.dofs": system.loads.dof,
             "loads.histories": system.loads.row,
             "moved.dofs": system.moved.dof,

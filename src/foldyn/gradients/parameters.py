@@ -110,7 +110,7 @@ class Parameters:
         here = numbers_of(self.case())
         return {name: self._slope(name, numbers_of, here) for name in (names or self.values)}
 
-    def _slope(self, name: str, numbers_of: Callable[[Any], Arrays], here: Arrays) -> Slope:
+    def _slope(self, name: str, numbers_of: Callable[[Any], Arrays], here: Arrays) -> Any:
         value, size = self.values[name], self.size(name)
 
         def at(direction: NDArray, by: float) -> Mapping[str, NDArray]:
