@@ -110,6 +110,31 @@ def damped(**given: Any) -> fd.Case:
     return replace(case(**given), damping=fd.ModalDamping([0.02, 0.03]))
 
 
+def with_a_rigid_panel(shift: float) -> fd.Case:
+    """Of a shape, which says how its corners move with each other."""
+    far = 2.0 + 2.0 * shift
+    points = [
+        (0, 0, 0),
+        (1, 0, 0),
+        (1 + shift, 1, 0),
+        (0, 1, 0),
+        (2, 0, 0.5),
+        (far, 1, 0.5 + 0.5 * shift),
+    ]
+    pattern = fd.Pattern(points, [(0, 1, 2, 3), (1, 4, 5, 2)])
+    sheet = fd.Sheet(1e6, 0.25, 0.02, 900.0)
+    return fd.Case(fd.discretize(pattern, sheet, rigid=[1]), [fd.Fix([0, 1, 3])])
+
+
+def test_a_design_that_changes_what_constraints_tie_is_refused() -> None:
+    drive = {"drive": fd.Force([4], (0.0, 0.0, 1.0))}
+    with pytest.raises(InputError, match=r"constraints.*fd\.sweep"):
+        fd.sensitivity(with_a_rigid_panel, {"shift": 0.31}, "response[4,z,3]", PUSH | drive)
+    made = with_a_rigid_panel(0.31)
+    found = fd.sensitivity(made, ["fold_stiffness"], "response[4,z,3]", PUSH | drive)
+    assert np.isfinite(found["gradient_fold_stiffness"]).all()
+
+
 WRONG = {
     "some modes": (case, {"method": "modal", "count": 3}, AT[0], "choose direct"),
     "harmonic": (case, {"method": "harmonic"}, AT[0], "choose direct"),

@@ -10,8 +10,10 @@ import pytest
 from differences import Design
 
 import foldyn as fd
-from foldyn.dynamics import implicit_adjoint
+from foldyn.dynamics import central_difference_adjoint, implicit_adjoint
+from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.generalized_alpha import Alpha
+from foldyn.dynamics.implicit_adjoint import Retraced
 from foldyn.errors import InputError
 from foldyn.gradients import sensitivity
 
@@ -106,11 +108,22 @@ def test_gradients_are_those_of_the_motion(name: str, method: str) -> None:
     assert max(errors.values()) < 1e-8, errors
 
 
-def test_rk4_goes_through_supports_that_move_a_consistent_mass() -> None:
-    motion = {"kind": "dynamics", "duration": 2e-3, "method": "rk4", "dt": 1e-4}
+@pytest.mark.parametrize("method", ["rk4", "central_difference"])
+def test_explicit_methods_go_through_supports_that_move_a_consistent_mass(method: str) -> None:
+    motion = {"kind": "dynamics", "duration": 2e-3, "method": method, "dt": 1e-4}
     measures = ["velocity[4,z]", "mean_square[4,x]"]
-    errors = Design(shaken, {"dihedral": 72.0, "way": 0.05}, measures, motion).errors()
+    values = {"dihedral": 72.0, "way": 0.05, "alpha": 2.2}
+    errors = Design(shaken, values, measures, motion).errors()
     assert max(errors.values()) < 1e-7, errors
+
+
+@pytest.mark.parametrize("name", ["jump", "dampers", "lumped"])
+def test_central_differences(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(central_difference_adjoint, "ROOM", 5e4)  # segments of some hundred steps
+    build, values = CASES[name]
+    motion = {"kind": "dynamics", "duration": 0.05, "method": "central_difference", "dt": 1e-4}
+    errors = Design(build, values, TIP, motion | {"every": 10}).errors()
+    assert max(errors.values()) < 1e-6, errors
 
 
 @pytest.mark.parametrize("name", ARRAYS)
@@ -148,6 +161,20 @@ def test_a_start_with_velocity_and_segments_that_are_taken_again(
         assert np.array_equal(parts[name], value)
 
 
+def test_steps_taken_again_are_those_of_the_motion_to_the_bit() -> None:
+    made, given = falling(3.0), {"duration": 0.06, "dt": 0.003}
+    for method in METHODS:
+        motion = prepare(made, method=method, **given)
+        found = fd.simulate(made, method=method, **given)
+        taken = [
+            one for one in Retraced(motion).back(0, 20) if one.end.t == (one.number + 1) * 0.003
+        ]
+        assert len(taken) > 15
+        for one in taken:
+            sample = found["displacement"].values[one.number + 1]
+            assert np.array_equal(motion.packed.numbering.outward(one.end.q), sample)
+
+
 def test_gradient_of_what_was_computed_with_the_usual_tolerance(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -156,10 +183,10 @@ def test_gradient_of_what_was_computed_with_the_usual_tolerance(
     assert max(design.errors().values()) < 1e-4  # differences show the tolerance of steps
 
 
-TAKE = "take rk4, newmark or generalized_alpha"
+REMEDY = "take rk4, central_difference, newmark or generalized_alpha"
 WRONG = {
-    "energy_momentum": (case, {"method": "energy_momentum"}, TAKE),
-    "dormand_prince": (case, {"method": "dormand_prince"}, TAKE),
+    "energy_momentum": (case, {"method": "energy_momentum"}, REMEDY),
+    "dormand_prince": (case, {"method": "dormand_prince"}, REMEDY),
     "steps by error": (case, {"tolerance": 1e-4}, "give dt, and no tolerance"),
     "no dt": (case, {"dt": None}, "give dt"),
     "contact": (

@@ -39,12 +39,10 @@ from foldyn.dynamics.adjoint import Adjoint
 from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.newton import SAME_STEP
-from foldyn.dynamics.inertia import substitute, times_mass
+from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.motion_state import samples
-from foldyn.dynamics.system import carried
 from foldyn.dynamics.timing import jumps
 from foldyn.errors import ComputationError, InputError
-from foldyn.mechanics.pullback import pull_all
 
 METHODS = ("newmark", "generalized_alpha")
 ROOM = 16e6  # bytes of the states of a segment
@@ -170,7 +168,6 @@ class ImplicitAdjoint(Adjoint):
         self._by_a, self._z = np.zeros(shape), np.zeros(shape)
         self._made = 0.0  # step of the matrix that is factorized
         self._forget()
-        self._rows = np.repeat(np.arange(shape[0]), np.diff(self._mass.indptr))
 
     def backward(self, first: int, last: int, by_u: NDArray, by_v: NDArray) -> None:
         """See `Adjoint`."""
@@ -241,28 +238,14 @@ class ImplicitAdjoint(Adjoint):
 
     def _back_to_begin(self, start: State, by_u: NDArray, by_v: NDArray) -> None:
         """To before the acceleration -M^-1 b - alpha w with which a motion begins, or a part."""
-        (_, af, _, _), (t, q, w, a), by_a = self._scheme.parameters, start, self._by_a
-        push = np.zeros_like(by_a)
-        if self._mass.lumped:
-            push += self._mass.inverse * by_a
-        else:
-            substitute(self._mass, by_a, push, self._scratch.line)
+        (_, af, _, _), (t, q, w, a) = self._scheme.parameters, start
         self._forget()
-        self._pull(*self._whole(t, q, w), af * self._z + push)
-        self._add_supports()
-        self._add_mass(push, a, w)
-        by_u -= self._product
-        by_v -= self._rate + self._system.alpha * by_a
+        self._pull(*self._whole(t, q, w), af * self._z + self._push(self._by_a))
+        self._add_acceleration(a, w, self._by_a, by_u, by_v)
         by_v *= self._kinds[0]
-        by_a[:] = self._z[:] = 0.0
+        self._by_a[:] = self._z[:] = 0.0
 
     # ------------------------------------------------------------------ parts
-    def _whole(self, t: float, q: NDArray, w: NDArray) -> tuple[NDArray, NDArray]:
-        """Displacement and velocity (n, 3) at a time (s) with those of supports."""
-        self._evaluate(t)
-        moved, factor = self._system.moved, self._scratch.factor
-        return carried(moved, factor[:, 0], q), carried(moved, factor[:, 1], w)
-
     def _factorize(self, u: NDArray, h: float) -> None:
         """Factorize the matrix of a step that ends at u."""
         matrix = self._matrix
@@ -271,36 +254,13 @@ class ImplicitAdjoint(Adjoint):
         matrix.factorize(self._scheme.weights(h))
         self._made = h
 
-    def _forget(self) -> None:
-        self._weight, self._product, self._rate = np.zeros((3, *self._by_a.shape))
-
-    def _pull(self, u: NDArray, v: NDArray, weight: NDArray) -> None:
-        """Add the derivatives of weight . b at the time evaluated last, since `_forget`."""
-        self._weight += weight
-        time = float(self._scratch.time[0])
-        pull_all(self._pullback.terms, u, v, time, weight, self._product, self._rate)
-
-    def _add_supports(self) -> None:
-        """Add what loads and supports that move have of what was pulled since `_forget`."""
-        loads, moved, factor = self._system.loads, self._system.moved, self._scratch.factor
-        self._by.loads[:] += self._weight.ravel()[loads.dof] * factor[loads.row, 0]
-        self._by.moved[:] -= self._product.ravel()[moved.dof] * factor[moved.row, 0]
-        self._by.moved[:] -= self._rate.ravel()[moved.dof] * factor[moved.row, 1]
-
-    def _add_mass(self, push: NDArray, a: NDArray, w: NDArray) -> None:
-        """Add the derivatives of -push . M (a + alpha w) by the mass and by alpha."""
-        mass, alpha = self._mass, self._system.alpha
-        pushed = push[self._rows]
-        self._by.mass[:] -= np.einsum("ea,ea->e", pushed, (a + alpha * w)[mass.indices])
-        self._by.alpha[0] -= mass.data @ np.einsum("ea,ea->e", pushed, w[mass.indices])
-
 
 def _refuse(motion: Any) -> None:
     """Refuse steps that have no adjoint, with a remedy."""
     if motion.method.name not in METHODS:
         raise InputError(
             f" = {motion.method.name!r}: motions by it have no gradients; take rk4, "
-            f"{' or '.join(METHODS)}",
+            f"central_difference, {' or '.join(METHODS)}",
             "method",
         )
     if not motion.plan.steps:

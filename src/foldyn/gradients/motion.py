@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.dynamics.adjoint import Adjoint, refuse
+from foldyn.dynamics.central_difference_adjoint import CentralDifferenceAdjoint
 from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.implicit_adjoint import ImplicitAdjoint, Retraced
 from foldyn.dynamics.methods import with_mass
@@ -49,6 +50,9 @@ class MotionGradient:
                 motion = prepare(case, **{**given, "dt": motion.plan.dt, "every": apart})
             samples = motion.run(progress)
             self._adjoint: Callable[[], Adjoint] = lambda: RK4Adjoint(motion, samples)
+        elif motion.method.name == "central_difference":
+            samples = motion.run(progress)
+            self._adjoint = lambda: CentralDifferenceAdjoint(motion)
         else:
             steps = Retraced(motion)
             samples = motion.run(progress)

@@ -31,6 +31,9 @@ def numbers_of(case: Case, body: Any = None) -> Arrays:
         for k, (vector, _) in enumerate(getattr(case, f"{kind}_terms")):
             numbers[f"{kind}.{k}"] = np.asarray(vector, float)
     layout["held"] = case.fixed
+    if case.constraints:  # no solver has derivatives by what they tie: any change shows in these
+        basis = case.constraints.basis
+        numbers["constraints"] = basis @ np.random.default_rng(0).uniform(1.0, 2.0, basis.shape[1])
     numbers["alpha"], numbers["beta"] = np.array([[case.rayleigh.alpha], [case.rayleigh.beta]])
     with suppress(InputError):  # statics needs no mass
         mass = sparse.csr_array(case.mass)

@@ -95,8 +95,8 @@ def sensitivity(
         "-frequency[2] / frequency[1]"; or own ones by name: pairs of a function of the result and
         the case, and one that returns its derivatives by variables of the result, by name.
     analysis : mapping, optional
-        What is computed: its kind, "modes" or "dynamics", and arguments of `fd.modes` or
-        `fd.simulate`. A case file has its own.
+        What is computed: its kind, "modes", "statics", "dynamics" or "frf", and arguments of
+        `fd.modes`, `fd.path`, `fd.simulate` or `fd.frf`. A case file has its own.
     sizes : mapping, optional
         Sizes of parameters that are 0 where the gradient is taken: a case is built for differences
         of a thousandth of them.
