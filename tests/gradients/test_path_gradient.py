@@ -10,6 +10,7 @@ from differences import Design
 
 import foldyn as fd
 from foldyn.errors import InputError
+from foldyn.gradients.equilibrium import solved
 
 TIP = 8  # on the upper ring
 
@@ -106,3 +107,17 @@ def test_a_limit_load_falls_as_the_force_grows():
 def test_refused(analysis, measure, told):
     with pytest.raises(InputError, match=told):
         fd.sensitivity(tower, {"force": 1.0}, measure, analysis)
+
+
+def test_displacements_at_a_limit_point_have_no_derivative():
+    case = tower()
+    given = {name: value for name, value in SNAP.items() if name != "kind"}
+    path = fd.trace(case, **given)
+    at = int(np.flatnonzero(path["point"].values == "limit")[0])
+    q = case.body.dofs(path["displacement"].values[at])
+    force = np.zeros(len(q))
+    force[3 * TIP + 2] = 1.0
+    with pytest.raises(InputError, match=r"limit point or a bifurcation.*limit_load"):
+        solved(case, q, force)
+    before = case.body.dofs(path["displacement"].values[at - 1])
+    assert np.isfinite(solved(case, before, force)).all()

@@ -8,7 +8,10 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from foldyn.cases import Case
+from foldyn.errors import InputError
 from foldyn.mechanics.pullback import Pullback
+
+SINGULAR = 1e-13  # of the stiffness at play: a motion that meets no more is a critical point's
 
 
 def equilibrium_seen(
@@ -19,13 +22,37 @@ def equilibrium_seen(
 
     by_state : derivatives (m,) of the number by the dofs at constant numbers.
     """
-    ties, body = case.constraints, case.body
-    free = np.concatenate([case.free_dofs, body.hidden])
-    tangent = sparse.csr_array(ties.matrix(body.tangent(q)))
-    block = sparse.csc_array(tangent[free][:, free])
-    adjoint = np.zeros(len(q))
-    adjoint[free] = splu(block).solve(ties.force(by_state)[free])
-    seen_through(case, q, by_state, ties.displacement(adjoint), pullback, total, factor)
+    seen_through(case, q, by_state, solved(case, q, by_state), pullback, total, factor)
+
+
+def free_block(case: Case, q: NDArray) -> tuple[NDArray, sparse.csc_array]:
+    """Free dofs (nf,), and the tangent (nf, nf) there."""
+    free = np.concatenate([case.free_dofs, case.body.hidden])
+    tangent = sparse.csr_array(case.constraints.matrix(case.body.tangent(q)))
+    return free, sparse.csc_array(tangent[free][:, free])
+
+
+def solved(case: Case, q: NDArray, force: NDArray) -> NDArray:
+    """Motion (m,) of an equilibrium under a force (m,).
+
+    Raises
+    ------
+    InputError
+        At a critical point, where there is none.
+    """
+    free, block = free_block(case, q)
+    load, out = case.constraints.force(force)[free], np.zeros(len(q))
+    try:
+        out[free] = splu(block).solve(load)
+    except RuntimeError:  # exactly singular
+        out[free] = np.inf
+    met = float(np.abs(load).max(initial=0.0))
+    if not met >= SINGULAR * float(np.abs(block).max()) * float(np.abs(out).max(initial=0.0)):
+        raise InputError(
+            "the equilibrium is a limit point or a bifurcation, where displacements have no "
+            "derivative; ask for the load factor (limit_load), or take another load factor"
+        )
+    return case.constraints.displacement(out)
 
 
 def seen_through(

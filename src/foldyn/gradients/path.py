@@ -22,7 +22,7 @@ from scipy.sparse.linalg import splu
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.gradients.equilibrium import equilibrium_seen, seen_through
+from foldyn.gradients.equilibrium import equilibrium_seen, free_block, seen_through, solved
 from foldyn.gradients.numbers import Gradient, nothing, numbers_of
 from foldyn.mechanics.pullback import Arrays, Pullback
 from foldyn.statics import trace
@@ -54,8 +54,7 @@ class PathGradient:
         _refuse(case, arguments)
         self.case, self.result = case, trace(case, **arguments)
         self._given = arguments.get("method", "newton") in GIVEN
-        self._pullback, body = Pullback(case.body), case.body
-        self._free = np.concatenate([case.free_dofs, body.hidden])
+        self._pullback = Pullback(case.body)
 
     def numbers(self, case: Case) -> Arrays:
         """Numbers of a case by which gradients are taken."""
@@ -80,7 +79,7 @@ class PathGradient:
             q = self.case.body.dofs(moved.displacement)
             unit = np.zeros(len(q))
             unit[dof] = 1.0
-            self._add_factor(moved, self._solved(q, unit), seed, total)
+            self._add_factor(moved, solved(self.case, q, unit), seed, total)
         return total
 
     def _add_point(self, k: int, seeds: Mapping[str, Any], total: dict[str, NDArray]) -> None:
@@ -139,25 +138,14 @@ class PathGradient:
         adjoint = seed / along * weight
         seen_through(case, q, np.zeros(len(q)), adjoint, self._pullback, total, moved.factor)
 
-    def _block(self, q: NDArray) -> sparse.csc_array:
-        """Tangent (nf, nf) of the free dofs."""
-        tangent = sparse.csr_array(self.case.constraints.matrix(self.case.body.tangent(q)))
-        return sparse.csc_array(tangent[self._free][:, self._free])
-
-    def _solved(self, q: NDArray, force: NDArray) -> NDArray:
-        """Motion (m,) under a force (m,)."""
-        out = np.zeros(len(q))
-        out[self._free] = splu(self._block(q)).solve(self.case.constraints.force(force)[self._free])
-        return self.case.constraints.displacement(out)
-
     def _soft(self, q: NDArray) -> NDArray:
         """Motion (m,) that meets no stiffness at a limit point."""
-        block = self._block(q)
+        free, block = free_block(self.case, q)
         scale = 1e-12 * float(np.abs(block.diagonal()).max())
         factors = splu(sparse.csc_array(block + scale * sparse.eye_array(block.shape[0])))
         values, shapes = softest_modes(block, factors, 1, DENSE)
         out = np.zeros(len(q))
-        out[self._free] = shapes[:, np.abs(values).argmin()]
+        out[free] = shapes[:, np.abs(values).argmin()]
         return self.case.constraints.displacement(out)
 
 
