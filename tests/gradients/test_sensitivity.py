@@ -81,6 +81,15 @@ def test_a_case_file_is_changed_by_its_keys(tmp_path):
     )
 
 
+def test_a_case_file_that_starts_from_a_state_is_refused(tmp_path):
+    own = CASE.replace('kind = "modes"\ncount = 3', 'kind = "dynamics"\nduration = 0.1')
+    (tmp_path / "cell.toml").write_text(
+        own.replace('[[supports]]\nnodes = "xmin"', "") + "[initial]\nvelocity = [0.0, 0.0, 0.1]\n"
+    )
+    with pytest.raises(InputError, match=r"cell.toml: initial: there are no gradients"):
+        fd.sensitivity(tmp_path / "cell.toml", {"sheet.thickness": 0.02}, "mass")
+
+
 def test_an_own_measure_with_its_derivative():
     def ratio(result: Any, case: fd.Case) -> float:
         return float(result["frequency"][1] / result["frequency"][0])

@@ -294,7 +294,15 @@ def _of_file(
         changed = replaced(document, plain)
         return case_of_document(place, {k: v for k, v in changed.items() if k not in ASIDE})
 
-    analysis = file({}).analysis
+    own = file({})
+    if own.start_keys:
+        raise InputError(
+            ": there are no gradients of what starts from a given state; leave the table out, or "
+            "give a function that builds the case",
+            "initial",
+            place,
+        )
+    analysis = own.analysis
     return (
         lambda **values: file(values).case(),
         checked(parameters),
