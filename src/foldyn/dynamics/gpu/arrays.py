@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.dynamics.gpu.checks import MOST_KINDS
 from foldyn.dynamics.gpu.kernels import Counts, Damping, Elements, Nodes
 from foldyn.dynamics.system import Packed
 from foldyn.mechanics.constant_damping import DampingMatrix
@@ -63,7 +64,7 @@ class CaseArrays:
                 bars=model.bars.astype(np.int32), hinges=model.hinges.astype(np.int32)
             ),
             _codes(model.bar_runs, len(model.bars)), _codes(model.hinge_runs, len(model.hinges)),
-            tuple(membranes) or (_no_panels(),), springs, dampers, damping,
+            (*membranes, *[_no_panels()] * (MOST_KINDS - len(membranes))), springs, dampers, damping,
         )  # fmt: skip
         rows, groups = first.system.rows, list(first.body.energy_groups)
         self.counts = Counts(

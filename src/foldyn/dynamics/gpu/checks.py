@@ -17,7 +17,7 @@ from foldyn.structures.bars_hinges import BarsHingesTerm
 METHODS = "rk4", "central_difference"
 OLDEST = 12, 0  # version of CUDA that a driver must know
 TERMS = MembranesTerm, SpringsTerm, DampingMatrix, ViscousTerm
-MOST_GROUPS, MOST_BARS = 8, 16  # of strain energy; of a panel
+MOST_GROUPS, MOST_BARS, MOST_KINDS = 8, 16, 3  # of strain energy; of a panel; of panels
 
 
 def check_gpu(method: str) -> None:
@@ -82,4 +82,6 @@ def lacking(packed: Packed) -> str:
             return "a damper at dofs without mass"
         if isinstance(term, MembranesTerm) and len(term.membranes.ends) > MOST_BARS:
             return f"a panel with more than {MOST_BARS} bars"
+    if sum(isinstance(term, MembranesTerm) for term in body.others) > MOST_KINDS:
+        return f"a sheet with more than {MOST_KINDS} kinds of panels"
     return f"more than {MOST_GROUPS} energies" if len(body.energy_groups) > MOST_GROUPS else ""

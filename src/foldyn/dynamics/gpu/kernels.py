@@ -15,8 +15,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-import numpy as np
-from numba import cuda
+from numba import cuda, float64
 
 from foldyn.dynamics.gpu.checks import MOST_BARS, MOST_GROUPS
 from foldyn.dynamics.gpu.ported import SIMULATED, on_device, ported
@@ -123,8 +122,13 @@ if SIMULATED:
         """Rows of three from a place in a flat array."""
         return array[first : first + 3 * rows].reshape(rows, 3)
 
+    def at(array, m):
+        """That of model m, or the one of all."""
+        return array[m if array.shape[0] > 1 else 0]
+
 else:
     from numba import types
+    from numba.cuda import cgutils
     from numba.cuda.extending import intrinsic
     from numba.cuda.np.arrayobj import make_array, populate_array
 
@@ -145,28 +149,32 @@ else:
 
         return view(array, types.int64, types.int64), codegen
 
+    @intrinsic
+    def at(typing_context, array, m):
+        """The same: a device function may not return an array."""
+        view = types.Array(array.dtype, array.ndim - 1, "C")
 
-@on_device
-def at(array, m):
-    """That of model m, or the one of all."""
-    return array[m if array.shape[0] > 1 else 0]
+        def codegen(context, builder, signature, arguments):
+            source = make_array(array)(context, builder, arguments[0])
+            out, kind = make_array(view)(context, builder), context.get_value_type(types.intp)
+            shape = cgutils.unpack_tuple(builder, source.shape)
+            strides = cgutils.unpack_tuple(builder, source.strides)
+            several = builder.icmp_signed(">", shape[0], kind(1))
+            row = builder.select(several, arguments[1], kind(0))
+            count = builder.sdiv(strides[0], source.itemsize)
+            populate_array(
+                out, data=builder.gep(source.data, [builder.mul(row, count)]), shape=shape[1:],
+                strides=strides[1:], itemsize=source.itemsize, meminfo=None,
+            )  # fmt: skip
+            return out._getvalue()
+
+        return view(array, types.int64), codegen
 
 
 @on_device
 def put(slot, size, s, x, y, z):
     """Write a vector of force."""
     slot[s], slot[size + s], slot[2 * size + s] = x, y, z
-
-
-@on_device
-def sheet_of(model, m):
-    """The bars and hinges of one of many models."""
-    return BarsHinges(
-        at(model.rest, m), model.bars, at(model.bar_vector, m), at(model.bar_per_length2, m),
-        at(model.bar_stiffness, m), model.bar_runs, model.hinges, at(model.hinge_stiffness, m),
-        at(model.hinge_rest, m), at(model.hinge_parameters, m), at(model.hinge_share, m),
-        at(model.hinge_offset, m), model.hinge_group, model.hinge_runs, model.addresses,
-    )  # fmt: skip
 
 
 @on_device
@@ -225,7 +233,7 @@ def panels_to(kind, m, u, slot, size, at_slot, who, crowd, sampled, strain):
         kind.nodes, kind.ends, at(kind.vector, m), at(kind.per_length2, m), at(kind.stiffness, m)
     )
     count, corners, bars = own.nodes.shape[0], own.nodes.shape[1], own.ends.shape[0]
-    stretch, along = cuda.local.array(MOST_BARS, np.float64), cuda.local.array(3, np.float64)
+    stretch, along = cuda.local.array(MOST_BARS, float64), cuda.local.array(3, float64)
     for p in range(who, count, crowd):
         for i in range(bars):
             stretch[i] = strain_of(own, u, p, i, along)
@@ -286,7 +294,7 @@ def dampers_to(dampers, m, u, v, slot, size, at_slot, who, crowd):
         dampers.dofs, at(dampers.axial, m), at(dampers.corners, m), at(dampers.hidden_turn, m),
         at(dampers.coefficient, m), at(dampers.gradient, m),
     )  # fmt: skip
-    count, power, g = own.dofs.shape[0], 0.0, cuda.local.array(14, np.float64)
+    count, power, g = own.dofs.shape[0], 0.0, cuda.local.array(14, float64)
     for e in range(who, count, crowd):
         viscous_gradient(own, u, e, g)
         rate = 0.0
@@ -317,15 +325,23 @@ def damping_to(damping, m, nodes, v, slot, size, at_slot, who, crowd):
 @on_device
 def forces_to(elements, counts, m, u, flat_u, flat_v, slot, angle, who, crowd, sampled, looks, strain):
     """The first half: forces of all elements; returns how many are wrong, and W dissipated."""
-    own, size = sheet_of(elements.model, m), counts.slots
+    model, size = elements.model, counts.slots
+    own = BarsHinges(
+        at(model.rest, m), model.bars, at(model.bar_vector, m), at(model.bar_per_length2, m),
+        at(model.bar_stiffness, m), model.bar_runs, model.hinges, at(model.hinge_stiffness, m),
+        at(model.hinge_rest, m), at(model.hinge_parameters, m), at(model.hinge_share, m),
+        at(model.hinge_offset, m), model.hinge_group, model.hinge_runs, model.addresses,
+    )  # fmt: skip
     bars_to(own, elements.bar_code, u, slot, size, who, crowd, sampled, strain)
     s = own.bars.shape[0]
     wrong = hinges_to(
         own, elements.hinge_code, u, slot, size, s, who, crowd, sampled, looks, angle, strain
     )
     s += 4 * own.hinges.shape[0]
-    for kind in elements.membranes:
-        s = panels_to(kind, m, u, slot, size, s, who, crowd, sampled, strain)
+    kinds = elements.membranes  # written out: Numba cannot loop over tuples on the card
+    s = panels_to(kinds[0], m, u, slot, size, s, who, crowd, sampled, strain)
+    s = panels_to(kinds[1], m, u, slot, size, s, who, crowd, sampled, strain)
+    s = panels_to(kinds[2], m, u, slot, size, s, who, crowd, sampled, strain)
     s = springs_to(
         elements.springs, m, counts.spring_group, u, slot, size, s, who, crowd, sampled, strain
     )
@@ -336,8 +352,8 @@ def forces_to(elements, counts, m, u, flat_u, flat_v, slot, angle, who, crowd, s
 
 
 @on_device
-def sum_of(nodes, slot, size, i):
-    """The forces on a node, added up in the order of its entries."""
+def sum_to(nodes, slot, size, i, out):
+    """The force (3,) on a node, added up in the order of its entries."""
     x, y, z = 0.0, 0.0, 0.0
     for k in range(nodes.start[i], nodes.start[i + 1]):
         s = nodes.entry[k]
@@ -346,7 +362,7 @@ def sum_of(nodes, slot, size, i):
         else:
             s = -1 - s
             x, y, z = x - slot[s], y - slot[size + s], z - slot[2 * size + s]
-    return x, y, z
+    out[0], out[1], out[2] = x, y, z
 
 
 @on_device
@@ -412,7 +428,7 @@ def kernel(method: str, wide: bool, shared: bool) -> Callable[..., Any]:
         blocks, thread = cuda.gridDim.x, cuda.blockIdx.x * cuda.blockDim.x + cuda.threadIdx.x
         n, size, groups = counts.nodes, counts.slots, counts.groups
         if shared:
-            slot = cuda.shared.array(0, np.float64)
+            slot = cuda.shared.array(0, float64)
             ut, vt = rows_of(slot, 3 * size, n), rows_of(slot, 3 * size + 3 * n, n)
             flat_u, flat_v = slot[3 * size : 3 * size + 3 * n], slot[3 * size + 3 * n : 3 * size + 6 * n]
         else:
@@ -420,9 +436,10 @@ def kernel(method: str, wide: bool, shared: bool) -> Callable[..., Any]:
             ut, vt = rows_of(flat_u, 0, n), rows_of(flat_v, 0, n)
         u, v, angle = state.u[m], state.v[m], state.angle[m]
         du, dv = state.first[m], state.second[m]
-        mass, inverse, alpha = at(nodes.mass, m), at(nodes.inverse, m), at(nodes.alpha, m)
+        mass, inverse, alpha = at(nodes.mass, m), at(nodes.inverse, m), nodes.alpha[m]
         load_start, load, load_row = at(nodes.load_start, m), at(nodes.load, m), at(nodes.load_row, m)
-        strain = cuda.local.array(MOST_GROUPS, np.float64)
+        strain = cuda.local.array(MOST_GROUPS, float64)
+        force = cuda.local.array(3, float64)
         arrived, sample, wrong = 0, span.sample, 0
         work_in, work_out, dt = 0.0, 0.0, span.dt
         before_in, before_out = state.power[thread, 0], state.power[thread, 1]
@@ -463,7 +480,7 @@ def kernel(method: str, wide: bool, shared: bool) -> Callable[..., Any]:
                     cuda.syncthreads()
                 ends = runge and step == span.last
                 for i in range(who, n, crowd):
-                    force = sum_of(nodes, slot, size, i)
+                    sum_to(nodes, slot, size, i, force)
                     for c in range(3):
                         dof, speed = 3 * i + c, vt[i, c]
                         pull = load_on(nodes, load_start, load, load_row, factor, time, dof)
