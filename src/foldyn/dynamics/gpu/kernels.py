@@ -26,6 +26,8 @@ from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.springs import Springs
 from foldyn.mechanics.viscous import Viscous
 
+REGISTERS = 168  # of a thread of a grid with one model: with fewer, more threads run at once
+
 bar_extension, hinge_dihedral = ported(energy.bar_extension), ported(energy.hinge_dihedral)
 bar_energy, bar_stress = ported(switch.bar_energy), ported(switch.bar_stress)
 series_energy, series_moment = ported(series.series_energy), ported(series.series_moment)
@@ -540,4 +542,4 @@ def kernel(method: str, wide: bool, shared: bool) -> Callable[..., Any]:
         if wrong > 0:
             state.wrong[m] = 1
 
-    return cuda.jit(advance)
+    return cuda.jit(advance, **({"max_registers": REGISTERS} if wide and not SIMULATED else {}))

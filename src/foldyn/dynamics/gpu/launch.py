@@ -18,7 +18,7 @@ from foldyn.dynamics.motion_state import StepPlan
 from foldyn.dynamics.system import Packed
 
 BLOCK = 128  # threads of a block of a grid with one model
-MODEL_BLOCKS = 64, 128, 256  # of a block with a model of its own
+FEWEST, MOST = 64, 256  # of a block with a model of its own: few, unless models are few
 WINDOW = 0.25  # of the free memory: samples of a launch
 FACTORS = 2**28  # bytes: factors of a launch
 LOOKS = {"rk4": (0.0, 0.5, 1.0), "central_difference": (0.0,)}  # in a step, at the loads
@@ -106,8 +106,8 @@ class Launches:
         if config.ENABLE_CUDASIM:  # type: ignore[attr-defined]
             self._threads, self._blocks = 4, 1 if self._wide else m
         elif not self._wide:
-            items = max(n, hinges)
-            self._threads = next((b for b in MODEL_BLOCKS if b >= items), MODEL_BLOCKS[-1])
+            idle = cuda.get_current_device().MULTIPROCESSOR_COUNT // m
+            self._threads = FEWEST if idle < 1 else MOST
             self._blocks = m
         else:
             self._threads = BLOCK
