@@ -50,7 +50,7 @@ REFUSED = {
     ),
     "a support that moves": lambda: fd.Case(
         fd.discretize(PATTERN, SHEET, **LUMPED),
-        [HELD, fd.Impose([8], (None, None, 1e-3), fd.HalfSine(0.01))],
+        [HELD, fd.Impose([8], "z", 1e-3, fd.HalfSine(0.01))],
     ),
 }
 

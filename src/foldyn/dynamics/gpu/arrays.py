@@ -48,7 +48,8 @@ class CaseArrays:
 
     def __init__(self, cases: Sequence[Packed]) -> None:
         first, bodies = cases[0], [packed.body for packed in cases]
-        model: BarsHinges = first.model
+        models = [_with_force(packed.model) for packed in cases]
+        model = models[0]
         self._entries: list[tuple[NDArray, NDArray, NDArray]] = []  # nodes, slots, whether added
         self._slots = 0
         self._add(model.bars[:, 1], 1), self._again(model.bars[:, 0], 0)
@@ -60,7 +61,7 @@ class CaseArrays:
         dampers = self._dampers([[t.elements for t in own] for own in self._terms(bodies, ViscousTerm)])
         damping = self._damping(cases)
         self.elements = Elements(
-            _stacked([packed.model for packed in cases], TOPOLOGY)._replace(
+            _stacked(models, TOPOLOGY)._replace(
                 bars=model.bars.astype(np.int32), hinges=model.hinges.astype(np.int32)
             ),
             _codes(model.bar_runs, len(model.bars)), _codes(model.hinge_runs, len(model.hinges)),
@@ -182,6 +183,13 @@ def _stacked(own: Sequence[Any], same: Sequence[str]) -> Any:
     numbers = {name: _one_or_all([getattr(each, name) for each in own]) for name in names}
     kept = {name: np.ascontiguousarray(getattr(own[0], name)) for name in same}
     return own[0]._replace(**numbers, **kept)
+
+
+def _with_force(model: BarsHinges) -> BarsHinges:
+    """The model without bars of no run, in whose place membranes are."""
+    count = int(model.bar_runs[:, 1].max(initial=0))
+    bars = ("bars", "bar_vector", "bar_per_length2", "bar_stiffness")
+    return model._replace(**{name: getattr(model, name)[:count] for name in bars})
 
 
 def _codes(runs: NDArray, count: int) -> NDArray:
