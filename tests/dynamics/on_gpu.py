@@ -116,3 +116,21 @@ def test_what_goes_wrong_is_told_as_by_the_cpu():
     with pytest.warns(FoldynWarning, match="1 of 1 motions ended"):
         many = fd.simulate_many([each], 0.1, method="rk4", device="gpu", **given)
     assert str(many.outcome[0].values) == str(alone.value)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_engine_goes_on_from_a_checkpoint(method):
+    each = case(1)
+    ends = []
+    for stops in ((20,), (8, 20)):
+        motion = prepare(each, 2e-4, method, initial=shaken(each), device="gpu", **STEPS)
+        motion.output.begin()
+        for stop in stops:
+            engine = motion.method.engine(each, motion.packed, motion.course, motion.plan, "gpu")
+            if stop != stops[0]:
+                engine.resume_from(kept)
+            engine.advance(motion.output.window, stop - int(motion.course.tally.steps))
+            kept = engine.checkpoint_arrays()
+        ends.append(kept)
+    for name, array in ends[0].items():
+        np.testing.assert_allclose(ends[1][name], array, rtol=1e-12, atol=1e-20, err_msg=name)

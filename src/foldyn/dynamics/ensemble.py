@@ -48,10 +48,10 @@ def simulate_many(
     """Integrate the motions of many models of one topology at once.
 
     All have as many nodes and the same supported dofs and groups of strain energy; all else may
-    differ. Each motion is that of ``simulate(case, duration, method, dt)``, but for rounding. On the
-    CPU and by central differences, models with the same bars, hinges and kinds of laws stand in the lanes of vectors,
-    eight a vector, and the vectors are shared among threads: two to three times quicker than one
-    motion after the other for small models.
+    differ. Each motion is that of ``simulate(case, duration, method, dt)``, but for rounding. By
+    central differences, models with the same bars, hinges and kinds of laws stand in the lanes of
+    vectors, eight a vector, and the vectors are shared among threads: two to three times quicker
+    than one motion after the other for small models. On a GPU all take their steps at once.
 
     Parameters
     ----------
@@ -70,8 +70,7 @@ def simulate_many(
     method : str, default "central_difference"
         An explicit method with fixed steps: this, or "rk4".
     device : {"cpu", "gpu"}
-        Where steps are computed: on a GPU each model has a block of threads, and all take their
-        steps at once. It takes `rk4` too, as well as panels' membranes, springs and dampers.
+        Where steps are computed; a GPU takes panels' membranes, springs and dampers, too.
 
     Returns
     -------
@@ -135,7 +134,8 @@ def simulate_many(
         "duration": plan.end - plan.start, "every": plan.every, "critical_step": critical,
         "wall_seconds": time.perf_counter() - clock,
         "processor_seconds": time.process_time() - spent,
-        "threads": threads, "device": _name(device), "energy_error": _warn(motions, ended, out.energy),
+        "threads": threads, "device": _name(device),
+        "energy_error": _warn(motions, ended, out.energy),
     }  # fmt: skip
     return _dataset(case, out, [ended.get(k, "done") for k in range(len(motions))], facts)
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.dynamics.gpu.checks import MOST_KINDS
-from foldyn.dynamics.gpu.kernels import Counts, Damping, Elements, Nodes
+from foldyn.dynamics.gpu.elements import Counts, Damping, Elements
+from foldyn.dynamics.gpu.kernels import Nodes
 from foldyn.dynamics.system import Packed
 from foldyn.mechanics.constant_damping import DampingMatrix
 from foldyn.mechanics.membranes import Membranes, MembranesTerm
@@ -57,15 +58,20 @@ class CaseArrays:
             self._add(model.hinges[:, v], 1)
         panels = self._terms(bodies, MembranesTerm)
         membranes = [self._membranes([term.membranes for term in own]) for own in panels]
-        springs = self._springs([term.springs for term in (self._terms(bodies, SpringsTerm) or [[]])[0]])
-        dampers = self._dampers([[t.elements for t in own] for own in self._terms(bodies, ViscousTerm)])
+        springs = self._springs(
+            [term.springs for term in (self._terms(bodies, SpringsTerm) or [[]])[0]]
+        )
+        dampers = self._dampers(
+            [[t.elements for t in own] for own in self._terms(bodies, ViscousTerm)]
+        )
         damping = self._damping(cases)
         self.elements = Elements(
             _stacked(models, TOPOLOGY)._replace(
                 bars=model.bars.astype(np.int32), hinges=model.hinges.astype(np.int32)
             ),
             _codes(model.bar_runs, len(model.bars)), _codes(model.hinge_runs, len(model.hinges)),
-            (*membranes, *[_no_panels()] * (MOST_KINDS - len(membranes))), springs, dampers, damping,
+            (*membranes, *[_no_panels()] * (MOST_KINDS - len(membranes))),
+            springs, dampers, damping,
         )  # fmt: skip
         rows, groups = first.system.rows, list(first.body.energy_groups)
         self.counts = Counts(
@@ -117,7 +123,7 @@ class CaseArrays:
 
     def _damping(self, cases: Sequence[Packed]) -> Damping:
         size = 3 * cases[0].system.rows
-        own = [
+        own: list[Any] = [
             sum(
                 (term.matrix for term in packed.body.others if isinstance(term, DampingMatrix)),
                 sparse.csr_array((size, size)),
@@ -201,11 +207,6 @@ def _codes(runs: NDArray, count: int) -> NDArray:
 
 
 def _no_panels() -> Membranes:
-    empty = Membranes(
-        np.zeros((0, 1), np.int64), np.zeros((0, 2), np.int64), *np.zeros((2, 0, 0)),
-        np.zeros((0, 0, 0)),
-    )  # fmt: skip
-    return empty._replace(
-        vector=np.zeros((1, 0, 3, 0)), per_length2=np.zeros((1, 0, 0)),
-        stiffness=np.zeros((1, 0, 0, 0)),
-    )  # fmt: skip
+    nodes, ends = np.zeros((0, 1), np.int64), np.zeros((0, 2), np.int64)
+    shapes = (1, 0, 3, 0), (1, 0, 0), (1, 0, 0, 0)
+    return Membranes(nodes, ends, *map(np.zeros, shapes))  # type: ignore[call-arg]

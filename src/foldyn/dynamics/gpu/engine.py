@@ -52,22 +52,22 @@ class OnCard:
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
-        course, plan, tally = self._course, self._plan, self._course.tally
-        end = min(int(tally.steps) + stretch, plan.steps)
-        outcome = 0, -1
-        while True:
+        plan, tally = self._plan, self._course.tally
+        begun = int(tally.steps)
+        end = min(begun + stretch, plan.steps)
+        keeps = self._method.name == "central_difference" and begun > 0  # the forces of its end
+        while not keeps or tally.steps < end:
             first = int(tally.steps)
             last = min(end, first + self._launches.fits(plan))
-            keeps = self._method.name == "central_difference" and first > 0
-            if keeps and first == last:  # its step ends with the forces that it keeps
-                return int(Outcome.DONE), -1
+            skips = self._method.name == "central_difference" and first > 0
             sample = int(tally.samples)
-            written, wrong = self._launches.run(plan, first + keeps, last, sample)
+            written, wrong = self._launches.run(plan, first + skips, last, sample)
             if wrong.any() or not np.isfinite(written.energy).all():
                 return self._again(out, end - first)
             self._take(written, out, sample, last - first)
             if last == end:
-                return outcome
+                break
+        return int(Outcome.DONE), -1
 
     def _take(self, written: Any, out: Samples, sample: int, steps: int) -> None:
         """Take over what a launch has done."""

@@ -11,60 +11,30 @@ A model of a block lives in the block's shared memory; that of a grid in the car
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from numba import cuda, float64
+from numba import float64
 
 from foldyn.dynamics.gpu.checks import MOST_BARS, MOST_GROUPS
-from foldyn.dynamics.gpu.ported import SIMULATED, on_device, ported
-from foldyn.materials import series, switch
-from foldyn.mechanics import energy, membranes, springs, viscous
+from foldyn.dynamics.gpu.elements import (
+    at,
+    bars_to,
+    damping_to,
+    hinges_to,
+    put,
+    rows_of,
+    springs_to,
+)
+from foldyn.dynamics.gpu.ported import SIMULATED, cuda, on_device, ported
+from foldyn.mechanics import membranes, viscous
 from foldyn.mechanics.membranes import Membranes
 from foldyn.mechanics.model import BarsHinges
-from foldyn.mechanics.springs import Springs
 from foldyn.mechanics.viscous import Viscous
 
-REGISTERS = 168  # of a thread of a grid with one model: with fewer, more threads run at once
-
-bar_extension, hinge_dihedral = ported(energy.bar_extension), ported(energy.hinge_dihedral)
-bar_energy, bar_stress = ported(switch.bar_energy), ported(switch.bar_stress)
-series_energy, series_moment = ported(series.series_energy), ported(series.series_moment)
 strain_of = ported(membranes.strain_of)
-directed_extension = ported(springs.directed_extension)
-axial_extension, axial_pull = ported(springs.axial_extension), ported(springs.axial_pull)
 viscous_gradient = ported(viscous.element_gradient)
-
-
-class Counts(NamedTuple):
-    """How many there are."""
-
-    nodes: int
-    slots: int  # of vectors of force
-    groups: int  # of strain energy
-    spring_group: int
-    damped: int  # rows of the damping matrix: all nodes, or none
-
-
-class Damping(NamedTuple):
-    """A constant damping matrix of the dofs."""
-
-    start: Any
-    column: Any
-    value: Any  # (m, k)
-
-
-class Elements(NamedTuple):
-    """The elements of m models; numbers have an axis of m, or of 1 where they are equal."""
-
-    model: BarsHinges
-    bar_code: Any  # (nb,)
-    hinge_code: Any  # (nh,)
-    membranes: tuple[Membranes, ...]
-    springs: Springs
-    viscous: Viscous
-    damping: Damping
+REGISTERS = 168  # of a thread of a grid with one model: with fewer, more threads run at once
 
 
 class Nodes(NamedTuple):
@@ -118,116 +88,6 @@ class Span(NamedTuple):
     sample: int  # number of the next sample, and of the first one in this launch
 
 
-if SIMULATED:
-
-    def rows_of(array, first, rows):
-        """Rows of three from a place in a flat array."""
-        return array[first : first + 3 * rows].reshape(rows, 3)
-
-    def at(array, m):
-        """That of model m, or the one of all."""
-        return array[m if array.shape[0] > 1 else 0]
-
-else:
-    from numba import types
-    from numba.cuda import cgutils
-    from numba.cuda.extending import intrinsic
-    from numba.cuda.np.arrayobj import make_array, populate_array
-
-    @intrinsic
-    def rows_of(typing_context, array, first, rows):
-        """The same: NumPy's would call a function of the run-time library."""
-        view = types.Array(array.dtype, 2, "C")
-
-        def codegen(context, builder, signature, arguments):
-            source = make_array(array)(context, builder, arguments[0])
-            out = make_array(view)(context, builder)
-            three, size, row = (context.get_constant(types.intp, k) for k in (3, 8, 24))
-            populate_array(
-                out, data=builder.gep(source.data, [arguments[1]]), shape=[arguments[2], three],
-                strides=[row, size], itemsize=size, meminfo=None,
-            )  # fmt: skip
-            return out._getvalue()
-
-        return view(array, types.int64, types.int64), codegen
-
-    @intrinsic
-    def at(typing_context, array, m):
-        """The same: a device function may not return an array."""
-        view = types.Array(array.dtype, array.ndim - 1, "C")
-
-        def codegen(context, builder, signature, arguments):
-            source = make_array(array)(context, builder, arguments[0])
-            out, kind = make_array(view)(context, builder), context.get_value_type(types.intp)
-            shape = cgutils.unpack_tuple(builder, source.shape)
-            strides = cgutils.unpack_tuple(builder, source.strides)
-            several = builder.icmp_signed(">", shape[0], kind(1))
-            row = builder.select(several, arguments[1], kind(0))
-            count = builder.sdiv(strides[0], source.itemsize)
-            populate_array(
-                out, data=builder.gep(source.data, [builder.mul(row, count)]), shape=shape[1:],
-                strides=strides[1:], itemsize=source.itemsize, meminfo=None,
-            )  # fmt: skip
-            return out._getvalue()
-
-        return view(array, types.int64), codegen
-
-
-@on_device
-def put(slot, size, s, x, y, z):
-    """Write a vector of force."""
-    slot[s], slot[size + s], slot[2 * size + s] = x, y, z
-
-
-@on_device
-def bars_to(own, code, u, slot, size, who, crowd, sampled, strain):
-    """Forces of the bars, at their second ends; energies where this is a sample."""
-    for e in range(who, own.bars.shape[0], crowd):
-        stretch = bar_extension(own, u, e)
-        s = own.bar_stiffness[e] * bar_stress(code[e], stretch, 0)
-        a, b = own.bars[e, 0], own.bars[e, 1]
-        put(
-            slot, size, e,
-            s * (own.bar_vector[e, 0] + (u[b, 0] - u[a, 0])),
-            s * (own.bar_vector[e, 1] + (u[b, 1] - u[a, 1])),
-            s * (own.bar_vector[e, 2] + (u[b, 2] - u[a, 2])),
-        )  # fmt: skip
-        if sampled:
-            w = bar_energy(code[e], stretch, 0)
-            strain[0] += own.bar_stiffness[e] / own.bar_per_length2[e] * w
-
-
-@on_device
-def hinges_to(own, code, u, slot, size, at_slot, who, crowd, sampled, looks, angle, strain):
-    """Forces of the hinges; returns how many have passed through 0 or 360 degrees."""
-    count, p, jumped = own.hinges.shape[0], own.hinge_parameters, 0
-    for e in range(who, count, crowd):
-        found = hinge_dihedral(own, u, e)
-        theta, share = found[0] + own.hinge_offset[e, 0], own.hinge_share[e]
-        moment = own.hinge_stiffness[e] * series_moment(
-            code[e], theta, own.hinge_rest[e], p[e, 0], p[e, 1], p[e, 2], p[e, 3], share,
-            own.addresses[0],
-        )  # fmt: skip
-        k = at_slot + e
-        put(slot, size, k, moment * found[1], moment * found[2], moment * found[3])
-        k += count
-        put(slot, size, k, moment * found[4], moment * found[5], moment * found[6])
-        k += count
-        put(slot, size, k, moment * found[7], moment * found[8], moment * found[9])
-        k += count
-        put(slot, size, k, moment * found[10], moment * found[11], moment * found[12])
-        if looks:
-            jumped += abs(found[0] - angle[e]) > math.pi
-            angle[e] = found[0]
-        if sampled:
-            w = series_energy(
-                code[e], theta, own.hinge_rest[e], p[e, 0], p[e, 1], p[e, 2], p[e, 3], share,
-                own.addresses[0],
-            )  # fmt: skip
-            strain[1 + own.hinge_group[e]] += own.hinge_stiffness[e] * w
-    return jumped
-
-
 @on_device
 def panels_to(kind, m, u, slot, size, at_slot, who, crowd, sampled, strain):
     """Forces of the panels of one kind at their corners; returns the slot after theirs."""
@@ -257,39 +117,6 @@ def panels_to(kind, m, u, slot, size, at_slot, who, crowd, sampled, strain):
 
 
 @on_device
-def springs_to(all_springs, m, group, u, slot, size, at_slot, who, crowd, sampled, strain):
-    """Forces of springs, at their first ends, or the second of axial ones; returns the next slot."""
-    own = Springs(
-        all_springs.ends, at(all_springs.direction, m), at(all_springs.stiffness, m),
-        all_springs.axial_ends, at(all_springs.vector, m), at(all_springs.length, m),
-        at(all_springs.stretch, m), at(all_springs.axial_stiffness, m),
-    )  # fmt: skip
-    directed, axial = own.ends.shape[0], own.axial_ends.shape[0]
-    for s in range(who, directed, crowd):
-        extension = directed_extension(own, u, s)
-        pull = own.stiffness[s] * extension
-        put(
-            slot, size, at_slot + s, pull * own.direction[s, 0], pull * own.direction[s, 1],
-            pull * own.direction[s, 2],
-        )  # fmt: skip
-        if sampled:
-            strain[group] += 0.5 * pull * extension
-    for s in range(who, axial, crowd):
-        a, b = own.axial_ends[s, 0], own.axial_ends[s, 1]
-        pull = axial_pull(own, u, s)
-        put(
-            slot, size, at_slot + directed + s,
-            pull * (own.vector[s, 0] + u[b, 0] - u[a, 0]),
-            pull * (own.vector[s, 1] + u[b, 1] - u[a, 1]),
-            pull * (own.vector[s, 2] + u[b, 2] - u[a, 2]),
-        )  # fmt: skip
-        if sampled:
-            extension = axial_extension(own, u, s)[0]
-            strain[group] += 0.5 * own.axial_stiffness[s] * extension * extension
-    return at_slot + directed + axial
-
-
-@on_device
 def dampers_to(dampers, m, u, v, slot, size, at_slot, who, crowd):
     """Forces of viscous elements, at four nodes each; returns what they dissipate, W."""
     own = Viscous(
@@ -305,27 +132,17 @@ def dampers_to(dampers, m, u, v, slot, size, at_slot, who, crowd):
         resisted = own.coefficient[e] * rate
         for k in range(4):
             s = at_slot + k * count + e
-            put(slot, size, s, resisted * g[3 * k], resisted * g[3 * k + 1], resisted * g[3 * k + 2])
+            put(
+                slot, size, s, resisted * g[3 * k], resisted * g[3 * k + 1], resisted * g[3 * k + 2]
+            )
         power += resisted * rate
     return power
 
 
 @on_device
-def damping_to(damping, m, nodes, v, slot, size, at_slot, who, crowd):
-    """Forces of a constant matrix; returns what it dissipates, W."""
-    value, power = at(damping.value, m), 0.0
-    for i in range(who, nodes, crowd):
-        for c in range(3):
-            resisted, row = 0.0, 3 * i + c
-            for k in range(damping.start[row], damping.start[row + 1]):
-                resisted += value[k] * v[damping.column[k]]
-            slot[c * size + at_slot + i] = resisted
-            power += resisted * v[row]
-    return power
-
-
-@on_device
-def forces_to(elements, counts, m, u, flat_u, flat_v, slot, angle, who, crowd, sampled, looks, strain):
+def forces_to(
+    elements, counts, m, u, flat_u, flat_v, slot, angle, who, crowd, sampled, looks, strain
+):
     """The first half: forces of all elements; returns how many are wrong, and W dissipated."""
     model, size = elements.model, counts.slots
     own = BarsHinges(
@@ -378,7 +195,7 @@ def load_on(nodes, load_start, load, load_row, factor, time, dof):
 
 @on_device
 def meet(state, blocks, arrived):
-    """Wait until all threads of the grid are here, for the next time; returns how often they were."""
+    """Wait for all threads of the grid; returns how often they have met."""
     cuda.syncthreads()
     if cuda.threadIdx.x == 0:
         cuda.threadfence()
@@ -412,7 +229,7 @@ def add_notes(state, row, columns):
 
 
 @lru_cache
-def kernel(method: str, wide: bool, shared: bool) -> Callable[..., Any]:
+def kernel(method: str, wide: bool, shared: bool) -> Any:
     """The loop of a method.
 
     wide : whether the grid has one model, else each block has one.
@@ -432,14 +249,21 @@ def kernel(method: str, wide: bool, shared: bool) -> Callable[..., Any]:
         if shared:
             slot = cuda.shared.array(0, float64)
             ut, vt = rows_of(slot, 3 * size, n), rows_of(slot, 3 * size + 3 * n, n)
-            flat_u, flat_v = slot[3 * size : 3 * size + 3 * n], slot[3 * size + 3 * n : 3 * size + 6 * n]
+            flat_u, flat_v = (
+                slot[3 * size : 3 * size + 3 * n],
+                slot[3 * size + 3 * n : 3 * size + 6 * n],
+            )
         else:
             slot, flat_u, flat_v = state.slot[m], state.ahead_u[m], state.ahead_v[m]
             ut, vt = rows_of(flat_u, 0, n), rows_of(flat_v, 0, n)
         u, v, angle = state.u[m], state.v[m], state.angle[m]
         du, dv = state.first[m], state.second[m]
         mass, inverse, alpha = at(nodes.mass, m), at(nodes.inverse, m), nodes.alpha[m]
-        load_start, load, load_row = at(nodes.load_start, m), at(nodes.load, m), at(nodes.load_row, m)
+        load_start, load, load_row = (
+            at(nodes.load_start, m),
+            at(nodes.load, m),
+            at(nodes.load_row, m),
+        )
         strain = cuda.local.array(MOST_GROUPS, float64)
         force = cuda.local.array(3, float64)
         arrived, sample, wrong = 0, span.sample, 0
@@ -542,4 +366,5 @@ def kernel(method: str, wide: bool, shared: bool) -> Callable[..., Any]:
         if wrong > 0:
             state.wrong[m] = 1
 
-    return cuda.jit(advance, **({"max_registers": REGISTERS} if wide and not SIMULATED else {}))
+    options = {"max_registers": REGISTERS} if wide and not SIMULATED else {}
+    return cuda.jit(advance, **options)

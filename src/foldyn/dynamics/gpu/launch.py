@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import config, cuda
 from numpy.typing import NDArray
 
 from foldyn.cases.waveforms import CALLED, waveform_table
 from foldyn.dynamics.gpu import card
 from foldyn.dynamics.gpu.arrays import CaseArrays
 from foldyn.dynamics.gpu.kernels import Span, State, Written, kernel
+from foldyn.dynamics.gpu.ported import SIMULATED, cuda
 from foldyn.dynamics.motion_state import StepPlan
 from foldyn.dynamics.system import Packed
 
@@ -53,9 +53,7 @@ class Launches:
         The card has no memory for them.
     """
 
-    def __init__(
-        self, cases: Sequence[Packed], method: str, places: Places, wide: bool
-    ) -> None:
+    def __init__(self, cases: Sequence[Packed], method: str, places: Places, wide: bool) -> None:
         host, self._cases, self._method, self._wide = CaseArrays(cases), cases, method, wide
         self._counts, self._count = host.counts, len(cases)
         n, slots = host.counts.nodes, host.counts.slots
@@ -89,8 +87,12 @@ class Launches:
             waves, rows = packed.system.waves, []
             for row, code in enumerate(waves.code):
                 own = slice(waves.first[row], waves.first[row + 1])
-                key: Any = (int(code), waves.parameters[row].tobytes(), waves.knot[own].tobytes(),
-                            waves.cubic[own].tobytes())
+                key: Any = (
+                    int(code),
+                    waves.parameters[row].tobytes(),
+                    waves.knot[own].tobytes(),
+                    waves.cubic[own].tobytes(),
+                )
                 if code == CALLED:
                     key = id(packed), row
                 if key not in numbers:
@@ -103,7 +105,7 @@ class Launches:
     def _start(self, places: Places) -> None:
         (m, n), slots = self._shape, self._counts.slots
         hinges = places.angle.shape[1]
-        if config.ENABLE_CUDASIM:  # type: ignore[attr-defined]
+        if SIMULATED:
             self._threads, self._blocks = 4, 1 if self._wide else m
         elif not self._wide:
             idle = cuda.get_current_device().MULTIPROCESSOR_COUNT // m
@@ -121,20 +123,16 @@ class Launches:
         """Put the models there."""
         m, n = self._shape
         threads = self._blocks * self._threads
-        self._power = np.zeros((threads, 2))
-        self._power[:: threads if self._wide else self._threads] = places.power
+        power = np.zeros((threads, 2))
+        power[:: threads if self._wide else self._threads] = places.power
+        memory, put = cuda.device_array, card.put
         self._state = State(
-            *(cuda.to_device(np.ascontiguousarray(array)) for array in (places.u, places.v)),
-            cuda.to_device(np.ascontiguousarray(places.carry)),
-            cuda.device_array((m, n, 3)),
-            *(cuda.device_array(self._ahead) for _ in range(2)),
-            cuda.device_array(self._slot),
-            cuda.to_device(np.ascontiguousarray(places.angle)),
-            cuda.to_device(np.zeros(m, np.int64)),
-            cuda.device_array((threads, self._counts.groups + 3)),
-            cuda.to_device(self._power),
-            cuda.to_device(np.zeros(1, np.int64)),
-        )
+            u=put(places.u), v=put(places.v), first=put(places.carry), second=memory((m, n, 3)),
+            ahead_u=memory(self._ahead), ahead_v=memory(self._ahead), slot=memory(self._slot),
+            angle=put(places.angle), wrong=put(np.zeros(m, np.int64)),
+            note=memory((threads, self._counts.groups + 3)), power=put(power),
+            barrier=put(np.zeros(1, np.int64)),
+        )  # fmt: skip
 
     def fits(self, plan: StepPlan) -> int:
         """Steps of one launch, at most: samples and factors must have room on the card."""
@@ -170,8 +168,10 @@ class Launches:
         span = Span(first, last, plan.dt, plan.every, sample)
         factor = cuda.to_device(self._factors(plan, first, last))
         self._state.barrier.copy_to_device(np.zeros(1, np.int64))
-        if not config.ENABLE_CUDASIM and self._compiled is None:  # type: ignore[attr-defined]
-            self._fit_grid((self._elements, self._nodes, self._counts, span, factor, self._state, out))
+        if not SIMULATED and self._compiled is None:
+            self._fit_grid(
+                (self._elements, self._nodes, self._counts, span, factor, self._state, out)
+            )
             out = out._replace(energy=self._energies(count))
         arguments = self._elements, self._nodes, self._counts, span, factor, self._state, out
         launched = self._compiled or self._kernel
@@ -181,7 +181,10 @@ class Launches:
         if self._wide:
             energy = energy.sum(axis=1, keepdims=True)
         host = Written(
-            host.u[:, :count], host.v[:, :count], host.reaction[:, :count, : self._supported], energy
+            host.u[:, :count],
+            host.v[:, :count],
+            host.reaction[:, :count, : self._supported],
+            energy,
         )
         return host, self._state.wrong.copy_to_host() != 0
 

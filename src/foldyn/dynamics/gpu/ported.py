@@ -13,10 +13,12 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
-from numba import config, cuda
+from numba import config
+from numba import cuda as _cuda
 
 from foldyn.jit import eights, intrinsics
 
+cuda: Any = _cuda  # whose types are unknown to checkers
 SIMULATED: bool = config.ENABLE_CUDASIM  # type: ignore[attr-defined]
 
 
