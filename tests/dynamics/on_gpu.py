@@ -125,9 +125,10 @@ def test_an_engine_goes_on_from_a_checkpoint(method):
     for stops in ((20,), (8, 20)):
         motion = prepare(each, 2e-4, method, initial=shaken(each), device="gpu", **STEPS)
         motion.output.begin()
+        kept = {}
         for stop in stops:
             engine = motion.method.engine(each, motion.packed, motion.course, motion.plan, "gpu")
-            if stop != stops[0]:
+            if kept:
                 engine.resume_from(kept)
             engine.advance(motion.output.window, stop - int(motion.course.tally.steps))
             kept = engine.checkpoint_arrays()
