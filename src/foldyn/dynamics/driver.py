@@ -115,9 +115,8 @@ def simulate(
         With `store`: go on with the same motion from the last checkpoint of a run that was cut off,
         to the same bits; from the beginning where there is none. A finished one is only read.
     device : {"cpu", "gpu"}
-        Where steps are computed; "gpu" asks for a GPU of NVIDIA's and numba-cuda, for `rk4` or
-        `central_difference`, and for a case of bars and hinges: the documentation has a page on
-        when it pays.
+        Where steps are computed; "gpu" needs a GPU of NVIDIA's and numba-cuda, an explicit method
+        with fixed steps, and bars and hinges: the documentation has a page on when it pays.
 
     Returns
     -------
