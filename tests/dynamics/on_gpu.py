@@ -14,7 +14,7 @@ from measured import agree
 import foldyn as fd
 from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.gpu.checks import METHODS, lacking
-from foldyn.errors import FoldynWarning, InstabilityError
+from foldyn.errors import FoldynWarning, InputError, InstabilityError, MotionInterrupted
 
 STEPS = {"dt": 1e-5, "every": 5}
 LAWS = {
@@ -135,3 +135,22 @@ def test_an_engine_goes_on_from_a_checkpoint(method):
         ends.append(kept)
     for name, array in ends[0].items():
         np.testing.assert_allclose(ends[1][name], array, rtol=1e-12, atol=1e-20, err_msg=name)
+
+
+def test_a_motion_that_was_cut_off_goes_on(tmp_path, monkeypatch):
+    each = case(1)
+    monkeypatch.setattr("foldyn.dynamics.motion.CHUNK", 8)
+    monkeypatch.setattr("foldyn.dynamics.motion.REPORT_EVERY", 0.0)
+    given = {"initial": shaken(each), "device": "gpu", **STEPS}
+    whole = fd.simulate(each, 2e-4, **given)
+
+    def cut(progress):
+        if progress.steps:
+            raise KeyboardInterrupt
+
+    kept = {"store": tmp_path / "run.nc", "checkpoint": 1e-9}
+    with pytest.raises(MotionInterrupted):
+        fd.simulate(each, 2e-4, progress=cut, **given, **kept)
+    with pytest.raises(InputError, match="device"):
+        fd.simulate(each, 2e-4, **(given | {"device": "cpu"}), **kept, resume=True)
+    agree(fd.simulate(each, 2e-4, **given, **kept, resume=True), whole, 1e-12)

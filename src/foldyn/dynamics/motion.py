@@ -337,6 +337,8 @@ class Motion:
         if self._keeping is None:
             return 0.0
         about = self._identity() | {"threads": engine.threads}
+        if self.device != "cpu":
+            about["device"] = self.device
         kept = self._keeping.begin(about, self.output.rows)
         if kept is None:
             return 0.0

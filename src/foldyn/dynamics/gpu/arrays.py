@@ -53,7 +53,8 @@ class CaseArrays:
         model = models[0]
         self._entries: list[tuple[NDArray, NDArray, NDArray]] = []  # nodes, slots, whether added
         self._slots = 0
-        self._add(model.bars[:, 1], 1), self._again(model.bars[:, 0], 0)
+        self._add(model.bars[:, 1], 1)
+        self._again(model.bars[:, 0], 0)
         for v in range(4):
             self._add(model.hinges[:, v], 1)
         panels = self._terms(bodies, MembranesTerm)
