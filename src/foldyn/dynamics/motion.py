@@ -49,6 +49,8 @@ from foldyn.structures.stretching import REMEDY, stretch
 if TYPE_CHECKING:
     import xarray
 
+    from foldyn.dynamics.gpu.engine import OnCard
+
 RECHECKS = 20  # of the critical step during a motion
 CHUNK = 256  # steps of the first stretch; later ones take about REPORT_EVERY seconds
 REPORT_EVERY = 0.25
@@ -67,13 +69,15 @@ class Motion:
         self, case: Case, method: Integrator, plan: StepPlan, critical: float, force: bool,
         state: tuple[NDArray, NDArray, NDArray | str | None, Continuation | None], packed: Packed,
         sampler: Sampler, reason: str = "", better: Callable[[], Motion] | None = None,
+        device: str = "cpu",
     ) -> None:  # fmt: skip
+        self.device = device
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force, self.reason = critical, force, reason
         self._state, self.packed, self._sampler = state, packed, sampler
         self._better = better
         self._rounding = Rounding(packed.body)
-        self._engine: Compiled | Implicit | None = None
+        self._engine: Compiled | Implicit | OnCard | None = None
         self._keeping: Keeping | None = None
         self.seconds = 0.0
         self._start()
@@ -229,7 +233,7 @@ class Motion:
         self.output.begin()
         report, close = reporter(progress)
         try:
-            engine = self.method.engine(self.case, self.packed, self.course, self.plan)
+            engine = self.method.engine(self.case, self.packed, self.course, self.plan, self.device)
             continued = self._state[3] if self.case.contact is None else None
             if isinstance(engine, Implicit) and continued and continued.method == self.method.name:
                 engine.continue_from(continued.values)
@@ -260,7 +264,7 @@ class Motion:
         self.course = self.beginning
         self.output = Output(self.case, self.plan, self._sampler, self._branches, self._keeping)
 
-    def _advance(self, engine: Compiled | Implicit, report: Reporter) -> None:
+    def _advance(self, engine: Compiled | Implicit | OnCard, report: Reporter) -> None:
         """Advance to the end, in stretches; after each, report the progress, and audit."""
         system, callbacks, by = self.packed.system, self.packed.callbacks, self.packed.numbering
         plan, course, output = self.plan, self.course, self.output
@@ -334,7 +338,7 @@ class Motion:
             fits = self.output.fits(int(self.course.tally.steps), self.stored)
         return length if fits is None else max(0, min(length, fits))
 
-    def _checkpoint_if_due(self, engine: Compiled | Implicit) -> None:
+    def _checkpoint_if_due(self, engine: Compiled | Implicit | OnCard) -> None:
         """Make a checkpoint, if it is time for one."""
         if self._keeping is None or not self._keeping.due:
             return
@@ -343,11 +347,13 @@ class Motion:
         arrays |= self.output.checkpoint_arrays() | {"seconds": np.array(self.seconds)}
         self._keeping.checkpoint(arrays, float(self.course.tally.time))
 
-    def _resumed(self, engine: Compiled | Implicit) -> float:
+    def _resumed(self, engine: Compiled | Implicit | OnCard) -> float:
         """Go on from the last checkpoint, if there is one; seconds that were spent until then."""
         if self._keeping is None:
             return 0.0
         about = self._identity() | {"threads": engine.threads}
+        if self.device != "cpu":
+            about["device"] = self.device
         kept = self._keeping.begin(about, self.output.rows)
         if kept is None:
             return 0.0

@@ -77,6 +77,16 @@ def axial_extension(springs, u, s):
 
 
 @inner_scalar
+def axial_pull(springs, u, s):
+    """Pull (N/m) of an axial spring per length between its ends; k where they may meet."""
+    extension, length = axial_extension(springs, u, s)
+    per_length = springs.axial_stiffness[s]
+    if springs.stretch[s] < springs.length[s]:
+        per_length *= extension / length
+    return per_length
+
+
+@inner_scalar
 def add_directed(springs, s, pull, force):
     """Add the pull (N) of a directed spring to the forces of its ends."""
     a, b = springs.ends[s, 0], springs.ends[s, 1]
@@ -94,10 +104,7 @@ def add_spring_forces(springs, u, force):
         add_directed(springs, s, pull, force)
     for s in range(springs.axial_stiffness.size):
         a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
-        extension, length = axial_extension(springs, u, s)
-        per_length = springs.axial_stiffness[s]
-        if springs.stretch[s] < springs.length[s]:  # else it is k, also where the ends meet
-            per_length *= extension / length
+        per_length = axial_pull(springs, u, s)
         for c in range(3):
             pull = per_length * (springs.vector[s, c] + u[b, c] - u[a, c])
             force[b, c] += pull

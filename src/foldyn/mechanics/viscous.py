@@ -129,7 +129,7 @@ def hinge_gradient(x, dofs, hidden_turn, moved, out):
 
 
 @inner
-def _gradient(elements, moved, e, out):
+def element_gradient(elements, moved, e, out):
     """Gradient (14,) of element e at flat displacements."""
     dofs, p = elements.dofs[e], elements.axial.shape[0]
     for c in range(14):
@@ -151,7 +151,7 @@ def _gradient(elements, moved, e, out):
 def put_gradients(elements, moved, out):
     """Gradients of all elements at flat displacements, to out (p + h, 14)."""
     for e in range(elements.coefficient.size):
-        _gradient(elements, moved, e, out[e])
+        element_gradient(elements, moved, e, out[e])
 
 
 class _Context(NamedTuple):
@@ -166,7 +166,7 @@ def _forces(own, u, v, t, force, powers):
         numbers_at(u, own.size), numbers_at(v, own.size), numbers_at(force, own.size)
     )  # fmt: skip
     for e in range(elements.coefficient.size):
-        _gradient(elements, moved, e, g)
+        element_gradient(elements, moved, e, g)
         rate = 0.0
         for c in range(14):
             rate += g[c] * speed[elements.dofs[e, c]]
