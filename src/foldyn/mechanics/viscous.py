@@ -242,7 +242,7 @@ def _pullback(own, u, v, t, weight, product, rate):
     )
     for e in range(elements.coefficient.size):
         dofs, coefficient = elements.dofs[e], elements.coefficient[e]
-        _gradient(elements, moved, e, g)
+        element_gradient(elements, moved, e, g)
         ahead, back = 0.0, 0.0
         for c in range(14):
             ahead += g[c] * speed[dofs[c]]
