@@ -113,6 +113,8 @@ class Fit:
     evaluations : int
         Of the model, in all.
     seconds : float
+    quotients : tuple of str
+        Names of the measurements whose derivatives are difference quotients of whole runs.
     """
 
     estimates: tuple[Estimate, ...]
@@ -128,6 +130,7 @@ class Fit:
     predicted: tuple[NDArray[np.float64], ...] = field(repr=False)
     evaluations: int
     seconds: float
+    quotients: tuple[str, ...]
 
     def __getitem__(self, key: str) -> Estimate:
         """Estimate of a parameter."""
@@ -208,6 +211,7 @@ class Fit:
             "starts": [_plain(vars(one)) for one in self.descents],
             "evaluations": self.evaluations,
             "seconds": self.seconds,
+            "quotients": list(self.quotients),
         }
 
     def dataset(self) -> xr.Dataset:
