@@ -19,7 +19,7 @@ from foldyn.plots.design_charts import convergence_charts
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet
 from foldyn.plots.visibility import split_edges
-from foldyn.values import choice
+from foldyn.values import choice, of_kind
 
 COLORS = "coolwarm"
 WIDE, HIDDEN = 3.5, 0.25  # points, and opacity behind panels; of colored creases
@@ -34,6 +34,7 @@ def plot_convergence(history: xr.Dataset) -> Figure:
     history : xarray.Dataset
         Of a `foldyn.Design`.
     """
+    of_kind("history", history, xr.Dataset)
     charts = convergence_charts(history)
     return figure_of(charts, (4.5 * len(charts), 3.4), columns=len(charts))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,6 @@ from foldyn.dynamics.gpu.launch import Launches, Places
 from foldyn.dynamics.motion_state import Course, Outcome, Samples, StepPlan
 from foldyn.dynamics.system import Packed
 
-if TYPE_CHECKING:
-    from foldyn.dynamics.methods import Compiled, Integrator
-
 
 class OnCard:
     """An explicit method on the card, for one motion.
@@ -25,25 +22,25 @@ class OnCard:
 
     Parameters
     ----------
-    method : Integrator
+    method : methods.Integrator
     packed : Packed
     course : Course
     plan : StepPlan
     on_cpu : callable
-        Makes the same for the CPU.
+        Makes the same for the CPU, a `methods.Compiled`.
     """
 
     threads = 1
 
     def __init__(
-        self, method: Integrator, packed: Packed, course: Course, plan: StepPlan,
-        on_cpu: Callable[[], Compiled],
+        self, method: Any, packed: Packed, course: Course, plan: StepPlan,
+        on_cpu: Callable[[], Any],
     ) -> None:  # fmt: skip
         self._method, self._packed, self._course, self._plan = method, packed, course, plan
         self._on_cpu = on_cpu
         self._power = np.zeros(2)
         self._launches = Launches([packed], method.name, self._places(), wide=True)
-        self._alone: Compiled | None = None
+        self._alone: Any = None
 
     def _places(self) -> Places:
         course = self._course
