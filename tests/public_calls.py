@@ -186,11 +186,12 @@ def solved(folder: Path) -> Calls:
             "case": case(), "duration": 0.02, "method": "rk4", "dt": 1e-3, "every": 2,
             "initial": fd.State(), "force": False, "tolerance": None, "start": 0.0,
             "progress": None, "spectral_radius": None, "sample": None, "store": None,
-            "checkpoint": 60.0, "resume": False,
+            "checkpoint": 60.0, "resume": False, "device": "cpu",
         }),
         "simulate_many": (fd.simulate_many, {
             "cases": [light], "duration": 0.02, "dt": 1e-4, "every": 100, "initial": None,
-            "start": 0.0, "force": False, "threads": 1,
+            "start": 0.0, "force": False, "threads": 1, "method": "central_difference",
+            "device": "cpu",
         }),
         "trace": (fd.trace, {
             "case": case(), "method": "newton", "load_factors": [0.0, 1.0], "steps": None,
@@ -237,6 +238,18 @@ def solved(folder: Path) -> Calls:
             "case": folder / "case.toml", "vary": {"sheet.thickness": [0.01, 0.02]},
             "measures": ["frequency"], "samples": None, "method": None, "seed": None, "ties": None,
             "processes": 1, "scheduler": None, "folder": None, "progress": None,
+        }),
+        "sensitivity": (fd.sensitivity, {
+            "build": folder / "case.toml", "parameters": {"sheet.thickness": 0.01},
+            "measures": "mass", "analysis": None, "sizes": {"sheet.thickness": 0.01},
+            "along": None,
+        }),
+        "design": (fd.design, {  # refused: nothing to make small
+            "build": folder / "case.toml", "bounds": {"sheet.thickness": (0.01, 0.02)},
+            "minimize": None, "maximize": None, "subject_to": ["mass <= 1"], "analysis": None,
+            "start": {"sheet.thickness": 0.015}, "method": "slsqp", "starts": 1, "seed": 0,
+            "tolerance": 1e-6, "slack": 1e-4, "max_evaluations": 2, "folder": None,
+            "progress": None,
         }),
         "fit": (fd.fit, {  # refused: nothing to fit to
             "case": folder / "case.toml", "data": [], "parameters": [], "ties": None, "starts": 1,

@@ -4,11 +4,13 @@ from foldyn import (
     analyses as analyses,
     cases as cases,
     checks as checks,
+    designs as designs,
     dynamics as dynamics,
     errors as errors,
     experiment as experiment,
     exports as exports,
     formats as formats,
+    gradients as gradients,
     linear as linear,
     live as live,
     materials as materials,
@@ -59,6 +61,7 @@ from foldyn.cases import (
     Temperature as Temperature,
     TotalForce as TotalForce,
 )
+from foldyn.designs import design as design
 from foldyn.dynamics import (
     critical_step as critical_step,
     initial_state as initial_state,
@@ -73,6 +76,7 @@ from foldyn.formats import (
     write_pattern as write_pattern,
 )
 from foldyn.live import View as View, view as view
+from foldyn.gradients import sensitivity as sensitivity
 from foldyn.linear import (
     Fidelity as Fidelity,
     fidelity as fidelity,

@@ -193,6 +193,8 @@ def _brief(value: Any) -> str:
         return f"<Dataset {dict(value.sizes)}>"
     if isinstance(value, np.ndarray) and value.size > SOME:
         return f"<{value.dtype.name} {value.shape}>"
+    if type(value) is dict:
+        return "{" + ", ".join(f"{key}: {_brief(item)}" for key, item in value.items()) + "}"
     if type(value) in (list, tuple):
         items = [_brief(item) for item in value[:SOME]]
         more = [f"... {len(value)} in all"] if len(value) > SOME else []

@@ -158,14 +158,14 @@ def test_a_path_has_no_time_step(tmp_path) -> None:
 def test_a_model_that_fails_with_finer_steps_is_told_of(swung, seen, monkeypatch) -> None:
     from foldyn.experiment.calibration import fit
 
-    evaluate = fit._evaluate
+    evaluate = fit.evaluate
 
     def failing(made, values):
         found = evaluate(made, values)
         coarse = "dt" not in made.runs[0].document["analysis"]
         return found if coarse else replace(found, values={}, failure="no equilibrium")
 
-    monkeypatch.setattr(fit, "_evaluate", failing)
+    monkeypatch.setattr(fit, "evaluate", failing)
     with pytest.warns(FoldynWarning, match=r"finer time step \(no equilibrium\): the intervals"):
         found = fd.fit(swung, [seen], [replace(ALPHA, start=0.41)])
     alpha = found.estimates[0]

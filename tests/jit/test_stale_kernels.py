@@ -17,7 +17,9 @@ from foldyn.jit import sources
 from foldyn.jit.kernel_cache import Kept
 from foldyn.jit.sources import PACKAGE, digest, imports, made_from, read
 
-FILES = sorted(PACKAGE.rglob("*.py"))
+FILES = [  # kernels for GPUs are not kept, and import what is optional
+    path for path in sorted(PACKAGE.rglob("*.py")) if path.parent.name != "gpu"
+]
 HALF_SINE = ("s = math.sin(math.pi * t / a)", "s = 3.0 * math.sin(math.pi * t / a)")
 LAW = (
     "def moment(theta, rest):",

@@ -63,7 +63,7 @@ def test_irregular_panels_are_planar_and_no_parallelograms():
 
 @pytest.mark.matrix
 def test_stored_shell_is_what_the_code_gives(sets):
-    case = sets["mixed_1"][0]
+    case = min(sets["mixed_1"], key=lambda one: len(one.pattern().faces) * one.divisions[-1] ** 2)
     kept, again = (
         stored(case, read_references("mixed_1")[case.name]),
         stored(case, computed(case, case.divisions)),

@@ -15,7 +15,7 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn.analyses.provenance import Call, provenance
-from foldyn.analyses.sections import CaseSchema, SweepSection
+from foldyn.analyses.sections import CaseSchema, DesignSection, SweepSection
 from foldyn.analyses.start import Start, start_of
 from foldyn.cases import Case, State
 from foldyn.cases.models import MODELS
@@ -234,6 +234,11 @@ class CaseFile:
     def sweep(self) -> SweepSection | None:
         """Its table [sweep], None where it has none."""
         return self._schema.sweep
+
+    @property
+    def design(self) -> DesignSection | None:
+        """Its table [design], None where it has none."""
+        return self._schema.design
 
     @property
     def start_keys(self) -> dict[str, Any]:

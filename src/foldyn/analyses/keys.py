@@ -6,6 +6,7 @@ import copy
 import re
 from collections.abc import Mapping
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 from foldyn.errors import InputError
@@ -101,3 +102,13 @@ def files_of(value: Any, *without: str) -> list[str]:
     if isinstance(value, list):
         return [file for item in value for file in files_of(item, *without)]
     return []
+
+
+def files_moved(value: Any, way: str) -> Any:
+    """Document whose file names are relative to another folder."""
+    if isinstance(value, dict):
+        return {
+            key: Path(way, item).as_posix() if key == "file" else files_moved(item, way)
+            for key, item in value.items()
+        }
+    return [files_moved(item, way) for item in value] if isinstance(value, list) else value

@@ -118,22 +118,25 @@ def validated(path: Path, document: Mapping[str, Any]) -> Any:
         raise InputError(describe(error, shape, shapes), "", path) from None
 
 
-def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") -> CaseFile:
+def case_of_document(
+    path: Path, document: Mapping[str, Any], text: str = "", pattern: Any = None
+) -> CaseFile:
     """Check what a case file says and make its cases; see `read_case`.
 
     text : of the file, if the document was read from one.
+    pattern : what the document's pattern has made before; made if it is not given.
     """
     schema = validated(path, document)
     model = MODELS[schema.model.kind]
     kind, faults = ANALYSES[schema.analysis.kind], Faults()
-    pattern: Any = None
+    made = pattern is not None
     sheet: Any = None
     resolved: Any = None
     with faults.collected():
-        pattern = _pattern(schema.pattern, path.parent)
+        pattern = pattern if made else _pattern(schema.pattern, path.parent)
     with faults.collected():
         sheet = sheet_from(schema.sheet.model_dump())
-    if HINGES in schema.pattern and not faults.found:
+    if HINGES in schema.pattern and not made and not faults.found:
         with faults.collected():
             pattern = _thick(pattern, sheet, schema.pattern[HINGES])
     if schema.sheet.density is None and kind.needs_density and not schema.masses:

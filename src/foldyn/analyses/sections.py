@@ -307,6 +307,22 @@ class SweepSection(Section):
     measures: list[str] = []
 
 
+class DesignSection(Section):
+    """[design]: arguments of `design`."""
+
+    bounds: dict[str, Any]
+    minimize: str | None = None
+    maximize: str | None = None
+    subject_to: list[str] = []
+    start: dict[str, Any] = {}
+    method: str = "slsqp"
+    starts: Count = 1
+    seed: Annotated[int, Field(ge=0, le=MOST)] = 0
+    tolerance: Positive = 1e-6
+    slack: Positive = 1e-4
+    max_evaluations: Count = 1000
+
+
 class CaseSchema(Section):
     """The sections that every case file may have."""
 
@@ -320,3 +336,4 @@ class CaseSchema(Section):
     masses: list[Annotated[Any, part(mass_from)]] = []
     contact: Annotated[Any, contact_part()] = None
     sweep: SweepSection | None = None
+    design: DesignSection | None = None

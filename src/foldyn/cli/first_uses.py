@@ -130,6 +130,17 @@ def vibrating(**parts: Any) -> None:
 
 Uses = Mapping[str, Sequence[Callable[[], None]]]
 TOUCHING: dict[str, Any] = {"pattern": sheets(), "start": (-0.6, 0.2, -1.0)}
+
+
+def differentiated(*methods: str, **parts: Any) -> None:
+    """Gradients of motions, and of a frequency, by the stiffness of the creases."""
+    made, given = case(**parts), {"duration": STEPS * SHORT, "dt": SHORT}
+    fd.sensitivity(made, ["fold_stiffness"], "frequency[2]", {"kind": "modes", "count": 2})
+    for method in methods:
+        motion = {"kind": "dynamics", "method": method, **given}
+        fd.sensitivity(made, ["fold_stiffness"], "displacement[8,z]", motion)
+
+
 STAGES: Sequence[Uses] = (
     {"bars and hinges": [vibrating, partial(moved, "rk4")]},
     {
@@ -150,6 +161,10 @@ STAGES: Sequence[Uses] = (
         ],
         "shells": [partial(vibrating, model="shell"), partial(moved, "newmark", model="shell")],
         "several motions at once": [moved_at_once],
+        "gradients": [
+            partial(differentiated, "rk4", "newmark", supports=SPRINGS, damping=DAMPED),
+            partial(differentiated, "rk4", "newmark", model="n5b8e"),
+        ],
         "folding and tracking": [folded],
     },
     {

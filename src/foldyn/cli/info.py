@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Callable
+from functools import partial
 from importlib import metadata
 
 from foldyn import __version__
@@ -43,7 +44,8 @@ def info() -> str:
 
     video = _part(find_ffmpeg, "imageio-ffmpeg")
     camera = _part(lambda: opencv().__version__, "opencv-python-headless")
-    clusters = _part(_dask, "distributed")
+    clusters = _part(partial(_installed, "distributed"), "distributed")
+    moving, drawn = (_part(partial(_installed, name), name) for name in ("nlopt", "cma"))
     drawings = _part(lambda: f"ezdxf {ezdxf().__version__}", "ezdxf")
     lines = [
         f"foldyn {__version__}",
@@ -60,6 +62,7 @@ def info() -> str:
         f"optional part for camera tracking: OpenCV, {camera}",
         f"optional part for pattern files in DXF: {drawings}",
         f"optional part for sweeps on clusters: Dask, {clusters}",
+        f"optional parts for inverse design: NLopt, {moving}; CMA-ES, {drawn}",
         *(
             f"linear solver from {solver.worthwhile:,} directions: {name}, "
             f"{'found' if solver.found() else f'missing: pip install {solver.package}'}"
@@ -88,8 +91,9 @@ def _part(look: Callable[[], object], package: str) -> str:
         return f"missing: pip install {package}"
 
 
-def _dask() -> str:
-    return optional("distributed", "", "").__version__
+def _installed(name: str) -> str:
+    optional(name, "", "")
+    return metadata.version(name)
 
 
 def _version(name: str) -> str:

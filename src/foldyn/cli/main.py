@@ -18,6 +18,7 @@ from typing import NoReturn
 
 from foldyn import __version__
 from foldyn.cli.convert import add_convert, convert
+from foldyn.cli.design import add_design, run_design
 from foldyn.cli.fit import add_fit, run_fit
 from foldyn.cli.folder import reason
 from foldyn.cli.folding import add_fold, run_fold
@@ -34,7 +35,7 @@ from foldyn.ram_limit import HALF, at_most
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 OTHERS = {
-    "convert": convert, "fit": run_fit, "fold": run_fold, "study": study,
+    "convert": convert, "design": run_design, "fit": run_fit, "fold": run_fold, "study": study,
     "sweep": run_sweep, "track": track, "view": run_view, "warm-up": run_warm_up,
 }  # fmt: skip
 """Commands that do not take just a case file."""
@@ -135,6 +136,7 @@ def parser() -> argparse.ArgumentParser:
     add_study(commands)
     add_fit(commands)
     add_sweep(commands)
+    add_design(commands)
     add_track(commands)
     add_view(commands)
     add_warm_up(commands)

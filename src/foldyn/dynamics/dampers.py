@@ -28,9 +28,21 @@ def damping_terms(case: Case, start: NDArray | None, modal: ModalRows) -> list[T
     if rayleigh.beta > 0.0:
         state = start if rayleigh.state == "start" else None
         state = np.zeros_like(case.structure.nodes) if state is None else state
-        terms.insert(0, DampingMatrix(body.tangent(body.dofs(state)) * rayleigh.beta))
+        terms.insert(0, DampingMatrix(_tangent(body, body.dofs(state)) * rayleigh.beta))
     modal.warn()
     return [*terms, DampingRows(modal.rows)] if len(modal.rows) else terms
+
+
+def _tangent(body: Assembly, q: NDArray) -> sparse.csr_array:
+    """Tangent (m, m) at the dofs q (m,) with all places that the model couples.
+
+    Zeros among them stay, so that the places are the same for all numbers of the model.
+    """
+    parts = [term.tangent(q).tocoo() for term in body.terms]
+    data, rows, columns = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("data", "row", "col")
+    )
+    return sparse.csr_array(sparse.coo_array((data, (rows, columns)), (q.size, q.size)))
 
 
 def damping_matrix(case: Case, q: NDArray, quasi_static: bool = False) -> sparse.csr_array:

@@ -16,6 +16,7 @@ from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Dashpot, Rayleigh, State
 from foldyn.dynamics import generalized_alpha, timing
 from foldyn.dynamics.checkpoint import SECONDS, check_keeping
+from foldyn.dynamics.gpu.checks import check_gpu, check_taken
 from foldyn.dynamics.inertia import check_mass, is_lumped
 from foldyn.dynamics.initial import (
     check_start,
@@ -65,6 +66,7 @@ def simulate(
     store: str | os.PathLike[str] | None = None,
     checkpoint: float = SECONDS,
     resume: bool = False,
+    device: str = "cpu",
 ) -> xarray.Dataset:
     """Integrate M x'' + C x' + F_int(x) = p(t) from an initial state.
 
@@ -112,6 +114,9 @@ def simulate(
     resume : bool, default False
         With `store`: go on with the same motion from the last checkpoint of a run that was cut off,
         to the same bits; from the beginning where there is none. A finished one is only read.
+    device : {"cpu", "gpu"}
+        Where steps are computed; "gpu" needs a GPU of NVIDIA's and numba-cuda, an explicit method
+        with fixed steps, and bars and hinges: the documentation has a page on when it pays.
 
     Returns
     -------
@@ -155,7 +160,7 @@ def simulate(
         raise InputError(": there is nothing to go on with; name the file of the result", "store")
     motion = prepare(
         case, duration, method, dt, every, initial, force, tolerance, start, spectral_radius,
-        sample, keeping is not None,
+        sample, keeping is not None, device,
     )  # fmt: skip
     return motion.run(progress) if keeping is None else motion.run_into_file(keeping, progress)
 
@@ -173,6 +178,7 @@ def prepare(
     spectral_radius: float | None = None,
     sample: Mapping[str, Callable[..., Any] | Quantity] | None = None,
     kept: bool = False,
+    device: str = "cpu",
 ) -> Motion:
     """Check everything that `simulate` checks and choose the step, without computing a motion.
 
@@ -181,6 +187,8 @@ def prepare(
     """
     of_kind("case", case, Case)
     choice("method", method, (*METHODS, AUTO))
+    if choice("device", device, ("cpu", "gpu")) == "gpu":
+        check_gpu(method)
     integrator = method_of("rk4") if method == AUTO else suited(method, case)
     if method != AUTO:
         case = with_mass(integrator, case)
@@ -237,6 +245,8 @@ def prepare(
         )
     span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
     packed = pack(case, span, u, modal)
+    if device == "gpu":
+        check_taken(packed)
     sampler = Sampler(case, {} if sample is None else sample, u, v, plan.start)
     state = u, v, remembered, initial.continuation if initial else None
     better = None
@@ -248,8 +258,9 @@ def prepare(
             None, sample, kept,
         )  # fmt: skip
     return Motion(
-        case, integrator, plan, critical, force, state, packed, sampler, chosen.reason, better
-    )
+        case, integrator, plan, critical, force, state, packed, sampler, chosen.reason, better,
+        device,
+    )  # fmt: skip
 
 
 def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrator:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -26,10 +26,10 @@ from foldyn.mechanics.lanes import WIDTH
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import MOTION, energies_of, variable, variables
 from foldyn.structures.stretching import MOST, REMEDY, stretch
-from foldyn.values import flag, of_kind, show, whole
+from foldyn.values import choice, flag, of_kind, show, whole
 
 METHOD = "central_difference"
-COMMON = ("duration", "dt", "every", "start")
+COMMON = ("duration", "dt", "every", "start", "method")
 """Arguments that are those of all cases."""
 
 
@@ -42,14 +42,16 @@ def simulate_many(
     start: float = 0.0,
     force: bool = False,
     threads: int | None = None,
+    method: str = METHOD,
+    device: str = "cpu",
 ) -> xarray.Dataset:
-    """Integrate the motions of many models of one topology at once, by central differences.
+    """Integrate the motions of many models of one topology at once.
 
     All have as many nodes and the same supported dofs and groups of strain energy; all else may
-    differ. Each motion is that of ``simulate(case, duration, "central_difference", dt)``, but for
-    rounding. Models with the same bars, hinges and kinds of laws stand in the lanes of vectors,
-    eight a vector, and the vectors are shared among threads: two to three times quicker than one
-    motion after the other for small models.
+    differ. Each motion is that of ``simulate(case, duration, method, dt)``, but for rounding. By
+    central differences, models with the same bars, hinges and kinds of laws stand in the lanes of
+    vectors, eight a vector, and the vectors are shared among threads: two to three times quicker
+    than one motion after the other for small models. On a GPU all take their steps at once.
 
     Parameters
     ----------
@@ -65,6 +67,10 @@ def simulate_many(
         Displacement and velocity at the start, of all or of each; None is rest.
     threads : int, optional
         As many as this process has processors by default.
+    method : str, default "central_difference"
+        An explicit method with fixed steps: this, or "rk4".
+    device : {"cpu", "gpu"}
+        Where steps are computed; a GPU takes panels' membranes, springs and dampers, too.
 
     Returns
     -------
@@ -90,6 +96,7 @@ def simulate_many(
     if not isinstance(states, Sequence) or len(states) != len(cases):
         raise InputError(f": give one State, or a list of {len(cases)}", "initial")
     force = flag("force", force)
+    choice("method", method, (METHOD, "rk4"))
     most = int(config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
     threads = most if threads is None else whole("threads", threads, least=1)
     threads = min(threads, -(-len(cases) // WIDTH))
@@ -97,8 +104,8 @@ def simulate_many(
     for k, (case, state) in enumerate(zip(cases, states, strict=True)):
         of_kind(f"cases[{k}]", case, Case)
         try:
-            given = case, duration, METHOD, dt, every, state
-            motions.append(prepare(*given, force=True, start=start, kept=True))
+            given = case, duration, method, dt, every, state
+            motions.append(prepare(*given, force=True, start=start, kept=True, device=device))
         except InputError as error:
             place = f"cases[{k}]{'.' if error.field else ': '}"
             raise error if error.field in COMMON else error.within(place) from None
@@ -121,13 +128,14 @@ def simulate_many(
         motion.plan, motion.force = plan, force  # one step for all
         motion.output.window = Samples._make([out.time, *(array[k] for array in out[1:-1]), 0])
     clock, spent = time.perf_counter(), time.process_time()
-    ended = _integrate(motions, out, threads)
+    ended = _integrate(motions, out, threads, device)
     facts = {
-        "method": METHOD, "dt": plan.dt, "steps": plan.steps, "start": plan.start,
+        "method": method, "dt": plan.dt, "steps": plan.steps, "start": plan.start,
         "duration": plan.end - plan.start, "every": plan.every, "critical_step": critical,
         "wall_seconds": time.perf_counter() - clock,
         "processor_seconds": time.process_time() - spent,
-        "threads": threads, "energy_error": _warn(motions, ended, out.energy),
+        "threads": threads, "device": _name(device),
+        "energy_error": _warn(motions, ended, out.energy),
     }  # fmt: skip
     return _dataset(case, out, [ended.get(k, "done") for k in range(len(motions))], facts)
 
@@ -138,19 +146,26 @@ def _shape(case: Case) -> dict[str, Any]:
     return {"nodes": len(case.structure.nodes), "supported dofs": supported, "energies": energies}
 
 
-def _integrate(motions: Sequence[Motion], out: Samples, threads: int) -> dict[int, str]:
+def _name(device: str) -> str:
+    """Name of the device, for the result."""
+    if device == "cpu":
+        return device
+    from foldyn.dynamics.gpu import card
+
+    return card.name()
+
+
+def _integrate(
+    motions: Sequence[Motion], out: Samples, threads: int, device: str
+) -> dict[int, str]:
     """Integrate all; returns why some ended before their time.
 
     What lanes do not take is computed alone, and what goes wrong there, which then says why.
     """
-    alike: dict[tuple[bytes, ...], list[tuple[int, Motion]]] = {}
-    for k, motion in enumerate(motions):
-        alike.setdefault(topology(motion), []).append((k, motion))
-    alone, ended = {k for k, _ in alike.pop((), ())}, dict[int, str]()
-    groups = [own[k : k + WIDTH] for own in alike.values() for k in range(0, len(own), WIDTH)]
-    with ThreadPoolExecutor(threads) as pool:
-        alone = alone.union(*pool.map(lambda group: integrate(group, out), groups))
-    for k in sorted(alone):
+    side_by_side = _on_gpu if device == "gpu" else _in_lanes
+    ended = dict[int, str]()
+    for k in sorted(side_by_side(motions, out, threads)):
+        motions[k].device = "cpu"  # which says why
         try:
             motions[k].integrate()
         except ComputationError as error:
@@ -158,6 +173,32 @@ def _integrate(motions: Sequence[Motion], out: Samples, threads: int) -> dict[in
         for array, own in zip(out[1:5], motions[k].output.window[1:5], strict=True):
             array[k], array[k, motions[k].stored :] = own, np.nan
     return ended
+
+
+def _alike(keys: Iterable[Any], motions: Sequence[Motion]) -> dict[Any, list[tuple[int, Motion]]]:
+    """Motions with their numbers, by their keys."""
+    found: dict[Any, list[tuple[int, Motion]]] = {}
+    for (k, motion), key in zip(enumerate(motions), keys, strict=True):
+        found.setdefault(key, []).append((k, motion))
+    return found
+
+
+def _in_lanes(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]:
+    """Integrate what lanes take; numbers of what they do not, and of what goes wrong."""
+    lanes = motions[0].method.name == METHOD
+    alike = _alike([topology(motion) if lanes else () for motion in motions], motions)
+    alone = {k for k, _ in alike.pop((), ())}
+    groups = [own[k : k + WIDTH] for own in alike.values() for k in range(0, len(own), WIDTH)]
+    with ThreadPoolExecutor(threads) as pool:
+        return alone.union(*pool.map(lambda group: integrate(group, out), groups))
+
+
+def _on_gpu(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]:
+    """Integrate all on the card; numbers of those that go wrong."""
+    from foldyn.dynamics.gpu import arrays, many
+
+    alike = _alike([arrays.topology(motion.packed) for motion in motions], motions)
+    return set[int]().union(*(many.integrate(own, out) for own in alike.values()))
 
 
 def _warn(motions: Sequence[Motion], ended: Mapping[int, str], energy: NDArray) -> float:

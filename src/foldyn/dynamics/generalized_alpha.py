@@ -96,7 +96,7 @@ class Alpha(Scheme):
         facts: Mapping[str, float] = Scheme.facts,
     ) -> None:  # fmt: skip
         super().__init__(packed, course)
-        self._p, self.facts, equation = parameters, facts, self.equation
+        self.parameters, self.facts, equation = parameters, facts, self.equation
         self._step = Context(
             Step(
                 equation.still.value, equation.setting, parameters, self.old, self.new, self.shift,
@@ -115,7 +115,7 @@ class Alpha(Scheme):
 
     def weights(self, h: float) -> Weights:
         """See `Scheme`; the mass carries what multiplies alpha M too."""
-        am, af, beta, gamma = self._p
+        am, af, beta, gamma = self.parameters
         rate = (1.0 - af) * gamma / (beta * h)
         mass = (1.0 - am) / (beta * h * h) + rate * self.packed.system.alpha
         return Weights(1.0 - af, mass, rate)
@@ -156,7 +156,7 @@ class Alpha(Scheme):
         Since a stands for the acceleration at t + (am - af) h, the displacement's error is
         (am/2 - af/2 + beta - 1/6) h^3 times its third derivative: 1/12 for the trapezoidal rule.
         """
-        am, af, beta, _ = self._p
+        am, af, beta, _ = self.parameters
         constant = 0.5 * (am - af) + beta - 1.0 / 6.0
         return constant * h * h * (self.new.a - self.old.a)
 

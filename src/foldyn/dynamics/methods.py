@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,6 +40,9 @@ from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.threads import run_together
 from foldyn.values import of_kind
 
+if TYPE_CHECKING:
+    from foldyn.dynamics.gpu.engine import OnCard
+
 
 class Compiled:
     """An explicit method, whose whole loop is compiled.
@@ -69,6 +73,11 @@ class Compiled:
             for work, memory in zip(self._works, self._memories, strict=True)
         ]
         self.threads = len(self._works)
+
+    def start_with(self, powers: NDArray) -> None:
+        """Take the powers (2,) in and out, W, at the last step from elsewhere."""
+        for memory in self._memories:
+            memory.powers[:] = powers if memory is self._memories[0] else 0.0
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
@@ -156,9 +165,14 @@ class Integrator(NamedTuple):
         return self.scheme is not None
 
     def engine(
-        self, case: Case, packed: Packed, course: Course, plan: StepPlan
-    ) -> Compiled | Implicit:
+        self, case: Case, packed: Packed, course: Course, plan: StepPlan, device: str = "cpu"
+    ) -> Compiled | Implicit | OnCard:
         """The method with a case, its motion and the memory that it works with."""
+        if device == "gpu":
+            from foldyn.dynamics.gpu.engine import OnCard
+
+            on_cpu = partial(Compiled, self.loop, packed, course, plan, threads_of(packed))
+            return OnCard(self, packed, course, plan, on_cpu)
         if self.scheme is not None:
             return Implicit(self.scheme, packed, course, plan, jumps(case))
         threads = 1 if self.adaptive else threads_of(packed)

@@ -18,7 +18,7 @@ from foldyn.dynamics.diagnostics import INACCURATE, doubts, is_off
 from foldyn.dynamics.failures import failure, smaller_step
 from foldyn.dynamics.initial import begin
 from foldyn.dynamics.methods import Compiled, Implicit, Integrator
-from foldyn.dynamics.motion_state import Outcome, Samples, StepPlan
+from foldyn.dynamics.motion_state import Course, Outcome, Samples, StepPlan
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
@@ -49,6 +49,8 @@ from foldyn.structures.stretching import REMEDY, stretch
 if TYPE_CHECKING:
     import xarray
 
+    from foldyn.dynamics.gpu.engine import OnCard
+
 RECHECKS = 20  # of the critical step during a motion
 CHUNK = 256  # steps of the first stretch; later ones take about REPORT_EVERY seconds
 REPORT_EVERY = 0.25
@@ -67,17 +69,34 @@ class Motion:
         self, case: Case, method: Integrator, plan: StepPlan, critical: float, force: bool,
         state: tuple[NDArray, NDArray, NDArray | str | None, Continuation | None], packed: Packed,
         sampler: Sampler, reason: str = "", better: Callable[[], Motion] | None = None,
+        device: str = "cpu",
     ) -> None:  # fmt: skip
+        self.device = device
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force, self.reason = critical, force, reason
         self._state, self.packed, self._sampler = state, packed, sampler
         self._better = better
         self._rounding = Rounding(packed.body)
-        self._engine: Compiled | Implicit | None = None
+        self._engine: Compiled | Implicit | OnCard | None = None
         self._keeping: Keeping | None = None
         self.seconds = 0.0
         self._start()
         self.at_rest = not (self.course.u.any() or self.course.v.any())
+
+    @property
+    def start(self) -> tuple[NDArray, NDArray]:
+        """Displacement and velocity (n, 3) where it starts."""
+        return self._state[0], self._state[1]
+
+    @property
+    def beginning(self) -> Course:
+        """Where it starts, anew."""
+        return begin(self.case, *self._state, self.plan, self.packed)
+
+    @property
+    def continues(self) -> bool:
+        """Whether it may go on with what a motion before it knew beside its state."""
+        return self._state[3] is not None
 
     @property
     def expected_samples(self) -> int:
@@ -214,7 +233,7 @@ class Motion:
         self.output.begin()
         report, close = reporter(progress)
         try:
-            engine = self.method.engine(self.case, self.packed, self.course, self.plan)
+            engine = self.method.engine(self.case, self.packed, self.course, self.plan, self.device)
             continued = self._state[3] if self.case.contact is None else None
             if isinstance(engine, Implicit) and continued and continued.method == self.method.name:
                 engine.continue_from(continued.values)
@@ -242,10 +261,10 @@ class Motion:
 
     def _start(self) -> None:
         """Go back to the start."""
-        self.course = begin(self.case, *self._state, self.plan, self.packed)
+        self.course = self.beginning
         self.output = Output(self.case, self.plan, self._sampler, self._branches, self._keeping)
 
-    def _advance(self, engine: Compiled | Implicit, report: Reporter) -> None:
+    def _advance(self, engine: Compiled | Implicit | OnCard, report: Reporter) -> None:
         """Advance to the end, in stretches; after each, report the progress, and audit."""
         system, callbacks, by = self.packed.system, self.packed.callbacks, self.packed.numbering
         plan, course, output = self.plan, self.course, self.output
@@ -319,7 +338,7 @@ class Motion:
             fits = self.output.fits(int(self.course.tally.steps), self.stored)
         return length if fits is None else max(0, min(length, fits))
 
-    def _checkpoint_if_due(self, engine: Compiled | Implicit) -> None:
+    def _checkpoint_if_due(self, engine: Compiled | Implicit | OnCard) -> None:
         """Make a checkpoint, if it is time for one."""
         if self._keeping is None or not self._keeping.due:
             return
@@ -328,11 +347,13 @@ class Motion:
         arrays |= self.output.checkpoint_arrays() | {"seconds": np.array(self.seconds)}
         self._keeping.checkpoint(arrays, float(self.course.tally.time))
 
-    def _resumed(self, engine: Compiled | Implicit) -> float:
+    def _resumed(self, engine: Compiled | Implicit | OnCard) -> float:
         """Go on from the last checkpoint, if there is one; seconds that were spent until then."""
         if self._keeping is None:
             return 0.0
         about = self._identity() | {"threads": engine.threads}
+        if self.device != "cpu":
+            about["device"] = self.device
         kept = self._keeping.begin(about, self.output.rows)
         if kept is None:
             return 0.0

@@ -36,6 +36,8 @@ from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.following import Following, joined
 
+ROUNDING = 1e-14  # of the motion of supports: motions of others that are none
+
 
 class Entries(NamedTuple):
     """Nodal vectors times histories: value[k] stands at dof[k] and belongs to history row[k]."""
@@ -198,7 +200,9 @@ def carry_supports(mass: Inertia, shape: NDArray) -> NDArray:
     product, out = np.empty_like(shape), np.empty_like(shape)
     times_mass(mass, shape, product)
     substitute(mass, product, out, np.zeros(shape.size))
-    return shape - out
+    moved = shape - out
+    moved[np.abs(moved) <= ROUNDING * np.abs(shape).max()] = 0.0  # or they would come and go
+    return moved
 
 
 def _moved_mass(mass: sparse.csr_array, moves, histories) -> NDArray:

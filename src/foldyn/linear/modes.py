@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +111,33 @@ def modes(
         The state is no equilibrium, or an unstable one; loads do not act at rest; hinges have no
         slope; a mode was missed.
     """
+    found = spectrum_of(
+        case, count, state, secant, load_factor=load_factor, internal=internal, verify=verify,
+        solver=solver,
+    )  # fmt: skip
+    return found.result
+
+
+class Found(NamedTuple):
+    """Modes as `modes` returns them, and what they were made of."""
+
+    linear: Linearized
+    spectrum: Spectrum  # shapes in their own order and signs
+    result: xarray.Dataset
+
+
+def spectrum_of(
+    case: Case,
+    count: int = 6,
+    state: State | str | None = None,
+    secant: float | None = None,
+    *,
+    load_factor: float = 1.0,
+    internal: int = 0,
+    verify: bool = True,
+    solver: str = "auto",
+) -> Found:
+    """See `modes`."""
     of_kind("case", case, Case)
     count = whole("count", count, least=1)
     check_memory(
@@ -120,7 +147,7 @@ def modes(
     began = time.perf_counter()
     linear = linearize(case, state, secant, load_factor, internal)
     pencil = Pencil(linear.stiffness, linear.mass, solver)
-    space, along = rigid_space(linear), _unit_translations(linear)
+    space, along = rigid_space(linear), unit_translations(linear)
     spectrum = lowest(pencil, count, unresisted(linear, space), verify)
     _warn(spectrum)
     _warn_of_stretch(linear, spectrum)
@@ -141,7 +168,8 @@ def modes(
         "rounding": _rounding(pencil, spectrum),
         "wall_seconds": time.perf_counter() - began,
     }
-    return modes_dataset(case, _variables(linear, spectrum, space, along), statistics)
+    result = modes_dataset(case, _variables(linear, spectrum, space, along), statistics)
+    return Found(linear, spectrum, result)
 
 
 def _variables(
@@ -214,7 +242,7 @@ def _internal(linear: Linearized, values: NDArray, shapes: NDArray) -> dict[str,
     }
 
 
-def _unit_translations(linear: Linearized) -> NDArray:
+def unit_translations(linear: Linearized) -> NDArray:
     """Unit translations (nf, 3) of the free dofs along x, y, z.
 
     Where constraints allow none, the motions that are nearest to them, weighted by mass.

@@ -67,6 +67,20 @@ def slope(theta, theta1, theta2):
 
 
 @scalar
+def limit_slopes(theta, theta1, theta2):
+    """Derivatives of moment / k as published with respect to theta1 and theta2."""
+    if theta < theta1:
+        tangent = math.tan(HALF_PI * ((theta1 - theta) / theta1))
+        return 1.0 - (1.0 + tangent * tangent) * theta / theta1 - tangent / HALF_PI, 0.0
+    if theta > theta2:
+        span = TWO_PI - theta2
+        tangent = math.tan(HALF_PI * ((theta - theta2) / span))
+        closing = (1.0 + tangent * tangent) * (TWO_PI - theta) / span
+        return 0.0, 1.0 - closing - tangent / HALF_PI
+    return 0.0, 0.0
+
+
+@scalar
 def rest_slope(theta, rest):
     """Derivative of energy / k as published with respect to rest."""
     return rest - theta

@@ -51,6 +51,13 @@ def slope(theta, rest, per_onset2):
 
 
 @scalar
+def onset_slope(theta, rest, per_onset2):
+    """Derivative of moment / k with respect to per_onset2."""
+    d = theta - rest
+    return d**3 / 6.0 * (1.0 + d * d * per_onset2) ** (-5.0 / 6.0)
+
+
+@scalar
 def rest_slope(theta, rest, per_onset2):
     """Derivative of energy / k with respect to rest."""
     return -moment(theta, rest, per_onset2)

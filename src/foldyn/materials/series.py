@@ -23,7 +23,13 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
 from foldyn.materials.law import HingeLaw
 from foldyn.materials.linear import CODE as LINEAR
-from foldyn.materials.switch import hinge_energy, hinge_moment, hinge_rest_slope, hinge_slope
+from foldyn.materials.switch import (
+    hinge_energy,
+    hinge_moment,
+    hinge_moment_by,
+    hinge_rest_slope,
+    hinge_slope,
+)
 
 ITERATIONS = 100
 ACCURACY = 4e-15  # rad, relative to angles above 1
@@ -99,6 +105,28 @@ def series_rest_slope(code, theta, rest, a, b, c, d, share, address):
         return hinge_rest_slope(code, theta, rest, a, b, address[0])
     phi = crease_angle(code, theta, rest, a, b, c, d, share, address)
     return hinge_rest_slope(code, phi, rest, a, b, address[0]) / share
+
+
+@inner
+def series_derivatives(code, theta, rest, a, b, c, d, share, address):
+    """Moment / k of a hinge at theta, its slope, and its derivatives by other numbers.
+
+    By the rest angle, by the parameters a, b and c, and by the share.
+    """
+    phi = theta
+    if not straight(code, share):
+        phi = crease_angle(code, theta, rest, a, b, c, d, share, address)
+    own = hinge_moment(code, phi, rest, a, b, c, d, address[1])
+    slope = hinge_slope(code, phi, rest, a, b, address[2])
+    by_rest, by_a, by_b, by_c = hinge_moment_by(code, phi, rest, a, b, address[1])
+    if straight(code, share):
+        return own, slope, by_rest, by_a, by_b, by_c, 0.0
+    whole = 1.0 / (share + (1.0 - share) * slope)
+    by_share = own / share**2 * (slope * whole - 1.0)
+    return (
+        own / share, slope * whole, by_rest * whole, by_a * whole, by_b * whole, by_c * whole,
+        by_share,
+    )  # fmt: skip
 
 
 @kernel

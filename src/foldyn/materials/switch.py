@@ -116,6 +116,26 @@ def hinge_rest_slope(code, theta, rest, a, b, address):
     return (call2(address, theta, rest + h) - call2(address, theta, rest - h)) / (2.0 * h)
 
 
+@inner_scalar
+def hinge_moment_by(code, theta, rest, a, b, address):
+    """Derivatives of the moment / k by the rest angle and by the parameters a, b and c."""
+    if code == linear.CODE:
+        return -1.0, 0.0, 0.0, 0.0
+    if code == superlinear.CODE:
+        return -superlinear.slope(theta, rest), 0.0, 0.0, 0.0
+    if code == plate_superlinear.CODE:
+        by_onset = plate_superlinear.onset_slope(theta, rest, a)
+        return -plate_superlinear.slope(theta, rest, a), by_onset, 0.0, 0.0
+    if (code == AS_PUBLISHED) | (code == STRESS_FREE):
+        by_first, by_second = enhanced_linear.limit_slopes(theta, a, b)
+        return -1.0, by_first, by_second, -1.0 if code == STRESS_FREE else 0.0
+    if address == 0:
+        return np.nan, 0.0, 0.0, 0.0
+    h = 1e-5  # error 1e-10 of the moment's third derivative
+    by_rest = (call2(address, theta, rest + h) - call2(address, theta, rest - h)) / (2.0 * h)
+    return by_rest, 0.0, 0.0, 0.0
+
+
 @scalar
 def move_rest(code, rest, parameters):
     """Set what follows the rest angle in the four parameters of a hinge."""

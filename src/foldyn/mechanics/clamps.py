@@ -16,10 +16,12 @@ from scipy import sparse
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
+from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.block_matrix import pairs_within, places_of
-from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient
+from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient, dihedral_rates
 from foldyn.mechanics.discrete_gradient import discrete_gradient
 from foldyn.mechanics.model import ranks
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
 from foldyn.mechanics.sheet_term import unit_rows
 from foldyn.mechanics.term import (
     ENERGIES,
@@ -159,6 +161,56 @@ def clamp_blocks(clamps, u):
     return out
 
 
+class Gradient(NamedTuple):
+    """Derivatives by arrays of `Clamps` of the same names."""
+
+    points: NDArray
+    rest: NDArray
+    stiffness: NDArray
+
+
+class _Backward(NamedTuple):
+    clamps: Clamps
+    out: Gradient
+    points: NDArray  # (4, 3) memory: positions of one clamp, m
+    moves: NDArray  # (4, 3) weights there
+    rows: int  # up to the last node
+
+
+@pullback
+def _pullback(own, u, v, t, weight, product, rate):
+    moved, weights, out = (
+        rows_at(u, own.rows), rows_at(weight, own.rows), rows_at(product, own.rows)
+    )  # fmt: skip
+    clamps, by, x, dx = own.clamps, own.out, own.points, own.moves
+    for e in range(clamps.rest.size):
+        for c in range(3):
+            for n in range(3):
+                node = clamps.nodes[e, n]
+                x[n, c], dx[n, c] = clamps.points[e, n, c] + moved[node, c], weights[node, c]
+            j, k = clamps.nodes[e, 0], clamps.nodes[e, 1]
+            x[3, c] = clamps.points[e, 3, c] + 0.5 * (moved[j, c] + moved[k, c])
+            dx[3, c] = 0.5 * (weights[j, c] + weights[k, c])
+        found = dihedral_rates(
+            x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2],
+            x[2, 0], x[2, 1], x[2, 2], x[3, 0], x[3, 1], x[3, 2],
+            dx[0, 0], dx[0, 1], dx[0, 2], dx[1, 0], dx[1, 1], dx[1, 2],
+            dx[2, 0], dx[2, 1], dx[2, 2], dx[3, 0], dx[3, 1], dx[3, 2],
+        )  # fmt: skip
+        turn, turned = found[0] - clamps.rest[e], clamps.stiffness[e] * found[13]
+        by.stiffness[e] += turn * found[13]
+        by.rest[e] -= turned
+        moment = clamps.stiffness[e] * turn
+        for c in range(12):
+            flat(x)[c] = moment * found[14 + c] + turned * found[1 + c]
+        for c in range(3):
+            for n in range(4):
+                by.points[e, n, c] += x[n, c]
+            for n in range(3):
+                carried = 0.5 * x[3, c] if n < 2 else 0.0
+                out[clamps.nodes[e, n], c] += x[n, c] + carried
+
+
 class _Context(NamedTuple):
     clamps: Clamps
     angle: NDArray  # (nh + c,) dihedrals of all hinges, theirs at the end
@@ -200,6 +252,18 @@ class ClampsTerm(Term):
         """See `Term`; their dihedrals end those of the thread."""
         own = Context(_Context(self.clamps, work.angle, int(work.strips.own[1])))
         return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
+
+    def arrays(self) -> Arrays:
+        """See `Term`."""
+        return arrays_of(self.clamps)
+
+    def pulled(self) -> Pulled:
+        """See `Term`."""
+        out = Gradient(*(np.zeros_like(getattr(self.clamps, name)) for name in Gradient._fields))
+        points, moves = np.zeros((2, 4, 3))
+        rows = 1 + int(self.clamps.nodes.max(initial=0))
+        own = Context(_Backward(self.clamps, out, points, moves, rows))
+        return Pulled(own, _pullback, out._asdict())
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:

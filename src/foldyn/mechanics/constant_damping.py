@@ -14,6 +14,7 @@ from scipy import sparse
 
 from foldyn.jit.context import Context, numbers_at
 from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.pullback import Arrays, Pulled, pullback
 from foldyn.mechanics.term import FORCES, Compiled, Term, forces
 from foldyn.mechanics.threads import Team, wait
 
@@ -58,6 +59,43 @@ def _of_rows(own, u, v, t, force, powers):
     numbers_at(powers, 2)[1] += power
 
 
+class _MatrixBackward(NamedTuple):
+    indptr: NDArray
+    indices: NDArray
+    data: NDArray
+    out: NDArray  # gradient by the data
+
+
+class _RowsBackward(NamedTuple):
+    rows: NDArray
+    out: NDArray  # (r, 3 rows) gradient
+
+
+@pullback
+def _matrix_pullback(own, u, v, t, weight, product, rate):
+    size = own.indptr.size - 1
+    speed, weights, out = numbers_at(v, size), numbers_at(weight, size), numbers_at(rate, size)
+    for i in range(size):
+        for k in range(own.indptr[i], own.indptr[i + 1]):
+            j = own.indices[k]
+            own.out[k] += weights[i] * speed[j]
+            out[j] += own.data[k] * weights[i]
+
+
+@pullback
+def _rows_pullback(own, u, v, t, weight, product, rate):
+    size = own.rows.shape[1]
+    speed, weights, out = numbers_at(v, size), numbers_at(weight, size), numbers_at(rate, size)
+    for k in range(own.rows.shape[0]):
+        row, ahead, back = own.rows[k], 0.0, 0.0
+        for i in range(size):
+            ahead += row[i] * speed[i]
+            back += row[i] * weights[i]
+        for i in range(size):
+            out[i] += back * row[i]
+            own.out[k, i] += back * speed[i] + ahead * weights[i]
+
+
 class DampingMatrix(Term):
     """A sparse matrix C (m, m), N s/m; see `Term`."""
 
@@ -72,6 +110,18 @@ class DampingMatrix(Term):
         rows = np.asarray(work.strips.own)
         own = _Matrix(start, column, self.matrix.data, rows, work.team)
         return Compiled(Context(own), {FORCES: _of_matrix})
+
+    def arrays(self) -> Arrays:
+        """See `Term`."""
+        layout = {"indptr": self.matrix.indptr, "indices": self.matrix.indices}
+        return Arrays({"data": self.matrix.data}, layout)
+
+    def pulled(self) -> Pulled:
+        """See `Term`."""
+        start, column = self.matrix.indptr.astype(np.int64), self.matrix.indices.astype(np.int64)
+        out = np.zeros_like(self.matrix.data)
+        own = _MatrixBackward(start, column, self.matrix.data, out)
+        return Pulled(Context(own), _matrix_pullback, {"data": out})
 
     @cached_property
     def damping_places(self) -> tuple[NDArray, NDArray]:
@@ -98,6 +148,15 @@ class DampingRows(Term):
     def compiled(self, work: Any, kept: Any, group: int) -> Compiled:
         """See `Term`."""
         return Compiled(Context(_Rows(self.rows)), {FORCES: _of_rows})
+
+    def arrays(self) -> Arrays:
+        """See `Term`."""
+        return Arrays({"rows": self.rows}, {})
+
+    def pulled(self) -> Pulled:
+        """See `Term`."""
+        out = np.zeros_like(self.rows)
+        return Pulled(Context(_RowsBackward(self.rows, out)), _rows_pullback, {"rows": out})
 
     def placed(self, order: NDArray, before: Assembly) -> DampingRows:
         """See `Term`."""

@@ -95,6 +95,77 @@ def dihedral_gradient(jx, jy, jz, kx, ky, kz, ix, iy, iz, lx, ly, lz):
 
 
 @inner_scalar
+def dihedral_rates(
+    jx, jy, jz, kx, ky, kz, ix, iy, iz, lx, ly, lz, vjx, vjy, vjz, vkx, vky, vkz, vix, viy, viz,
+    vlx, vly, vlz,
+):  # fmt: skip
+    """Dihedral (rad), its gradient, and the rates of both where the points move with velocities.
+
+    1 + 12 numbers, then their rates, 1 + 12 numbers.
+    """
+    bx, by, bz = kx - jx, ky - jy, kz - jz
+    rx, ry, rz = ix - jx, iy - jy, iz - jz
+    sx, sy, sz = kx - lx, ky - ly, kz - lz
+    dbx, dby, dbz = vkx - vjx, vky - vjy, vkz - vjz
+    drx, dry, drz = vix - vjx, viy - vjy, viz - vjz
+    dsx, dsy, dsz = vkx - vlx, vky - vly, vkz - vlz
+    mx, my, mz = ry * bz - rz * by, rz * bx - rx * bz, rx * by - ry * bx
+    nx, ny, nz = by * sz - bz * sy, bz * sx - bx * sz, bx * sy - by * sx
+    dmx = dry * bz - drz * by + ry * dbz - rz * dby
+    dmy = drz * bx - drx * bz + rz * dbx - rx * dbz
+    dmz = drx * by - dry * bx + rx * dby - ry * dbx
+    dnx = dby * sz - dbz * sy + by * dsz - bz * dsy
+    dny = dbz * sx - dbx * sz + bz * dsx - bx * dsz
+    dnz = dbx * sy - dby * sx + bx * dsy - by * dsx
+    bb = bx * bx + by * by + bz * bz
+    mm = mx * mx + my * my + mz * mz
+    nn = nx * nx + ny * ny + nz * nz
+    length = math.sqrt(bb)
+    theta = PI + branch_free_atan2(
+        -length * (rx * nx + ry * ny + rz * nz), -(mx * nx + my * ny + mz * nz)
+    )
+    once = 1.0 / (bb * mm * nn)
+    per_bb, per_mm, per_nn = mm * nn * once, bb * nn * once, bb * mm * once
+    fi, fl = length * per_mm, -length * per_nn
+    rho = (rx * bx + ry * by + rz * bz) * per_bb
+    sigma = (sx * bx + sy * by + sz * bz) * per_bb
+    dhalf = bx * dbx + by * dby + bz * dbz  # half the rate of bb
+    dfi = fi * (dhalf * per_bb - 2.0 * (mx * dmx + my * dmy + mz * dmz) * per_mm)
+    dfl = fl * (dhalf * per_bb - 2.0 * (nx * dnx + ny * dny + nz * dnz) * per_nn)
+    drho = drx * bx + dry * by + drz * bz + rx * dbx + ry * dby + rz * dbz
+    drho = (drho - 2.0 * rho * dhalf) * per_bb
+    dsigma = dsx * bx + dsy * by + dsz * bz + sx * dbx + sy * dby + sz * dbz
+    dsigma = (dsigma - 2.0 * sigma * dhalf) * per_bb
+    gix, giy, giz = fi * mx, fi * my, fi * mz
+    glx, gly, glz = fl * nx, fl * ny, fl * nz
+    hix, hiy, hiz = dfi * mx + fi * dmx, dfi * my + fi * dmy, dfi * mz + fi * dmz
+    hlx, hly, hlz = dfl * nx + fl * dnx, dfl * ny + fl * dny, dfl * nz + fl * dnz
+    less_rho, less_sigma = rho - 1.0, sigma - 1.0
+    # of the motion of the wings against the axis: the gradient of a translation is none
+    rate = gix * drx + giy * dry + giz * drz + (sigma * glx - rho * gix) * dbx
+    rate += (sigma * gly - rho * giy) * dby + (sigma * glz - rho * giz) * dbz
+    rate -= glx * dsx + gly * dsy + glz * dsz
+    return (
+        theta,
+        less_rho * gix - sigma * glx,
+        less_rho * giy - sigma * gly,
+        less_rho * giz - sigma * glz,
+        less_sigma * glx - rho * gix,
+        less_sigma * gly - rho * giy,
+        less_sigma * glz - rho * giz,
+        gix, giy, giz, glx, gly, glz,
+        rate,
+        drho * gix + less_rho * hix - dsigma * glx - sigma * hlx,
+        drho * giy + less_rho * hiy - dsigma * gly - sigma * hly,
+        drho * giz + less_rho * hiz - dsigma * glz - sigma * hlz,
+        dsigma * glx + less_sigma * hlx - drho * gix - rho * hix,
+        dsigma * gly + less_sigma * hly - drho * giy - rho * hiy,
+        dsigma * glz + less_sigma * hlz - drho * giz - rho * hiz,
+        hix, hiy, hiz, hlx, hly, hlz,
+    )  # fmt: skip
+
+
+@inner_scalar
 def _cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 

@@ -37,6 +37,8 @@ class HingeMemory(Term):
     sheet : SheetTerm
     """
 
+    undifferentiated = "creases that yield, creep, relax or, beside panels that give way, damp"
+
     def __init__(self, own: MemoryHinges, settles: NDArray, sheet: SheetTerm) -> None:
         self.own, self.settles = own, settles
         self._offset, self._rows = sheet.series()[1], sheet.rows

@@ -55,9 +55,15 @@ def take(array, row, columns=3):
 def add(array, row, x, y, z):
     """Add three eights to those of a node."""
     at = 3 * WIDTH * np.int64(row)
-    put(array, at, eight(array, at) + x)
-    put(array, at + WIDTH, eight(array, at + WIDTH) + y)
-    put(array, at + 2 * WIDTH, eight(array, at + 2 * WIDTH) + z)
+    increase(array, at, x)
+    increase(array, at + WIDTH, y)
+    increase(array, at + 2 * WIDTH, z)
+
+
+@inner_scalar
+def increase(array, at, more):
+    """array[at :][:8] += more."""
+    put(array, at, eight(array, at) + more)
 
 
 @inner

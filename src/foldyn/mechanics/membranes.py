@@ -24,8 +24,9 @@ from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.eights import eight, put
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.block_matrix import pairs_within, places_of
-from foldyn.mechanics.lanes import WIDTH, add, take
+from foldyn.mechanics.lanes import WIDTH, add, increase, take
 from foldyn.mechanics.model import ranks
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
@@ -232,6 +233,113 @@ def membrane_blocks(membranes, u0, u1, loose):
     return out
 
 
+class Back(NamedTuple):
+    """Memory of the pullback for a group of eight panels, and the gradients to which it adds."""
+
+    weight: NDArray  # (24 c,) of the nodes
+    between: NDArray  # (24 b,) what the weights of the ends of the bars differ by
+    excess: NDArray  # (8 b,) length now squared less that at rest, m2
+    growth: NDArray  # (8 b,) its rate where the nodes move by half their weights
+    stress: NDArray  # (8 b,) S E
+    pulled: NDArray  # (8 b,) S^T r, r the rates of the strains
+    vector: NDArray  # (3 b, p'), p' the panels with room for whole groups
+    per_length2: NDArray  # (b, p')
+    stiffness: NDArray  # (b b, p')
+
+
+def back(membranes: Membranes) -> Back:
+    """Memory for panels."""
+    count, corners = membranes.nodes.shape
+    bars = len(membranes.ends)
+    # an odd number of groups: else rows may stand in the same few places of the cache
+    room = WIDTH * (-(-count // WIDTH) | 1)
+    return Back(
+        *(np.zeros(rows * WIDTH) for rows in (3 * corners, 3 * bars, bars, bars, bars, bars)),
+        *(np.zeros((rows, room)) for rows in (3 * bars, bars, bars * bars)),
+    )
+
+
+@inner
+def pull_membranes(own, back, u, weight, product):
+    """Add the derivatives of weight . F = r^T S E to `product` and the gradients; all flat."""
+    bars, room = own.ends.shape[0], back.vector.shape[1]
+    for first in range(0, own.count, WIDTH):
+        m, at = min(WIDTH, own.count - first), own.corners * first
+        for v in range(own.corners):
+            for q in range(m):
+                row = 3 * own.nodes[at + v * WIDTH + q]
+                for c in range(3):
+                    own.moved[(3 * v + c) * WIDTH + q] = u[row + c]
+                    back.weight[(3 * v + c) * WIDTH + q] = weight[row + c]
+        own.force[:] = 0.0
+        back.pulled[:] = 0.0
+        at = bars * (first // WIDTH)
+        for i in range(bars):
+            x1, y1, z1 = take(own.moved, own.ends[i, 0])
+            x2, y2, z2 = take(own.moved, own.ends[i, 1])
+            vx, vy, vz = take(own.vector, at + i)
+            dx, dy, dz = x2 - x1, y2 - y1, z2 - z1
+            excess = dx * (2.0 * vx + dx) + dy * (2.0 * vy + dy) + dz * (2.0 * vz + dz)
+            put(back.excess, i * WIDTH, excess)
+            put(own.strain, i * WIDTH, 0.5 * eight(own.per_length2, (at + i) * WIDTH) * excess)
+            x1, y1, z1 = take(back.weight, own.ends[i, 0])
+            x2, y2, z2 = take(back.weight, own.ends[i, 1])
+            wx, wy, wz = x2 - x1, y2 - y1, z2 - z1
+            put(back.growth, i * WIDTH, wx * (vx + dx) + wy * (vy + dy) + wz * (vz + dz))
+            row = 3 * i * WIDTH
+            put(own.along, row, dx)
+            put(own.along, row + WIDTH, dy)
+            put(own.along, row + 2 * WIDTH, dz)
+            put(back.between, row, wx)
+            put(back.between, row + WIDTH, wy)
+            put(back.between, row + 2 * WIDTH, wz)
+        for i in range(bars):
+            row = (at + i) * bars
+            rate = eight(own.per_length2, (at + i) * WIDTH) * eight(back.growth, i * WIDTH)
+            stress = 0.0 * rate
+            for j in range(bars):
+                stiffness = eight(own.stiffness, (row + j) * WIDTH)
+                strain = eight(own.strain, j * WIDTH)
+                stress = stress + stiffness * strain
+                increase(back.pulled, j * WIDTH, stiffness * rate)
+                increase(back.stiffness, (i * bars + j) * room + first, rate * strain)
+            put(back.stress, i * WIDTH, stress)
+        for i in range(bars):
+            per_length2 = eight(own.per_length2, (at + i) * WIDTH)
+            stress, pulled = eight(back.stress, i * WIDTH), eight(back.pulled, i * WIDTH)
+            growth, excess = eight(back.growth, i * WIDTH), eight(back.excess, i * WIDTH)
+            increase(back.per_length2, i * room + first, stress * growth + 0.5 * pulled * excess)
+            stress, pulled = stress * per_length2, pulled * per_length2
+            one, other = own.ends[i, 0], own.ends[i, 1]
+            for c in range(3):
+                by = stress * eight(back.between, (3 * i + c) * WIDTH)
+                by = by + pulled * eight(own.along, (3 * i + c) * WIDTH)
+                increase(back.vector, (3 * i + c) * room + first, by)
+                by = by + pulled * eight(own.vector, (3 * (at + i) + c) * WIDTH)
+                increase(own.force, (3 * other + c) * WIDTH, by)
+                increase(own.force, (3 * one + c) * WIDTH, -by)
+        at = own.corners * first
+        for v in range(own.corners):
+            for q in range(m):
+                row = 3 * own.nodes[at + v * WIDTH + q]
+                for c in range(3):
+                    product[row + c] += own.force[(3 * v + c) * WIDTH + q]
+
+
+class _Backward(NamedTuple):
+    own: Packed
+    back: Back
+    rows: int
+
+
+@pullback
+def _pullback(own, u, v, t, weight, product, rate):
+    moved, weights, out = (
+        rows_at(u, own.rows), rows_at(weight, own.rows), rows_at(product, own.rows)
+    )  # fmt: skip
+    pull_membranes(own.own, own.back, flat(moved), flat(weights), flat(out))
+
+
 class _Context(NamedTuple):
     own: Packed  # with nodes of the thread
     whole: Membranes
@@ -292,6 +400,20 @@ class MembranesTerm(Term):
         return Compiled(
             Context(context), {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
         )
+
+    def arrays(self) -> Arrays:
+        """See `Term`."""
+        return arrays_of(self.membranes)
+
+    def pulled(self) -> Pulled:
+        """See `Term`."""
+        own = back(self.membranes)
+        gradient = {  # without the room
+            name: getattr(own, name).reshape(*array.shape[:-1], -1)[..., : array.shape[-1]]
+            for name, array in self.arrays().numbers.items()
+        }
+        context = Context(_Backward(packed(self.membranes), own, self.rows))
+        return Pulled(context, _pullback, gradient)
 
     @cached_property
     def places(self) -> tuple[NDArray, NDArray]:

@@ -159,6 +159,16 @@ def factorize_band(band):
 
 
 @inner
+def factorize(model, work):
+    """Factorize the stiffness of rotations at the slopes of folds in memory, to work.factor."""
+    factor, band = flat(work.factor), flat(model.band)
+    for k in range(band.size):  # an assignment of slices takes seconds to compile
+        factor[k] = band[k]
+    add_folds(model.plates, model.rank, work.plates.slope, work.factor)
+    factorize_band(work.factor)
+
+
+@inner
 def solve_band(factor, x):
     """Solve with a factor of `factorize_band`, in place."""
     size, width = factor.shape[0], factor.shape[1] - 1
@@ -224,11 +234,7 @@ def balance(model, u, work):
                 )  # fmt: skip
                 stiff = plates.fold_stiffness[f]
                 slope[f] = max(stiff * found + work.branches[f, 1], 0.0)
-            factor, band = flat(work.factor), flat(model.band)
-            for k in range(band.size):  # an assignment of slices takes seconds to compile
-                factor[k] = band[k]
-            add_folds(plates, model.rank, slope, work.factor)
-            factorize_band(work.factor)
+            factorize(model, work)
         largest = 0.0
         for k in range(work.x.size):
             work.step[model.rank[k]] = push[k, 0] - work.couple[k]

@@ -20,6 +20,7 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.block_matrix import blocks_of_ends, pairs_of_ends, places_of
 from foldyn.mechanics.model import ranks
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
 from foldyn.mechanics.sheet_term import unit_rows
 from foldyn.mechanics.term import (
     ENERGIES,
@@ -76,6 +77,16 @@ def axial_extension(springs, u, s):
 
 
 @inner_scalar
+def axial_pull(springs, u, s):
+    """Pull (N/m) of an axial spring per length between its ends; k where they may meet."""
+    extension, length = axial_extension(springs, u, s)
+    per_length = springs.axial_stiffness[s]
+    if springs.stretch[s] < springs.length[s]:
+        per_length *= extension / length
+    return per_length
+
+
+@inner_scalar
 def add_directed(springs, s, pull, force):
     """Add the pull (N) of a directed spring to the forces of its ends."""
     a, b = springs.ends[s, 0], springs.ends[s, 1]
@@ -93,10 +104,7 @@ def add_spring_forces(springs, u, force):
         add_directed(springs, s, pull, force)
     for s in range(springs.axial_stiffness.size):
         a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
-        extension, length = axial_extension(springs, u, s)
-        per_length = springs.axial_stiffness[s]
-        if springs.stretch[s] < springs.length[s]:  # else it is k, also where the ends meet
-            per_length *= extension / length
+        per_length = axial_pull(springs, u, s)
         for c in range(3):
             pull = per_length * (springs.vector[s, c] + u[b, c] - u[a, c])
             force[b, c] += pull
@@ -155,6 +163,76 @@ def axial_blocks(springs, u, loose):
     return out
 
 
+class Gradient(NamedTuple):
+    """Derivatives by arrays of `Springs` of the same names."""
+
+    direction: NDArray
+    stiffness: NDArray
+    vector: NDArray
+    length: NDArray
+    stretch: NDArray
+    axial_stiffness: NDArray
+
+
+@inner
+def pull_directed(springs, u, weight, out, product):
+    """Add the derivatives of weight . F of directed springs to `product` and the gradients."""
+    for s in range(springs.stiffness.size):
+        a, b, k = springs.ends[s, 0], springs.ends[s, 1], springs.stiffness[s]
+        extension, rate = directed_extension(springs, u, s), directed_extension(springs, weight, s)
+        out.stiffness[s] += extension * rate
+        add_directed(springs, s, k * rate, product)
+        for c in range(3):
+            moved = u[a, c] - (u[b, c] if b >= 0 else 0.0)
+            weighs = weight[a, c] - (weight[b, c] if b >= 0 else 0.0)
+            out.direction[s, c] += k * (moved * rate + weighs * extension)
+
+
+@inner
+def pull_axial(springs, u, weight, out, product):
+    """The same of axial springs, those without length at rest as they are if that grows."""
+    for s in range(springs.axial_stiffness.size):
+        a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]
+        extension, length = axial_extension(springs, u, s)
+        share = 1.0  # force over k l
+        if springs.stretch[s] < springs.length[s]:
+            share = extension / length
+        grown = 0.0  # what the ends part by where they move by the weights, times l
+        for c in range(3):
+            x = springs.vector[s, c] + u[b, c] - u[a, c]
+            grown += (weight[b, c] - weight[a, c]) * x
+        k = springs.axial_stiffness[s]
+        by_extension = k * grown / length if length > 0.0 else 0.0
+        by_length = by_extension * (1.0 - share)  # l, of which the extension is a part
+        out.axial_stiffness[s] += share * grown
+        out.stretch[s] += by_extension
+        if length > 0.0:
+            out.length[s] += by_length * springs.length[s] / length - by_extension
+            by_length /= length
+        for c in range(3):
+            moved = u[b, c] - u[a, c]
+            by = k * share * (weight[b, c] - weight[a, c]) + by_length * moved
+            out.vector[s, c] += by
+            by += by_length * springs.vector[s, c]
+            product[b, c] += by
+            product[a, c] -= by
+
+
+class _Backward(NamedTuple):
+    springs: Springs
+    out: Gradient
+    rows: int  # up to the last node
+
+
+@pullback
+def _pullback(own, u, v, t, weight, product, rate):
+    moved, weights, out = (
+        rows_at(u, own.rows), rows_at(weight, own.rows), rows_at(product, own.rows)
+    )  # fmt: skip
+    pull_directed(own.springs, moved, weights, own.out, out)
+    pull_axial(own.springs, moved, weights, own.out, out)
+
+
 class _Context(NamedTuple):
     springs: Springs
     group: int  # of the energies
@@ -194,6 +272,17 @@ class SpringsTerm(Term):
         """See `Term`."""
         own = Context(_Context(self.springs, group, int(work.strips.own[1])))
         return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
+
+    def arrays(self) -> Arrays:
+        """See `Term`."""
+        return arrays_of(self.springs)
+
+    def pulled(self) -> Pulled:
+        """See `Term`."""
+        rows = 1 + int(self._ends.max(initial=GROUND))
+        out = Gradient(*(np.zeros_like(getattr(self.springs, name)) for name in Gradient._fields))
+        own = Context(_Backward(self.springs, out, rows))
+        return Pulled(own, _pullback, out._asdict())
 
     @cached_property
     def _ends(self) -> NDArray:

@@ -116,6 +116,8 @@ class Term(ABC):
         Whether some of the hidden dofs are its own.
     damps : bool
         Whether its forces resist velocities, and dissipate all their work.
+    undifferentiated : str
+        What it is called where gradients are refused, of a term that has no `pulled`.
     """
 
     energy_groups: ClassVar[Mapping[str, str]] = {}
@@ -123,6 +125,7 @@ class Term(ABC):
     shared: ClassVar[bool] = False
     owns_hidden: ClassVar[bool] = False
     damps: ClassVar[bool] = False
+    undifferentiated: ClassVar[str] = ""
 
     # ------------------------------------------------------------------ what is compiled
     @abstractmethod
@@ -195,6 +198,15 @@ class Term(ABC):
         """The same as a matrix (m, m)."""
         entries = (self.damping_entries(q), self.damping_places)
         return sparse.csr_array(sparse.coo_array(entries, shape=(q.size, q.size)))
+
+    # ------------------------------------------------------------------ gradients
+    def arrays(self) -> Any:
+        """`pullback.Arrays` that its forces depend on; None where it has no gradients."""
+        return None
+
+    def pulled(self) -> Any:
+        """Its forces differentiated, as `pullback.Pulled`; None where it has no gradients."""
+        return None
 
     # ------------------------------------------------------------------ measures
     @property

@@ -20,8 +20,10 @@ from scipy import sparse
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at
+from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.dihedral import dihedral_gradient
+from foldyn.mechanics.dihedral import dihedral_gradient, dihedral_rates
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
 from foldyn.mechanics.sheet_term import NO_DOF
 from foldyn.mechanics.term import FORCES, Compiled, Term, forces
 
@@ -127,7 +129,7 @@ def hinge_gradient(x, dofs, hidden_turn, moved, out):
 
 
 @inner
-def _gradient(elements, moved, e, out):
+def element_gradient(elements, moved, e, out):
     """Gradient (14,) of element e at flat displacements."""
     dofs, p = elements.dofs[e], elements.axial.shape[0]
     for c in range(14):
@@ -149,7 +151,7 @@ def _gradient(elements, moved, e, out):
 def put_gradients(elements, moved, out):
     """Gradients of all elements at flat displacements, to out (p + h, 14)."""
     for e in range(elements.coefficient.size):
-        _gradient(elements, moved, e, out[e])
+        element_gradient(elements, moved, e, out[e])
 
 
 class _Context(NamedTuple):
@@ -164,7 +166,7 @@ def _forces(own, u, v, t, force, powers):
         numbers_at(u, own.size), numbers_at(v, own.size), numbers_at(force, own.size)
     )  # fmt: skip
     for e in range(elements.coefficient.size):
-        _gradient(elements, moved, e, g)
+        element_gradient(elements, moved, e, g)
         rate = 0.0
         for c in range(14):
             rate += g[c] * speed[elements.dofs[e, c]]
@@ -173,6 +175,97 @@ def _forces(own, u, v, t, force, powers):
             out[elements.dofs[e, c]] += resisted * g[c]
         power += resisted * rate
     numbers_at(powers, 2)[1] += power
+
+
+class Gradient(NamedTuple):
+    """Derivatives by arrays of `Viscous` of the same names."""
+
+    axial: NDArray
+    corners: NDArray
+    hidden_turn: NDArray
+    coefficient: NDArray
+
+
+class _Backward(NamedTuple):
+    elements: Viscous
+    out: Gradient
+    points: NDArray  # (4, 3) memory: positions of one hinge, m
+    moves: NDArray  # (14,) velocities of the dofs of one element
+    by: NDArray  # (14,)
+    size: int  # up to the last dof
+
+
+@inner
+def _turn_gradient(elements, moved, e, z, points, out):
+    """Rate (14,) of the gradient of element e where its dofs move by z (14,), to `out`."""
+    dofs, p = elements.dofs[e], elements.axial.shape[0]
+    for c in range(14):
+        out[c] = 0.0
+    if e < p:
+        g, square, along = elements.gradient, 0.0, 0.0  # g is at these displacements
+        for c in range(3):
+            x = elements.axial[e, c] + moved[dofs[3 + c]] - moved[dofs[c]]
+            square += x * x
+            along += g[3 + c] * (z[3 + c] - z[c])
+        length = math.sqrt(square)
+        for c in range(3):
+            out[3 + c] = (z[3 + c] - z[c] - g[3 + c] * along) / length
+            out[c] = -out[3 + c]
+        return
+    ride = 3 if dofs[9] == dofs[0] else 9
+    for c in range(3):
+        for n in range(3):
+            points[n, c] = elements.corners[e - p, n, c] + moved[dofs[3 * n + c]]
+        mean = 0.5 * (moved[dofs[9 + c]] + moved[dofs[ride + c]])
+        points[3, c] = elements.corners[e - p, 3, c] + mean
+    x = flat(points)
+    found = dihedral_rates(
+        x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11],
+        z[0], z[1], z[2], z[3], z[4], z[5], z[6], z[7], z[8],
+        0.5 * (z[9] + z[ride]), 0.5 * (z[10] + z[ride + 1]), 0.5 * (z[11] + z[ride + 2]),
+    )  # fmt: skip
+    for c in range(12):
+        out[c] = found[14 + c]
+
+
+@pullback
+def _pullback(own, u, v, t, weight, product, rate):
+    """w . F = c (g . w) (g . v): by positions c times the rate of g along (g.w) v + (g.v) w."""
+    elements, g, z, by, out = own.elements, own.elements.gradient, own.moves, own.by, own.out
+    moved, speed, weights = (
+        numbers_at(u, own.size), numbers_at(v, own.size), numbers_at(weight, own.size)
+    )  # fmt: skip
+    by_u, by_v, p = (
+        numbers_at(product, own.size),
+        numbers_at(rate, own.size),
+        own.out.axial.shape[0],
+    )
+    for e in range(elements.coefficient.size):
+        dofs, coefficient = elements.dofs[e], elements.coefficient[e]
+        element_gradient(elements, moved, e, g)
+        ahead, back = 0.0, 0.0
+        for c in range(14):
+            ahead += g[c] * speed[dofs[c]]
+            back += g[c] * weights[dofs[c]]
+        for c in range(14):
+            by_v[dofs[c]] += coefficient * back * g[c]
+            z[c] = coefficient * (back * speed[dofs[c]] + ahead * weights[dofs[c]])
+        out.coefficient[e] += back * ahead
+        _turn_gradient(elements, moved, e, z, own.points, by)
+        if e < p:
+            for c in range(3):
+                out.axial[e, c] += by[3 + c]
+        else:
+            for c in range(12):
+                out.corners[e - p, c // 3, c % 3] += by[c]
+            out.hidden_turn[e - p, 0] -= z[12]
+            out.hidden_turn[e - p, 1] -= z[13]
+            if dofs[9] == dofs[0]:
+                for c in range(3):
+                    by[9 + c] *= 0.5
+                    by[3 + c] += by[9 + c]
+        for c in range(12):
+            by_u[dofs[c]] += by[c]
 
 
 class ViscousTerm(Term):
@@ -187,6 +280,18 @@ class ViscousTerm(Term):
         """See `Term`."""
         own = Context(_Context(self.elements, 3 * int(work.strips.own[1])))
         return Compiled(own, {FORCES: _forces})
+
+    def arrays(self) -> Arrays:
+        """See `Term`."""
+        return arrays_of(self.elements, "gradient")
+
+    def pulled(self) -> Pulled:
+        """See `Term`."""
+        out = Gradient(*(np.zeros_like(getattr(self.elements, name)) for name in Gradient._fields))
+        moves, by = np.zeros((2, WIDTH))
+        size = 1 + int(self.elements.dofs.max(initial=0))
+        own = Context(_Backward(self.elements, out, np.zeros((4, 3)), moves, by, size))
+        return Pulled(own, _pullback, out._asdict())
 
     @cached_property
     def _coupled(self) -> tuple[NDArray, NDArray, NDArray]:

@@ -21,6 +21,7 @@ from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.mechanics.block_matrix import pairs_within, places_of
 from foldyn.mechanics.membranes import Membranes
 from foldyn.mechanics.model import ranks
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of, pullback
 from foldyn.mechanics.term import FORCES, Compiled, Term, forces, nodal
 
 
@@ -98,6 +99,60 @@ def _forces(own, u, v, t, force, powers):
     numbers_at(powers, 2)[1] += power
 
 
+class Gradient(NamedTuple):
+    """Derivatives by arrays of `ViscousPanels` of the same names."""
+
+    vector: NDArray
+    per_length2: NDArray
+    resistance: NDArray
+
+
+class _Backward(NamedTuple):
+    panels: ViscousPanels
+    out: Gradient
+    growth: NDArray  # (2, b) memory of one panel: rates of its bars' lengths, times length,
+    stress: NDArray  # (2, b) and C and C^T times those of strains, by the weights and velocities
+    rows: int  # up to the last node
+
+
+@pullback
+def _pullback(own, u, v, t, weight, product, rate):
+    panels, bars, by = own.panels, own.panels.rate.size, own.out
+    moved, speed, weights = (
+        rows_at(u, own.rows), rows_at(v, own.rows), rows_at(weight, own.rows)
+    )  # fmt: skip
+    out, by_speed = rows_at(product, own.rows), rows_at(rate, own.rows)
+    growth, stress = own.growth, own.stress
+    for p in range(panels.nodes.shape[0]):
+        _vectors(panels, p, moved)
+        for i in range(bars):
+            a, b = panels.nodes[p, panels.ends[p, i, 0]], panels.nodes[p, panels.ends[p, i, 1]]
+            growth[0, i], growth[1, i] = 0.0, 0.0
+            stress[0, i], stress[1, i] = 0.0, 0.0
+            for c in range(3):
+                growth[0, i] += panels.along[i, c] * (weights[b, c] - weights[a, c])
+                growth[1, i] += panels.along[i, c] * (speed[b, c] - speed[a, c])
+        for i in range(bars):
+            back = panels.per_length2[p, i] * growth[0, i]
+            for j in range(bars):
+                ahead = panels.per_length2[p, j] * growth[1, j]
+                stress[0, j] += panels.resistance[p, i, j] * back
+                stress[1, i] += panels.resistance[p, i, j] * ahead
+                by.resistance[p, i, j] += back * ahead
+        for i in range(bars):
+            a, b = panels.nodes[p, panels.ends[p, i, 0]], panels.nodes[p, panels.ends[p, i, 1]]
+            by.per_length2[p, i] += stress[1, i] * growth[0, i] + stress[0, i] * growth[1, i]
+            ahead = panels.per_length2[p, i] * stress[1, i]
+            back = panels.per_length2[p, i] * stress[0, i]
+            for c in range(3):
+                pull = ahead * (weights[b, c] - weights[a, c]) + back * (speed[b, c] - speed[a, c])
+                by.vector[p, i, c] += pull
+                out[b, c] += pull
+                out[a, c] -= pull
+                by_speed[b, c] += back * panels.along[i, c]
+                by_speed[a, c] -= back * panels.along[i, c]
+
+
 @kernel
 def panel_blocks(panels, u):
     """Their matrices (p, c, c, 3, 3) at u (rows, 3), N s/m."""
@@ -131,6 +186,18 @@ class ViscousPanelsTerm(Term):
         """See `Term`."""
         own = Context(_Context(self.panels, int(work.strips.own[1])))
         return Compiled(own, {FORCES: _forces})
+
+    def arrays(self) -> Arrays:
+        """See `Term`."""
+        return arrays_of(self.panels, "along", "rate")
+
+    def pulled(self) -> Pulled:
+        """See `Term`."""
+        out = Gradient(*(np.zeros_like(getattr(self.panels, name)) for name in Gradient._fields))
+        growth, stress = np.zeros((2, 2, len(self.panels.rate)))
+        rows = 1 + int(self.panels.nodes.max(initial=0))
+        own = Context(_Backward(self.panels, out, growth, stress, rows))
+        return Pulled(own, _pullback, out._asdict())
 
     @cached_property
     def damping_places(self) -> tuple[NDArray, NDArray]:

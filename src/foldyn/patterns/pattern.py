@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -213,6 +214,15 @@ class Pattern(Transforms):
     def lines(self) -> NDArray[np.int64]:
         """All edges by what they are, shape (m, 2): creases, then boundary edges, then welds."""
         return np.concatenate([self.creases, self.boundary, self.welds]).reshape(-1, 2)
+
+    @cached_property
+    def sides(self) -> list[NDArray[np.float64]]:
+        """Lengths (m) of the sides of each face, from each corner to the next."""
+        x, sizes = self.vertices, [len(face) for face in self.faces]
+        here = np.concatenate(self.faces)
+        there = np.concatenate([(*face[1:], face[0]) for face in self.faces])
+        length = np.linalg.norm(x[here] - x[there], axis=1)
+        return np.split(length, np.cumsum(sizes)[:-1])
 
     def __repr__(self) -> str:
         """One line: name and counts."""

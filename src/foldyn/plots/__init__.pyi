@@ -2,6 +2,10 @@
 
 from foldyn.plots.animation import animate as animate, animate_modes as animate_modes
 from foldyn.plots.boards import draw_boards as draw_boards
+from foldyn.plots.designs import (
+    draw_sensitivity as draw_sensitivity,
+    plot_convergence as plot_convergence,
+)
 from foldyn.plots.energies import (
     plot_energies as plot_energies,
     plot_path_energies as plot_path_energies,

@@ -365,7 +365,7 @@ def add_panels(
 def add_segments(
     axes: Axes3D,
     segments: Points,
-    color: str,
+    color: Any,
     width: float,
     linestyle: Any = "solid",
     zorder: float = 2.0,

@@ -13,6 +13,7 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, Superlinear
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of
 from foldyn.mechanics.sheet_term import (
     NO_DOF,
     FoldHinges,
@@ -32,6 +33,7 @@ from foldyn.shells.kernels import (
     shell_kernels,
     shell_work,
 )
+from foldyn.shells.pullback import shell_pulled
 from foldyn.shells.tangent import (
     ShellPattern,
     add_extrapolated_strain,
@@ -132,6 +134,14 @@ class ShellTerm(SheetTerm):
     def compiled(self, work: Any, kept: ShellWork, group: int) -> Compiled:
         """See `Term`."""
         return shell_kernels(self.model, kept)
+
+    def arrays(self) -> Arrays:
+        """See `Term`."""
+        return arrays_of(self.model, "addresses")
+
+    def pulled(self) -> Pulled:
+        """See `Term`."""
+        return shell_pulled(self.model)
 
     @property
     def hinges(self) -> NDArray:

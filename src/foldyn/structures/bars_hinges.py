@@ -13,8 +13,10 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.materials import BarLaw, HingeLaw, Superlinear
 from foldyn.mechanics.bars_hinges import bars_hinges_kernels
+from foldyn.mechanics.bars_hinges_pullback import bars_hinges_pulled
 from foldyn.mechanics.energy import gradients
 from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of
 from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges, SheetTerm, SoftHinges, largest_turn
 from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_mean_tangent, put_tangent
 from foldyn.mechanics.term import Compiled, Folds, Strains, Unstrained
@@ -105,6 +107,14 @@ class BarsHingesTerm(SheetTerm):
         """See `Term`."""
         return bars_hinges_kernels(self.model, kept, len(GROUPS))
 
+    def arrays(self) -> Arrays:
+        """See `Term`."""
+        return arrays_of(self.model, "addresses")
+
+    def pulled(self) -> Pulled:
+        """See `Term`."""
+        return bars_hinges_pulled(self.model)
+
     @property
     def hinges(self) -> NDArray:
         """See `SheetTerm`."""
@@ -169,6 +179,11 @@ class BarsHingesTerm(SheetTerm):
         stiffness = np.zeros(len(alone.hinges))
         stiffness[self._soft] = alone.hinge_stiffness[self._soft] * slope
         return self._with(alone._replace(hinge_stiffness=stiffness)).tangent(q)
+
+    def weakened(self, hinges: NDArray) -> BarsHingesTerm:
+        """The sheet without the stiffness of some of its hinges, a mask (nh,)."""
+        stiffness = np.where(hinges, 0.0, self.model.hinge_stiffness)
+        return self._with(self.model._replace(hinge_stiffness=stiffness))
 
     @property
     def rest_angles(self) -> NDArray:

@@ -21,7 +21,9 @@ from foldyn.mechanics.plates import (
     turn_folds,
     turn_hinges,
 )
+from foldyn.mechanics.plates_pullback import plates_pulled
 from foldyn.mechanics.plates_tangent import PlatesPattern, add_plates_tangent, plates_pattern
+from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of
 from foldyn.mechanics.sheet_term import (
     NO_DOF,
     FoldHinges,
@@ -131,6 +133,14 @@ class BarsPlatesTerm(SheetTerm):
     def compiled(self, work: Any, kept: PlatesWork, group: int) -> Compiled:
         """See `Term`."""
         return plates_kernels(self.model, kept, self.rows)
+
+    def arrays(self) -> Arrays:
+        """See `Term`."""
+        return arrays_of(self.model, "addresses")
+
+    def pulled(self) -> Pulled:
+        """See `Term`."""
+        return plates_pulled(self.model)
 
     @property
     def hinges(self) -> NDArray:

@@ -127,7 +127,7 @@ def bar_areas(
         stiffer = own.youngs_modulus / sheet.youngs_modulus
         inside = slice(inner_first[panel], inner_first[panel + 1])
         ends = [edge_of(a, b) for a, b in around(face)]
-        length = np.linalg.norm(x[list(face)] - x[[*face[1:], face[0]]], axis=1)
+        length = pattern.sides[panel]
         if len(face) == 4 and mesh.centers[panel] >= 0 and not alike:
             if nu <= 0.0:
                 raise InputError(

@@ -22,6 +22,8 @@ from foldyn.mechanics.plates_condensed import (
     condensed_plates,
     condensed_work,
 )
+from foldyn.mechanics.plates_condensed_pullback import condensed_pulled
+from foldyn.mechanics.pullback import Arrays, Pulled
 from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges
 from foldyn.mechanics.step_tangent import SparseBlocks
 from foldyn.mechanics.term import Compiled, Unstrained
@@ -31,6 +33,7 @@ from foldyn.structures.bars_plates import BarsPlatesTerm
 class CondensedPlatesTerm(BarsPlatesTerm):
     """Bars, folds and plates by their displacements alone; see `mechanics.sheet_term.SheetTerm`."""
 
+    undifferentiated = "creases that yield, creep, relax or, beside panels that give way, damp"
     _held: Context  # of branches of its folds
 
     def __init__(
@@ -56,6 +59,17 @@ class CondensedPlatesTerm(BarsPlatesTerm):
     def compiled(self, work: Any, kept: CondensedWork, group: int) -> Compiled:
         """See `Term`."""
         return condensed_kernels(self.condensed, kept)
+
+    def arrays(self) -> Arrays | None:
+        """See `Term`."""
+        if self.condensed.memory.any():
+            return None
+        found = super().arrays()
+        return found._replace(numbers={**found.numbers, "push": self._push})
+
+    def pulled(self) -> Pulled | None:
+        """See `Term`."""
+        return None if self.condensed.memory.any() else condensed_pulled(self.condensed)
 
     def workspaces(self, threads: int) -> list[CondensedWork]:
         """See `SheetTerm`."""

@@ -165,7 +165,7 @@ def _sides(
             area = float(pattern.face_areas[p])
             both /= youngs[p] * thickness[p] * 2.0 * area  # an outline's area is 1/2
             held[k] = both > STRAIGHT * sine**2 or not stiff.isdisjoint((p, other))
-            resistance[k] = 0.0 if held[k] else float(f"{both / sine**2:.6g}")
+            resistance[k] = 0.0 if held[k] else float(f"{both / sine**2:.10g}")
         x = pattern.vertices[list(face)]
         center = x.mean(axis=0) if len(face) > 3 else None
         if mesh.centers[p] >= 0:

@@ -18,7 +18,7 @@ from scipy.sparse.linalg import splu
 
 from foldyn.mechanics.triangle import triangle_stiffness
 
-DIGITS = 9  # to which panels have the same shape
+DIGITS = 11  # to which panels have the same shape
 TRIANGLE_MASS = (np.ones((3, 3)) + np.eye(3)) / 12.0  # of 1 in all, linear between corners
 Rows = tuple[tuple[float, float], ...]
 

@@ -25,11 +25,7 @@ def doubt_units(pattern: Pattern, sheet: Sheet) -> None:
 
 
 def _doubts(pattern: Pattern, sheet: Sheet) -> Iterator[str]:
-    x, count = pattern.vertices, len(pattern.faces)
-    loops = (x[list(face)] for face in pattern.faces)
-    shortest = np.array([
-        np.linalg.norm(loop - np.roll(loop, 1, axis=0), axis=1).min() for loop in loops
-    ])  # fmt: skip
+    count, shortest = len(pattern.faces), np.array([sides.min() for sides in pattern.sides])
     thickness = sheet.values("thickness", count)
     thick = thickness / shortest
     worst = int(thick.argmax())

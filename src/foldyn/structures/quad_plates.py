@@ -26,7 +26,7 @@ DEGREES = (4, 6)
 OBTUSE = 2.0 * np.pi / 3.0
 POINTS = 8  # of Gauss, in each direction
 CHUNK = 256  # panels at a time
-DIGITS = 9  # to which panels are alike
+DIGITS = 11  # to which panels are alike
 SIGNS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])  # xi, eta of the corners
 
 

@@ -25,7 +25,7 @@ from foldyn.sweeps.points import Point
 
 COMPUTING = ("analyses", "results", "sweeps")
 """Folders that measures depend on, besides the solvers."""
-ASIDE = ("sweep", "title")
+ASIDE = ("design", "sweep", "title")
 """Tables and keys of a case file that change no result."""
 
 

@@ -18,9 +18,10 @@ from foldyn.analyses import CaseFile
 from foldyn.cases import Case
 from foldyn.cases.directions import AXES
 from foldyn.errors import FoldynError, InputError
-from foldyn.values import choice, show, suggest
+from foldyn.values import choice, number, show, suggest
 
 NODE, AXIS, MODE, MODEL = "node", "axis", "mode", "model"
+REALS = {"time": "s", "displacement": "m", "frequency": "Hz"}
 """Arguments that a measure may have."""
 _ASKED = re.compile(r"([A-Za-z_]\w*)(?:\[([^\[\]]*)\])?\Z")
 _NAME = re.compile(r"[A-Za-z_]\w*\Z")
@@ -46,7 +47,8 @@ class Measure:
     dims : tuple of str
         Dimensions of an array; their lengths may differ from point to point.
     takes : tuple of str
-        Arguments, in their order: "node", "axis", "mode", "model".
+        Arguments, in their order: "node", "axis", "mode", "model", "time", "displacement",
+        "frequency".
     needs : int
         How many of them must be given.
     through : callable, optional
@@ -178,6 +180,13 @@ def _argument(text: str, what: str, word: str) -> Any:
         return choice(f" = {show(text)}: axis", word, AXES)
     if what == MODEL:
         return word
+    if what in REALS:
+        try:
+            return number("", float(word))
+        except (ValueError, InputError):
+            raise InputError(
+                f" = {show(text)}: {what} = {show(word)}: give a number, {REALS[what]}"
+            ) from None
     least = 1 if what == MODE else 0
     if not (word.isascii() and word.isdecimal()) or int(word) < least:
         raise InputError(f" = {show(text)}: {what} = {show(word)}: give a number from {least} on")

@@ -24,6 +24,7 @@ from foldyn.signals import (
     spectrum,
 )
 from foldyn.statics import Landscape, landscape
+from foldyn.statics.load_at import load_at
 from foldyn.sweeps.measure import MODE, Measure
 from foldyn.viewer.fields import bar_strain
 
@@ -48,6 +49,11 @@ def _measure(*kinds: str, **about: Any) -> Callable[[F], F]:
         return function
 
     return registered
+
+
+@_measure(units="kg", doc="mass of the sheet and of point masses")
+def _mass(result: xr.Dataset, case: Case) -> float:
+    return float(case.mass.sum())
 
 
 # ------------------------------------------------------------------------- modes
@@ -93,7 +99,9 @@ def _rigid_modes(result: xr.Dataset, case: Case) -> int:
 
 
 # ------------------------------------------------------- responses, and spectra of motions
-def _curve(result: xr.Dataset, node: int, axis: str | None) -> tuple[NDArray, NDArray, Peaks, str]:
+def curve_of(
+    result: xr.Dataset, node: int, axis: str | None
+) -> tuple[NDArray, NDArray, Peaks, str]:
     """Frequencies, magnitudes at a node (of the vector where no axis is named), and their peaks."""
     along = list(AXES) if axis is None else [axis]
     if "time" in result:
@@ -113,21 +121,39 @@ def _curve(result: xr.Dataset, node: int, axis: str | None) -> tuple[NDArray, ND
     return f, size, peaks, kind_of(shown)
 
 
-def _highest(peaks: Peaks) -> int | None:
+def highest(peaks: Peaks) -> int | None:
+    """Number of the highest peak, if there is one."""
     return int(np.argmax(peaks.height)) if peaks.height.size else None
+
+
+def frequency_of(result: xr.Dataset, frequency: float) -> int:
+    """Number of the nearest frequency (Hz) of a response, half their distance off at most."""
+    known = result["frequency"].values
+    k = int(np.abs(known - frequency).argmin())
+    if abs(known[k] - frequency) > 0.5 * np.diff(known).max(initial=0.0):
+        raise InputError(f"the response has frequencies from {known[0]:g} to {known[-1]:g} Hz")
+    return k
+
+
+@_measure(FRF, units="", doc="magnitude of the response at a frequency (unit of the response)")
+def _response(
+    result: xr.Dataset, case: Case, node: int, axis: str, frequency: float
+) -> float:  # fmt: skip
+    response = result[quantity_of(result)].transpose("frequency", ...).sel(node=node, axis=axis)
+    return float(np.abs(response.values[frequency_of(result, frequency)]))
 
 
 @_measure(*CURVES, units="Hz", doc="frequency of the highest peak")
 def _peak_frequency(result: xr.Dataset, case: Case, node: int, axis: str | None = None) -> float:
-    peaks = _curve(result, node, axis)[2]
-    k = _highest(peaks)
+    peaks = curve_of(result, node, axis)[2]
+    k = highest(peaks)
     return np.nan if k is None else float(peaks.frequency[k])
 
 
 @_measure(*CURVES, units="", doc="height of the highest peak (unit of the response)")
 def _peak_height(result: xr.Dataset, case: Case, node: int, axis: str | None = None) -> float:
-    peaks = _curve(result, node, axis)[2]
-    k = _highest(peaks)
+    peaks = curve_of(result, node, axis)[2]
+    k = highest(peaks)
     return np.nan if k is None else float(peaks.height[k])
 
 
@@ -135,13 +161,13 @@ def _peak_height(result: xr.Dataset, case: Case, node: int, axis: str | None = N
 def _peak_frequencies(
     result: xr.Dataset, case: Case, node: int, axis: str | None = None
 ) -> NDArray:  # fmt: skip
-    return _curve(result, node, axis)[2].frequency
+    return curve_of(result, node, axis)[2].frequency
 
 
 @_measure(FRF, doc="damping ratio of the highest peak, by half power")
 def _peak_damping(result: xr.Dataset, case: Case, node: int, axis: str | None = None) -> float:
-    f, size, peaks, kind = _curve(result, node, axis)
-    k = _highest(peaks)
+    f, size, peaks, kind = curve_of(result, node, axis)
+    k = highest(peaks)
     if k is None:
         return np.nan
     return half_power(f, size, float(peaks.frequency[k]), kind).damping_ratio
@@ -157,6 +183,50 @@ def _decay(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
 @_measure(*MOVED, units="m", doc="displacement at the end")
 def _displacement(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
     return float(_sampled(result, "displacement")[-1].sel(node=node, axis=axis))
+
+
+@_measure(MOTION, units="m", doc="displacement at a time (s)")
+def _displacement_at(
+    result: xr.Dataset, case: Case, node: int, axis: str, time: float
+) -> float:  # fmt: skip
+    moved = _sampled(result, "displacement")[time_of(result, time)]
+    return float(moved.sel(node=node, axis=axis))
+
+
+def time_of(result: xr.Dataset, time: float) -> int:
+    """Number of the sample at a time (s), half a sampling interval off at most."""
+    times = result["time"].values
+    k = int(np.abs(times - time).argmin())
+    if abs(times[k] - time) > 0.5 * np.diff(times).max():
+        raise InputError(f"the motion lasts from {times[0]:g} to {times[-1]:g} s")
+    return k
+
+
+@_measure(MOTION, units="m/s", doc="velocity at the end")
+def _velocity(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
+    return float(_sampled(result, "velocity")[-1].sel(node=node, axis=axis))
+
+
+@_measure(MOTION, units="m", doc="highest displacement")
+def _maximum(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
+    return float(result["displacement"].sel(node=node, axis=axis).max())
+
+
+@_measure(MOTION, units="m", doc="lowest displacement")
+def _minimum(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
+    return float(result["displacement"].sel(node=node, axis=axis).min())
+
+
+@_measure(MOTION, units="m s", doc="integral of a displacement over time")
+def _integral(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
+    moved = result["displacement"].sel(node=node, axis=axis)
+    return float(moved.integrate("time"))
+
+
+@_measure(MOTION, units="m2", doc="mean square of a displacement over time")
+def _mean_square(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
+    square, times = result["displacement"].sel(node=node, axis=axis) ** 2, result["time"].values
+    return float(square.integrate("time")) / float(times[-1] - times[0])
 
 
 @_measure(*MOVED, units="m", doc="largest displacement")
@@ -222,6 +292,13 @@ def _limit_loads(result: xr.Dataset, case: Case) -> NDArray:
 def _limit_load(result: xr.Dataset, case: Case) -> float:
     found = _loads_at(result, "limit")
     return float(found[0]) if found.size else np.nan
+
+
+@_measure(PATH, doc="load factor where a node has moved so far (m)")
+def _load_at(
+    result: xr.Dataset, case: Case, node: int, axis: str, displacement: float
+) -> float:  # fmt: skip
+    return load_at(result, 3 * node + AXES.index(axis), displacement, case).factor
 
 
 @_measure(PATH, doc="load factor of the first bifurcation")

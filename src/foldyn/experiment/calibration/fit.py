@@ -10,19 +10,25 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.experiment.calibration.fit_evaluation import (
+    PREDICTED,
+    SLOPES,
+    Point,
+    evaluate,
+    stamp,
+)
 from foldyn.experiment.calibration.fit_problem import Finer, Problem, problem
 from foldyn.experiment.calibration.fitted import Descent, Fit, score
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter
 from foldyn.experiment.calibration.uncertainty import Uncertainty
-from foldyn.sweeps.evaluations import Evaluation, Evaluations
+from foldyn.sweeps.evaluations import Evaluations
 from foldyn.sweeps.pool import Pool, pool_of
 from foldyn.values import number, whole
 
@@ -48,12 +54,8 @@ MOST_PROCESSES = 1024
 
 COUNTED = ("computed", "found")
 """Counts of a `Course`."""
-PREDICTED = "predicted"
-"""Name of what an evaluation holds."""
 Outcome = NDArray[np.float64] | str
 """All predictions in a row, or why there are none."""
-Values = tuple[float, ...]
-"""Of the parameters."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,9 @@ def fit(
 
     Every key of the case file that holds a number can be a parameter: for other values of it the
     file is read anew. Searches are by the trust region method of `scipy.optimize.least_squares`
-    with bounds, in the parameters over their scales, with difference quotients.
+    with bounds, in the parameters over their scales. Derivatives of paths, modes and frequency
+    responses are found beside the result, without running the model again; those of motions are
+    difference quotients of whole motions.
 
     Parameters
     ----------
@@ -145,7 +149,7 @@ def fit(
     made = problem(case, data, parameters, {} if ties is None else ties)
     points = made.space.starts(starts, seed)
     began = time.perf_counter()
-    with pool_of(partial(_evaluate, made), processes) as pool:
+    with pool_of(partial(evaluate, made), processes) as pool:
         search = _Search(made, pool, folder, progress)
         if processes > 1 and starts > 1:
             descents = _at_a_time(min(starts, processes), pool, search, points)
@@ -160,6 +164,7 @@ def fit(
         ends = np.cumsum([len(one) for one in made.observed()])
         predicted = np.split(np.asarray(best), ends[:-1])
         shifts = search.shifts(values, known)
+        again = tuple(search.quotients(values))
     if not lowest.converged:
         _warn(
             f"the search was {lowest.message}: the values are not those of the least misfit, and "
@@ -171,7 +176,7 @@ def fit(
         known.estimates(made.space.keys, values, shifts), known.correlation, known.singular_values,
         known.directions, confidence, known.freedom, known.misfit,
         tuple(map(score, made.measurements, predicted)), tuple(descents), made, tuple(predicted),
-        search.count, time.perf_counter() - began,
+        search.count, time.perf_counter() - began, again,
     )  # fmt: skip
 
 
@@ -207,10 +212,12 @@ class _Search:
         self.absorbed = sum(one.absorbed for one in made.measurements if not one.held_out)
         self.chosen = self.weight > 0.0
         self.observed = np.concatenate(observed)
+        runs = {i: k for k, run in enumerate(made.runs) for i in run.members}
+        self.run = np.repeat([runs[i] for i in range(len(observed))], [len(o) for o in observed])
 
-    def _evaluations(self, made: Problem, pool: Pool) -> Evaluations[Values]:
+    def _evaluations(self, made: Problem, pool: Pool) -> Evaluations[Point]:
         self.all.append(
-            Evaluations[Values](pool, partial(_stamp, made.digest()), self.folder, self._tell)
+            Evaluations[Point](pool, partial(stamp, made.digest()), self.folder, self._tell)
         )
         return self.all[-1]
 
@@ -224,9 +231,9 @@ class _Search:
             computed, found = (sum(getattr(one, name) for one in self.all) for name in COUNTED)
             self.progress(Course(computed, found, self.cost))
 
-    def at(self, points: Sequence[NDArray]) -> list[Outcome]:
+    def at(self, points: Sequence[NDArray], runs: tuple[int, ...] | None = None) -> list[Outcome]:
         """Predictions at several points, at the same time where there are processes for it."""
-        found = self.evaluations.at([tuple(map(float, point)) for point in points])
+        found = self.evaluations.at([Point(tuple(map(float, point)), runs) for point in points])
         return [one.failure or one.values[PREDICTED] for one in found]
 
     def descend(self, start: NDArray[np.float64]) -> Descent:
@@ -310,14 +317,17 @@ class _Search:
 
     def _outcome(self, made: Problem, values: NDArray[np.float64]) -> Outcome:
         """Predictions of another model."""
-        with pool_of(partial(_evaluate, made), 1) as pool:
-            (found,) = self._evaluations(made, pool).at([tuple(values.tolist())])
+        with pool_of(partial(evaluate, made), 1) as pool:
+            every = tuple(range(len(made.runs)))
+            (found,) = self._evaluations(made, pool).at([Point(tuple(values.tolist()), every)])
         return found.failure or found.values[PREDICTED]
 
-    def _residual(self, points: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+    def _residual(
+        self, points: list[NDArray[np.float64]], runs: tuple[int, ...] | None = None
+    ) -> list[NDArray[np.float64]]:
         """Weighted residuals; infinite where the model fails, so that a search steps back."""
         residuals = []
-        for predicted in self.at(points):
+        for predicted in self.at(points, runs):
             if isinstance(predicted, str):
                 residuals.append(np.full(int(self.chosen.sum()), np.inf))
                 continue
@@ -327,8 +337,37 @@ class _Search:
         return residuals
 
     def _jacobian(self, values: NDArray[np.float64], both_sides: bool) -> NDArray[np.float64]:
-        """Residuals by the parameters over their scales: difference quotients within the bounds."""
-        points = [values]
+        """Residuals by the parameters over their scales."""
+        of = self.run[self.chosen]
+        slopes, runs = self._slopes(values, False)
+        if both_sides and not np.isin(of, runs).all():
+            slopes, runs = self._slopes(values, True)
+        jacobian = slopes[self.chosen] * self.scale * self.weight[self.chosen, None]
+        if runs:
+            again = np.isin(of, runs)
+            jacobian[again] = self._quotients(values, runs, again, both_sides)
+        return jacobian
+
+    def _slopes(
+        self, values: NDArray[np.float64], second: bool
+    ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+        """Derivatives of all predictions, and runs that have none."""
+        (found,) = self.evaluations.at([Point(tuple(map(float, values)), None, second)])
+        slopes = found.values[SLOPES]
+        lost = self.chosen & np.isnan(slopes).any(axis=1)
+        return slopes, tuple(np.unique(self.run[lost]).tolist())
+
+    def quotients(self, values: NDArray[np.float64]) -> list[str]:
+        """Names of the fitted measurements whose derivatives are those of whole runs."""
+        runs, every = self._slopes(values, False)[1], self.made.measurements
+        members = {i for k in runs for i in self.made.runs[k].members}
+        return [every[i].name for i in sorted(members) if not every[i].held_out]
+
+    def _quotients(
+        self, values: NDArray[np.float64], runs: tuple[int, ...], rows: NDArray, both_sides: bool
+    ) -> NDArray[np.float64]:
+        """Some rows of them: difference quotients of whole runs within the bounds."""
+        points: list[NDArray[np.float64]] = []
         pairs: list[tuple[int, int, float]] = []  # points of each quotient, and their distance
         for k, scale in enumerate(self.scale):
             step = np.zeros(len(values))
@@ -341,14 +380,17 @@ class _Search:
                 )
             first = len(points)
             points += sides if both_sides else sides[:1]
-            end = first + 1 if len(points) == first + 2 else 0
-            pairs.append((first, end, (points[first][k] - points[end][k]) / scale))
-        residuals = self._residual(points)
+            end = first + 1 if len(points) == first + 2 else -1
+            other = points[end] if end > 0 else values
+            pairs.append((first, end, (points[first][k] - other[k]) / scale))
+        residuals = [
+            one[rows] for one in (*self._residual(points, runs), *self._residual([values]))
+        ]
         with np.errstate(invalid="ignore"):  # where the model fails
             columns = [(residuals[i] - residuals[j]) / step for i, j, step in pairs]
         if not np.isfinite(columns).all():
             place = next(k for k, one in enumerate(columns) if not np.isfinite(one).all())
-            (why,) = self.at([points[pairs[place][0]]])
+            (why,) = self.at([points[pairs[place][0]]], runs)
             raise ComputationError(
                 f"{self.made.space.keys[place]}: the model fails beside {values[place]:.6g}: {why}"
             )
@@ -380,17 +422,3 @@ def _warn_of_pairing(made: Problem, values: NDArray[np.float64]) -> None:
 
 def _warn(text: str, level: int = 4) -> None:
     warnings.warn(text, FoldynWarning, stacklevel=level)
-
-
-def _stamp(digest: str, values: Values) -> list[Any]:
-    """All that predictions depend on."""
-    return [digest, list(values)]
-
-
-def _evaluate(problem: Problem, values: Values) -> Evaluation:
-    began = time.perf_counter()
-    try:
-        found, why = {PREDICTED: np.concatenate(problem.predict(values))}, ""
-    except (InputError, ComputationError) as error:
-        found, why = {}, str(error)
-    return Evaluation(found, why, seconds=time.perf_counter() - began)

@@ -199,6 +199,8 @@ def _searches(fit: Fit) -> Table:
     header = [*(f"{key}, start" for key in keys), *(f"{key}, end" for key in keys),
               "cost", "steps", "why it ended"]  # fmt: skip
     text = f"{fit.evaluations} evaluations of the model in all."
+    if fit.quotients:
+        text += f" Derivatives of {', '.join(fit.quotients)} are quotients of whole runs."
     if len(rows) > 1:
         text = f"{fit.agreeing} of {len(rows)} searches ended at the smallest cost. {text}"
     return Table(header, rows, text)

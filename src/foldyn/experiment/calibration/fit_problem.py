@@ -15,52 +15,31 @@ from numpy.typing import NDArray
 
 from foldyn.analyses import CaseFile
 from foldyn.analyses.keys import files_of, replaced, value_at
+from foldyn.analyses.pattern_section import HINGES
 from foldyn.analyses.reading import case_of_document, read_document, validated
-from foldyn.cases import Case
 from foldyn.cases.models import SHELL
-from foldyn.dynamics.methods import method_of
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynError, FoldynWarning, InputError
 from foldyn.experiment.calibration.measurement import Measurement
-from foldyn.experiment.calibration.modal import ModalParameters, ModeShapes
 from foldyn.experiment.calibration.parameters import Parameter, Space, space
-from foldyn.experiment.calibration.responses import FrequencyResponse
+from foldyn.experiment.calibration.predicted_run import (
+    PredictedRun,
+    asked,
+    computed,
+    neighbors,
+    result_of,
+    steady,
+)
 from foldyn.experiment.camera import Sight
 from foldyn.input_files import path_of
 from foldyn.program import program
 from foldyn.values import listed, show
 
-STEADY = "generalized_alpha"
-"""Integrator of a fit where the case file leaves the choice open."""
 ASIDE = ("name", "label", "sigma", "held_out", "case", "force")
 """Fields of measurements that do not change what is predicted."""
 VIBRATIONS = ("modes", "frf")
 """Analyses whose results are looked at before a search."""
 MESH_ORDER = 2
 """Order of a shell's elements."""
-
-
-@dataclass(frozen=True, eq=False)
-class PredictedRun:
-    """One path or motion that predicts several measurements.
-
-    Attributes
-    ----------
-    path : Path
-        Its case file.
-    document : dict
-        Its content, with the changes of these measurements.
-    members : tuple of int
-        Numbers of the measurements.
-    """
-
-    path: Path
-    document: dict[str, Any]
-    members: tuple[int, ...]
-
-    @property
-    def kind(self) -> str:
-        """Kind of its analysis."""
-        return self.document["analysis"]["kind"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +63,10 @@ class Problem:
     measurements: tuple[Measurement, ...]
     runs: tuple[PredictedRun, ...]
 
-    def predict(self, values: Sequence[float] | NDArray) -> list[NDArray[np.float64]]:
-        """Values that the model gives for each measurement.
+    def predict(
+        self, values: Sequence[float] | NDArray, runs: Sequence[int] | None = None
+    ) -> list[NDArray[np.float64]]:
+        """Values that the model gives for each measurement; nan for those of runs left out.
 
         Raises
         ------
@@ -94,19 +75,77 @@ class Problem:
         ComputationError
             A path or motion cannot be computed.
         """
+        predicted = [np.full(len(one), np.nan) for one in self.observed()]
+        for k in range(len(self.runs)) if runs is None else runs:
+            for i, own in self._computed(self.runs[k], values).predicted.items():
+                predicted[i] = own
+        return predicted
+
+    def differentiate(
+        self, values: NDArray, second: bool = True
+    ) -> tuple[list[NDArray], list[NDArray]]:
+        """Values that the model gives, and their derivatives (n, p) by the parameters.
+
+        second : whether these are right to the second order in the changes of the parameters.
+
+        Derivatives are nan where a run has no neighbors, and 0 of what is not fitted.
+        """
         predicted: dict[int, NDArray[np.float64]] = {}
+        slopes: dict[int, NDArray[np.float64]] = {}
         for run in self.runs:
-            case_file = self.case_file(run, values)
-            result = _result(case_file, [self.measurements[i] for i in run.members])
-            for i in run.members:
-                predicted[i] = self.measurements[i].predicted(result, case_file.case())
-        return [predicted[i] for i in range(len(self.measurements))]
+            computed = self._computed(run, values)
+            predicted |= computed.predicted
+            try:
+                slopes |= self._slopes(run, values, computed, second)
+            except FoldynError:
+                shapes = {i: (len(own), len(values)) for i, own in computed.predicted.items()}
+                slopes |= {i: np.full(shape, np.nan) for i, shape in shapes.items()}
+        every = range(len(self.measurements))
+        return [predicted[i] for i in every], [slopes[i] for i in every]
+
+    def _computed(self, run: PredictedRun, values: Sequence[float] | NDArray) -> Computed:
+        """A run at given values."""
+        case_file, members = self.case_file(run, values), run.those_of(self.measurements)
+        result, case = result_of(case_file, members), case_file.case()
+        pairs = zip(run.members, members, strict=True)
+        return Computed(case_file, result, {i: one.predicted(result, case) for i, one in pairs})
+
+    def _slopes(
+        self, run: PredictedRun, values: NDArray, computed: Computed, second: bool
+    ) -> dict[int, NDArray[np.float64]]:
+        """Derivatives (n, p) of what a run predicts, by differences of its neighbors."""
+        members = run.those_of(self.measurements)
+        slopes = {i: np.zeros((len(own), len(values))) for i, own in computed.predicted.items()}
+        fitted = {i: self.measurements[i] for i in run.members if not self.measurements[i].held_out}
+        if not fitted:
+            return slopes
+        parts = self.space.differences(values, second)
+        points = {tuple(part.point): part.point for part in parts}
+        one = asked(computed.case_file, members)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FoldynWarning)
+            others = [asked(self.case_file(run, point), members) for point in points.values()]
+            found = neighbors(run.kind, one, computed.result, others, [*fitted.values()])
+        beside = dict(zip(points, zip(others, found, strict=True), strict=True))
+        for part in parts:
+            other, result = beside[tuple(part.point)]
+            for i, each in fitted.items():
+                slopes[i][:, part.place] += part.weight * each.predicted(result, other.case)
+        return slopes
 
     def case_file(self, run: PredictedRun, values: Sequence[float] | NDArray) -> CaseFile:
         """Case file at given values; its warnings were given when it was checked."""
+        changes = self.space.changes(values)
+        fixed = HINGES not in run.document["pattern"] and not any(
+            key.startswith("pattern") for key in changes
+        )
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
-            return case_of_document(run.path, replaced(run.document, self.space.changes(values)))
+            pattern = run.patterns[0] if fixed and run.patterns else None
+            made = case_of_document(run.path, replaced(run.document, changes), pattern=pattern)
+        if fixed and not run.patterns:
+            run.patterns.append(made.pattern)
+        return made
 
     def result(
         self,
@@ -115,8 +154,7 @@ class Problem:
         members: Sequence[Measurement] | None = None,
     ) -> Any:
         """Path or motion at given values, for its own measurements or others."""
-        own = [self.measurements[i] for i in run.members]
-        return _result(self.case_file(run, values), members or own)
+        return result_of(self.case_file(run, values), members or run.those_of(self.measurements))
 
     def observed(self) -> list[NDArray[np.float64]]:
         """Measured values of each measurement."""
@@ -149,8 +187,8 @@ class Problem:
         for run in self.runs:
             if run.kind in VIBRATIONS:
                 case_file = self.case_file(run, values)
-                members = [self.measurements[i] for i in run.members]
-                result = _computed(case_file, members)
+                members = run.those_of(self.measurements)
+                result = computed(case_file, members)
                 for one in members:
                     one.examine(result, case_file.case())
 
@@ -185,7 +223,7 @@ class Problem:
     def _motion(self, run: PredictedRun, values: Sequence[float] | NDArray) -> Any:
         """The motion that a run computes, before it begins."""
         case_file = self.case_file(run, values)
-        return case_file.computation(**_steady(case_file)).compute.motion  # type: ignore[attr-defined]
+        return case_file.computation(**steady(case_file)).compute.motion  # type: ignore[attr-defined]
 
     def _changed(self, changes: Mapping[int, Mapping[str, float]]) -> Problem:
         runs = [
@@ -193,6 +231,14 @@ class Problem:
             for k, run in enumerate(self.runs)
         ]
         return replace(self, runs=tuple(runs))
+
+
+class Computed(NamedTuple):
+    """A run at some values: its result, and what it predicts of each of its measurements."""
+
+    case_file: CaseFile
+    result: Any
+    predicted: dict[int, NDArray[np.float64]]
 
 
 class Finer(NamedTuple):
@@ -300,34 +346,8 @@ def _check(one: Measurement, case_file: CaseFile) -> None:
             f"{case_file.path} is of kind {show(kind)}"
         )
     if kind == "dynamics":
-        _steady(case_file)
+        steady(case_file)
     one.check(case_file.case(), case_file.analysis.arguments)
-
-
-def _result(case_file: CaseFile, members: Sequence[Measurement]) -> Any:
-    """What a case file asks for, without its warnings."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
-        return _computed(case_file, members)
-
-
-def _computed(case_file: CaseFile, members: Sequence[Measurement]) -> Any:
-    """What a case file asks for, at the load factors, modes or frequencies that are measured."""
-    case, given = case_file.case(), case_file.analysis.arguments
-    if case_file.analysis.kind == "dynamics":
-        changes: dict[str, Any] = _steady(case_file)
-    elif case_file.analysis.kind == "modes":
-        counts = [one.count for one in members if isinstance(one, ModeShapes | ModalParameters)]
-        changes = {"count": min(max(given["count"], *counts), len(case.free_dofs))}
-    elif case_file.analysis.kind == "frf":
-        lines = [one.frequency for one in members if isinstance(one, FrequencyResponse)]
-        changes = {"frequencies": np.unique(np.concatenate(lines))}
-    else:
-        changes = {
-            "method": "newton", "load_factors": _path(case, members), "first_step": None,
-            "until": None, "settings": replace(given["settings"], stability=False),
-        }  # fmt: skip
-    return case_file.computation(**changes).result()
 
 
 def _parts(one: Measurement) -> Iterator[Any]:
@@ -342,43 +362,3 @@ def _parts(one: Measurement) -> Iterator[Any]:
             yield from value
         else:
             yield np.isfinite(value) if item.name == "values" and not one.adapts else value
-
-
-def _path(case: Case, members: Sequence[Measurement]) -> list[float]:
-    """Load factors at which a case is measured; in the order of a test in which creases yield."""
-    given = [one.factors(case) for one in members]
-    if all(part.law.relaxes for part in case.remembering):
-        factors = np.unique(np.concatenate(given))
-        return [*factors[factors < 0.0][::-1], *factors[factors >= 0.0]]
-    if any(not np.array_equal(one, given[0]) for one in given[1:]):
-        raise InputError(
-            "data: creases that yield depend on the way, and these measurements have different "
-            "ones: give what was measured along one path, or fit them apart"
-        )
-    return given[0][np.append(True, np.diff(given[0]) != 0.0)].tolist()
-
-
-def _steady(case_file: CaseFile) -> dict[str, Any]:
-    """Arguments of `simulate` for steps that do not depend on the parameters.
-
-    Steps chosen by their error would make the misfit jump between neighboring values.
-    """
-    given = dict(case_file.analysis.arguments)
-    if given["method"] == "auto":
-        given["method"] = STEADY
-    method = method_of(given["method"])
-    if method.adaptive:
-        raise InputError(
-            f"{case_file.path}: analysis.method = {show(method.name)}: chooses its steps by their "
-            "error, which makes a misfit jump; fit with rk4, newmark or generalized_alpha"
-        )
-    if method.implicit:
-        given["tolerance"] = None
-        if given["dt"] is None:
-            if not isinstance(given["every"], float):
-                raise InputError(
-                    f"{case_file.path}: analysis.dt: missing; a fit needs fixed steps: give dt, or "
-                    "output.every in seconds, which is then the step"
-                )
-            given["dt"] = given["every"]
-    return given

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 import foldyn
-from foldyn.analyses.keys import replaced
+from foldyn.analyses.keys import files_moved, replaced
 from foldyn.arguments import brief
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.fit_problem import Problem
@@ -113,6 +113,8 @@ class Fit:
     evaluations : int
         Of the model, in all.
     seconds : float
+    quotients : tuple of str
+        Names of the measurements whose derivatives are difference quotients of whole runs.
     """
 
     estimates: tuple[Estimate, ...]
@@ -128,6 +130,7 @@ class Fit:
     predicted: tuple[NDArray[np.float64], ...] = field(repr=False)
     evaluations: int
     seconds: float
+    quotients: tuple[str, ...]
 
     def __getitem__(self, key: str) -> Estimate:
         """Estimate of a parameter."""
@@ -188,7 +191,7 @@ class Fit:
         path = Path(path)
         moved = os.path.relpath(self.problem.path.parent.resolve(), path.parent.resolve())
         text = f"# Fitted by Foldyn {foldyn.__version__} from {self.problem.path.name}.\n"
-        write_text(path, text + tomli_w.dumps(_moved(self.document(), moved)))
+        write_text(path, text + tomli_w.dumps(files_moved(self.document(), moved)))
 
     def summary(self) -> dict[str, Any]:
         """All numbers but the measured and predicted values, as JSON has them (nan is null)."""
@@ -208,6 +211,7 @@ class Fit:
             "starts": [_plain(vars(one)) for one in self.descents],
             "evaluations": self.evaluations,
             "seconds": self.seconds,
+            "quotients": list(self.quotients),
         }
 
     def dataset(self) -> xr.Dataset:
@@ -274,13 +278,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.generic):
         value = value.item()
     return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
-def _moved(value: Any, way: str) -> Any:
-    """Document whose file names are relative to another folder."""
-    if isinstance(value, dict):
-        return {
-            key: Path(way, item).as_posix() if key == "file" else _moved(item, way)
-            for key, item in value.items()
-        }
-    return [_moved(item, way) for item in value] if isinstance(value, list) else value

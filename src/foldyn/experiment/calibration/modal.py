@@ -179,6 +179,10 @@ class ModeShapes(NodeValues):
         """See `Measurement`."""
         return self.shapes(result, case)[np.isfinite(self.values)]
 
+    def places(self, result: Any, case: Case) -> NDArray[np.int64]:
+        """Places (k,) in a result of the modes that were measured."""
+        return resisted(result)[self.pairing(result, case).place]
+
     def _of_model(self, result: Any, case: Case) -> NDArray[np.float64]:
         """Shapes (K, m, a) of the model where it was measured, of modes that something resists."""
         shapes = result["shape"].transpose("mode", "node", "axis").values[resisted(result)]
@@ -275,9 +279,9 @@ class ModalParameters(Measurement):
 
     def places(self, result: Any, case: Case) -> NDArray[np.int64]:
         """Places (k,) in a result of the modes that were measured."""
-        kept = resisted(result)
         if self.shapes is not None:
-            return kept[self.shapes.pairing(result, case).place]
+            return self.shapes.places(result, case)
+        kept = resisted(result)
         _enough(self.name, len(kept), self.count, result)
         return kept[self.mode - 1]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,15 @@ from foldyn.arguments import brief
 from foldyn.errors import InputError
 from foldyn.values import number, show, suggest, whole
 
+NEAR = 1e-4
+"""Change of a parameter, in its scale, for a difference of neighbors."""
+FIRST = ((0, -1.0), (1, 1.0)), ((0, 1.0), (-1, -1.0))
+SECOND = (
+    ((1, 0.5), (-1, -0.5)),
+    ((0, -1.5), (1, 2.0), (2, -0.5)),
+    ((0, 1.5), (-1, -2.0), (-2, 0.5)),
+)
+"""Steps from a value and weights of differences by their order; the next where a bound is near."""
 MOST_STARTS = 100_000
 """Searches: a larger number is a typing error."""
 
@@ -64,6 +73,19 @@ class Parameter:
             )
 
 
+class Beside(NamedTuple):
+    """Values with one parameter changed.
+
+    point : values of all.
+    place : the parameter's.
+    weight : of a prediction there, in the derivative.
+    """
+
+    point: NDArray[np.float64]
+    place: int
+    weight: float
+
+
 @brief
 @dataclass(frozen=True)
 class Space:
@@ -92,6 +114,31 @@ class Space:
         """Values of all keys, parameters and ties, at given values of the parameters."""
         own = {key: float(value) for key, value in zip(self.keys, values, strict=True)}
         return own | {tie.key: tie.value(own) for tie in self.ties}
+
+    def differences(self, values: NDArray, second: bool) -> list[Beside]:
+        """Points beside given values, within the bounds.
+
+        Weighted sums of predictions are derivatives, right to the first or the second order.
+
+        Raises
+        ------
+        InputError
+            Bounds leave no room.
+        """
+        found = []
+        for k, one in enumerate(self.parameters):
+            step = NEAR * (one.scale or 0.0)
+            for sides in SECOND if second else FIRST:
+                ends = [values[k] + side * step for side, _ in sides]
+                if one.lower <= min(ends) and max(ends) <= one.upper:
+                    break
+            else:
+                raise InputError(f"{one.key}: the bounds are closer than {2 * NEAR:g} of its scale")
+            for end, (_, weight) in zip(ends, sides, strict=True):
+                point = np.array(values, float)
+                point[k] = end
+                found.append(Beside(point, k, weight / step))
+        return found
 
     def starts(self, count: int, seed: int) -> NDArray[np.float64]:
         """Values to start from, shape (count, p): the given ones, then random ones.

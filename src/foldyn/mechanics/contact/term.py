@@ -59,6 +59,7 @@ class ContactTerm(Term):
     energy_groups: ClassVar[Mapping[str, str]] = {GROUP: "energy of contact"}
     shared = True
     eased: ClassVar[bool] = True
+    undifferentiated: ClassVar[str] = "contact"
 
     def __init__(self, sheets: Sheets, guarded: Assembly) -> None:
         self.sheets, self._guarded = sheets, guarded

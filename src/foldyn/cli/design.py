@@ -1,0 +1,128 @@
+"""`foldyn design`: the best design of a case file, from reading to report."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from foldyn.cli.folder import Results, drawing, held
+from foldyn.cli.options import BOTH, add_figures, add_results, integer
+from foldyn.cli.stamp import Owner
+from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
+from foldyn.errors import InputError
+from foldyn.plots import FIGURES
+
+if TYPE_CHECKING:
+    from foldyn.designs import Course, Design
+    from foldyn.designs.run_design import Plan
+
+WRITTEN = ("design.nc", "history.csv", "designed.toml")
+KEPT = "evaluations"
+DRAWN = [
+    "report.html",
+    *(f"{name}.{form}" for name in ("convergence", "before", "after") for form in FIGURES),
+    *(f"sensitivity-*.{form}" for form in FIGURES),
+]
+
+
+def add_design(commands: Any) -> None:
+    """Add the command and its arguments."""
+    design = commands.add_parser(
+        "design",
+        help="the best design of a case file, within bounds and constraints",
+        description="Search for values of some keys of a case file that make a measure as small or "
+        "large as possible, as its table [design] asks for. Every evaluation is kept, so that a "
+        "search that was cut off goes on. The history, the case file with the best values, figures "
+        "and report.html go to a folder.",
+    )
+    design.add_argument("case", help="case file (TOML) with a table [design]")
+    design.add_argument(
+        "--method", metavar="slsqp|trust-constr|mma|cma", help="method (default: that of the file)"
+    )
+    design.add_argument(
+        "--starts", type=integer, metavar="N", help="searches, from designs drawn within the bounds"
+    )
+    design.add_argument("--seed", type=integer, help="of the drawn designs (default: 0)")
+    add_results(design, "NAME-design")
+    add_figures(design)
+
+
+def run_design(given: argparse.Namespace) -> Path:
+    """Search as the arguments of `add_design` ask for; returns the folder of the results."""
+    from foldyn.designs.case_files import planned, write_case
+    from foldyn.studies import find_case
+
+    clock = Clock.now()
+    if given.figures and given.no_figures:
+        raise InputError(BOTH)
+    path = find_case(given.case)
+    changes = {name: getattr(given, name) for name in ("method", "starts", "seed")}
+    changes = {name: value for name, value in changes.items() if value is not None}
+    case_file, plan = planned(path, changes)
+    folder = Path(f"{path.stem}-design" if given.out is None else given.out)
+    names = [*WRITTEN, *([] if given.no_figures else ["report.html"])]
+    owner = Owner.of("design", path, folder)
+    say = speech(given.quiet)
+    goal = "minimize" if plan.problem.sign > 0.0 else "maximize"
+    count = len(plan.space.lower)
+    say(f"{case_file.heading}: {goal} {plan.problem.objective.text} by {count} "
+        f"number{'s' * (count > 1)} ({plan.method})")  # fmt: skip
+    with held(folder, given.out, names, owner, given.replace, DRAWN, [KEPT]) as results:
+        with noted_warnings() as noted:
+            found = _searched(plan, results, given.quiet)
+        spent = clock.spent()
+        _tell(found, say)
+        for name in WRITTEN[:2]:
+            results.keep(name, found.save)
+        results.keep(WRITTEN[2], partial(write_case, case_file, found.parameters))
+        say(f"wrote {folder / WRITTEN[0]}")
+        if not given.no_figures:
+            from foldyn.analyses.provenance import Call
+            from foldyn.designs.page import write_design
+
+            with drawing(folder):
+                call = Call(given.typed, tuple(noted), **spent)
+                page = write_design(found, plan, folder, case_file, call, given.figures)
+                say(f"wrote {page}")
+    return folder
+
+
+def _searched(plan: Plan, results: Results, quiet: bool) -> Design:
+    """Search with a bar; every evaluation is kept."""
+    from foldyn.designs.run_design import designed
+
+    layout = "evaluations: {n_fmt}{postfix} [{elapsed}]"
+    with progress_bar(quiet, bar_format=layout, mininterval=0.0) as bar:
+
+        def tell(course: Course) -> None:
+            if not results.kept:
+                results.begin(KEPT)
+            if math.isfinite(course.objective):
+                off = f", violation {course.violation:.2g}" if course.violation > 0.0 else ""
+                bar.set_postfix_str(f"best {course.objective:.6g}{off}", refresh=False)
+            bar.n = course.done
+            bar.refresh()
+
+        return designed(plan, results.folder / KEPT, tell)
+
+
+def _tell(found: Design, say: Any) -> None:
+    """Say what was found."""
+    import numpy as np
+
+    for name, value in found.parameters.items():
+        if np.ndim(value) == 0:
+            say(f"  {name} = {value:.6g}")
+        else:
+            low, high = np.min(value), np.max(value)
+            say(f"  {name}: {np.size(value)} values from {low:.4g} to {high:.4g}")
+    sound = "" if found.feasible else ", not feasible"
+    say(f"  objective {found.objective:.6g}{sound}")
+    for text, amount in found.constraints.items():
+        say(f"  {text}: {f'violated by {amount:.3g}' if amount else 'holds'}")
+    for end in found.ends:
+        count = f"{end.evaluations} evaluation{'s' * (end.evaluations != 1)}"
+        say(f"  start {end.start + 1}: {end.objective:.6g} after {count}: {end.message}")

@@ -1,0 +1,7 @@
+"""Inverse design: parameters of a case that make the most of what is measured, within limits."""
+
+from __future__ import annotations
+
+from foldyn.facade import lazy
+
+__getattr__, __dir__, __all__ = lazy(__name__, __file__)

@@ -1,0 +1,223 @@
+"""What is measured of one design, and how that changes with its entries."""
+
+from __future__ import annotations
+
+import os
+import time
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn.analyses import CaseFile
+from foldyn.analyses.keys import parts, replaced
+from foldyn.analyses.reading import case_of_document, read_document, validated
+from foldyn.cases import Case
+from foldyn.designs.space import Space
+from foldyn.dynamics import simulate
+from foldyn.errors import ComputationError, FoldynError, FoldynWarning, InputError, within
+from foldyn.input_files import path_of
+from foldyn.linear import frf, modes
+from foldyn.program import program
+from foldyn.statics import trace
+from foldyn.sweeps.evaluations import Evaluation
+from foldyn.sweeps.job import ASIDE, Job, code_of
+from foldyn.sweeps.measure import Asked, asked
+from foldyn.sweeps.measures import MEASURES
+from foldyn.values import choice, show
+
+ANALYSES: Mapping[str, Callable[..., xr.Dataset]] = {
+    "modes": modes, "dynamics": simulate, "statics": trace, "frf": frf,
+}  # fmt: skip
+"""What computes each kind of analysis of a case."""
+COMPUTING = ("analyses", "results", "sweeps", "gradients", "designs")
+"""Folders that evaluations depend on, besides the solvers."""
+VALUES, JACOBIAN = "value", "jacobian"
+Point = tuple[float, ...]
+Source = Callable[..., Case] | str | os.PathLike[str]
+
+
+class Evaluator(Protocol):
+    """Measures of designs."""
+
+    @property
+    def stamp(self) -> list[Any]:
+        """All that they depend on, as JSON holds it."""
+        ...
+
+    def __call__(self, values: Mapping[str, Any], gradient: bool) -> tuple[NDArray, NDArray | None]:
+        """Measures (m,) of a design, and if asked their derivatives (m, n) by its entries."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Measures of a case that a function builds, or a case file, with exact derivatives.
+
+    Attributes
+    ----------
+    build : callable or Path
+    analysis : dict or None
+        What is computed of built cases.
+    measures : tuple of Asked
+    space : Space
+    """
+
+    build: Any
+    analysis: dict[str, Any] | None
+    measures: tuple[Asked, ...]
+    space: Space
+    document: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def stamp(self) -> list[Any]:
+        """See `Evaluator`."""
+        texts = [one.text for one in self.measures]
+        return [program(*COMPUTING), self._source(), repr(self.analysis), texts]
+
+    def __call__(self, values: Mapping[str, Any], gradient: bool) -> tuple[NDArray, NDArray | None]:
+        """See `Evaluator`."""
+        if not gradient:
+            result, case, shared = *self._computed(values), dict[Any, Any]()
+            return np.array([_single(one, result, case, shared) for one in self.measures]), None
+        from foldyn.gradients import sensitivity
+
+        width = self.space.parts(self.space.upper - self.space.lower)
+        zeros = {name: width[name] for name, value in values.items() if not np.any(value)}
+        sizes = {n: size if self.space.shapes[n] else float(size[0]) for n, size in zeros.items()}
+        texts = [one.text for one in self.measures]
+        found = sensitivity(self.build, dict(values), texts, self.analysis, sizes=sizes)
+        parts = [found[f"gradient_{name}"].values.reshape(len(texts), -1) for name in values]
+        return found["value"].values, np.concatenate(parts, axis=1)
+
+    def case(self, values: Mapping[str, Any]) -> Case:
+        """Case of a design."""
+        return self._file(values).case() if self.document else self.build(**values)
+
+    def result(self, values: Mapping[str, Any]) -> xr.Dataset:
+        """Result of a design."""
+        return self._computed(values)[0]
+
+    def _computed(self, values: Mapping[str, Any]) -> tuple[xr.Dataset, Case]:
+        if self.document:
+            file = self._file(values)
+            return file.computation().result(), file.case()
+        case, arguments = self.build(**values), dict(self.analysis or {})
+        return ANALYSES[arguments.pop("kind")](case, **arguments), case
+
+    def _file(self, values: Mapping[str, Any]) -> CaseFile:
+        plain = {key: np.asarray(value).tolist() for key, value in values.items()}
+        changed = replaced(self.document, plain)
+        own = {key: value for key, value in changed.items() if key not in ASIDE}
+        return case_of_document(self.build, own)
+
+    def _source(self) -> Any:
+        """What a case is built from."""
+        if not self.document:
+            return code_of(self.build)
+        return Job(self.build, self.document, (), (), (), "").stamp(())[1:3]
+
+
+def measured(
+    build: Source, analysis: Mapping[str, Any] | None, places: Mapping[str, str], space: Space
+) -> Measured:
+    """Check what is to be computed of each design.
+
+    places : measures, each with the argument that asks for it.
+
+    Raises
+    ------
+    InputError
+        There is no such analysis, or no such measure of it.
+    """
+    document: dict[str, Any] = {}
+    if isinstance(build, str | os.PathLike):
+        if analysis is not None:
+            raise InputError(": a case file has its own; leave this out", "analysis")
+        build = path_of(build, "build")
+        document = read_document(build)
+        kind = document.get("analysis", {}).get("kind")
+        _check_keys(build, document, space)
+    elif callable(build):
+        if not isinstance(analysis, Mapping) or "kind" not in analysis:
+            raise InputError(
+                f' = {show(analysis)}: say what is computed, as {{"kind": "modes", "count": 4}}',
+                "analysis",
+            )
+        kind = choice("analysis.kind", analysis["kind"], ANALYSES)
+        analysis = dict(analysis)
+    else:
+        raise InputError(f" = {show(build)}: give a function or a case file", "build")
+    measures = []
+    for name, place in places.items():
+        with within(place):
+            measures.append(_measure(name, kind))
+    return Measured(build, analysis, tuple(measures), space, document)
+
+
+def _measure(name: str, kind: Any) -> Asked:
+    """A measure that is one number of results of a kind."""
+    one = asked(name, MEASURES)
+    kinds = one.measure.kinds
+    if kinds and kind not in kinds:
+        raise InputError(f": {name} is of results of kind {' or '.join(kinds)}, not {kind}")
+    if one.measure.dims:
+        raise InputError(f": {name} is an array; ask for one of its numbers, as frequency[1]")
+    return one
+
+
+def _check_keys(path: Path, document: Mapping[str, Any], space: Space) -> None:
+    """Refuse keys that no case file of this kind has, and bounds that it cannot hold."""
+    for ends in (space.lower, space.upper):
+        for name, part in space.parts(ends).items():
+            if parts(name)[0] in ASIDE:
+                raise InputError(f": {name} changes no result; leave it out", "bounds")
+            value = part.tolist() if space.shapes[name] else float(part[0])
+            validated(path, replaced(document, {name: value}))
+
+
+def _single(one: Asked, result: xr.Dataset, case: Case, shared: dict[Any, Any]) -> float:
+    value = one.of(result, case, shared)
+    if value.ndim:
+        raise InputError(f"{one.text}: is an array; ask for one of its numbers")
+    if not np.isfinite(value):
+        raise ComputationError(f"{one.text}: has no value")
+    return float(value)
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluate:
+    """Evaluates points of a space: what goes wrong is what is found there."""
+
+    evaluator: Evaluator
+    space: Space
+    gradient: bool
+
+    def stamp(self, point: Point) -> list[Any]:
+        """All that the evaluation of a point depends on."""
+        shapes = {name: list(shape) for name, shape in self.space.shapes.items()}
+        return [self.evaluator.stamp, shapes, list(point), self.gradient]
+
+    def __call__(self, point: Point) -> Evaluation:
+        """Evaluate a point."""
+        began, values, failure, lasting = time.perf_counter(), {}, "", True
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            try:
+                value, jacobian = self.evaluator(self.space.values(point), self.gradient)
+                values = {VALUES: value} | ({} if jacobian is None else {JACOBIAN: jacobian})
+            except FoldynError as error:
+                failure = str(error)
+            except Exception as error:  # of a user's function, at this point alone
+                failure, lasting = f"{type(error).__name__}: {error}", False
+        bad = [name for name, array in values.items() if not np.isfinite(array).all()]
+        if bad:
+            values, failure = {}, f"gave a {bad[0]} that is not finite"
+        said = [str(one.message) for one in told if issubclass(one.category, FoldynWarning)]
+        warned = "; ".join(dict.fromkeys(said))
+        return Evaluation(values, failure, warned, time.perf_counter() - began, lasting)

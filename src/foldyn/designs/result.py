@@ -1,0 +1,182 @@
+"""What a search for a design has found."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import foldyn
+from foldyn.arguments import brief
+from foldyn.designs.problem import Problem
+from foldyn.designs.search import Row
+from foldyn.designs.space import Space
+from foldyn.errors import InputError
+from foldyn.results import netcdf
+from foldyn.values import show, suggest
+from foldyn.writing import write_text
+
+PARAMETER, GRADIENT = "parameter_", "gradient_"
+"""What stands before the names of parameters in datasets."""
+
+
+@dataclass(frozen=True)
+class End:
+    """How the search from one start ended.
+
+    Attributes
+    ----------
+    start : int
+    objective, violation : float
+        Of the best design of this start; nan where none could be computed. The violation is the
+        largest of all constraints, over their sizes.
+    feasible : bool
+        Whether it is small enough to count as none.
+    evaluations : int
+    message : str
+        Why it ended.
+    converged : bool
+    """
+
+    start: int
+    objective: float
+    violation: float
+    feasible: bool
+    evaluations: int
+    message: str
+    converged: bool
+
+
+@brief
+@dataclass(frozen=True, eq=False)
+class Design:
+    """The best design that was found, and how. ``design["parameters"]`` is `design.parameters`.
+
+    Attributes
+    ----------
+    parameters : dict
+        Values by name: numbers, or arrays.
+    objective : float
+        Value of the expression that was minimized or maximized.
+    feasible : bool
+        Whether all constraints hold, up to the slack.
+    constraints : dict of str to float
+        By how much each constraint is violated, in the unit of its sides; 0 up to the slack.
+    measures : dict of str to float
+        All that was measured of this design.
+    gradient : dict
+        Derivatives of the objective by the parameters, per unit; empty without derivatives.
+    ends : tuple of End
+        How the search from each start ended.
+    history : xarray.Dataset
+        A row for each evaluation, see `foldyn.design`.
+    evaluations : int
+        Of all starts.
+    seconds : float
+    """
+
+    parameters: dict[str, Any]
+    objective: float
+    feasible: bool
+    constraints: dict[str, float]
+    measures: dict[str, float]
+    gradient: dict[str, Any]
+    ends: tuple[End, ...] = field(repr=False)
+    history: xr.Dataset = field(repr=False)
+    evaluations: int
+    seconds: float
+
+    def __getitem__(self, name: str) -> Any:
+        """Attribute by its name."""
+        known = list(type(self).__dataclass_fields__)
+        if name not in known:
+            hint = suggest(name, known) if isinstance(name, str) else ""
+            raise InputError(f"{show(name)}: {hint}a design has {', '.join(known)}")
+        return getattr(self, name)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the history, with the best design, as a dataset (``*.nc``) or a table (``*.csv``).
+
+        Raises
+        ------
+        InputError
+            The name has another ending.
+        """
+        path = Path(path)
+        if path.suffix == ".nc":
+            netcdf.write(self.history, path)
+        elif path.suffix == ".csv":
+            columns = dict(_columns(self.history))
+            text = StringIO()
+            table = csv.writer(text, lineterminator="\n")
+            table.writerow(columns)
+            table.writerows(zip(*columns.values(), strict=True))
+            write_text(path, text.getvalue())
+        else:
+            raise InputError(f"{path}: a design is written as .nc or .csv; choose one of them")
+
+
+def _columns(history: xr.Dataset) -> Iterator[tuple[str, list[Any]]]:
+    """Columns of a table: a number of each evaluation each."""
+    for name, one in history.items():
+        if one.dims[:1] != ("evaluation",):
+            continue
+        if one.ndim == 1:
+            yield str(name), one.values.tolist()
+            continue
+        for k, label in enumerate(one[one.dims[1]].values.tolist()):
+            own = f"{name}[{k}]" if one.dims[1] != "constraint" else label
+            yield own, one.values[:, k].tolist()
+
+
+def history_of(
+    rows: Sequence[Row], best: Row, space: Space, problem: Problem, facts: dict[str, Any]
+) -> xr.Dataset:
+    """Dataset of all evaluations."""
+    entries = np.array([row.point for row in rows])
+    numbers = np.array([row.numbers for row in rows])
+    along = "evaluation"
+    data: dict[str, Any] = {
+        "start": (along, np.array([row.start for row in rows])),
+        "iteration": (along, np.array([row.iteration for row in rows])),
+        "objective": (along, numbers[:, 0], {"long_name": problem.objective.text}),
+        "violation": (
+            along, np.array([row.violation for row in rows]),
+            {"long_name": "largest violation of a constraint, over its size"},
+        ),
+        "feasible": (along, np.array([row.feasible for row in rows])),
+        "seconds": (along, np.array([row.seconds for row in rows]), {"units": "s"}),
+        "failure": (along, np.array([row.failure for row in rows], dtype=str)),
+        "warnings": (along, np.array([row.warnings for row in rows], dtype=str)),
+        "best": ((), rows.index(best)),
+    }  # fmt: skip
+    coordinates: dict[str, Any] = {along: np.arange(len(rows))}
+    if problem.constraints:
+        told = {"long_name": "left minus right side"}
+        data["constraints"] = ((along, "constraint"), numbers[:, 1:], told)
+        coordinates["constraint"] = [one.text for one in problem.constraints]
+    lowers, uppers = space.parts(space.lower), space.parts(space.upper)
+    for name, values in space.parts(entries).items():
+        lower, upper = lowers[name], uppers[name]
+        array = bool(space.shapes[name])
+        dims = (along, f"{name}_entry") if array else (along,)
+        one = lower.size == 1 or (np.ptp(lower) == np.ptp(upper) == 0.0)
+        bounds = {"lower": float(lower[0]), "upper": float(upper[0])} if one else {
+            "lower": lower, "upper": upper,
+        }  # fmt: skip
+        data[f"{PARAMETER}{name}"] = (dims, values if array else values[:, 0], bounds)
+        if array:
+            coordinates[f"{name}_entry"] = np.arange(lower.size)
+    if best.slopes is not None:
+        for name, part in space.parts(best.slopes[0]).items():
+            dims = (f"{name}_entry",) if space.shapes[name] else ()
+            data[f"{GRADIENT}{name}"] = (dims, part if dims else part[0])
+    facts = {"foldyn_version": foldyn.__version__, **facts}
+    return xr.Dataset(data, coordinates, facts)

@@ -1,0 +1,275 @@
+"""`design`: parameters that make the most of what is measured, within bounds and constraints."""
+
+from __future__ import annotations
+
+import os
+import time
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.designs.evaluator import Evaluate, Evaluator, Point, Source, measured
+from foldyn.designs.methods import METHODS, Settings, searched
+from foldyn.designs.problem import Problem, problem_of
+from foldyn.designs.result import Design, End, history_of
+from foldyn.designs.search import Row, Search
+from foldyn.designs.space import Space, space_of
+from foldyn.errors import ComputationError, FoldynWarning
+from foldyn.sweeps.evaluations import Evaluation, Evaluations
+from foldyn.sweeps.pool import Here
+from foldyn.values import MOST, choice, number, whole
+
+MOST_DRAWN = 20
+"""Designs that are drawn for a start until one can be computed."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """How far a search is.
+
+    Attributes
+    ----------
+    done, found : int
+        Evaluations, and those of them that were kept from before.
+    start : int
+        Which of the starts.
+    objective, violation : float
+        Of the best design so far; nan without one.
+    """
+
+    done: int
+    found: int
+    start: int
+    objective: float
+    violation: float
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A search for a design that was checked.
+
+    Attributes
+    ----------
+    problem : Problem
+    space : Space
+    first : ndarray
+        Entries of the first start.
+    evaluator : Evaluator
+    method : str
+    settings : Settings
+    starts : int
+    """
+
+    problem: Problem
+    space: Space
+    first: NDArray
+    evaluator: Evaluator
+    method: str
+    settings: Settings
+    starts: int
+
+
+def design(
+    build: Source,
+    bounds: Mapping[str, Any],
+    *,
+    minimize: str | None = None,
+    maximize: str | None = None,
+    subject_to: str | Sequence[str] = (),
+    analysis: Mapping[str, Any] | None = None,
+    start: Mapping[str, Any] | None = None,
+    method: str = "slsqp",
+    starts: int = 1,
+    seed: int = 0,
+    tolerance: float = 1e-6,
+    slack: float = 1e-4,
+    max_evaluations: int = 1000,
+    folder: str | os.PathLike[str] | None = None,
+    progress: Callable[[Course], None] | None = None,
+) -> Design:
+    """Find parameters that make an expression of measures as small or large as possible.
+
+    Parameters
+    ----------
+    build : callable or path
+        ``build(**parameters)`` returns the case; or a case file, whose parameters are keys, as
+        "pattern.panel_angle".
+    bounds : mapping
+        Parameters by name, each with its lower and upper bound: numbers, or for an array lists of
+        one for each entry; numbers hold for all entries of an array that `start` gives.
+    minimize, maximize : str
+        One of both: an expression of measures of a sweep, "-frequency[2] / frequency[1]", with
+        ``+ - * / **``, parentheses, min, max, abs, sqrt, log and exp.
+    subject_to : sequence of str
+        Constraints: expressions with "==", "<=" or ">=", as "mass <= 0.1".
+    analysis : mapping
+        What is computed of a case that is built: its kind, "modes", "dynamics", "statics" or "frf",
+        and arguments of `modes`, `simulate`, `trace` or `frf`. A case file has its own.
+    start : mapping, optional
+        Values to start from; where none is given, the middle between the bounds.
+    method : {"slsqp", "trust-constr", "mma", "cma"}
+        The first three use exact derivatives, see `sensitivity`; "mma" needs NLopt. "cma" (CMA-ES)
+        needs none, and some hundred times as many evaluations.
+    starts : int
+        How many searches: the first from `start`, the others from designs drawn within the bounds.
+    seed : int
+        Of the drawn designs, and of CMA-ES.
+    tolerance : float
+        Change of the objective, over its size at the first design, at which a search ends.
+    slack : float
+        Violation of a constraint that counts as none, over the size of the constraint: that of the
+        side that is a number, or else of the larger one at the first design.
+    max_evaluations : int
+        At most from each start.
+    folder : path, optional
+        Keeps every evaluation: a search that was cut off goes on where it stopped.
+    progress : callable, optional
+        Called with a `Course` after every evaluation.
+
+    Returns
+    -------
+    Design
+        The best of all feasible designs that were evaluated, with the history of all starts:
+        ``best["parameters"]``, ``best["history"]``.
+
+    Raises
+    ------
+    InputError
+        An argument cannot be used, or the first design is no case or has no such measure.
+    ComputationError
+        No start can be computed.
+
+    Warns
+    -----
+    FoldynWarning
+        No design is feasible: the one with the least violation is returned.
+
+    Notes
+    -----
+    A design that cannot be computed does not end a search: the method takes a shorter step, and the
+    history says why. CMA-ES holds constraints by an augmented Lagrangian, MMA equalities.
+    """
+    plan = plan_of(
+        build, bounds, minimize, maximize, subject_to, analysis, start, method, starts, seed,
+        tolerance, slack, max_evaluations,
+    )  # fmt: skip
+    return designed(plan, folder, progress)
+
+
+def plan_of(
+    build: Source, bounds: Any, minimize: Any, maximize: Any, subject_to: Any, analysis: Any,
+    start: Any, method: str, starts: int, seed: int, tolerance: float, slack: float,
+    max_evaluations: int,
+) -> Plan:  # fmt: skip
+    """Check the arguments of `design`; raises `InputError`."""
+    problem = problem_of(minimize, maximize, subject_to)
+    space, first = space_of(bounds, start)
+    METHODS[choice("method", method, METHODS)].check()
+    settings = Settings(
+        number("tolerance", tolerance, above=0.0, below=1.0),
+        number("slack", slack, above=0.0, below=1.0),
+        whole("max_evaluations", max_evaluations, least=1),
+        whole("seed", seed, least=0, most=2**31),
+    )
+    whole("starts", starts, least=1, most=MOST)
+    evaluator = measured(build, analysis, problem.places, space)
+    return Plan(problem, space, first, evaluator, method, settings, starts)
+
+
+def designed(
+    plan: Plan,
+    folder: str | os.PathLike[str] | None = None,
+    progress: Callable[[Course], None] | None = None,
+) -> Design:
+    """Search as planned; arguments as of `design`."""
+    began = time.perf_counter()
+    gradient = METHODS[plan.method].gradient
+    evaluate = Evaluate(plan.evaluator, plan.space, gradient)
+    with Here[Point, Evaluation](evaluate) as pool:
+        evaluations = Evaluations[Point](pool, evaluate.stamp, folder)
+        search = Search(
+            plan.problem, plan.space, evaluations, gradient, plan.settings.slack,
+            plan.settings.most, lambda: _tell(search, progress),
+        )  # fmt: skip
+        ends = []
+        for k in range(plan.starts):
+            search.begin(k)
+            x = _first(plan, search, k)
+            message, converged = searched(plan.method, search, x, plan.settings)
+            ends.append(_end(k, search, message, converged))
+            if k == 0 and search.rows[0].failure and search.sizes is None:
+                plan.evaluator(plan.space.values(search.rows[0].point), gradient)  # raises it
+    if search.best is None:
+        raise ComputationError(f"no start can be computed: {search.rows[0].failure}")
+    return _found(plan, search, search.best, ends, time.perf_counter() - began)
+
+
+def _first(plan: Plan, search: Search, start: int) -> NDArray:
+    """Where a search starts: as given, or drawn, again where a design cannot be computed."""
+    if start == 0:
+        return plan.space.x(plan.first)
+    drawn = np.random.default_rng([plan.settings.seed, start])
+    for _ in range(MOST_DRAWN - 1):
+        x = drawn.random(len(plan.first))
+        if search.can(x):
+            return x
+    return drawn.random(len(plan.first))
+
+
+def _tell(search: Search, progress: Callable[[Course], None] | None) -> None:
+    if progress is None:
+        return
+    best, found = search.best, search.evaluations.found
+    objective, violation = (np.nan, np.nan) if best is None else (best.numbers[0], best.violation)
+    progress(Course(len(search.rows), found, search.start, float(objective), float(violation)))
+
+
+def _end(start: int, search: Search, message: str, converged: bool) -> End:
+    own = [row for row in search.rows if row.start == start]
+    sound = [row for row in own if not row.failure]
+    if not sound:
+        return End(start, np.nan, np.nan, False, len(own), message, False)
+    best = min(sound, key=search.key)
+    return End(
+        start, float(best.numbers[0]), best.violation, best.feasible, len(own), message, converged
+    )
+
+
+def _found(
+    plan: Plan, search: Search, best: Row, ends: Sequence[End], seconds: float
+) -> Design:  # fmt: skip
+    """The result of a search, with a warning where no design is feasible."""
+    problem, space = plan.problem, plan.space
+    violations = {}
+    slacks = (plan.settings.slack * np.asarray(search.sizes)[1:]).tolist()
+    for one, difference, slack in zip(problem.constraints, best.numbers[1:], slacks, strict=True):
+        amount = one.violation(float(difference))
+        violations[one.text] = amount if amount > slack else 0.0
+    if not best.feasible:
+        violated = ", ".join(
+            f"{text} by {amount:.3g}" for text, amount in violations.items() if amount
+        )
+        warnings.warn(
+            f"none of {len(search.rows)} designs is feasible; the nearest one violates {violated}. "
+            "Widen the bounds, relax constraints, or take more starts",
+            FoldynWarning,
+            stacklevel=4,
+        )
+    gradient: dict[str, Any] = {}
+    if best.slopes is not None:
+        gradient = space.values(tuple(best.slopes[0].tolist()))
+    facts = {
+        "objective": problem.objective.text, "sense": "min" if problem.sign > 0.0 else "max",
+        "method": plan.method, "starts": plan.starts, "seed": plan.settings.seed,
+        "tolerance": plan.settings.tolerance, "slack": plan.settings.slack,
+        "feasible": int(best.feasible), "seconds": seconds,
+    }  # fmt: skip
+    return Design(
+        space.values(best.point), float(best.numbers[0]), best.feasible, violations, best.values,
+        gradient, tuple(ends), history_of(search.rows, best, space, problem, facts),
+        len(search.rows), seconds,
+    )  # fmt: skip

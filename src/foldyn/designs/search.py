@@ -1,0 +1,205 @@
+"""A search: designs are evaluated once each, noted, and given to a method in numbers near 1."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.designs.evaluator import JACOBIAN, VALUES, Point
+from foldyn.designs.problem import Problem
+from foldyn.designs.space import Space
+from foldyn.errors import FoldynError
+from foldyn.sweeps.evaluations import Evaluations
+
+BAD = 1e6
+"""Objective of a design that cannot be computed, over the size of the objective."""
+MOST_FAILED = 20, 200
+"""Designs in a row that cannot be computed, after which a search is given up: of a method with
+gradients, and of one that draws designs."""
+
+
+class Ended(Exception):  # noqa: N818
+    """A search ends, whatever the method thinks."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A design that was tried; numbers are over their sizes, slopes by numbers from 0 to 1.
+
+    Attributes
+    ----------
+    x : ndarray, shape (n,)
+    objective : float
+        To be made small.
+    excess : ndarray, shape (c,)
+        Of the constraints: at most 0, or 0 of an equality, where they hold.
+    slope, slopes : ndarray, shapes (n,) and (c, n)
+        Their derivatives; empty where no method asks for them.
+    violation : float
+        The largest of all violations.
+    """
+
+    x: NDArray
+    objective: float
+    excess: NDArray
+    slope: NDArray
+    slopes: NDArray
+    violation: float
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """A line of the history.
+
+    numbers : the objective, and left minus right sides of the constraints; nan where it failed.
+    """
+
+    start: int
+    iteration: int
+    point: Point
+    numbers: NDArray
+    violation: float
+    feasible: bool
+    seconds: float
+    failure: str
+    warnings: str
+    values: dict[str, float] = field(default_factory=dict)
+    slopes: NDArray | None = None  # of the numbers, per unit of the entries
+
+
+class Search:
+    """Evaluates designs for a method.
+
+    Parameters
+    ----------
+    problem, space
+    evaluations : Evaluations
+    gradient : bool
+        Whether they have derivatives.
+    slack : float
+        Violations of constraints over their sizes that count as none.
+    most : int
+        Evaluations from one start.
+    tell : callable, optional
+        Called after each new row.
+    """
+
+    def __init__(
+        self, problem: Problem, space: Space, evaluations: Evaluations[Point], gradient: bool,
+        slack: float, most: int, tell: Callable[[], None] | None = None,
+    ) -> None:  # fmt: skip
+        self.problem, self.space, self.evaluations = problem, space, evaluations
+        self.gradient, self.slack, self.most, self.tell = gradient, slack, most, tell
+        self.rows: list[Row] = []
+        self.sizes: NDArray | None = None  # by the first design that can be computed
+        self.start = 0
+        self.best: Row | None = None
+        self._known: dict[Point, Trial | None] = {}
+        self.begin(0)
+
+    def begin(self, start: int) -> None:
+        """Begin a search from another start."""
+        self.start, self.iteration, self.count, self._failed = start, 0, 0, 0
+        self._known.clear()
+        self._last: Trial | None = None
+
+    def step(self, *_: object) -> None:
+        """Count an iteration of the method."""
+        self.iteration += 1
+
+    def can(self, x: NDArray) -> bool:
+        """Whether a design to start from can be computed."""
+        try:
+            self.at(x)
+        except Ended:
+            return False
+        return True
+
+    def at(self, x: NDArray) -> Trial:
+        """What is found at a design.
+
+        Where it cannot be computed the objective is very large and everything else that of the
+        last design that could: methods take a shorter step.
+
+        Raises
+        ------
+        Ended
+            The first design of a search cannot be computed, or too many in a row, or too many
+            have been tried.
+        """
+        point = self.space.point(np.asarray(x, float))
+        if point not in self._known:
+            if self.count >= self.most:
+                raise Ended(f"{self.most} evaluations; allow more by max_evaluations")
+            self.count += 1
+            self._known[point] = self._new(point)
+        found = self._known[point]
+        if found is not None:
+            self._last, self._failed = found, 0
+            return found
+        self._failed += 1
+        if self._last is None:
+            raise Ended(f"the first design cannot be computed: {self.rows[-1].failure}")
+        most = MOST_FAILED[not self.gradient]
+        if self._failed > most:
+            raise Ended(f"{most} designs in a row failed: {self.rows[-1].failure}")
+        last = self._last
+        return Trial(np.asarray(x), BAD, last.excess, last.slope, last.slopes, np.inf)
+
+    def _new(self, point: Point) -> Trial | None:
+        (found,) = self.evaluations.at([point])
+        failure, numbers, slopes = found.failure, None, None
+        values: dict[str, float] = {}
+        if not failure:
+            measured = zip(self.problem.measures, found.values[VALUES].tolist(), strict=True)
+            values = dict(measured)
+            try:
+                if self.gradient:
+                    rows = zip(self.problem.measures, found.values[JACOBIAN], strict=True)
+                    numbers, slopes = self.problem.with_slopes(values, dict(rows))
+                else:
+                    numbers = self.problem.numbers(values)
+                if self.sizes is None:
+                    self.sizes = self.problem.sizes(values)
+            except FoldynError as error:
+                failure = str(error)
+        trial = None
+        if numbers is not None and self.sizes is not None and not failure:
+            trial = self._trial(point, numbers, slopes)
+        violation = np.nan if trial is None else trial.violation
+        nothing = np.full(1 + len(self.problem.constraints), np.nan)
+        row = Row(
+            self.start, self.iteration, point, nothing if trial is None else np.asarray(numbers),
+            violation, violation <= self.slack, found.seconds, failure, found.warnings, values,
+            slopes,
+        )  # fmt: skip
+        self.rows.append(row)
+        if trial is not None and (self.best is None or self.key(row) < self.key(self.best)):
+            self.best = row
+        if self.tell is not None:
+            self.tell()
+        return trial
+
+    def _trial(self, point: Point, numbers: NDArray, slopes: NDArray | None) -> Trial:
+        """Numbers of a design over their sizes."""
+        signs = np.array([self.problem.sign, *self.problem.signs])
+        scale = signs / self.sizes
+        scaled = numbers * scale
+        width = 0 if slopes is None else len(point)
+        by = np.zeros((len(scaled), 0)) if slopes is None else (
+            slopes * scale[:, None] * (self.space.upper - self.space.lower)
+        )  # fmt: skip
+        excess = scaled[1:]
+        off = np.where(self.problem.equal, np.abs(excess), np.maximum(excess, 0.0))
+        return Trial(
+            self.space.x(np.array(point)), float(scaled[0]), excess, by[0, :width], by[1:, :width],
+            float(off.max(initial=0.0)),
+        )  # fmt: skip
+
+    def key(self, row: Row) -> tuple[bool, float]:
+        """By which the best of several comes first: feasible, the least objective or violation."""
+        least = self.problem.sign * row.numbers[0] if row.feasible else row.violation
+        return not row.feasible, float(least)

@@ -1,0 +1,151 @@
+"""What discrete adjoints of motions share: derivatives by what a motion has beside its terms."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.waveforms import evaluate
+from foldyn.dynamics.inertia import substitute
+from foldyn.dynamics.system import carried, scratch
+from foldyn.errors import InputError
+from foldyn.mechanics.pullback import Pullback, arrays_of_body, pull_all
+
+
+class ByMotion(NamedTuple):
+    """Derivatives by what a motion has beside its terms."""
+
+    loads: NDArray  # (l,) by `System.loads`
+    moved: NDArray  # (s,) by `System.moved`
+    mass: NDArray  # (entries,) by those of the nodal mass matrix
+    alpha: NDArray  # (1,)
+
+
+class Adjoint(ABC):
+    """Backward through a motion, from derivatives of a number by its samples.
+
+    Parameters
+    ----------
+    motion : Motion
+        Ready to be computed, by `dynamics.driver.prepare`.
+    """
+
+    def __init__(self, motion: Any) -> None:
+        packed = motion.packed
+        self._packed, self._system, self._mass = packed, packed.system, packed.mass
+        self._plan, self._pullback = motion.plan, Pullback(packed.body)
+        self._imposed = packed.numbering.inward(motion.case.imposed)
+        self._scratch = scratch(packed.system)
+        sizes = len(self._system.loads.dof), len(self._system.moved.dof), len(self._mass.data), 1
+        self._by = ByMotion(*map(np.zeros, sizes))
+        self._rows = np.repeat(np.arange(len(self._mass.indptr) - 1), np.diff(self._mass.indptr))
+        self._weight, self._product, self._rate = np.zeros((3, packed.system.rows, 3))
+
+    def add_supports(self, t: float, by_u: NDArray, by_v: NDArray) -> None:
+        """Add what a number with these derivatives by a sample at t (s) has by supports."""
+        self._evaluate(t)
+        moved, factor = self._system.moved, self._scratch.factor
+        rate = factor[moved.row]
+        self._by.moved[:] += by_u.ravel()[moved.dof] * rate[:, 0]
+        self._by.moved[:] += by_v.ravel()[moved.dof] * rate[:, 1]
+
+    @abstractmethod
+    def backward(self, first: int, last: int, by_u: NDArray, by_v: NDArray) -> None:
+        """Go back over the steps from number `first` to `last`.
+
+        by_u, by_v : derivatives (n, 3) of the number by the state at the last; they become, in
+            place, those by the state at the first.
+        """
+
+    def gradient(self, by_u: NDArray, by_v: NDArray) -> dict[str, NDArray]:
+        """Derivatives of the number, from those by the state at the start, where it goes back to.
+
+        By the arrays of the terms (`pullback.arrays_of_body`), by "loads", "moved", "mass" and
+        "alpha" as `ByMotion` says, and by "start.displacement" and "start.velocity".
+        """
+        self._evaluate(self._plan.start)
+        moved, outward = self._system.moved, self._packed.numbering.outward
+        # a base starts from where the state puts it
+        free = ~self._imposed.ravel()[moved.dof]
+        factor = self._scratch.factor[moved.row, 0]
+        self._by.moved[:] -= free * by_u.ravel()[moved.dof] * factor
+        # forces of terms resist: they stand with a minus in the acceleration
+        terms = {name: -out for name, out in self._pullback.gradient.items()}
+        start = {"start.displacement": outward(by_u), "start.velocity": outward(by_v)}
+        return terms | self._by._asdict() | start
+
+    # ------------------------------------------------------------------ for steps in Python
+    def _whole(self, t: float, q: NDArray, w: NDArray) -> tuple[NDArray, NDArray]:
+        """Displacement and velocity (n, 3) at a time (s) with those of supports."""
+        self._evaluate(t)
+        moved, factor = self._system.moved, self._scratch.factor
+        return carried(moved, factor[:, 0], q), carried(moved, factor[:, 1], w)
+
+    def _forget(self) -> None:
+        self._weight, self._product, self._rate = np.zeros((3, *self._product.shape))
+
+    def _pull(self, u: NDArray, v: NDArray, weight: NDArray) -> None:
+        """Add the derivatives of weight . b at the time evaluated last, since `_forget`."""
+        self._weight += weight
+        time = float(self._scratch.time[0])
+        pull_all(self._pullback.terms, u, v, time, weight, self._product, self._rate)
+
+    def _add_supports(self) -> None:
+        """Add what loads and supports that move have of what was pulled since `_forget`."""
+        loads, moved, factor = self._system.loads, self._system.moved, self._scratch.factor
+        self._by.loads[:] += self._weight.ravel()[loads.dof] * factor[loads.row, 0]
+        self._by.moved[:] -= self._product.ravel()[moved.dof] * factor[moved.row, 0]
+        self._by.moved[:] -= self._rate.ravel()[moved.dof] * factor[moved.row, 1]
+
+    def _add_mass(self, push: NDArray, a: NDArray, w: NDArray) -> None:
+        """Add the derivatives of -push . M (a + alpha w) by the mass and by alpha."""
+        mass, alpha = self._mass, self._system.alpha
+        pushed = push[self._rows]
+        self._by.mass[:] -= np.einsum("ea,ea->e", pushed, (a + alpha * w)[mass.indices])
+        self._by.alpha[0] -= mass.data @ np.einsum("ea,ea->e", pushed, w[mass.indices])
+
+    def _push(self, by_a: NDArray) -> NDArray:
+        """Weights (n, 3) of b in a number that has these derivatives by -M^-1 b: less M^-1 them."""
+        if self._mass.lumped:
+            return self._mass.inverse * by_a
+        out = np.zeros_like(by_a)
+        substitute(self._mass, by_a, out, self._scratch.line)
+        return out
+
+    def _add_acceleration(
+        self, a: NDArray, w: NDArray, by_a: NDArray, by_u: NDArray, by_v: NDArray
+    ) -> None:  # fmt: skip
+        """Add what derivatives by a = -M^-1 b - alpha w are by all else, after `_pull`."""
+        self._add_supports()
+        self._add_mass(self._push(by_a), a, w)
+        by_u -= self._product
+        by_v -= self._rate + self._system.alpha * by_a
+
+    def _evaluate(self, t: float) -> None:
+        if self._system.varies:
+            evaluate(self._system.waves, t, True, self._scratch.factor)
+        self._scratch.time[0] = t
+
+
+def refuse(motion: Any) -> None:
+    """Refuse motions that have no adjoint yet, with a remedy."""
+    packed, system = motion.packed, motion.packed.system
+    arrays_of_body(packed.body)  # which refuses terms
+    lacks = {
+        "contact, which switches on and off": system.touches,
+        "rest angles that turn in time (Actuate, Temperature)": system.turns,
+        "loads that depend on the displacement (Pressure, CreaseMoment)": system.follows,
+        "constraints (Link, rigid panels)": len(system.ties.slave) > 0,
+        "supports that move at the start, and a mass matrix that is not diagonal": (
+            not packed.mass.lumped and bool(motion.start[1][motion.case.fixed].any())
+        ),
+    }
+    for what, here in lacks.items():
+        if here:
+            raise InputError(
+                f"there are no gradients of motions with {what}; leave that out, or vary the "
+                "parameters by fd.sweep"
+            )

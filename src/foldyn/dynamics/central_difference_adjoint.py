@@ -1,0 +1,100 @@
+"""The discrete adjoint of central differences: exact gradients of what it computes.
+
+A step takes displacement u, velocity v and the acceleration a that it keeps to
+
+    v' = v + dt/2 a,   u1 = u + dt v',   a1 = a(u1, v' + dt/2 a),   v1 = v' + dt/2 a1.
+
+Steps are taken again, to the bit, from states that are kept: of a segment where forces were
+evaluated, and the accelerations.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.dynamics.adjoint import Adjoint
+from foldyn.dynamics.equation import EquationOfMotion, accelerate
+
+ROOM = 4e6  # bytes of the states of a segment
+
+
+class Evaluated(NamedTuple):
+    """Where forces were evaluated in a step, and the acceleration there."""
+
+    u: NDArray  # (n, 3) m
+    ahead: NDArray  # m/s
+    a: NDArray  # m/s2
+
+
+class CentralDifferenceAdjoint(Adjoint):
+    """Backward through a motion by central differences; see `Adjoint`."""
+
+    def __init__(self, motion: Any) -> None:
+        super().__init__(motion)
+        packed, start = self._packed, motion.beginning
+        self._work = packed.body.workspaces(1)[0]
+        self._equation = EquationOfMotion(packed, self._work, self._scratch, start, None)
+        self._apart = max(1, int(ROOM / (3 * start.u.nbytes)))
+        self._number, self._segment = -1, list[Evaluated]()
+        self._by_a = np.zeros_like(start.u)
+        state = start.u, start.v, self._acceleration(0, start.u, start.v)
+        self._begin, self._kept = Evaluated(*state), [state]
+        for first in range(0, self._plan.steps - self._apart, self._apart):
+            self._kept.append(self._taken(first, first + self._apart, *self._kept[-1])[0])
+
+    def backward(self, first: int, last: int, by_u: NDArray, by_v: NDArray) -> None:
+        """See `Adjoint`."""
+        for step in range(last, first, -1):
+            number, place = divmod(step - 1, self._apart)
+            if number != self._number:
+                start = number * self._apart
+                end = min(start + self._apart, self._plan.steps)
+                self._number, self._segment = (
+                    number,
+                    self._taken(start, end, *self._kept[number])[1],
+                )
+            self._back(step, self._segment[place], by_u, by_v)
+        if first == 0:
+            self._through(self._plan.start, self._begin, by_u, by_v, self._by_a)
+            self._by_a[:] = 0.0
+
+    def _back(self, step: int, at: Evaluated, by_u: NDArray, by_v: NDArray) -> None:
+        """From the end of a step to its start."""
+        half, by_ahead = 0.5 * self._plan.dt, np.zeros_like(by_v)
+        by_a = self._by_a + half * by_v
+        self._through(self._plan.start + step * self._plan.dt, at, by_u, by_ahead, by_a)
+        by_v += by_ahead + self._plan.dt * by_u
+        self._by_a[:] = half * (by_ahead + by_v)
+
+    def _through(
+        self, t: float, at: Evaluated, by_u: NDArray, by_v: NDArray, by_a: NDArray
+    ) -> None:  # fmt: skip
+        """Add what derivatives by an acceleration are by its displacement and velocity."""
+        self._forget()
+        self._pull(*self._whole(t, at.u, at.ahead), self._push(by_a))
+        self._add_acceleration(at.a, at.ahead, by_a, by_u, by_v)
+
+    def _taken(
+        self, first: int, last: int, u: NDArray, v: NDArray, a: NDArray
+    ) -> tuple[tuple[NDArray, NDArray, NDArray], list[Evaluated]]:
+        """The state after the steps from `first` to `last`, and where they evaluate forces.
+
+        The arithmetic is that of the method itself, to the bit.
+        """
+        dt, taken = self._plan.dt, []
+        for step in range(first + 1, last + 1):
+            v = v + 0.5 * dt * a
+            u = u + dt * v
+            ahead = v + 0.5 * dt * a
+            a = self._acceleration(step, u, ahead)
+            v = v + 0.5 * dt * a
+            taken.append(Evaluated(u, ahead, a))
+        return (u, v, a), taken
+
+    def _acceleration(self, step: int, u: NDArray, v: NDArray) -> NDArray:
+        out, t = np.zeros_like(u), self._plan.start + step * self._plan.dt
+        accelerate(self._equation.still, u, v, t, out)
+        return out

@@ -1,0 +1,213 @@
+"""Cases of one topology as arrays for the card: those of the CPU, of many models side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.dynamics.gpu.checks import MOST_KINDS
+from foldyn.dynamics.gpu.elements import Counts, Damping, Elements
+from foldyn.dynamics.gpu.kernels import Nodes
+from foldyn.dynamics.system import Packed
+from foldyn.mechanics.constant_damping import DampingMatrix
+from foldyn.mechanics.membranes import Membranes, MembranesTerm
+from foldyn.mechanics.model import BarsHinges
+from foldyn.mechanics.springs import Springs, SpringsTerm
+from foldyn.mechanics.viscous import Viscous, ViscousTerm, viscous
+
+TOPOLOGY = ("bars", "bar_runs", "hinges", "hinge_runs", "hinge_group", "addresses")
+NO_SPRINGS = Springs(
+    np.zeros((0, 2), np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2), np.int64),
+    np.zeros((0, 3)), *np.zeros((3, 0)),
+)  # fmt: skip
+NONE = np.zeros(0, np.int64)
+NO_DAMPERS = viscous(
+    *(NONE.reshape(shape) for shape in ((0, 2), (0, 3), 0, (0, 4), (0, 4, 3), (0, 2), (0, 2), 0))
+)
+
+
+class CaseArrays:
+    """Cases of one topology as arrays of the host.
+
+    Parameters
+    ----------
+    cases : sequence of Packed
+
+    Attributes
+    ----------
+    elements : Elements
+    nodes : Nodes
+        But for the loads' rows, which `load_rows` (m, l) holds by history.
+    counts : Counts
+    histories : list
+        (case, row) of each row of the factors.
+    """
+
+    def __init__(self, cases: Sequence[Packed]) -> None:
+        first, bodies = cases[0], [packed.body for packed in cases]
+        models = [_with_force(packed.model) for packed in cases]
+        model = models[0]
+        self._entries: list[tuple[NDArray, NDArray, NDArray]] = []  # nodes, slots, whether added
+        self._slots = 0
+        self._add(model.bars[:, 1], 1)
+        self._again(model.bars[:, 0], 0)
+        for v in range(4):
+            self._add(model.hinges[:, v], 1)
+        panels = self._terms(bodies, MembranesTerm)
+        membranes = [self._membranes([term.membranes for term in own]) for own in panels]
+        springs = self._springs(
+            [term.springs for term in (self._terms(bodies, SpringsTerm) or [[]])[0]]
+        )
+        dampers = self._dampers(
+            [[t.elements for t in own] for own in self._terms(bodies, ViscousTerm)]
+        )
+        damping = self._damping(cases)
+        self.elements = Elements(
+            _stacked(models, TOPOLOGY)._replace(
+                bars=model.bars.astype(np.int32), hinges=model.hinges.astype(np.int32)
+            ),
+            _codes(model.bar_runs, len(model.bars)), _codes(model.hinge_runs, len(model.hinges)),
+            (*membranes, *[_no_panels()] * (MOST_KINDS - len(membranes))),
+            springs, dampers, damping,
+        )  # fmt: skip
+        rows, groups = first.system.rows, list(first.body.energy_groups)
+        self.counts = Counts(
+            rows, self._slots, len(groups),
+            groups.index("strain_springs") if "strain_springs" in groups else 0,
+            rows if len(damping.column) else 0,
+        )  # fmt: skip
+        self.nodes = self._nodes(cases)
+
+    @staticmethod
+    def _terms(bodies: Sequence[Any], kind: type) -> list[list[Any]]:
+        """Terms of a kind: of each, those of all models."""
+        rows = [[term for term in body.others if isinstance(term, kind)] for body in bodies]
+        return [list(own) for own in zip(*rows, strict=True)]
+
+    def _add(self, nodes: NDArray, plus: int) -> None:
+        """Slots of vectors that act on these nodes."""
+        self._again(nodes, plus, self._slots)
+        self._slots += len(nodes)
+
+    def _again(self, nodes: NDArray, plus: int, first: int = 0) -> None:
+        """The same slots for other nodes; those without one are negative."""
+        slots = first + np.arange(len(nodes))
+        own = np.asarray(nodes).astype(np.int64)
+        some = own >= 0
+        self._entries.append((own[some], (slots if plus else -1 - slots)[some], slots[some]))
+
+    def _membranes(self, own: Sequence[Membranes]) -> Membranes:
+        for v in range(own[0].nodes.shape[1]):
+            self._add(own[0].nodes[:, v], 1)
+        return _stacked(own, ("nodes", "ends"))
+
+    def _springs(self, own: Sequence[Springs]) -> Springs:
+        own = own or [NO_SPRINGS]
+        for ends, plus in ((own[0].ends, 0), (own[0].axial_ends, 1)):
+            first = self._slots
+            self._add(ends[:, plus], 1)
+            self._again(ends[:, 1 - plus], 0, first)
+        return _stacked(own, ("ends", "axial_ends"))
+
+    def _dampers(self, rows: Sequence[Sequence[Viscous]]) -> Viscous:
+        own = list(rows[0]) if rows else [NO_DAMPERS]
+        axial = len(own[0].axial)
+        for v in range(4):
+            nodes = own[0].dofs[:, 3 * v] // 3
+            nodes[:axial] = nodes[:axial] if v < 2 else -1
+            self._add(nodes, 1)
+        return _stacked(own, ("dofs",))
+
+    def _damping(self, cases: Sequence[Packed]) -> Damping:
+        size = 3 * cases[0].system.rows
+        own: list[Any] = [
+            sum(
+                (term.matrix for term in packed.body.others if isinstance(term, DampingMatrix)),
+                sparse.csr_array((size, size)),
+            )
+            for packed in cases
+        ]
+        if own[0].nnz:
+            self._add(np.arange(cases[0].system.rows), 1)
+        start, column = own[0].indptr.astype(np.int64), own[0].indices.astype(np.int64)
+        return Damping(start, column, _one_or_all([matrix.data for matrix in own]))
+
+    def _nodes(self, cases: Sequence[Packed]) -> Nodes:
+        node, entry, slot = (np.concatenate(column) for column in zip(*self._entries, strict=True))
+        order = np.lexsort((slot, node))
+        system, rows = cases[0].system, self.counts.nodes
+        start = np.searchsorted(node[order], np.arange(rows + 1))
+        support = np.full(3 * rows, -1, np.int64)
+        support[system.supported] = np.arange(len(system.supported))
+        most = max(len(packed.system.loads.dof) for packed in cases)
+        load, load_row = np.zeros((len(cases), most)), np.zeros((len(cases), most), np.int64)
+        starts = np.zeros((len(cases), 3 * rows + 1), np.int64)
+        for k, packed in enumerate(cases):
+            own = packed.system.loads
+            load[k, : len(own.dof)] = own.value
+            load_row[k, : len(own.dof)] = own.row
+            starts[k] = np.searchsorted(own.dof, np.arange(3 * rows + 1))
+        return Nodes(
+            start.astype(np.int32), entry[order].astype(np.int32), system.order, support,
+            _one_or_all([packed.mass.diagonal for packed in cases]),
+            _one_or_all([packed.mass.inverse for packed in cases]),
+            np.array([packed.system.alpha for packed in cases]),
+            starts, load, load_row,
+        )  # fmt: skip
+
+
+def topology(packed: Packed) -> tuple[Any, ...]:
+    """What cases of one launch have in common."""
+    arrays = [getattr(packed.model, name) for name in TOPOLOGY]
+    arrays += [packed.system.order, packed.system.supported]
+    kinds = []
+    for term in packed.body.others:
+        kinds.append(type(term).__name__)
+        if isinstance(term, MembranesTerm):
+            arrays += term.membranes[:2]
+        elif isinstance(term, SpringsTerm):
+            arrays += [term.springs.ends, term.springs.axial_ends]
+        elif isinstance(term, DampingMatrix):
+            arrays += [term.matrix.indptr, term.matrix.indices]
+        elif isinstance(term, ViscousTerm):
+            arrays += [term.elements.dofs, np.array(len(term.elements.axial))]
+    return (*kinds, *(array.tobytes() for array in arrays))
+
+
+def _one_or_all(arrays: Sequence[NDArray]) -> NDArray:
+    """The arrays of all models, or of one if they are equal."""
+    alike = all(np.array_equal(array, arrays[0]) for array in arrays[1:])
+    return np.ascontiguousarray(arrays[0][None] if alike else np.stack(arrays))
+
+
+def _stacked(own: Sequence[Any], same: Sequence[str]) -> Any:
+    """A tuple of arrays of one model, with those of all models but for what is the same."""
+    names = [name for name in own[0]._fields if name not in same]
+    numbers = {name: _one_or_all([getattr(each, name) for each in own]) for name in names}
+    kept = {name: np.ascontiguousarray(getattr(own[0], name)) for name in same}
+    return own[0]._replace(**numbers, **kept)
+
+
+def _with_force(model: BarsHinges) -> BarsHinges:
+    """The model without bars of no run, in whose place membranes are."""
+    count = int(model.bar_runs[:, 1].max(initial=0))
+    bars = ("bars", "bar_vector", "bar_per_length2", "bar_stiffness")
+    return model._replace(**{name: getattr(model, name)[:count] for name in bars})
+
+
+def _codes(runs: NDArray, count: int) -> NDArray:
+    """The law (count,) of each element."""
+    out = np.zeros(count, np.int64)
+    for start, end, code, _ in runs:
+        out[start:end] = code
+    return out
+
+
+def _no_panels() -> Membranes:
+    nodes, ends = np.zeros((0, 1), np.int64), np.zeros((0, 2), np.int64)
+    shapes = (1, 0, 3, 0), (1, 0, 0), (1, 0, 0, 0)
+    return Membranes(nodes, ends, *map(np.zeros, shapes))  # type: ignore[call-arg]

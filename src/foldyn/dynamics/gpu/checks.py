@@ -1,0 +1,87 @@
+"""What can be computed on a GPU, and whether there is one: checked before anything is imported."""
+
+from __future__ import annotations
+
+import importlib.util
+
+from numba import config
+
+from foldyn.dynamics.system import Packed
+from foldyn.errors import InputError
+from foldyn.mechanics.constant_damping import DampingMatrix
+from foldyn.mechanics.membranes import MembranesTerm
+from foldyn.mechanics.springs import SpringsTerm
+from foldyn.mechanics.viscous import ViscousTerm
+from foldyn.structures.bars_hinges import BarsHingesTerm
+
+METHODS = "rk4", "central_difference"
+OLDEST = 12, 0  # version of CUDA that a driver must know
+TERMS = MembranesTerm, SpringsTerm, DampingMatrix, ViscousTerm
+MOST_GROUPS, MOST_BARS, MOST_KINDS = 8, 16, 3  # of strain energy; of a panel; of panels
+
+
+def check_gpu(method: str) -> None:
+    """Refuse a method without GPU kernels, and a machine without a GPU, and say what is missing."""
+    if method not in METHODS:
+        raise InputError(
+            f' = "gpu": {method} has no GPU kernel; choose one of {", ".join(METHODS)}, or '
+            'device = "cpu"',
+            "device",
+        )
+    if config.ENABLE_CUDASIM:  # type: ignore[attr-defined]
+        return
+    if importlib.util.find_spec("numba_cuda") is None:
+        raise InputError(
+            ' = "gpu": numba-cuda is not installed; install it with: '
+            'pip install "foldyn[gpu]" "numba-cuda[cu13]"',
+            "device",
+        )
+    from numba import cuda
+
+    if not cuda.is_available():
+        raise InputError(
+            ' = "gpu": no GPU of NVIDIA\'s with a driver is found here (what does nvidia-smi '
+            'say?); device = "cpu" needs none',
+            "device",
+        )
+    version = tuple(cuda.driver.driver.get_version())
+    if version < OLDEST:
+        raise InputError(
+            f' = "gpu": the driver of the GPU is too old: it knows CUDA {version[0]}.{version[1]}, '
+            f"and CUDA {OLDEST[0]}.{OLDEST[1]} is needed; update it",
+            "device",
+        )
+
+
+def check_taken(packed: Packed, place: str = "device") -> None:
+    """Refuse a case with something that has no GPU kernel, and name it."""
+    if lack := lacking(packed):
+        raise InputError(f' = "gpu": {lack} has no GPU kernel; use device = "cpu"', place)
+
+
+def lacking(packed: Packed) -> str:
+    """What of a case has no GPU kernel, in words; empty where nothing."""
+    system, body = packed.system, packed.body
+    if not isinstance(body.sheet, BarsHingesTerm):
+        return "a sheet whose panels bend as plates"
+    if packed.model.addresses.any():
+        return "a law of your own"
+    if not packed.mass.lumped:
+        return "a constraint" if len(system.ties.slave) else "a mass matrix that is not diagonal"
+    drives = {
+        "a support that moves": system.moves, "a rest angle that changes": system.turns,
+        "a load that depends on the displacement": system.follows,
+    }  # fmt: skip
+    for what, there in drives.items():
+        if there:
+            return what
+    for term in body.others:
+        if not isinstance(term, TERMS):
+            return f"the term {type(term).__name__.removesuffix('Term')}"
+        if isinstance(term, ViscousTerm) and term.elements.hidden_turn.any():
+            return "a damper at dofs without mass"
+        if isinstance(term, MembranesTerm) and len(term.membranes.ends) > MOST_BARS:
+            return f"a panel with more than {MOST_BARS} bars"
+    if sum(isinstance(term, MembranesTerm) for term in body.others) > MOST_KINDS:
+        return f"a sheet with more than {MOST_KINDS} kinds of panels"
+    return f"more than {MOST_GROUPS} energies" if len(body.energy_groups) > MOST_GROUPS else ""

@@ -1,0 +1,214 @@
+"""Elements on the card: each thread has some, and writes the forces on their corners to slots.
+
+Elements and slots are those of one model; arrays of many have an axis for it in front.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from foldyn.dynamics.gpu.ported import SIMULATED, on_device, ported
+from foldyn.materials import series, switch
+from foldyn.mechanics import energy, springs
+from foldyn.mechanics.membranes import Membranes
+from foldyn.mechanics.model import BarsHinges
+from foldyn.mechanics.springs import Springs
+from foldyn.mechanics.viscous import Viscous
+
+bar_extension, hinge_dihedral = ported(energy.bar_extension), ported(energy.hinge_dihedral)
+bar_energy, bar_stress = ported(switch.bar_energy), ported(switch.bar_stress)
+series_energy, series_moment = ported(series.series_energy), ported(series.series_moment)
+directed_extension = ported(springs.directed_extension)
+axial_extension, axial_pull = ported(springs.axial_extension), ported(springs.axial_pull)
+
+
+class Counts(NamedTuple):
+    """How many there are."""
+
+    nodes: int
+    slots: int  # of vectors of force
+    groups: int  # of strain energy
+    spring_group: int
+    damped: int  # rows of the damping matrix: all nodes, or none
+
+
+class Damping(NamedTuple):
+    """A constant damping matrix of the dofs."""
+
+    start: Any
+    column: Any
+    value: Any  # (m, k)
+
+
+class Elements(NamedTuple):
+    """The elements of m models; numbers have an axis of m, or of 1 where they are equal."""
+
+    model: BarsHinges
+    bar_code: Any  # (nb,)
+    hinge_code: Any  # (nh,)
+    membranes: tuple[Membranes, ...]
+    springs: Springs
+    viscous: Viscous
+    damping: Damping
+
+
+if SIMULATED:
+
+    def rows_of(array, first, rows):  # type: ignore[no-redef]
+        """Rows of three from a place in a flat array."""
+        return array[first : first + 3 * rows].reshape(rows, 3)
+
+    def at(array, m):  # type: ignore[no-redef]
+        """That of model m, or the one of all."""
+        return array[m if array.shape[0] > 1 else 0]
+
+else:
+    from numba import types
+    from numba.cuda import cgutils, extending  # type: ignore[attr-defined]
+    from numba.cuda.np.arrayobj import (  # type: ignore[import-not-found]
+        make_array,
+        populate_array,
+    )
+
+    intrinsic: Any = extending.intrinsic
+
+    @intrinsic
+    def rows_of(typing_context, array, first, rows):
+        """The same: NumPy's would call a function of the run-time library."""
+        view = types.Array(array.dtype, 2, "C")
+
+        def codegen(context, builder, signature, arguments):
+            source = make_array(array)(context, builder, arguments[0])
+            out = make_array(view)(context, builder)
+            three, size, row = (context.get_constant(types.intp, k) for k in (3, 8, 24))
+            populate_array(
+                out, data=builder.gep(source.data, [arguments[1]]), shape=[arguments[2], three],
+                strides=[row, size], itemsize=size, meminfo=None,
+            )  # fmt: skip
+            return out._getvalue()
+
+        return view(array, types.int64, types.int64), codegen
+
+    @intrinsic
+    def at(typing_context, array, m):
+        """The same: a device function may not return an array."""
+        view = types.Array(array.dtype, array.ndim - 1, "C")
+
+        def codegen(context, builder, signature, arguments):
+            source = make_array(array)(context, builder, arguments[0])
+            out, kind = make_array(view)(context, builder), context.get_value_type(types.intp)
+            shape = cgutils.unpack_tuple(builder, source.shape)
+            strides = cgutils.unpack_tuple(builder, source.strides)
+            several = builder.icmp_signed(">", shape[0], kind(1))
+            row = builder.select(several, arguments[1], kind(0))
+            count = builder.sdiv(strides[0], source.itemsize)
+            populate_array(
+                out, data=builder.gep(source.data, [builder.mul(row, count)]), shape=shape[1:],
+                strides=strides[1:], itemsize=source.itemsize, meminfo=None,
+            )  # fmt: skip
+            return out._getvalue()
+
+        return view(array, types.int64), codegen
+
+
+@on_device
+def put(slot, size, s, x, y, z):
+    """Write a vector of force."""
+    slot[s], slot[size + s], slot[2 * size + s] = x, y, z
+
+
+@on_device
+def bars_to(own, code, u, slot, size, who, crowd, sampled, strain):
+    """Forces of the bars, at their second ends; energies where this is a sample."""
+    for e in range(who, own.bars.shape[0], crowd):
+        stretch = bar_extension(own, u, e)
+        s = own.bar_stiffness[e] * bar_stress(code[e], stretch, 0)
+        a, b = own.bars[e, 0], own.bars[e, 1]
+        put(
+            slot, size, e,
+            s * (own.bar_vector[e, 0] + (u[b, 0] - u[a, 0])),
+            s * (own.bar_vector[e, 1] + (u[b, 1] - u[a, 1])),
+            s * (own.bar_vector[e, 2] + (u[b, 2] - u[a, 2])),
+        )  # fmt: skip
+        if sampled:
+            w = bar_energy(code[e], stretch, 0)
+            strain[0] += own.bar_stiffness[e] / own.bar_per_length2[e] * w
+
+
+@on_device
+def hinges_to(own, code, u, slot, size, at_slot, who, crowd, sampled, looks, angle, strain):
+    """Forces of the hinges; returns how many have passed through 0 or 360 degrees."""
+    count, p, jumped = own.hinges.shape[0], own.hinge_parameters, 0
+    for e in range(who, count, crowd):
+        found = hinge_dihedral(own, u, e)
+        theta, share = found[0] + own.hinge_offset[e, 0], own.hinge_share[e]
+        moment = own.hinge_stiffness[e] * series_moment(
+            code[e], theta, own.hinge_rest[e], p[e, 0], p[e, 1], p[e, 2], p[e, 3], share,
+            own.addresses[0],
+        )  # fmt: skip
+        k = at_slot + e
+        put(slot, size, k, moment * found[1], moment * found[2], moment * found[3])
+        k += count
+        put(slot, size, k, moment * found[4], moment * found[5], moment * found[6])
+        k += count
+        put(slot, size, k, moment * found[7], moment * found[8], moment * found[9])
+        k += count
+        put(slot, size, k, moment * found[10], moment * found[11], moment * found[12])
+        if looks:
+            jumped += abs(found[0] - angle[e]) > math.pi
+            angle[e] = found[0]
+        if sampled:
+            w = series_energy(
+                code[e], theta, own.hinge_rest[e], p[e, 0], p[e, 1], p[e, 2], p[e, 3], share,
+                own.addresses[0],
+            )  # fmt: skip
+            strain[1 + own.hinge_group[e]] += own.hinge_stiffness[e] * w
+    return jumped
+
+
+@on_device
+def springs_to(all_springs, m, group, u, slot, size, at_slot, who, crowd, sampled, strain):
+    """Forces of springs, at the first ends of directed ones; returns the slot after theirs."""
+    own = Springs(
+        all_springs.ends, at(all_springs.direction, m), at(all_springs.stiffness, m),
+        all_springs.axial_ends, at(all_springs.vector, m), at(all_springs.length, m),
+        at(all_springs.stretch, m), at(all_springs.axial_stiffness, m),
+    )  # fmt: skip
+    directed, axial = own.ends.shape[0], own.axial_ends.shape[0]
+    for s in range(who, directed, crowd):
+        extension = directed_extension(own, u, s)
+        pull = own.stiffness[s] * extension
+        put(
+            slot, size, at_slot + s, pull * own.direction[s, 0], pull * own.direction[s, 1],
+            pull * own.direction[s, 2],
+        )  # fmt: skip
+        if sampled:
+            strain[group] += 0.5 * pull * extension
+    for s in range(who, axial, crowd):
+        a, b = own.axial_ends[s, 0], own.axial_ends[s, 1]
+        pull = axial_pull(own, u, s)
+        put(
+            slot, size, at_slot + directed + s,
+            pull * (own.vector[s, 0] + u[b, 0] - u[a, 0]),
+            pull * (own.vector[s, 1] + u[b, 1] - u[a, 1]),
+            pull * (own.vector[s, 2] + u[b, 2] - u[a, 2]),
+        )  # fmt: skip
+        if sampled:
+            extension = axial_extension(own, u, s)[0]
+            strain[group] += 0.5 * own.axial_stiffness[s] * extension * extension
+    return at_slot + directed + axial
+
+
+@on_device
+def damping_to(damping, m, nodes, v, slot, size, at_slot, who, crowd):
+    """Forces of a constant matrix; returns what it dissipates, W."""
+    value, power = at(damping.value, m), 0.0
+    for i in range(who, nodes, crowd):
+        for c in range(3):
+            resisted, row = 0.0, 3 * i + c
+            for k in range(damping.start[row], damping.start[row + 1]):
+                resisted += value[k] * v[damping.column[k]]
+            slot[c * size + at_slot + i] = resisted
+            power += resisted * v[row]
+    return power

@@ -1,0 +1,115 @@
+"""The engine of one motion on a GPU, in the place of `methods.Compiled`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.dynamics.checkpoint import restore, snapshot, state_parts
+from foldyn.dynamics.gpu import card
+from foldyn.dynamics.gpu.launch import Launches, Places
+from foldyn.dynamics.motion_state import Course, Outcome, Samples, StepPlan
+from foldyn.dynamics.system import Packed
+
+
+class OnCard:
+    """An explicit method on the card, for one motion.
+
+    Where something goes wrong in a stretch, the CPU does it once more, and says what it was.
+
+    Parameters
+    ----------
+    method : methods.Integrator
+    packed : Packed
+    course : Course
+    plan : StepPlan
+    on_cpu : callable
+        Makes the same for the CPU, a `methods.Compiled`.
+    """
+
+    threads = 1
+
+    def __init__(
+        self, method: Any, packed: Packed, course: Course, plan: StepPlan,
+        on_cpu: Callable[[], Any],
+    ) -> None:  # fmt: skip
+        self._method, self._packed, self._course, self._plan = method, packed, course, plan
+        self._on_cpu = on_cpu
+        self._power = np.zeros(2)
+        self._launches = Launches([packed], method.name, self._places(), wide=True)
+        self._alone: Any = None
+
+    def _places(self) -> Places:
+        course = self._course
+        one = (course.u, course.v, course.carry, self._power, course.angle)
+        return Places(*(np.array(array)[None] for array in one))
+
+    def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
+        """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
+        plan, tally = self._plan, self._course.tally
+        begun = int(tally.steps)
+        end = min(begun + stretch, plan.steps)
+        keeps = self._method.name == "central_difference" and begun > 0  # the forces of its end
+        while not keeps or tally.steps < end:
+            first = int(tally.steps)
+            last = min(end, first + self._launches.fits(plan))
+            skips = self._method.name == "central_difference" and first > 0
+            sample = int(tally.samples)
+            written, wrong = self._launches.run(plan, first + skips, last, sample)
+            if wrong.any() or not np.isfinite(written.energy).all():
+                return self._again(out, end - first)
+            self._take(written, out, sample, last - first)
+            if last == end:
+                break
+        return int(Outcome.DONE), -1
+
+    def _take(self, written: Any, out: Samples, sample: int, steps: int) -> None:
+        """Take over what a launch has done."""
+        course, tally, plan = self._course, self._course.tally, self._plan
+        count = written.u.shape[1]
+        rows = slice(sample - out.first, sample - out.first + count)
+        out.time[rows] = plan.start + np.arange(sample, sample + count) * plan.every * plan.dt
+        out.displacement[rows], out.velocity[rows] = written.u[0], written.v[0]
+        out.reaction[rows] = written.reaction[0]
+        energy = written.energy[:, 0] + 0.0
+        energy[:, -2] += tally.dissipated
+        energy[:, -1] += tally.work
+        out.energy[rows] = energy[:-1]
+        tally.dissipated, tally.work = energy[-1, -2], energy[-1, -1]
+        tally.steps += steps
+        tally.samples += count
+        tally.time = plan.start + tally.steps * plan.dt
+        tally.evaluations += self._method.evaluations * steps
+        places = self._launches.places()
+        for array, own in zip(
+            (course.u, course.v, course.carry, self._power, course.angle), places, strict=True
+        ):
+            array[...] = own[0]
+
+    def _again(self, out: Samples, stretch: int) -> tuple[int, int]:
+        """Do a stretch on the CPU, from where the card began it."""
+        if self._alone is None:
+            self._alone = self._on_cpu()
+        self._alone.start_with(self._power)
+        result = self._alone.advance(out, stretch)
+        self._launches = Launches([self._packed], self._method.name, self._places(), wide=True)
+        return result
+
+    def checkpoint_arrays(self) -> dict[str, NDArray]:
+        """See `methods.Compiled`."""
+        return snapshot(self._parts())
+
+    def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
+        """See `methods.Compiled`."""
+        restore(self._parts(), arrays)
+        self._launches = Launches([self._packed], self._method.name, self._places(), wide=True)
+
+    def _parts(self) -> dict[str, Any]:
+        return state_parts(self._packed, self._course) | {"card_powers": self._power}
+
+    def facts(self) -> dict[str, Any]:
+        """See `methods.Compiled`."""
+        return {"device": card.name()}

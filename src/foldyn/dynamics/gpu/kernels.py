@@ -1,0 +1,370 @@
+"""Explicit methods as CUDA kernels: a model for each block of threads, or one for the whole grid.
+
+A force evaluation has two halves, and every thread waits between them. In the first, threads share
+the elements: each writes the forces on its corners to slots of its own. In the second, threads
+share the nodes: each adds up the slots of its nodes, in an order that never changes, and moves
+them. Nothing is added atomically, so the same input gives the same bits on the same card.
+
+A model of a block lives in the block's shared memory; that of a grid in the card's memory.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+from numba import float64
+
+from foldyn.dynamics.gpu.checks import MOST_BARS, MOST_GROUPS
+from foldyn.dynamics.gpu.elements import (
+    at,
+    bars_to,
+    damping_to,
+    hinges_to,
+    put,
+    rows_of,
+    springs_to,
+)
+from foldyn.dynamics.gpu.ported import SIMULATED, cuda, on_device, ported
+from foldyn.mechanics import membranes, viscous
+from foldyn.mechanics.membranes import Membranes
+from foldyn.mechanics.model import BarsHinges
+from foldyn.mechanics.viscous import Viscous
+
+strain_of = ported(membranes.strain_of)
+viscous_gradient = ported(viscous.element_gradient)
+REGISTERS = 168  # of a thread of a grid with one model: with fewer, more threads run at once
+
+
+class Nodes(NamedTuple):
+    """What nodes work with."""
+
+    start: Any  # (n + 1,) first of the entries of each node
+    entry: Any  # slots, or -1 - slot where it is subtracted
+    order: Any  # (n,) the structure's number of each node
+    support: Any  # (3 n,) number of the supported dof, or -1
+    mass: Any  # (m, n)
+    inverse: Any  # (m, n, 3)
+    alpha: Any  # (m,)
+    load_start: Any  # (m, 3 n + 1) first of the loads of each dof
+    load: Any  # (m, l) N
+    load_row: Any  # (m, l) rows of the factors
+
+
+class State(NamedTuple):
+    """Where m models are; rows of the threads of all blocks, in order, in `note` and `power`."""
+
+    u: Any  # (m, n, 3)
+    v: Any
+    first: Any  # (m, n, 3) sums of the method, or its acceleration
+    second: Any
+    ahead_u: Any  # (m, n, 3) where forces are evaluated, unless that is in shared memory
+    ahead_v: Any
+    slot: Any  # (m, 3 slots) likewise
+    angle: Any  # (m, nh)
+    wrong: Any  # (m,) int64
+    note: Any  # (threads, columns)
+    power: Any  # (threads, 2)
+    barrier: Any  # (1,) int64
+
+
+class Written(NamedTuple):
+    """Samples of one launch; the last row of the energies is that of its end."""
+
+    u: Any  # (m, k, n, 3)
+    v: Any
+    reaction: Any  # (m, k, s)
+    energy: Any  # (k + 1, blocks, columns)
+
+
+class Span(NamedTuple):
+    """Steps of a launch."""
+
+    first: int
+    last: int
+    dt: float
+    every: int
+    sample: int  # number of the next sample, and of the first one in this launch
+
+
+@on_device
+def panels_to(kind, m, u, slot, size, at_slot, who, crowd, sampled, strain):
+    """Forces of the panels of one kind at their corners; returns the slot after theirs."""
+    own = Membranes(
+        kind.nodes, kind.ends, at(kind.vector, m), at(kind.per_length2, m), at(kind.stiffness, m)
+    )
+    count, corners, bars = own.nodes.shape[0], own.nodes.shape[1], own.ends.shape[0]
+    stretch, along = cuda.local.array(MOST_BARS, float64), cuda.local.array(3, float64)
+    for p in range(who, count, crowd):
+        for i in range(bars):
+            stretch[i] = strain_of(own, u, p, i, along)
+        for v in range(corners):
+            put(slot, size, at_slot + v * count + p, 0.0, 0.0, 0.0)
+        for i in range(bars):
+            pull = 0.0
+            for j in range(bars):
+                pull += own.stiffness[i, j, p] * stretch[j]
+            if sampled:
+                strain[0] += 0.5 * stretch[i] * pull
+            pull *= own.per_length2[i, p]
+            strain_of(own, u, p, i, along)
+            a, b = at_slot + own.ends[i, 0] * count + p, at_slot + own.ends[i, 1] * count + p
+            for c in range(3):
+                slot[c * size + a] -= pull * along[c]
+                slot[c * size + b] += pull * along[c]
+    return at_slot + corners * count
+
+
+@on_device
+def dampers_to(dampers, m, u, v, slot, size, at_slot, who, crowd):
+    """Forces of viscous elements, at four nodes each; returns what they dissipate, W."""
+    own = Viscous(
+        dampers.dofs, at(dampers.axial, m), at(dampers.corners, m), at(dampers.hidden_turn, m),
+        at(dampers.coefficient, m), at(dampers.gradient, m),
+    )  # fmt: skip
+    count, power, g = own.dofs.shape[0], 0.0, cuda.local.array(14, float64)
+    for e in range(who, count, crowd):
+        viscous_gradient(own, u, e, g)
+        rate = 0.0
+        for c in range(12):
+            rate += g[c] * v[own.dofs[e, c]]
+        resisted = own.coefficient[e] * rate
+        for k in range(4):
+            s = at_slot + k * count + e
+            put(
+                slot, size, s, resisted * g[3 * k], resisted * g[3 * k + 1], resisted * g[3 * k + 2]
+            )
+        power += resisted * rate
+    return power
+
+
+@on_device
+def forces_to(
+    elements, counts, m, u, flat_u, flat_v, slot, angle, who, crowd, sampled, looks, strain
+):
+    """The first half: forces of all elements; returns how many are wrong, and W dissipated."""
+    model, size = elements.model, counts.slots
+    own = BarsHinges(
+        at(model.rest, m), model.bars, at(model.bar_vector, m), at(model.bar_per_length2, m),
+        at(model.bar_stiffness, m), model.bar_runs, model.hinges, at(model.hinge_stiffness, m),
+        at(model.hinge_rest, m), at(model.hinge_parameters, m), at(model.hinge_share, m),
+        at(model.hinge_offset, m), model.hinge_group, model.hinge_runs, model.addresses,
+    )  # fmt: skip
+    bars_to(own, elements.bar_code, u, slot, size, who, crowd, sampled, strain)
+    s = own.bars.shape[0]
+    wrong = hinges_to(
+        own, elements.hinge_code, u, slot, size, s, who, crowd, sampled, looks, angle, strain
+    )
+    s += 4 * own.hinges.shape[0]
+    kinds = elements.membranes  # written out: Numba cannot loop over tuples on the card
+    s = panels_to(kinds[0], m, u, slot, size, s, who, crowd, sampled, strain)
+    s = panels_to(kinds[1], m, u, slot, size, s, who, crowd, sampled, strain)
+    s = panels_to(kinds[2], m, u, slot, size, s, who, crowd, sampled, strain)
+    s = springs_to(
+        elements.springs, m, counts.spring_group, u, slot, size, s, who, crowd, sampled, strain
+    )
+    power = dampers_to(elements.viscous, m, flat_u, flat_v, slot, size, s, who, crowd)
+    s += 4 * elements.viscous.dofs.shape[0]
+    power += damping_to(elements.damping, m, counts.damped, flat_v, slot, size, s, who, crowd)
+    return wrong, power
+
+
+@on_device
+def sum_to(nodes, slot, size, i, out):
+    """The force (3,) on a node, added up in the order of its entries."""
+    x, y, z = 0.0, 0.0, 0.0
+    for k in range(nodes.start[i], nodes.start[i + 1]):
+        s = nodes.entry[k]
+        if s >= 0:
+            x, y, z = x + slot[s], y + slot[size + s], z + slot[2 * size + s]
+        else:
+            s = -1 - s
+            x, y, z = x - slot[s], y - slot[size + s], z - slot[2 * size + s]
+    out[0], out[1], out[2] = x, y, z
+
+
+@on_device
+def load_on(nodes, load_start, load, load_row, factor, time, dof):
+    """The load (N) on a dof."""
+    total = 0.0
+    for k in range(load_start[dof], load_start[dof + 1]):
+        total += load[k] * factor[load_row[k], time]
+    return total
+
+
+@on_device
+def meet(state, blocks, arrived):
+    """Wait for all threads of the grid; returns how often they have met."""
+    cuda.syncthreads()
+    if cuda.threadIdx.x == 0:
+        cuda.threadfence()
+        cuda.atomic.add(state.barrier, 0, 1)
+        while cuda.atomic.add(state.barrier, 0, 0) < (arrived + 1) * blocks:
+            pass
+        cuda.threadfence()
+    cuda.syncthreads()
+    return arrived + 1
+
+
+@on_device
+def note_down(state, thread, groups, strain, kinetic, work_out, work_in):
+    """What a thread knows of the energies, for the sum over its block."""
+    for g in range(groups):
+        state.note[thread, g] = strain[g]
+    state.note[thread, groups] = kinetic
+    state.note[thread, groups + 1] = work_out
+    state.note[thread, groups + 2] = work_in
+
+
+@on_device
+def add_notes(state, row, columns):
+    """Sums over the threads of a block, by its first threads."""
+    first, count = cuda.blockIdx.x * cuda.blockDim.x, cuda.blockDim.x
+    for c in range(cuda.threadIdx.x, columns, count):
+        total = 0.0
+        for k in range(count):
+            total += state.note[first + k, c]
+        row[cuda.blockIdx.x, c] = total
+
+
+@lru_cache
+def kernel(method: str, wide: bool, shared: bool) -> Any:
+    """The loop of a method.
+
+    wide : whether the grid has one model, else each block has one.
+    shared : whether it lives in shared memory.
+    """
+    runge = method == "rk4"
+    stages, per_step = (4, 3) if runge else (1, 1)
+
+    def advance(elements, nodes, counts, span, factor, state, out):
+        """The steps of a span."""
+        if wide:
+            m, who, crowd = 0, cuda.grid(1), cuda.gridsize(1)
+        else:
+            m, who, crowd = cuda.blockIdx.x, cuda.threadIdx.x, cuda.blockDim.x
+        blocks, thread = cuda.gridDim.x, cuda.blockIdx.x * cuda.blockDim.x + cuda.threadIdx.x
+        n, size, groups = counts.nodes, counts.slots, counts.groups
+        if shared:
+            slot = cuda.shared.array(0, float64)
+            ut, vt = rows_of(slot, 3 * size, n), rows_of(slot, 3 * size + 3 * n, n)
+            flat_u, flat_v = (
+                slot[3 * size : 3 * size + 3 * n],
+                slot[3 * size + 3 * n : 3 * size + 6 * n],
+            )
+        else:
+            slot, flat_u, flat_v = state.slot[m], state.ahead_u[m], state.ahead_v[m]
+            ut, vt = rows_of(flat_u, 0, n), rows_of(flat_v, 0, n)
+        u, v, angle = state.u[m], state.v[m], state.angle[m]
+        du, dv = state.first[m], state.second[m]
+        mass, inverse, alpha = at(nodes.mass, m), at(nodes.inverse, m), nodes.alpha[m]
+        load_start, load, load_row = (
+            at(nodes.load_start, m),
+            at(nodes.load, m),
+            at(nodes.load_row, m),
+        )
+        strain = cuda.local.array(MOST_GROUPS, float64)
+        force = cuda.local.array(3, float64)
+        arrived, sample, wrong = 0, span.sample, 0
+        work_in, work_out, dt = 0.0, 0.0, span.dt
+        before_in, before_out = state.power[thread, 0], state.power[thread, 1]
+        for i in range(who, n, crowd):
+            for c in range(3):
+                ut[i, c], vt[i, c] = u[i, c], v[i, c]
+        for step in range(span.first, span.last + 1):
+            sampled = step == sample * span.every
+            part_in, part_out, kinetic = 0.0, 0.0, 0.0
+            for stage in range(stages):
+                h = dt
+                if not runge:  # kick and drift
+                    h = dt if step > 0 else 0.0
+                    for i in range(who, n, crowd):
+                        for c in range(3):
+                            v[i, c] += 0.5 * h * du[i, c]
+                            u[i, c] += h * v[i, c]
+                            ut[i, c] = u[i, c]
+                            vt[i, c] = v[i, c] + 0.5 * h * du[i, c]
+                first = stage == 0
+                if wide:
+                    arrived = meet(state, blocks, arrived)
+                else:
+                    cuda.syncthreads()
+                looks = first and sampled
+                if looks:
+                    for g in range(groups):
+                        strain[g] = 0.0
+                jumped, power_out = forces_to(
+                    elements, counts, m, ut, flat_u, flat_v, slot, angle, who, crowd, looks, first,
+                    strain,
+                )  # fmt: skip
+                wrong += jumped
+                power_in, time = 0.0, per_step * (step - span.first) + (stage + 1) // 2
+                if wide:
+                    arrived = meet(state, blocks, arrived)
+                else:
+                    cuda.syncthreads()
+                ends = runge and step == span.last
+                for i in range(who, n, crowd):
+                    sum_to(nodes, slot, size, i, force)
+                    for c in range(3):
+                        dof, speed = 3 * i + c, vt[i, c]
+                        pull = load_on(nodes, load_start, load, load_row, factor, time, dof)
+                        left = force[c] - pull
+                        power_in += pull * speed
+                        power_out += alpha * mass[i] * speed * speed
+                        a = -left * inverse[i, c] - alpha * speed
+                        if not runge:
+                            du[i, c] = a
+                            v[i, c] += 0.5 * h * a
+                            wrong += not abs(v[i, c]) < math.inf
+                        if looks:
+                            k, now = sample - span.sample, v[i, c]
+                            kinetic += 0.5 * mass[i] * now * now
+                            out.u[m, k, nodes.order[i], c] = u[i, c]
+                            out.v[m, k, nodes.order[i], c] = now
+                            if nodes.support[dof] >= 0:
+                                out.reaction[m, k, nodes.support[dof]] = left
+                        if runge and not ends:
+                            if stage == 0:
+                                du[i, c], dv[i, c] = speed, a
+                                ut[i, c] = u[i, c] + 0.5 * dt * speed
+                                vt[i, c] = v[i, c] + 0.5 * dt * a
+                            elif stage < 3:
+                                ahead = 0.5 * dt if stage == 1 else dt
+                                du[i, c] += 2.0 * speed
+                                dv[i, c] += 2.0 * a
+                                ut[i, c] = u[i, c] + ahead * speed
+                                vt[i, c] = v[i, c] + ahead * a
+                            else:
+                                u[i, c] += dt / 6.0 * (du[i, c] + speed)
+                                v[i, c] += dt / 6.0 * (dv[i, c] + a)
+                                wrong += not abs(v[i, c]) < math.inf
+                                ut[i, c], vt[i, c] = u[i, c], v[i, c]
+                if not runge:
+                    work_in += 0.5 * h * (before_in + power_in)
+                    work_out += 0.5 * h * (before_out + power_out)
+                    before_in, before_out = power_in, power_out
+                if looks:
+                    note_down(state, thread, groups, strain, kinetic, work_out, work_in)
+                    cuda.syncthreads()
+                    add_notes(state, out.energy[sample - span.sample], groups + 3)
+                    sample += 1
+                if ends:
+                    break
+                weight = 2.0 if stage == 1 or stage == 2 else 1.0
+                part_in += weight * power_in
+                part_out += weight * power_out
+            if runge and step < span.last:
+                work_in += dt / 6.0 * part_in
+                work_out += dt / 6.0 * part_out
+        state.power[thread, 0], state.power[thread, 1] = before_in, before_out
+        cuda.syncthreads()  # the notes of a last sample are added up
+        note_down(state, thread, groups, strain, 0.0, work_out, work_in)
+        cuda.syncthreads()
+        add_notes(state, out.energy[out.energy.shape[0] - 1], groups + 3)
+        if wrong > 0:
+            state.wrong[m] = 1
+
+    options = {"max_registers": REGISTERS} if wide and not SIMULATED else {}
+    return cuda.jit(advance, **options)

@@ -1,0 +1,212 @@
+"""Launches of a method's kernel: the models on the card, and their steps in pieces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.waveforms import CALLED, waveform_table
+from foldyn.dynamics.gpu import card
+from foldyn.dynamics.gpu.arrays import CaseArrays
+from foldyn.dynamics.gpu.kernels import Span, State, Written, kernel
+from foldyn.dynamics.gpu.ported import SIMULATED, cuda
+from foldyn.dynamics.motion_state import StepPlan
+from foldyn.dynamics.system import Packed
+
+BLOCK = 128  # threads of a block of a grid with one model
+FEWEST, MOST = 64, 256  # of a block with a model of its own: few, unless models are few
+WINDOW = 0.25  # of the free memory: samples of a launch
+FACTORS = 2**28  # bytes: factors of a launch
+LOOKS = {"rk4": (0.0, 0.5, 1.0), "central_difference": (0.0,)}  # in a step, at the loads
+
+
+class Places(NamedTuple):
+    """Where models stand between two launches: arrays of the host, m of them."""
+
+    u: NDArray  # (m, n, 3)
+    v: NDArray
+    carry: NDArray  # (m, n, 3) acceleration, for methods that keep it
+    power: NDArray  # (m, 2) likewise
+    angle: NDArray  # (m, nh)
+
+
+class Launches:
+    """Models of one topology on the card.
+
+    Parameters
+    ----------
+    cases : sequence of Packed
+    method : str
+        One of `checks.METHODS`.
+    places : Places
+        Where they start.
+    wide : bool
+        Whether one model has all of the card; else each has a block.
+
+    Raises
+    ------
+    InputError
+        The card has no memory for them.
+    """
+
+    def __init__(self, cases: Sequence[Packed], method: str, places: Places, wide: bool) -> None:
+        host, self._cases, self._method, self._wide = CaseArrays(cases), cases, method, wide
+        self._counts, self._count = host.counts, len(cases)
+        n, slots = host.counts.nodes, host.counts.slots
+        room = 8 * (3 * slots + 6 * n)
+        shared = not wide and room <= card.SHARED
+        own = self._count if not shared else 1
+        needed = card.size_of(tuple(host.elements)) + card.size_of(tuple(host.nodes))
+        needed += 8 * self._count * (12 * n + places.angle.shape[1]) + own * room
+        what = f"{self._count} models of {n} nodes" if self._count > 1 else f"a model of {n} nodes"
+        card.check_size(needed, what)
+        self._rows = self._histories()
+        load_row = host.nodes.load_row
+        for k, rows in enumerate(self._of_case):
+            if len(rows):
+                load_row[k] = rows[np.minimum(load_row[k], len(rows) - 1)]
+        self._elements = card.put(host.elements)
+        self._nodes = card.put(host.nodes)
+        self._room = room if shared else 0
+        self._kernel, self._threads, self._blocks = kernel(method, wide, shared), 0, 0
+        self._shape, self._shared = (self._count, n), shared
+        self._supported = len(cases[0].system.supported)
+        self._compiled: Any = None
+        self._start(places)
+
+    def _histories(self) -> list[tuple[Packed, int]]:
+        """Distinct histories; `_of_case` gets their numbers by the rows of each case."""
+        numbers: dict[Any, int] = {}
+        found: list[tuple[Packed, int]] = []
+        self._of_case = []
+        for packed in self._cases:
+            waves, rows = packed.system.waves, []
+            for row, code in enumerate(waves.code):
+                own = slice(waves.first[row], waves.first[row + 1])
+                key: Any = (
+                    int(code),
+                    waves.parameters[row].tobytes(),
+                    waves.knot[own].tobytes(),
+                    waves.cubic[own].tobytes(),
+                )
+                if code == CALLED:
+                    key = id(packed), row
+                if key not in numbers:
+                    numbers[key] = len(found)
+                    found.append((packed, row))
+                rows.append(numbers[key])
+            self._of_case.append(np.array(rows, np.int64))
+        return found
+
+    def _start(self, places: Places) -> None:
+        (m, n), slots = self._shape, self._counts.slots
+        hinges = places.angle.shape[1]
+        if SIMULATED:
+            self._threads, self._blocks = 4, 1 if self._wide else m
+        elif not self._wide:
+            idle = cuda.get_current_device().MULTIPROCESSOR_COUNT // m
+            self._threads = FEWEST if idle < 1 else MOST
+            self._blocks = m
+        else:
+            self._threads = BLOCK
+            self._blocks = 8 * cuda.get_current_device().MULTIPROCESSOR_COUNT
+        ahead = (1, 1) if self._shared else (m, 3 * n)
+        self._hinges, self._ahead = hinges, ahead
+        self._slot = (1, 1) if self._shared else (m, 3 * slots)
+        self._set(places)
+
+    def _set(self, places: Places) -> None:
+        """Put the models there."""
+        m, n = self._shape
+        threads = self._blocks * self._threads
+        power = np.zeros((threads, 2))
+        power[:: threads if self._wide else self._threads] = places.power
+        memory, put = cuda.device_array, card.put
+        self._state = State(
+            u=put(places.u), v=put(places.v), first=put(places.carry), second=memory((m, n, 3)),
+            ahead_u=memory(self._ahead), ahead_v=memory(self._ahead), slot=memory(self._slot),
+            angle=put(places.angle), wrong=put(np.zeros(m, np.int64)),
+            note=memory((threads, self._counts.groups + 3)), power=put(power),
+            barrier=put(np.zeros(1, np.int64)),
+        )  # fmt: skip
+
+    def fits(self, plan: StepPlan) -> int:
+        """Steps of one launch, at most: samples and factors must have room on the card."""
+        (m, n), looks = self._shape, len(LOOKS[self._method])
+        sample = 8.0 * m * (6 * n + self._supported) + 8.0 * self._blocks * 11
+        samples = max(1, int(WINDOW * card.free_memory() / sample))
+        factors = max(1, int(FACTORS / (8 * looks * max(1, len(self._rows)))))
+        return min(samples * plan.every, factors)
+
+    def _factors(self, plan: StepPlan, first: int, last: int) -> NDArray:
+        """Factors of all histories (h, looks) of these steps."""
+        looks = np.array(LOOKS[self._method]) * plan.dt
+        times = (plan.start + np.arange(first, last + 1)[:, None] * plan.dt + looks).ravel()
+        out = np.ones((len(self._rows), len(times)))
+        for k, (packed, row) in enumerate(self._rows):
+            if packed.system.varies:
+                out[k] = waveform_table(packed.system.waves, row, times)[0]
+        return out
+
+    def run(self, plan: StepPlan, first: int, last: int, sample: int) -> tuple[Written, NDArray]:
+        """Do the steps from first to last; samples from number `sample` on.
+
+        Returns the samples as arrays of the host, their energies (k + 1, m, columns) since the
+        start of the launch, the last row at its end; and which models (m,) went wrong.
+        """
+        m, n = self._shape
+        count = max(0, last // plan.every + 1 - sample)
+        room = max(1, count)
+        out = Written(
+            cuda.device_array((m, room, n, 3)), cuda.device_array((m, room, n, 3)),
+            cuda.device_array((m, room, max(1, self._supported))), self._energies(count),
+        )  # fmt: skip
+        span = Span(first, last, plan.dt, plan.every, sample)
+        factor = cuda.to_device(self._factors(plan, first, last))
+        self._state.barrier.copy_to_device(np.zeros(1, np.int64))
+        if not SIMULATED and self._compiled is None:
+            self._fit_grid(
+                (self._elements, self._nodes, self._counts, span, factor, self._state, out)
+            )
+            out = out._replace(energy=self._energies(count))
+        arguments = self._elements, self._nodes, self._counts, span, factor, self._state, out
+        launched = self._compiled or self._kernel
+        launched[self._blocks, self._threads, 0, self._room](*arguments)
+        host = Written(*(array.copy_to_host() for array in out))
+        energy = host.energy
+        if self._wide:
+            energy = energy.sum(axis=1, keepdims=True)
+        host = Written(
+            host.u[:, :count],
+            host.v[:, :count],
+            host.reaction[:, :count, : self._supported],
+            energy,
+        )
+        return host, self._state.wrong.copy_to_host() != 0
+
+    def _energies(self, count: int) -> Any:
+        return cuda.to_device(np.zeros((count + 1, self._blocks, self._counts.groups + 3)))
+
+    def _fit_grid(self, arguments: tuple[Any, ...]) -> None:
+        """Compile, and of one model take as many blocks as the card runs at once."""
+        self._compiled = self._kernel.specialize(*arguments)
+        if self._wide:
+            made: Any = next(iter(self._compiled.overloads.values()))
+            most = int(made.max_cooperative_grid_blocks(self._threads))
+            items = max(self._shape[1], self._hinges)
+            blocks = max(1, min(most, math.ceil(items / self._threads)))
+            places = self.places()
+            self._blocks = blocks
+            self._set(places)
+
+    def places(self) -> Places:
+        """Where the models are."""
+        state, m = self._state, self._shape[0]
+        power = state.power.copy_to_host().reshape(m, -1, 2).sum(axis=1)
+        arrays = (array.copy_to_host() for array in (state.u, state.v, state.first, state.angle))
+        u, v, carry, angle = arrays
+        return Places(u, v, carry, power, angle)

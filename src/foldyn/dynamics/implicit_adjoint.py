@@ -1,0 +1,287 @@
+"""The discrete adjoint of Newmark's and the generalized-alpha method.
+
+A step of `dynamics.generalized_alpha` has as unknown the shift d = q1 - q0. With c = 1/(beta h^2),
+
+    a1 = c (d - h w0) - (1/2 - beta)/beta a0,   w1 = w0 + h ((1 - gamma) a0 + gamma a1),
+    M ((1 - am) a1 + am a0 + alpha ((1 - af) w1 + af w0)) + (1 - af) b1 + af b0 = 0
+
+on the free dofs. Backward, with the derivatives lq, lw, la of a number by the state at the end and
+the multipliers z' of the balance of the next step, which sees b1 too, those of this one solve
+
+    A' z = lq - P' + c (la + h gamma (lw - R')),
+
+A the matrix of the step at its end, P' and R' the derivatives of af z' . b1 by q1 and w1: the
+pullback of the forces (`mechanics.pullback`) has the weights W = (1 - af) z + af z' in all. Factors
+of the matrix that steps use, which leaves out how dampers turn, serve to iterate, also those of an
+earlier step: what is left of the balance of z comes from the pullback itself, and so does the
+gradient.
+
+The gradient is that of steps which are solved exactly. Newton's method stops at a residual of
+`Scheme.tolerance`, mostly far below: so near is it to that of what was computed.
+
+Steps are taken again, to the bit, from where an engine can go on; a segment of them is kept.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from foldyn.algebra.banded import one_thread
+from foldyn.dynamics.adjoint import Adjoint
+from foldyn.dynamics.implicit.engine import Implicit
+from foldyn.dynamics.implicit.matrix import StepMatrix
+from foldyn.dynamics.implicit.newton import SAME_STEP
+from foldyn.dynamics.inertia import times_mass
+from foldyn.dynamics.motion_state import samples
+from foldyn.dynamics.timing import jumps
+from foldyn.errors import ComputationError, InputError
+
+METHODS = ("newmark", "generalized_alpha")
+ROOM = 16e6  # bytes of the states of a segment
+ITERATIONS = 30
+TOLERANCE = 1e-12  # of what is left of the balance of z
+ENOUGH = 1e-7  # the same where it falls no more
+FAST = 0.1  # share that an iteration leaves, above which an older matrix is made anew
+STALL = 0.5  # the same, above which it falls no more
+
+
+class State(NamedTuple):
+    """State at the end or the beginning of a step, without what supports move."""
+
+    t: float  # at which forces are evaluated, s
+    q: NDArray  # (n, 3) m
+    w: NDArray  # m/s
+    a: NDArray  # m/s2
+
+
+class Taken(NamedTuple):
+    """A step, or a part of one, that was accepted."""
+
+    number: int  # of the step, from 0
+    h: float  # s
+    start: State
+    end: State
+    begins: bool  # whether its start was made by `Scheme.begin`
+
+
+class Place(NamedTuple):
+    """Where a segment of steps starts, and all that an engine needs to go on from there."""
+
+    number: int  # of the step
+    state: State
+    begins: bool
+    engine: dict[str, NDArray]
+
+
+class Retraced(Implicit):
+    """A motion by fixed implicit steps, taken again: its steps, from the last one back."""
+
+    def __init__(self, motion: Any) -> None:
+        _refuse(motion)
+        packed, plan = motion.packed, motion.plan
+        self._room = samples(
+            1, len(packed.numbering.order), len(motion.case.reaction_dofs),
+            motion.output.window.energy.shape[1],
+        )  # fmt: skip
+        unseen = plan._replace(every=plan.steps + 1)  # but for the start
+        given = packed, motion.beginning, unseen, jumps(motion.case)
+        super().__init__(motion.method.scheme, *given)
+        self.advance(self._room, 0)
+        self._at, self._begins = self._reached(plan.start), True
+        self._taken: list[Taken] = []
+        apart = max(1, int(ROOM / (3 * self._at.q.nbytes)))
+        self._places: list[Place] = []
+        for first in range(0, plan.steps, apart):
+            arrays = self.checkpoint_arrays()
+            self._places.append(Place(first, self._at, self._begins, arrays))
+            self._taken.clear()
+            self.advance(self._room, min(apart, plan.steps - first))
+        self._ends = [*(place.number for place in self._places[1:]), plan.steps]
+
+    @property
+    def scheme(self) -> Any:
+        """What it takes steps by."""
+        return self._scheme
+
+    def back(self, first: int, last: int) -> Iterator[Taken]:
+        """All steps from number `first` to `last`, the last one first."""
+        for place, end in zip(reversed(self._places), reversed(self._ends), strict=True):
+            if place.number < last and end > first:
+                if self._taken[0].number != place.number:
+                    self._at, self._begins = place.state, place.begins
+                    self.resume_from(place.engine)
+                    self._taken.clear()
+                    self.advance(self._room, end - place.number)
+                low, high = (bisect_left(self._taken, k, key=_number) for k in (first, last))
+                yield from reversed(self._taken[low:high])
+
+    def _parts(self) -> dict[str, Any]:
+        """See `Implicit`, without its own: that counts, and what is kept here."""
+        return {name: part for name, part in super()._parts().items() if name != "engine"}
+
+    def _reached(self, t: float) -> State:
+        old = self._scheme.old
+        return State(t, old.q.copy(), old.w.copy(), old.a.copy())
+
+    def _accept(self, h: float, end: float, jump: float | None) -> None:
+        new = self._scheme.new
+        t = end if jump is None else math.nextafter(min(end, jump), -math.inf)
+        reached = State(t, new.q.copy(), new.w.copy(), new.a.copy())
+        number = int(self._course.tally.steps)
+        self._taken.append(Taken(number, h, self._at, reached, self._begins))
+        super()._accept(h, end, jump)
+        self._at = reached if jump is None else self._reached(max(end, jump))
+        self._begins = jump is not None
+
+
+def _number(taken: Taken) -> int:
+    return taken.number
+
+
+class ImplicitAdjoint(Adjoint):
+    """Backward through a motion by Newmark's or the generalized-alpha method; see `Adjoint`.
+
+    Parameters
+    ----------
+    motion : Motion
+    steps : Retraced
+        Its steps.
+    """
+
+    def __init__(self, motion: Any, steps: Retraced) -> None:
+        super().__init__(motion)
+        packed, self._steps = self._packed, steps
+        self._matrix, self._scheme = StepMatrix(packed, True), steps.scheme
+        shape = self._scheme.shift.shape
+        free = np.zeros(shape, bool)
+        free.ravel()[self._matrix.free] = True
+        self._kinds = free, free & ~self._scheme.massless[:, None]  # and with mass
+        # derivatives by the acceleration where it has come to, and z of the step after that
+        self._by_a, self._z = np.zeros(shape), np.zeros(shape)
+        self._made = 0.0  # step of the matrix that is factorized
+        self._forget()
+
+    def backward(self, first: int, last: int, by_u: NDArray, by_v: NDArray) -> None:
+        """See `Adjoint`."""
+        with one_thread():
+            for taken in self._steps.back(first, last):
+                self._back(taken, by_u, by_v)
+                if taken.begins:
+                    self._back_to_begin(taken.start, by_u, by_v)
+
+    def gradient(self, by_u: NDArray, by_v: NDArray) -> dict[str, NDArray]:
+        """See `Adjoint`; dofs beside displacements start where they are in balance."""
+        body = self._packed.body
+        if len(hidden := body.hidden):
+            start = next(self._steps.back(0, 1)).start
+            u, _ = self._whole(*start[:3])
+            tangent = sparse.csr_array(body.tangent(u.ravel()[: body.size]))
+            block, weight = sparse.csc_array(tangent[hidden][:, hidden]), np.zeros_like(u)
+            weight.ravel()[hidden] = splu(block).solve(by_u.ravel()[hidden])
+            self._forget()
+            self._pull(u, np.zeros_like(u), weight)
+            self._add_supports()
+            by_u -= self._product
+        return super().gradient(by_u, by_v)
+
+    # ------------------------------------------------------------------ a step
+    def _back(self, taken: Taken, by_u: NDArray, by_v: NDArray) -> None:
+        """From the end of a step to its start; see the module's text."""
+        (am, af, beta, gamma), h = self._scheme.parameters, taken.h
+        (_, _, w0, a0), (t, q, w1, a1) = taken.start, taken.end
+        curvature, alpha, free, heavy = 1.0 / (beta * h * h), self._system.alpha, *self._kinds
+        u, v = self._whole(t, q, w1)
+        mass, kept = self._scheme.weights(h).mass, abs(h - self._made) <= SAME_STEP * h
+        if not kept:
+            self._factorize(u, h)
+        self._forget()
+        self._pull(u, v, af * self._z)
+        z, inertia, change = (np.zeros_like(u) for _ in range(3))
+        first, last, norm = 0.0, np.inf, 0.0
+        for _ in range(ITERATIONS):
+            by_w = by_v - self._rate
+            by_shift = np.where(heavy, curvature * (self._by_a + h * gamma * by_w), by_w / h)
+            left = free * (by_u - self._product + by_shift - mass * inertia)
+            norm = float(np.linalg.norm(left))
+            first = first or norm
+            if norm <= TOLERANCE * first or (norm > STALL * last and not kept):
+                break
+            if norm > FAST * last and kept:
+                self._factorize(u, h)
+                kept = False
+            z += self._matrix.solve(left, change)
+            times_mass(self._mass, z, inertia)
+            self._pull(u, v, (1.0 - af) * change)
+            last = norm
+        if not norm <= ENOUGH * first:
+            raise ComputationError(
+                f"the gradient of the step to t = {t:.6g} s was not found: take shorter steps"
+            )
+        self._add_supports()
+        self._add_mass(z, (1.0 - am) * a1 + am * a0, (1.0 - af) * w1 + af * w0)
+        by_u -= self._product
+        by_v -= self._rate + (1.0 - af) * alpha * inertia
+        by_end = self._by_a - (1.0 - am) * inertia + h * gamma * by_v
+        self._by_a[:] = (1.0 - gamma) * h * by_v - (0.5 - beta) / beta * by_end - am * inertia
+        by_v -= curvature * h * by_end + af * alpha * inertia
+        for each in (by_v, self._by_a):
+            each *= heavy
+        self._z = z
+
+    def _back_to_begin(self, start: State, by_u: NDArray, by_v: NDArray) -> None:
+        """To before the acceleration -M^-1 b - alpha w with which a motion begins, or a part."""
+        (_, af, _, _), (t, q, w, a) = self._scheme.parameters, start
+        self._forget()
+        self._pull(*self._whole(t, q, w), af * self._z + self._push(self._by_a))
+        self._add_acceleration(a, w, self._by_a, by_u, by_v)
+        by_v *= self._kinds[0]
+        self._by_a[:] = self._z[:] = 0.0
+
+    # ------------------------------------------------------------------ parts
+    def _factorize(self, u: NDArray, h: float) -> None:
+        """Factorize the matrix of a step that ends at u."""
+        matrix = self._matrix
+        matrix.blocks.put(self._packed.body, matrix.pattern, u, u, False, matrix.stiffness)
+        matrix.follow(u, 0.5)
+        matrix.factorize(self._scheme.weights(h))
+        self._made = h
+
+
+def _refuse(motion: Any) -> None:
+    """Refuse steps that have no adjoint, with a remedy."""
+    if motion.method.name not in METHODS:
+        raise InputError(
+            f" = {motion.method.name!r}: motions by it have no gradients; take rk4, "
+            f"central_difference, {' or '.join(METHODS)}",
+            "method",
+        )
+    if not motion.plan.steps:
+        raise InputError(
+            ": there are gradients of fixed steps alone, which change with nothing; give dt, and "
+            "no tolerance",
+            "dt",
+        )
+    if motion.continues:
+        raise InputError(
+            ": goes on from the end of another motion, whose acceleration has no derivative; give "
+            "its displacement and velocity alone, fd.State(displacement, velocity)",
+            "initial",
+        )
+    if len(motion.packed.body.hidden) and _jumps_within(motion):
+        raise InputError(
+            "there are no gradients of motions in which loads jump and rotations without mass "
+            "follow at once; let them rise in a step, as by fd.Ramp"
+        )
+
+
+def _jumps_within(motion: Any) -> bool:
+    plan = motion.plan
+    return any(plan.start < jump <= plan.end for jump in jumps(motion.case))

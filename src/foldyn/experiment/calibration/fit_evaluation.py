@@ -1,0 +1,55 @@
+"""What a fit evaluates at values of its parameters: predictions, and their derivatives."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from foldyn.errors import ComputationError, InputError
+from foldyn.experiment.calibration.fit_problem import Problem
+from foldyn.sweeps.evaluations import Evaluation
+
+PREDICTED = "predicted"
+"""Name of what an evaluation holds."""
+SLOPES = "slopes"
+"""Name of their derivatives by the parameters."""
+
+
+class Point(NamedTuple):
+    """What an evaluation is of.
+
+    Attributes
+    ----------
+    values : tuple of float
+        Of the parameters.
+    runs : tuple of int, optional
+        Those to be computed, without derivatives; all, with derivatives, if not given.
+    second : bool
+        Whether derivatives are right to the second order, as intervals need them.
+    """
+
+    values: tuple[float, ...]
+    runs: tuple[int, ...] | None = None
+    second: bool = False
+
+
+def stamp(digest: str, point: Point) -> list[Any]:
+    """All that an evaluation depends on."""
+    return [digest, *point]
+
+
+def evaluate(problem: Problem, point: Point) -> Evaluation:
+    """Predictions at a point, and their derivatives if it asks for them."""
+    began, values = time.perf_counter(), np.array(point.values)
+    try:
+        if point.runs is None:
+            found = problem.differentiate(values, point.second)
+            parts = dict(zip((PREDICTED, SLOPES), found, strict=True))
+        else:
+            parts = {PREDICTED: problem.predict(values, point.runs)}
+        found, why = {name: np.concatenate(part) for name, part in parts.items()}, ""
+    except (InputError, ComputationError) as error:
+        found, why = {}, str(error)
+    return Evaluation(found, why, seconds=time.perf_counter() - began)

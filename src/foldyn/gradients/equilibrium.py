@@ -1,0 +1,73 @@
+"""What an equilibrium adds to gradients: the state follows the parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from foldyn.cases import Case
+from foldyn.errors import InputError
+from foldyn.mechanics.pullback import Pullback
+
+SINGULAR = 1e-13  # of the stiffness at play: a motion that meets no more is a critical point's
+
+
+def equilibrium_seen(
+    case: Case, q: NDArray, by_state: NDArray, pullback: Pullback, total: dict[str, NDArray],
+    factor: float = 1.0,
+) -> None:  # fmt: skip
+    """Add to a gradient what comes by the state (m,), an equilibrium under loads times a factor.
+
+    by_state : derivatives (m,) of the number by the dofs at constant numbers.
+    """
+    seen_through(case, q, by_state, solved(case, q, by_state), pullback, total, factor)
+
+
+def free_block(case: Case, q: NDArray) -> tuple[NDArray, sparse.csc_array]:
+    """Free dofs (nf,), and the tangent (nf, nf) there."""
+    free = np.concatenate([case.free_dofs, case.body.hidden])
+    tangent = sparse.csr_array(case.constraints.matrix(case.body.tangent(q)))
+    return free, sparse.csc_array(tangent[free][:, free])
+
+
+def solved(case: Case, q: NDArray, force: NDArray) -> NDArray:
+    """Motion (m,) of an equilibrium under a force (m,).
+
+    Raises
+    ------
+    InputError
+        At a critical point, where there is none.
+    """
+    free, block = free_block(case, q)
+    load, out = case.constraints.force(force)[free], np.zeros(len(q))
+    try:
+        out[free] = splu(block).solve(load)
+    except RuntimeError:  # exactly singular
+        out[free] = np.inf
+    met = float(np.abs(load).max(initial=0.0))
+    if not met >= SINGULAR * float(np.abs(block).max()) * float(np.abs(out).max(initial=0.0)):
+        raise InputError(
+            "the equilibrium is a limit point or a bifurcation, where displacements have no "
+            "derivative; ask for the load factor (limit_load), or take another load factor"
+        )
+    return case.constraints.displacement(out)
+
+
+def seen_through(
+    case: Case, q: NDArray, by_state: NDArray, adjoint: NDArray, pullback: Pullback,
+    total: dict[str, NDArray], factor: float,
+) -> None:  # fmt: skip
+    """Add -adjoint' dR to a gradient, R = F - factor p, and what supports move."""
+    pullback.clear()
+    product = pullback.at(q, adjoint)
+    for name, out in pullback.gradient.items():
+        total[name] -= out
+    size = case.structure.nodes.size
+    for k in range(len(case.load_terms)):
+        pushed = factor * adjoint[:size].reshape(-1, 3)
+        total[f"load.{k}"] += pushed
+    for k in range(len(case.imposed_terms)):
+        moved = factor * (by_state - product)[:size].reshape(-1, 3) * case.imposed
+        total[f"imposed.{k}"] += moved

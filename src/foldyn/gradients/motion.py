@@ -1,0 +1,95 @@
+"""Gradients of numbers that are functions of a motion's samples, by discrete adjoints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.dynamics.adjoint import Adjoint, refuse
+from foldyn.dynamics.central_difference_adjoint import CentralDifferenceAdjoint
+from foldyn.dynamics.driver import prepare
+from foldyn.dynamics.implicit_adjoint import ImplicitAdjoint, Retraced
+from foldyn.dynamics.methods import with_mass
+from foldyn.dynamics.rk4_adjoint import RK4Adjoint, segment
+from foldyn.dynamics.system import pack
+from foldyn.errors import InputError
+from foldyn.gradients.numbers import Gradient, numbers_of_motion
+from foldyn.mechanics.pullback import Arrays
+
+KNOWN = ("displacement", "velocity")
+
+
+class MotionGradient:
+    """A motion, and gradients of numbers that are functions of it.
+
+    Parameters
+    ----------
+    case : Case
+    arguments : mapping
+        Of `fd.simulate`.
+
+    Attributes
+    ----------
+    result : xarray.Dataset
+        As `fd.simulate` returns it.
+    """
+
+    def __init__(self, case: Case, arguments: Mapping[str, Any]) -> None:
+        given = dict(arguments)
+        progress = given.pop("progress", None)
+        motion = prepare(case, **given)
+        refuse(motion)
+        wanted = motion.plan.every
+        if motion.method.name == "rk4":
+            if (apart := segment(motion.plan, motion.packed.system.rows)) < wanted:
+                # samples between serve as states to go back from
+                motion = prepare(case, **{**given, "dt": motion.plan.dt, "every": apart})
+            samples = motion.run(progress)
+            self._adjoint: Callable[[], Adjoint] = lambda: RK4Adjoint(motion, samples)
+        elif motion.method.name == "central_difference":
+            samples = motion.run(progress)
+            self._adjoint = lambda: CentralDifferenceAdjoint(motion)
+        else:
+            steps = Retraced(motion)
+            samples = motion.run(progress)
+            self._adjoint = lambda: ImplicitAdjoint(motion, steps)
+        self._motion, self._times = motion, samples["time"].values
+        self._every, self._stride = motion.plan.every, wanted // motion.plan.every
+        self.result = samples.isel(time=slice(None, None, self._stride))
+
+    def numbers(self, case: Case) -> Arrays:
+        """Numbers of a case by which gradients are taken."""
+        packed = self._motion.packed
+        made = with_mass(self._motion.method, case)
+        other = pack(made, packed.system.waves.span, self._motion.start[0])
+        return numbers_of_motion(other, self._motion.start)
+
+    def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:
+        """Gradient of a number by the numbers of the case.
+
+        seeds : its derivatives by variables of the result.
+        """
+        if unknown := [name for name in seeds if name not in KNOWN]:
+            raise InputError(
+                f"there are no derivatives through {', '.join(unknown)} of motions, but through "
+                f"{', '.join(KNOWN)}"
+            )
+        adjoint, by = self._adjoint(), self._motion.packed.numbering
+        by_u, by_v = np.zeros((2, self._motion.packed.system.rows, 3))
+        for k in range(len(self._times) - 1, -1, -1):
+            sample, between = divmod(k, self._stride)
+            if not between:
+                own = [
+                    by.inward(seeds[name][sample]) if name in seeds else np.zeros_like(by_u)
+                    for name in KNOWN
+                ]
+                adjoint.add_supports(self._times[k], *own)
+                by_u += own[0]
+                by_v += own[1]
+            if k:
+                adjoint.backward((k - 1) * self._every, k * self._every, by_u, by_v)
+        return adjoint.gradient(by_u, by_v)

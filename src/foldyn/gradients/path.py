@@ -1,0 +1,171 @@
+"""Gradients of numbers that are functions of equilibria on a path.
+
+An equilibrium R(u, f; p) = 0 has K du = -R_p dp - R_f df. Three kinds of points stay well defined
+as the parameters p change:
+
+- at a given load factor, where df = 0;
+- a limit point, where phi' K = 0 and so df = -phi' R_p dp / (phi' R_f);
+- one at which a node has moved so far, e' u = const: with K mu = e, df = -mu' R_p dp / (mu' R_f).
+
+All take -w' R_p dp of the forces' pullback with some weights w.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from foldyn.cases import Case
+from foldyn.errors import InputError
+from foldyn.gradients.equilibrium import equilibrium_seen, free_block, seen_through, solved
+from foldyn.gradients.numbers import Gradient, nothing, numbers_of
+from foldyn.mechanics.pullback import Arrays, Pullback
+from foldyn.statics import trace
+from foldyn.statics.load_at import Moved, load_at
+from foldyn.statics.stability import softest_modes
+
+KNOWN = ("displacement", "reaction", "load_factor", "load_at")
+GIVEN = ("newton", "displacement")
+"""Methods whose points have given load factors."""
+DENSE = 300  # dofs up to which the shape of a limit point is found from all
+
+
+class PathGradient:
+    """An equilibrium path, and gradients of numbers that are functions of its points.
+
+    Parameters
+    ----------
+    case : Case
+    arguments : mapping
+        Of `fd.path`.
+
+    Attributes
+    ----------
+    result : xarray.Dataset
+        As `fd.path` returns it.
+    """
+
+    def __init__(self, case: Case, arguments: Mapping[str, Any]) -> None:
+        _refuse(case, arguments)
+        self.case, self.result = case, trace(case, **arguments)
+        self._given = arguments.get("method", "newton") in GIVEN
+        self._pullback = Pullback(case.body)
+
+    def numbers(self, case: Case) -> Arrays:
+        """Numbers of a case by which gradients are taken."""
+        return numbers_of(case)
+
+    def backward(self, seeds: Mapping[str, Any]) -> Gradient:
+        """Gradient of a number by the numbers of the case.
+
+        seeds : its derivatives by variables of the result, and by load factors where nodes have
+            moved so far: "load_at", a mapping of (dof, displacement) to them.
+        """
+        if unknown := [name for name in seeds if name not in KNOWN]:
+            raise InputError(
+                f"there are no derivatives through {', '.join(unknown)} of paths, but through "
+                f"{', '.join(KNOWN)}"
+            )
+        total = nothing(self.case, self._pullback)
+        for k in range(self.result.sizes["step"]):
+            self._add_point(k, seeds, total)
+        for (dof, displacement), seed in seeds.get("load_at", {}).items():
+            moved = load_at(self.result, dof, displacement, self.case)
+            q = self.case.body.dofs(moved.displacement)
+            unit = np.zeros(len(q))
+            unit[dof] = 1.0
+            self._add_factor(moved, solved(self.case, q, unit), seed, total)
+        return total
+
+    def _add_point(self, k: int, seeds: Mapping[str, Any], total: dict[str, NDArray]) -> None:
+        """Add what is a function of the displacement and reactions at a point, and its factor."""
+        case, result = self.case, self.result
+        moved, pulled, climbed = (
+            np.ravel(seeds[name][k]) if name in seeds else np.zeros(1) for name in KNOWN[:3]
+        )
+        u = result["displacement"].transpose("step", "node", "axis").values[k]
+        factor, q = float(result["load_factor"].values[k]), case.body.dofs(u)
+        if climbed.any():
+            if result["point"].values[k] != "limit":
+                raise InputError(
+                    f"the load factor at point {k} of the path is no number of the design: that of "
+                    "a limit point is, and load_at[node,axis,displacement]"
+                )
+            self._add_factor(Moved(u, factor), self._soft(q), float(climbed[0]), total)
+        if not (moved.any() or pulled.any()):
+            return
+        if not self._given:
+            raise InputError(
+                f"point {k} of the path has no given load factor, and moves along the path as the "
+                'design changes: take method = "newton" or "displacement", or load_at[...]'
+            )
+        by_state, size = np.zeros(len(q)), u.size
+        by_state[:size] += moved
+        if pulled.any():
+            weight = np.zeros(len(q))
+            weight[:size] = case.constraints.reactions.T @ pulled
+            self._pullback.clear()
+            by_state += self._pullback.at(q, weight)
+            for name, out in self._pullback.gradient.items():
+                total[name] += out
+            for j in range(len(case.load_terms)):
+                total[f"load.{j}"] -= factor * weight[:size].reshape(-1, 3)
+        equilibrium_seen(case, q, by_state, self._pullback, total, factor)
+
+    def _add_factor(
+        self, moved: Moved, weight: NDArray, seed: float, total: dict[str, NDArray]
+    ) -> None:
+        """Add the derivatives of a load factor df = -w' R_p dp / (w' R_f), times a seed."""
+        case, q = self.case, self.case.body.dofs(moved.displacement)
+        growing = sum((vector for vector, _ in case.load_terms), np.zeros_like(moved.displacement))
+        motion = sum(
+            (vector for vector, _ in case.imposed_terms), np.zeros_like(moved.displacement)
+        )
+        rate = case.body.tangent(q)[:, : motion.size] @ motion.ravel()
+        rate[: growing.size] -= growing.ravel()
+        along = float(weight @ rate)
+        size = float(np.abs(weight) @ np.abs(rate))
+        if abs(along) <= 1e-9 * size:
+            raise InputError(
+                "the load factor turns or branches there (a bifurcation): it has no derivative; "
+                "break the symmetry by a small load or a small change of the pattern"
+            )
+        adjoint = seed / along * weight
+        seen_through(case, q, np.zeros(len(q)), adjoint, self._pullback, total, moved.factor)
+
+    def _soft(self, q: NDArray) -> NDArray:
+        """Motion (m,) that meets no stiffness at a limit point."""
+        free, block = free_block(self.case, q)
+        scale = 1e-12 * float(np.abs(block.diagonal()).max())
+        factors = splu(sparse.csc_array(block + scale * sparse.eye_array(block.shape[0])))
+        values, shapes = softest_modes(block, factors, 1, DENSE)
+        out = np.zeros(len(q))
+        out[free] = shapes[:, np.abs(values).argmin()]
+        return self.case.constraints.displacement(out)
+
+
+def _refuse(case: Case, arguments: Mapping[str, Any]) -> None:
+    """Refuse paths that have no derivatives yet, with a remedy."""
+    lacks = {
+        "contact": case.contact is not None,
+        "creases that yield, creep or relax": bool(case.remembering),
+        "folds that are actuated (Actuate, Temperature)": bool(case.rest_terms),
+        "loads that depend on the displacement (Pressure, CreaseMoment)": bool(
+            case.following_terms
+        ),
+        "an adaptive load": arguments.get("adaptive_load") is not None,
+        "constant loads": bool(np.size(arguments.get("constant", ()))),
+        "inertia relief": bool(arguments.get("inertia_relief")),
+        "an initial state": arguments.get("initial") is not None,
+    }
+    for what, here in lacks.items():
+        if here:
+            raise InputError(
+                f"there are no gradients of paths with {what}; leave that out, or vary the "
+                "parameters by fd.sweep"
+            )

@@ -1,0 +1,446 @@
+"""`sensitivity`: numbers that are taken of a result, and their exact gradients."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn.analyses.keys import replaced
+from foldyn.analyses.reading import case_of_document, read_document
+from foldyn.cases import Case
+from foldyn.dynamics.inertia import is_lumped
+from foldyn.errors import InputError, within
+from foldyn.gradients.expressions import Expression, parse
+from foldyn.gradients.frf import FrfGradient
+from foldyn.gradients.measures import Derivative, Seeds, derivative_of
+from foldyn.gradients.modes import ModesGradient
+from foldyn.gradients.motion import MotionGradient
+from foldyn.gradients.numbers import Gradient
+from foldyn.gradients.parameters import Parameters, Slope, Values, checked
+from foldyn.gradients.path import PathGradient
+from foldyn.input_files import path_of
+from foldyn.mechanics.pullback import Arrays
+from foldyn.structures import Structure
+from foldyn.sweeps.job import ASIDE
+from foldyn.sweeps.measure import Asked, asked, of_callable
+from foldyn.sweeps.measures import MEASURES
+from foldyn.values import choice, listed, show
+
+if TYPE_CHECKING:
+    from typing import Protocol
+
+    class Differentiated(Protocol):
+        """A result, and gradients of numbers that are functions of it."""
+
+        result: xr.Dataset
+
+        def numbers(self, case: Case) -> Arrays:
+            """Numbers of a case by which gradients are taken."""
+            ...
+
+        def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:
+            """Gradient of a number, by its derivatives by variables of the result."""
+            ...
+
+
+KINDS: Mapping[str, Callable[[Case, Mapping[str, Any]], Differentiated]] = {
+    "modes": ModesGradient,
+    "dynamics": MotionGradient,
+    "statics": PathGradient,
+    "frf": FrfGradient,
+}
+"""Analyses with gradients, by their kind in case files."""
+LENGTH = "bar_length"
+ARRAYS = (
+    "fold_stiffness", "fold_rest", "bend_stiffness", "bend_rest", "bar_area", LENGTH,
+    "node_mass",
+)  # fmt: skip
+"""Arrays of a structure that can be parameters as they are."""
+Source = Callable[..., Case] | Case | str | os.PathLike[str]
+Own = tuple[Callable[..., float], Callable[..., Seeds]]
+
+
+def sensitivity(
+    build: Source,
+    parameters: Values | Sequence[str],
+    measures: str | Sequence[str] | Mapping[str, Own],
+    analysis: Mapping[str, Any] | None = None,
+    *,
+    sizes: Values | None = None,
+    along: Values | None = None,
+) -> xr.Dataset:
+    """Numbers that are taken of a result, and their exact gradients.
+
+    Parameters
+    ----------
+    build : callable, Case or path
+        ``build(**parameters)`` returns the case; or a case file, whose parameters are keys, as
+        "pattern.panel_angle"; or a case, whose parameters are arrays of its structure:
+        `fold_stiffness` and `bend_stiffness` (N m/rad, of whole hinges), `fold_rest` and
+        `bend_rest` (rad), `bar_area` (m2), `bar_length` (m, to which bars were cut: those that do
+        not fit are strained at rest), `node_mass` (kg).
+    parameters : mapping, or names of arrays of a case
+        Where the gradient is taken: numbers, or arrays of one dimension, whose entries count one by
+        one. Arrays of a case are taken where they stand.
+    measures : str, sequence of str, or mapping
+        Measures of a sweep, as "frequency[2]", and expressions of them, as
+        "-frequency[2] / frequency[1]"; or own ones by name: pairs of a function of the result and
+        the case, and one that returns its derivatives by variables of the result, by name.
+    analysis : mapping, optional
+        What is computed: its kind, "modes", "statics", "dynamics" or "frf", and arguments of
+        `fd.modes`, `fd.path`, `fd.simulate` or `fd.frf`. A case file has its own.
+    sizes : mapping, optional
+        Sizes of parameters that are 0 where the gradient is taken: a case is built for differences
+        of a thousandth of them.
+    along : mapping, optional
+        A direction: its rates of the parameters. The result then has one derivative, in this
+        direction, where modes that have one frequency part too.
+
+    Returns
+    -------
+    xarray.Dataset
+        `value` (measure,), and for each parameter `gradient_<name>` (measure,), or
+        (measure, <name>_entry) of an array, per unit of the parameter; with `along` instead
+        `derivative` (measure,). Attributes: the kind of the analysis and the time it all took.
+
+    Raises
+    ------
+    InputError
+        A measure or a parameter has no derivative there: the message says why, and what has.
+    ComputationError
+        The analysis fails.
+
+    Notes
+    -----
+    Derivatives of the mechanics are analytic, those of the numbers that a case is made of by its
+    parameters central differences of the fourth order, in which nothing is solved. Motions are
+    differentiated as they were computed, step by step, with steps that stay as they are: give `dt`
+    where it should not depend on the case.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> def build(panel_angle):
+    ...     pattern = fd.patterns.miura(panel_angle=panel_angle)
+    ...     sheet = fd.Sheet(1e6, 0.25, 0.01, 1000.0)
+    ...     return fd.Case(fd.discretize(pattern, sheet), [fd.Fix("xmin")])
+    >>> found = fd.sensitivity(
+    ...     build, {"panel_angle": 60.0}, "frequency[1]", {"kind": "modes", "count": 3}
+    ... )
+    >>> found["gradient_panel_angle"].dims
+    ('measure',)
+    """
+    began = time.perf_counter()
+    source = source_of(build, parameters, analysis)
+    design = Parameters(source.build, source.values, {} if sizes is None else sizes)
+    wanted = _wanted(measures)
+    case = design.case()
+    found = source.analyse(case)
+    slopes = design.slopes(found.numbers)
+    if isinstance(build, Case) and LENGTH in slopes:
+        slopes[LENGTH] = _by_lengths(slopes[LENGTH], found.numbers(case).numbers)
+    direction = None if along is None else _direction(along, design)
+    if direction is not None and isinstance(found, ModesGradient):
+        found = found.along(lambda gradient: _rate(slopes, direction, gradient))
+    parts = _Parts(found, case, design, slopes)
+    values, gradients = zip(*(parts.of(one) for one in wanted), strict=True)
+    data: dict[str, Any] = {"value": ("measure", np.array(values))}
+    if direction is None:
+        for name, value in design.values.items():
+            rows = np.stack([gradient[name] for gradient in gradients])
+            own = (
+                (("measure",), rows[:, 0])
+                if value.ndim == 0
+                else (
+                    ("measure", f"{name}_entry"),
+                    rows,
+                )
+            )
+            data[f"gradient_{name}"] = own
+    else:
+        rates = [sum(float(direction[n] @ g[n]) for n in direction) for g in gradients]
+        data["derivative"] = ("measure", np.array(rates))
+    names = [one.text for one in wanted]
+    facts = {"analysis": source.kind, "wall_seconds": time.perf_counter() - began}
+    return xr.Dataset(data, {"measure": names}, facts)
+
+
+class Sourced(NamedTuple):
+    """What is differentiated: how a case is built, where, and what is computed."""
+
+    build: Callable[..., Case]
+    values: dict[str, NDArray]
+    kind: str
+    arguments: Mapping[str, Any]
+
+    def analyse(self, case: Case) -> Differentiated:
+        """The result, ready to be differentiated."""
+        try:
+            return KINDS[self.kind](case, self.arguments)
+        except InputError as error:
+            if error.field:
+                raise error.within("analysis.") from None
+            raise InputError(f": {error}", "analysis") from None
+
+
+def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None) -> Sourced:
+    """Check what `sensitivity` is to differentiate."""
+    if isinstance(build, Case):
+        build, values = _of_arrays(build, parameters)
+    elif isinstance(build, str | os.PathLike):
+        build, values, own = _of_file(build, parameters)
+        analysis = {**own, **(analysis or {})}
+    elif callable(build):
+        values = checked(parameters)
+    else:
+        raise InputError(f" = {show(build)}: give a function, a case or a case file", "build")
+    if not isinstance(analysis, Mapping) or "kind" not in analysis:
+        raise InputError(
+            f' = {show(analysis)}: say what is computed, as {{"kind": "modes", "count": 4}}',
+            "analysis",
+        )
+    kind = choice("analysis.kind", analysis["kind"], tuple(KINDS))
+    arguments = {name: value for name, value in analysis.items() if name != "kind"}
+    return Sourced(build, values, kind, arguments)
+
+
+def _by_lengths(areas: Slope, numbers: Gradient) -> Slope:
+    """How numbers change with the lengths to which bars are cut, from how they do with EA / L0.
+
+    With x = (l^2 - L^2) / L^2 the excess of a bar of the length l, and its stiffness EA / L.
+    """
+    name = next(key for key in numbers if key.endswith("bar_stiffness"))
+    prefix = name.removesuffix("bar_stiffness")
+    length = numbers[f"{prefix}bar_per_length2"] ** -0.5
+    by = {
+        name: -numbers[name] / length,
+        f"{prefix}bar_per_length2": -2.0 / length**3,
+        f"{prefix}bar_excess": -2.0 / length,
+    }
+    return Slope(by, dict.fromkeys(by, areas.entry[name]), areas.count)
+
+
+def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, NDArray]]:
+    """A case whose structure has other arrays."""
+    given = (
+        names
+        if isinstance(names, Mapping)
+        else dict.fromkeys(listed("parameters", names, "names of arrays"))
+    )
+    values = {}
+    for name, value in given.items():
+        choice("parameters", name, ARRAYS)
+        _check_acts(case.structure, name)
+        own = getattr(case.structure, name)
+        if own is None:  # masses by a rule
+            own = case.structure.mass.sum(axis=1)
+        values[name] = own if value is None else value
+        if np.shape(values[name]) != np.shape(own):
+            raise InputError(
+                f" has the shape {np.shape(values[name])}; the structure has {np.shape(own)}",
+                f"parameters.{name}",
+            )
+
+    def build(**arrays: NDArray) -> Case:
+        if LENGTH in arrays:  # no structure has bars that do not fit: see `by_lengths`
+            share = arrays.pop(LENGTH) / case.structure.bar_length
+            arrays["bar_area"] = arrays.get("bar_area", case.structure.bar_area) * share
+        return replace(case, structure=replace(case.structure, **arrays))
+
+    return build, checked(values)
+
+
+def _check_acts(structure: Any, name: str) -> None:
+    """Refuse arrays that a structure does not work with."""
+    if not isinstance(structure, Structure):
+        raise InputError(": a shell has no such arrays; give a function that builds it", name)
+    if name == "node_mass" and not is_lumped(structure.mass):
+        raise InputError(
+            f": the mass rule {show(structure.options.mass)} couples nodes; take a rule that lumps "
+            'the mass, as mass = "mixed_voronoi"',
+            name,
+        )
+    if name.startswith("bar") and structure.membranes:
+        raise InputError(
+            ": the panels of this structure resist as membranes, and its bars do not; give a "
+            'function that builds it, or take membrane = "bars"',
+            name,
+        )
+    if name.startswith("bend") and structure.edge_plates is not None:
+        raise InputError(
+            ": panels of the scheme n5b8e bend as plates, without hinges; give a function that "
+            "builds it",
+            name,
+        )
+
+
+def _of_file(
+    path: str | os.PathLike[str], parameters: Any
+) -> tuple[Callable[..., Case], dict[str, NDArray], dict[str, Any]]:
+    """A case file with other values of its keys; its analysis."""
+    place = path_of(path, "build")
+    document = read_document(place)
+
+    def file(values: Mapping[str, Any]) -> Any:
+        plain = {key: np.asarray(value).tolist() for key, value in values.items()}
+        changed = replaced(document, plain)
+        return case_of_document(place, {k: v for k, v in changed.items() if k not in ASIDE})
+
+    own = file({})
+    if own.start_keys:
+        raise InputError(
+            ": there are no gradients of what starts from a given state; leave the table out, or "
+            "give a function that builds the case",
+            "initial",
+            place,
+        )
+    analysis = own.analysis
+    return (
+        lambda **values: file(values).case(),
+        checked(parameters),
+        {"kind": analysis.kind, **analysis.arguments},
+    )
+
+
+# ------------------------------------------------------------------ measures
+class Wanted(NamedTuple):
+    """A number to be differentiated: an expression of measures with their derivatives."""
+
+    text: str
+    expression: Expression
+    measures: dict[str, tuple[Asked, Derivative]]
+
+
+def _wanted(measures: Any) -> list[Wanted]:
+    if isinstance(measures, Mapping):
+        return [_own(name, pair) for name, pair in measures.items()]
+    texts = [measures] if isinstance(measures, str) else listed("measures", measures, "measures")
+    found = []
+    for k, text in enumerate(texts):
+        with within(f"measures[{k}]"):
+            found.append(wanted(text))
+    if not found:
+        raise InputError(': none; give at least one, as "frequency[1]"', "measures")
+    return found
+
+
+def wanted(text: str) -> Wanted:
+    """An expression of measures of the registry."""
+    expression = parse(text)
+    measures = {}
+    for name in expression.measures:
+        one = asked(name, MEASURES)
+        measures[name] = one, derivative_of(one)
+    return Wanted(text, expression, measures)
+
+
+def _own(name: str, pair: Any) -> Wanted:
+    if not isinstance(pair, tuple) or len(pair) != 2 or not all(map(callable, pair)):
+        raise InputError(
+            f" = {show(pair)}: give a pair of a function and its derivative", f"measures.{name}"
+        )
+    one = of_callable(name, pair[0])
+    return Wanted(name, parse(name), {name: (one, Derivative(pair[1], _own_of(pair[0])))})
+
+
+def _own_of(function: Callable[..., float]) -> Callable[..., Callable[[Case], float]]:
+    """A user's function where the result stays as it is."""
+    return lambda result, case: lambda other: float(function(result, other))
+
+
+def _add(seeds: dict[Any, Any], variable: Any, seed: Any, share: float) -> None:
+    """Add a share of derivatives by a variable of a result to others."""
+    if isinstance(seed, Mapping):  # by what a variable takes: see `path.PathGradient`
+        own = seeds.setdefault(variable, {})
+        for key, each in seed.items():
+            _add(own, key, each, share)
+    else:
+        seeds[variable] = seeds.get(variable, 0.0) + share * np.asarray(seed)
+
+
+class _Parts(NamedTuple):
+    """All that values and gradients of measures are made of."""
+
+    found: Differentiated
+    case: Case
+    design: Parameters
+    slopes: dict[str, Any]
+
+    def of(self, one: Wanted) -> tuple[float, dict[str, NDArray]]:
+        """Value of a number, and its derivatives by all entries of each parameter."""
+        result, shared = self.found.result, dict[Any, Any]()
+        values = {}
+        for name, (measure, _) in one.measures.items():
+            value = measure.of(result, self.case, shared)
+            if value.ndim:
+                raise InputError(f"{measure.text}: is an array; ask for one of its numbers")
+            values[name] = float(value)
+        value, parts = one.expression.value_and_slopes(values)
+        seeds: Seeds = {}
+        explicit = {name: np.zeros(each.size) for name, each in self.design.values.items()}
+        for name, (measure, derivative) in one.measures.items():
+            with said_of(measure.text):
+                own = derivative.seeds(result, self.case, **measure.arguments)
+            for variable, seed in own.items():
+                _add(seeds, variable, seed, parts[name])
+            if derivative.frozen:
+                frozen = derivative.frozen(result, self.case, **measure.arguments)
+                for key, slope in self._explicit(frozen).items():
+                    explicit[key] += parts[name] * slope
+        with said_of(one.text):
+            gradient = dict(self.found.backward(seeds)) if seeds else self._nothing
+        for name, (_, derivative) in one.measures.items():
+            if derivative.numbers:
+                own = derivative.numbers(result, self.case, **measure.arguments)
+                for key, by in own.items():
+                    _add(gradient, key, by, parts[name])
+        return value, {
+            name: slope.pulled(gradient) + explicit[name] for name, slope in self.slopes.items()
+        }
+
+    @property
+    def _nothing(self) -> dict[str, NDArray]:
+        """Gradient of nothing."""
+        numbers = self.found.numbers(self.case).numbers
+        return {name: np.zeros_like(array) for name, array in numbers.items()}
+
+    def _explicit(self, frozen: Callable[[Case], float]) -> dict[str, NDArray]:
+        """Derivatives of a measure where the result stays as it is."""
+        slopes = self.design.slopes(lambda case: Arrays({"value": np.array([frozen(case)])}, {}))
+        return {name: slope.pulled({"value": np.ones(1)}) for name, slope in slopes.items()}
+
+
+@contextmanager
+def said_of(text: str) -> Iterator[None]:
+    """Say of which measure bad input is."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{text}: {error}") from None
+
+
+# ------------------------------------------------------------------ directions
+def _direction(along: Values, design: Parameters) -> dict[str, NDArray]:
+    """Rates (count,) of the parameters of a direction."""
+    found = {}
+    for name, rate in checked(along).items():
+        if name not in design.values:
+            raise InputError(f".{name}: there is no such parameter", "along")
+        value = design.values[name]
+        found[name] = np.broadcast_to(rate, value.shape).ravel() if value.ndim else rate.ravel()
+    return found
+
+
+def _rate(
+    slopes: Mapping[str, Slope], direction: Mapping[str, NDArray], gradient: Gradient
+) -> float:
+    """Rate of a number with this gradient in a direction."""
+    return sum(float(rate @ slopes[name].pulled(gradient)) for name, rate in direction.items())

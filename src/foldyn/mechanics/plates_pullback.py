@@ -1,0 +1,235 @@
+"""The pullback of bars, folds and plates (`mechanics.pullback`), with rotations x as dofs.
+
+A prime is a rate where the nodes and rotations move by their weights. With the dihedrals theta, the
+angles phi of folds, which have the moments M, and the angles phi of plates,
+
+    w . F = sum of M phi' + sum of phi'^T K phi.
+
+A dihedral has therein the moment that multiplies theta', and one, `back`, that multiplies its
+changes: M_phi phi' of a fold, K^T phi' of a plate. Its nodes get moment g' + back g, g the gradient
+of the dihedral.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.jit.compiled import inner
+from foldyn.jit.context import Context, rows_at
+from foldyn.materials.series import series_derivatives
+from foldyn.mechanics import bars_hinges_pullback as of_bars
+from foldyn.mechanics.bars_hinges_pullback import PullbackWork, pull_bars_hinges, pullback_work
+from foldyn.mechanics.dihedral import dihedral_rates
+from foldyn.mechanics.plates import (
+    BarsPlates,
+    PlatesWork,
+    plates_work,
+    ride,
+    rides,
+    turn_folds,
+    turn_plate,
+)
+from foldyn.mechanics.pullback import Pulled, pullback
+from foldyn.mechanics.term import parted_rows
+
+
+class Gradient(NamedTuple):
+    """Derivatives by arrays of `BarsPlates` of the same names."""
+
+    bars: of_bars.Gradient
+    per_reach: NDArray  # (1,)
+    wings: NDArray
+    fold_stiffness: NDArray
+    fold_rest: NDArray
+    fold_parameters: NDArray
+    bend_rest: NDArray
+    stiffness: NDArray
+
+
+class Back(NamedTuple):
+    """Memory of the pullback of one evaluation, and what it adds to; nh = nf + nb."""
+
+    out: Gradient
+    bars: PullbackWork
+    points: NDArray  # (4, 3) of a hinge, m
+    moves: NDArray  # (4, 3) weights there
+    by: NDArray  # (4, 3)
+    rate: NDArray  # (nh,) of the dihedrals
+    gradient_rate: NDArray  # (nh, 12) of their gradients
+    moment: NDArray  # (nh,) back
+    turned: NDArray  # (the most angles of a plate,) rates of its angles
+    resisted: NDArray  # (the most angles of a plate,) K^T times them
+
+
+def back_of(model: BarsPlates) -> Back:
+    """Memory for a model."""
+    nh, most = len(model.hinges), int(np.diff(model.start).max(initial=0))
+    names = [name for name in Gradient._fields if name not in ("bars", "per_reach")]
+    out = Gradient(
+        bars=of_bars.gradient_of(model.bars),
+        per_reach=np.zeros(1),
+        **{name: np.zeros_like(getattr(model, name)) for name in names},
+    )
+    points, moves, by = np.zeros((3, 4, 3))
+    return Back(
+        out, pullback_work(model.nodes), points, moves, by, np.zeros(nh), np.zeros((nh, 12)),
+        np.zeros(nh), np.zeros(most), np.zeros(most),
+    )  # fmt: skip
+
+
+def gradients(out: Gradient) -> dict[str, NDArray]:
+    """By the names of `pullback.arrays_of` a model."""
+    of_plates = out._asdict()
+    bars = of_plates.pop("bars")._asdict()
+    of_plates["per_reach"] = out.per_reach.reshape(())
+    return {f"bars.{name}": array for name, array in bars.items()} | of_plates
+
+
+@inner
+def rate_hinges(model, u, w, work, back):
+    """Dihedrals and their gradients at u, and their rates where the nodes move by w."""
+    for h in range(model.hinges.shape[0]):
+        for v in range(4):
+            node = model.hinges[h, v]
+            for c in range(3):
+                back.points[v, c] = model.bars.rest[node, c] + u[node, c]
+                back.moves[v, c] = w[node, c]
+        ride(model, h, 1.0, back.points)
+        ride(model, h, 0.0, back.moves)
+        x, dx = back.points, back.moves
+        found = dihedral_rates(
+            x[0, 0], x[0, 1], x[0, 2], x[1, 0], x[1, 1], x[1, 2],
+            x[2, 0], x[2, 1], x[2, 2], x[3, 0], x[3, 1], x[3, 2],
+            dx[0, 0], dx[0, 1], dx[0, 2], dx[1, 0], dx[1, 1], dx[1, 2],
+            dx[2, 0], dx[2, 1], dx[2, 2], dx[3, 0], dx[3, 1], dx[3, 2],
+        )  # fmt: skip
+        work.angle[h], back.rate[h] = found[0], found[13]
+        for c in range(12):
+            work.gradient[h, c], back.gradient_rate[h, c] = found[1 + c], found[14 + c]
+
+
+@inner
+def rate_plate(model, y, back, p):
+    """Rates of the angles of plate p where rotations move by y, to back.turned."""
+    for k in range(model.start[p + 1] - model.start[p]):
+        h = model.angle[model.start[p] + k]
+        back.turned[k] = back.rate[h] if h >= 0 else model.per_reach * y[-1 - h]
+
+
+@inner
+def pull_folds(model, x, y, work, back, by_x):
+    """Moments of folds, and what is their share in the gradients, `moment` and by_x (r,)."""
+    turn_folds(model, x, work)
+    out, p = back.out, model.fold_parameters
+    for f in range(model.fold_rest.size):
+        stiffness, rate = model.fold_stiffness[f], back.rate[f]
+        moment, slope, by_rest, by_a, by_b, by_c, _ = series_derivatives(
+            model.code, work.fold_angle[f], model.fold_rest[f],
+            p[f, 0], p[f, 1], p[f, 2], p[f, 3], 1.0, model.addresses,
+        )  # fmt: skip
+        work.moment[f] = stiffness * moment
+        for rotation in model.fold_rotations[f]:
+            if rotation >= 0:
+                rate -= model.per_reach * y[rotation]
+        back.moment[f] = stiffness * slope * rate
+        for rotation in model.fold_rotations[f]:
+            if rotation >= 0:
+                by_x[rotation] -= model.per_reach * back.moment[f]
+                out.per_reach[0] -= back.moment[f] * x[rotation] + work.moment[f] * y[rotation]
+        out.fold_stiffness[f] += moment * rate
+        rate *= stiffness
+        out.fold_rest[f] += by_rest * rate
+        out.fold_parameters[f, 0] += by_a * rate
+        out.fold_parameters[f, 1] += by_b * rate
+        out.fold_parameters[f, 2] += by_c * rate
+
+
+@inner
+def pull_plate(model, x, y, work, back, by_x, p):
+    """The same for plate p."""
+    count, folds, out = model.start[p + 1] - model.start[p], model.fold_rest.size, back.out
+    turn_plate(model, x, work, p)
+    rate_plate(model, y, back, p)
+    for k in range(count):
+        back.resisted[k] = 0.0
+    for k in range(count):
+        row, moment, rate = model.entry[p] + k * count, 0.0, back.turned[k]
+        for m in range(count):
+            moment += model.stiffness[row + m] * work.turn[m]
+            back.resisted[m] += model.stiffness[row + m] * rate
+            out.stiffness[row + m] += rate * work.turn[m]
+        h = model.angle[model.start[p] + k]
+        if h >= 0:
+            work.moment[h] += moment
+        else:
+            out.per_reach[0] += moment * y[-1 - h]
+    for k in range(count):
+        h = model.angle[model.start[p] + k]
+        if h >= 0:
+            back.moment[h] += back.resisted[k]
+            out.bend_rest[h - folds] -= back.resisted[k]
+        else:
+            by_x[-1 - h] += model.per_reach * back.resisted[k]
+            out.per_reach[0] += back.resisted[k] * x[-1 - h]
+
+
+@inner
+def pull_hinges(model, work, back, product):
+    """Add what the nodes of all hinges get, to `product` and to the gradients."""
+    by, rest = back.by, back.out.bars.rest
+    for h in range(model.hinges.shape[0]):
+        moment, other = work.moment[h], back.moment[h]
+        for v in range(4):
+            for c in range(3):
+                by[v, c] = moment * back.gradient_rate[h, 3 * v + c]
+                by[v, c] += other * work.gradient[h, 3 * v + c]
+        if rides(model, h):
+            e = h - model.hinges.shape[0] + model.wings.shape[0]
+            for c in range(3):  # as `plates.carry` does
+                back.out.wings[e, c] += by[3, c]
+                by[3, c] *= 0.5
+                by[1, c] += by[3, c]
+        for v in range(4):
+            node = model.hinges[h, v]
+            for c in range(3):
+                product[node, c] += by[v, c]
+                rest[node, c] += by[v, c]
+
+
+@inner
+def pull_turns(model, x, y, work, back, product, by_x):
+    """Add the derivatives for folds and plates, after `rate_hinges`."""
+    for h in range(model.hinges.shape[0]):
+        work.moment[h], back.moment[h] = 0.0, 0.0
+    pull_folds(model, x, y, work, back, by_x)
+    for p in range(model.start.size - 1):
+        pull_plate(model, x, y, work, back, by_x, p)
+    pull_hinges(model, work, back, product)
+
+
+class _Context(NamedTuple):
+    model: BarsPlates
+    work: PlatesWork
+    back: Back
+    rows: int
+
+
+@pullback
+def _pullback(own, u, v, t, weight, product, rate):
+    model, moved, weights = own.model, rows_at(u, own.rows), rows_at(weight, own.rows)
+    n, r = model.bars.rest.shape[0], model.rotations
+    (here, x), (w, y) = parted_rows(moved, n, r), parted_rows(weights, n, r)
+    out, by_x = parted_rows(rows_at(product, own.rows), n, r)
+    pull_bars_hinges(model.bars, here, w, own.back.bars, own.back.out.bars, out)
+    rate_hinges(model, here, w, own.work, own.back)
+    pull_turns(model, x, y, own.work, own.back, out, by_x)
+
+
+def plates_pulled(model: BarsPlates) -> Pulled:
+    """Bars, folds and plates differentiated."""
+    back = back_of(model)
+    own = Context(_Context(model, plates_work(model), back, model.rows))
+    return Pulled(own, _pullback, gradients(back.out))

@@ -1,0 +1,50 @@
+"""Charts of a search for a design: objective and violation over the evaluations, and slopes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.plots.charts import Chart, Curve
+
+
+def convergence_charts(history: xr.Dataset) -> list[Chart]:
+    """Objective and largest violation over the evaluations, a curve for each start."""
+    number = 1 + history["evaluation"].values
+    starts = history["start"].values
+    objective, violation = history["objective"].values, history["violation"].values
+    best = int(history["best"])
+    along = "evaluation"
+
+    def curves(values: NDArray) -> list[Curve]:
+        several = len(np.unique(starts)) > 1
+        return [
+            Curve(f"start {k + 1}" if several else "", number[starts == k], values[starts == k])
+            for k in np.unique(starts).tolist()
+        ]
+
+    label = str(history["objective"].attrs["long_name"])
+    marked = Curve("best", number[[best]], objective[[best]], dots=True)
+    charts = [Chart(along, label, [*curves(objective), marked])]
+    if "constraint" in history.dims:
+        with np.errstate(divide="ignore"):
+            decades = np.log10(np.maximum(violation, 0.1 * history.attrs["slack"]))
+        slack = np.full(2, np.log10(history.attrs["slack"]))
+        allowed = Curve("slack", number[[0, -1]], slack)
+        charts.append(Chart(along, "log10 of the largest violation", [*curves(decades), allowed]))
+    return charts
+
+
+def slope_chart(slopes: Mapping[str, ArrayLike], objective: str) -> Chart:
+    """How an objective changes over the whole range of each parameter, arrays by their norms."""
+    names: Sequence[str] = list(slopes)
+    sizes = np.array(
+        [float(np.linalg.norm(one)) if np.ndim(one) else one for one in slopes.values()]
+    )
+    dots = Curve("", np.arange(len(names)), sizes, dots=True)
+    return Chart(
+        "parameter", f"change of {objective} over the range", [dots], words=names, zero=True
+    )

@@ -1,0 +1,156 @@
+"""The kernels of the GPU against the CPU: run by `test_gpu` in Numba's CUDA simulator.
+
+On a machine with a GPU, ``python -m pytest tests/dynamics/on_gpu.py`` runs them on the card.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from measured import agree
+
+import foldyn as fd
+from foldyn.dynamics.driver import prepare
+from foldyn.dynamics.gpu.checks import METHODS, lacking
+from foldyn.errors import FoldynWarning, InputError, InstabilityError, MotionInterrupted
+
+STEPS = {"dt": 1e-5, "every": 5}
+LAWS = {
+    "enhanced": (fd.EnhancedLinear(), fd.EnhancedLinear()),
+    "locking": (fd.EnhancedLinear(120, 240, rest="as_published"), "superlinear"),
+    "plate": (fd.PlateSuperlinear(2.0), fd.PlateSuperlinear(1.0)),
+    "linear": ("linear", "linear"),
+}
+
+
+def case(k: int = 0, laws: str = "enhanced", damping=None, supports=(), **options) -> fd.Case:
+    """A cell, whose geometry, stiffness, mass, loads and damping go by the number."""
+    pattern = fd.patterns.miura((1, 1), panel_angle=60.0, dihedral=110.0 + 2 * k)
+    material = fd.Sheet(1e6 * (1.0 + 0.1 * k), 0.25, 0.01, density=1.0 + 0.05 * k)
+    fold, bend = LAWS[laws]
+    given = {"mass": "mixed_voronoi", "fold_law": fold, "bend_law": bend, **options}
+    x = pattern.vertices[:, 0]
+    held, far = np.flatnonzero(x <= 1e-9), np.flatnonzero(x >= x.max() - 1e-9)
+    loads = [fd.Force(far, (0, 0, -2e-3 * (k + 1)), fd.HalfSine(2e-4 * (1 + k)))]
+    if k % 2:
+        loads += [fd.Gravity((0, 0, -9.81)), fd.Force(far[:1], (1e-3, 0, 0), lambda t: 1 + t)]
+    structure = fd.discretize(pattern, material, **given)
+    return fd.Case(structure, [fd.Fix(held), *supports], loads, damping or fd.Rayleigh(0.2 * k))
+
+
+def shaken(of: fd.Case, seed: int = 0) -> fd.State:
+    """A state at random."""
+    return fd.State(1e-4 * np.random.default_rng(seed).standard_normal(of.fixed.shape) * ~of.fixed)
+
+
+SPRINGS = [
+    fd.Spring(3.0, nodes=[7, 8]), fd.Spring(7.0, nodes=[5], direction=(1, 2, -1)),
+    fd.Spring(4.0, between=[(3, 7)]), fd.Spring(2.0, between=[(4, 8)], rest_length=0.4),
+]  # fmt: skip
+DASHPOTS = [
+    fd.Dashpot(0.01, nodes=[7]), fd.Dashpot(0.02, nodes=[8], direction="x"),
+    fd.Dashpot(0.005, between=[(4, 8)]),
+]  # fmt: skip
+CREASES = [fd.Rayleigh(0.1), fd.CreaseDamping(1e-5, "mountain"), fd.CreaseDamping(2e-5, "valley")]
+CASES = {
+    **{laws: {"laws": laws} for laws in LAWS},
+    "springs": {"supports": SPRINGS},
+    "dampers": {"supports": DASHPOTS, "damping": CREASES, "preset": "merlin2"},
+    "stiffness": {"damping": fd.Rayleigh(0.3, 1e-6), "supports": [*SPRINGS, *DASHPOTS]},
+    "bars": {"preset": "herkal"},
+    "bars of another law": {"preset": "merlin2", "laws": "locking", "bar_law": "linear"},
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", CASES)
+def test_a_motion_is_that_of_the_cpu(method, name):
+    each = case(1, **CASES[name])
+    assert not lacking(prepare(each, 1e-4, **STEPS).packed)
+    given = {"method": method, "initial": shaken(each), **STEPS}
+    mine = fd.simulate(each, 2e-4, device="gpu", **given)
+    alone = fd.simulate(each, 2e-4, **given)
+    agree(mine, alone, 1e-9)
+    np.testing.assert_allclose(mine.displacement, alone.displacement, rtol=0, atol=1e-16)
+    assert mine.attrs["energy_error"] == pytest.approx(alone.attrs["energy_error"], rel=1e-6)
+    assert mine.attrs["force_evaluations"] == alone.attrs["force_evaluations"]
+    assert mine.attrs["device"]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_many_are_those_of_the_cpu(method):
+    cases = [case(k) for k in range(3)]
+    given = {"method": method, "initial": [shaken(c, k) for k, c in enumerate(cases)], **STEPS}
+    mine = fd.simulate_many(cases, 2e-4, device="gpu", **given)
+    agree(mine, fd.simulate_many(cases, 2e-4, **given), 1e-9)
+    again = fd.simulate_many(cases, 2e-4, device="gpu", **given)
+    assert all(mine[name].equals(again[name]) for name in mine.data_vars)
+
+
+def test_samples_do_not_depend_on_the_pieces(monkeypatch):
+    from foldyn.dynamics.gpu.launch import Launches
+
+    each = case(1)
+    given = {"initial": shaken(each), "device": "gpu", **STEPS}
+    for method in METHODS:
+        whole = fd.simulate(each, 2e-4, method, **given)
+        with monkeypatch.context() as patch:
+            patch.setattr(Launches, "fits", lambda *_: 7)
+            agree(fd.simulate(each, 2e-4, method, **given), whole, 1e-12)
+            agree(
+                fd.simulate_many([each], 2e-4, method=method, **given).isel(model=0), whole, 1e-12
+            )
+
+
+def test_what_goes_wrong_is_told_as_by_the_cpu():
+    each = case()
+    each = replace(each, loads=[])
+    given = {"dt": 1e-3, "every": 5, "force": True, "initial": shaken(each)}
+    with pytest.raises(InstabilityError) as mine:
+        fd.simulate(each, 0.1, device="gpu", **given)
+    with pytest.raises(InstabilityError) as alone:
+        fd.simulate(each, 0.1, **given)
+    assert str(mine.value) == str(alone.value)
+    with pytest.warns(FoldynWarning, match="1 of 1 motions ended"):
+        many = fd.simulate_many([each], 0.1, method="rk4", device="gpu", **given)
+    assert str(many.outcome[0].values) == str(alone.value)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_engine_goes_on_from_a_checkpoint(method):
+    each = case(1)
+    ends = []
+    for stops in ((20,), (8, 20)):
+        motion = prepare(each, 2e-4, method, initial=shaken(each), device="gpu", **STEPS)
+        motion.output.begin()
+        kept = {}
+        for stop in stops:
+            engine = motion.method.engine(each, motion.packed, motion.course, motion.plan, "gpu")
+            if kept:
+                engine.resume_from(kept)
+            engine.advance(motion.output.window, stop - int(motion.course.tally.steps))
+            kept = engine.checkpoint_arrays()
+        ends.append(kept)
+    for name, array in ends[0].items():
+        np.testing.assert_allclose(ends[1][name], array, rtol=1e-12, atol=1e-20, err_msg=name)
+
+
+def test_a_motion_that_was_cut_off_goes_on(tmp_path, monkeypatch):
+    each = case(1)
+    monkeypatch.setattr("foldyn.dynamics.motion.CHUNK", 8)
+    monkeypatch.setattr("foldyn.dynamics.motion.REPORT_EVERY", 0.0)
+    given = {"initial": shaken(each), "device": "gpu", **STEPS}
+    whole = fd.simulate(each, 2e-4, **given)
+
+    def cut(progress):
+        if progress.steps:
+            raise KeyboardInterrupt
+
+    kept = {"store": tmp_path / "run.nc", "checkpoint": 1e-9}
+    with pytest.raises(MotionInterrupted):
+        fd.simulate(each, 2e-4, progress=cut, **given, **kept)
+    with pytest.raises(InputError, match="device"):
+        fd.simulate(each, 2e-4, **(given | {"device": "cpu"}), **kept, resume=True)
+    agree(fd.simulate(each, 2e-4, **given, **kept, resume=True), whole, 1e-12)

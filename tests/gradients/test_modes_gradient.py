@@ -1,0 +1,200 @@
+"""Gradients of modes, against differences of the modes and what is known otherwise."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from differences import Design
+
+import foldyn as fd
+from foldyn.errors import InputError
+from pairwise import in_pairs
+
+PRESETS = ("merlin2", "plate", "n5b8e")
+MODES = {"kind": "modes", "count": 4}
+
+
+def cell(
+    panel_angle: float = 63.0, thickness: float = 0.02, stiffness: Any = 0.02, density: float = 900,
+    preset: Any = "plate", supports: Any = ("xmin",), **options: Any,
+) -> fd.Case:  # fmt: skip
+    pattern = fd.patterns.miura(panel_angle=panel_angle)
+    sheet = fd.Sheet(1e6, 0.25, thickness, density)
+    made = fd.discretize(pattern, sheet, preset=preset, crease_stiffness=stiffness, **options)
+    return fd.Case(made, [fd.Fix(part) for part in supports], damping=[fd.Rayleigh(0.3, 2e-4)])
+
+
+def build(preset: Any) -> Any:
+    options = {} if preset != "merlin2" else {"bend_law": "linear"}
+    return lambda **given: cell(preset=preset, **options, **given)
+
+
+@pytest.mark.parametrize(
+    ("preset", "measure"),
+    in_pairs(PRESETS, ("frequency[1]", "frequency[3]", "effective_mass[2,z]", "damping_ratio[2]")),
+)
+def test_gradients_agree_with_differences(preset, measure):
+    stiffness = np.random.default_rng(1).uniform(0.01, 0.03, 4)
+    values = {"thickness": 0.02, "stiffness": stiffness, "density": 900.0}
+    if preset == "n5b8e":  # whose edges give way by numbers of six digits in terms of the thickness
+        del values["thickness"]
+    design = Design(build(preset), values, [measure], MODES)
+    design.step = 4e-3  # eigenvalues have nine digits, and masses hardly depend on stiffness
+    errors = design.errors()
+    assert max(errors.values()) < (1e-5 if "mass" in measure else 1e-6), errors
+
+
+@pytest.mark.parametrize("preset", ["merlin2", "plate"])
+def test_gradients_by_the_shape_of_panels(preset):
+    """Of n5b8e the numbers of edges that give way are known to six digits alone."""
+    design = Design(build(preset), {"panel_angle": 61.7}, ["frequency[1]", "frequency[2]"], MODES)
+    assert max(design.errors().values()) < 1e-6
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_the_remainder_falls_with_the_second_order(seed):
+    values = {"thickness": 0.02, "stiffness": np.full(4, 0.02)}
+    design = Design(build("merlin2"), values, ["frequency[1]", "frequency[2]"], MODES)
+    assert (design.order(seed, (2e-1, 2e-2, 2e-3, 2e-4)) > 1.9).all()
+
+
+def test_all_frequencies_scale_with_the_root_of_all_stiffness_over_mass():
+    case = cell(mass="mixed_voronoi")
+    found = fd.sensitivity(case, ["node_mass", "fold_stiffness"], "frequency[2]", MODES)
+    own = found["value"].values[0]
+    by_mass = found["gradient_node_mass"].values[0] @ case.mass.diagonal()
+    assert by_mass == pytest.approx(-0.5 * own, rel=1e-9)
+
+
+def test_what_a_mass_does_at_a_node_is_what_its_shape_says():
+    """d lambda = -lambda phi_i' phi_i for a mass at node i (Rayleigh's quotient)."""
+    case = cell(mass="mixed_voronoi")
+    found = fd.sensitivity(case, ["node_mass"], "frequency[1]", MODES)
+    modes = fd.modes(case, count=4)
+    shape, frequency = modes["shape"].values[0], float(modes["frequency"][0])
+    expected = -0.5 * frequency * (shape**2).sum(axis=1)
+    assert found["gradient_node_mass"].values[0] == pytest.approx(expected, rel=1e-8, abs=1e-10)
+
+
+def test_rayleigh_damping_of_a_mode():
+    def damped(alpha: float, beta: float) -> fd.Case:
+        made = cell()
+        return fd.Case(made.structure, made.supports, damping=[fd.Rayleigh(alpha, beta)])
+
+    values = {"alpha": 0.3, "beta": 2e-4}
+    found = fd.sensitivity(damped, values, ["damping_ratio[1]", "frequency[1]"], MODES)
+    omega = 2.0 * np.pi * found["value"].values[1]
+    assert found["gradient_alpha"].values[0] == pytest.approx(0.5 / omega, rel=1e-9)
+    assert found["gradient_beta"].values[0] == pytest.approx(0.5 * omega, rel=1e-9)
+
+
+# ------------------------------------------------------------------ states under load
+def test_modes_about_an_equilibrium_feel_its_change():
+    def loaded(force: float, stiffness: float) -> fd.Case:
+        made = cell(stiffness=stiffness)
+        return fd.Case(made.structure, made.supports, [fd.Force("xmax", (force, 0.0, 0.4 * force))])
+
+    values = {"force": 0.05, "stiffness": 0.02}
+    about = {**MODES, "state": "equilibrium"}
+    errors = Design(loaded, values, ["frequency[1]", "frequency[2]"], about).errors()
+    assert max(errors.values()) < 1e-6, errors
+    unloaded = fd.sensitivity(cell(), ["fold_stiffness"], "frequency[1]", MODES)
+    changed = fd.sensitivity(loaded(**values), ["fold_stiffness"], "frequency[1]", about)
+    name = "gradient_fold_stiffness"
+    assert not np.allclose(unloaded[name], changed[name], rtol=1e-2)
+
+
+# ------------------------------------------------------------------ several modes at once
+def square(one: float = 0.02, other: float = 0.02, thickness: float = 0.02) -> fd.Case:
+    """A flat sheet of 2 x 2 squares held in its middle, whose bending modes come in pairs."""
+    grid = np.array([[i, j, 0.0] for i in range(3) for j in range(3)]) - 1.0
+    grid[:, 2] = 0.0
+    faces = [(0, 3, 4, 1), (1, 4, 5, 2), (3, 6, 7, 4), (4, 7, 8, 5)]
+    pattern = fd.Pattern(grid, faces)
+    along = np.ptp(pattern.vertices[pattern.creases][..., 0], axis=1) > 0.5
+    sheet = fd.Sheet(1e6, 0.25, thickness, 900.0)
+    stiffness = np.where(along, one, other).tolist()
+    made = fd.discretize(pattern, sheet, preset="plate", crease_stiffness=stiffness)
+    return fd.Case(made, [fd.Fix([4]), fd.Fix([1, 3, 5, 7], "xy")])
+
+
+def pair() -> int:
+    """Number of the first of two modes that have one frequency."""
+    frequency = fd.modes(square(), count=8)["frequency"].values
+    near = np.flatnonzero(np.abs(np.diff(frequency)) < 1e-7 * frequency[1:])
+    assert len(near)
+    return int(near[0]) + 1
+
+
+PAIR = {"kind": "modes", "count": 8}
+
+
+def test_one_of_two_modes_with_one_frequency_has_no_derivative():
+    k = pair()
+    with pytest.raises(InputError, match=r"have one frequency.*the sum of all.*along"):
+        fd.sensitivity(square, {"one": 0.02, "other": 0.02}, f"frequency[{k}]", PAIR)
+
+
+def test_their_sum_has_one():
+    k = pair()
+    both = f"frequency[{k}] + frequency[{k + 1}]"
+    found = fd.sensitivity(square, {"one": 0.02}, both, PAIR)
+
+    def total(one: float) -> float:
+        frequency = fd.modes(square(one), count=8)["frequency"].values
+        return float(frequency[k - 1] + frequency[k])
+
+    h = 1e-5
+    slope = (total(0.02 + h) - total(0.02 - h)) / (2.0 * h)
+    assert found["gradient_one"].values[0] == pytest.approx(slope, rel=1e-5)
+
+
+@pytest.mark.parametrize("rates", [{"one": 1.0}, {"one": 0.3, "other": -1.0}, {"thickness": 1.0}])
+def test_each_has_derivatives_in_one_direction(rates):
+    k = pair()
+    values = {"one": 0.02, "other": 0.02, "thickness": 0.02}
+    names = [f"frequency[{k}]", f"frequency[{k + 1}]"]
+    found = fd.sensitivity(square, values, names, PAIR, along=rates)["derivative"].values
+
+    def at(h: float) -> np.ndarray:
+        moved = {name: value + h * rates.get(name, 0.0) for name, value in values.items()}
+        return fd.modes(square(**moved), count=8)["frequency"].values[k - 1 : k + 1]
+
+    h = 1e-6
+    one_sided = (-3.0 * at(0.0) + 4.0 * at(h) - at(2.0 * h)) / (2.0 * h)
+    assert found == pytest.approx(one_sided, rel=1e-4, abs=1e-8)
+
+
+# ------------------------------------------------------------------ what has none
+@pytest.mark.parametrize(
+    ("measures", "analysis", "told"),
+    [
+        ("frequency[1]", {**MODES, "internal": 1}, "internal amplitudes.*leave that out"),
+        ("frequency[1]", {**MODES, "secant": 1.0}, "finite amplitude.*leave that out"),
+        ("unstable_modes", MODES, "has no derivative; those that have one are"),
+        ("frequencies", MODES, "has no derivative"),
+        ("frequency[9]", MODES, "raise analysis.count"),
+    ],
+)
+def test_refused(measures, analysis, told):
+    with pytest.raises(InputError, match=told):
+        fd.sensitivity(cell(preset="n5b8e"), ["fold_stiffness"], measures, analysis)
+
+
+def test_rigid_modes_have_no_derivative():
+    free = fd.Case(cell().structure)
+    with pytest.raises(InputError, match=r"mode 1 is rigid or unstable.*hold the sheet"):
+        fd.sensitivity(free, ["fold_stiffness"], "frequency[1]", {"kind": "modes", "count": 8})
+
+
+def test_soft_hinges_have_no_part():
+    """Superlinear bends have no slope at rest: nothing changes with their stiffness."""
+    made = cell(preset="herkal", supports=("xmin", "xmax"))
+    with pytest.warns(fd.errors.FoldynWarning, match="superlinear"):
+        found = fd.sensitivity(
+            made, ["bend_stiffness", "fold_stiffness"], "effective_mass[4,z]", MODES
+        )
+    assert not found["gradient_bend_stiffness"].values.any()
+    assert found["gradient_fold_stiffness"].values.any()

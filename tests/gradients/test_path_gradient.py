@@ -1,0 +1,123 @@
+"""Gradients along equilibrium paths, against differences of the paths and what is known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from differences import Design
+
+import foldyn as fd
+from foldyn.errors import InputError
+from foldyn.gradients.equilibrium import solved
+
+TIP = 8  # on the upper ring
+
+
+def tower(
+    height: float = 0.06, twist: float = 30.0, thickness: float = 2.4e-4, force: float = 1.0,
+    stiffness: Any = 6e-3, drop: float = 0.0, preset: Any = "merlin2", spring: float = 0.0,
+) -> fd.Case:  # fmt: skip
+    """A Kresling tower, pressed from above by forces, or by a plate that moves down."""
+    pattern = fd.patterns.kresling(6, 0.04, height, twist)
+    sheet = fd.Sheet(1.2e9, 0.2, thickness, 700.0)
+    made = fd.discretize(pattern, sheet, preset=preset, crease_stiffness=stiffness)
+    supports: list[Any] = [fd.Fix("zmin")]
+    if spring:
+        supports.append(fd.Spring(spring, "zmax", direction=(0, 0, 1)))
+    if drop:
+        return fd.Case(made, [*supports, fd.Impose("zmax", "z", -drop)])
+    return fd.Case(made, supports, [fd.Force("zmax", (0, 0, -force))])
+
+
+STIFFNESS = np.random.default_rng(8).uniform(5e-3, 7e-3, 12)
+SNAP = {
+    "kind": "statics", "method": "arc_length", "first_step": 1.0, "steps": 200,
+    "settings": {"largest_turn": 3.0},
+    "until": {"node": TIP, "axis": "z", "displacement": -0.036},
+}  # fmt: skip
+PRESSED = {"kind": "statics", "load_factors": [0.0, 0.5, 1.0]}
+MOVED = {"kind": "statics", "method": "displacement", "steps": 4}
+
+
+@pytest.mark.parametrize("preset", ["merlin2", "plate", "n5b8e"])
+@pytest.mark.parametrize("measure", ["displacement[8,z]", "strain_energy", "largest_displacement"])
+def test_equilibria_under_given_forces(preset, measure):
+    values = {"force": 2.0, "stiffness": STIFFNESS, "spring": 900.0}
+    build = lambda **given: tower(preset=preset, **given)  # noqa: E731
+    design = Design(build, values, [measure], PRESSED)
+    design.step = 3e-3
+    assert max(design.errors().values()) < 1e-6
+
+
+def test_equilibria_where_supports_move():
+    values = {"drop": 0.01, "stiffness": STIFFNESS, "height": 0.06, "twist": 30.0}
+    measures = ["displacement[8,x]", "strain_energy"]
+    errors = Design(tower, values, measures, MOVED).errors()
+    assert max(errors.values()) < 1e-6, errors
+
+
+def test_the_force_of_supports_is_the_slope_of_the_energy():
+    """dE/d drop is the force on the plate (Castigliano)."""
+    found = fd.sensitivity(tower, {"drop": 0.01, "spring": 900.0}, "strain_energy", MOVED)
+    path = fd.trace(tower(drop=0.01, spring=900.0), "displacement", steps=4)
+    chosen = path["support_axis"].values == "z"
+    nodes = path["support_node"].values[chosen]
+    upper = path["reaction"].values[-1][chosen][nodes >= 6].sum()
+    assert found["gradient_drop"].values[0] == pytest.approx(-upper, rel=1e-8)
+
+
+@pytest.mark.parametrize("measure", ["limit_load", "load_at[8,z,-0.01]", "barrier", "barrier_back"])
+def test_snap_through(measure):
+    values = {"height": 0.06, "twist": 30.0, "thickness": 2.4e-4, "stiffness": STIFFNESS}
+    design = Design(tower, values, [measure], SNAP)
+    design.step = 3e-4
+    assert max(design.errors().values()) < 1e-7
+
+
+@pytest.mark.filterwarnings("ignore:the path loses stability")
+@pytest.mark.parametrize("seed", [21, 22])
+def test_the_remainder_falls_with_the_second_order(seed):
+    values = {"height": 0.06, "thickness": 2.4e-4, "stiffness": np.full(12, 6e-3)}
+    design = Design(tower, values, ["limit_load", "load_at[8,z,-0.01]"], SNAP)
+    lengths = (4e-2, 4e-3, 4e-4, 4e-5)
+    assert (design.order(seed, lengths) > 1.9).all()
+
+
+def test_a_limit_load_falls_as_the_force_grows():
+    found = fd.sensitivity(tower, {"force": 1.0}, ["limit_load", "barrier"], SNAP)
+    value, slope = found["value"].values, found["gradient_force"].values
+    assert slope[0] == pytest.approx(-value[0], rel=1e-10)
+    assert slope[1] == 0.0  # a barrier is between states without force
+
+
+# ------------------------------------------------------------------ what has none
+@pytest.mark.parametrize(
+    ("analysis", "measure", "told"),
+    [
+        (SNAP, "displacement[8,z]", r"no given load factor.*newton"),
+        (PRESSED, "limit_load", "limit_load.*nan"),
+        (PRESSED, "barrier", "no two stable states|needs at least|barrier"),
+        (PRESSED, "load_at[8,z,0.5]", "moves from.* and not to"),
+        (PRESSED, "bifurcation_load", "has no derivative"),
+        ({**PRESSED, "constant": [0]}, "displacement[8,z]", "constant loads.*leave that out"),
+    ],
+)
+def test_refused(analysis, measure, told):
+    with pytest.raises(InputError, match=told):
+        fd.sensitivity(tower, {"force": 1.0}, measure, analysis)
+
+
+def test_displacements_at_a_limit_point_have_no_derivative():
+    case = tower()
+    given = {name: value for name, value in SNAP.items() if name != "kind"}
+    path = fd.trace(case, **given)
+    at = int(np.flatnonzero(path["point"].values == "limit")[0])
+    q = case.body.dofs(path["displacement"].values[at])
+    force = np.zeros(len(q))
+    force[3 * TIP + 2] = 1.0
+    with pytest.raises(InputError, match=r"limit point or a bifurcation.*limit_load"):
+        solved(case, q, force)
+    before = case.body.dofs(path["displacement"].values[at - 1])
+    assert np.isfinite(solved(case, before, force)).all()

@@ -1,0 +1,182 @@
+"""`sensitivity` and what it takes: sources, parameters, measures, and bad input."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.errors import InputError
+from foldyn.gradients.numbers import numbers_of
+from foldyn.gradients.parameters import Columns, Parameters, Slope
+
+MODES = {"kind": "modes", "count": 3}
+CASE = """
+[pattern]
+kind = "miura"
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.02
+density = 900.0
+[[supports]]
+nodes = "xmin"
+[analysis]
+kind = "modes"
+count = 3
+"""
+
+
+def cell(
+    panel_angle: float = 60.0, thickness: Any = 0.02, stiffness: Any = 0.02, cells: int = 1,
+    force: float = 0.0,
+) -> fd.Case:  # fmt: skip
+    pattern = fd.patterns.miura(cells=(int(cells), 1), panel_angle=panel_angle)
+    own = [fd.PanelSheet(k, thickness=float(t)) for k, t in enumerate(np.ravel(thickness))]
+    several = np.ndim(thickness) > 0
+    sheet = fd.Sheet(1e6, 0.25, 0.02 if several else thickness, 900.0, panels=own * several)
+    made = fd.discretize(pattern, sheet, preset="merlin2", bend_law="linear",
+                         crease_stiffness=stiffness)  # fmt: skip
+    loads = [fd.Force("xmax", (force, 0.0, 0.0))] if force else []
+    return fd.Case(made, [fd.Fix("xmin")], loads)
+
+
+def test_names_and_dimensions():
+    values = {"panel_angle": 60.0, "stiffness": np.full(4, 0.02)}
+    found = fd.sensitivity(cell, values, ["frequency[1]", "mass"], MODES)
+    assert found["measure"].values.tolist() == ["frequency[1]", "mass"]
+    assert found["gradient_panel_angle"].dims == ("measure",)
+    assert found["gradient_stiffness"].dims == ("measure", "stiffness_entry")
+    assert found["gradient_stiffness"].shape == (2, 4)
+    assert found.attrs["analysis"] == "modes"
+
+
+def test_expressions_follow_the_chain_rule():
+    values = {"panel_angle": 60.0}
+    ratio = "-frequency[2] / frequency[1] + min(mass, 1e9) ** 2"
+    found = fd.sensitivity(cell, values, ["frequency[1]", "frequency[2]", "mass", ratio], MODES)
+    (f1, f2, m, r), (d1, d2, dm, dr) = found["value"].values, found["gradient_panel_angle"].values
+    assert r == pytest.approx(-f2 / f1 + m**2)
+    assert dr == pytest.approx(-d2 / f1 + f2 * d1 / f1**2 + 2.0 * m * dm, rel=1e-12)
+
+
+def test_a_case_file_is_changed_by_its_keys(tmp_path):
+    (tmp_path / "cell.toml").write_text(CASE)
+    values = {"pattern.panel_angle": 60.0, "sheet.thickness": 0.02}
+    found = fd.sensitivity(tmp_path / "cell.toml", values, "frequency[1]")
+
+    def own(panel_angle: float, thickness: float) -> fd.Case:
+        pattern = fd.patterns.miura(panel_angle=panel_angle)
+        made = fd.discretize(pattern, fd.Sheet(1e6, 0.25, thickness, 900.0))
+        return fd.Case(made, [fd.Fix("xmin")])
+
+    other = fd.sensitivity(own, {"panel_angle": 60.0, "thickness": 0.02}, "frequency[1]", MODES)
+    assert found["gradient_pattern.panel_angle"].values == pytest.approx(
+        other["gradient_panel_angle"].values, rel=1e-6
+    )
+    assert found["gradient_sheet.thickness"].values == pytest.approx(
+        other["gradient_thickness"].values, rel=1e-6
+    )
+
+
+def test_a_case_file_that_starts_from_a_state_is_refused(tmp_path):
+    own = CASE.replace('kind = "modes"\ncount = 3', 'kind = "dynamics"\nduration = 0.1')
+    (tmp_path / "cell.toml").write_text(
+        own.replace('[[supports]]\nnodes = "xmin"', "") + "[initial]\nvelocity = [0.0, 0.0, 0.1]\n"
+    )
+    with pytest.raises(InputError, match=r"cell.toml: initial: there are no gradients"):
+        fd.sensitivity(tmp_path / "cell.toml", {"sheet.thickness": 0.02}, "mass")
+
+
+def test_an_own_measure_with_its_derivative():
+    def ratio(result: Any, case: fd.Case) -> float:
+        return float(result["frequency"][1] / result["frequency"][0])
+
+    def slope(result: Any, case: fd.Case) -> dict[str, Any]:
+        first, second = result["frequency"].values[:2]
+        return {"frequency": np.array([-second / first**2, 1.0 / first, 0.0])}
+
+    values = {"panel_angle": 60.0}
+    own = fd.sensitivity(cell, values, {"ratio": (ratio, slope)}, MODES)
+    text = fd.sensitivity(cell, values, "frequency[2] / frequency[1]", MODES)
+    for name in ("value", "gradient_panel_angle"):
+        assert own[name].values == pytest.approx(text[name].values, rel=1e-12)
+
+
+# ------------------------------------------------------------------ parameters
+def test_stiffnesses_of_creases_are_told_apart_at_once():
+    calls = []
+
+    def build(stiffness: Any) -> fd.Case:
+        calls.append(1)
+        return cell(stiffness=stiffness)
+
+    design = Parameters(build, {"stiffness": np.linspace(0.01, 0.04, 4)}, {})
+    slope = design.slopes(numbers_of)["stiffness"]
+    assert isinstance(slope, Slope)
+    assert len(calls) < 15
+    entry = slope.entry["0.hinge_stiffness"]
+    assert sorted(entry[entry >= 0].tolist()) == [0, 1, 2, 3]
+
+
+def test_thicknesses_of_panels_share_edges_and_are_changed_one_by_one():
+    design = Parameters(cell, {"thickness": np.linspace(0.015, 0.02, 4)}, {})
+    slope = design.slopes(numbers_of)["thickness"]
+    assert isinstance(slope, Columns)
+    found = fd.sensitivity(cell, design.values, ["frequency[1]", "mass"], MODES)
+    assert found["gradient_thickness"].shape == (2, 4)
+    total = fd.sensitivity(cell, {"thickness": 0.02}, "mass", MODES)
+    each = fd.sensitivity(cell, {"thickness": np.full(4, 0.02)}, "mass", MODES)
+    assert each["gradient_thickness"].values.sum() == pytest.approx(
+        total["gradient_thickness"].values[0], rel=1e-9
+    )
+
+
+def test_a_parameter_of_zero_needs_a_size():
+    state = {**MODES, "state": "equilibrium"}
+
+    def build(force: float) -> fd.Case:
+        made = cell()
+        return fd.Case(made.structure, made.supports, [fd.Force("xmax", (force + 0.01, 0, 0))])
+
+    with pytest.raises(InputError, match=r"force = 0: how far.*sizes="):
+        fd.sensitivity(build, {"force": 0.0}, "frequency[1]", state)
+    found = fd.sensitivity(build, {"force": 0.0}, "frequency[1]", state, sizes={"force": 0.01})
+    assert found["gradient_force"].values[0] != 0.0
+
+
+# ------------------------------------------------------------------ bad input
+@pytest.mark.parametrize(
+    ("build", "values", "measures", "analysis", "told"),
+    [
+        (cell, {"cells": 2.0}, "frequency[1]", MODES, "cells"),
+        (cell, {"angle": 60.0}, "frequency[1]", MODES, "build cannot take these parameters"),
+        (cell, {}, "frequency[1]", MODES, "parameters = .*give a mapping of names"),
+        (cell, {"panel_angle": "wide"}, "frequency[1]", MODES, "panel_angle = 'wide'|\"wide\""),
+        (cell, {"panel_angle": np.nan}, "frequency[1]", MODES, "finite number"),
+        (cell, {"panel_angle": 60.0}, "frequence[1]", MODES, "no measure frequence"),
+        (cell, {"panel_angle": 60.0}, [], MODES, "measures: none"),
+        (cell, {"panel_angle": 60.0}, "frequency[1]", None, "say what is computed"),
+        (cell, {"panel_angle": 60.0}, "frequency[1]", {"kind": "mode"}, "analysis.kind = "),
+        (3, {"panel_angle": 60.0}, "frequency[1]", MODES, "a function, a case or a case file"),
+        (cell(), ["fold_stiffnes"], "frequency[1]", MODES, "fold_stiffness"),
+        (cell(), {"fold_stiffness": np.ones(3)}, "frequency[1]", MODES, "shape"),
+        (cell, {"panel_angle": 60.0}, {"own": len}, MODES, "a pair of a function and its deriv"),
+        (cell, {"panel_angle": 60.0}, "open('x')", MODES, "measures"),
+    ],
+)
+def test_bad_input(build, values, measures, analysis, told):
+    with pytest.raises(InputError, match=told):
+        fd.sensitivity(build, values, measures, analysis)
+
+
+def test_what_changes_the_topology_is_named():
+    def build(share: float) -> fd.Case:
+        made = cell()
+        held = "xmin" if share <= 0.5 else ["xmin", "xmax"][:2]
+        return fd.Case(made.structure, [fd.Fix(one) for one in np.atleast_1d(held)])
+
+    with pytest.raises(InputError, match=r"share: changes what is connected, held.*fd.sweep"):
+        fd.sensitivity(build, {"share": 0.5}, "frequency[1]", MODES)
