@@ -9,7 +9,7 @@ from formulas import Formulas, best, plan
 import foldyn as fd
 from foldyn.designs.methods import METHODS
 from foldyn.designs.run_design import designed
-from foldyn.designs.search import NEAR, STILL, Ended, Search
+from foldyn.designs.search import NEAR, STILL, Ended, Search, Trial
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 
 SQUARE = {"a": (-2.0, 2.0), "b": (-1.0, 2.0)}
@@ -124,15 +124,21 @@ def test_a_first_design_that_fails_is_an_error():
 def test_a_search_that_stands_still_ends():
     search = object.__new__(Search)
     search.gradient, search._last, search._still = True, None, 0
-    trials = [type("Trial", (), {"x": np.full(2, 0.5 + k * 0.1 * NEAR)})() for k in range(99)]
-    with pytest.raises(Ended, match="no longer changes"):
-        for count, trial in enumerate(trials):
+    seen: list[float] = []
+
+    def go_on() -> None:
+        for k in range(99):
+            trial = Trial(np.full(2, 0.5 + k * 0.1 * NEAR), *[0.0] * 5)  # type: ignore[arg-type]
             search._count_still(trial)
             search._last = trial
-    assert count == STILL + 1
+            seen.append(k)
+
+    with pytest.raises(Ended, match="no longer changes"):
+        go_on()
+    assert len(seen) == STILL + 1
     search._still = 0
     for k in range(99):  # as long as it moves it goes on
-        moving = type("Trial", (), {"x": np.full(2, 0.5 + k * 10.0 * NEAR)})()
+        moving = Trial(np.full(2, 0.5 + k * 10.0 * NEAR), *[0.0] * 5)  # type: ignore[arg-type]
         search._count_still(moving)
         search._last = moving
 
