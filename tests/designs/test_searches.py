@@ -9,6 +9,7 @@ from formulas import Formulas, best, plan
 import foldyn as fd
 from foldyn.designs.methods import METHODS
 from foldyn.designs.run_design import designed
+from foldyn.designs.search import NEAR, STILL, Ended, Search, Trial
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 
 SQUARE = {"a": (-2.0, 2.0), "b": (-1.0, 2.0)}
@@ -118,6 +119,28 @@ def test_starts_are_drawn_again_where_they_fail():
 def test_a_first_design_that_fails_is_an_error():
     with pytest.raises(ComputationError, match="no equilibrium"):
         best(SQUARE, VALLEY, evaluator=Formulas(fails=lambda x: True))
+
+
+def test_a_search_that_stands_still_ends():
+    search = object.__new__(Search)
+    search.gradient, search._last, search._still = True, None, 0
+    seen: list[float] = []
+
+    def go_on() -> None:
+        for k in range(99):
+            trial = Trial(np.full(2, 0.5 + k * 0.1 * NEAR), *[0.0] * 5)  # type: ignore[arg-type]
+            search._count_still(trial)
+            search._last = trial
+            seen.append(k)
+
+    with pytest.raises(Ended, match="no longer changes"):
+        go_on()
+    assert len(seen) == STILL + 1
+    search._still = 0
+    for k in range(99):  # as long as it moves it goes on
+        moving = Trial(np.full(2, 0.5 + k * 10.0 * NEAR), *[0.0] * 5)  # type: ignore[arg-type]
+        search._count_still(moving)
+        search._last = moving
 
 
 def test_without_a_feasible_design_the_nearest_is_returned_with_a_warning():

@@ -19,6 +19,8 @@ BAD = 1e6
 MOST_FAILED = 20, 200
 """Designs in a row that cannot be computed, after which a search is given up: of a method with
 gradients, and of one that draws designs."""
+NEAR, STILL = 1e-7, 20
+"""Of the width of the bounds: designs that are one; how many in a row end a search by gradients."""
 
 
 class Ended(Exception):  # noqa: N818
@@ -103,6 +105,7 @@ class Search:
     def begin(self, start: int) -> None:
         """Begin a search from another start."""
         self.start, self.iteration, self.count, self._failed = start, 0, 0, 0
+        self._still = 0
         self._known.clear()
         self._last: Trial | None = None
 
@@ -138,6 +141,7 @@ class Search:
             self._known[point] = self._new(point)
         found = self._known[point]
         if found is not None:
+            self._count_still(found)
             self._last, self._failed = found, 0
             return found
         self._failed += 1
@@ -148,6 +152,16 @@ class Search:
             raise Ended(f"{most} designs in a row failed: {self.rows[-1].failure}")
         last = self._last
         return Trial(np.asarray(x), BAD, last.excess, last.slope, last.slopes, np.inf)
+
+    def _count_still(self, found: Trial) -> None:
+        """End a search by derivatives that goes on about one design, as where none is feasible."""
+        last = self._last
+        if not self.gradient or last is None or found is last:
+            return
+        near = float(np.abs(found.x - last.x).max()) < NEAR
+        self._still = self._still + 1 if near else 0
+        if self._still > STILL:
+            raise Ended("the design no longer changes")
 
     def _new(self, point: Point) -> Trial | None:
         (found,) = self.evaluations.at([point])

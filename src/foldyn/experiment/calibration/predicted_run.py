@@ -23,6 +23,8 @@ from foldyn.values import show
 
 STEADY = "generalized_alpha"
 """Integrator of a fit where the case file leaves the choice open."""
+MANY = 2000
+"""Coordinates of nodes beyond which modes are found as quickly as those of a neighbor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +102,8 @@ def neighbors(
     if kind == "statics":
         return equilibria(one, result, others)
     if kind == "modes":
+        if one.case.structure.nodes.size > MANY:
+            raise InputError("modes of so many dofs are found as quickly as their neighbors")
         places = [each.places(result, one.case) for each in fitted]  # type: ignore[attr-defined]
         return modes(one, result, others, np.unique(np.concatenate(places)).tolist())
     return responses(one, result, others)
