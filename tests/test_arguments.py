@@ -48,8 +48,8 @@ def calls(tmp_path_factory):
 SOLVED = (
     "simulate", "simulate_many", "trace", "switch_branch", "landscape", "modes", "frf", "fold",
     "critical_step", "initial_state", "mac", "case_of", "save", "load", "export", "view",
-    "read_case", "read_pattern", "diagnose", "write_pattern", "sweep", "design", "fit",
-    "fidelity",
+    "read_case", "read_pattern", "diagnose", "write_pattern", "sweep", "sensitivity", "design",
+    "fit", "fidelity",
 )  # fmt: skip
 """Calls of `solved`, which computes."""
 NAMES = (*DATA, *PATTERNS, *SOLVED)

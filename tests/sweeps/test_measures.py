@@ -17,7 +17,9 @@ from foldyn.sweeps.measure import asked, own_measure
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 TEXTS = {"modes": MODES, "frf": FRF, "dynamics": MOTION, "statics": PATH}
-GIVEN = {"node": "8", "axis": "z", "mode": "1", "model": "own"}
+GIVEN = {
+    "node": "8", "axis": "z", "mode": "1", "model": "own", "frequency": "0.3", "time": "0.01",
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -43,8 +45,8 @@ EVERY = [(one, kind) for one in MEASURES.values() for kind in one.kinds if kind 
 @pytest.mark.matrix
 @pytest.mark.parametrize(("one", "kind"), EVERY, ids=lambda one: getattr(one, "name", one))
 def test_every_measure_can_be_taken_of_all_its_kinds(results, one, kind):
-    words = [GIVEN[what] if kind != "statics" else {"node": "0", "axis": "x"}[what]
-             for what in one.takes]  # fmt: skip
+    given = GIVEN if kind != "statics" else {"node": "0", "axis": "x", "displacement": "0"}
+    words = [given[what] for what in one.takes]
     value = take(results, kind, f"{one.name}[{','.join(words)}]" if words else one.name)
     assert value.ndim == len(one.dims)
     assert one.doc

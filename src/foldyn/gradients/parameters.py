@@ -233,13 +233,13 @@ def _known(gradient: Gradient, name: str) -> NDArray:
     return gradient[name]
 
 
-def checked(values: Values) -> dict[str, NDArray]:
+def checked(values: Values, argument: str = "parameters") -> dict[str, NDArray]:
     """Values of parameters as arrays."""
     if not isinstance(values, Mapping) or not values:
-        raise InputError(f" = {show(values)}: give a mapping of names to values", "parameters")
+        raise InputError(f" = {show(values)}: give a mapping of names to values", argument)
     found = {}
     for name, value in values.items():
-        with within("parameters"):
+        with within(f"{argument}."):
             try:
                 array = np.array(value, dtype=float)
             except (TypeError, ValueError):

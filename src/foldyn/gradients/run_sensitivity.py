@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from inspect import signature
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from foldyn.analyses.keys import replaced
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.cases import Case
+from foldyn.dynamics import simulate
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import InputError, within
 from foldyn.gradients.expressions import Expression, parse
@@ -27,12 +29,14 @@ from foldyn.gradients.numbers import Gradient
 from foldyn.gradients.parameters import Parameters, Slope, Values, checked
 from foldyn.gradients.path import PathGradient
 from foldyn.input_files import path_of
+from foldyn.linear import frf, modes
 from foldyn.mechanics.pullback import Arrays
+from foldyn.statics import trace
 from foldyn.structures import Structure
 from foldyn.sweeps.job import ASIDE
 from foldyn.sweeps.measure import Asked, asked, of_callable
 from foldyn.sweeps.measures import MEASURES
-from foldyn.values import choice, listed, show
+from foldyn.values import choice, listed, of_kind, show
 
 if TYPE_CHECKING:
     from typing import Protocol
@@ -58,6 +62,10 @@ KINDS: Mapping[str, Callable[[Case, Mapping[str, Any]], Differentiated]] = {
     "frf": FrfGradient,
 }
 """Analyses with gradients, by their kind in case files."""
+FUNCTIONS: Mapping[str, Callable[..., Any]] = {
+    "modes": modes, "frf": frf, "dynamics": simulate, "statics": trace,
+}  # fmt: skip
+"""What computes them, whose arguments they take."""
 LENGTH = "bar_length"
 ARRAYS = (
     "fold_stiffness", "fold_rest", "bend_stiffness", "bend_rest", "bar_area", LENGTH,
@@ -140,7 +148,7 @@ def sensitivity(
     """
     began = time.perf_counter()
     source = source_of(build, parameters, analysis)
-    design = Parameters(source.build, source.values, {} if sizes is None else sizes)
+    design = Parameters(source.build, source.values, _sizes(sizes))
     wanted = _wanted(measures)
     case = design.case()
     found = source.analyse(case)
@@ -173,6 +181,12 @@ def sensitivity(
     return xr.Dataset(data, {"measure": names}, facts)
 
 
+def _sizes(given: Values | None) -> dict[str, NDArray]:
+    """Sizes of parameters, if any are given."""
+    none = given is None or (isinstance(given, Mapping) and not given)
+    return {} if none else checked(given, "sizes")  # type: ignore[arg-type]
+
+
 class Sourced(NamedTuple):
     """What is differentiated: how a case is built, where, and what is computed."""
 
@@ -193,6 +207,8 @@ class Sourced(NamedTuple):
 
 def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None) -> Sourced:
     """Check what `sensitivity` is to differentiate."""
+    if analysis is not None:
+        of_kind("analysis", analysis, Mapping)
     if isinstance(build, Case):
         build, values = _of_arrays(build, parameters)
     elif isinstance(build, str | os.PathLike):
@@ -202,13 +218,15 @@ def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None
         values = checked(parameters)
     else:
         raise InputError(f" = {show(build)}: give a function, a case or a case file", "build")
-    if not isinstance(analysis, Mapping) or "kind" not in analysis:
+    if analysis is None or "kind" not in analysis:
         raise InputError(
             f' = {show(analysis)}: say what is computed, as {{"kind": "modes", "count": 4}}',
             "analysis",
         )
     kind = choice("analysis.kind", analysis["kind"], tuple(KINDS))
     arguments = {name: value for name, value in analysis.items() if name != "kind"}
+    for name in arguments:
+        choice("analysis", name, [*signature(FUNCTIONS[kind]).parameters][1:])
     return Sourced(build, values, kind, arguments)
 
 
@@ -431,7 +449,7 @@ def said_of(text: str) -> Iterator[None]:
 def _direction(along: Values, design: Parameters) -> dict[str, NDArray]:
     """Rates (count,) of the parameters of a direction."""
     found = {}
-    for name, rate in checked(along).items():
+    for name, rate in checked(along, "along").items():
         if name not in design.values:
             raise InputError(f".{name}: there is no such parameter", "along")
         value = design.values[name]
