@@ -15,7 +15,7 @@ from foldyn.analyses import CaseFile
 from foldyn.analyses.keys import files_moved, replaced, value_at
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.designs.run_design import Plan, plan_of
-from foldyn.errors import InputError, within
+from foldyn.errors import InputError
 from foldyn.writing import write_text
 
 
@@ -40,8 +40,12 @@ def planned(path: Path, changes: Mapping[str, Any]) -> tuple[CaseFile, Plan]:
         )
     asked = case_file.design.model_dump() | dict(changes)
     asked["start"] = _starts(document, asked["bounds"]) | asked["start"]
-    with within("design.", path):
+    try:
         return case_file, plan_of(path, analysis=None, **asked)
+    except InputError as error:
+        if error.file is not None:  # of the case that the first design has
+            raise
+        raise error.within("design.", path) from None
 
 
 def _starts(document: Mapping[str, Any], bounds: Mapping[str, Any]) -> dict[str, Any]:

@@ -225,8 +225,10 @@ def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None
         )
     kind = choice("analysis.kind", analysis["kind"], tuple(KINDS))
     arguments = {name: value for name, value in analysis.items() if name != "kind"}
-    for name in arguments:
-        choice("analysis", name, [*signature(FUNCTIONS[kind]).parameters][1:])
+    known = [*signature(FUNCTIONS[kind]).parameters.values()][1:]
+    if all(one.kind is not one.VAR_KEYWORD for one in known):  # `frf` has options of its methods
+        for name in arguments:
+            choice("analysis", name, [one.name for one in known])
     return Sourced(build, values, kind, arguments)
 
 
