@@ -10,13 +10,11 @@ from foldyn.mechanics.following import (
     Following,
     asymmetry,
     following_force,
-    following_gradient,
     following_places,
     following_tangent,
     joined,
     moments,
     pressures,
-    pull_following,
     pushes,
     put_following,
     tensions,
@@ -59,27 +57,6 @@ def hidden(x) -> Following:
 
 def bars(x) -> Following:
     return tensions(x, np.array([[0, 5], [2, 6]]), np.array([1.5, -2.0]))
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize("kind", [triangles, hinges, clamps, bars, hidden])
-def test_the_pullback_has_the_derivatives_of_weighted_forces(kind, x, u, seed) -> None:
-    loads = joined([(kind(x), 1)])
-    w, out = np.random.default_rng(seed).standard_normal(u.size), following_gradient(loads)
-    product = np.zeros_like(u)
-    pull_following(loads, u, FACTOR, w, product, out)
-    exact = -following_tangent(loads, u, FACTOR).T @ w
-    np.testing.assert_allclose(product, exact, rtol=0, atol=1e-13 * np.abs(exact).max(initial=0))
-    for name, gradient in out._asdict().items():
-        if not gradient.size:
-            continue
-
-        def weighted(values: np.ndarray, name: str = name) -> float:
-            return float(w @ following_force(loads._replace(**{name: values}), u, FACTOR))
-
-        array = getattr(loads, name)
-        assert gradient_error(weighted, lambda _, g=gradient: g, array, seed) < 1e-9
-        assert gradient_error(weighted, lambda _, g=gradient: 1.001 * g, array, seed) > 1e-4
 
 
 @pytest.mark.parametrize("kind", [triangles, hinges, clamps, bars])

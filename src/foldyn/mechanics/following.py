@@ -28,12 +28,7 @@ from scipy import sparse
 
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.dihedral import (
-    add_hessian,
-    carry_wing,
-    dihedral_gradient,
-    dihedral_rates,
-)
+from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient
 
 ASYMMETRIC = 1e-3  # share of the stiffness of loads that is not symmetric and not to be overlooked
 NO_POTENTIAL = (
@@ -241,88 +236,6 @@ def add_following(loads, u, factor, out):
             out[3 * second + c] -= along
     for e in range(loads.push.size):
         out[loads.hidden[e]] += loads.push[e] * factor[loads.push_row[e], 0]
-
-
-class FollowingGradient(NamedTuple):
-    """Derivatives by arrays of `Following` of the same names."""
-
-    sides: NDArray
-    pressure: NDArray
-    corners: NDArray
-    moment: NDArray
-    vectors: NDArray
-    tension: NDArray
-    push: NDArray
-
-
-def following_gradient(loads: Following) -> FollowingGradient:
-    """Room for the derivatives by the arrays of loads."""
-    names = FollowingGradient._fields
-    return FollowingGradient(*(np.zeros_like(getattr(loads, name)) for name in names))
-
-
-@kernel
-def pull_following(loads, u, factor, weight, product, out):
-    """Add the derivatives of weight . F, F as `add_following` adds it, to `product` and `out`.
-
-    u, weight and product are flat.
-    """
-    a, b, w = np.empty(3), np.empty(3), np.empty(3)
-    points, gradient = np.empty((4, 3)), np.empty((4, 3))
-    for t in range(loads.pressure.size):
-        share = factor[loads.pressure_row[t], 0] / 6.0
-        first, second, third = loads.triangles[t]
-        _edges(loads, u, t, a, b)
-        for c in range(3):
-            w[c] = weight[3 * first + c] + weight[3 * second + c] + weight[3 * third + c]
-        for c in range(3):
-            d, e = (c + 1) % 3, (c + 2) % 3
-            out.pressure[t] += share * w[c] * (a[d] * b[e] - a[e] * b[d])
-            by_a = share * loads.pressure[t] * (b[d] * w[e] - b[e] * w[d])
-            by_b = share * loads.pressure[t] * (w[d] * a[e] - w[e] * a[d])
-            out.sides[t, 0, c] += by_a
-            out.sides[t, 1, c] += by_b
-            product[3 * first + c] -= by_a + by_b
-            product[3 * second + c] += by_a
-            product[3 * third + c] += by_b
-    for h in range(loads.moment.size):
-        share = factor[loads.moment_row[h], 0]
-        rides = _hinge(loads, u, h, points, gradient)
-        j, k, i, l = loads.hinges[h]  # noqa: E741
-        for c in range(3):  # the rates of the points, in the place of the gradient
-            gradient[0, c], gradient[1, c] = weight[3 * j + c], weight[3 * k + c]
-            gradient[2, c] = weight[3 * i + c]
-            gradient[3, c] = 0.5 * (gradient[0, c] + gradient[1, c])
-            if not rides:
-                gradient[3, c] = weight[3 * l + c]
-        p, g = flat(points), flat(gradient)
-        found = dihedral_rates(
-            p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11],
-            g[0], g[1], g[2], g[3], g[4], g[5], g[6], g[7], g[8], g[9], g[10], g[11],
-        )  # fmt: skip
-        out.moment[h] += share * found[13]
-        for n in range(12):
-            g[n] = share * loads.moment[h] * found[14 + n]
-        for v in range(4):
-            for c in range(3):
-                by = gradient[v, c]
-                out.corners[h, v, c] += by
-                if rides and v == 3:
-                    product[3 * j + c] += 0.5 * by
-                    product[3 * k + c] += 0.5 * by
-                else:
-                    product[3 * loads.hinges[h, v] + c] += by
-    for e in range(loads.tension.size):
-        share, first, second = factor[loads.tension_row[e], 0], loads.bars[e, 0], loads.bars[e, 1]
-        for c in range(3):
-            along = loads.vectors[e, c] + u[3 * second + c] - u[3 * first + c]
-            apart = share * (weight[3 * first + c] - weight[3 * second + c])
-            out.tension[e] += apart * along
-            out.vectors[e, c] += loads.tension[e] * apart
-            product[3 * first + c] -= loads.tension[e] * apart
-            product[3 * second + c] += loads.tension[e] * apart
-    for e in range(loads.push.size):
-        out.push[e] += factor[loads.push_row[e], 0] * weight[loads.hidden[e]]
 
 
 @inner
