@@ -16,25 +16,19 @@ from numpy.typing import NDArray
 
 from foldyn.analyses import CaseFile
 from foldyn.analyses.keys import parts, replaced
-from foldyn.analyses.reading import case_of_document, read_document, validated
+from foldyn.analyses.reading import read_document, validated
 from foldyn.cases import Case
 from foldyn.designs.space import Space
-from foldyn.dynamics import simulate
 from foldyn.errors import ComputationError, FoldynError, FoldynWarning, InputError, within
+from foldyn.gradients.run_sensitivity import FUNCTIONS, case_file_at, sensitivity
 from foldyn.input_files import path_of
-from foldyn.linear import frf, modes
 from foldyn.program import program
-from foldyn.statics import trace
 from foldyn.sweeps.evaluations import Evaluation
 from foldyn.sweeps.job import ASIDE, Job, code_of
 from foldyn.sweeps.measure import Asked, asked
 from foldyn.sweeps.measures import MEASURES
 from foldyn.values import choice, show
 
-ANALYSES: Mapping[str, Callable[..., xr.Dataset]] = {
-    "modes": modes, "dynamics": simulate, "statics": trace, "frf": frf,
-}  # fmt: skip
-"""What computes each kind of analysis of a case."""
 COMPUTING = ("analyses", "results", "sweeps", "gradients", "designs")
 """Folders that evaluations depend on, besides the solvers."""
 VALUES, JACOBIAN = "value", "jacobian"
@@ -85,8 +79,6 @@ class Measured:
         if not gradient:
             result, case, shared = *self._computed(values), dict[Any, Any]()
             return np.array([_single(one, result, case, shared) for one in self.measures]), None
-        from foldyn.gradients import sensitivity
-
         width = self.space.parts(self.space.upper - self.space.lower)
         zeros = {name: width[name] for name, value in values.items() if not np.any(value)}
         sizes = {n: size if self.space.shapes[n] else float(size[0]) for n, size in zeros.items()}
@@ -108,13 +100,10 @@ class Measured:
             file = self._file(values)
             return file.computation().result(), file.case()
         case, arguments = self.build(**values), dict(self.analysis or {})
-        return ANALYSES[arguments.pop("kind")](case, **arguments), case
+        return FUNCTIONS[arguments.pop("kind")](case, **arguments), case
 
     def _file(self, values: Mapping[str, Any]) -> CaseFile:
-        plain = {key: np.asarray(value).tolist() for key, value in values.items()}
-        changed = replaced(self.document, plain)
-        own = {key: value for key, value in changed.items() if key not in ASIDE}
-        return case_of_document(self.build, own)
+        return case_file_at(self.build, self.document, values)
 
     def _source(self) -> Any:
         """What a case is built from."""
@@ -149,7 +138,7 @@ def measured(
                 f' = {show(analysis)}: say what is computed, as {{"kind": "modes", "count": 4}}',
                 "analysis",
             )
-        kind = choice("analysis.kind", analysis["kind"], ANALYSES)
+        kind = choice("analysis.kind", analysis["kind"], FUNCTIONS)
         analysis = dict(analysis)
     else:
         raise InputError(f" = {show(build)}: give a function or a case file", "build")

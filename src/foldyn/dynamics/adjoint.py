@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.inertia import substitute
 from foldyn.dynamics.system import carried, scratch
-from foldyn.errors import InputError
-from foldyn.mechanics.pullback import Pullback, arrays_of_body, pull_all
+from foldyn.mechanics.pullback import Pullback, arrays_of_body, pull_all, refuse_lacking
 
 
 class ByMotion(NamedTuple):
@@ -143,9 +142,4 @@ def refuse(motion: Any) -> None:
             not packed.mass.lumped and bool(motion.start[1][motion.case.fixed].any())
         ),
     }
-    for what, here in lacks.items():
-        if here:
-            raise InputError(
-                f"there are no gradients of motions with {what}; leave that out, or vary the "
-                "parameters by fd.sweep"
-            )
+    refuse_lacking("motions", lacks)

@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.errors import InputError
 from foldyn.gradients.equilibrium import equilibrium_seen
 from foldyn.gradients.numbers import nothing
 from foldyn.linear.linearized import Linearized
 from foldyn.materials import Superlinear
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.pullback import Pullback
+from foldyn.mechanics.pullback import Pullback, refuse_lacking
 from foldyn.structures.bars_hinges import BarsHingesTerm
 
 TURN = 1e-3  # rad: of the largest turn in a difference along a motion
@@ -100,12 +99,7 @@ def refuse(linear: Linearized, what: str) -> None:
             case.following_terms
         ),
     }
-    for lack, here in lacks.items():
-        if here:
-            raise InputError(
-                f"there are no gradients of {what} with {lack}; leave that out, or vary the "
-                "parameters by fd.sweep"
-            )
+    refuse_lacking(what, lacks)
 
 
 def _soft(sheet: Any, q: NDArray) -> NDArray:

@@ -17,7 +17,7 @@ from foldyn.linear.frf import quantity_of
 from foldyn.signals.peaks import magnitude_curve
 from foldyn.statics import Equilibrium, Landscape, landscape
 from foldyn.sweeps.measure import Asked
-from foldyn.sweeps.measures import curve_of, frequency_of, highest, time_of
+from foldyn.sweeps.measures import curve_of, frequency_of, highest, sampled, time_of
 from foldyn.viewer.fields import bar_strain
 
 Seeds = dict[str, NDArray]
@@ -63,6 +63,11 @@ def _samples(result: xr.Dataset, node: int, axis: str, weights: NDArray) -> Seed
     array = np.zeros((len(weights), result.sizes["node"], result.sizes["axis"]))
     array[:, node, AXES.index(axis)] = weights
     return {"displacement": array}
+
+
+def _all_moved(result: xr.Dataset) -> NDArray:
+    """Displacements (samples, n, 3)."""
+    return sampled(result, "displacement").transpose(..., "node", "axis").values
 
 
 def _one(count: int, k: int) -> NDArray:
@@ -122,8 +127,7 @@ def _mean_square(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
 
 
 def _largest_displacement(result: xr.Dataset, case: Case, node: int | None = None) -> Seeds:
-    along = "time" if "time" in result.dims else "step"
-    moved = result["displacement"].transpose(along, "node", "axis").values
+    moved = _all_moved(result)
     size = np.linalg.norm(moved, axis=-1)
     if node is not None:
         size = np.where(np.arange(size.shape[1]) == node, size, -1.0)
@@ -152,8 +156,7 @@ class _Strained(NamedTuple):
 
 
 def _strained(result: xr.Dataset, case: Case) -> _Strained:
-    along = "time" if "time" in result.dims else "step"
-    moved = result["displacement"].transpose(along, "node", "axis").values
+    moved = _all_moved(result)
     size = np.stack([np.abs(bar_strain(case.structure, u[None])[0]) for u in moved])
     k, e = (int(i) for i in np.unravel_index(size.argmax(), size.shape))
     ends = case.structure.bars[e]
@@ -189,9 +192,8 @@ def _strain_energy(result: xr.Dataset, case: Case) -> Seeds:
 
 
 def _strained_most(result: xr.Dataset, case: Case) -> tuple[NDArray, int]:
-    along = "time" if "time" in result.dims else "step"
     energy = sum(result[name].values for name in case.energy_groups)
-    return result["displacement"].transpose(along, "node", "axis").values, int(np.argmax(energy))
+    return _all_moved(result), int(np.argmax(energy))
 
 
 def _strain_energy_of(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
@@ -226,6 +228,8 @@ def _between_states(pair: Callable[[Landscape], tuple[Equilibrium, Equilibrium]]
         return lambda other: _energy(other, high) - _energy(other, low)
 
     def numbers(result: xr.Dataset, case: Case) -> Gradient:
+        if not case.imposed_terms:
+            return {}
         high, low = pair(landscape(result, case))
         motion = sum((vector for vector, _ in case.imposed_terms), np.zeros_like(high.displacement))
         size = np.abs(motion).max()

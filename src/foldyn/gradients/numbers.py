@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +22,9 @@ Gradient = Mapping[str, NDArray]
 """Derivatives of a number by arrays of numbers, by the name of these."""
 
 
-def numbers_of(case: Case, body: Any = None) -> Arrays:
+def numbers_of(case: Case) -> Arrays:
     """Numbers of a case: of the terms of its body, mass, loads, supports and damping."""
-    arrays = arrays_of_body(case.body if body is None else body)
+    arrays = arrays_of_body(case.body)
     numbers, layout = dict(arrays.numbers), dict(arrays.layout)
     for kind in ("load", "imposed", "rest"):
         for k, (vector, _) in enumerate(getattr(case, f"{kind}_terms")):
@@ -57,16 +56,16 @@ def numbers_of_motion(packed: Packed, start: tuple[NDArray, NDArray]) -> Arrays:
     }
     waves = system.waves._asdict()
     waves = {f"histories.{key}": np.asarray(waves[key]) for key in waves if key != "address"}
-    layout = {**arrays.layout, **waves} | (
-        {
-            "loads.dofs": system.loads.dof,
-            "loads.histories": system.loads.row,
-            "moved.dofs": system.moved.dof,
-            "mass.columns": mass.indices,
-            "mass.rows": mass.indptr,
-            "order": system.order,
-        }
-    )
+    layout = {
+        **arrays.layout,
+        **waves,
+        "loads.dofs": system.loads.dof,
+        "loads.histories": system.loads.row,
+        "moved.dofs": system.moved.dof,
+        "mass.columns": mass.indices,
+        "mass.rows": mass.indptr,
+        "order": system.order,
+    }
     return Arrays(numbers, layout)
 
 

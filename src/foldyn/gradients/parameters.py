@@ -12,7 +12,7 @@ an edge, entries are changed one by one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -268,9 +268,3 @@ def check_layout(name: str, one: Arrays, other: Arrays) -> None:
                 "it: keep it fixed, or vary it by fd.sweep",
                 name,
             )
-
-
-def entries(values: Mapping[str, NDArray]) -> Iterator[tuple[str, int]]:
-    """All entries of parameters, by name and number."""
-    for name, value in values.items():
-        yield from ((name, k) for k in range(value.size))

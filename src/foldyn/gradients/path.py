@@ -24,7 +24,7 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.gradients.equilibrium import equilibrium_seen, free_block, seen_through, solved
 from foldyn.gradients.numbers import Gradient, nothing, numbers_of
-from foldyn.mechanics.pullback import Arrays, Pullback
+from foldyn.mechanics.pullback import Arrays, Pullback, refuse_lacking
 from foldyn.statics import trace
 from foldyn.statics.load_at import Moved, load_at
 from foldyn.statics.stability import softest_modes
@@ -163,9 +163,4 @@ def _refuse(case: Case, arguments: Mapping[str, Any]) -> None:
         "inertia relief": bool(arguments.get("inertia_relief")),
         "an initial state": arguments.get("initial") is not None,
     }
-    for what, here in lacks.items():
-        if here:
-            raise InputError(
-                f"there are no gradients of paths with {what}; leave that out, or vary the "
-                "parameters by fd.sweep"
-            )
+    refuse_lacking("paths", lacks)

@@ -8,12 +8,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from inspect import signature
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from foldyn.analyses import CaseFile
 from foldyn.analyses.keys import replaced
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.cases import Case
@@ -302,6 +304,13 @@ def _check_acts(structure: Any, name: str) -> None:
         )
 
 
+def case_file_at(place: Path, document: dict[str, Any], values: Mapping[str, Any]) -> CaseFile:
+    """A case file with other values of its keys."""
+    plain = {key: np.asarray(value).tolist() for key, value in values.items()}
+    changed = replaced(document, plain)
+    return case_of_document(place, {k: v for k, v in changed.items() if k not in ASIDE})
+
+
 def _of_file(
     path: str | os.PathLike[str], parameters: Any
 ) -> tuple[Callable[..., Case], dict[str, NDArray], dict[str, Any]]:
@@ -309,12 +318,7 @@ def _of_file(
     place = path_of(path, "build")
     document = read_document(place)
 
-    def file(values: Mapping[str, Any]) -> Any:
-        plain = {key: np.asarray(value).tolist() for key, value in values.items()}
-        changed = replaced(document, plain)
-        return case_of_document(place, {k: v for k, v in changed.items() if k not in ASIDE})
-
-    own = file({})
+    own = case_file_at(place, document, {})
     if own.start_keys:
         raise InputError(
             ": there are no gradients of what starts from a given state; leave the table out, or "
@@ -324,7 +328,7 @@ def _of_file(
         )
     analysis = own.analysis
     return (
-        lambda **values: file(values).case(),
+        lambda **values: case_file_at(place, document, values).case(),
         checked(parameters),
         {"kind": analysis.kind, **analysis.arguments},
     )

@@ -142,6 +142,16 @@ def not_differentiated(term: Any) -> str:
     )
 
 
+def refuse_lacking(what: str, lacks: Mapping[str, bool]) -> None:
+    """Refuse what has no gradients, as the modes of a case with contact, with a remedy."""
+    for lack, here in lacks.items():
+        if here:
+            raise InputError(
+                f"there are no gradients of {what} with {lack}; leave that out, or vary the "
+                "parameters by fd.sweep"
+            )
+
+
 @inner_scalar
 def pulled_back(terms, u, v, t, weight, product, rate):
     """Add the derivatives of weight . F at u, v and t by u and v to `product` and `rate`."""

@@ -182,14 +182,14 @@ def _decay(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
 # ------------------------------------------------------------------- motions and paths
 @_measure(*MOVED, units="m", doc="displacement at the end")
 def _displacement(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
-    return float(_sampled(result, "displacement")[-1].sel(node=node, axis=axis))
+    return float(sampled(result, "displacement")[-1].sel(node=node, axis=axis))
 
 
 @_measure(MOTION, units="m", doc="displacement at a time (s)")
 def _displacement_at(
     result: xr.Dataset, case: Case, node: int, axis: str, time: float
 ) -> float:  # fmt: skip
-    moved = _sampled(result, "displacement")[time_of(result, time)]
+    moved = sampled(result, "displacement")[time_of(result, time)]
     return float(moved.sel(node=node, axis=axis))
 
 
@@ -204,7 +204,7 @@ def time_of(result: xr.Dataset, time: float) -> int:
 
 @_measure(MOTION, units="m/s", doc="velocity at the end")
 def _velocity(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
-    return float(_sampled(result, "velocity")[-1].sel(node=node, axis=axis))
+    return float(sampled(result, "velocity")[-1].sel(node=node, axis=axis))
 
 
 @_measure(MOTION, units="m", doc="highest displacement")
@@ -231,12 +231,12 @@ def _mean_square(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
 
 @_measure(*MOVED, units="m", doc="largest displacement")
 def _largest_displacement(result: xr.Dataset, case: Case, node: int | None = None) -> float:
-    moved = _sampled(result, "displacement")
+    moved = sampled(result, "displacement")
     moved = moved if node is None else moved.sel(node=[node])
     return float(np.linalg.norm(moved.values, axis=-1).max())
 
 
-def _sampled(result: xr.Dataset, name: str) -> xr.DataArray:
+def sampled(result: xr.Dataset, name: str) -> xr.DataArray:
     """A variable of a motion or a path, samples first."""
     along = "time" if "time" in result.dims else "step"
     return result[name].transpose(along, ...)
@@ -251,7 +251,7 @@ def _strain_energy(result: xr.Dataset, case: Case) -> float:
 def _dissipated(result: xr.Dataset, case: Case) -> float:
     if "dissipated" not in result:
         return 0.0  # a path without creases that yield
-    return float(_sampled(result, "dissipated")[-1])
+    return float(sampled(result, "dissipated")[-1])
 
 
 @_measure(MOTION, doc="error of the energy balance")
@@ -263,7 +263,7 @@ def _energy_error(result: xr.Dataset, case: Case) -> float:
 def _strain(result: xr.Dataset, case: Case) -> float:
     if case.structure.bar_law is None:
         raise InputError("is of bars, and a shell has none")
-    moved = _sampled(result, "displacement").transpose(..., "node", "axis").values
+    moved = sampled(result, "displacement").transpose(..., "node", "axis").values
     return float(np.abs(bar_strain(case.structure, moved)).max())
 
 
@@ -271,7 +271,7 @@ def _strain(result: xr.Dataset, case: Case) -> float:
 @_measure(PATH, units="N", doc="sum of the reactions at the end")
 def _reaction(result: xr.Dataset, case: Case, axis: str) -> float:
     chosen = (result["support_axis"] == axis).values
-    return float(_sampled(result, "reaction").values[-1, chosen].sum())
+    return float(sampled(result, "reaction").values[-1, chosen].sum())
 
 
 @_measure(PATH, doc="largest load factor")
