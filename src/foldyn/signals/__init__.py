@@ -23,6 +23,7 @@ from foldyn.signals.preprocessing import (
 from foldyn.signals.records import is_uniform, sampling_interval
 from foldyn.signals.spectrum import spectrum
 from foldyn.signals.stepped_sine import SineFit, fit_sine, stepped_sine
+from foldyn.signals.wave_field import Pulse, WavenumberSpectrum, pulse, wavenumber_spectrum
 
 __all__ = [
     "CircleFit",
@@ -31,7 +32,9 @@ __all__ = [
     "HalfPower",
     "LogDecrement",
     "Peaks",
+    "Pulse",
     "SineFit",
+    "WavenumberSpectrum",
     "base_transmissibility",
     "choose_window",
     "circle_fit",
@@ -47,11 +50,13 @@ __all__ = [
     "is_uniform",
     "log_decrement",
     "matrix_pencil",
+    "pulse",
     "remove_trend",
     "sampling_interval",
     "spectrum",
     "stepped_sine",
     "subtract_final",
     "transmissibility",
+    "wavenumber_spectrum",
     "without_window",
 ]

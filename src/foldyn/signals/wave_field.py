@@ -1,0 +1,190 @@
+"""Waves in a chain of cells: their spectrum over phase and frequency, and pulses on their way."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.errors import InputError
+from foldyn.signals import records
+from foldyn.values import number
+
+FEWEST = 4  # cells, and samples, of a field
+
+
+class WavenumberSpectrum(NamedTuple):
+    """How strong waves exp(i (omega t - kappa n)) are in a field; see `wavenumber_spectrum`.
+
+    Attributes
+    ----------
+    phase : ndarray, shape (p,)
+        kappa, rad per cell, increasing from -pi, in steps of 2 pi/n for n cells. Waves of positive
+        phase travel to higher cells.
+    frequency : ndarray, shape (f,)
+        Hz, from 0 in steps of 1/(m dt) for m samples.
+    amplitude : ndarray, shape (p, f)
+        In the unit of the field; the root of the sum of squares over components.
+    """
+
+    phase: NDArray[np.float64]
+    frequency: NDArray[np.float64]
+    amplitude: NDArray[np.float64]
+
+
+def wavenumber_spectrum(
+    values: ArrayLike, dt: float, window: records.Window = "hann"
+) -> WavenumberSpectrum:
+    """Two-dimensional spectrum of what moves in a chain of cells.
+
+    The transform over time and cells, divided by the sums of the windows and doubled for negative
+    frequencies: a traveling wave of amplitude A on a bin gives a peak of height A.
+
+    Parameters
+    ----------
+    values : array_like, shape (m, n, ...)
+        Over m times, evenly spaced, and n cells; further axes are components of a cell.
+    dt : float
+        Sampling interval (s).
+    window : str, tuple, array_like, or None
+        Over time and over cells, as `spectrum` takes it (an array is one over time); None leaves
+        both as they are.
+
+    Returns
+    -------
+    WavenumberSpectrum
+
+    Raises
+    ------
+    InputError
+        Fewer than 4 times or cells, values that are not finite, or an unknown window.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from foldyn.signals import wavenumber_spectrum
+    >>> n, t = np.arange(16), np.arange(64)[:, None] * 0.1
+    >>> found = wavenumber_spectrum(np.cos(2 * np.pi * 1.25 * t - np.pi / 2 * n), 0.1)
+    >>> k, f = np.unravel_index(found.amplitude.argmax(), found.amplitude.shape)
+    >>> float(found.phase[k] / np.pi), float(found.frequency[f]), float(found.amplitude[k, f])
+    (0.5, 1.25, 1.0)
+    """
+    field = records.real_array("values", values)
+    if field.ndim < 2 or min(field.shape[:2]) < FEWEST:
+        raise InputError(
+            f"values: shape {field.shape}: give at least {FEWEST} times and cells, (times, cells)"
+        )
+    interval = records.checked_interval(dt)
+    times, cells = field.shape[:2]
+    over_time = records.checked_window(window, times)
+    over_cells = records.checked_window(window if isinstance(window, str | tuple) else None, cells)
+    gain = over_time.sum() * over_cells.sum()
+    flat = field.reshape(times, cells, -1) * (over_time[:, None] * over_cells)[..., None]
+    # exp(-i omega t) of the transform over time makes exp(+i kappa n) the one over cells
+    waves = np.fft.ifft(np.fft.rfft(flat, axis=0), axis=1) * (cells / gain)
+    waves[1 : (times + 1) // 2] *= 2.0
+    amplitude = np.linalg.norm(np.fft.fftshift(waves, axes=1), axis=2).T
+    phase = 2.0 * np.pi * np.fft.fftshift(np.fft.fftfreq(cells))
+    return WavenumberSpectrum(phase, np.fft.rfftfreq(times, interval), amplitude)
+
+
+class Pulse(NamedTuple):
+    """A pulse on its way along cells; see `pulse`.
+
+    Attributes
+    ----------
+    arrival : ndarray, shape (n,)
+        Time of its peak in each cell; nan where it does not come.
+    amplitude : ndarray, shape (n,)
+        Value at the peak, with its sign.
+    width : ndarray, shape (n,)
+        Time for which it exceeds half of that around the peak; nan if the record ends before.
+    speed : float
+        Cells per time, from the slopes between all pairs of arrivals (their median); nan with
+        fewer than three.
+    """
+
+    arrival: NDArray[np.float64]
+    amplitude: NDArray[np.float64]
+    width: NDArray[np.float64]
+    speed: float
+
+
+def pulse(time: ArrayLike, values: ArrayLike, sign: int = 1, share: float = 0.5) -> Pulse:
+    """Follow the first pulse of one sign along a chain of cells.
+
+    It arrives in a cell with the first maximum that has at least a share of the largest value of
+    this sign that the cell ever sees.
+
+    Parameters
+    ----------
+    time : array_like, shape (m,)
+        s, increasing.
+    values : array_like, shape (m, n)
+        Of n cells, such as their strain: a rarefaction is a pulse of sign 1, a compression of -1.
+    sign : {1, -1}
+        Of the pulse.
+    share : float
+        From 0 to 1: which maxima count.
+
+    Returns
+    -------
+    Pulse
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, values that are not finite, or another sign.
+
+    Notes
+    -----
+    Speed: P. K. Sen, Estimates of the regression coefficient based on Kendall's tau, J. Am. Stat.
+    Assoc. 63, 1968.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from foldyn.signals import pulse
+    >>> t, n = np.linspace(0.0, 3.0, 301)[:, None], np.arange(5)
+    >>> found = pulse(t[:, 0], -np.exp(-(((t - 0.5 - 0.25 * n) / 0.1) ** 2)), sign=-1)
+    >>> round(found.speed, 6), found.amplitude.round(6).tolist()
+    (4.0, [-1.0, -1.0, -1.0, -1.0, -1.0])
+    """
+    from scipy.stats import theilslopes
+
+    moments = records.checked_record("time", time, FEWEST)
+    field = records.real_array("values", values)
+    if field.ndim != 2 or len(field) != len(moments):
+        raise InputError(f"values: shape {field.shape}; {len(moments)} times need (times, cells)")
+    if (np.diff(moments) <= 0.0).any():
+        raise InputError("time: must increase")
+    if isinstance(sign, bool) or sign not in (1, -1):
+        raise InputError(f"sign = {sign!r}: must be 1 or -1")
+    number("share", share, least=0.0, most=1.0)
+    found = np.array([_first_peak(moments, sign * each, share) for each in field.T])
+    arrival, amplitude, width = found.reshape(-1, 3).T
+    come = np.flatnonzero(np.isfinite(arrival))
+    slope = theilslopes(arrival[come], come)[0] if len(come) > 2 else np.nan
+    speed = 1.0 / slope if slope else np.nan
+    return Pulse(arrival, sign * amplitude, width, float(speed))
+
+
+def _first_peak(time: NDArray, values: NDArray, share: float) -> tuple[float, float, float]:
+    """Time, height and width at half of it of the first high maximum (inside the record)."""
+    inner = values[1:-1]
+    high = (inner >= values[:-2]) & (inner > values[2:]) & (inner > 0.0)
+    peaks = np.flatnonzero(high & (inner >= share * values.max())) + 1
+    if not len(peaks):
+        return np.nan, np.nan, np.nan
+    k = int(peaks[0])
+    a, b, c = np.polyfit(time[k - 1 : k + 2] - time[k], values[k - 1 : k + 2], 2)
+    height = c - 0.25 * b * b / a
+    before = np.flatnonzero(values[:k] < 0.5 * height)
+    after = np.flatnonzero(values[k:] < 0.5 * height)
+    width = np.nan
+    if len(before) and len(after):
+        i, j = int(before[-1]), k + int(after[0])
+        start = np.interp(0.5 * height, values[i : i + 2], time[i : i + 2])
+        width = np.interp(-0.5 * height, -values[j - 1 : j + 1], time[j - 1 : j + 1]) - start
+    return time[k] - 0.5 * b / a, height, float(width)
