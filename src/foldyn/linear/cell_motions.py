@@ -1,0 +1,314 @@
+"""What each cell of a finite chain or sheet does: over time, in waves, and from end to end.
+
+A finite chain is made by repeating the pattern of a cell (`storeys`, `cells`). Its nodes are told
+from each other by the motion that brings a cell to the next one, and displacements of cell n are
+told in the axes of cell 0, turned back with the screw, as those of Bloch waves.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.linear.unit_cell import UnitCell
+from foldyn.patterns.screw import Screw
+from foldyn.results.contents import check_variable
+from foldyn.signals import sampling_interval, wavenumber_spectrum
+from foldyn.signals.records import Window
+from foldyn.values import choice, of_kind, whole
+
+if TYPE_CHECKING:
+    import xarray
+
+FEWEST = 3  # cells of a chain
+AXES = ("x", "y", "z")
+COMPONENTS = (*AXES, "rotation")
+FLOOR = 1e-8  # of the largest amplitude: below it there is rounding
+ENDS = 0.2  # of the cells at each end: there waves decay that come from the end
+
+
+class Cells(NamedTuple):
+    """Nodes (n, m) of n cells, the m of a row from one cell, and the motion from each to the next."""
+
+    nodes: NDArray[np.int64]
+    motion: Screw
+
+    def turned(self, vectors: NDArray) -> NDArray:
+        """Vectors (..., nodes, 3) as (..., n, m, 3), in the axes of cell 0."""
+        back = np.array([self.motion.rotation(-k) for k in range(len(self.nodes))])
+        return np.einsum("nij,...nmj->...nmi", back, vectors[..., self.nodes, :])
+
+
+def cells_of(positions: NDArray, cell: UnitCell, along: int = 0) -> Cells:
+    """Cells of a chain or sheet along one motion of its unit cell.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (nodes, 3)
+        At rest (m). Nodes without partners, and incomplete cells at the end, are left out.
+    cell : UnitCell
+    along : int
+        Which motion, from 0; the rows of a sheet along the other one count as one cell.
+
+    Raises
+    ------
+    InputError
+        Fewer than 3 cells in a row.
+    """
+    from scipy.spatial import cKDTree
+
+    of_kind("cell", cell, UnitCell)
+    along = whole("along", along, least=0)
+    if along >= cell.dimensions:
+        raise InputError(f" = {along}: the cell repeats under {cell.dimensions} motions", "along")
+    motion = cell.motions[along]
+    near = cell.tolerance * float(np.ptp(positions, axis=0).max())
+    distance, partner = cKDTree(positions).query(motion.images(positions))
+    following = np.where(distance <= near, partner, -1)
+    rows = []
+    for node in np.setdiff1d(np.arange(len(positions)), following):
+        row = [int(node)]
+        while following[row[-1]] >= 0 and following[row[-1]] != node:
+            row.append(int(following[row[-1]]))
+        rows.append(row)
+    longest = max(map(len, rows), default=0)
+    if longest < FEWEST:
+        raise InputError(
+            f": {longest} of these cells are in a row in the structure, {FEWEST} are needed; give "
+            "a longer chain, and the cell that it repeats",
+            "cell",
+        )
+    rows = [row for row in rows if len(row) >= longest - 1]
+    shortest = min(map(len, rows))
+    return Cells(np.array([row[:shortest] for row in rows]).T, motion)
+
+
+def space_time(
+    trajectory: xarray.Dataset, cell: UnitCell, component: str = "z", along: int = 0
+) -> xarray.Dataset:
+    """Motion of each cell of a chain over time.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        A motion of a chain or sheet of such cells, as `simulate` returns it.
+    cell : UnitCell
+    component : {"x", "y", "z", "rotation"}
+        Which displacement: along an axis of cell 0, in cells that turn with a screw along that
+        which has turned with it; or the rotation about the axis of the screw, in rad.
+    along : int
+        Which motion of the cell leads along the chain.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions time and cell: `displacement` (m, or rad) and `velocity`, means over the nodes of
+        a cell, and `strain` (time, gap): how much farther apart two cells are along the motion,
+        over their distance at rest (of all nodes alike; negative in compression). Coordinates
+        `position` (cell), m, along the motion, and `between` (gap), the cell before it plus 1/2.
+
+    Raises
+    ------
+    InputError
+        No motion, or not one of these cells; rotations of cells that no screw repeats.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import foldyn as fd
+    >>> sheet = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.3, thickness=1e-3, density=100.0)
+    >>> tower = lambda n: fd.Case(fd.discretize(
+    ...     fd.patterns.kresling(radius=0.05, height=0.07, storeys=n), sheet))
+    >>> push = np.zeros((30, 3))
+    >>> push[:6, 2] = 0.1
+    >>> motion = fd.simulate(tower(4), 1e-3, initial=fd.State(velocity=push))
+    >>> found = fd.linear.space_time(motion, fd.UnitCell(tower(1)))
+    >>> found.displacement.dims, found.sizes["cell"], found.sizes["gap"]
+    (('time', 'cell'), 5, 4)
+    """
+    import xarray as xr
+
+    choice("component", component, COMPONENTS)
+    time, positions = _motion(trajectory)
+    cells = cells_of(positions, cell, along)
+    moved, speed = (
+        trajectory[name].transpose("time", "node", "axis").values
+        for name in ("displacement", "velocity")
+    )
+    motion, rest = cells.motion, positions[cells.nodes]
+    axial = (moved[:, cells.nodes] @ motion.unit).mean(axis=2)
+    if component == "rotation":
+        values, rates = _rotation(motion, rest, moved[:, cells.nodes], speed[:, cells.nodes])
+    else:
+        k = AXES.index(component)
+        values = cells.turned(moved)[..., k].mean(axis=2)
+        rates = cells.turned(speed)[..., k].mean(axis=2)
+    unit = "rad" if component == "rotation" else "m"
+    number = np.arange(len(cells.nodes))
+    variables: dict[str, Any] = {
+        "displacement": (("time", "cell"), values, {"units": unit}),
+        "velocity": (("time", "cell"), rates, {"units": f"{unit}/s"}),
+    }
+    if motion.shift:
+        strain = np.diff(axial, axis=1) / motion.shift
+        variables["strain"] = (("time", "gap"), strain, {"units": "1"})
+    coordinates = {
+        "time": ("time", time, {"units": "s"}),
+        "cell": number,
+        "position": ("cell", number * motion.shift, {"units": "m"}),
+        "between": ("gap", number[:-1] + 0.5),
+    }
+    attributes = {"kind": "space_time", "component": component, "shift": motion.shift}
+    return xr.Dataset(variables, coordinates, attributes)
+
+
+def wave_spectrum(
+    trajectory: xarray.Dataset,
+    cell: UnitCell,
+    component: str | None = None,
+    along: int = 0,
+    window: Window = "hann",
+) -> xarray.Dataset:
+    """Two-dimensional spectrum of a motion, which lies on the bands where the motion is small.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        A motion of a chain or sheet of such cells.
+    cell : UnitCell
+    component : {"x", "y", "z"}, optional
+        Of the axes of cell 0, as in `space_time`; by default all.
+    along : int
+        Which motion of the cell leads along the chain.
+    window : str, tuple, array_like, or None
+        See `signals.wavenumber_spectrum`.
+
+    Returns
+    -------
+    xarray.Dataset
+        `amplitude` (phase, frequency), m/s: root of the sum of squares over the nodes of a cell,
+        of their velocities. Coordinates `phase` (rad per cell; positive for waves that travel to
+        higher cells) and `frequency` (Hz). Attributes: their steps, `phase_step`, `frequency_step`.
+
+    Raises
+    ------
+    InputError
+        No motion, or not one of these cells; times that are not evenly spaced.
+    """
+    import xarray as xr
+
+    if component is not None:
+        choice("component", component, AXES)
+    time, positions = _motion(trajectory)
+    cells = cells_of(positions, cell, along)
+    velocity = cells.turned(trajectory["velocity"].transpose("time", "node", "axis").values)
+    if component is not None:
+        velocity = velocity[..., AXES.index(component)]
+    found = wavenumber_spectrum(velocity, sampling_interval(time), window)
+    return xr.Dataset(
+        {"amplitude": (("phase", "frequency"), found.amplitude, {"units": "m/s"})},
+        {
+            "phase": ("phase", found.phase, {"units": "rad"}),
+            "frequency": ("frequency", found.frequency, {"units": "Hz"}),
+        },
+        {
+            "kind": "wave_spectrum",
+            "phase_step": float(found.phase[1] - found.phase[0]),
+            "frequency_step": float(found.frequency[1]),
+        },
+    )
+
+
+def transmission(response: xarray.Dataset, cell: UnitCell, along: int = 0) -> xarray.Dataset:
+    """How far a vibration reaches along a chain, from its frequency response.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        Of `frf`: to forces, or to a moving base.
+    cell : UnitCell
+    along : int
+        Which motion of the cell leads along the chain, away from the drive.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions frequency and cell: `amplitude`, the root mean square over the nodes of a cell of
+        their response (its unit); `ratio` (frequency), that of the last cell over the first; and
+        `decay` (frequency), nepers per cell, the slope of the logarithm over the cells (the median
+        over all pairs) but a fifth at each end and what is rounding: in a gap the imaginary part
+        of the phase of the slowest wave that the drive excites; next to nothing in a band.
+
+    Raises
+    ------
+    InputError
+        No frequency response, or not of a chain of these cells.
+    """
+    import xarray as xr
+    from scipy.stats import theilslopes
+
+    name = next((each for each in ("receptance", "mobility", "accelerance", "transmissibility")
+                 if each in getattr(response, "data_vars", ())), "")  # fmt: skip
+    if not name:
+        raise InputError(": give a frequency response, as fd.frf returns it", "response")
+    positions = check_variable(response, "rest_position", ("node", "axis")).values
+    cells = cells_of(positions, cell, along)
+    values = response[name].transpose("frequency", "node", "axis").values
+    size = np.linalg.norm(values[:, cells.nodes], axis=3)
+    amplitude = np.sqrt(np.mean(size**2, axis=2))
+    decay = np.full(len(amplitude), np.nan)
+    count = amplitude.shape[1]
+    inner = np.arange(count)[int(ENDS * count) : count - int(ENDS * count)]
+    for k, row in enumerate(amplitude):
+        seen = inner[row[inner] > FLOOR * row.max()]
+        seen = seen if len(seen) >= FEWEST else np.flatnonzero(row > FLOOR * row.max())
+        if len(seen) >= FEWEST:
+            decay[k] = -theilslopes(np.log(row[seen]), seen)[0]
+    units = response[name].attrs.get("units", "1")
+    with np.errstate(invalid="ignore"):
+        ratio = amplitude[:, -1] / amplitude[:, 0]
+    return xr.Dataset(
+        {
+            "amplitude": (("frequency", "cell"), amplitude, {"units": units}),
+            "ratio": ("frequency", ratio, {"units": "1"}),
+            "decay": ("frequency", decay, {"units": "Np"}),
+        },
+        {
+            "frequency": ("frequency", response["frequency"].values, {"units": "Hz"}),
+            "cell": np.arange(count),
+        },
+        {"kind": "transmission", "response": name},
+    )
+
+
+def _motion(trajectory: Any) -> tuple[NDArray, NDArray]:
+    """Times (s) and rest positions (m) of a motion."""
+    for name in ("displacement", "velocity"):
+        if name not in getattr(trajectory, "data_vars", ()) or "time" not in trajectory.dims:
+            raise InputError(f": has no {name} over time; give a motion", "trajectory")
+    positions = check_variable(trajectory, "rest_position", ("node", "axis")).values
+    return trajectory["time"].values, positions
+
+
+def _rotation(
+    motion: Screw, rest: NDArray, moved: NDArray, speed: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Mean rotation (times, n) of nodes (n, m, 3) about a screw's axis, rad, and its rate."""
+    if not motion.turns:
+        raise InputError(
+            ' = "rotation": the cell repeats under a translation, which has no axis; take x, y or z',
+            "component",
+        )
+    unit = motion.unit
+    first = rest - np.array(motion.point)
+    arm = first + moved
+    radial, start = (each - (each @ unit)[..., None] * unit for each in (arm, first))
+    if np.linalg.norm(start, axis=-1).min() == 0.0:
+        raise InputError(' = "rotation": a node lies on the axis; take x, y or z', "component")
+    across = np.cross(np.broadcast_to(start, radial.shape), radial) @ unit
+    angle = np.unwrap(np.arctan2(across, (start * radial).sum(axis=-1)), axis=0)
+    rate = (np.cross(radial, speed) @ unit) / (radial**2).sum(axis=-1)
+    return angle.mean(axis=2), rate.mean(axis=2)
