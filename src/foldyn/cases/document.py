@@ -196,7 +196,8 @@ class _Writer:
             ]
         if pattern.periods:
             table["periods"] = [
-                self.store(f"tables_period{k}_pairs", pairs) for k, pairs in enumerate(pattern.periods)
+                self.store(f"tables_period{k}_pairs", pairs)
+                for k, pairs in enumerate(pattern.periods)
             ]
         if pattern.custom:
             try:

@@ -1,7 +1,9 @@
 """Small vibrations about an equilibrium: modes and frequency response."""
 
+from foldyn.linear.absorbing_ends import LongWaves, absorbing_end, long_waves
 from foldyn.linear.band_gaps import band_gaps
 from foldyn.linear.band_structure import bands
+from foldyn.linear.cell_motions import space_time, transmission, wave_spectrum
 from foldyn.linear.character import character
 from foldyn.linear.compared import ComparedMode, Fidelity
 from foldyn.linear.fidelity import fidelity
@@ -25,12 +27,14 @@ __all__ = [
     "HarmonicBalance",
     "Impulse",
     "Linearized",
+    "LongWaves",
     "Modal",
     "Pairs",
     "Peak",
     "Refinement",
     "SteppedSine",
     "UnitCell",
+    "absorbing_end",
     "band_gaps",
     "bands",
     "character",
@@ -39,9 +43,13 @@ __all__ = [
     "fidelity",
     "frf",
     "linearize",
+    "long_waves",
     "mac",
     "modes",
     "pair_modes",
     "peaks_of",
     "refinement",
+    "space_time",
+    "transmission",
+    "wave_spectrum",
 ]

@@ -31,7 +31,7 @@ ENDS = 0.2  # of the cells at each end: there waves decay that come from the end
 
 
 class Cells(NamedTuple):
-    """Nodes (n, m) of n cells, the m of a row from one cell, and the motion from each to the next."""
+    """Nodes (n, m) of n cells, in the same order, and the motion from each cell to the next."""
 
     nodes: NDArray[np.int64]
     motion: Screw
@@ -121,7 +121,7 @@ def space_time(
     >>> import foldyn as fd
     >>> sheet = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.3, thickness=1e-3, density=100.0)
     >>> tower = lambda n: fd.Case(fd.discretize(
-    ...     fd.patterns.kresling(radius=0.05, height=0.07, storeys=n), sheet))
+    ...     fd.patterns.kresling(radius=0.05, height=0.07, storeys=n), sheet, preset="n5b8e"))
     >>> push = np.zeros((30, 3))
     >>> push[:6, 2] = 0.1
     >>> motion = fd.simulate(tower(4), 1e-3, initial=fd.State(velocity=push))
@@ -299,7 +299,7 @@ def _rotation(
     """Mean rotation (times, n) of nodes (n, m, 3) about a screw's axis, rad, and its rate."""
     if not motion.turns:
         raise InputError(
-            ' = "rotation": the cell repeats under a translation, which has no axis; take x, y or z',
+            ' = "rotation": the cell repeats under a translation, without an axis; take x, y or z',
             "component",
         )
     unit = motion.unit

@@ -39,6 +39,10 @@ from foldyn.plots.readings import (
     moved_supports as moved_supports,
     total_reaction as total_reaction,
 )
+from foldyn.plots.space_time import (
+    plot_space_time as plot_space_time,
+    plot_wave_spectrum as plot_wave_spectrum,
+)
 from foldyn.plots.structure import draw_structure as draw_structure
 from foldyn.plots.sweeps import (
     plot_main_effects as plot_main_effects,

@@ -70,6 +70,8 @@ def wavenumber_spectrum(
     >>> float(found.phase[k] / np.pi), float(found.frequency[f]), float(found.amplitude[k, f])
     (0.5, 1.25, 1.0)
     """
+    import scipy.fft
+
     field = records.real_array("values", values)
     if field.ndim < 2 or min(field.shape[:2]) < FEWEST:
         raise InputError(
@@ -82,11 +84,11 @@ def wavenumber_spectrum(
     gain = over_time.sum() * over_cells.sum()
     flat = field.reshape(times, cells, -1) * (over_time[:, None] * over_cells)[..., None]
     # exp(-i omega t) of the transform over time makes exp(+i kappa n) the one over cells
-    waves = np.fft.ifft(np.fft.rfft(flat, axis=0), axis=1) * (cells / gain)
+    waves = scipy.fft.ifft(scipy.fft.rfft(flat, axis=0), axis=1) * (cells / gain)
     waves[1 : (times + 1) // 2] *= 2.0
-    amplitude = np.linalg.norm(np.fft.fftshift(waves, axes=1), axis=2).T
-    phase = 2.0 * np.pi * np.fft.fftshift(np.fft.fftfreq(cells))
-    return WavenumberSpectrum(phase, np.fft.rfftfreq(times, interval), amplitude)
+    amplitude = np.linalg.norm(scipy.fft.fftshift(waves, axes=1), axis=2).T
+    phase = 2.0 * np.pi * scipy.fft.fftshift(scipy.fft.fftfreq(cells))
+    return WavenumberSpectrum(phase, scipy.fft.rfftfreq(times, interval), amplitude)
 
 
 class Pulse(NamedTuple):

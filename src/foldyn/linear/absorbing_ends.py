@@ -1,0 +1,224 @@
+"""Ends of a chain that absorb long waves: dashpots with the impedance of the chain that is cut off.
+
+Long waves move the sections of a chain as rigid bodies, q (k,): along it, and about its axis where
+it is a tube. With the mass M of a cell and its stiffness K against differences of q between cells,
+M q'' = K (q_n+1 - 2 q_n + q_n-1): waves travel c_j = sqrt(eig(M^-1 K)) cells per second, and the
+rest of the chain pushes back with -Z q', Z the sum over waves of c_j (M q_j)(M q_j)^T, with
+q_j^T M q_j = 1. Dampers with that impedance absorb long waves exactly (J. Lysmer, R. L. Kuhlemeyer,
+Finite dynamic model for infinite media, J. Eng. Mech. Div. 95, 1969).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import eigh
+
+from foldyn.arguments import Check, Checked
+from foldyn.cases import Case, Dashpot, State
+from foldyn.cases.selection import Nodes, resolve_nodes
+from foldyn.errors import ComputationError, InputError
+from foldyn.linear.band_structure import Solver
+from foldyn.linear.linearized_cell import linearize_cell
+from foldyn.linear.unit_cell import UnitCell
+from foldyn.values import numbers, of_kind, vector, whole
+
+PHASE = 1e-3  # rad per cell: a long wave
+LEAST = 0.5  # share of a wave's kinetic energy in sections that move as rigid bodies
+NEGLIGIBLE = 1e-3  # of the largest coefficient: dashpots that are left out
+ON_AXIS = 1e-6  # of the largest distance from the axis
+
+
+def _matrix(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return a symmetric matrix (1, 1) or (2, 2), without negative eigenvalues."""
+    array = np.atleast_2d(numbers(name, value))
+    if array.shape not in ((1, 1), (2, 2)):
+        raise InputError(f": shape {array.shape}: give (1, 1), or (2, 2) with rotations", name)
+    size = np.sqrt(np.abs(np.outer(*(array.diagonal(),) * 2)))
+    if (np.abs(array - array.T) > 1e-6 * size).any() or np.linalg.eigvalsh(array)[0] < 0.0:
+        raise InputError(f" = {array.tolist()}: must be symmetric, and not negative", name)
+    return 0.5 * (array + array.T)
+
+
+@dataclass(frozen=True, eq=False)
+class LongWaves(Checked):
+    """Long waves of a chain: its cells as rigid sections, along it and about its axis.
+
+    Parameters
+    ----------
+    axis : sequence of float, shape (3,)
+        Direction of the chain, of any length.
+    stiffness : array_like, shape (1, 1) or (2, 2)
+        K of a cell: force along the chain (N) and torque about it (N m) for the elongation (m) and
+        the twist (rad) of a cell, as statics of one cell gives them.
+    mass : array_like of the same shape
+        M of a cell: its mass (kg) and, with rotations, its moment of inertia (kg m2).
+    point : sequence of float, shape (3,)
+        Any point on the axis (m), about which sections rotate.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> fd.linear.LongWaves((0, 0, 1), [[400.0]], [[0.25]]).impedance.tolist()
+    [[10.0]]
+    """
+
+    axis: Annotated[Sequence[float], Check(vector, nonzero=True)]
+    stiffness: Annotated[ArrayLike, Check(_matrix)]
+    mass: Annotated[ArrayLike, Check(_matrix)]
+    point: Annotated[Sequence[float], Check(vector, unit="m")] = (0.0, 0.0, 0.0)
+
+    def agree(self) -> None:
+        """Ask for matrices of one shape, and for mass."""
+        stiffness, mass = np.asarray(self.stiffness), np.asarray(self.mass)
+        if stiffness.shape != mass.shape:
+            raise InputError(f": shape {mass.shape}: the stiffness has {stiffness.shape}", "mass")
+        if np.linalg.eigvalsh(mass)[0] <= 0.0:
+            raise InputError(f" = {mass.tolist()}: must be positive", "mass")
+
+    @property
+    def speeds(self) -> NDArray[np.float64]:
+        """Cells per second (k,), the slowest first: slopes of bands at the origin, rad/s."""
+        return np.sqrt(eigh(self.stiffness, self.mass, eigvals_only=True).clip(min=0.0))
+
+    @property
+    def impedance(self) -> NDArray[np.float64]:
+        """Z (k, k): N s/m, N s, and N m s of rotations."""
+        _, shapes = eigh(self.stiffness, self.mass)
+        momenta = np.asarray(self.mass) @ shapes
+        return (momenta * self.speeds) @ momenta.T
+
+
+def long_waves(cell: UnitCell, state: State | None = None, along: int = 0) -> LongWaves:
+    """Long waves of a chain, from its bands near the origin of the Brillouin zone.
+
+    Parameters
+    ----------
+    cell : UnitCell
+        Of a chain or tube. With a screw the sections turn, too; else they move along the chain
+        alone.
+    state : State, optional
+        About which; see `bands`.
+    along : int
+        Which motion of the cell leads along the chain.
+
+    Returns
+    -------
+    LongWaves
+
+    Raises
+    ------
+    InputError
+        Arguments as of `bands`.
+    ComputationError
+        The cell has no such waves, as where it is held.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> sheet = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.3, thickness=1e-3, density=100.0)
+    >>> pattern = fd.patterns.kresling(radius=0.05, height=0.07)
+    >>> cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet)))
+    >>> fd.linear.long_waves(cell).speeds.shape
+    (2,)
+    """
+    of_kind("cell", cell, UnitCell)
+    along = whole("along", along, least=0)
+    if along >= cell.dimensions:
+        raise InputError(f" = {along}: the cell repeats under {cell.dimensions} motions", "along")
+    linear = linearize_cell(cell, state)
+    motion = linear.motions[along]
+    phase = PHASE * np.eye(cell.dimensions)[along]
+    places = (cell.case.structure.nodes + linear.displacement)[linear.patch.first]
+    rigid = _rigid(places, motion.unit, np.array(motion.point), motion.turns)
+    basis = np.zeros((linear.bloch.size, rigid.shape[2]))
+    basis[: 3 * linear.nodes] = rigid.reshape(-1, rigid.shape[2])
+    momenta = linear.bloch.mass.sparse_at(linear.bloch.factors(0.0 * phase)).real @ basis
+    mass = basis.T @ momenta
+    count = min(2 * len(mass) + 4, len(Solver(linear.bloch, 1).free))
+    waves = Solver(linear.bloch, count).waves(phase)
+    parts = momenta.T @ waves.shapes
+    share = np.einsum("ij,ij->j", parts.conj(), np.linalg.solve(mass, parts)).real
+    chosen = np.flatnonzero(share > LEAST)[: len(mass)]
+    if len(chosen) < len(mass) or (waves.values[chosen] <= 0.0).any():
+        raise ComputationError(
+            f"only {len(chosen)} of {len(mass)} waves of a phase of {PHASE} rad move sections of "
+            "the chain as rigid bodies, or one is unstable: hold none of its nodes along the "
+            "chain, and take a stable state"
+        )
+    squares = waves.values[chosen] / PHASE**2
+    scaled = parts[:, chosen] / np.sqrt(share[chosen])
+    stiffness = ((scaled * squares) @ scaled.conj().T).real
+    return LongWaves(tuple(motion.unit), stiffness, mass, motion.point)
+
+
+def absorbing_end(case: Case, nodes: Nodes, waves: LongWaves) -> list[Dashpot]:
+    """Dashpots that absorb long waves at an end of a chain.
+
+    Parameters
+    ----------
+    case : Case
+        Of the chain, without them.
+    nodes : int, sequence of int, or str
+        Nodes of its last section, which share the impedance equally.
+    waves : LongWaves
+        Of the chain: `long_waves(cell)`, or from the stiffness and mass of a cell.
+
+    Returns
+    -------
+    list of Dashpot
+        To the ground, one or two for each node along fixed directions, for the supports of a case.
+        Their sum on rigid motions of the section is `waves.impedance`. As the directions stand
+        still, the section must not turn far.
+
+    Raises
+    ------
+    InputError
+        No such nodes, or one on the axis of sections that rotate.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> sheet = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.3, thickness=1e-3, density=100.0)
+    >>> tower = lambda n: fd.Case(fd.discretize(
+    ...     fd.patterns.kresling(radius=0.05, height=0.07, storeys=n), sheet))
+    >>> waves = fd.linear.long_waves(fd.UnitCell(tower(1)))
+    >>> len(fd.linear.absorbing_end(tower(8), range(48, 54), waves))
+    12
+    """
+    structure = of_kind("case", case, Case).structure
+    of_kind("waves", waves, LongWaves)
+    chosen = resolve_nodes(structure, nodes, "nodes")
+    impedance = waves.impedance
+    axis = np.array(waves.axis) / np.linalg.norm(waves.axis)
+    motions = _rigid(
+        structure.nodes[chosen], axis, np.array(waves.point), turns=len(impedance) == 2
+    )
+    arms = np.linalg.norm(motions[:, :, -1], axis=1)
+    if arms.min() <= ON_AXIS * arms.max():
+        raise InputError(
+            f": node {chosen[int(arms.argmin())]} lies on the axis and cannot resist rotations; "
+            "leave it out",
+            "nodes",
+        )
+    found: list[Dashpot] = []
+    for node, motion in zip(chosen.tolist(), motions, strict=True):
+        inverse = np.linalg.pinv(motion)
+        coefficients, ways = np.linalg.eigh(inverse.T @ (impedance / len(chosen)) @ inverse)
+        found += [
+            Dashpot(float(c), nodes=[node], direction=tuple(way.tolist()))
+            for c, way in zip(coefficients, ways.T, strict=True)
+            if c > NEGLIGIBLE * coefficients[-1]
+        ]
+    return found
+
+
+def _rigid(points: NDArray, axis: NDArray, center: NDArray, turns: bool) -> NDArray[np.float64]:
+    """Motions (n, 3, k) of points (n, 3) of a section: along an axis, and about it."""
+    along = np.broadcast_to(axis, points.shape)
+    parts: list[Any] = [along, np.cross(axis, points - center)][: 1 + turns]
+    return np.stack(parts, axis=2)

@@ -1,0 +1,159 @@
+"""Waves in chains of cells: over cells and time, over phase and frequency, and from end to end."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+
+from foldyn.errors import InputError
+from foldyn.linear.cell_motions import space_time
+from foldyn.linear.unit_cell import UnitCell
+from foldyn.plots import style
+from foldyn.plots.given import alone
+from foldyn.values import choice, number
+
+SIGNED = LinearSegmentedColormap.from_list(
+    "signed", [style.VERMILLION, "#F5C9B0", "#FFFFFF", "#A9D2EE", style.BLUE]
+)
+STRENGTH = LinearSegmentedColormap.from_list(
+    "strength", ["#FFFFFF", "#C9DDEC", style.SKY, style.BLUE, "#00304A"]
+)
+QUANTITIES = ("displacement", "velocity", "strain")
+DECADES = 3.0  # of amplitudes that a spectrum shows
+
+
+def plot_space_time(
+    trajectory: xr.Dataset,
+    cell: UnitCell,
+    component: str = "z",
+    quantity: str = "displacement",
+    along: int = 0,
+    limit: float | None = None,
+    title: str = "",
+) -> Figure:
+    """Draw a motion of a chain: cells to the right, time upward, what they do as color.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        A motion of a chain or sheet of such cells.
+    cell : UnitCell
+    component : {"x", "y", "z", "rotation"}
+        Of displacement and velocity; see `foldyn.linear.space_time`.
+    quantity : {"displacement", "velocity", "strain"}
+        Displacement or velocity of each cell, or the strain between neighbors along the chain.
+    along : int
+        Which motion of the cell leads along the chain.
+    limit : float, optional
+        Value at the ends of the colors; by default the largest, of strains that of all but the
+        first quarter of the gaps, which an impact strains most.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Positive values (tension) are blue, negative ones (compression) red.
+
+    Raises
+    ------
+    InputError
+        As of `foldyn.linear.space_time`; strains of cells that do not advance.
+    """
+    choice("quantity", quantity, QUANTITIES)
+    found = space_time(trajectory, cell, component, along)
+    if quantity not in found:
+        raise InputError(' = "strain": the cells do not advance along the chain', "quantity")
+    shown = found[quantity]
+    places = found["between" if quantity == "strain" else "cell"].values
+    if limit is None:
+        later = shown.values[:, len(places) // 4 if quantity == "strain" else 0 :]
+        limit = float(np.abs(later).max()) or 1.0
+    else:
+        limit = number("limit", limit, above=0.0)
+    figure = style.new_figure(6.2, 4.6, title)
+    axes = figure.subplots()
+    style.frame(axes, "cell", "time (s)")
+    mesh = axes.pcolormesh(
+        places, found["time"].values, shown.values, cmap=SIGNED, vmin=-limit, vmax=limit,
+        shading="nearest", rasterized=True,
+    )  # fmt: skip
+    name = quantity if quantity == "strain" else f"{component} {quantity}"
+    units = shown.attrs["units"]
+    _scale(figure, axes, mesh, name if units == "1" else f"{name} ({units})", "both")
+    return style.finish(figure)
+
+
+def plot_wave_spectrum(
+    spectrum: xr.Dataset,
+    bands: xr.Dataset | None = None,
+    max_frequency: float | None = None,
+    title: str = "",
+) -> Figure:
+    """Draw the two-dimensional spectrum of a motion, with the bands on which small motions lie.
+
+    Parameters
+    ----------
+    spectrum : xarray.Dataset
+        From `foldyn.linear.wave_spectrum`.
+    bands : xarray.Dataset, optional
+        From `foldyn.bands`, at phases of the one period along the chain; those below zero may be
+        left out, as bands are the same there.
+    max_frequency : float, optional
+        Upper end of the frequency axis (Hz); by default all of the spectrum.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Phases to the right, frequencies upward, three decades of amplitude as color; bands dashed.
+
+    Raises
+    ------
+    InputError
+        No such spectrum, or bands of a path or a grid of a sheet.
+    """
+    if "amplitude" not in alone("spectrum", spectrum) or "phase" not in spectrum.dims:
+        raise InputError(": give what foldyn.linear.wave_spectrum returns", "spectrum")
+    size = spectrum["amplitude"].transpose("frequency", "phase").values
+    frequency = spectrum["frequency"].values
+    top = frequency[-1]
+    if max_frequency is not None:
+        top = number("max_frequency", max_frequency, above=0.0, unit="Hz")
+    level = np.log10(np.maximum(size / (size.max() or 1.0), 10.0**-DECADES))
+    figure = style.new_figure(6.2, 4.6, title)
+    axes = figure.subplots()
+    style.frame(axes, "phase (rad per cell)", "frequency (Hz)")
+    mesh = axes.pcolormesh(
+        spectrum["phase"].values, frequency, level, cmap=STRENGTH, vmin=-DECADES, vmax=0.0,
+        shading="nearest", rasterized=True,
+    )  # fmt: skip
+    _scale(figure, axes, mesh, "amplitude over the largest (decades)")
+    keys = []
+    if bands is not None:
+        if "wave_vector" not in alone("bands", bands) or bands["wave_vector"].shape[1] != 1:
+            raise InputError(": give bands at phases of one period", "bands")
+        look = {"color": style.VERMILLION, "linestyle": (0, (4, 2)), "linewidth": 0.9}
+        phases, lines = bands["wave_vector"].values[:, 0], bands["frequency"].values
+        order = np.argsort(phases)
+        for sign in (1.0, -1.0) if phases.min() >= -1e-9 else (1.0,):
+            axes.plot(sign * phases[order], lines[order], **look)
+        keys = [style.key("bands", **look)]
+    axes.set_xlim(-np.pi, np.pi)
+    axes.set_xticks([-np.pi, 0.0, np.pi], ["-π", "0", "π"])
+    axes.set_ylim(0.0, top)
+    return style.finish(figure, keys)
+
+
+def _scale(figure: Figure, axes: Axes, mesh: Any, label: str, extend: str = "neither") -> None:
+    bar = figure.colorbar(mesh, ax=axes, extend=extend)
+    bar.set_label(label, **style.TEXT)
+    bar.ax.tick_params(labelsize=style.TICK, labelcolor=style.BLACK, color=style.GRAY)
+    bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
+    axes.grid(False)
