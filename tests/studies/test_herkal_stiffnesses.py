@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from foldyn.report import Table, Text
-from foldyn.studies.herkal import pool, report, stiffnesses_page
+from foldyn.studies import pool
+from foldyn.studies.herkal import report, stiffnesses_page
 from foldyn.studies.herkal import study as studies
 from foldyn.studies.herkal.runs import Job, Numerics
 from foldyn.studies.herkal.sheet_models import REFERENCE

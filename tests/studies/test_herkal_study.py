@@ -14,12 +14,12 @@ from foldyn.cli.main import main
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.linear.fidelity import MODELS as BESIDE
 from foldyn.structures.discretize import PER_NODE
-from foldyn.studies.herkal import pool, report, runs
+from foldyn.studies import pool
+from foldyn.studies.herkal import report, runs
 from foldyn.studies.herkal import study as studies
 from foldyn.studies.herkal.claims import CLAIMS, TARGETS, claims, table1
 from foldyn.studies.herkal.metric import FAR, LEAST_MAC, best, content, deviation, errors, ranks
 from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
-from foldyn.studies.herkal.pool import Done
 from foldyn.studies.herkal.runs import Job, Numerics
 from foldyn.studies.herkal.sheet_models import (
     MODELS,
@@ -33,6 +33,7 @@ from foldyn.studies.herkal.sheet_models import (
     rules,
 )
 from foldyn.studies.herkal.study import LINEAR, Study, StudyPlan, mean_ranks, second_table
+from foldyn.studies.pool import Done
 from foldyn.studies.targets import Target, Verdict, read_targets
 
 SHORT = Numerics(divisions=2, dt=0.02, duration=0.5)

@@ -15,8 +15,8 @@ from foldyn.cli.streams import Clock, progress_bar, speech
 from foldyn.errors import ComputationError, FoldynError, InputError
 
 if TYPE_CHECKING:
-    from foldyn.studies.herkal.pool import Done
     from foldyn.studies.herkal.specimen.measured import Data
+    from foldyn.studies.pool import Done
 
 Say = Callable[[str], None]
 PROCESSES = 2
@@ -115,7 +115,8 @@ def _study(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence
 
 
 def _vary(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence[Done]]:
-    from foldyn.studies.herkal import pool, report, sensitivity, variations
+    from foldyn.studies import pool
+    from foldyn.studies.herkal import report, sensitivity, variations
     from foldyn.studies.herkal.study import CASES, QUICK, VARIED
 
     numerics = QUICK.numerics if given.quick else VARIED

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from foldyn.studies.herkal import metric, stiffnesses
 from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
-from foldyn.studies.herkal.pool import Done, run
 from foldyn.studies.herkal.runs import Job, Numerics, reported, stored
 from foldyn.studies.herkal.sheet_models import (
     AS_FILED,
@@ -26,6 +25,7 @@ from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.synthetic import COARSE, PAPERS, Shot
 from foldyn.studies.herkal.specimen.tasks import Part, parts
 from foldyn.studies.herkal.stiffnesses import MESHES, Rows, Stiffness
+from foldyn.studies.pool import Done, run
 
 RESULTS = "runs"  # folder of the results in that of the study
 LINEAR = Variant(bend_law="linear")
@@ -119,7 +119,7 @@ class Study:
     def compute(
         self, tell: Callable[[Done], None] = lambda done: None, processes: int = 2
     ) -> list[Done]:
-        """Compute what is not there yet; see `foldyn.studies.herkal.pool.run`."""
+        """Compute what is not there yet; see `foldyn.studies.pool.run`."""
         results = self.folder / RESULTS
         results.mkdir(parents=True, exist_ok=True)
         first, then = self.parts
