@@ -82,8 +82,8 @@ class Solver:
             own, inert, lumped = basis.conj().T @ own @ basis, basis.conj().T @ inert @ basis, None
         if len(own) < self.count:
             raise InputError(
-                f" = {self.count}: supports, links and rigid panels leave {len(own)} motions at the "
-                f"phases {phase.round(6).tolist()}; ask for no more bands",
+                f" = {self.count}: supports, links and rigid panels leave {len(own)} motions at "
+                f"the phases {phase.round(6).tolist()}; ask for no more bands",
                 "count",
             )
         values, motions, noise = lowest_dense(own, inert, lumped, self.count)
