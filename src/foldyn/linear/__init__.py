@@ -3,9 +3,12 @@
 from foldyn.linear.absorbing_ends import LongWaves, absorbing_end, long_waves
 from foldyn.linear.band_gaps import band_gaps
 from foldyn.linear.band_structure import bands
+from foldyn.linear.cell_equilibrium import relaxed
 from foldyn.linear.cell_motions import space_time, transmission, wave_spectrum
 from foldyn.linear.character import character
 from foldyn.linear.compared import ComparedMode, Fidelity
+from foldyn.linear.damped_bands import damped_bands
+from foldyn.linear.evanescent import attenuation
 from foldyn.linear.fidelity import fidelity
 from foldyn.linear.frequency_domain import Modal
 from foldyn.linear.frf import METHODS, convert, frf
@@ -35,10 +38,12 @@ __all__ = [
     "SteppedSine",
     "UnitCell",
     "absorbing_end",
+    "attenuation",
     "band_gaps",
     "bands",
     "character",
     "convert",
+    "damped_bands",
     "equivalent_slope",
     "fidelity",
     "frf",
@@ -49,6 +54,7 @@ __all__ = [
     "pair_modes",
     "peaks_of",
     "refinement",
+    "relaxed",
     "space_time",
     "transmission",
     "wave_spectrum",

@@ -60,7 +60,8 @@ class UnitCell:
 
     Its supports, point masses, springs, dashpots and damping repeat with it. What is said of a node
     holds for its partners on the other side of the cell too: it is one node of the repeated sheet,
-    and counts once where one support or mass names several of them. Loads count for the state alone.
+    and counts once where one support or mass names several of them. Loads count for the state
+    alone.
 
     Parameters
     ----------
@@ -118,7 +119,7 @@ class UnitCell:
             raise InputError(": its structure has no pattern that could repeat", "case")
         near = number("tolerance", self.tolerance, above=0.0) * pattern.size
         motions, pairs = self._found(pattern, near)
-        _check_commuting(pattern.vertices, motions, near)
+        check_commuting(pattern.vertices, motions, near, "screw" if self.screw else "vectors")
         pairs += _partners(pattern, motions, near, {v for rows in pairs for v in rows[:2]})
         _check_all(pattern, motions, pairs, near, "screw" if self.screw else "vectors")
         object.__setattr__(self, "motions", motions)
@@ -167,6 +168,11 @@ class UnitCell:
             step = tuple(int(j == k) for j in range(len(pattern.periods)))
             pairs += [(v, w, step) for v, w in rows.tolist()]
         return tuple(motions), pairs
+
+    @property
+    def near(self) -> float:
+        """Distance (m) at which points lie in the same place."""
+        return self.tolerance * self.case.structure.pattern.size
 
     @property
     def dimensions(self) -> int:
@@ -256,7 +262,10 @@ def _steps(vectors: Any) -> NDArray[np.float64]:
     return array
 
 
-def _check_commuting(vertices: NDArray, motions: Sequence[Screw], near: float) -> None:
+def check_commuting(
+    vertices: NDArray, motions: Sequence[Screw], near: float, field: str
+) -> None:
+    """Refuse two motions that lead to different places in different orders."""
     if len(motions) < 2:
         return
     one, two = motions
@@ -265,7 +274,7 @@ def _check_commuting(vertices: NDArray, motions: Sequence[Screw], near: float) -
         raise InputError(
             ": the two motions lead to different places in the two orders, and a lattice needs "
             "motions that commute: translations, or a screw and a translation along its axis",
-            "screw" if any(motion.turns for motion in motions) else "vectors",
+            field,
         )
 
 

@@ -379,7 +379,7 @@ def case_variables(document: Document) -> dict[str, Any]:
     }
     for name, array in document.arrays.items():
         # the times and values of one table share a dimension
-        own = (f"{name.rsplit('_', 1)[0]}_point", f"{name}_column")[: array.ndim]
+        own = (f"{name.rsplit('_', 1)[0]}_point",)
         unit = "m" if name in LENGTHS else "rad" if name == "fold_angles" else ""
         attributes = {"units": unit} if unit else {}
         variables[name] = (DOCUMENT.get(name, own), array, attributes)

@@ -1,0 +1,167 @@
+"""Equilibria of a repeated sheet whose periods are given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import State
+from foldyn.errors import ComputationError, InputError
+from foldyn.linear.cell_patch import cell_patch
+from foldyn.linear.cell_reach import CellReach
+from foldyn.linear.linearized_cell import deformed_motions, folded_body, spread
+from foldyn.linear.unit_cell import UnitCell, check_commuting, images
+from foldyn.patterns.screw import Screw, of_twist, translation
+from foldyn.statics.tracing import displacement_of
+from foldyn.values import listed, number, of_kind, vector, whole
+
+ITERATIONS = 40
+BALANCED = 1e-12  # of the bars' EA: the largest force left
+HALVINGS = 12
+NULL = 1e-11  # of the largest stiffness: motions that nothing resists
+
+
+def relaxed(
+    cell: UnitCell,
+    motions: Sequence[Any] | None = None,
+    state: State | None = None,
+    load_factor: float = 1.0,
+    steps: int = 4,
+) -> State:
+    """Equilibrium of a repeated sheet with given periods: a state that repeats.
+
+    Copies of the cell move as the periods say; everything else is free but for supports. Newton's
+    method, from an even deformation of the cell, in steps of the periods.
+
+    Parameters
+    ----------
+    cell : UnitCell
+    motions : sequence of Screw or array_like of shape (3,), optional
+        The motion from a cell to the next in the state for each of the cell's: a translation by its
+        vector (m), or a screw; a translation that becomes a rotation bends the sheet evenly. Those
+        at rest, or in the state given, by default.
+    state : State, optional
+        From where the search begins; it repeats.
+    load_factor : float
+        How far actuated folds are folded.
+    steps : int
+        Of the way there.
+
+    Returns
+    -------
+    State
+        Displacements (m) of the cell's own nodes.
+
+    Raises
+    ------
+    InputError
+        Motions that do not fit the cell.
+    ComputationError
+        No equilibrium is found.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> sheet = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3, density=1000.0)
+    >>> pattern = fd.patterns.miura(a=0.03, b=0.03)
+    >>> cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet)))
+    >>> pulled = fd.linear.relaxed(cell, 1.01 * cell.vectors)
+    >>> fd.bands(cell, [[0.5, 0.5]], count=1, state=pulled).vectors.round(5).tolist()
+    [[0.03967, 0.0, 0.0], [0.0, 0.04008, 0.0]]
+    """
+    of_kind("cell", cell, UnitCell)
+    patch = cell_patch(cell)
+    steps, load_factor = whole("steps", steps, least=1), number("load_factor", load_factor)
+    rest = cell.case.structure.nodes
+    place, now = rest, cell.motions
+    if state is not None:
+        displacement = displacement_of(of_kind("state", state, State), cell.case, "state")
+        place, now = rest + displacement, deformed_motions(cell, patch, displacement)
+    end = now if motions is None else _given(cell, motions)
+    first = np.array([images(now, place[v], -patch.own_step[v]) for v in patch.first.tolist()])
+    first, begin = first.reshape(-1, 3), np.array([motion.twist for motion in now])
+    way = np.array([motion.twist for motion in end]) - begin
+    for k in range(1, steps + 1):
+        share = k / steps
+        then = end if k == steps else tuple(map(of_twist, begin + share * way))
+        first = _carried(first, now, then)
+        factor = load_factor * (1.0 if state is not None else share)
+        reach = CellReach(patch, then, folded_body(cell, patch, factor))
+        first, now = _newton(reach, patch, then, first), then
+    moved = spread(end, first, patch.own_unit, patch.own_step) - rest
+    return State(displacement=moved)
+
+
+def _given(cell: UnitCell, motions: Any) -> tuple[Screw, ...]:
+    """The motions at the end."""
+    given = [
+        motion if isinstance(motion, Screw) else translation(vector(f"motions[{k}]", motion))
+        for k, motion in enumerate(listed("motions", motions, "screws or vectors (m)"))
+    ]
+    if len(given) != cell.dimensions:
+        raise InputError(f": {len(given)} of them; the cell has {cell.dimensions}", "motions")
+    check_commuting(cell.case.structure.nodes, given, cell.near, "motions")
+    return tuple(given)
+
+
+def _carried(points: NDArray, one: Sequence[Screw], two: Sequence[Screw]) -> NDArray[np.float64]:
+    """Points (m, 3) as an even deformation takes them along from motions to others.
+
+    Each goes back along the first ones by its place among the cells, and forth along the others.
+    """
+    shifts = np.array([motion.vector for motion in one])
+    place = (points - points.mean(axis=0)) @ np.linalg.pinv(shifts)
+    back, forth = (np.array([motion.twist for motion in each]) for each in (one, two))
+    out = np.empty_like(points)
+    for k, (point, share) in enumerate(zip(points, place, strict=True)):
+        for twist in (-share @ back, share @ forth):
+            point = of_twist(twist).images(point) if twist.any() else point
+        out[k] = point
+    return out
+
+
+def _newton(
+    reach: CellReach, patch: Any, motions: Sequence[Screw], first: NDArray
+) -> NDArray[np.float64]:
+    """Places (m, 3) of the nodes of cell 0 in equilibrium, from others."""
+    rest, moves = patch.case.structure.nodes, reach.moves
+    free, enough = ~reach.hidden, BALANCED * float(reach.body.scale().max())
+    ones = np.ones(len(reach.steps))
+
+    def dofs(points: NDArray) -> NDArray:
+        return reach.balanced(spread(motions, points, patch.unit, patch.step) - rest)
+
+    q = dofs(first)
+    left = reach.projected(reach.forces(q))
+    done = False
+    for _ in range(ITERATIONS):
+        if done:
+            return first
+        done = np.abs(left).max(initial=0.0) <= enough  # one more step leaves rounding alone
+        stiffness = moves.T @ reach.hops(reach.body.step_tangent(q)).at(ones) @ moves
+        values, shapes = np.linalg.eigh(0.5 * (stiffness + stiffness.T))
+        kept = np.abs(values) > NULL * np.abs(values).max()
+        push = shapes[:, kept].T @ left
+        step = -moves @ (shapes[:, kept] @ (push / np.abs(values[kept])))
+        step = step[free].reshape(-1, 3)
+        for halving in range(HALVINGS):
+            trial = first + 0.5**halving * step
+            try:
+                q_new = dofs(trial)
+            except ComputationError:
+                continue
+            new = reach.projected(reach.forces(q_new))
+            if np.linalg.norm(new) < np.linalg.norm(left):
+                break
+        else:
+            if done:
+                return first
+            break
+        first, q, left = trial, q_new, new
+    raise ComputationError(
+        f"no equilibrium with these periods: {np.abs(left).max():.2g} N are left; take more steps, "
+        "or motions nearer to those at rest"
+    )

@@ -1,0 +1,1 @@
+"""Waves in periodic origami: bands of sheets, and impacts on chains of Kresling cells."""

@@ -1,0 +1,220 @@
+"""A chain of Kresling cells between plates: bands, the two-dof unit, and an impact.
+
+The unit of the literature has two degrees of freedom, the elongation u and the twist phi of a cell
+between rigid plates (Yasuda et al., Sci. Adv. 5, eaau2835, 2019). Here the plates are the rings of
+a tower: three corners of each ring carry the others (`Link`), stiff springs keep them apart, and
+links along the axis keep them level, as the guide of a test rig does.
+
+The paper's dimensions, masses and stiffnesses were not at hand. Those of `Unit` are ours: a soft
+cell that softens in compression and stiffens in tension, as the paper's does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from foldyn.cases import Case, Link, PointMass, Spring, State
+from foldyn.dynamics import critical_step, simulate
+from foldyn.linear import LongWaves, UnitCell, bands, long_waves, space_time
+from foldyn.patterns import kresling
+from foldyn.signals import Pulse, pulse
+from foldyn.structures import Sheet, Structure, discretize
+
+SIDES = 6
+SUBSTEPS = 4  # of the critical step: cells stiffen in tension
+SAMPLES = 1e-3  # s, between samples of a motion
+UNTIL = 0.8  # of a chain: the cells that are judged, before waves come back from its end
+SHARE = 0.85  # of the largest strain of a cell: peaks that count
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A Kresling cell with its plate.
+
+    Attributes
+    ----------
+    radius, height : float
+        Of a ring, and of a cell (m).
+    twist : float
+        Of a cell (degrees).
+    youngs_modulus, thickness, density : float
+        Of the sheet (N/m2, m, kg/m3).
+    crease : float
+        Stiffness per length (N) of the mountains, which are the sides and the rings; the diagonals
+        have none.
+    plate_mass : float
+        Of a plate, at the corners of its ring (kg).
+    plate_stiffness : float
+        Of the springs between three corners (N/m).
+    """
+
+    radius: float = 0.05
+    height: float = 0.05
+    twist: float = 45.0
+    youngs_modulus: float = 1.25e6
+    thickness: float = 1e-3
+    density: float = 140.0
+    crease: float = 0.03
+    plate_mass: float = 0.02
+    plate_stiffness: float = 3e4
+
+    def structure(self, cells: int) -> Structure:
+        """Bars and hinges of a tower of cells."""
+        pattern = kresling(SIDES, self.radius, self.height, self.twist, storeys=cells)
+        sheet = Sheet(self.youngs_modulus, 0.3, self.thickness, self.density)
+        creases: Any = {"mountain": self.crease, "valley": 0.0} if self.crease else 0.0
+        return discretize(
+            pattern, sheet, mass="panel", bar_law="linear", fold_law="linear",
+            calibration="standard", membrane="bars",
+            crease_stiffness=creases,
+        )
+
+    def case(self, structure: Structure, rings: Iterable[int]) -> Case:
+        """A case of a tower with plates on some rings."""
+        supports: list[Any] = []
+        for r in rings:
+            a, b, c, d, e, f = range(SIDES * r, SIDES * (r + 1))
+            supports += [
+                Link([b, d, f], to=(a, c, e)),
+                Link([a, c, e], axes="z"),
+                Spring(self.plate_stiffness, between=[(a, c), (c, e), (e, a)]),
+            ]
+        nodes = [node for r in rings for node in range(SIDES * r, SIDES * (r + 1))]
+        return Case(structure, supports, masses=[PointMass(nodes, self.plate_mass / SIDES)])
+
+    def chain(self, cells: int) -> Case:
+        """A chain with a plate at each end of each cell."""
+        return self.case(self.structure(cells), range(cells + 1))
+
+    @property
+    def cell(self) -> UnitCell:
+        """What the chain repeats: what is said of its lower ring holds for the upper one."""
+        return UnitCell(self.case(self.structure(1), [0]))
+
+    @property
+    def two_dofs(self) -> LongWaves:
+        """Static stiffness of one cell against elongation and twist of rigid plates; and mass.
+
+        The lower plate stands still while the upper one moves; creases at the plates, between two
+        cells, have no part in it.
+        """
+        structure = self.structure(1)
+        x, y, _ = structure.nodes.T
+        motions = np.zeros((2, *structure.nodes.shape))
+        motions[0, :, 2] = 1.0
+        motions[1, :, 0], motions[1, :, 1] = -y, x
+        upper = motions.copy()
+        upper[:, :SIDES] = 0.0
+        moved = upper.reshape(2, -1)
+        stiffness = moved @ (structure.tangent(np.zeros_like(structure.nodes)) @ moved.T)
+        plate = np.zeros(len(x))
+        plate[:SIDES] = self.plate_mass / SIDES
+        mass = structure.mass.toarray() + np.diag(plate)
+        inertia = np.einsum("ina,nm,jma->ij", motions, mass, motions)
+        return LongWaves((0.0, 0.0, 1.0), stiffness, inertia)
+
+
+def two_dof_frequencies(unit: LongWaves, phases: NDArray) -> NDArray[np.float64]:
+    """omega = 2 |sin(kappa/2)| sqrt(eig(M^-1 K)), in Hz, (n, 2), of phases (n,), rad."""
+    values = eigh(unit.stiffness, unit.mass, eigvals_only=True)
+    return 2.0 * np.abs(np.sin(0.5 * phases))[:, None] * np.sqrt(values) / (2.0 * np.pi)
+
+
+def guided(found: xarray.Dataset) -> NDArray[np.float64]:
+    """Frequencies (n, 2), Hz, of the bands in which plates move along the axis and turn about it.
+
+    The others slide sideways: their share of the motion is the same along x and y as in these, but
+    nothing of it lies along z, nor is it a rotation.
+    """
+    shapes = found["shape"].values[:, :, :SIDES]
+    sideways = np.abs(shapes.mean(axis=2)[..., :2]).sum(axis=-1)
+    size = np.linalg.norm(shapes, axis=(2, 3))
+    order = np.argsort(sideways / size, axis=1)[:, :2]
+    return np.sort(np.take_along_axis(found["frequency"].values, order, axis=1), axis=1)
+
+
+def dispersion(unit: Unit, count: int = 41) -> xarray.Dataset:
+    """Bands of the chain beside those of the two-dof unit.
+
+    Variables over phase (0 to pi) and branch: `bands`, of the chain as it is; `two_dof`; `free`, of
+    the chain without creases, and `free_two_dof`; all in Hz.
+    """
+    phases = np.linspace(0.0, np.pi, count)
+    free = replace(unit, crease=0.0)
+    data = {}
+    for name, one in (("", unit), ("free_", free)):
+        found = bands(one.cell, phases[1:], count=4, shape=True, track=False)
+        start = np.zeros((1, 2))
+        data[f"{name}bands"] = np.concatenate([start, guided(found)])
+        data[f"{name}two_dof"] = two_dof_frequencies(one.two_dofs, phases)
+    variables = {key: (("phase", "branch"), each, {"units": "Hz"}) for key, each in data.items()}
+    return xarray.Dataset(variables, {"phase": phases, "branch": [1, 2]})
+
+
+def impact(unit: Unit, cells: int, velocity: float, duration: float) -> xarray.Dataset:
+    """Motion of each cell after the first plate of a free chain got a velocity (m/s).
+
+    Variables of `space_time`, the rotation of the plates (rad), and energies (J) and momentum
+    (kg m/s) over time; attributes: the balance of energy, the speeds of long waves (cells per s).
+    """
+    case = unit.chain(cells)
+    start = np.zeros_like(case.structure.nodes)
+    start[:SIDES, 2] = velocity
+    steps = np.ceil(SAMPLES * SUBSTEPS / critical_step(case))
+    motion = simulate(
+        case, duration, method="rk4", dt=SAMPLES / steps, every=SAMPLES,
+        initial=State(velocity=start),
+    )  # fmt: skip
+    cell = unit.cell
+    found = space_time(motion, cell)
+    turned = space_time(motion, cell, "rotation")["displacement"]
+    found["rotation"] = (("time", "cell"), turned.values, {"units": "rad"})
+    momentum = motion["velocity"].sel(axis="z").values @ np.asarray(case.mass.sum(axis=0)).ravel()
+    found["momentum"] = ("time", momentum, {"units": "kg m/s"})
+    for name in ("kinetic", "strain_bars", "strain_folds", "strain_springs"):
+        found[name] = motion[name]
+    found.attrs |= {
+        "energy_error": motion.attrs["energy_error"],
+        "long_waves": long_waves(cell).speeds,
+        "velocity": velocity,
+    }
+    return found
+
+
+@dataclass(frozen=True)
+class Overtaking:
+    """How a rarefaction passes a compression.
+
+    Attributes
+    ----------
+    compression, rarefaction : Pulse
+        Of the strain of the cells but for those at the end.
+    cell : int
+        Which parts those where compression peaks first from those where tension does, best.
+    share : float
+        Of the cells from there on in which tension does.
+    """
+
+    compression: Pulse
+    rarefaction: Pulse
+    cell: int
+    share: float
+
+
+def overtaking(found: xarray.Dataset) -> Overtaking:
+    """Follow the first high peaks of compression and of tension."""
+    last = int(UNTIL * found.sizes["gap"])
+    strain = found["strain"].values[:, :last]
+    time = found["time"].values
+    pressed, pulled = (pulse(time, strain, sign, SHARE) for sign in (-1, 1))
+    ahead = pulled.arrival < pressed.arrival
+    wrong = [int(ahead[:k].sum() + (~ahead[k:]).sum()) for k in range(last + 1)]
+    cell = int(np.argmin(wrong))
+    return Overtaking(pressed, pulled, cell, float(ahead[cell:].mean()) if cell < last else 0.0)
