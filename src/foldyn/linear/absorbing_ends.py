@@ -23,12 +23,14 @@ from foldyn.cases import Case, Dashpot, State
 from foldyn.cases.selection import Nodes, resolve_nodes
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.band_structure import Solver
+from foldyn.linear.bloch import Bloch, null_space
 from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.values import numbers, of_kind, vector, whole
 
 PHASE = 1e-3  # rad per cell: a long wave
 LEAST = 0.5  # share of a wave's kinetic energy in sections that move as rigid bodies
+LOOKED_AT = 8  # lowest waves: bending ones are below those along the chain
 NEGLIGIBLE = 1e-3  # of the largest coefficient: dashpots that are left out
 ON_AXIS = 1e-6  # of the largest distance from the axis
 
@@ -139,8 +141,7 @@ def long_waves(cell: UnitCell, state: State | None = None, along: int = 0) -> Lo
     basis[: 3 * linear.nodes] = rigid.reshape(-1, rigid.shape[2])
     momenta = linear.bloch.mass.sparse_at(linear.bloch.factors(0.0 * phase)).real @ basis
     mass = basis.T @ momenta
-    count = min(2 * len(mass) + 4, len(Solver(linear.bloch, 1).free))
-    waves = Solver(linear.bloch, count).waves(phase)
+    waves = Solver(linear.bloch, _lowest(linear.bloch, phase)).waves(phase)
     parts = momenta.T @ waves.shapes
     share = np.einsum("ij,ij->j", parts.conj(), np.linalg.solve(mass, parts)).real
     chosen = np.flatnonzero(share > LEAST)[: len(mass)]
@@ -222,3 +223,11 @@ def _rigid(points: NDArray, axis: NDArray, center: NDArray, turns: bool) -> NDAr
     along = np.broadcast_to(axis, points.shape)
     parts: list[Any] = [along, np.cross(axis, points - center)][: 1 + turns]
     return np.stack(parts, axis=2)
+
+
+def _lowest(bloch: Bloch, phase: NDArray) -> int:
+    """How many waves are looked at, with long ones among them: those that there are at most."""
+    free = Solver(bloch, 1).free
+    if bloch.ties.empty:
+        return min(LOOKED_AT, len(free))
+    return min(LOOKED_AT, null_space(bloch.ties.at(bloch.factors(phase))[:, free]).shape[1])

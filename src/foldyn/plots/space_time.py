@@ -69,13 +69,18 @@ def plot_space_time(
     found = space_time(trajectory, cell, component, along)
     if quantity not in found:
         raise InputError(' = "strain": the cells do not advance along the chain', "quantity")
+    if limit is not None:
+        limit = number("limit", limit, above=0.0)
+    return drawn_cells(found, quantity, limit, title)
+
+
+def drawn_cells(found: xr.Dataset, quantity: str, limit: float | None, title: str = "") -> Figure:
+    """Figure of what `space_time` returns; see `plot_space_time`."""
     shown = found[quantity]
     places = found["between" if quantity == "strain" else "cell"].values
     if limit is None:
         later = shown.values[:, len(places) // 4 if quantity == "strain" else 0 :]
         limit = float(np.abs(later).max()) or 1.0
-    else:
-        limit = number("limit", limit, above=0.0)
     figure = style.new_figure(6.2, 4.6, title)
     axes = figure.subplots()
     style.frame(axes, "cell", "time (s)")
@@ -83,7 +88,7 @@ def plot_space_time(
         places, found["time"].values, shown.values, cmap=SIGNED, vmin=-limit, vmax=limit,
         shading="nearest", rasterized=True,
     )  # fmt: skip
-    name = quantity if quantity == "strain" else f"{component} {quantity}"
+    name = quantity if quantity == "strain" else f"{found.attrs['component']} {quantity}"
     units = shown.attrs["units"]
     _scale(figure, axes, mesh, name if units == "1" else f"{name} ({units})", "both")
     return style.finish(figure)

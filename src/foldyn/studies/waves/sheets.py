@@ -36,33 +36,47 @@ def cell_of(kind: str, dihedral: float) -> UnitCell:
     return UnitCell(Case(made))
 
 
-def fold_states(kind: str, dihedrals: Sequence[float], count: int = 81) -> xarray.Dataset:
-    """Bands along the edge of the zone in each fold state, and the widest full gap.
+def fold_states(
+    kind: str, dihedrals: Sequence[float], count: int = 81, grid: int = 24
+) -> xarray.Dataset:
+    """Bands in fold states, and their gaps.
 
-    Variables: `frequency` (dihedral, phase, band), Hz; `bottom`, `top` (dihedral) of the widest gap
-    relative to its middle, Hz, and `below`, the number of bands below it; nan and 0 where there is
-    none. Attributes: ticks of the path.
+    Variables: `frequency` (dihedral, phase, band), Hz, along the edge of the zone; `bottom`, `top`
+    (direction, dihedral, below), Hz, of the gaps above so many bands, nan where there is none, for
+    waves along x alone and for all of the zone. Attributes: ticks of the path.
     """
-    frequency, gaps, path = [], [], None
-    for dihedral in dihedrals:
+    path = cell_of(kind, 90.0).path(PATH, count)
+    frequency, edges = [], np.full((2, 2, len(dihedrals), COUNT), np.nan)
+    for k, dihedral in enumerate(dihedrals):
         cell = cell_of(kind, float(dihedral))
-        path = cell.path(PATH, count)
         found = bands(cell, path, count=COUNT)
-        frequency.append(found["frequency"].values)
-        gaps.append(_widest(frequency[-1]))
-    bottom, top, below = np.array(gaps).T
-    assert path is not None
+        frequency.append(np.sort(found["frequency"].values, axis=1))
+        zone = bands(cell, cell.grid(grid), count=COUNT, track=False)
+        for d, (gaps, name) in enumerate(((band_gaps(found), "G-X"), (band_gaps(zone), "all"))):
+            for row in np.flatnonzero(np.isin(gaps["direction"].values, (name, "all"))):
+                below = int(gaps["below"][row])
+                edges[:, d, k, below] = float(gaps["bottom"][row]), float(gaps["top"][row])
+    place = ("direction", "dihedral", "below")
     return xarray.Dataset(
         {
             "frequency": (("dihedral", "phase", "band"), np.array(frequency), {"units": "Hz"}),
-            "bottom": ("dihedral", bottom, {"units": "Hz"}),
-            "top": ("dihedral", top, {"units": "Hz"}),
-            "below": ("dihedral", below.astype(int)),
+            "bottom": (place, edges[0], {"units": "Hz"}),
+            "top": (place, edges[1], {"units": "Hz"}),
         },
         {
+            "direction": ["along x", "all"],
             "dihedral": ("dihedral", np.asarray(dihedrals, float), {"units": "degrees"}),
             "distance": ("phase", path["distance"].values),
             "band": 1 + np.arange(COUNT),
+            "below": np.arange(COUNT),
         },
-        {"ticks": path.attrs["ticks"], "tick_labels": path.attrs["tick_labels"], "pattern": kind},
+        {"ticks": path.attrs["ticks"], "tick_labels": path.attrs["tick_labels"]},
     )
+
+
+def widest(found: xarray.Dataset, direction: str) -> tuple[float, float, float]:
+    """Dihedral (degrees) and edges (Hz) of the gap that is widest by its middle; nan for none."""
+    bottom, top = (found[name].sel(direction=direction).values for name in ("bottom", "top"))
+    width = np.nan_to_num((top - bottom) / (top + bottom))
+    k, below = np.unravel_index(width.argmax(), width.shape)
+    return float(found["dihedral"][k]), float(bottom[k, below]), float(top[k, below])

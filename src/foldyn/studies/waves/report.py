@@ -1,0 +1,313 @@
+"""The page of the study of waves: an impact on a Kresling chain, and bands of sheets."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray
+from matplotlib.figure import Figure
+
+from foldyn.plots import style
+from foldyn.plots.space_time import drawn_cells, plot_wave_spectrum
+from foldyn.report import Heading, Section, Table, Text, write_report
+from foldyn.report.album import Album
+from foldyn.signals import sampling_interval, wavenumber_spectrum
+from foldyn.studies.waves import kresling, sheets
+from foldyn.studies.waves.study import FULL, Study
+
+TITLE = "Waves in periodic origami"
+STATES = 4  # fold states whose bands are drawn
+FROM, TO = 0.3, 0.7  # of a chain: between these cells the pulse is followed
+SPEEDS = 0.01  # relative difference of speeds that counts as none
+
+
+def write(study: Study) -> Path:
+    """Draw the figures of a study into its folder and write report.html; returns its path."""
+    album = Album(study.folder)
+    hit, small = study.result("impact"), study.result("small_impact")
+    lines = study.result("dispersion")
+    found: list[Any] = [Text(_opening(study))]
+    if lines is not None:
+        found += _dispersion(album, lines, small)
+    if hit is not None:
+        found += _impact(album, hit, small)
+    for kind in sheets.PATTERNS:
+        states = study.result(kind)
+        if states is not None:
+            found += _sheet(album, kind, states)
+    found += [Heading("What was computed"), _inputs(study)]
+    return write_report(study.folder / "report.html", TITLE, found)
+
+
+def _opening(study: Study) -> str:
+    text = (
+        "Two studies, repeated with Foldyn: the chain of Kresling cells of Yasuda, Miyazawa, "
+        "Charalampidis, Chong, Kevrekidis and Yang (Origami-based impact mitigation via "
+        "rarefaction solitary wave creation, Science Advances 5, eaau2835, 2019), and the bands of "
+        "Miura and eggbox sheets of Pratapa, Suryanarayana and Paulino (Bloch wave framework for "
+        "structures with nonlocal interactions, J. Mech. Phys. Solids 118, 2018).\n\n"
+        "Dimensions, masses and stiffnesses of the papers were not at hand. All parameters are "
+        "ours and stand in the last table, so that claims can be compared and numbers cannot."
+    )
+    if study.plan != FULL:
+        text += "\n\nThis is a coarse run with fewer fold states, phases and cells."
+    return text
+
+
+# ---------------------------------------------------------------------- the chain
+def deviations(lines: xarray.Dataset, free: bool) -> tuple[float, float]:
+    """Largest relative deviations of the two bands from the two-dof unit (but for phase 0)."""
+    start = "free_" if free else ""
+    ratio = lines[f"{start}bands"].values[1:] / lines[f"{start}two_dof"].values[1:] - 1.0
+    slow, fast = np.abs(ratio).max(axis=0).tolist()
+    return slow, fast
+
+
+def _dispersion(
+    album: Album, lines: xarray.Dataset, small: xarray.Dataset | None
+) -> list[Section | Any]:
+    slow, fast = deviations(lines, free=False)
+    free = max(deviations(lines, free=True))
+    found: list[Any] = [
+        Heading("Kresling chain: small waves"),
+        Text(
+            "A cell between rigid plates has two degrees of freedom, its elongation and its twist, "
+            "and the chain the frequencies omega = 2 |sin(kappa/2)| sqrt(eig(K, M)). With the "
+            "static stiffness K of one cell and without creases this agrees with the bands of the "
+            f"chain to {100 * free:.2g} %, which is what the springs of the plates give way. The "
+            "creases at the plates are folds between two cells, which the unit does not have: with "
+            f"them the slow band deviates by up to {100 * slow:.2g} %, the fast one by "
+            f"{100 * fast:.2g} %."
+        ),
+    ]
+    found += album.figure(
+        "dispersion",
+        "Bands of the Kresling chain with plates (solid) and of the two-dof unit (dashed).",
+        lambda: _plot_dispersion(lines),
+    )
+    if small is not None:
+        found += album.figure(
+            "spectrum",
+            "Two-dimensional spectrum of the axial velocity after a small impact, over the bands.",
+            lambda: _plot_spectrum(small, lines),
+        )
+    return found
+
+
+def _plot_dispersion(lines: xarray.Dataset) -> Figure:
+    figure = style.new_figure(8.0, 3.6)
+    for axes, start, title in zip(
+        figure.subplots(1, 2), ("", "free_"), ("with creases", "without creases"), strict=True
+    ):
+        style.frame(axes, "phase (rad per cell)", "frequency (Hz)", title)
+        phase = lines["phase"].values
+        axes.plot(phase, lines[f"{start}bands"].values, color=style.BLUE, linewidth=1.3)
+        look: dict[str, Any] = {"color": style.VERMILLION, "linestyle": (0, (4, 3))}
+        axes.plot(phase, lines[f"{start}two_dof"].values, linewidth=1.3, **look)
+        axes.set_xlim(0.0, np.pi)
+        axes.set_ylim(bottom=0.0)
+    keys = [style.key("chain", color=style.BLUE), style.key("two-dof unit", **look)]
+    return style.finish(figure, keys)
+
+
+def _plot_spectrum(small: xarray.Dataset, lines: xarray.Dataset) -> Figure:
+    found = wavenumber_spectrum(small["velocity"].values, sampling_interval(small["time"].values))
+    spectrum = xarray.Dataset(
+        {"amplitude": (("phase", "frequency"), found.amplitude)},
+        {"phase": found.phase, "frequency": found.frequency},
+    )
+    shown = xarray.Dataset(
+        {"frequency": (("phase", "band"), lines["bands"].values)},
+        {"wave_vector": (("phase", "period"), lines["phase"].values[:, None])},
+    )
+    return plot_wave_spectrum(spectrum, shown, 1.15 * float(lines["bands"].max()))
+
+
+def _impact(album: Album, hit: xarray.Dataset, small: xarray.Dataset | None) -> list[Any]:
+    passed = kresling.overtaking(hit)
+    found: list[Any] = [
+        Heading("Kresling chain: an impact"),
+        Text(verdict(hit, passed)),
+    ]
+    found += album.figure(
+        "impact",
+        f"Strain of the cells after an impact of {hit.attrs['velocity']:g} m/s on the first "
+        "plate: compression red, tension blue.",
+        lambda: drawn_cells(hit, "strain", None),
+    )
+    if small is not None:
+        found += album.figure(
+            "small-impact",
+            f"The same after {1e3 * small.attrs['velocity']:.2g} mm/s, where all is linear.",
+            lambda: drawn_cells(small, "strain", None),
+        )
+    found += album.figure(
+        "arrivals",
+        "Arrival of the highest compression and of the highest tension in each cell, and strains "
+        "there.",
+        lambda: _plot_arrivals(passed),
+    )
+    slow, fast = np.asarray(hit.attrs["long_waves"]).tolist()
+    middle = _middle(passed)
+    rows = [
+        ["rarefaction", passed.rarefaction.speed, *_of(passed.rarefaction, middle)],
+        ["compression", passed.compression.speed, *_of(passed.compression, middle)],
+        ["slow long waves", slow, None, None],
+        ["fast long waves", fast, None, None],
+    ]
+    found.append(
+        Table(
+            ["wave", "speed (cells/s)", "peak strain", "width (ms)"],
+            rows,
+            "Pulses, the median over the cells in the middle of the chain, and long waves.",
+            digits=3,
+        )
+    )
+    return found
+
+
+def _middle(passed: kresling.Overtaking) -> slice:
+    count = len(passed.rarefaction.arrival) / kresling.UNTIL
+    return slice(int(FROM * count), int(TO * count))
+
+
+def _of(pulse: Any, cells: slice) -> tuple[float, float]:
+    return (
+        float(np.nanmedian(pulse.amplitude[cells])),
+        1e3 * float(np.nanmedian(pulse.width[cells])),
+    )
+
+
+def verdict(hit: xarray.Dataset, passed: kresling.Overtaking) -> str:
+    """Say from the numbers what agrees with the paper, and what does not."""
+    slow = float(np.asarray(hit.attrs["long_waves"])[0])
+    rare, press = passed.rarefaction, passed.compression
+    momentum = hit["momentum"].values
+    lead = rare.speed / press.speed - 1.0
+    middle = _middle(passed)
+    tension, pressed = _of(rare, middle)[0], -_of(press, middle)[0]
+    overtakes = lead > SPEEDS and passed.share > 0.5
+    ahead = (
+        f"agrees with the paper: the rarefaction is {100 * lead:.2g} % faster than the compression "
+        f"and overtakes it at cell {passed.cell}; from there on tension peaks first in "
+        f"{100 * passed.share:.0f} % of the cells"
+        if overtakes
+        else "does not agree with the paper: no rarefaction overtakes the compression"
+    )
+    return (
+        "The first plate of a free chain gets a velocity. It presses its cell, which springs back "
+        "and pulls: a rarefaction starts behind the compression. Cells soften in compression and "
+        f"stiffen in tension. What happens {ahead}. It travels at {rare.speed / slow:.3g} times "
+        f"the speed of slow long waves, the compression at {press.speed / slow:.3g} times. The "
+        f"first cell is pressed by {100 * abs(float(hit['strain'].values[:, 0].min())):.2g} %; in the "
+        f"middle of the chain the peak tension is {100 * tension:.2g} % and the peak compression "
+        f"{100 * pressed:.2g} %.\n\n"
+        "What differs from the words of the paper's abstract: the latter part of the chain does "
+        "not feel tension first. Weak dispersive ripples of both signs, and a precursor on the "
+        "fast branch, arrive before; the rarefaction leads among the high peaks.\n\n"
+        f"Energy is balanced to {hit.attrs['energy_error']:.1g} of the energies at play, the "
+        f"momentum along the chain changes by {np.ptp(momentum) / abs(momentum[0]):.1g} of itself."
+    )
+
+
+def _plot_arrivals(passed: kresling.Overtaking) -> Figure:
+    labels = ["time (s)", "strain"]
+    figure, (upper, lower) = style.rows((6.2, 5.0), "", "cell", labels, heights=[1.6, 1.0])
+    keys = []
+    for pulse, color, label in (
+        (passed.compression, style.VERMILLION, "compression"),
+        (passed.rarefaction, style.BLUE, "tension"),
+    ):
+        look = {"color": color, "marker": ".", "linestyle": "none", "label": label}
+        keys += upper.plot(pulse.arrival, **look)
+        lower.plot(np.abs(pulse.amplitude), **look)
+    look = {"color": style.GRAY, "linestyle": "dashed", "linewidth": 0.9}
+    upper.axvline(passed.cell, **look)
+    top = np.nanquantile(np.abs(passed.compression.amplitude), 0.95)
+    lower.set_ylim(0.0, 1.5 * top)
+    return style.finish(figure, [*keys, style.key("overtaking", **look)])
+
+
+# ---------------------------------------------------------------------- sheets
+def _sheet(album: Album, kind: str, states: xarray.Dataset) -> list[Any]:
+    found: list[Any] = [Heading(f"Bands of the {kind} sheet against its fold state")]
+    rows = []
+    for direction in states["direction"].values.tolist():
+        dihedral, bottom, top = sheets.widest(states, direction)
+        open_ = np.isfinite(states["bottom"].sel(direction=direction).values).any(axis=1)
+        share = f"{int(open_.sum())} of {len(open_)}"
+        there = np.isfinite(bottom)
+        rows.append([direction, share, *((dihedral, bottom, top) if there else [None] * 3)])
+    found.append(
+        Table(
+            ["direction", "fold states with a gap", "widest at (degrees)", "from (Hz)", "to (Hz)"],
+            rows,
+            "Gaps for waves along x, and for all waves of the zone; the widest by its middle.",
+            digits=4,
+        )
+    )
+    found += album.figure(
+        f"{kind}-bands",
+        f"Bands of the {kind} sheet in some fold states (dihedral of the creases along x).",
+        lambda: _plot_bands(states),
+    )
+    found += album.figure(
+        f"{kind}-gaps",
+        f"Gaps of the {kind} sheet: along x (light) and in all directions (dark).",
+        lambda: _plot_gaps(states),
+    )
+    return found
+
+
+def _plot_bands(states: xarray.Dataset) -> Figure:
+    count = states.sizes["dihedral"]
+    chosen = np.unique(np.linspace(0, count - 1, min(STATES, count)).round().astype(int))
+    figure = style.new_figure(9.0, 3.4)
+    frames = figure.subplots(1, len(chosen), sharey=True, squeeze=False)[0]
+    names = states.attrs["tick_labels"].replace("G", "Γ").split("-")
+    for axes, k in zip(frames, chosen.tolist(), strict=True):
+        first = axes is frames[0]
+        dihedral = float(states["dihedral"][k])
+        style.frame(axes, "", "frequency (kHz)" if first else "", f"{dihedral:.0f}°")
+        values = 1e-3 * states["frequency"].values[k]
+        axes.plot(states["distance"].values, values, color=style.BLUE, linewidth=1.0)
+        axes.set_xticks(np.atleast_1d(states.attrs["ticks"]), names)
+        axes.set_ylim(bottom=0.0)
+    return style.finish(figure)
+
+
+def _plot_gaps(states: xarray.Dataset) -> Figure:
+    figure = style.new_figure(6.2, 3.8)
+    axes = figure.subplots()
+    style.frame(axes, "dihedral (degrees)", "frequency (kHz)")
+    keys = []
+    for direction, color in (("along x", style.SKY), ("all", style.BLUE)):
+        bottom, top = (1e-3 * states[k].sel(direction=direction).values for k in ("bottom", "top"))
+        for below in range(bottom.shape[1]):
+            edges = states["dihedral"].values, bottom[:, below], top[:, below]
+            axes.fill_between(*edges, color=color, linewidth=0.0)
+            lone = {"color": color, "linestyle": "none", "marker": "_", "markersize": 3.0}
+            axes.plot(edges[0], 0.5 * (edges[1] + edges[2]), **lone)
+        keys.append(style.key(direction, color=color, linewidth=5.0))
+    axes.set_ylim(bottom=0.0)
+    return style.finish(figure, keys)
+
+
+def _inputs(study: Study) -> Table:
+    plan = study.plan
+    rows = [[name.replace("_", " "), value] for name, value in asdict(plan.unit).items()]
+    rows += [["cells of the chain", plan.cells], ["velocity of the first plate", plan.velocity]]
+    sheet = sheets.PAPER
+    rows += [
+        ["sheets: edges of panels", sheets.EDGE],
+        ["sheets: angle of panels (degrees)", 60.0],
+        ["sheets: Young's modulus", sheet.youngs_modulus],
+        ["sheets: thickness", sheet.thickness],
+        ["sheets: density", sheet.density],
+        ["sheets: length-scale ratio", sheet.length_scale_ratio],
+        ["fold states", plan.dihedrals],
+    ]
+    return Table(["parameter", "value"], rows, "All of them ours, in SI units.", digits=5)

@@ -1,0 +1,140 @@
+"""What the study of waves computes, each part kept in a file of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import xarray
+
+from foldyn.program import program
+from foldyn.results.netcdf import read, write
+from foldyn.store import Store
+from foldyn.studies.pool import Done, run
+from foldyn.studies.waves import kresling, sheets
+
+RESULTS = "runs"
+STAMP = "study_settings"
+COMPUTING = tuple(f"studies/waves/{name}.py" for name in ("kresling", "sheets"))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How finely is computed.
+
+    Attributes
+    ----------
+    dihedrals : int
+        Fold states of each sheet, from 20 to 170 degrees.
+    phases : int
+        Along the edge of the zone of a sheet, and of the chain.
+    cells : int
+        Of the chain.
+    velocity : float
+        Of the first plate (m/s).
+    """
+
+    dihedrals: int = 31
+    phases: int = 81
+    cells: int = 80
+    velocity: float = 1.3
+    unit: kresling.Unit = field(default_factory=kresling.Unit)
+
+    @property
+    def duration(self) -> float:
+        """Of a motion (s): until slow waves have nearly reached the end."""
+        slow = kresling.long_waves(self.unit.cell).speeds[0]
+        return float(round(0.9 * self.cells / slow, 2))
+
+
+FULL = Plan()
+QUICK = Plan(dihedrals=7, phases=31, cells=48)
+
+
+@dataclass(frozen=True)
+class Part:
+    """One computation: bands of a sheet, or of the chain, or its impact."""
+
+    kind: Literal["miura", "eggbox", "dispersion", "impact", "small_impact"]
+    plan: Plan
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return self.kind
+
+    def settings(self) -> dict[str, Any]:
+        """All that its result depends on."""
+        return {"kind": self.kind, "program": program(*COMPUTING), **asdict(self.plan)}
+
+    def result(self, folder: Path) -> xarray.Dataset | None:
+        """What a folder has of it; None if that is nothing, or of other settings."""
+        return KEPT.find(folder / f"{self.kind}.nc", self.settings())
+
+    def there(self, folder: Path) -> bool:
+        """Whether its result is in a folder."""
+        return self.result(folder) is not None
+
+    def make(self, folder: Path) -> None:
+        """Compute its result into a folder."""
+        KEPT.keep(folder / f"{self.kind}.nc", self.settings(), self.compute())
+
+    def compute(self) -> xarray.Dataset:
+        """Its result."""
+        plan = self.plan
+        if self.kind in sheets.PATTERNS:
+            return sheets.fold_states(
+                self.kind, np.linspace(20.0, 170.0, plan.dihedrals).tolist(), plan.phases
+            )
+        if self.kind == "dispersion":
+            return kresling.dispersion(plan.unit, plan.phases)
+        velocity = plan.velocity * (1.0 if self.kind == "impact" else 1e-3)
+        return kresling.impact(plan.unit, plan.cells, velocity, plan.duration)
+
+
+def _read(file: Path) -> tuple[str, xarray.Dataset]:
+    found = read(file, "the study")
+    return found.attrs.get(STAMP, ""), found
+
+
+def _write(file: Path, stamp: str, result: xarray.Dataset) -> None:
+    write(result.assign_attrs({STAMP: stamp}), file)
+
+
+KEPT: Store[xarray.Dataset] = Store(_read, _write)
+KINDS = ("impact", "small_impact", "miura", "eggbox", "dispersion")
+
+
+@dataclass(frozen=True)
+class Study:
+    """Results of a plan in a folder.
+
+    Attributes
+    ----------
+    plan : Plan
+    folder : Path
+        Of the study; results are in its folder `runs`.
+    """
+
+    plan: Plan
+    folder: Path
+
+    @property
+    def count(self) -> int:
+        """Number of computations."""
+        return len(KINDS)
+
+    def compute(
+        self, tell: Callable[[Done], None] = lambda done: None, processes: int = 2
+    ) -> list[Done]:
+        """Compute what is not there yet; see `foldyn.studies.pool.run`."""
+        results = self.folder / RESULTS
+        results.mkdir(parents=True, exist_ok=True)
+        return run([Part(kind, self.plan) for kind in KINDS], results, tell, processes)
+
+    def result(self, kind: Any) -> xarray.Dataset | None:
+        """Result of a computation, or None where there is none."""
+        return Part(kind, self.plan).result(self.folder / RESULTS)
