@@ -21,6 +21,7 @@ from foldyn.studies.waves.study import FULL, Study
 TITLE = "Waves in periodic origami"
 STATES = 4  # fold states whose bands are drawn
 FROM, TO = 0.3, 0.7  # of a chain: between these cells the pulse is followed
+SHEETS = {"miura": "Miura", "eggbox": "eggbox"}
 SPEEDS = 0.01  # relative difference of speeds that counts as none
 
 
@@ -85,7 +86,7 @@ def _dispersion(
     ]
     found += album.figure(
         "dispersion",
-        "Bands of the Kresling chain with plates (solid) and of the two-dof unit (dashed).",
+        "Bands of the Kresling chain and of the two-dof unit, and what they are apart.",
         lambda: _plot_dispersion(lines),
     )
     if small is not None:
@@ -98,19 +99,23 @@ def _dispersion(
 
 
 def _plot_dispersion(lines: xarray.Dataset) -> Figure:
-    figure = style.new_figure(8.0, 3.6)
-    for axes, start, title in zip(
-        figure.subplots(1, 2), ("", "free_"), ("with creases", "without creases"), strict=True
-    ):
-        style.frame(axes, "phase (rad per cell)", "frequency (Hz)", title)
-        phase = lines["phase"].values
-        axes.plot(phase, lines[f"{start}bands"].values, color=style.BLUE, linewidth=1.3)
-        look: dict[str, Any] = {"color": style.VERMILLION, "linestyle": (0, (4, 3))}
-        axes.plot(phase, lines[f"{start}two_dof"].values, linewidth=1.3, **look)
-        axes.set_xlim(0.0, np.pi)
-        axes.set_ylim(bottom=0.0)
-    keys = [style.key("chain", color=style.BLUE), style.key("two-dof unit", **look)]
-    return style.finish(figure, keys)
+    figure = style.new_figure(8.4, 3.6)
+    left, right = figure.subplots(1, 2)
+    style.frame(left, "phase (rad per cell)", "frequency (Hz)")
+    style.frame(right, "phase (rad per cell)", "deviation from two dofs (%)")
+    phase = lines["phase"].values[1:]
+    keys = []
+    for start, name in (("", "with creases"), ("free_", "without creases")):
+        chain, unit = (lines[f"{start}{key}"].values[1:] for key in ("bands", "two_dof"))
+        color = style.BLUE if name == "with creases" else style.VERMILLION
+        dashed: dict[str, Any] = {"color": color, "linestyle": (0, (3, 3)), "linewidth": 1.2}
+        left.semilogy(phase, chain, color=color, linewidth=0.9)
+        left.semilogy(phase, unit, **dashed)
+        right.plot(phase, 100.0 * (chain / unit - 1.0), color=color)
+        keys += [style.key(f"chain {name}", color=color), style.key("its two-dof unit", **dashed)]
+    left.set_xlim(0.0, np.pi)
+    right.set_xlim(0.0, np.pi)
+    return style.finish(figure, keys, columns=4)
 
 
 def _plot_spectrum(small: xarray.Dataset, lines: xarray.Dataset) -> Figure:
@@ -202,9 +207,9 @@ def verdict(hit: xarray.Dataset, passed: kresling.Overtaking) -> str:
         "and pulls: a rarefaction starts behind the compression. Cells soften in compression and "
         f"stiffen in tension. What happens {ahead}. It travels at {rare.speed / slow:.3g} times "
         f"the speed of slow long waves, the compression at {press.speed / slow:.3g} times. The "
-        f"first cell is pressed by {100 * abs(float(hit['strain'].values[:, 0].min())):.2g} %; in the "
-        f"middle of the chain the peak tension is {100 * tension:.2g} % and the peak compression "
-        f"{100 * pressed:.2g} %.\n\n"
+        f"first cell is pressed by {100 * abs(float(hit['strain'].values[:, 0].min())):.2g} %; in "
+        f"the middle of the chain the peak tension is {100 * tension:.2g} % and the peak "
+        f"compression {100 * pressed:.2g} %.\n\n"
         "What differs from the words of the paper's abstract: the latter part of the chain does "
         "not feel tension first. Weak dispersive ripples of both signs, and a precursor on the "
         "fast branch, arrive before; the rarefaction leads among the high peaks.\n\n"
@@ -233,12 +238,12 @@ def _plot_arrivals(passed: kresling.Overtaking) -> Figure:
 
 # ---------------------------------------------------------------------- sheets
 def _sheet(album: Album, kind: str, states: xarray.Dataset) -> list[Any]:
-    found: list[Any] = [Heading(f"Bands of the {kind} sheet against its fold state")]
+    found: list[Any] = [Heading(f"Bands of the {SHEETS[kind]} sheet against its fold state")]
     rows = []
     for direction in states["direction"].values.tolist():
         dihedral, bottom, top = sheets.widest(states, direction)
         open_ = np.isfinite(states["bottom"].sel(direction=direction).values).any(axis=1)
-        share = f"{int(open_.sum())} of {len(open_)}"
+        share = f"{int(np.sum(open_))} of {states.sizes['dihedral']}"
         there = np.isfinite(bottom)
         rows.append([direction, share, *((dihedral, bottom, top) if there else [None] * 3)])
     found.append(
@@ -251,12 +256,12 @@ def _sheet(album: Album, kind: str, states: xarray.Dataset) -> list[Any]:
     )
     found += album.figure(
         f"{kind}-bands",
-        f"Bands of the {kind} sheet in some fold states (dihedral of the creases along x).",
+        f"Bands of the {SHEETS[kind]} sheet in some fold states (dihedral of the creases along x).",
         lambda: _plot_bands(states),
     )
     found += album.figure(
         f"{kind}-gaps",
-        f"Gaps of the {kind} sheet: along x (light) and in all directions (dark).",
+        f"Gaps of the {SHEETS[kind]} sheet: along x (light) and in all directions (dark).",
         lambda: _plot_gaps(states),
     )
     return found
