@@ -154,7 +154,7 @@ def test_decay_per_cell_is_the_imaginary_phase(shaken):
     np.testing.assert_allclose(found.decay[inside], decay(f[inside]), rtol=0.02)
     waves = attenuation(pair, f[inside], count=8)
     off = np.abs(waves.phase.values.imag / decay(f[inside])[:, None] - 1.0)
-    assert np.nanmin(off, axis=1).max() < 2e-3  # others slide sideways
+    assert off.min(axis=1).max() < 5e-3  # the other waves slide sideways
     assert np.abs(found.decay[f < 0.9 * low]).max() < 0.05
 
 

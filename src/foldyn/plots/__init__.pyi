@@ -41,6 +41,7 @@ from foldyn.plots.readings import (
 )
 from foldyn.plots.space_time import (
     plot_space_time as plot_space_time,
+    plot_transmission as plot_transmission,
     plot_wave_spectrum as plot_wave_spectrum,
 )
 from foldyn.plots.structure import draw_structure as draw_structure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from foldyn.errors import InputError
 from foldyn.linear.cell_motions import space_time
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.plots import style
-from foldyn.plots.given import alone
+from foldyn.plots.given import alone, by_label
 from foldyn.values import choice, number
 
 SIGNED = LinearSegmentedColormap.from_list(
@@ -153,6 +154,63 @@ def plot_wave_spectrum(
     axes.set_xlim(-np.pi, np.pi)
     axes.set_xticks([-np.pi, 0.0, np.pi], ["-π", "0", "π"])
     axes.set_ylim(0.0, top)
+    return style.finish(figure, keys)
+
+
+def plot_transmission(
+    transmissions: xr.Dataset | Mapping[str, xr.Dataset],
+    attenuation: xr.Dataset | None = None,
+    title: str = "",
+) -> Figure:
+    """Draw what reaches the end of a chain, and its decay from cell to cell beside the bands'.
+
+    Parameters
+    ----------
+    transmissions : xarray.Dataset, or mapping of str to xarray.Dataset
+        From `foldyn.linear.transmission`, one or several by their labels.
+    attenuation : xarray.Dataset, optional
+        From `foldyn.linear.attenuation`.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Response of the last cell over that of the first, and below it the decay (Np per cell) as
+        dots, with the attenuation of the waves of the repeated chain as lines, of which a drive
+        excites some.
+
+    Raises
+    ------
+    InputError
+        Not what these functions return.
+    """
+    shown = by_label("transmissions", transmissions)
+    for label, one in shown.items():
+        if "decay" not in one or "ratio" not in one:
+            where = f"transmissions[{label!r}]" if label else "transmissions"
+            raise InputError(": give what foldyn.linear.transmission returns", where)
+    labels = ["last cell over first", "decay (Np per cell)"]
+    figure, (upper, lower) = style.rows((6.8, 5.0), title, "frequency (Hz)", labels)
+    keys = []
+    top = max(float(np.nanmax(one["decay"].values, initial=0.0)) for one in shown.values())
+    for k, (label, one) in enumerate(shown.items()):
+        look = style.line_style(k)
+        upper.semilogy(one["frequency"].values, one["ratio"].values, **look)
+        dots = style.ring(look["color"], 3.5)
+        lower.plot(one["frequency"].values, one["decay"].values, **dots)
+        keys.append(style.key(label or "chain", **look | dots | {"linestyle": "solid"}))
+    if attenuation is not None:
+        if "phase" not in alone("attenuation", attenuation):
+            raise InputError(": give what foldyn.linear.attenuation returns", "attenuation")
+        phase = np.asarray(attenuation["phase"].values, complex)
+        waves = np.sort(np.where(np.isnan(phase), np.inf, np.imag(phase)), axis=1)
+        look = {"color": style.GRAY, "linewidth": 1.0, "zorder": 1.5}
+        lower.plot(
+            attenuation["frequency"].values, np.where(np.isinf(waves), np.nan, waves), **look
+        )
+        keys.append(style.key("waves of the repeated chain", **look))
+    lower.set_ylim(-0.05 * top, 1.25 * top or 1.0)
     return style.finish(figure, keys)
 
 
