@@ -262,9 +262,7 @@ def _steps(vectors: Any) -> NDArray[np.float64]:
     return array
 
 
-def check_commuting(
-    vertices: NDArray, motions: Sequence[Screw], near: float, field: str
-) -> None:
+def check_commuting(vertices: NDArray, motions: Sequence[Screw], near: float, field: str) -> None:
     """Refuse two motions that lead to different places in different orders."""
     if len(motions) < 2:
         return
