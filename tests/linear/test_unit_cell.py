@@ -148,9 +148,10 @@ def test_vertices_without_partners_are_named():
         cell_of(bent)
     with pytest.raises(InputError, match=r"vertices 1 have no partner under motion 0"):
         cell_of(bent.changed(periods=()), vectors=miura().vectors[:1])
-    flasher = fd.patterns.flasher(rings=1).scaled(0.03)
+    ring = 0.03 * np.exp(2j * np.pi / 5.0 * np.arange(5))
+    pentagon = fd.Pattern(np.column_stack([ring.real, ring.imag]), [range(5)])
     with pytest.raises(InputError, match="does not say how it repeats"):
-        cell_of(flasher)
+        cell_of(pentagon)
 
 
 def test_states_that_do_not_repeat_name_nodes():
