@@ -20,7 +20,7 @@ from foldyn.values import number
 ROOT = Path(__file__).resolve().parents[1]
 # section, the new name there, one that exists, and what mentions that in code
 EXISTING = {
-    "A pattern": ("hypar", "eggbox", r"\beggbox\b"),
+    "A pattern": ("hypar", "yoshimura", r"\byoshimura\b"),
     "A mass rule": ("", "", r"(def|import|:) centroid\b"),
     "A history": ("", "", r"\b(Chirp|CHIRP)\b"),
     "An integrator": ("leapfrog", "central_difference", r'(?<!")\bcentral_difference\b(?!")'),

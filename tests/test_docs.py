@@ -177,6 +177,17 @@ def test_compress_release_vibrate_of_the_statics_page():
     assert top.min() < -0.002  # it springs back beyond its height
 
 
+def test_the_page_on_waves_in_chains_follows_an_impact(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = executed(*blocks("wave-chains.md", "python"))
+    assert names["rarefaction"].amplitude[0] > 0.0 > names["compression"].amplitude[0]
+    assert np.abs(names["turn"].displacement).max() > 0.1  # rad
+    assert len(names["quiet"].supports) > len(names["case"].supports)
+    np.testing.assert_allclose(names["waves"].speeds[0], 45.4, rtol=1e-3)
+    assert names["passed"].ratio[-1] < 1e-6 * names["passed"].ratio.max()
+    assert {path.stem for path in tmp_path.iterdir()} == {"strain", "spectrum", "transmission"}
+
+
 def test_the_folding_page_folds_a_pattern_and_computes_its_modes():
     names = executed(*blocks("folding.md", "python"))
     assert names["folding"].kind == "rigid"

@@ -120,6 +120,16 @@ def fidelity(found):
     assert "use it" in result.advice
 
 
+def kresling_chain(found):
+    """The rarefaction is the faster one and leads from the middle on; the end absorbs energy."""
+    strain, motion = found["strain"], found["motion"]
+    pressed, pulled = (fd.signals.pulse(motion.time, strain, sign, 0.85) for sign in (-1, 1))
+    assert pulled.speed > 1.1 * pressed.speed
+    assert (pulled.arrival < pressed.arrival)[25:35].mean() > 0.8
+    assert motion.attrs["energy_error"] < 1e-3
+    assert float(motion.dissipated[-1]) > 0.0
+
+
 def point_mass(found):
     """f = sqrt(k / (M + c m)) / 2 pi: one k and one c for all weights, peaks at the frequencies."""
     line = 1.0 / np.sqrt(found["slope"] * found["added"] + found["start"])
@@ -166,7 +176,7 @@ def thick_panel(found):
 
 CHECKS = (
     bilayer, case_study_1, clamped, contact_tower, crane, deployment, design_frequencies,
-    design_kresling, design_miura, fidelity, point_mass,
+    design_kresling, design_miura, fidelity, kresling_chain, point_mass,
     pressure, snap_through, sweep, thick_panel,
 )  # fmt: skip
 

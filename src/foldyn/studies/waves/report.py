@@ -14,7 +14,7 @@ from foldyn.plots import style
 from foldyn.plots.space_time import drawn_cells, plot_wave_spectrum
 from foldyn.report import Heading, Section, Table, Text, write_report
 from foldyn.report.album import Album
-from foldyn.signals import sampling_interval, wavenumber_spectrum
+from foldyn.signals import Pulse, sampling_interval, wavenumber_spectrum
 from foldyn.studies.waves import kresling, sheets
 from foldyn.studies.waves.study import FULL, Study
 
@@ -179,7 +179,7 @@ def _middle(passed: kresling.Overtaking) -> slice:
     return slice(int(FROM * count), int(TO * count))
 
 
-def _of(pulse: Any, cells: slice) -> tuple[float, float]:
+def _of(pulse: Pulse, cells: slice) -> tuple[float, float]:
     return (
         float(np.nanmedian(pulse.amplitude[cells])),
         1e3 * float(np.nanmedian(pulse.width[cells])),
@@ -212,9 +212,22 @@ def verdict(hit: xarray.Dataset, passed: kresling.Overtaking) -> str:
         f"compression {100 * pressed:.2g} %.\n\n"
         "What differs from the words of the paper's abstract: the latter part of the chain does "
         "not feel tension first. Weak dispersive ripples of both signs, and a precursor on the "
-        "fast branch, arrive before; the rarefaction leads among the high peaks.\n\n"
+        "fast branch, arrive before; the rarefaction leads among the high peaks. Nor is it a "
+        f"solitary wave of one form here: {_form(rare)}.\n\n"
         f"Energy is balanced to {hit.attrs['energy_error']:.1g} of the energies at play, the "
         f"momentum along the chain changes by {np.ptp(momentum) / abs(momentum[0]):.1g} of itself."
+    )
+
+
+def _form(rare: Pulse) -> str:
+    """How the rarefaction changes on its way."""
+    count = len(rare.arrival) / kresling.UNTIL
+    parts = [slice(int(a * count), int(b * count)) for a, b in ((0.15, 0.3), (0.6, 0.75))]
+    (early, narrow), (late, wide) = (_of(rare, part) for part in parts)
+    return (
+        f"its peak goes from {100 * early:.2g} % of strain in cells {parts[0].start} to "
+        f"{parts[0].stop} to {100 * late:.2g} % in cells {parts[1].start} to {parts[1].stop}, its "
+        f"width from {narrow:.2g} to {wide:.2g} ms"
     )
 
 
