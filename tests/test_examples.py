@@ -121,11 +121,11 @@ def fidelity(found):
 
 
 def kresling_chain(found):
-    """The rarefaction is the faster one and leads from the middle on; the end absorbs energy."""
+    """The rarefaction is the faster one and leads at last; the end absorbs energy."""
     strain, motion = found["strain"], found["motion"]
     pressed, pulled = (fd.signals.pulse(motion.time, strain, sign, 0.85) for sign in (-1, 1))
     assert pulled.speed > 1.1 * pressed.speed
-    assert (pulled.arrival < pressed.arrival)[25:35].mean() > 0.8
+    assert (pulled.arrival < pressed.arrival)[40:].mean() > 0.8
     assert motion.attrs["energy_error"] < 1e-3
     assert float(motion.dissipated[-1]) > 0.0
 

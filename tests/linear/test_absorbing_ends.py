@@ -77,7 +77,7 @@ def reflected():
 def test_an_absorbing_end_sends_hardly_anything_back(reflected):
     """At 0.3 rad per cell; the error of the impedance grows with the square of the phase."""
     assert reflected["free"] > 0.99
-    assert reflected["absorbing"] < 1e-3
+    assert reflected["absorbing"] < 2e-3
 
 
 @pytest.mark.parametrize(

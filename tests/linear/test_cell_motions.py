@@ -166,6 +166,25 @@ def test_rows_of_incomplete_cells_are_left_out():
     np.testing.assert_allclose(steps, np.broadcast_to(found.motion.vector, steps.shape), atol=1e-12)
 
 
+def test_cells_of_a_ring_are_found_and_do_not_advance():
+    """A sixth of a storey, which a turn repeats; here the whole storey moves outward."""
+    storey = fd.patterns.kresling(6, 0.05, 0.05, 20.0)
+    faces = [face for face in storey.faces if set(face) <= {0, 1, 6, 7}]
+    part = fd.Pattern(storey.vertices[[0, 1, 6, 7]], [[f % 6 + f // 6 * 2 for f in face]
+                                                    for face in faces])  # fmt: skip
+    one = fd.UnitCell(
+        fd.Case(fd.discretize(part, SHEET)), screw=fd.Screw("z", angle=60.0, shift=0.0)
+    )
+    nodes = storey.vertices
+    moved = np.zeros((4, *nodes.shape))
+    moved[1:, :, :2] = 0.1 * nodes[:, :2]
+    run = motion(nodes, moved, moved, np.arange(4.0))
+    found = space_time(run, one, "x")
+    assert found.sizes["cell"] == 6
+    assert "strain" not in found
+    np.testing.assert_allclose(found.displacement[1], float(found.displacement[1, 0]), rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [

@@ -68,12 +68,15 @@ def cells_of(positions: NDArray, cell: UnitCell, along: int = 0) -> Cells:
     near = cell.tolerance * float(np.ptp(positions, axis=0).max())
     distance, partner = cKDTree(positions).query(motion.images(positions))
     following = np.where(distance <= near, partner, -1)
-    rows = []
-    for node in np.setdiff1d(np.arange(len(positions)), following):
-        row = [int(node)]
-        while following[row[-1]] >= 0 and following[row[-1]] != node:
-            row.append(int(following[row[-1]]))
-        rows.append(row)
+    rows, left = [], np.ones(len(positions), bool)
+    starts = np.setdiff1d(np.arange(len(positions)), following)
+    for node in (*starts, *range(len(positions))):  # the latter lie on rings, which have no ends
+        if left[node]:
+            row = [int(node)]
+            while (after := int(following[row[-1]])) >= 0 and after != node:
+                row.append(after)
+            left[row] = False
+            rows.append(row)
     longest = max(map(len, rows), default=0)
     if longest < FEWEST:
         raise InputError(

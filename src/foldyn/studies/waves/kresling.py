@@ -58,12 +58,12 @@ class Unit:
     """
 
     radius: float = 0.05
-    height: float = 0.05
+    height: float = 0.04
     twist: float = 45.0
     youngs_modulus: float = 1.25e6
     thickness: float = 1e-3
     density: float = 140.0
-    crease: float = 0.03
+    crease: float = 0.01
     plate_mass: float = 0.02
     plate_stiffness: float = 3e4
 

@@ -40,7 +40,7 @@ class Plan:
     dihedrals: int = 31
     phases: int = 81
     cells: int = 80
-    velocity: float = 1.3
+    velocity: float = 0.8
     unit: kresling.Unit = field(default_factory=kresling.Unit)
 
     @property
@@ -51,7 +51,7 @@ class Plan:
 
 
 FULL = Plan()
-QUICK = Plan(dihedrals=7, phases=31, cells=48)
+QUICK = Plan(dihedrals=7, phases=31, cells=60)
 
 
 @dataclass(frozen=True)
