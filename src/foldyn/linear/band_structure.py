@@ -98,7 +98,7 @@ def bands(
     --------
     >>> import foldyn as fd
     >>> sheet = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3, density=1000.0)
-    >>> pattern = fd.patterns.eggbox(a=0.03, b=0.03)
+    >>> pattern = fd.patterns.miura(a=0.03, b=0.03)
     >>> cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet)))
     >>> b = fd.bands(cell, cell.path("G-X-M-G", 12), count=4)
     >>> dict(b.frequency.sizes)

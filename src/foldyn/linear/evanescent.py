@@ -89,7 +89,7 @@ def attenuation(
     >>> sheet = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3, density=1000.0)
     >>> pattern = fd.patterns.miura(a=0.03, b=0.03)
     >>> cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet)))
-    >>> found = fd.linear.attenuation(cell, [800.0, 1200.0], phase=3.14159)
+    >>> found = fd.linear.attenuation(cell, [1700.0, 1200.0], phase=3.14159)
     >>> (found.attenuation > 0.01).values.tolist()
     [False, True]
     """
