@@ -286,3 +286,15 @@ def test_a_law_of_single_bars_has_single_bars():
     assert fd.discretize(pattern, RUBBER, bar_law="ogden").options.membrane == "bars"
     assert fd.discretize(pattern, RUBBER, membrane="bars").bar_law.name == "ogden"
     assert fd.discretize(pattern, RUBBER, bar_law="linear").options.membrane == "panel"
+
+
+def test_stiffness_follows_the_length_without_jumps():
+    """The slope is the same by steps of 1e-3 and 1e-4, which waves that come in whole would break."""
+    pattern = fd.patterns.miura(panel_angle=62.0)
+
+    def first(thickness: float) -> float:
+        made = fd.discretize(pattern, fd.Sheet(1e6, 0.25, thickness, 1.0), preset="n5b8e")
+        return np.log(fd.modes(fd.Case(made, [fd.Fix("xmin")]), 1)["frequency"].item())
+
+    slopes = [(first(0.03 * (1 + h)) - first(0.03 * (1 - h))) / (2 * h) for h in (1e-3, 3e-4, 1e-4)]
+    assert np.ptp(slopes) < 3e-6 * slopes[0]
