@@ -34,7 +34,6 @@ COARSE, FINE = 4, 8  # pieces of each edge in the two meshes; twice as many in t
 RAYS = 2  # of a graded mesh, in half a corner
 STIFF = 1e3  # times as stiff as the rest: rigid corners
 WAVES = 2.0  # in a bow of an edge, for each of its radii
-TIE = 1e-6  # of a wave: panels alike but for rounding have as many
 MIDDLES = 0.5 * (np.ones((3, 3)) - np.eye(3))  # of the sides: three points integrate exactly
 
 
@@ -179,10 +178,15 @@ def _bowing(mesh: PanelMesh, edge: int, resistance: float) -> NDArray:
         wave = np.pi / length * np.arange(1, len(points) + 1)
         shapes = 2.0 / (len(points) + 1) * np.sin(np.outer(wave, place))
     else:  # of bows that are linear between the points
-        wave = np.pi / length * np.arange(1, int(WAVES * length / mesh.radius + TIE))
+        count = WAVES * length / mesh.radius
+        number = np.arange(1, int(np.ceil(1.5 * count)))
+        wave = np.pi / length * number
         at = np.concatenate([[0.0], place, [length]])
         slopes = np.diff(np.sin(np.outer(wave, at)), axis=1) / np.diff(at)
         shapes = -2.0 / length * np.diff(slopes, axis=1) / wave[:, None] ** 2
+        # the shortest ones fade, as a last whole wave would make the stiffness jump with the length
+        part = np.clip(1.5 - number / count, 0.0, 1.0)
+        resistance = resistance * part**2 * (3.0 - 2.0 * part)
     return (shapes.T * (resistance * wave**3 * 0.5 * length)) @ shapes
 
 

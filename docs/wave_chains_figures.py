@@ -1,9 +1,9 @@
 """Figures of the page on waves in chains, from a full study.
 
     foldyn study waves --out FOLDER
-    python docs/waves_figures.py FOLDER
+    python docs/wave_chains_figures.py FOLDER
 
-writes images/waves-*.png. The first figure of the page is that of examples/kresling_chain.py.
+writes images/wave-chains-*.png. The first figure of the page is that of examples/kresling_chain.py.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def main(folder: Path) -> None:
         with Image.open(folder / f"{name}.png") as picture:
             picture.thumbnail((WIDTH, WIDTH))
             picture.convert("P", palette=Image.Palette.ADAPTIVE).save(
-                IMAGES / f"waves-{name}.png", optimize=True
+                IMAGES / f"wave-chains-{name}.png", optimize=True
             )
     case = paired(PAIRS, 2 * PAIRS + 1)
     held = Case(case.structure, [Fix(range(SIDES)), *case.supports[3:]], masses=case.masses)
@@ -48,7 +48,7 @@ def main(folder: Path) -> None:
     cell = UnitCell(paired(1, 2))
     passed = transmission(frf(held, BaseMotion("z"), frequencies), cell)
     figure = plots.plot_transmission(passed, attenuation(cell, frequencies))
-    figure.savefig(IMAGES / "waves-transmission.png", dpi=100)
+    figure.savefig(IMAGES / "wave-chains-transmission.png", dpi=100)
 
 
 if __name__ == "__main__":
