@@ -180,7 +180,7 @@ def test_compress_release_vibrate_of_the_statics_page():
 def test_the_page_on_waves_in_chains_follows_an_impact(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = executed(*blocks("wave-chains.md", "python"))
-    assert names["rarefaction"].amplitude[0] > 0.0 > names["compression"].amplitude[0]
+    assert names["rarefaction"].peak[0] > 0.0 > names["compression"].peak[0]
     assert np.abs(names["turn"].displacement).max() > 0.1  # rad
     assert len(names["quiet"].supports) > len(names["case"].supports)
     np.testing.assert_allclose(names["waves"].speeds[0], 39.6, rtol=1e-3)

@@ -55,7 +55,7 @@ def test_a_pulse_has_its_arrival_height_width_and_speed(sign):
     later = 0.9 * np.exp(-(((time[:, None] - center - 0.8) / 0.1) ** 2))  # as an echo
     found = pulse(time, sign * size * (first + later), sign)
     np.testing.assert_allclose(found.arrival, center, atol=1e-5)
-    np.testing.assert_allclose(found.amplitude, sign * size, rtol=1e-5)
+    np.testing.assert_allclose(found.peak, sign * size, rtol=1e-5)
     np.testing.assert_allclose(found.width, 0.2 * np.sqrt(np.log(2.0)), rtol=1e-3)
     assert found.speed == pytest.approx(8.0, rel=1e-4)
 

@@ -62,10 +62,10 @@ def test_a_rarefaction_overtakes_the_compression(impacts):
     assert 25 < hit.cell < 40
     assert hit.share > 0.6
     assert slow < hit.rarefaction.speed < 1.1 * slow
-    height, width = hit.rarefaction.amplitude, hit.rarefaction.width
+    height, width = hit.rarefaction.peak, hit.rarefaction.width
     for early, late in ((each[20:25].mean(), each[40:45].mean()) for each in (height, width)):
         assert late == pytest.approx(early, rel=0.15)  # it keeps its form
-    assert height[20:45].min() > 1.5 * -np.median(hit.compression.amplitude[20:45])
+    assert height[20:45].min() > 1.5 * -np.median(hit.compression.peak[20:45])
     small = kresling.overtaking(impacts[1e-3])
     assert (small.rarefaction.arrival > small.compression.arrival)[2:20].all()
     verdict = report.verdict(impacts[1.0], hit)

@@ -22,10 +22,10 @@ from foldyn.arguments import Check, Checked
 from foldyn.cases import Case, Dashpot, State
 from foldyn.cases.selection import Nodes, resolve_nodes
 from foldyn.errors import ComputationError, InputError
-from foldyn.linear.band_structure import Solver
 from foldyn.linear.bloch import Bloch, null_space
 from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.unit_cell import UnitCell
+from foldyn.linear.wave_solver import WaveSolver
 from foldyn.values import numbers, of_kind, vector, whole
 
 PHASE = 1e-3  # rad per cell: a long wave
@@ -141,7 +141,7 @@ def long_waves(cell: UnitCell, state: State | None = None, along: int = 0) -> Lo
     basis[: 3 * linear.nodes] = rigid.reshape(-1, rigid.shape[2])
     momenta = linear.bloch.mass.sparse_at(linear.bloch.factors(0.0 * phase)).real @ basis
     mass = basis.T @ momenta
-    waves = Solver(linear.bloch, _lowest(linear.bloch, phase)).waves(phase)
+    waves = WaveSolver(linear.bloch, _lowest(linear.bloch, phase)).waves(phase)
     parts = momenta.T @ waves.shapes
     share = np.einsum("ij,ij->j", parts.conj(), np.linalg.solve(mass, parts)).real
     chosen = np.flatnonzero(share > LEAST)[: len(mass)]
@@ -227,7 +227,7 @@ def _rigid(points: NDArray, axis: NDArray, center: NDArray, turns: bool) -> NDAr
 
 def _lowest(bloch: Bloch, phase: NDArray) -> int:
     """How many waves are looked at, with long ones among them: those that there are at most."""
-    free = Solver(bloch, 1).free
+    free = WaveSolver(bloch, 1).free
     if bloch.ties.empty:
         return min(LOOKED_AT, len(free))
     return min(LOOKED_AT, null_space(bloch.ties.at(bloch.factors(phase))[:, free]).shape[1])

@@ -98,8 +98,8 @@ class Pulse(NamedTuple):
     ----------
     arrival : ndarray, shape (n,)
         Time of its peak in each cell; nan where it does not come.
-    amplitude : ndarray, shape (n,)
-        Value at the peak, with its sign.
+    peak : ndarray, shape (n,)
+        Value at its peak, with its sign.
     width : ndarray, shape (n,)
         Time for which it exceeds half of that around the peak; nan if the record ends before.
     speed : float
@@ -108,7 +108,7 @@ class Pulse(NamedTuple):
     """
 
     arrival: NDArray[np.float64]
-    amplitude: NDArray[np.float64]
+    peak: NDArray[np.float64]
     width: NDArray[np.float64]
     speed: float
 
@@ -150,7 +150,7 @@ def pulse(time: ArrayLike, values: ArrayLike, sign: int = 1, share: float = 0.5)
     >>> from foldyn.signals import pulse
     >>> t, n = np.linspace(0.0, 3.0, 301)[:, None], np.arange(5)
     >>> found = pulse(t[:, 0], -np.exp(-(((t - 0.5 - 0.25 * n) / 0.1) ** 2)), sign=-1)
-    >>> round(found.speed, 6), found.amplitude.round(6).tolist()
+    >>> round(found.speed, 6), found.peak.round(6).tolist()
     (4.0, [-1.0, -1.0, -1.0, -1.0, -1.0])
     """
     from scipy.stats import theilslopes
@@ -165,11 +165,11 @@ def pulse(time: ArrayLike, values: ArrayLike, sign: int = 1, share: float = 0.5)
         raise InputError(f"sign = {sign!r}: must be 1 or -1")
     number("share", share, least=0.0, most=1.0)
     found = np.array([_first_peak(moments, sign * each, share) for each in field.T])
-    arrival, amplitude, width = found.reshape(-1, 3).T
+    arrival, height, width = found.reshape(-1, 3).T
     come = np.flatnonzero(np.isfinite(arrival))
     slope = theilslopes(arrival[come], come)[0] if len(come) > 2 else np.nan
     speed = 1.0 / slope if slope else np.nan
-    return Pulse(arrival, sign * amplitude, width, float(speed))
+    return Pulse(arrival, sign * height, width, float(speed))
 
 
 def _first_peak(time: NDArray, values: NDArray, share: float) -> tuple[float, float, float]:

@@ -182,7 +182,7 @@ def _middle(passed: kresling.Overtaking) -> slice:
 
 def _of(pulse: Pulse, cells: slice) -> tuple[float, float]:
     return (
-        float(np.nanmedian(pulse.amplitude[cells])),
+        float(np.nanmedian(pulse.peak[cells])),
         1e3 * float(np.nanmedian(pulse.width[cells])),
     )
 
@@ -244,10 +244,10 @@ def _plot_arrivals(passed: kresling.Overtaking) -> Figure:
     ):
         look = {"color": color, "marker": ".", "linestyle": "none", "label": label}
         keys += upper.plot(pulse.arrival, **look)
-        lower.plot(np.abs(pulse.amplitude), **look)
+        lower.plot(np.abs(pulse.peak), **look)
     look = {"color": style.GRAY, "linestyle": "dashed", "linewidth": 0.9}
     upper.axvline(passed.cell, **look)
-    top = np.nanquantile(np.abs(passed.compression.amplitude), 0.95)
+    top = np.nanquantile(np.abs(passed.compression.peak), 0.95)
     lower.set_ylim(0.0, 1.5 * top)
     return style.finish(figure, [*keys, style.key("overtaking", **look)])
 
