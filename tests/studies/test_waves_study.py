@@ -71,6 +71,8 @@ def test_a_rarefaction_overtakes_the_compression(impacts):
     verdict = report.verdict(impacts[1.0], hit)
     assert "What happens agrees with the paper" in verdict
     assert "It keeps its form" in verdict
+    assert hit.before < 0.6  # less than the compression where it starts
+    assert hit.before < small.before
     assert "does not agree" in report.verdict(impacts[1e-3], small)
 
 

@@ -209,12 +209,16 @@ class Overtaking:
         Which parts those where compression peaks first from those where tension does, best.
     share : float
         Of the cells from there on in which tension does.
+    before : float
+        Largest compression that a cell feels before its highest tension, over that tension: median
+        of the last third.
     """
 
     compression: Pulse
     rarefaction: Pulse
     cell: int
     share: float
+    before: float
 
 
 def overtaking(found: xarray.Dataset) -> Overtaking:
@@ -226,4 +230,10 @@ def overtaking(found: xarray.Dataset) -> Overtaking:
     ahead = pulled.arrival < pressed.arrival
     wrong = [int(ahead[:k].sum() + (~ahead[k:]).sum()) for k in range(last + 1)]
     cell = int(np.argmin(wrong))
-    return Overtaking(pressed, pulled, cell, float(ahead[cell:].mean()) if cell < last else 0.0)
+    before = [
+        -strain[: int(np.searchsorted(time, pulled.arrival[k])) + 1, k].min() / pulled.peak[k]
+        for k in range(2 * last // 3, last)
+        if np.isfinite(pulled.arrival[k])
+    ]
+    share = float(ahead[cell:].mean()) if cell < last else 0.0
+    return Overtaking(pressed, pulled, cell, share, float(np.median(before)) if before else np.nan)
