@@ -24,7 +24,9 @@ from foldyn.errors import InputError
 from foldyn.linear.bloch import Bloch
 from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.unit_cell import UnitCell
+from foldyn.results.dataset import result_dataset
 from foldyn.values import number, numbers, whole
+from foldyn.workers import in_threads
 
 if TYPE_CHECKING:
     import xarray
@@ -93,8 +95,6 @@ def attenuation(
     >>> (found.attenuation > 0.01).values.tolist()
     [False, True]
     """
-    import xarray
-
     linear = linearize_cell(cell, state, secant, load_factor)
     wanted = np.atleast_1d(numbers("frequencies", frequencies))
     if wanted.ndim != 1 or not len(wanted) or (wanted <= 0.0).any():
@@ -115,26 +115,30 @@ def attenuation(
     ]
     ties = along(linear.bloch, linear.bloch.ties, direction, phase)
     kept = np.flatnonzero(~linear.bloch.held)
-    out = np.full((len(wanted), count), np.nan + 0j)
-    for row, omega in enumerate(TURN * wanted):
+
+    def waves(frequency: float) -> NDArray[np.complex128]:
+        """Phases (count,) of a frequency, Hz."""
+        omega = TURN * frequency
         stiffness, damping, mass = (each.blocks[:, kept[:, None], kept] for each in parts)
         dynamic = stiffness + 1j * omega * damping - omega**2 * mass
         blocks = _bordered(dynamic, ties.blocks[:, :, kept])
         found = phases_of(Reach(parts[0].steps, blocks), linear.bloch.ties.empty)
         found = _forward(found, both=phase == 0.0)[:count]
-        out[row, : len(found)] = found
+        return np.pad(found, (0, count - len(found)), constant_values=np.nan)
+
+    out = np.array(in_threads(waves, wanted))
     decay = np.imag(out)
     least = decay.min(axis=1, initial=FASTEST, where=~np.isnan(decay))
-    return xarray.Dataset(
-        {
-            "phase": (("frequency", "wave"), out, {"units": "rad"}),
-            "attenuation": (
-                "frequency", np.where(least <= TRAVELS, 0.0, least), {"units": "Np"},
-            ),
-        },
-        {"frequency": ("frequency", wanted, {"units": "Hz"}), "wave": 1 + np.arange(count)},
-        {"kind": "attenuation", "direction": direction, "other_phase": phase},
-    )  # fmt: skip
+    data: dict[str, Any] = {
+        "phase": (("frequency", "wave"), out, {"units": "rad"}),
+        "attenuation": ("frequency", np.where(least <= TRAVELS, 0.0, least), {"units": "Np"}),
+    }
+    run = {
+        "frequency": ("frequency", wanted, {"units": "Hz"}),
+        "wave": ("wave", 1 + np.arange(count)),
+    }
+    facts = {"count": count, "secant": secant, "direction": direction, "other_phase": phase}
+    return result_dataset("attenuation", cell.case, data | linear.variables, run, facts)
 
 
 def along(bloch: Bloch, matrix: Any, direction: int, phase: float) -> Reach:

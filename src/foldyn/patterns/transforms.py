@@ -267,7 +267,10 @@ def _still_at_the_rim(
     """Families of boundary edges without those that are none of other faces."""
     if not families:
         return None
-    count = Counter(edge_of(a, b) for face in faces for a, b in around(list(face)))
+    try:
+        count = Counter(edge_of(a, b) for face in faces for a, b in around(list(face)))
+    except (TypeError, IndexError):  # which `Pattern` refuses by name
+        return None
     return {
         name: [pair for pair in pairs.tolist() if count[pair[0], pair[1]] == 1]
         for name, pairs in families.items()

@@ -124,7 +124,7 @@ def _colored(along: np.ndarray, values: np.ndarray, shares: np.ndarray) -> LineC
     """Lines of bands (phase, band) in pieces from phase to phase, colored by shares."""
     points = np.stack([np.broadcast_to(along[:, None], values.shape), values], axis=-1)
     pieces = np.stack([points[:-1], points[1:]], axis=2).reshape(-1, 2, 2)
-    lines = LineCollection(pieces, cmap="viridis", linewidths=1.6, capstyle="round")
+    lines = LineCollection(list(pieces), cmap="viridis", linewidths=1.6, capstyle="round")
     lines.set_array(0.5 * (shares[:-1] + shares[1:]).ravel())
     lines.set_clim(0.0, 1.0)
     return lines
