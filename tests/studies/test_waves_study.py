@@ -98,17 +98,20 @@ def test_gaps_of_sheets_depend_on_their_fold_state():
 
 
 @pytest.mark.matrix
-def test_the_study_writes_its_page_and_goes_on(tmp_path):
-    study = Study(Plan(dihedrals=2, phases=13, cells=24), tmp_path)
-    done = study.compute(processes=1)
-    assert [each.failure for each in done] == [""] * study.count
-    page = report.write(study).read_text("utf-8")
+def test_the_study_writes_its_page_and_goes_on(tmp_path, monkeypatch, capsys):
+    plan = Plan(dihedrals=2, phases=13, cells=24)
+    monkeypatch.setattr(studies, "QUICK", plan)
+    monkeypatch.setattr("foldyn.cli.study.PROCESSES", 1)
+    command = ["study", "waves", "--quick", "--out", str(tmp_path / "out")]
+    assert main(command) == 0
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
     for words in ("a coarse run", "two degrees of freedom", "Miura sheet", "eggbox sheet"):
         assert words in page
-    assert all(each.skipped for each in study.compute(processes=1))
-    other = Study(replace(study.plan, velocity=1.0), tmp_path)
-    assert other.result("impact") is None
+    assert main(command) == 0
+    assert "skipped 5 of 5 runs" in capsys.readouterr().out
+    study = Study(plan, tmp_path / "out")
     assert study.result("impact") is not None
+    assert Study(replace(plan, velocity=1.0), study.folder).result("impact") is None
 
 
 def test_options_of_another_study_are_refused(tmp_path, capsys):
