@@ -137,8 +137,7 @@ def two_dof_frequencies(unit: LongWaves, phases: NDArray) -> NDArray[np.float64]
 def guided(found: xarray.Dataset) -> NDArray[np.float64]:
     """Frequencies (n, 2), Hz, of the bands in which plates move along the axis and turn about it.
 
-    The others slide sideways: their share of the motion is the same along x and y as in these, but
-    nothing of it lies along z, nor is it a rotation.
+    In the other ones plates slide sideways, and their corners have a mean motion along x or y.
     """
     shapes = found["shape"].values[:, :, :SIDES]
     sideways = np.abs(shapes.mean(axis=2)[..., :2]).sum(axis=-1)
