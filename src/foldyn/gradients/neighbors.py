@@ -9,29 +9,37 @@ bars are strained by what is of second order in the motion, and they are far sti
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from scipy import sparse
 from xarray import Variable
 
+from foldyn.algebra.complex_symmetric import solved
 from foldyn.algebra.superlu import PIVOT, factorize
 from foldyn.cases import Case
+from foldyn.dynamics.companions import Accompanied, Companion
+from foldyn.dynamics.initial import begin, check_start
+from foldyn.dynamics.motion import Motion
+from foldyn.dynamics.motion_state import Course
+from foldyn.dynamics.system import pack
+from foldyn.dynamics.timing import jumps
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.excitation import absolute, drive_of, drive_terms
 from foldyn.linear.frequency_domain import dynamic_stiffness
 from foldyn.linear.linearized import Linearized, linearize
+from foldyn.linear.modes import Found
 from foldyn.statics.equilibrium import OrigamiProblem
-
-if TYPE_CHECKING:
-    import xarray
 
 GAINED = 1e-6  # of the first step: the size of the last one
 ROUNDING = 1e-14  # of the whole: a step that is none
 ENOUGH, STALLED = 1e-4, 1e-8  # of the first step, and of the whole: what rounding may leave
 ROUNDS = 12
 TURN = 2.0 * np.pi
+ALONG = ("newmark", "generalized_alpha")
+"""Methods along whose steps neighbors go."""
 NONE = "there is no neighbor of"
 
 
@@ -125,12 +133,50 @@ def _balanced(problem: OrigamiProblem, x: NDArray, factor: float, factored: Any)
     return x
 
 
+# ------------------------------------------------------------------ motions
+def motions(
+    motion: Motion, one: Asked, others: Sequence[Asked], share: float
+) -> list[NDArray[np.float64]]:
+    """Displacements (k, n, 3) of other cases at the samples of a motion, which is computed.
+
+    share : change of a difference between motions, in itself, at which a step has found it.
+    """
+    case, state, lasting = motion.case, one.arguments.get("initial"), ("initial", "sample")
+    lacks = (
+        motion.method.name not in ALONG, not motion.plan.steps, motion.continues, case.contact,
+        case.remembering, motion.packed.system.turns, motion.device != "cpu",
+    )  # fmt: skip
+    if any(lacks):
+        raise InputError(f"{NONE} a motion of this kind")
+    given = {name: value for name, value in one.arguments.items() if name not in lasting}
+    beside = []
+    for other in others:
+        if given != {name: value for name, value in other.arguments.items() if name in given}:
+            raise InputError(f"{NONE} a motion with other steps")
+        start = check_start(other.case, state)
+        packed = pack(other.case, motion.packed.system.waves.span, start[0])
+        if not np.array_equal(packed.numbering.order, motion.packed.numbering.order):
+            raise InputError(f"{NONE} a motion whose nodes are numbered otherwise")
+        course = begin(other.case, *start, None, None, motion.plan, packed)
+        beside.append(Companion(packed, course))
+    engines: list[Accompanied] = []
+
+    def engine_of(course: Course) -> Accompanied:
+        made = motion.method.scheme, motion.packed, course, motion.plan, jumps(case)
+        engines.append(Accompanied(*made, beside, share))
+        return engines[-1]
+
+    motion.integrate(engine_of=engine_of)
+    for packed, _ in beside:
+        if packed.callbacks.error is not None:
+            raise ComputationError(f"{NONE} this motion: {packed.callbacks.error}")
+    return [np.array(found) for found in engines[-1].displacement]
+
+
 # ------------------------------------------------------------------ modes
-def modes(
-    one: Asked, result: xarray.Dataset, others: Sequence[Asked], wanted: Sequence[int]
-) -> list[Any]:
-    """Modes of other cases beside some modes of a result, those with the places `wanted`."""
-    linear, *beside = (_linear(each) for each in (one, *others))
+def modes(found: Found, others: Sequence[Asked], wanted: Sequence[int]) -> list[Any]:
+    """Modes of other cases beside some of those found, those with the places `wanted`."""
+    linear, result, beside = found.linear, found.result, [_linear(each) for each in others]
     frequency, eigenvalue, ratio = (
         [result[name].values.copy() for _ in others]
         for name in ("frequency", "eigenvalue", "damping_ratio")
@@ -199,45 +245,61 @@ def _vibrating(linear: Linearized, mode: NDArray, factored: Any) -> NDArray:
 
 
 # ------------------------------------------------------------------ frequency responses
-def responses(one: Asked, result: xarray.Dataset, others: Sequence[Asked]) -> list[Any]:
-    """Frequency responses of other cases beside that of one, by the direct method."""
+def responses(one: Asked, others: Sequence[Asked]) -> list[xarray.Dataset]:
+    """Frequency responses of a case by the direct method, and of other cases beside it.
+
+    Those are found by one step: what a case is linear in has no further ones to first order.
+    """
     if one.arguments["method"] != "direct":
         raise InputError(f"{NONE} a response by another method than the direct one")
-    linear, *beside = (_linear(each) for each in (one, *others))
-    if len(linear.modal):
-        raise InputError(f"{NONE} a response with modal damping")
-    drives = [
-        drive_of(each.case, each.arguments["drive"], each.arguments.get("amplitude", 1.0))
-        for each in (one, *others)
-    ]
-    terms = [drive_terms(each, drive) for each, drive in zip(beside, drives[1:], strict=True)]
-    hertz, name = result["frequency"].values, drives[0].quantity
-    found = np.zeros((len(others), len(hertz), len(linear.free)), np.complex128)
-    own = drive_terms(linear, drives[0])
+    cases = [_Driven(each) for each in (one, *others)]
+    first, *beside = cases
+    hertz = np.asarray(one.arguments["frequencies"], float)
+    found = np.full((len(cases), len(hertz), len(first.linear.free)), np.nan, np.complex128)
+    matrices = sparse.vstack([each.matrices for each in beside], format="csr")
     for k, omega in enumerate(TURN * hertz):
-        factored = factorize(dynamic_stiffness(linear, omega), pivot=PIVOT)
-        begin = factored.solve(_load(own, omega))
-        size = float(np.linalg.norm(begin))
-        for other, pushed, out in zip(beside, terms, found, strict=True):
-            out[k] = refined(begin, _corrected(other, _load(pushed, omega), omega, factored), size)
+        linear = first.linear
+        stiffness = dynamic_stiffness(linear, omega)
+        x, factors = solved(stiffness, first.load(omega), linear.gram, 1j * omega)
+        if factors is None:
+            continue
+        products = (matrices @ np.stack([x.real, x.imag], axis=1)) @ (1.0, 1.0j)
+        left = [
+            each.load(omega) - each.stiffened(part, x, omega)
+            for each, part in zip(beside, products.reshape(len(beside), 3, -1), strict=True)
+        ]
+        found[0, k], found[1:, k] = x, x + factors.solve(np.stack(left, axis=1)).T
+    named = {"frequency": hertz}
     return [
-        result.assign({name: (("frequency", "node", "axis"), absolute(each, drive, response))})
-        for each, drive, response in zip(beside, drives[1:], found, strict=True)
+        xarray.Dataset(
+            {each.drive.quantity: (("frequency", "node", "axis"), each.absolute(own))}, named
+        )
+        for each, own in zip(cases, found, strict=True)
     ]
 
 
-def _corrected(
-    linear: Linearized, load: NDArray, omega: float, factored: Any
-) -> Callable[[NDArray], NDArray]:
-    """Steps of a response at an angular frequency (rad/s), with the factors of another case."""
+class _Driven:
+    """A case linearized, and what drives it."""
 
-    def step_at(x: NDArray) -> NDArray:
-        damped = 1j * omega * (linear.damping @ x)
-        return factored.solve(load - linear.stiffness @ x + omega**2 * (linear.mass @ x) - damped)
+    def __init__(self, one: Asked) -> None:
+        self.linear = _linear(one)
+        self.drive = drive_of(one.case, one.arguments["drive"], one.arguments.get("amplitude", 1.0))
+        self._terms = drive_terms(self.linear, self.drive)
+        each = self.linear.stiffness, self.linear.damping, self.linear.mass
+        self.matrices = sparse.vstack(each, format="csr")
 
-    return step_at
+    def load(self, omega: float) -> NDArray[np.complex128]:
+        """Load (nf,) per unit of the drive at an angular frequency (rad/s)."""
+        parts = [term.shape * term.factor(omega) for term in self._terms]
+        return np.sum(parts, axis=0).astype(complex)
 
+    def stiffened(self, products: NDArray, x: NDArray, omega: float) -> NDArray:
+        """Dynamic stiffness times x (nf,), from the products (3, nf) of the matrices with it."""
+        elastic, damped, inertia = products
+        rows = self.linear.modal
+        damped = damped + rows.T @ (rows @ x) if len(rows) else damped
+        return elastic - omega**2 * inertia + 1j * omega * damped
 
-def _load(terms: Sequence[Any], omega: float) -> NDArray[np.complex128]:
-    """Load per unit of the drive at an angular frequency (rad/s)."""
-    return np.sum([term.shape * term.factor(omega) for term in terms], axis=0).astype(complex)
+    def absolute(self, response: NDArray) -> NDArray[np.complex128]:
+        """Response (f, n, 3) from that of the free dofs (f, nf)."""
+        return absolute(self.linear, self.drive, response)
