@@ -38,6 +38,8 @@ from foldyn.values import listed, show
 
 ASIDE = ("name", "label", "sigma", "held_out", "case", "force")
 """Fields of measurements that do not change what is predicted."""
+STRUCTURAL = "pattern", "sheet", "model", "supports"
+"""Tables of a case file of which its structure is made."""
 VIBRATIONS = ("modes", "frf")
 """Analyses whose results are looked at before a search."""
 MESH_ORDER = 2
@@ -141,7 +143,13 @@ class Problem:
             points.pop(tuple(values), None)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
-            one, *others = (self.case_file(run, point) for point in (values, *points.values()))
+            one = self.case_file(run, values)
+            others = [
+                one
+                if np.array_equal(each, values)
+                else self.case_file(run, each, Like(values, one))
+                for each in points.values()
+            ]
             members = run.those_of(self.measurements)
             result, found = with_neighbors(run, one, others, members, second)
         own = self._predicted(result, one, run.members)
@@ -151,16 +159,28 @@ class Problem:
         }
         return own, [(part, beside[tuple(part.point)]) for part in parts]
 
-    def case_file(self, run: PredictedRun, values: Sequence[float] | NDArray) -> CaseFile:
-        """Case file at given values; its warnings were given when it was checked."""
+    def case_file(
+        self, run: PredictedRun, values: Sequence[float] | NDArray, like: Like | None = None
+    ) -> CaseFile:
+        """Case file at given values; its warnings were given when it was checked.
+
+        like : one at other values, whose structure it takes where that is the same.
+        """
         changes = self.space.changes(values)
         fixed = HINGES not in run.document["pattern"] and not any(
             key.startswith("pattern") for key in changes
         )
+        pattern = run.patterns[0] if fixed and run.patterns else None
+        structures = None
+        if like is not None:
+            before = self.space.changes(like.values)
+            moved = [key for key, value in changes.items() if value != before[key]]
+            if not any(key.startswith(STRUCTURAL) for key in moved):
+                structures = like.case_file.structures
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
-            pattern = run.patterns[0] if fixed and run.patterns else None
-            made = case_of_document(run.path, replaced(run.document, changes), pattern=pattern)
+            document = replaced(run.document, changes)
+            made = case_of_document(run.path, document, pattern=pattern, structures=structures)
         if fixed and not run.patterns:
             run.patterns.append(made.pattern)
         return made
@@ -245,6 +265,13 @@ class Problem:
             for k, run in enumerate(self.runs)
         ]
         return replace(self, runs=tuple(runs))
+
+
+class Like(NamedTuple):
+    """A case file, and the values of the parameters that it is at."""
+
+    values: NDArray[np.float64]
+    case_file: CaseFile
 
 
 class Finer(NamedTuple):

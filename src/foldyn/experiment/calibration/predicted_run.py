@@ -28,7 +28,7 @@ from foldyn.values import show
 STEADY = "generalized_alpha"
 """Integrator of a fit where the case file leaves the choice open."""
 SHARES = 1e-4, 1e-6
-"""Change of a difference between motions, in itself, at which it is found: in a search, at its end."""
+"""Change of a difference of motions, in itself, at which it is found: in a search, at its end."""
 REFINED = "statics", "modes"
 """Analyses whose neighbors are found with fewer errors than the result: it is one of them, too."""
 MANY = 2000
@@ -56,8 +56,8 @@ class PredictedRun:
     path: Path
     document: dict[str, Any]
     members: tuple[int, ...]
-    patterns: list[Pattern] = field(init=False, repr=False, default_factory=list)
-    starts: list[State] = field(init=False, repr=False, default_factory=list)
+    patterns: list[Pattern] = field(repr=False, default_factory=list)
+    starts: list[State] = field(repr=False, default_factory=list)
 
     @property
     def kind(self) -> str:
