@@ -22,6 +22,7 @@ from foldyn.dynamics.generalized_alpha import Alpha, balanced, residual
 from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.newton import SAME_STEP
+from foldyn.dynamics.implicit.scheme import Scheme
 from foldyn.dynamics.motion_state import Course, Samples, StepPlan
 from foldyn.dynamics.system import Packed
 from foldyn.dynamics.ties import follow_masters
@@ -54,7 +55,7 @@ class Accompanied(Implicit):
 
     Attributes
     ----------
-    displacement : list of ndarray, each (k, n, 3)
+    displacement : list of list of ndarray (n, 3)
         That of each of the others at the samples, m.
     """
 
@@ -112,7 +113,7 @@ class _Beside:
         self._apart = np.zeros((3, *shape))  # differences of the last shifts, the last one first
         self._known, self._h, self._largest = 0, 0.0, 0.0
 
-    def follow(self, one: Alpha, matrix: StepMatrix, h: float, t: float) -> None:
+    def follow(self, one: Scheme, matrix: StepMatrix, h: float, t: float) -> None:
         """Take the step h (s) to the time t (s) that the one has taken."""
         scheme, apart = self.scheme, self._apart
         if abs(h - self._h) > SAME_STEP * h:
@@ -127,7 +128,7 @@ class _Beside:
         self._known = min(self._known + 1, 3)
         scheme.accept(h)
 
-    def _solve(self, one: Alpha, matrix: StepMatrix, h: float, t: float) -> int:
+    def _solve(self, one: Scheme, matrix: StepMatrix, h: float, t: float) -> int:
         scheme, least = self.scheme, FADED * self._largest
         if matrix.band is not None:
             given = scheme.context, one.shift, one.out, h, t, matrix.band, matrix.free

@@ -173,10 +173,11 @@ def motions(
         course = begin(other.case, *start, None, None, motion.plan, packed)
         beside.append(Companion(packed, course))
     engines: list[Accompanied] = []
+    scheme: Any = motion.method.scheme
+    steps = motion.plan, jumps(case)
 
     def engine_of(course: Course) -> Accompanied:
-        made = motion.method.scheme, motion.packed, course, motion.plan, jumps(case)
-        engines.append(Accompanied(*made, beside, share))
+        engines.append(Accompanied(scheme, motion.packed, course, *steps, beside, share))
         return engines[-1]
 
     motion.integrate(engine_of=engine_of)
@@ -305,7 +306,7 @@ def _left(
     beside: Sequence[_Driven], matrices: sparse.csr_array, omega: float, x: NDArray
 ) -> NDArray[np.complex128]:  # fmt: skip
     """Forces (nf, c) that responses (nf, c) of cases leave out of balance."""
-    parts = np.stack([x.T.real.ravel(), x.T.imag.ravel()], axis=1)
+    parts = np.stack([np.real(x.T).ravel(), np.imag(x.T).ravel()], axis=1)
     products = ((matrices @ parts) @ (1.0, 1.0j)).reshape(len(beside), 3, -1)
     each = zip(beside, products, x.T, strict=True)
     return np.stack([one.left(product, own, omega) for one, product, own in each], axis=1)
@@ -358,7 +359,7 @@ class _InParts:
 
     def solve(self, force: NDArray) -> NDArray[np.complex128]:
         """Solution (n, c) for complex right-hand sides (n, c)."""
-        solution = self._factors.solve(np.vstack([force.real, force.imag]))
+        solution = self._factors.solve(np.vstack([np.real(force), np.imag(force)]))
         real, imag = np.split(solution, 2)
         return real + 1j * imag
 

@@ -49,7 +49,7 @@ class PredictedRun:
         Numbers of the measurements.
     patterns : list of Pattern
         Its pattern once it is made, for all values of parameters that leave it alone.
-    starts : list of State
+    starts : list of State or None
         The stored state that it starts from, once it is read.
     """
 
@@ -57,7 +57,7 @@ class PredictedRun:
     document: dict[str, Any]
     members: tuple[int, ...]
     patterns: list[Pattern] = field(repr=False, default_factory=list)
-    starts: list[State] = field(repr=False, default_factory=list)
+    starts: list[State | None] = field(repr=False, default_factory=list)
 
     @property
     def kind(self) -> str:
