@@ -10,6 +10,7 @@ from fit_cases import PRESSED, SAME_STEPS, SWUNG, write
 
 import foldyn as fd
 from case_texts import HELD_MIURA_TEXT
+from foldyn.dynamics.generalized_alpha import Alpha
 from foldyn.errors import InputError
 from foldyn.experiment import (
     DampingRatios,
@@ -33,6 +34,7 @@ SHAPES = [
     [[0.3, 0.2], [0.0, 0.0], [-0.3, 0.2], [1.0, 0.1], [0.6, 0.0], [0.2, 0.1]],
 ]
 LINES = np.linspace(0.2, 2.8, 5)
+TIMES = np.linspace(0.0, 1.9, 20)
 KEYS = {
     "pattern.panel_angle": 60.0, "sheet.youngs_modulus": 1e6, "sheet.thickness": 0.01,
     "sheet.length_scale_ratio": 1.0, "sheet.density": 1.0,
@@ -67,6 +69,22 @@ DATA = {
         [FrequencyResponse(nodes=[6, 8], axis="z", frequency=LINES, values=np.ones((5, 2)) + 1j)],
         KEYS | {"damping.alpha": 1.0, "damping.beta": 0.01, "drive[0].force[1]": 0.3},
     ),
+    "harmonic responses": (
+        MIURA.replace("alpha = 0.4", "alpha = 1.0")
+        + '[model]\npreset = "herkal"\n'
+        + FRF.replace("force = [0, 0, 1]", "force = [0, 0, 1e-3]")
+        + 'method = "harmonic"\ntolerance = 1e-9\n',
+        [FrequencyResponse(nodes=[6, 8], axis="z", frequency=LINES, values=np.ones((5, 2)) + 1j)],
+        KEYS | {"damping.alpha": 1.0, "damping.beta": 0.01, "drive[0].force[2]": 1e-3},
+    ),
+    "motions": (
+        SWUNG.replace("alpha = 0.4", "alpha = 0.4\nbeta = 0.01").replace(
+            '"herkal"', '"herkal"\nbend_law = "linear"'  # without infinite curvature
+        ),
+        [TimeHistory(nodes=[0, 2], time=TIMES, values=np.stack([TIMES, TIMES], 1), sigma=1.0)],
+        {"sheet.length_scale_ratio": 1.0, "sheet.density": 1.0, "pattern.dihedral": 60.0,
+         "damping.alpha": 0.4, "damping.beta": 0.01, "loads[0].force[0]": -1e-3},
+    ),
 }  # fmt: skip
 
 
@@ -81,7 +99,8 @@ def difference(made, values, k, step):
 
 
 @pytest.mark.parametrize("kind", DATA)
-def test_derivatives_are_those_of_whole_predictions(tmp_path, kind) -> None:
+def test_derivatives_are_those_of_whole_predictions(tmp_path, kind, monkeypatch) -> None:
+    monkeypatch.setattr(Alpha, "tolerance", 1e-14)  # whole motions, to the rounding of differences
     text, data, starts = DATA[kind]
     path = write(tmp_path, text)
     draw = np.random.default_rng(8)
@@ -116,13 +135,13 @@ def test_derivatives_within_the_bounds(tmp_path) -> None:
 
 @pytest.mark.filterwarnings(SAME_STEPS)
 def test_what_has_no_neighbors_is_run_again(tmp_path) -> None:
-    """Motions, and creases that yield; what is held out needs no derivative at all."""
-    pressed, swung = write(tmp_path), write(tmp_path, SWUNG, "swung.toml")
+    """As explicit motions are; what is held out needs no derivative at all."""
+    explicit = SWUNG.replace('"newmark"', '"rk4"')
+    pressed, swung = write(tmp_path), write(tmp_path, explicit, "swung.toml")
     ratio = Parameter("sheet.length_scale_ratio", 1.0)
     forces = ForceDisplacement(displacement=[-0.1, -0.2], force=[1e-3, 2e-3], sigma=1e-4)
-    time = np.linspace(0.0, 1.9, 20)
     history = TimeHistory(
-        nodes=[0], time=time, values=1e-3 * np.sin(time), sigma=1e-3, case=swung, name="swing"
+        nodes=[0], time=TIMES, values=1e-3 * np.sin(TIMES), sigma=1e-3, case=swung, name="swing"
     )
     made = problem(pressed, [forces, history], [ratio], {})
     of_forces, of_history = made.differentiate(np.array([1.0]))[1]
@@ -142,7 +161,7 @@ def test_optimum_and_intervals_are_those_of_difference_quotients(tmp_path, monke
     noise = 1e-4 * np.random.default_rng(2).standard_normal(len(true))
     data = [replace(data[0], values=(true + noise).reshape(data[0].values.shape), sigma=1e-4)]
     near = fd.fit(path, data, keys)
-    monkeypatch.setattr(Problem, "_slopes", refuse)
+    monkeypatch.setattr(Problem, "_beside", refuse)
     whole = fd.fit(path, data, keys)
     assert near.quotients == ()
     assert whole.quotients == ("shapes",)

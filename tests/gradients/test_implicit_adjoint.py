@@ -13,9 +13,11 @@ import foldyn as fd
 from foldyn.dynamics import central_difference_adjoint, implicit_adjoint
 from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.generalized_alpha import Alpha
+from foldyn.dynamics.implicit import matrix
 from foldyn.dynamics.implicit_adjoint import Retraced
 from foldyn.errors import InputError
 from foldyn.gradients import sensitivity
+from foldyn.gradients.neighbors import Asked, motions
 
 FOLD = {"a": 1.0, "b": 1.3}
 TIP = ["displacement[4,z]", "velocity[5,x]", "mean_square[4,z]"]
@@ -213,3 +215,60 @@ def test_a_motion_that_goes_on_with_what_another_knew_is_refused() -> None:
     analysis = MOTION | {"method": "newmark", "initial": fd.initial_state(before), "start": 0.03}
     with pytest.raises(InputError, match=r"analysis\.initial.*fd\.State"):
         sensitivity(case, {"force": 2.9}, TIP[0], analysis)
+
+
+# ------------------------------------------------------------------ motions beside one
+def linked(**given: Any) -> fd.Case:
+    """Corners that move alike."""
+    return case(extra=(fd.Link([4, 5], "x"),), **given)
+
+
+def blown(pressure: float, **given: Any) -> fd.Case:
+    """Under a pressure that follows the panels."""
+    made = case(**given)
+    return replace(made, loads=[*made.loads, fd.Pressure(pressure, history=PULSE)])
+
+
+BESIDE = CASES | {"linked": (linked, BASIC), "blown": (blown, BASIC | {"pressure": 2.0})}
+
+
+def compare_beside(name: str, method: str, least: float = 2e-6) -> None:
+    """Motions found along another one with those that their cases have on their own."""
+    build, values = BESIDE[name]
+    given = {key: value for key, value in MOTION.items() if key != "kind"} | {"method": method}
+    one = build(**values)
+    others = [build(**values | {key: 1.0001 * value}) for key, value in values.items()]
+    motion = prepare(one, **given)
+    found = motions(motion, Asked(one, given), [Asked(each, given) for each in others], 1e-7)
+    first = fd.simulate(one, **given)["displacement"].values
+    np.testing.assert_array_equal(motion.output.first(motion.stored)[0].displacement, first)
+    for other, beside in zip(others, found, strict=True):
+        own = fd.simulate(other, **given)["displacement"].values
+        apart = np.abs(own - first).max()
+        assert apart > 1e-9
+        np.testing.assert_allclose(beside, own, 0.0, least * apart)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", BESIDE)
+def test_motions_beside_one_are_those_of_their_cases(name: str, method: str) -> None:
+    compare_beside(name, method)
+
+
+def test_motions_beside_one_without_a_band(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(matrix, "takes_band", lambda *_: False)
+    compare_beside("imposed", "generalized_alpha")
+
+
+def test_what_has_no_motions_beside_it() -> None:
+    given = {"duration": 0.06, "dt": 0.003, "method": "newmark"}
+    folded = case()
+    turned = replace(folded, loads=[fd.Actuate([0], angle=80, history=fd.Ramp(0.05))])
+    touching = replace(folded, contact=fd.Contact(thickness=0.01))
+    for made, other in ((turned, {}), (touching, {}), (folded, {"method": "energy_momentum"})):
+        asked = Asked(made, given | other)
+        with pytest.raises(InputError, match="no neighbor"):
+            motions(prepare(made, **asked.arguments), asked, [asked], 1e-4)
+    coarse = Asked(folded, given | {"dt": 0.006})
+    with pytest.raises(InputError, match="other steps"):
+        motions(prepare(folded, **given), Asked(folded, given), [coarse], 1e-4)

@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 from differences import Design
+from scipy.sparse.linalg import splu
 
 import foldyn as fd
 from foldyn.errors import InputError
-from foldyn.gradients.equilibrium import solved
+from foldyn.gradients import equilibrium
+from foldyn.gradients.equilibrium import Balance
 
 TIP = 8  # on the upper ring
 
@@ -118,6 +120,19 @@ def test_displacements_at_a_limit_point_have_no_derivative():
     force = np.zeros(len(q))
     force[3 * TIP + 2] = 1.0
     with pytest.raises(InputError, match=r"limit point or a bifurcation.*limit_load"):
-        solved(case, q, force)
+        Balance(case, q).under(force)
     before = case.body.dofs(path["displacement"].values[at - 1])
-    assert np.isfinite(solved(case, before, force)).all()
+    assert np.isfinite(Balance(case, before).under(force)).all()
+
+
+def test_numbers_of_one_equilibrium_share_the_factors(monkeypatch: pytest.MonkeyPatch) -> None:
+    count: list[int] = []
+
+    def factorized(block: Any) -> Any:
+        count.append(1)
+        return splu(block)
+
+    monkeypatch.setattr(equilibrium, "splu", factorized)
+    measures = [f"displacement[{TIP},{axis}]" for axis in "xyz"]
+    fd.sensitivity(tower, {"height": 0.06}, measures, {"kind": "statics", "load_factors": [0.01]})
+    assert len(count) == 1

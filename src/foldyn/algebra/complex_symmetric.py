@@ -59,7 +59,14 @@ def solve(
     weight : complex
         w.
     """
-    lost = np.full(len(load), np.nan, np.complex128)
+    return solved(matrix, load, gram, weight)[0]
+
+
+def solved(
+    matrix: sparse.csc_array, load: NDArray, gram: Gram | None = None, weight: complex = 0.0
+) -> tuple[NDArray[np.complex128], Solution | None]:
+    """As `solve`, with the factors; None if there are none."""
+    lost = np.full(len(load), np.nan, np.complex128), None
     if gram is None or weight == 0.0:
         gram = Gram(np.zeros((0, len(load))))
     rows = gram.rows
@@ -82,7 +89,7 @@ def solve(
     rounding = factors.solve(_EPS * phase * terms)
     if not max(np.abs(change).max(), np.abs(rounding).max()) <= LOST * size.max():
         return lost
-    return solution
+    return solution, factors
 
 
 def _factors(matrix: sparse.csc_array, gram: Gram, weight: complex) -> Solution:

@@ -253,6 +253,11 @@ class CaseFile:
             self._cases[rule] = self._make(rule)
         return self._cases[rule]
 
+    @property
+    def structures(self) -> Mapping[str, Any]:
+        """Structures of the cases made so far, by mass rule."""
+        return {rule: case.structure for rule, case in self._cases.items()}
+
     def initial(self, mass: str | None = None) -> State | None:
         """State that the motion or path starts from, or about which modes swing; None for rest.
 

@@ -115,7 +115,9 @@ class MotionAnalysis(Analysis):
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
         """See `Analysis`."""
-        given = {"initial": case_file.start(mass).state, **self.arguments, **changes}
+        given = {**self.arguments, **changes}
+        if "initial" not in given:
+            given["initial"] = case_file.start(mass).state
         return _Prepared(prepare(case_file.case(mass), **given, kept=True))
 
     def check(self, computations: Sequence[Compute], figures: bool) -> None:

@@ -119,12 +119,14 @@ def validated(path: Path, document: Mapping[str, Any]) -> Any:
 
 
 def case_of_document(
-    path: Path, document: Mapping[str, Any], text: str = "", pattern: Any = None
-) -> CaseFile:
+    path: Path, document: Mapping[str, Any], text: str = "", pattern: Any = None,
+    structures: Mapping[str, Any] | None = None,
+) -> CaseFile:  # fmt: skip
     """Check what a case file says and make its cases; see `read_case`.
 
     text : of the file, if the document was read from one.
-    pattern : what the document's pattern has made before; made if it is not given.
+    pattern, structures : what the document has made before, these by mass rule; made if they are
+        not given.
     """
     schema = validated(path, document)
     model = MODELS[schema.model.kind]
@@ -158,7 +160,9 @@ def case_of_document(
     def make(mass: str) -> Case:
         """Make the case with one mass rule."""
         with within("model: ", path):
-            structure = model.make(pattern, sheet, mass=mass, **options)
+            structure = (structures or {}).get(mass)
+            if structure is None:
+                structure = model.make(pattern, sheet, mass=mass, **options)
             if sheet.density is not None:
                 _ = structure.mass  # a rule may refuse this pattern: say so before anything runs
         with within("", path):

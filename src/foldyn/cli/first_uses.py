@@ -16,8 +16,10 @@ import numpy as np
 
 import foldyn as fd
 from foldyn.dynamics import METHODS
+from foldyn.dynamics.driver import prepare
 from foldyn.errors import FoldynWarning
 from foldyn.experiment.tracking.corners import refine
+from foldyn.gradients.neighbors import Asked, motions
 from foldyn.materials.series import in_series
 
 STEPS, SHORT, LONG = 4, 1e-4, 5e-3  # s, steps of explicit and implicit methods
@@ -141,6 +143,13 @@ def differentiated(*methods: str, **parts: Any) -> None:
         fd.sensitivity(made, ["fold_stiffness"], "displacement[8,z]", motion)
 
 
+def accompanied() -> None:
+    """An implicit motion with another one beside it, as fits compute them."""
+    made, given = case(), {"duration": STEPS * LONG, "dt": LONG, "method": IMPLICIT[0]}
+    asked = Asked(made, given)
+    motions(prepare(made, **given), asked, [asked], 1e-4)
+
+
 STAGES: Sequence[Uses] = (
     {"bars and hinges": [vibrating, partial(moved, "rk4")]},
     {
@@ -172,6 +181,7 @@ STAGES: Sequence[Uses] = (
             partial(moved, *IMPLICIT),
             adapted,
             jumped,
+            accompanied,
             partial(moved, *IMPLICIT, supports=[*SPRINGS, *TIED], damping=DAMPED),
             partial(moved, *IMPLICIT, supports=MOVING, loads=[*TURNING, *FOLLOWING]),
             partial(moved, *IMPLICIT, damping=[fd.ModalDamping(0.05, 4)], supports=DASHPOTS),

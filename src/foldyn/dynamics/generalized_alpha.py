@@ -47,7 +47,7 @@ from foldyn.dynamics.motion_state import Course
 from foldyn.dynamics.parts import Setting
 from foldyn.dynamics.system import Packed, carry
 from foldyn.dynamics.ties import follow_masters
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.context import Context, run_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.term import FORCES
@@ -97,7 +97,7 @@ class Alpha(Scheme):
     ) -> None:  # fmt: skip
         super().__init__(packed, course)
         self.parameters, self.facts, equation = parameters, facts, self.equation
-        self._step = Context(
+        self.context = Context(
             Step(
                 equation.still.value, equation.setting, parameters, self.old, self.new, self.shift,
                 self.out, self.earlier, self.damping,
@@ -110,7 +110,7 @@ class Alpha(Scheme):
         if len(self.damping):
             for old, new in zip(self.old, self.new, strict=True):
                 new[:] = old
-            _taken(self._step)
+            _taken(self.context)
             self.old.damped[:] = self.new.damped
 
     def weights(self, h: float) -> Weights:
@@ -122,7 +122,7 @@ class Alpha(Scheme):
 
     def residual(self, h: float, t: float) -> tuple[float, float]:
         """See `Scheme`."""
-        return residual(self._step, h, t)
+        return residual(self.context, h, t)
 
     def iterate(
         self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
@@ -131,7 +131,7 @@ class Alpha(Scheme):
         """See `Scheme`; with the factors of a band it is one compiled function."""
         if matrix.band is None:
             return super().iterate(matrix, goal, h, t, last, lowest, most)
-        return _iterate(self._step, h, t, matrix.band, matrix.free, goal, last, lowest, most)
+        return _iterate(self.context, h, t, matrix.band, matrix.free, goal, last, lowest, most)
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
         """See `Scheme`."""
@@ -143,11 +143,11 @@ class Alpha(Scheme):
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""
         system = self.packed.system
-        done, lost = _works(self._step, h)
+        done, lost = _works(self.context, h)
         if len(self.damping):
-            lost += _taken(self._step)
+            lost += _taken(self.context)
         if system.turns:
-            done += _actuation(self._step, self.folds, self.work.fold_angle)
+            done += _actuation(self.context, self.folds, self.work.fold_angle)
         return done, lost
 
     def change(self, h: float) -> NDArray:
@@ -175,15 +175,13 @@ def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[Packed, Course
     return partial(Alpha, parameters=parameters(spectral_radius), facts=facts)
 
 
-@kernel
-def residual(step, h, t):
-    """Residual of a step into `out`; returns its norm and that of the forces at play, N."""
-    equation, old, new, out = step.equation, step.old, step.new, step.out
-    system, mass, s = step.setting.system, step.setting.mass, step.setting.s
-    am, af, beta, gamma = step.p.am, step.p.af, step.p.beta, step.p.gamma
-    q0, w0, a0, b0 = flat(old.q), flat(old.w), flat(old.a), flat(old.force)
-    q1, w1, a1, b1 = flat(new.q), flat(new.w), flat(new.a), flat(new.force)
-    d, x, left = flat(step.shift), flat(s.moving), flat(out)
+@inner
+def move(step, h):
+    """Make the end of a step what belongs to its shift: displacement, velocity, acceleration."""
+    old, new, mass, ties = step.old, step.new, step.setting.mass, step.setting.system.ties
+    beta, gamma = step.p.beta, step.p.gamma
+    q0, w0, a0, d = flat(old.q), flat(old.w), flat(old.a), flat(step.shift)
+    q1, w1, a1 = flat(new.q), flat(new.w), flat(new.a)
     curvature = 1.0 / (beta * h * h)
     for i in range(q0.size):
         q1[i] = q0[i] + d[i]
@@ -193,20 +191,51 @@ def residual(step, h, t):
         if mass.diagonal[node] <= 0.0:  # no inertia: velocities would ring for ever
             for i in range(3 * node, 3 * node + 3):
                 a1[i], w1[i] = 0.0, d[i] / h
-    if system.ties.slave.size > 0:  # of which the masters may be such nodes
-        follow_masters(system.ties, a1)
-        follow_masters(system.ties, w1)
+    if ties.slave.size > 0:  # of which the masters may be such nodes
+        follow_masters(ties, a1)
+        follow_masters(ties, w1)
+
+
+@inner
+def slowed(step):
+    """Make `moving` what the mass resists in a step: acceleration, and velocity times alpha."""
+    old, new, am, af = step.old, step.new, step.p.am, step.p.af
+    w0, a0, w1, a1 = flat(old.w), flat(old.a), flat(new.w), flat(new.a)
+    alpha, x = step.setting.system.alpha, flat(step.setting.s.moving)
+    for i in range(x.size):
+        drag = alpha * ((1.0 - af) * w1[i] + af * w0[i])
+        x[i] = (1.0 - am) * a1[i] + am * a0[i] + drag
+
+
+@kernel
+def balanced(step, target, h):
+    """End a step at its shift, with the force there that leaves a residual (n, 3), N."""
+    af = step.p.af
+    move(step, h)
+    slowed(step)
+    times_mass(step.setting.mass, step.setting.s.moving, step.out)
+    b0, b1, inertia, left = flat(step.old.force), flat(step.new.force), flat(step.out), flat(target)
+    for i in range(b0.size):
+        b1[i] = (left[i] - inertia[i] - af * b0[i]) / (1.0 - af)
+
+
+@kernel
+def residual(step, h, t):
+    """Residual of a step into `out`; returns its norm and that of the forces at play, N."""
+    equation, old, new, out = step.equation, step.old, step.new, step.out
+    system, mass, s = step.setting.system, step.setting.mass, step.setting.s
+    af = step.p.af
+    b0, b1, left = flat(old.force), flat(new.force), flat(out)
+    move(step, h)
     advance_clock(equation, h)
     acceleration(equation, new.q, new.w, t, out)
-    for i in range(q0.size):
-        b1[i] = flat(s.force)[i]
-        slowed = system.alpha * ((1.0 - af) * w1[i] + af * w0[i])
-        x[i] = (1.0 - am) * a1[i] + am * a0[i] + slowed
+    copy(s.force, new.force)
     copy(s.factor, new.factor)
     copy(s.pushed, new.pushed)
+    slowed(step)
     times_mass(mass, s.moving, out)
     inertia = 0.0
-    for i in range(q0.size):
+    for i in range(b0.size):
         inertia += left[i] * left[i]
         left[i] += (1.0 - af) * b1[i] + af * b0[i]
     return norms(system, out, inertia, s.factor, new.pushed)

@@ -220,9 +220,13 @@ class Motion:
             warnings.warn(text, FoldynWarning, stacklevel=5)
 
     def integrate(
-        self, progress: bool | Reporter | None = None, keeping: Keeping | None = None
-    ) -> None:
-        """Integrate the motion; see `simulate`."""
+        self, progress: bool | Reporter | None = None, keeping: Keeping | None = None,
+        engine_of: Callable[[Course], Implicit] | None = None,
+    ) -> None:  # fmt: skip
+        """Integrate the motion; see `simulate`.
+
+        engine_of : makes what advances it, from where it starts; by default its method's engine.
+        """
         self._keeping = keeping
         size = self.expected_samples, len(self.case.structure.nodes), len(self.case.reaction_dofs)
         if keeping is None:
@@ -233,7 +237,8 @@ class Motion:
         self.output.begin()
         report, close = reporter(progress)
         try:
-            engine = self.method.engine(self.case, self.packed, self.course, self.plan, self.device)
+            given = self.case, self.packed, self.course, self.plan, self.device
+            engine = engine_of(self.course) if engine_of else self.method.engine(*given)
             continued = self._state[3] if self.case.contact is None else None
             if isinstance(engine, Implicit) and continued and continued.method == self.method.name:
                 engine.continue_from(continued.values)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -14,17 +17,6 @@ from foldyn.mechanics.pullback import Pullback
 SINGULAR = 1e-13  # of the stiffness at play: a motion that meets no more is a critical point's
 
 
-def equilibrium_seen(
-    case: Case, q: NDArray, by_state: NDArray, pullback: Pullback, total: dict[str, NDArray],
-    factor: float = 1.0,
-) -> None:  # fmt: skip
-    """Add to a gradient what comes by the state (m,), an equilibrium under loads times a factor.
-
-    by_state : derivatives (m,) of the number by the dofs at constant numbers.
-    """
-    seen_through(case, q, by_state, solved(case, q, by_state), pullback, total, factor)
-
-
 def free_block(case: Case, q: NDArray) -> tuple[NDArray, sparse.csc_array]:
     """Free dofs (nf,), and the tangent (nf, nf) there."""
     free = np.concatenate([case.free_dofs, case.body.hidden])
@@ -32,27 +24,52 @@ def free_block(case: Case, q: NDArray) -> tuple[NDArray, sparse.csc_array]:
     return free, sparse.csc_array(tangent[free][:, free])
 
 
-def solved(case: Case, q: NDArray, force: NDArray) -> NDArray:
-    """Motion (m,) of an equilibrium under a force (m,).
+class Balance:
+    """An equilibrium (m,) of a case, and its motions under forces.
 
-    Raises
-    ------
-    InputError
-        At a critical point, where there is none.
+    The factors of its tangent serve for all numbers of which derivatives are taken.
     """
-    free, block = free_block(case, q)
-    load, out = case.constraints.force(force)[free], np.zeros(len(q))
-    try:
-        out[free] = splu(block).solve(load)
-    except RuntimeError:  # exactly singular
-        out[free] = np.inf
-    met = float(np.abs(load).max(initial=0.0))
-    if not met >= SINGULAR * float(np.abs(block).max()) * float(np.abs(out).max(initial=0.0)):
-        raise InputError(
-            "the equilibrium is a limit point or a bifurcation, where displacements have no "
-            "derivative; ask for the load factor (limit_load), or take another load factor"
-        )
-    return case.constraints.displacement(out)
+
+    def __init__(self, case: Case, q: NDArray) -> None:
+        self.case, self.q = case, q
+
+    @cached_property
+    def _factors(self) -> tuple[NDArray, float, Any]:
+        """Free dofs, the stiffness at play (N/m), and factors; None where it is singular."""
+        free, block = free_block(self.case, self.q)
+        try:
+            return free, float(np.abs(block).max()), splu(block)
+        except RuntimeError:  # exactly singular
+            return free, float(np.abs(block).max()), None
+
+    def under(self, force: NDArray) -> NDArray:
+        """Motion (m,) under a force (m,).
+
+        Raises
+        ------
+        InputError
+            At a critical point, where there is none.
+        """
+        free, stiffness, factors = self._factors
+        load, out = self.case.constraints.force(force)[free], np.zeros(len(self.q))
+        out[free] = np.inf if factors is None else factors.solve(load)
+        met = float(np.abs(load).max(initial=0.0))
+        if not met >= SINGULAR * stiffness * float(np.abs(out).max(initial=0.0)):
+            raise InputError(
+                "the equilibrium is a limit point or a bifurcation, where displacements have no "
+                "derivative; ask for the load factor (limit_load), or take another load factor"
+            )
+        return self.case.constraints.displacement(out)
+
+    def add_seen(
+        self, by_state: NDArray, pullback: Pullback, total: dict[str, NDArray], factor: float = 1.0
+    ) -> None:
+        """Add to a gradient what comes by the state, under loads times a factor.
+
+        by_state : derivatives (m,) of the number by the dofs at constant numbers.
+        """
+        adjoint = self.under(by_state)
+        seen_through(self.case, self.q, by_state, adjoint, pullback, total, factor)
 
 
 def seen_through(

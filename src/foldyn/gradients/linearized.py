@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.gradients.equilibrium import equilibrium_seen
+from foldyn.gradients.equilibrium import Balance
 from foldyn.gradients.numbers import nothing
 from foldyn.linear.linearized import Linearized
 from foldyn.materials import Superlinear
@@ -39,6 +39,7 @@ class Products:
         self._linear, self._case = linear, linear.case
         body = linear.case.body
         self.q = body.dofs(linear.displacement if displacement is None else displacement)
+        self._balance = Balance(linear.case, self.q)
         self._soft = _soft(body.sheet, self.q)
         self._pullback = Pullback(_without(body, self._soft))
         self._mass = sparse.csr_array(linear.case.mass)
@@ -81,7 +82,7 @@ class Products:
 
     def add_equilibrium(self, state: NDArray, total: dict[str, NDArray]) -> None:
         """Add what a gradient (m,) by the state has if that is an equilibrium under the loads."""
-        equilibrium_seen(self._case, self.q, state, self._pullback, total)
+        self._balance.add_seen(state, self._pullback, total)
 
 
 def refuse(linear: Linearized, what: str) -> None:

@@ -9,29 +9,43 @@ bars are strained by what is of second order in the motion, and they are far sti
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import fields
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from scipy import sparse
 from xarray import Variable
 
+from foldyn.algebra.complex_symmetric import solved
 from foldyn.algebra.superlu import PIVOT, factorize
 from foldyn.cases import Case
+from foldyn.dynamics import Progress
+from foldyn.dynamics.companions import Accompanied, Companion
+from foldyn.dynamics.initial import begin, check_start
+from foldyn.dynamics.motion import Motion
+from foldyn.dynamics.motion_state import Course
+from foldyn.dynamics.system import pack
+from foldyn.dynamics.timing import jumps
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.excitation import absolute, drive_of, drive_terms
 from foldyn.linear.frequency_domain import dynamic_stiffness
+from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, Hinges, harmonic
 from foldyn.linear.linearized import Linearized, linearize
+from foldyn.linear.modes import Found
 from foldyn.statics.equilibrium import OrigamiProblem
-
-if TYPE_CHECKING:
-    import xarray
 
 GAINED = 1e-6  # of the first step: the size of the last one
 ROUNDING = 1e-14  # of the whole: a step that is none
 ENOUGH, STALLED = 1e-4, 1e-8  # of the first step, and of the whole: what rounding may leave
 ROUNDS = 12
 TURN = 2.0 * np.pi
+ALONG = ("newmark", "generalized_alpha")
+"""Methods along whose steps neighbors go."""
+RESPONSES = ("direct", "harmonic")
+"""Methods of responses that have neighbors."""
 NONE = "there is no neighbor of"
 
 
@@ -47,28 +61,34 @@ def refined(x: NDArray, step_at: Callable[[NDArray], NDArray], size: float) -> N
 
     Parameters
     ----------
-    x : ndarray
-        Where they begin.
+    x : ndarray, shape (n,) or (n, c)
+        Where they begin, for one neighbor or several.
     step_at : callable
-        The step from a place.
+        The steps from there.
     size : float
         Of the whole, by which rounding is measured.
 
     Raises
     ------
     ComputationError
-        They do not end: the neighbor is too far away.
+        They do not end: a neighbor is too far away.
     """
-    sizes: list[float] = []
+    sizes: list[NDArray] = []
+    going = np.ones(x.shape[1:], bool)
     for _ in range(ROUNDS):
-        step = step_at(x)
+        step = step_at(x) * going
         x = x + step
-        sizes.append(float(np.linalg.norm(step)))
-        if sizes[-1] <= max(GAINED * sizes[0], ROUNDING * size):
-            return x
-        if len(sizes) > 2 and not sizes[-1] <= 0.5 * sizes[-3]:  # even and odd ones differ
+        sizes.append(np.linalg.norm(step, axis=0))
+        near = sizes[-1] <= np.maximum(ENOUGH * sizes[0], STALLED * size)
+        going = sizes[-1] > np.maximum(GAINED * sizes[0], ROUNDING * size)
+        if len(sizes) > 2:  # even and odd ones differ
+            stalled = sizes[-1] > 0.5 * sizes[-3]
+            going &= ~(stalled & near)
+            if (stalled & going).any():
+                break
+        if not going.any():
             break
-    if sizes[-1] <= max(ENOUGH * sizes[0], STALLED * size):
+    if near.all():
         return x
     raise ComputationError(f"{NONE} this state: Newton's steps do not end")
 
@@ -76,7 +96,8 @@ def refined(x: NDArray, step_at: Callable[[NDArray], NDArray], size: float) -> N
 # ------------------------------------------------------------------ statics
 def equilibria(one: Asked, result: xarray.Dataset, others: Sequence[Asked]) -> list[Any]:
     """Equilibria of other cases beside those of a path with given load factors."""
-    problem, *beside = (_problem(each) for each in (one, *others))
+    problem = _problem(one)
+    beside = [problem if each.case is one.case else _problem(each) for each in others]
     factors = [each.arguments["load_factors"] for each in others]
     moved = result["displacement"].transpose("step", "node", "axis").values
     if any(len(each) != len(moved) for each in factors):
@@ -125,12 +146,52 @@ def _balanced(problem: OrigamiProblem, x: NDArray, factor: float, factored: Any)
     return x
 
 
+# ------------------------------------------------------------------ motions
+def motions(
+    motion: Motion, one: Asked, others: Sequence[Asked], share: float
+) -> list[NDArray[np.float64]]:
+    """Displacements (k, n, 3) of other cases at the samples of a motion, which is computed.
+
+    share : change of a difference between motions, in itself, at which a step has found it.
+    """
+    case, state, lasting = motion.case, one.arguments.get("initial"), ("initial", "sample")
+    lacks = (
+        motion.method.name not in ALONG, not motion.plan.steps, motion.continues, case.contact,
+        case.remembering, motion.packed.system.turns, motion.device != "cpu",
+    )  # fmt: skip
+    if any(lacks):
+        raise InputError(f"{NONE} a motion of this kind")
+    given = {name: value for name, value in one.arguments.items() if name not in lasting}
+    beside = []
+    for other in others:
+        if given != {name: value for name, value in other.arguments.items() if name in given}:
+            raise InputError(f"{NONE} a motion with other steps")
+        start = check_start(other.case, state)
+        packed = pack(other.case, motion.packed.system.waves.span, start[0])
+        if not np.array_equal(packed.numbering.order, motion.packed.numbering.order):
+            raise InputError(f"{NONE} a motion whose nodes are numbered otherwise")
+        course = begin(other.case, *start, None, None, motion.plan, packed)
+        beside.append(Companion(packed, course))
+    engines: list[Accompanied] = []
+    scheme: Any = motion.method.scheme
+    steps = motion.plan, jumps(case)
+
+    def engine_of(course: Course) -> Accompanied:
+        engines.append(Accompanied(scheme, motion.packed, course, *steps, beside, share))
+        return engines[-1]
+
+    motion.integrate(engine_of=engine_of)
+    for packed, _ in beside:
+        if packed.callbacks.error is not None:
+            raise ComputationError(f"{NONE} this motion: {packed.callbacks.error}")
+    return [np.array(found) for found in engines[-1].displacement]
+
+
 # ------------------------------------------------------------------ modes
-def modes(
-    one: Asked, result: xarray.Dataset, others: Sequence[Asked], wanted: Sequence[int]
-) -> list[Any]:
-    """Modes of other cases beside some modes of a result, those with the places `wanted`."""
-    linear, *beside = (_linear(each) for each in (one, *others))
+def modes(found: Found, others: Sequence[Asked], wanted: Sequence[int]) -> list[Any]:
+    """Modes of other cases beside some of those found, those with the places `wanted`."""
+    linear, result = found.linear, found.result
+    beside = [linear if each.case is linear.case else _linear(each) for each in others]
     frequency, eigenvalue, ratio = (
         [result[name].values.copy() for _ in others]
         for name in ("frequency", "eigenvalue", "damping_ratio")
@@ -199,45 +260,134 @@ def _vibrating(linear: Linearized, mode: NDArray, factored: Any) -> NDArray:
 
 
 # ------------------------------------------------------------------ frequency responses
-def responses(one: Asked, result: xarray.Dataset, others: Sequence[Asked]) -> list[Any]:
-    """Frequency responses of other cases beside that of one, by the direct method."""
-    if one.arguments["method"] != "direct":
-        raise InputError(f"{NONE} a response by another method than the direct one")
-    linear, *beside = (_linear(each) for each in (one, *others))
-    if len(linear.modal):
-        raise InputError(f"{NONE} a response with modal damping")
-    drives = [
-        drive_of(each.case, each.arguments["drive"], each.arguments.get("amplitude", 1.0))
-        for each in (one, *others)
-    ]
-    terms = [drive_terms(each, drive) for each, drive in zip(beside, drives[1:], strict=True)]
-    hertz, name = result["frequency"].values, drives[0].quantity
-    found = np.zeros((len(others), len(hertz), len(linear.free)), np.complex128)
-    own = drive_terms(linear, drives[0])
-    for k, omega in enumerate(TURN * hertz):
-        factored = factorize(dynamic_stiffness(linear, omega), pivot=PIVOT)
-        begin = factored.solve(_load(own, omega))
-        size = float(np.linalg.norm(begin))
-        for other, pushed, out in zip(beside, terms, found, strict=True):
-            out[k] = refined(begin, _corrected(other, _load(pushed, omega), omega, factored), size)
+def responses(one: Asked, others: Sequence[Asked]) -> list[xarray.Dataset]:
+    """Frequency responses of a case, by the direct or harmonic method, and of those beside it."""
+    if (method := one.arguments["method"]) not in RESPONSES:
+        raise InputError(f"{NONE} a response by another method than {', '.join(RESPONSES)}")
+    cases = [_Driven(each) for each in (one, *others)]
+    hertz = np.asarray(one.arguments["frequencies"], float)
+    if method == "direct":
+        found = _direct(cases, TURN * hertz)
+    else:
+        known = {each.name for each in fields(HarmonicBalance)}
+        given = {name: value for name, value in one.arguments.items() if name in known}
+        answer = harmonic(cases[0].linear, cases[0].drive, hertz, HarmonicBalance(**given), _silent)
+        found = _harmonic(cases, TURN * hertz, answer.response)
+    named = {"frequency": hertz}
     return [
-        result.assign({name: (("frequency", "node", "axis"), absolute(each, drive, response))})
-        for each, drive, response in zip(beside, drives[1:], found, strict=True)
+        xarray.Dataset(
+            {each.drive.quantity: (("frequency", "node", "axis"), each.absolute(own))}, named
+        )
+        for each, own in zip(cases, found, strict=True)
     ]
 
 
-def _corrected(
-    linear: Linearized, load: NDArray, omega: float, factored: Any
-) -> Callable[[NDArray], NDArray]:
-    """Steps of a response at an angular frequency (rad/s), with the factors of another case."""
-
-    def step_at(x: NDArray) -> NDArray:
-        damped = 1j * omega * (linear.damping @ x)
-        return factored.solve(load - linear.stiffness @ x + omega**2 * (linear.mass @ x) - damped)
-
-    return step_at
+def _silent(_: Progress) -> None:
+    """Tell nobody how far it is."""
 
 
-def _load(terms: Sequence[Any], omega: float) -> NDArray[np.complex128]:
-    """Load per unit of the drive at an angular frequency (rad/s)."""
-    return np.sum([term.shape * term.factor(omega) for term in terms], axis=0).astype(complex)
+def _direct(cases: Sequence[_Driven], omegas: NDArray) -> NDArray[np.complex128]:
+    """Responses (c, f, nf) of the first case and of those beside it by the direct method."""
+    linear, beside = cases[0].linear, cases[1:]
+    found = np.full((len(cases), len(omegas), len(linear.free)), np.nan, np.complex128)
+    matrices = sparse.block_diag([each.matrices for each in beside], format="csr")
+    for k, omega in enumerate(omegas):
+        stiffness, load = dynamic_stiffness(linear, omega), cases[0].load(omega)
+        x, factors = solved(stiffness, load, linear.gram, 1j * omega)
+        if factors is not None:
+            found[0, k] = x
+            found[1:, k] = _repeated(
+                x, len(beside), partial(_left, beside, matrices, omega), factors
+            )
+    return found
+
+
+def _left(
+    beside: Sequence[_Driven], matrices: sparse.csr_array, omega: float, x: NDArray
+) -> NDArray[np.complex128]:  # fmt: skip
+    """Forces (nf, c) that responses (nf, c) of cases leave out of balance."""
+    parts = np.stack([np.real(x.T).ravel(), np.imag(x.T).ravel()], axis=1)
+    products = ((matrices @ parts) @ (1.0, 1.0j)).reshape(len(beside), 3, -1)
+    each = zip(beside, products, x.T, strict=True)
+    return np.stack([one.left(product, own, omega) for one, product, own in each], axis=1)
+
+
+def _repeated(
+    x: NDArray, count: int, left: Callable[[NDArray], NDArray], factors: Any
+) -> NDArray[np.complex128]:  # fmt: skip
+    """Responses (c, nf) beside one (nf,), where no forces are left."""
+    begin = np.repeat(x[:, None], count, axis=1)
+    size = float(np.linalg.norm(x))
+    return refined(begin, lambda each: -factors.solve(left(each)), size).T
+
+
+def _harmonic(
+    cases: Sequence[_Driven], omegas: NDArray, response: NDArray
+) -> NDArray[np.complex128]:
+    """Responses (c, f, nf) by the harmonic method, that (f, nf) of the first case given."""
+    if len(cases[0].linear.modal):
+        raise InputError(f"{NONE} a harmonic response with modal damping")
+    values = np.array([each.drive.value for each in cases])
+    balances = [Hinges(each.linear) for each in cases]
+    found = np.repeat(response[None], len(cases), axis=0)
+    for k in np.flatnonzero(np.isfinite(response).all(axis=1)):
+        x, omega = response[k] * values[0], float(omegas[k])
+        stiffness = [dynamic_stiffness(each.linear, omega) for each in cases]
+        loads = [each.drive.value * each.load(omega) for each in cases]
+        own = balances[0].left(stiffness[0], x, loads[0])  # with which it was content
+        beside = [*zip(balances[1:], stiffness[1:], loads[1:], strict=True)]
+        factors = _InParts(balances[0].tangent(stiffness[0], x))
+        left = partial(_out_of_balance, beside, own)
+        found[1:, k] = _repeated(x, len(beside), left, factors) / values[1:, None]
+    return found
+
+
+def _out_of_balance(
+    beside: Sequence[tuple[Hinges, sparse.csc_array, NDArray]], own: NDArray, x: NDArray
+) -> NDArray[np.complex128]:
+    """Forces (nf, c) that motions (nf, c) of cases leave out of balance beyond those of one."""
+    each = zip(beside, x.T, strict=True)
+    forces = [hinges.left(matrix, motion, load) for (hinges, matrix, load), motion in each]
+    return np.stack(forces, axis=1) - own[:, None]
+
+
+class _InParts:
+    """Factors of a real matrix (2n, 2n) of real and imaginary parts."""
+
+    def __init__(self, matrix: sparse.csc_array) -> None:
+        self._factors = factorize(matrix, symmetric=False)
+
+    def solve(self, force: NDArray) -> NDArray[np.complex128]:
+        """Solution (n, c) for complex right-hand sides (n, c)."""
+        solution = self._factors.solve(np.vstack([np.real(force), np.imag(force)]))
+        real, imag = np.split(solution, 2)
+        return real + 1j * imag
+
+
+class _Driven:
+    """A case linearized, and what drives it."""
+
+    def __init__(self, one: Asked) -> None:
+        harmonically = one.arguments["method"] == "harmonic"
+        secant = REFERENCE if harmonically else one.arguments.get("secant")
+        self.linear = _linear(Asked(one.case, {**one.arguments, "secant": secant}))
+        self.drive = drive_of(one.case, one.arguments["drive"], one.arguments.get("amplitude", 1.0))
+        self._terms = drive_terms(self.linear, self.drive)
+        each = self.linear.stiffness, self.linear.damping, self.linear.mass
+        self.matrices = sparse.vstack(each, format="csr")
+
+    def load(self, omega: float) -> NDArray[np.complex128]:
+        """Load (nf,) per unit of the drive at an angular frequency (rad/s)."""
+        parts = [term.shape * term.factor(omega) for term in self._terms]
+        return np.sum(parts, axis=0).astype(complex)
+
+    def left(self, products: NDArray, x: NDArray, omega: float) -> NDArray:
+        """Out-of-balance force (nf,) of a response x, from the products (3, nf) with it."""
+        elastic, damped, inertia = products
+        rows = self.linear.modal
+        damped = damped + rows.T @ (rows @ x) if len(rows) else damped
+        return elastic - omega**2 * inertia + 1j * omega * damped - self.load(omega)
+
+    def absolute(self, response: NDArray) -> NDArray[np.complex128]:
+        """Response (f, n, 3) from that of the free dofs (f, nf)."""
+        return absolute(self.linear, self.drive, response)

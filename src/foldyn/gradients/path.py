@@ -22,7 +22,7 @@ from scipy.sparse.linalg import splu
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.gradients.equilibrium import equilibrium_seen, free_block, seen_through, solved
+from foldyn.gradients.equilibrium import Balance, free_block, seen_through
 from foldyn.gradients.numbers import Gradient, nothing, numbers_of
 from foldyn.mechanics.pullback import Arrays, Pullback, refuse_lacking
 from foldyn.statics import trace
@@ -55,6 +55,7 @@ class PathGradient:
         self.case, self.result = case, trace(case, **arguments)
         self._given = arguments.get("method", "newton") in GIVEN
         self._pullback = Pullback(case.body)
+        self._balances: dict[int, Balance] = {}
 
     def numbers(self, case: Case) -> Arrays:
         """Numbers of a case by which gradients are taken."""
@@ -79,7 +80,7 @@ class PathGradient:
             q = self.case.body.dofs(moved.displacement)
             unit = np.zeros(len(q))
             unit[dof] = 1.0
-            self._add_factor(moved, solved(self.case, q, unit), seed, total)
+            self._add_factor(moved, Balance(self.case, q).under(unit), seed, total)
         return total
 
     def _add_point(self, k: int, seeds: Mapping[str, Any], total: dict[str, NDArray]) -> None:
@@ -115,7 +116,8 @@ class PathGradient:
                 total[name] += out
             for j in range(len(case.load_terms)):
                 total[f"load.{j}"] -= factor * weight[:size].reshape(-1, 3)
-        equilibrium_seen(case, q, by_state, self._pullback, total, factor)
+        balance = self._balances.setdefault(k, Balance(case, q))
+        balance.add_seen(by_state, self._pullback, total, factor)
 
     def _add_factor(
         self, moved: Moved, weight: NDArray, seed: float, total: dict[str, NDArray]

@@ -36,6 +36,7 @@ PATIENCE = 25  # accelerated iterations before slow ones are tried
 RELAXED = 0.3  # of the way in a slow iteration
 FURTHEST = 1.5  # times: how far slopes are extrapolated from one frequency to the next
 LEAST = 1e-12  # rad: a swing is never taken as smaller
+APART = 1e-4  # of a swing: distance of the slopes whose difference is their derivative
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def harmonic(
             "superlinear law are from their rest angle; give another law, or take stepped_sine",
             "method",
         )
-    hinges = _Hinges(system)
+    hinges = Hinges(system)
     terms = drive_terms(system, drive)
     response = np.full((len(frequency), len(system.free)), np.nan, np.complex128)
     swing, spent = np.full(len(frequency), np.nan), 0
@@ -126,7 +127,7 @@ def _ahead(done: list[tuple[float, NDArray]], frequency: float, first: NDArray) 
     return np.clip(line, s2 / FURTHEST, s2 * FURTHEST)
 
 
-class _Hinges:
+class Hinges:
     """The superlinear hinges of a system: gradients, offsets from rest, stiffness and slopes."""
 
     def __init__(self, system: Linearized) -> None:
@@ -149,12 +150,42 @@ class _Hinges:
         weight = sparse.diags_array(self.stiffness * (slope - self.reference))
         return self.gradient.T @ weight @ self.gradient
 
+    def left(self, stiffness: sparse.csc_array, motion: NDArray, load: NDArray) -> NDArray:
+        """Out-of-balance force (nf,) of a motion (nf,), for the dynamic stiffness of reference."""
+        turned = self.gradient @ motion
+        change = self.stiffness * (self.slope(motion) - self.reference)
+        return stiffness @ motion + self.gradient.T @ (change * turned) - load
+
+    def tangent(self, stiffness: sparse.csc_array, motion: NDArray) -> sparse.csc_array:
+        """Derivative (2 nf, 2 nf) of real and imaginary parts of that by those of the motion.
+
+        A moment k s(A) y of the turn y changes by k s dy + k s' Re(y* dy) y / A.
+        """
+        turned = self.gradient @ motion
+        swing = np.maximum(np.abs(turned), LEAST)
+        ends = [equivalent_slope(self.offset, swing * by) for by in (1.0 + APART, 1.0 - APART)]
+        curved = self.stiffness * (ends[0] - ends[1]) / (2.0 * APART * swing) / swing
+        whole = stiffness + self.change(self.slope(motion))
+        parts = [
+            self.gradient.T @ sparse.diags_array(curved * one * other) @ self.gradient
+            for one, other in (
+                (turned.real, turned.real), (turned.real, turned.imag), (turned.imag, turned.imag),
+            )
+        ]  # fmt: skip
+        return sparse.block_array(
+            [
+                [whole.real + parts[0], parts[1] - whole.imag],
+                [parts[1] + whole.imag, whole.real + parts[2]],
+            ],
+            format="csc",
+        )
+
 
 class _Balance:
     """The iteration for the slopes at one frequency."""
 
     def __init__(
-        self, hinges: _Hinges, system: Linearized, omega: float, load: NDArray,
+        self, hinges: Hinges, system: Linearized, omega: float, load: NDArray,
         options: HarmonicBalance,
     ) -> None:  # fmt: skip
         self.hinges, self.stiffness = hinges, dynamic_stiffness(system, omega)

@@ -92,9 +92,9 @@ def fit(
 
     Every key of the case file that holds a number can be a parameter: for other values of it the
     file is read anew. Searches are by the trust region method of `scipy.optimize.least_squares`
-    with bounds, in the parameters over their scales. Derivatives of paths, modes and frequency
-    responses are found beside the result, without running the model again; those of motions are
-    difference quotients of whole motions.
+    with bounds, in the parameters over their scales. Derivatives of paths, modes, frequency
+    responses and implicit motions are found beside the result, without running the model again;
+    those of explicit motions are difference quotients of whole motions.
 
     Parameters
     ----------

@@ -20,14 +20,16 @@ from foldyn.analyses.reading import case_of_document, read_document, validated
 from foldyn.cases.models import SHELL
 from foldyn.errors import FoldynError, FoldynWarning, InputError
 from foldyn.experiment.calibration.measurement import Measurement
-from foldyn.experiment.calibration.parameters import Parameter, Space, space
+from foldyn.experiment.calibration.parameters import Beside, Parameter, Space, space
 from foldyn.experiment.calibration.predicted_run import (
+    REFINED,
     PredictedRun,
-    asked,
     computed,
-    neighbors,
+    motion_of,
     result_of,
+    seen,
     steady,
+    with_neighbors,
 )
 from foldyn.experiment.camera import Sight
 from foldyn.input_files import path_of
@@ -36,10 +38,14 @@ from foldyn.values import listed, show
 
 ASIDE = ("name", "label", "sigma", "held_out", "case", "force")
 """Fields of measurements that do not change what is predicted."""
+STRUCTURAL = "pattern", "sheet", "model", "supports"
+"""Tables of a case file of which its structure is made."""
 VIBRATIONS = ("modes", "frf")
 """Analyses whose results are looked at before a search."""
 MESH_ORDER = 2
 """Order of a shell's elements."""
+Predicted = dict[int, NDArray[np.float64]]
+"""Predictions by the number of the measurement."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +83,7 @@ class Problem:
         """
         predicted = [np.full(len(one), np.nan) for one in self.observed()]
         for k in range(len(self.runs)) if runs is None else runs:
-            for i, own in self._computed(self.runs[k], values).predicted.items():
+            for i, own in self._computed(self.runs[k], values).items():
                 predicted[i] = own
         return predicted
 
@@ -93,56 +99,88 @@ class Problem:
         predicted: dict[int, NDArray[np.float64]] = {}
         slopes: dict[int, NDArray[np.float64]] = {}
         for run in self.runs:
-            computed = self._computed(run, values)
-            predicted |= computed.predicted
+            fitted = [i for i in run.members if not self.measurements[i].held_out]
             try:
-                slopes |= self._slopes(run, values, computed, second)
+                own, beside = self._beside(run, values, second, fitted)
             except FoldynError:
-                shapes = {i: (len(own), len(values)) for i, own in computed.predicted.items()}
-                slopes |= {i: np.full(shape, np.nan) for i, shape in shapes.items()}
+                own, beside = self._computed(run, values), None
+            predicted |= own
+            for i, one in own.items():
+                lost = beside is None and i in fitted
+                slopes[i] = np.full((len(one), len(values)), np.nan if lost else 0.0)
+            for part, there in beside or ():
+                for i in fitted:
+                    slopes[i][:, part.place] += part.weight * there[i]
         every = range(len(self.measurements))
         return [predicted[i] for i in every], [slopes[i] for i in every]
 
-    def _computed(self, run: PredictedRun, values: Sequence[float] | NDArray) -> Computed:
-        """A run at given values."""
+    def _computed(self, run: PredictedRun, values: Sequence[float] | NDArray) -> Predicted:
+        """What a run predicts at given values."""
         case_file, members = self.case_file(run, values), run.those_of(self.measurements)
-        result, case = result_of(case_file, members), case_file.case()
-        pairs = zip(run.members, members, strict=True)
-        return Computed(case_file, result, {i: one.predicted(result, case) for i, one in pairs})
-
-    def _slopes(
-        self, run: PredictedRun, values: NDArray, computed: Computed, second: bool
-    ) -> dict[int, NDArray[np.float64]]:
-        """Derivatives (n, p) of what a run predicts, by differences of its neighbors."""
-        members = run.those_of(self.measurements)
-        slopes = {i: np.zeros((len(own), len(values))) for i, own in computed.predicted.items()}
-        fitted = {i: self.measurements[i] for i in run.members if not self.measurements[i].held_out}
-        if not fitted:
-            return slopes
-        parts = self.space.differences(values, second)
-        points = {tuple(part.point): part.point for part in parts}
-        one = asked(computed.case_file, members)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
-            others = [asked(self.case_file(run, point), members) for point in points.values()]
-            found = neighbors(run.kind, one, computed.result, others, [*fitted.values()])
-        beside = dict(zip(points, zip(others, found, strict=True), strict=True))
-        for part in parts:
-            other, result = beside[tuple(part.point)]
-            for i, each in fitted.items():
-                slopes[i][:, part.place] += part.weight * each.predicted(result, other.case)
-        return slopes
+            return self._predicted(seen(run, case_file, members), case_file, run.members)
 
-    def case_file(self, run: PredictedRun, values: Sequence[float] | NDArray) -> CaseFile:
-        """Case file at given values; its warnings were given when it was checked."""
+    def _predicted(self, result: Any, case_file: CaseFile, members: Sequence[int]) -> Predicted:
+        case = case_file.case()
+        return {i: self.measurements[i].predicted(result, case) for i in members}
+
+    def _beside(
+        self, run: PredictedRun, values: NDArray, second: bool, fitted: Sequence[int]
+    ) -> tuple[Predicted, list[tuple[Beside, Predicted]]]:
+        """What a run predicts at given values, and of `fitted` at those around for derivatives.
+
+        Raises
+        ------
+        FoldynError
+            Those are not found without whole runs.
+        """
+        if not fitted:
+            return self._computed(run, values), []
+        parts = self.space.differences(values, second)
+        points = {tuple(part.point): part.point for part in parts}
+        if run.kind not in REFINED:
+            points.pop(tuple(values), None)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FoldynWarning)
+            one = self.case_file(run, values)
+            others = [
+                one
+                if np.array_equal(each, values)
+                else self.case_file(run, each, Like(values, one))
+                for each in points.values()
+            ]
+            members = run.those_of(self.measurements)
+            result, found = with_neighbors(run, one, others, members, second)
+        own = self._predicted(result, one, run.members)
+        beside = {tuple(values): own} | {
+            point: self._predicted(there, other, fitted)
+            for point, there, other in zip(points, found, others, strict=True)
+        }
+        return own, [(part, beside[tuple(part.point)]) for part in parts]
+
+    def case_file(
+        self, run: PredictedRun, values: Sequence[float] | NDArray, like: Like | None = None
+    ) -> CaseFile:
+        """Case file at given values; its warnings were given when it was checked.
+
+        like : one at other values, whose structure it takes where that is the same.
+        """
         changes = self.space.changes(values)
         fixed = HINGES not in run.document["pattern"] and not any(
             key.startswith("pattern") for key in changes
         )
+        pattern = run.patterns[0] if fixed and run.patterns else None
+        structures = None
+        if like is not None:
+            before = self.space.changes(like.values)
+            moved = [key for key, value in changes.items() if value != before[key]]
+            if not any(key.startswith(STRUCTURAL) for key in moved):
+                structures = like.case_file.structures
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
-            pattern = run.patterns[0] if fixed and run.patterns else None
-            made = case_of_document(run.path, replaced(run.document, changes), pattern=pattern)
+            document = replaced(run.document, changes)
+            made = case_of_document(run.path, document, pattern=pattern, structures=structures)
         if fixed and not run.patterns:
             run.patterns.append(made.pattern)
         return made
@@ -154,7 +192,8 @@ class Problem:
         members: Sequence[Measurement] | None = None,
     ) -> Any:
         """Path or motion at given values, for its own measurements or others."""
-        return result_of(self.case_file(run, values), members or run.those_of(self.measurements))
+        case_file = self.case_file(run, values)
+        return result_of(run, case_file, members or run.those_of(self.measurements))
 
     def observed(self) -> list[NDArray[np.float64]]:
         """Measured values of each measurement."""
@@ -167,7 +206,7 @@ class Problem:
         digest.update(json.dumps(names).encode())
         for run in self.runs:
             digest.update(json.dumps(run.document, sort_keys=True, default=str).encode())
-            state = self.case_file(run, self.space.column("start")).initial()
+            state = run.start(self.case_file(run, self.space.column("start")))
             for array in () if state is None else (state.displacement, state.velocity):
                 digest.update(b"" if array is None else np.asarray(array).tobytes())
             for file in sorted(files_of(run.document, "initial")):
@@ -188,7 +227,7 @@ class Problem:
             if run.kind in VIBRATIONS:
                 case_file = self.case_file(run, values)
                 members = run.those_of(self.measurements)
-                result = computed(case_file, members)
+                result = computed(run, case_file, members)
                 for one in members:
                     one.examine(result, case_file.case())
 
@@ -199,7 +238,7 @@ class Problem:
         orders = []
         for k, run in enumerate(self.runs):
             if run.kind == "dynamics":
-                motion = self._motion(run, values)
+                motion = motion_of(run, self.case_file(run, values))
                 orders.append(motion.method.order)
                 steps[k] = {"analysis.dt": 0.5 * motion.plan.dt}
                 steps[k]["output.every"] = 0.5 * motion.plan.interval
@@ -220,11 +259,6 @@ class Problem:
             found.append(Finer("mesh", remedy, MESH_ORDER, half, half, 2))
         return found
 
-    def _motion(self, run: PredictedRun, values: Sequence[float] | NDArray) -> Any:
-        """The motion that a run computes, before it begins."""
-        case_file = self.case_file(run, values)
-        return case_file.computation(**steady(case_file)).compute.motion  # type: ignore[attr-defined]
-
     def _changed(self, changes: Mapping[int, Mapping[str, float]]) -> Problem:
         runs = [
             replace(run, document=replaced(run.document, changes.get(k, {})))
@@ -233,12 +267,11 @@ class Problem:
         return replace(self, runs=tuple(runs))
 
 
-class Computed(NamedTuple):
-    """A run at some values: its result, and what it predicts of each of its measurements."""
+class Like(NamedTuple):
+    """A case file, and the values of the parameters that it is at."""
 
+    values: NDArray[np.float64]
     case_file: CaseFile
-    result: Any
-    predicted: dict[int, NDArray[np.float64]]
 
 
 class Finer(NamedTuple):

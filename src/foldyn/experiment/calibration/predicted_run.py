@@ -9,20 +9,28 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from xarray import Variable
 
 from foldyn.analyses import CaseFile
-from foldyn.cases import Case
+from foldyn.analyses.casefile import Computation
+from foldyn.cases import Case, State
 from foldyn.dynamics.methods import method_of
+from foldyn.dynamics.motion import Motion
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.modal import ModalParameters, ModeShapes
 from foldyn.experiment.calibration.responses import FrequencyResponse
-from foldyn.gradients.neighbors import Asked, equilibria, modes, responses
+from foldyn.gradients.neighbors import Asked, equilibria, modes, motions, responses
+from foldyn.linear.modes import spectrum_of
 from foldyn.patterns import Pattern
 from foldyn.values import show
 
 STEADY = "generalized_alpha"
 """Integrator of a fit where the case file leaves the choice open."""
+SHARES = 1e-4, 1e-6
+"""Change of a difference of motions, in itself, at which it is found: in a search, at its end."""
+REFINED = "statics", "modes"
+"""Analyses whose neighbors are found with fewer errors than the result: it is one of them, too."""
 MANY = 2000
 """Coordinates of nodes beyond which modes are found as quickly as those of a neighbor."""
 
@@ -41,12 +49,15 @@ class PredictedRun:
         Numbers of the measurements.
     patterns : list of Pattern
         Its pattern once it is made, for all values of parameters that leave it alone.
+    starts : list of State or None
+        The stored state that it starts from, once it is read.
     """
 
     path: Path
     document: dict[str, Any]
     members: tuple[int, ...]
-    patterns: list[Pattern] = field(init=False, repr=False, default_factory=list)
+    patterns: list[Pattern] = field(repr=False, default_factory=list)
+    starts: list[State | None] = field(repr=False, default_factory=list)
 
     @property
     def kind(self) -> str:
@@ -57,28 +68,70 @@ class PredictedRun:
         """Its measurements, of all."""
         return [measurements[i] for i in self.members]
 
+    def start(self, case_file: CaseFile) -> State | None:
+        """What its case starts from."""
+        if "file" not in self.document.get("initial", ()):
+            return case_file.initial()
+        if not self.starts:
+            self.starts.append(case_file.initial())
+        return self.starts[0]
 
-def result_of(case_file: CaseFile, members: Sequence[Measurement]) -> Any:
+
+def result_of(run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]) -> Any:
     """What a case file asks for, without its warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
-        return computed(case_file, members)
+        return computed(run, case_file, members)
 
 
-def computed(case_file: CaseFile, members: Sequence[Measurement]) -> Any:
+def computed(run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]) -> Any:
     """What a case file asks for, at the load factors, modes or frequencies that are measured."""
-    return case_file.computation(**_changes(case_file, members)).result()
+    return _computation(run, case_file, members).result()
 
 
-def _changes(case_file: CaseFile, members: Sequence[Measurement]) -> dict[str, Any]:
+def seen(run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]) -> Any:
+    """What measurements compare of that."""
+    computation = _computation(run, case_file, members)
+    if run.kind != "dynamics":
+        return computation.result()
+    motion = computation.compute.motion  # type: ignore[attr-defined]
+    with case_file.placing():
+        motion.integrate()
+    return _moved(motion)
+
+
+def motion_of(run: PredictedRun, case_file: CaseFile) -> Motion:
+    """The motion that a case file asks for, before it begins."""
+    return _computation(run, case_file, ()).compute.motion  # type: ignore[attr-defined]
+
+
+def _moved(motion: Motion) -> dict[str, Variable]:
+    """What measurements compare of a motion that was computed."""
+    out, _ = motion.output.first(motion.stored)
+    return {
+        "time": Variable("time", out.time),
+        "displacement": Variable(("time", "node", "axis"), out.displacement),
+        "rest_position": Variable(("node", "axis"), motion.case.structure.nodes),
+    }
+
+
+def _computation(
+    run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]
+) -> Computation:  # fmt: skip
+    return case_file.computation(**_changes(run, case_file, members))
+
+
+def _changes(
+    run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]
+) -> dict[str, Any]:  # fmt: skip
     """Arguments of an analysis that are not those of the case file."""
     case, given = case_file.case(), case_file.analysis.arguments
-    if case_file.analysis.kind == "dynamics":
-        return steady(case_file)
-    if case_file.analysis.kind == "modes":
+    if run.kind == "dynamics":
+        return {**steady(case_file), "initial": run.start(case_file)}
+    if run.kind == "modes":
         counts = [one.count for one in members if isinstance(one, ModeShapes | ModalParameters)]
         return {"count": min(max(given["count"], *counts), len(case.free_dofs))}
-    if case_file.analysis.kind == "frf":
+    if run.kind == "frf":
         lines = [one.frequency for one in members if isinstance(one, FrequencyResponse)]
         return {"frequencies": np.unique(np.concatenate(lines))}
     return {
@@ -87,26 +140,43 @@ def _changes(case_file: CaseFile, members: Sequence[Measurement]) -> dict[str, A
     }  # fmt: skip
 
 
-def asked(case_file: CaseFile, members: Sequence[Measurement]) -> Asked:
-    """The case of a file, and the arguments of its analysis."""
-    if case_file.analysis.kind == "dynamics" or case_file.initial() is not None:
-        raise InputError("motions, and what starts from a state, have no neighbors")
-    given = {**case_file.analysis.arguments, **_changes(case_file, members)}
-    return Asked(case_file.case(), given)
+def with_neighbors(
+    run: PredictedRun, case_file: CaseFile, others: Sequence[CaseFile],
+    members: Sequence[Measurement], second: bool,
+) -> tuple[Any, list[Any]]:  # fmt: skip
+    """What measurements compare, and the same of other cases a little beside.
 
+    second : whether differences have to be right to the second order.
 
-def neighbors(
-    kind: str, one: Asked, result: Any, others: Sequence[Asked], fitted: Sequence[Measurement]
-) -> list[Any]:
-    """Results of other cases beside a result, as far as measurements need them."""
-    if kind == "statics":
-        return equilibria(one, result, others)
-    if kind == "modes":
-        if one.case.structure.nodes.size > MANY:
-            raise InputError("modes of so many dofs are found as quickly as their neighbors")
-        places = [each.places(result, one.case) for each in fitted]  # type: ignore[attr-defined]
-        return modes(one, result, others, np.unique(np.concatenate(places)).tolist())
-    return responses(one, result, others)
+    Raises
+    ------
+    FoldynError
+        There is none without computing the others on their own.
+    """
+    if run.kind != "dynamics" and run.start(case_file) is not None:
+        raise InputError("what starts from a state has no neighbors")
+    one, *beside = (
+        Asked(each.case(), {**each.analysis.arguments, **_changes(run, each, members)})
+        for each in (case_file, *others)
+    )
+    if run.kind == "dynamics":
+        motion = motion_of(run, case_file)
+        moved = motions(motion, one, beside, SHARES[second])
+        result = _moved(motion)
+        dims = result["displacement"].dims
+        return result, [{**result, "displacement": Variable(dims, each)} for each in moved]
+    if run.kind == "frf":
+        result, *found = responses(one, beside)
+        return result, found
+    if run.kind == "statics":
+        result = seen(run, case_file, members)
+        return result, equilibria(one, result, beside)
+    if one.case.structure.nodes.size > MANY:
+        raise InputError("modes of so many dofs are found as quickly as their neighbors")
+    base = spectrum_of(one.case, **one.arguments)
+    fitted = [each for each in members if not each.held_out]
+    places = [each.places(base.result, one.case) for each in fitted]  # type: ignore[attr-defined]
+    return base.result, modes(base, beside, np.unique(np.concatenate(places)).tolist())
 
 
 def _path(case: Case, members: Sequence[Measurement]) -> list[float]:
