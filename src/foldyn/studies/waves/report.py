@@ -53,7 +53,9 @@ def _opening(study: Study) -> str:
         "Miura and eggbox sheets of Pratapa, Suryanarayana and Paulino (Bloch wave framework for "
         "structures with nonlocal interactions, J. Mech. Phys. Solids 118, 2018).\n\n"
         "Dimensions, masses and stiffnesses of the papers were not at hand. All parameters are "
-        "ours and stand in the last table, so that claims can be compared and numbers cannot."
+        "ours and stand in the last table, so that claims can be compared and numbers cannot. "
+        "Those of the Kresling chain come from a search for one in which the rarefaction overtakes "
+        "the compression: they show that it can happen, not how often it does."
     )
     if study.plan != FULL:
         text += "\n\nThis is a coarse run with fewer fold states, phases and cells."
