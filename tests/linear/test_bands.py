@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from cells import SHEET, chain, eigenvalues, kresling, miura, of_ring
+from scipy.optimize import brentq
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
@@ -149,6 +150,25 @@ def test_a_closed_ring_has_the_waves_of_its_sector():
     own = eigenvalues(cell, of_ring((6,)))
     top = whole.eigenvalue.values[-1]
     np.testing.assert_allclose(own, whole.eigenvalue.values, rtol=0.0, atol=EXACT * top)
+
+
+@pytest.mark.matrix
+def test_a_closed_tube_has_the_waves_of_its_sector():
+    """A waterbomb sheet of nine bases that closes: its seam is a crease like the others."""
+
+    def cell(bases, dihedral):
+        pattern = fd.patterns.waterbomb(cells=(bases, 2), a=0.03, b=0.02, dihedral=dihedral)
+        return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET)))
+
+    def open_by(dihedral):
+        return cell(1, dihedral).motions[0].angle - 40.0
+
+    dihedral = brentq(open_by, 119.0, 120.0, xtol=1e-12)
+    sector, tube = cell(1, dihedral), cell(9, dihedral)
+    assert (sector.dimensions, tube.dimensions) == (2, 1)
+    own = eigenvalues(sector, [(2.0 * np.pi * j / 9, 0.7) for j in range(9)])
+    whole = eigenvalues(tube, [[0.7]])
+    np.testing.assert_allclose(own, whole, rtol=0.0, atol=EXACT * whole[-1])
 
 
 @pytest.mark.parametrize(
