@@ -53,6 +53,24 @@ def test_supercells_do_so_in_prestressed_states(mass):
     assert_alike(*cells, (2,), states)
 
 
+def bending(along, across, height, curvature):
+    """Motions that bend a sheet evenly along its first period, about a height (m)."""
+    turn = np.array([0.0, curvature * along[0], 0.0])
+    twist = np.concatenate([turn, along - np.cross(turn, [0.0, 0.0, height])])
+    return [of_twist(twist), translation(across)]
+
+
+def test_supercells_do_so_on_bent_sheets():
+    """Translations that become rotations."""
+    cells, states = (miura(), miura((2, 1))), []
+    for cell in cells:
+        height = cell.case.structure.nodes[:, 2].mean()
+        states.append({"state": fd.linear.relaxed(cell, bending(*cell.vectors, height, 5.0))})
+    assert_alike(*cells, (2, 1), states)
+    b = fd.bands(cells[0], [[0.5, 0.5]], 1, **states[0])
+    assert b.angles.values == pytest.approx([np.degrees(5.0 * cells[0].vectors[0, 0]), 0.0])
+
+
 def pair_of(make, **options):
     """One cell of a sheet, and two beside each other."""
     for counts in ((1, 1), (2, 1)):
@@ -299,10 +317,8 @@ def test_long_waves_are_those_of_the_homogenized_sheet():
         return sheet.energy([translation(along + g * length * np.eye(3)[1]), translation(across)])
 
     def bent(k):
-        turn = np.array([0.0, k * length, 0.0])
-        height = np.array([0.0, 0.0, sheet.sheets[0].nodes[:, 2].mean()])
-        twist = np.concatenate([turn, along - np.cross(turn, height)])
-        return sheet.energy([of_twist(twist), translation(across)])
+        height = sheet.sheets[0].nodes[:, 2].mean()
+        return sheet.energy(bending(along, across, height, k))
 
     static = [stiffness(bent, 0.05), stiffness(stretched, 1e-4), stiffness(sheared, 1e-4)]
     speeds = np.sqrt(np.array(static) / sheet.areal_density)
