@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cells import SHEET, chain, eigenvalues, kresling, miura, of_ring
+from cells import SHEET, chain, eigenvalues, kresling, miura, of_ring, squares
 from scipy.optimize import brentq
 
 import foldyn as fd
@@ -35,6 +35,10 @@ def test_supercells_have_the_waves_of_one_cell(mass):
     assert_alike(miura(mass=mass), miura((2, 2), mass=mass), (2, 2))
     assert_alike(chain(mass=mass), chain(3, mass=mass), (3,))
     assert_alike(kresling(mass=mass), kresling(3, mass=mass), (3,))
+
+
+def test_supercells_do_so_where_a_cell_is_one_panel():
+    assert_alike(squares(), squares(3), (3, 1))
 
 
 @pytest.mark.parametrize("mass", RULES)
