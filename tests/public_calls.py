@@ -44,6 +44,19 @@ def case() -> fd.Case:
     )
 
 
+@cache
+def swung() -> fd.Case:
+    """The same, swung by its load."""
+    load = fd.Force([4, 5], (0, 0, 1e-3), fd.Harmonic(5.0))
+    return fd.Case(case().structure, case().supports, [load], fd.Rayleigh(alpha=1.0))
+
+
+def at_rest(k: float) -> fd.State:
+    """A start."""
+    return fd.State()
+
+
+LIFT = fd.Quantity("m", "lift", function=lambda u, v, t: u[4, 2])
 DATA: Calls = {
     "Sheet": (fd.Sheet, {
         "youngs_modulus": 1e6, "poissons_ratio": 0.25, "thickness": 0.5, "density": 1000.0,
@@ -232,6 +245,29 @@ def solved(folder: Path) -> Calls:
             "cell": cell(), "phases": [[0.5]], "count": 2, "state": fd.State(), "secant": 2.0,
             "group_velocity": True, "shape": True, "polarization": True, "load_factor": 1.0,
             "track": False,
+        }),
+        "swept_sine": (fd.swept_sine, {
+            "case": swung(), "measure": LIFT, "frequencies": [5.0, 6.0], "duration": 2.0,
+            "sweep": "up", "settle": 1, "resolution": 0.25, "initial": None, "method": "rk4",
+            "dt": None, "tolerance": None, "progress": None,
+        }),
+        "bifurcation_diagram": (fd.bifurcation_diagram, {
+            "case": swung(), "measure": LIFT, "frequencies": [5.0, 6.0], "amplitudes": None,
+            "sweep": "up", "settle": 1, "record": 4, "resolution": 0.25, "initial": None,
+            "method": "rk4", "dt": None, "tolerance": None, "progress": None,
+        }),
+        "poincare_section": (fd.poincare_section, {
+            "motion": run, "period": 0.001, "plane": None, "level": 0.5, "direction": "up",
+            "phase": 30.0, "after": 0.0,
+        }),
+        "lyapunov_exponent": (fd.lyapunov_exponent, {
+            "case": swung(), "duration": 1.0, "settle": 0.5, "interval": 0.5, "initial": None,
+            "method": "rk4", "dt": None, "progress": None,
+        }),
+        "basins": (fd.basins, {
+            "case": case(), "initial": at_rest, "grid": {"k": [0.0, 1.0]}, "duration": 0.5,
+            "record": 4, "same": 0.5, "method": "rk4", "dt": None, "threads": 1, "device": "cpu",
+            "folder": None, "progress": None,
         }),
         "fold": (fd.fold, {
             "pattern": fd.Pattern(POINTS, PANELS, {(1, 2): "V"}), "fraction": 0.5, "angles": None,

@@ -207,6 +207,15 @@ def test_the_numbers_of_the_statics_page_are_what_its_script_computes():
     assert f"bends hold {bends[0]:.0f} % and {bends[1]:.0f} %" in page
 
 
+def test_the_page_on_long_motions_finds_jumps_chaos_and_basins():
+    with redirect_stdout(io.StringIO()):
+        names = executed(*blocks("long-motions.md", "python"))
+    up, down = names["turn"] * names["found"].jump_between.values.mean(axis=1)
+    assert 1.28 < up < 1.29 and 1.115 < down < 1.125
+    assert 0.09 < names["exponent"].exponent < 0.12
+    assert names["basins"].share.values.tolist() == [0.5, 0.5]
+
+
 def test_the_loads_page_shows_a_table_that_can_be_read(tmp_path):
     (text,), (_, toml) = blocks("loads.md", "text"), blocks("loads.md", "toml")
     (tmp_path / "pulse.csv").write_text(text, "utf-8")

@@ -2,6 +2,7 @@
 
 from foldyn import (
     analyses as analyses,
+    attractors as attractors,
     cases as cases,
     checks as checks,
     designs as designs,
@@ -27,6 +28,13 @@ from foldyn import (
     sweeps as sweeps,
 )
 from foldyn.analyses import read_case as read_case
+from foldyn.attractors import (
+    basins as basins,
+    bifurcation_diagram as bifurcation_diagram,
+    lyapunov_exponent as lyapunov_exponent,
+    poincare_section as poincare_section,
+    swept_sine as swept_sine,
+)
 from foldyn.cases import (
     Actuate as Actuate,
     BaseMotion as BaseMotion,

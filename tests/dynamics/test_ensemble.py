@@ -79,6 +79,29 @@ def test_other_laws_and_initial_states(law):
         compare(many, k, case, 0.004, 1e-10, initial=states[k], **STEPS)
 
 
+@pytest.mark.parametrize("method", ["central_difference", "rk4"])
+def test_starts_of_one_case_are_as_those_of_copies(method):
+    starts = [fd.State(moved(FIRST, 1e-5 * k, k)) for k in range(3)]
+    copies = [sheet(0) for _ in starts]
+    shared, apart = (
+        fd.simulate_many(cases, 0.01, initial=starts, method=method, **STEPS)
+        for cases in ([FIRST] * 3, copies)
+    )
+    for name in ("displacement", "velocity", "reaction", "kinetic", "work"):
+        np.testing.assert_array_equal(shared[name], apart[name])
+
+
+def test_a_start_in_a_stiffer_state_limits_the_step():
+    """Bars that are pulled far are stiffer than at rest: the shared step is too long for them."""
+    limit = fd.critical_step(FIRST, "central_difference")
+    far = fd.State(0.5 * FIRST.structure.nodes * ~FIRST.fixed)
+    own = fd.critical_step(FIRST, "central_difference", far.displacement)
+    assert own < 0.95 * limit
+    dt = 0.5 * (own + limit)
+    with pytest.raises(InputError, match=r"above the critical step of .* of cases\[1\]"):
+        fd.simulate_many([FIRST] * 2, 10 * dt, dt=dt, initial=[None, far])
+
+
 def test_without_loads():
     case = FIRST.altered(loads=[])
     given = {"every": 10, "initial": fd.State(velocity=1e-3 * ~case.fixed), "start": 3.0}

@@ -18,9 +18,12 @@ from foldyn.dynamics import timing
 from foldyn.dynamics.audit import audited
 from foldyn.dynamics.diagnostics import INACCURATE
 from foldyn.dynamics.driver import prepare
+from foldyn.dynamics.initial import check_start, check_touching
 from foldyn.dynamics.lane_steps import integrate, topology
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.motion_state import Samples
+from foldyn.dynamics.sampling import Sampler
+from foldyn.dynamics.stability import damper_rate, frequency_bound, is_stable
 from foldyn.errors import ComputationError, FoldynWarning, InputError, StretchWarning
 from foldyn.mechanics.lanes import WIDTH
 from foldyn.results.dataset import result_dataset
@@ -103,9 +106,13 @@ def simulate_many(
     motions: list[Motion] = []
     for k, (case, state) in enumerate(zip(cases, states, strict=True)):
         of_kind(f"cases[{k}]", case, Case)
+        like = next((m for m in motions[:1] if dt is not None and _takes_starts(m, case)), None)
         try:
             given = case, duration, method, dt, every, state
-            motions.append(prepare(*given, force=True, start=start, kept=True, device=device))
+            motions.append(
+                _from_start(like, state) if like
+                else prepare(*given, force=True, start=start, kept=True, device=device)
+            )  # fmt: skip
         except InputError as error:
             place = f"cases[{k}]{'.' if error.field else ': '}"
             raise error if error.field in COMMON else error.within(place) from None
@@ -138,6 +145,29 @@ def simulate_many(
         "energy_error": _warn(motions, ended, out.energy),
     }  # fmt: skip
     return _dataset(case, out, [ended.get(k, "done") for k in range(len(motions))], facts)
+
+
+def _takes_starts(motion: Motion, case: Case) -> bool:
+    """Whether what was prepared for a motion serves those of a case from any other start."""
+    fresh = any(getattr(part, "state", "rest") == "start" for part in case.dampings)
+    return motion.case is case and motion.device == "cpu" and not (fresh or case.remembering)
+
+
+def _from_start(like: Motion, initial: State | None) -> Motion:
+    """A motion as another one of the same case, from another start; they share their arrays."""
+    case, u_v = like.case, check_start(like.case, initial)
+    check_touching(case, u_v[0], like.plan.start, like.plan.end)
+    growth, critical, u = like.method.growth, like.critical, u_v[0]
+    rate = damper_rate(case, u) + like.packed.modal.rate
+    bound = frequency_bound(case, u)
+    assert growth is not None  # of explicit methods
+    if not (np.isfinite(bound) and is_stable(growth, bound, case.rayleigh, like.plan.dt, rate)):
+        critical = like.method.critical_step(case, u, like.packed.modal)
+    sampler = Sampler(case, {}, *u_v, like.plan.start)
+    state = *u_v, None, None
+    return Motion(
+        case, like.method, like.plan, critical, like.force, state, like.packed, sampler
+    )  # fmt: skip
 
 
 def _shape(case: Case) -> dict[str, Any]:

@@ -1,6 +1,13 @@
 # Public names and where they live; loaded when they are first used (facade.py)
 
 from foldyn.plots.animation import animate as animate, animate_modes as animate_modes
+from foldyn.plots.attractors import (
+    plot_amplitudes as plot_amplitudes,
+    plot_basins as plot_basins,
+    plot_bifurcation_diagram as plot_bifurcation_diagram,
+    plot_lyapunov_exponent as plot_lyapunov_exponent,
+    plot_poincare_section as plot_poincare_section,
+)
 from foldyn.plots.bands import (
     plot_bands as plot_bands,
     plot_iso_frequency as plot_iso_frequency,

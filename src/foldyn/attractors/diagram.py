@@ -1,0 +1,330 @@
+"""`bifurcation_diagram`: steady motions, frequency after frequency or amplitude after amplitude."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.attractors.drive import at_frequency, at_level, driven_frequency
+from foldyn.attractors.jumps import Jump, is_jump, jump_variables
+from foldyn.attractors.run import (
+    PER_PERIOD,
+    Run,
+    Stretch,
+    check_measure,
+    extremes,
+    measured,
+    told_once,
+)
+from foldyn.cases import Case, State
+from foldyn.dynamics.progress import Progress, Reporter, reporter
+from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.results import Quantity
+from foldyn.results.dataset import result_dataset
+from foldyn.results.quantities import variable
+from foldyn.values import choice, number, numbers, of_kind, whole
+
+if TYPE_CHECKING:
+    import xarray
+
+SWEEPS = ("up", "down", "both")
+SAME = 1e-9  # relative difference of values that are one
+REPEATS = 1e-3  # of the size of a motion: states as near as that are one
+FREQUENCY = Quantity("Hz", "frequency of the drive")
+LEVEL = Quantity("1", "factor on the drive")
+
+
+def bifurcation_diagram(
+    case: Case,
+    measure: Quantity,
+    frequencies: ArrayLike | None = None,
+    *,
+    amplitudes: ArrayLike | None = None,
+    sweep: str = "both",
+    settle: int = 200,
+    record: int = 32,
+    resolution: float = 1e-3,
+    initial: State | None = None,
+    method: str = "rk4",
+    dt: float | None = None,
+    tolerance: float | None = None,
+    progress: bool | Reporter | None = None,
+) -> xarray.Dataset:
+    """Steady motions at one frequency, or amplitude, of the drive after another: a stepped sine.
+
+    Each motion starts where the one before has ended, settles, and is recorded: its amplitude, and
+    what it looks like once in each period of the drive. Jumps are bracketed by bisection, from the
+    motion before them.
+
+    Parameters
+    ----------
+    case : Case
+        With `Harmonic` histories of loads or supports; they set the period.
+    measure : Quantity
+        With the `function` of displacement (n, 3), m, velocity (n, 3), m/s, and time, s, that the
+        diagram shows: a number.
+    frequencies : array_like, shape (k,)
+        Increasing (Hz), of the slowest of these histories: others keep their ratio to it, all their
+        phases.
+    amplitudes : array_like, shape (k,)
+        Instead: increasing factors on all that has such a history, at the case's own frequency.
+    sweep : {"up", "down", "both"}
+        Which way; "both" goes up first, and down from there.
+    settle, record : int
+        Periods of the drive that are left out, and that are recorded (at least 4), at each value.
+    resolution : float
+        Relative width to which a jump is bracketed. What is a large change (over 20 % of the larger
+        amplitude) between neighbors, but not within this width, is a steep curve and no jump.
+    initial : State, optional
+        Where the first motion starts; rest by default.
+    method, dt, tolerance :
+        As of `simulate`; `dt` is the largest step (s), without it at most a 64th of the period.
+    progress : bool or callable, optional
+        True shows a bar; a callable gets a `Progress` of the number of values.
+
+    Returns
+    -------
+    xarray.Dataset
+        Along `sweep` and `frequency` (Hz) or `level` (the factor): `section` (record), the measure
+        at the start of each period of the drive; `amplitude`, half the distance of its extremes
+        while it was recorded; `periods`, of the drive after which the motion repeats to 0.1 %, and
+        0 where it does not within half of the record (quasi-periodic or chaotic, or not settled).
+        Along `jump`: `jump_sweep`, `jump_between` and `jump_amplitude` (side), before and after.
+        Attribute `complete`: 1 if every sweep came to its end.
+
+    Raises
+    ------
+    InputError
+        An argument out of range, or nothing that drives the case.
+    ComputationError
+        The first motion fails.
+
+    Warns
+    -----
+    FoldynWarning
+        A later one fails, which ends its sweep: what comes after is nan.
+
+    Notes
+    -----
+    Close to a fold a motion lingers before it falls, and jumps come late: give `settle` some
+    hundred periods where damping is light. Points that a long step has kicked off before a jump are
+    replaced by motions that came there slowly.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> s = fd.discretize(fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.1, 1.0))
+    >>> supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")]
+    >>> push = fd.Force([0, 1], (1.0, 0, 0), history=fd.Harmonic(5.0))
+    >>> case = fd.Case(s, supports, [push], damping=fd.Rayleigh(alpha=20.0))
+    >>> ridge = fd.Quantity("m", "height of the ridge", function=lambda u, v, t: u[2, 2])
+    >>> found = bifurcation_diagram(case, ridge, [4.0, 5.0], settle=10, record=4)
+    >>> found.periods.values.tolist()
+    [[1, 1], [1, 1]]
+    """
+    began = time.perf_counter()
+    of_kind("case", case, Case)
+    check_measure(measure)
+    swept = _swept(case, frequencies, amplitudes)
+    choice("sweep", sweep, SWEEPS)
+    steady = Steady(
+        swept.case_at, swept.frequency_at, measure, whole("settle", settle, least=0),
+        whole("record", record, least=4),
+    )  # fmt: skip
+    resolution = number("resolution", resolution, above=0.0)
+    run = Run(method, dt, tolerance, initial)
+    ways = ["up", "down"] if sweep == "both" else [sweep]
+    values = swept.values
+    points: list[list[Point]] = []
+    jumps: list[Jump] = []
+    report, close = reporter(progress)
+    try:
+        with told_once():
+            for way in ways:
+                found: list[Point] = []
+                here = values if way == "up" else values[::-1]
+                if points:  # from where the sweep up has ended
+                    here = here[len(values) - len(points[0]) :]
+                try:
+                    for value in here.tolist():
+                        found.append(steady.point(run, value))
+                        run, done = found[-1].run, len(found) + len(points) * len(values)
+                        report(Progress(float(done), float(len(ways) * len(values)), done, 0.0))
+                except ComputationError as error:
+                    if not found:
+                        raise
+                    last = f"{swept.name} {found[-1].value:g}"
+                    warnings.warn(
+                        f"the sweep {way} ends after the {last}: {error}",
+                        FoldynWarning,
+                        stacklevel=2,
+                    )
+                jumps += bracketed(steady, way, found, resolution)
+                points.append(found)
+    finally:
+        close()
+    facts = {
+        "method": method, "settle": settle, "record": record, "resolution": resolution,
+        "complete": all(len(found) == len(values) for found in points),
+        "wall_seconds": time.perf_counter() - began,
+    }  # fmt: skip
+    return _dataset(case, measure, swept, ways, points, jumps, facts)
+
+
+class Swept(NamedTuple):
+    """What varies."""
+
+    name: str  # of its dimension
+    quantity: Quantity
+    values: NDArray[np.float64]
+    case_at: Callable[[float], Case]
+    frequency_at: Callable[[float], float]  # Hz, of the drive
+
+
+def _swept(case: Case, frequencies: ArrayLike | None, amplitudes: ArrayLike | None) -> Swept:
+    if (frequencies is None) == (amplitudes is None):
+        raise InputError(": give frequencies (Hz) or amplitudes, one of the two", "frequencies")
+    own = driven_frequency(case)
+    by, given = ("frequencies", frequencies) if amplitudes is None else ("amplitudes", amplitudes)
+    values = numbers(by, given)
+    if values.ndim != 1 or not values.size or values.min() <= 0.0 or (np.diff(values) <= 0.0).any():
+        raise InputError(": must be a list of numbers above 0 that increase", by)
+    if amplitudes is None:
+        return Swept("frequency", FREQUENCY, values, lambda f: at_frequency(case, f), lambda f: f)
+    return Swept("level", LEVEL, values, lambda level: at_level(case, level), lambda _: own)
+
+
+class Point(NamedTuple):
+    """A steady motion."""
+
+    value: float  # of what is swept
+    amplitude: float
+    section: NDArray[np.float64]  # (record,)
+    periods: int
+    run: Run
+
+
+class Steady(NamedTuple):
+    """How steady motions are found."""
+
+    case_at: Callable[[float], Case]
+    frequency_at: Callable[[float], float]
+    measure: Quantity
+    settle: int
+    record: int
+
+    def point(self, run: Run, value: float) -> Point:
+        """The motion at a value of what is swept, from where another one stands."""
+        case, period = self.case_at(value), 1.0 / self.frequency_at(value)
+        every, transient = period / PER_PERIOD, self.settle * period
+        if self.settle:
+            _, run = run.advanced(case, transient, transient, every)
+        stretch, run = run.advanced(case, self.record * period, every, every, transient)
+        values = measured(self.measure, stretch)
+        top, bottom = extremes(values)
+        path = states(stretch, period)
+        repeats = repeats_after(path[:-1:PER_PERIOD], REPEATS * float(np.ptp(path, axis=0).max()))
+        amplitude = 0.5 * float(top.max() - bottom.min())
+        return Point(value, amplitude, values[:-1:PER_PERIOD], repeats, run)
+
+
+def states(stretch: Stretch, period: float) -> NDArray[np.float64]:
+    """States (k, 6 n) of a stretch in m: velocities times period / (2 pi)."""
+    count = len(stretch.time)
+    u, v = stretch.displacement.reshape(count, -1), stretch.velocity.reshape(count, -1)
+    return np.hstack([u, period / (2.0 * np.pi) * v])
+
+
+def repeats_after(section: NDArray[np.float64], near: float) -> int:
+    """Periods after which a motion repeats: the fewest, at most half of them all; 0: it does not.
+
+    section : states (k, m), one a period.
+    near : distance of states that are the same.
+    """
+    for periods in range(1, len(section) // 2 + 1):
+        if np.abs(section[periods:] - section[:-periods]).max() <= near:
+            return periods
+    return 0
+
+
+def bracketed(steady: Steady, way: str, points: list[Point], resolution: float) -> list[Jump]:
+    """Jumps between points in the order of a sweep, bracketed to a relative width.
+
+    A long step may kick a motion off before its fold: from the motion before a jump the sweep goes
+    on in halved steps, and past the point where it fell, until it falls again. Points that it
+    passes are replaced.
+    """
+    found, k = [], 0
+    while k < len(points) - 1:
+        passed, after = [points[k]], points[k + 1]
+        k, step = k + 1, after.value - points[k].value
+        lower = sorted(points[k:], key=lambda point: point.value)
+        fallen = [point.value for point in lower], [point.amplitude for point in lower]
+        while is_jump(passed[-1].amplitude, after.amplitude):
+            before = passed[-1]
+            if abs(step) <= resolution * before.value:
+                sizes = before.amplitude, after.amplitude
+                found.append(Jump(way, before.value, after.value, sizes))
+                k = _replace(steady, points, k, passed)
+                break
+            step *= 0.5
+            while (points[-1].value - passed[-1].value) / step > 0.5:
+                try:
+                    ahead = steady.point(passed[-1].run, passed[-1].value + step)
+                except ComputationError:  # it fails there: nearer to the jump it may not
+                    break
+                to_fallen = ahead.amplitude - float(np.interp(ahead.value, *fallen))
+                if abs(ahead.amplitude - passed[-1].amplitude) > abs(to_fallen):
+                    after = ahead
+                    break
+                passed.append(ahead)
+            else:
+                break  # it does not fall when it is not kicked
+    return found
+
+
+def _replace(steady: Steady, points: list[Point], k: int, passed: list[Point]) -> int:
+    """Replace points from number k on by motions that were not kicked; the number after them."""
+    way = np.sign(passed[-1].value - passed[0].value)
+    while k < len(points) and way:
+        value = points[k].value
+        near = SAME * value
+        if (value - passed[-1].value) * way > near:
+            break
+        before = [one for one in passed if (one.value - value) * way <= near]
+        points[k] = steady.point(before[-1].run, value)
+        k += 1
+    return k
+
+
+def _dataset(
+    case: Case, measure: Quantity, swept: Swept, ways: list[str], points: list[list[Point]],
+    jumps: list[Jump], facts: dict[str, Any],
+) -> xarray.Dataset:  # fmt: skip
+    along, text, units = ("sweep", swept.name), measure.text or "measure", measure.units
+    shape = len(ways), len(swept.values)
+    section = np.full((*shape, points[0][0].section.size), np.nan)
+    amplitude, periods = np.full(shape, np.nan), np.zeros(shape, int)
+    for row, found in enumerate(points):
+        for point in found:
+            k = int(np.searchsorted(swept.values, point.value))
+            section[row, k], amplitude[row, k] = point.section, point.amplitude
+            periods[row, k] = point.periods
+    repeats = "periods of the drive after which the motion repeats (0: it does not)"
+    data = {
+        "section": variable((*along, "record"), section, units, f"{text} once a period"),
+        "amplitude": variable(along, amplitude, units, f"amplitude of {text}"),
+        "periods": variable(along, periods, "1", repeats),
+        **jump_variables(jumps, swept.quantity, measure),
+    }
+    own = swept.quantity
+    coordinates = {
+        "sweep": variable(("sweep",), np.array(ways), "", "sweep"),
+        swept.name: variable((swept.name,), swept.values, own.units, own.text),
+    }
+    return result_dataset("bifurcation_diagram", case, data, coordinates, facts)

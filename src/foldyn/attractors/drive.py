@@ -1,0 +1,120 @@
+"""The harmonic drive of a case: its frequency, and the case with another history or size of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+
+from foldyn.cases import (
+    BaseMotion,
+    Case,
+    CreaseMoment,
+    Force,
+    Gravity,
+    Harmonic,
+    History,
+    Impose,
+    LineLoad,
+    Pressure,
+    Temperature,
+    TotalForce,
+)
+from foldyn.errors import InputError
+
+WHOLE = 1e-9  # relative distance of a ratio of frequencies from a whole number
+SIZES: Mapping[type, str] = {
+    Force: "vector",
+    TotalForce: "total",
+    LineLoad: "force_per_length",
+    Gravity: "acceleration",
+    Pressure: "pressure",
+    CreaseMoment: "moment",
+    Temperature: "change",
+    Impose: "value",
+    BaseMotion: "value",
+}
+"""Fields that the effect of a load, or of a support that moves, is proportional to."""
+
+
+def drive_frequency(case: Case) -> float:
+    """Lowest frequency (Hz) of the harmonic histories of a case; 0.0 where it has none.
+
+    Raises
+    ------
+    InputError
+        The others are no multiples of it, so that the drive has no period.
+    """
+    found = [part.history.frequency for part in _driven_parts(case)]
+    lowest = min(found, default=0.0)
+    for frequency in found:
+        ratio = frequency / lowest
+        if abs(ratio - round(ratio)) > WHOLE * ratio:
+            raise InputError(
+                f"history.frequency = {frequency:g}: is no multiple of the lowest one "
+                f"({lowest:g} Hz), so that the drive has no period; give multiples"
+            )
+    return lowest
+
+
+def driven_frequency(case: Case) -> float:
+    """The same, refused where nothing drives the case."""
+    if frequency := drive_frequency(case):
+        return frequency
+    raise InputError(
+        "case: nothing drives it; give a load or a support the history fd.Harmonic(frequency=...)"
+    )
+
+
+def with_histories(case: Case, history: Callable[[Harmonic], History]) -> Case:
+    """The case with other histories in place of its harmonic ones."""
+
+    def changed(part: Any) -> Any:
+        own = getattr(part, "history", None)
+        return replace(part, history=history(own)) if isinstance(own, Harmonic) else part
+
+    return case.altered(
+        loads=[changed(part) for part in case.loads],
+        supports=[changed(part) for part in case.supports],
+    )
+
+
+def at_frequency(case: Case, frequency: float) -> Case:
+    """The case driven at another frequency (Hz); higher ones keep their ratio to it."""
+    ratio = frequency / drive_frequency(case)
+    return with_histories(case, lambda own: replace(own, frequency=ratio * own.frequency))
+
+
+def at_level(case: Case, level: float) -> Case:
+    """The case with its harmonic loads and moving supports times a level.
+
+    Raises
+    ------
+    InputError
+        Actuated creases swing, whose angles are no multiples.
+    """
+
+    def scaled(part: Any) -> Any:
+        if not isinstance(getattr(part, "history", None), Harmonic):
+            return part
+        if type(part) not in SIZES:
+            raise InputError(
+                f"amplitudes: {type(part).__name__} has no size that could be scaled; vary the "
+                "frequency, or drive by a force or a support"
+            )
+        field = SIZES[type(part)]
+        size = level * np.asarray(getattr(part, field), float)
+        return replace(cast(Any, part), **{field: size.tolist()})
+
+    return case.altered(
+        loads=[scaled(part) for part in case.loads],
+        supports=[scaled(part) for part in case.supports],
+    )
+
+
+def _driven_parts(case: Case) -> list[Any]:
+    """Loads and supports with a harmonic history."""
+    parts = (*case.loads, *case.supports)
+    return [part for part in parts if isinstance(getattr(part, "history", None), Harmonic)]

@@ -1,0 +1,290 @@
+"""`basins`: where motions from a grid of starts end."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import time
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.attractors.diagram import repeats_after
+from foldyn.attractors.drive import drive_frequency
+from foldyn.attractors.kept import KeptEnds
+from foldyn.attractors.run import PER_PERIOD, divisor, step_of, told_once
+from foldyn.cases import Case, State
+from foldyn.dynamics import simulate_many
+from foldyn.dynamics.progress import Progress, Reporter, reporter
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.results.dataset import result_dataset
+from foldyn.results.quantities import PLACE, variable
+from foldyn.values import number, numbers, of_kind, show, whole
+
+if TYPE_CHECKING:
+    import xarray
+
+AT_ONCE = 256  # motions
+LOOKED_AT = 64  # starts
+UNDRIVEN = 0.02  # of the duration: between the states of a motion without a drive
+
+
+def basins(
+    case: Case,
+    initial: Callable[..., State],
+    grid: Mapping[str, ArrayLike],
+    duration: float,
+    *,
+    record: int = 8,
+    same: float = 0.01,
+    method: str = "central_difference",
+    dt: float | None = None,
+    threads: int | None = None,
+    device: str = "cpu",
+    folder: str | os.PathLike[str] | None = None,
+    progress: bool | Reporter | None = None,
+) -> xarray.Dataset:
+    """Basins of attraction: the motion, or the equilibrium, that each start of a grid ends in.
+
+    All motions are computed side by side (`simulate_many`). Those that end in the same states, once
+    a period of the drive, have the same attractor.
+
+    Parameters
+    ----------
+    case : Case
+        Without hinges that remember. Its `Harmonic` histories set the period; without any,
+        attractors are equilibria.
+    initial : callable
+        Gives the `State` at a point of the grid, called with its values by their names.
+    grid : mapping of str to array_like
+        Values of each parameter of `initial`: {"height": ..., "speed": ...}.
+    duration : float
+        Of each motion before it is looked at (s), rounded up to whole periods.
+    record : int
+        States that are looked at then, one a period, at least 4: attractors of up to half as many
+        periods are told apart.
+    same : float
+        Relative distance of states that are the same, of the range of all states.
+    dt : float, optional
+        Largest step (s), shortened to divide the period. By default half the least critical step of
+        64 of the starts, and with a drive at most a 64th of its period.
+    method, threads, device :
+        As of `simulate_many`.
+    folder : path, optional
+        Keeps where motions end, 256 at a time, so that a grid that was cut off, or one with more
+        starts after the same first ones, goes on there.
+    progress : bool or callable, optional
+        True shows a bar; a callable gets a `Progress` of the number of motions.
+
+    Returns
+    -------
+    xarray.Dataset
+        Along the names of the grid: `basin`, the number of the attractor, from 0 in the order in
+        which they are met, or -1 where the motion does not repeat: it is chaotic or has not settled
+        yet, or has failed. Along `attractor`: `periods`, of the drive after which it repeats (an
+        equilibrium counts 1), `share` of the starts, and along `record` the states `displacement`
+        (m) and `velocity` (m/s).
+
+    Raises
+    ------
+    InputError
+        An argument out of range, what `simulate_many` refuses, or hinges that remember.
+
+    Warns
+    -----
+    FoldynWarning
+        Motions that do not repeat; what `simulate_many` warns of.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> s = fd.discretize(fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.1, 1.0))
+    >>> supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")]
+    >>> case = fd.Case(s, supports, damping=fd.Rayleigh(alpha=40.0))
+    >>> def pulled(length):
+    ...     u = np.zeros((len(s.nodes), 3))
+    ...     u[[0, 1], 0] = length
+    ...     return fd.State(u)
+    >>> basins(case, pulled, {"length": [-0.01, 0.0, 0.01]}, 1.0, dt=5e-5).basin.values.tolist()
+    [0, 0, 0]
+    """
+    began = time.perf_counter()
+    of_kind("case", case, Case)
+    if case.remembering:
+        raise InputError(
+            "structure: some of its hinges remember (prony, plastic or damped creases that give "
+            "way), and their state is no part of the grid; take an elastic law"
+        )
+    names, places = _grid(grid)
+    starts = _starts(case, initial, names, places)
+    duration = number("duration", duration, above=0.0, unit="s")
+    record, same = whole("record", record, least=4), number("same", same, above=0.0, below=1.0)
+    frequency = drive_frequency(case)
+    period = 1.0 / frequency if frequency else UNDRIVEN * duration
+    settled = float(np.ceil(duration / period - 1e-9) * period)
+    step = _step(case, starts, method, dt, period, bool(frequency))
+    about = {"method": method, "dt": step, "device": device}
+    compute = partial(_ends, case, settled, period, record, {**about, "threads": threads})
+    about |= {"duration": settled, "period": period, "record": record}
+    kept, found = KeptEnds(folder, case, about), list[NDArray]()
+    report, close = reporter(progress)
+    try:
+        with told_once():
+            for k in range(0, len(starts), AT_ONCE):
+                some = starts[k : k + AT_ONCE]
+                found.append(kept.of(some, partial(compute, some)))
+                done = k + len(some)
+                report(Progress(float(done), float(len(starts)), done, 0.0))
+    finally:
+        close()
+    ends = np.concatenate(found)
+    weights = np.array([1.0, period / (2.0 * np.pi) if frequency else 0.0])
+    size = _range(ends[:, :, 0])
+    if not frequency:  # all may end in one equilibrium: then the starts set the scale
+        first = [start.of_nodes("displacement", ends.shape[3:]) for start in starts]
+        size = max(size, _range(np.stack(first)[:, None]))
+    label, first_of, periods = told_apart(ends, weights, same, size)
+    lost = int((label < 0).sum())
+    if lost:
+        warnings.warn(
+            f"{lost} of {len(label)} motions do not repeat in {record // 2} periods (basin -1): "
+            "chaotic, or not settled yet; a longer duration or record tells",
+            FoldynWarning,
+            stacklevel=2,
+        )
+    about |= {"same": same, "wall_seconds": time.perf_counter() - began}
+    about["period"] = period if frequency else None
+    label = label.reshape([len(values) for values in places])
+    return _dataset(
+        case, dict(zip(names, places, strict=True)), label, periods, ends[first_of], about
+    )
+
+
+def _dataset(
+    case: Case, grid: Mapping[str, NDArray], label: NDArray, periods: Sequence[int],
+    states: NDArray, facts: Mapping[str, Any],
+) -> xarray.Dataset:  # fmt: skip
+    """The result; states (attractor, record, 2, n, 3)."""
+    share = np.bincount(label[label >= 0], minlength=len(periods)) / label.size
+    along, text = ("attractor", "record", *PLACE), "periods of the drive after which it repeats"
+    data = {
+        "basin": variable(tuple(grid), label, "", "attractor"),
+        "periods": variable(("attractor",), np.array(periods, int), "1", text),
+        "share": variable(("attractor",), share, "1", "share of the starts"),
+        "displacement": variable(along, states[:, :, 0], "m", "displacement once a period"),
+        "velocity": variable(along, states[:, :, 1], "m/s", "velocity once a period"),
+    }
+    coordinates = {name: variable((name,), values, "", name) for name, values in grid.items()}
+    return result_dataset("basins", case, data, coordinates, facts)
+
+
+def _grid(grid: Any) -> tuple[tuple[str, ...], list[NDArray[np.float64]]]:
+    """Names of the parameters, and the values of each."""
+    if not isinstance(grid, Mapping) or not grid:
+        raise InputError(f" = {show(grid)}: give values by name, {{'height': [0.0, 0.1]}}", "grid")
+    places = []
+    for name, given in grid.items():
+        if not isinstance(name, str) or not name.isidentifier():
+            raise InputError(f": {name!r} is no name of an argument", "grid")
+        values = numbers(f"grid.{name}", given)
+        if values.ndim != 1 or not values.size:
+            raise InputError(": must be a list of numbers", f"grid.{name}")
+        places.append(values)
+    return tuple(grid), places
+
+
+def _starts(
+    case: Case, initial: Any, names: tuple[str, ...], places: Sequence[NDArray]
+) -> list[State]:
+    """State at each point of the grid, the last parameter running first."""
+    if not callable(initial):
+        raise InputError(f" = {show(initial)}: must be a function that gives a State", "initial")
+    starts = []
+    for point in itertools.product(*(values.tolist() for values in places)):
+        given = dict(zip(names, point, strict=True))
+        try:
+            start = initial(**given)
+        except Exception as error:
+            raise InputError(
+                f": raised {type(error).__name__} at {given}: {error}", "initial"
+            ) from error
+        start = of_kind("initial", start, State)
+        start.of_nodes("displacement", case.structure.nodes.shape)
+        starts.append(start)
+    return starts
+
+
+def _step(
+    case: Case, starts: Sequence[State], method: str, dt: float | None, period: float, driven: bool
+) -> float:
+    """Step (s) that divides the period."""
+    if dt is None:
+        longest = period / PER_PERIOD if driven else np.inf
+        some = starts[:: -(-len(starts) // LOOKED_AT)]
+        dt = min(step_of(case, method, start, longest) for start in some)
+        if not np.isfinite(dt):
+            raise InputError(": nothing limits the step (no stiffness); give dt", "dt")
+    return divisor(period, dt)
+
+
+def _ends(
+    case: Case, settled: float, period: float, record: int, how: Mapping[str, Any],
+    starts: Sequence[State],
+) -> NDArray[np.float64]:  # fmt: skip
+    """States (m, record, 2, n, 3) of motions after they have settled, one a period."""
+    count = len(starts)
+    before = simulate_many([case] * count, settled, every=settled, initial=starts, **how)
+    out = np.full((count, record, 2, *case.structure.nodes.shape), np.nan)
+    sound = np.flatnonzero(before.outcome.values == "done")
+    if not len(sound):
+        return out
+    later = [State(before.displacement.values[k, -1], before.velocity.values[k, -1]) for k in sound]
+    span = (record - 1) * period
+    after = simulate_many(
+        [case] * len(sound), span, every=period, initial=later, start=settled, **how
+    )
+    out[sound, :, 0] = after.displacement.values
+    out[sound, :, 1] = after.velocity.values
+    return out
+
+
+def _range(displacement: NDArray[np.float64]) -> float:
+    """Largest range (m) of a displacement of motions (m, record, n, 3)."""
+    there = displacement[np.isfinite(displacement).all(axis=(1, 2, 3))]
+    return float(np.ptp(there, axis=(0, 1)).max()) if len(there) else 0.0
+
+
+def told_apart(
+    ends: NDArray[np.float64], weights: NDArray[np.float64], same: float, size: float
+) -> tuple[NDArray[np.int64], list[int], list[int]]:
+    """Attractor of each motion (m,), one motion of each attractor, and its periods.
+
+    ends : states (m, record, 2, n, 3), one a period.
+    weights : of displacement and velocity in a distance.
+    same : distance of states that are the same, relative to `size` (m).
+    """
+    states = (ends * weights[:, None, None]).reshape(*ends.shape[:2], -1)
+    label = np.full(len(states), -1)
+    kept: list[int] = []
+    periods: list[int] = []
+    for k, own in enumerate(states):
+        repeats = repeats_after(own, same * size) if np.isfinite(own).all() else 0
+        if not repeats:
+            continue
+        for number_, other in enumerate(kept):
+            if periods[number_] == repeats and any(
+                np.abs(own[:repeats] - np.roll(states[other][:repeats], turn, axis=0)).max()
+                <= same * size
+                for turn in range(repeats)
+            ):
+                label[k] = number_
+                break
+        else:
+            label[k] = len(kept)
+            kept.append(k)
+            periods.append(repeats)
+    return label, kept, periods

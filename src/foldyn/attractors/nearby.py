@@ -1,0 +1,247 @@
+"""`lyapunov_exponent`: how fast a motion and one that starts beside it come apart."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.attractors.drive import drive_frequency
+from foldyn.attractors.run import PER_PERIOD, divisor, step_of, told_once
+from foldyn.cases import Case, State
+from foldyn.dynamics import METHODS, Motion, prepare
+from foldyn.dynamics.failures import failure
+from foldyn.dynamics.motion_state import Outcome
+from foldyn.dynamics.progress import Progress, Reporter, reporter
+from foldyn.errors import ComputationError, InputError
+from foldyn.results.dataset import result_dataset
+from foldyn.results.quantities import variable
+from foldyn.values import choice, number, of_kind
+
+if TYPE_CHECKING:
+    import xarray
+
+APART = 1e-7  # distance of the second motion, relative to the size of the first
+SMALL = 1e-4  # of the longest bar: the least size, that of a motion at rest
+MOST = 11.0  # change of the logarithm of the distance in an interval
+BLOCKS = 16  # of the record, from whose means the error is estimated
+SEED = 20
+"""Of the direction in which the second motion starts."""
+
+
+def lyapunov_exponent(
+    case: Case,
+    duration: float,
+    *,
+    settle: float = 0.0,
+    interval: float | None = None,
+    initial: State | None = None,
+    method: str = "rk4",
+    dt: float | None = None,
+    progress: bool | Reporter | None = None,
+) -> xarray.Dataset:
+    """Largest Lyapunov exponent of a motion: above 0 where it is chaotic.
+
+    By Benettin's method: a second motion starts at a small distance and is brought back to it along
+    the line between both after each interval; the exponent is the mean rate at which the logarithm
+    of the distance grows.
+
+    Parameters
+    ----------
+    case : Case
+        Without contact and hinges that remember.
+    duration : float
+        How long the rate is averaged (s).
+    settle : float
+        Time before that (s), in which the motion comes to its attractor, and the distance to its
+        most unstable direction.
+    interval : float, optional
+        Between corrections of the distance (s); by default the period of the drive, without a drive
+        a hundredth of the duration.
+    initial : State, optional
+        Where the motion starts; rest by default.
+    method : {"rk4", "central_difference"}
+        An explicit method with fixed steps.
+    dt : float, optional
+        Largest step (s), shortened to divide the interval. By default half the critical one, and
+        with a drive at most a 64th of its period.
+    progress : bool or callable, optional
+        True shows a bar; a callable gets a `Progress`.
+
+    Returns
+    -------
+    xarray.Dataset
+        `exponent` (1/s), its standard `error` from the means of 16 blocks of the record, and, along
+        `time`, the end of each interval after `settle`, `estimate`: the mean until then, which
+        shows how it converges.
+
+    Raises
+    ------
+    InputError
+        An argument out of range, contact, or hinges that remember.
+    InstabilityError
+        A motion grew without bound.
+
+    Notes
+    -----
+    The distance is 1e-7 of the motion's size, so that what is not linear in it is as small. It is
+    that of the displacements (m) and of the velocities times interval / (2 pi). The mean converges
+    like one over the duration where the motion is periodic, and like one over its root where it is
+    chaotic.
+
+    Benettin, Galgani, Giorgilli, Strelcyn (1980), Meccanica 15, 9-30.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> s = fd.discretize(fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.1, 1.0))
+    >>> supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")]
+    >>> push = fd.Force([0, 1], (1.0, 0, 0), history=fd.Harmonic(5.0))
+    >>> case = fd.Case(s, supports, [push], damping=fd.Rayleigh(alpha=4.0))
+    >>> round(float(lyapunov_exponent(case, 20.0, settle=2.0).exponent))
+    -2
+    """
+    began = time.perf_counter()
+    _check(case, method, initial)
+    duration = number("duration", duration, above=0.0, unit="s")
+    settle = number("settle", settle, least=0.0, unit="s")
+    frequency = drive_frequency(case)
+    if interval is None:
+        interval = 1.0 / frequency if frequency else 0.01 * duration
+    interval = number("interval", interval, above=0.0, most=duration, unit="s")
+    silent, counted = math.ceil(settle / interval - 1e-9), math.floor(duration / interval + 1e-9)
+    if dt is None:
+        longest = 1.0 / (PER_PERIOD * frequency) if frequency else interval
+        dt = step_of(case, method, initial, longest)
+    dt = divisor(interval, dt)
+    report, close = reporter(progress)
+    try:
+        with told_once():
+            pair = Pair(case, (silent + counted) * interval, interval, initial, method, dt)
+            growth = pair.growth(silent + counted, report)[silent:]
+    finally:
+        close()
+    elapsed = interval * (1.0 + np.arange(counted))
+    estimate = np.cumsum(growth) / elapsed
+    blocks = np.array([block.mean() for block in np.array_split(growth, min(BLOCKS, counted))])
+    spread = blocks.std(ddof=1) / math.sqrt(len(blocks)) / interval if counted > 1 else math.nan
+    data = {
+        "exponent": variable((), estimate[-1], "1/s", "largest Lyapunov exponent"),
+        "error": variable((), spread, "1/s", "standard error of the exponent"),
+        "estimate": variable(
+            ("time",), estimate, "1/s", "largest Lyapunov exponent, mean until then"
+        ),
+    }
+    along = {"time": variable(("time",), silent * interval + elapsed, "s", "time")}
+    facts = {
+        "method": method, "dt": pair.dt, "interval": interval, "settle": silent * interval,
+        "apart": APART, "wall_seconds": time.perf_counter() - began,
+    }  # fmt: skip
+    return result_dataset("lyapunov_exponent", case, data, along, facts)
+
+
+def _check(case: Case, method: str, initial: State | None) -> None:
+    of_kind("case", case, Case)
+    if initial is not None:
+        of_kind("initial", initial, State)
+    explicit = [one.name for one in METHODS.values() if not (one.implicit or one.adaptive)]
+    choice("method", method, explicit)
+    if case.contact is not None:
+        raise InputError(": the exponent takes smooth forces; leave contact out", "contact")
+    if case.remembering:
+        raise InputError(
+            "structure: some of its hinges remember (prony, plastic or damped creases that give "
+            "way), and their state is part of the distance; take an elastic law"
+        )
+
+
+class Pair:
+    """Two motions beside each other.
+
+    Parameters
+    ----------
+    case, initial, method, dt :
+        As of `lyapunov_exponent`.
+    duration, interval : float
+        s.
+    """
+
+    def __init__(
+        self, case: Case, duration: float, interval: float, initial: State | None, method: str,
+        dt: float,
+    ) -> None:  # fmt: skip
+        given = case, duration, method, dt, interval, initial
+        self._motions: list[Motion] = [prepare(*given), prepare(*given)]
+        self.dt = self._motions[0].plan.dt
+        self._interval, self._speed = interval, interval / (2.0 * math.pi)
+        shape = case.structure.nodes.shape
+        x = np.zeros(case.structure.nodes.size)
+        free = case.constraints.free
+        free = free[free < x.size]
+        x[free] = np.random.default_rng(SEED).standard_normal(len(free))
+        aside = case.constraints.displacement(x).reshape(shape)
+        self._aside = self._motions[0].packed.numbering.inward(aside)
+
+    def growth(self, intervals: int, report: Reporter) -> NDArray[np.float64]:
+        """Growth (intervals,) of the logarithm of the distance in each interval."""
+        first, second = self._motions
+        engines = []
+        for motion in self._motions:
+            motion.output.begin()
+            engine = motion.method.engine(motion.case, motion.packed, motion.course, motion.plan)
+            engines.append(engine)
+            self._advance(motion, engine, 0)  # records the start
+        size = max(self._size(first), SMALL * float(first.case.structure.bar_length.max()))
+        difference = self._aside, np.zeros_like(self._aside), np.zeros_like(self._aside)
+        away = self._distance(*difference[:2])
+        out, steps = np.empty(intervals), first.plan.every
+        for k in range(intervals):
+            wanted = APART * size
+            for array, base, part in zip(_arrays(second), _arrays(first), difference, strict=True):
+                array[:] = base + wanted / away * part
+            for motion, engine in zip(self._motions, engines, strict=True):
+                self._advance(motion, engine, steps)
+            difference = [b - a for a, b in zip(_arrays(first), _arrays(second), strict=True)]
+            away = self._distance(*difference[:2])
+            out[k] = math.log(max(away, 1e-300) / wanted)
+            if not abs(out[k]) < MOST:
+                raise ComputationError(
+                    f"the distance changes by a factor of {math.exp(out[k]):.2g} in an interval of "
+                    f"{self._interval:.3g} s, too much to be measured; take a shorter interval"
+                )
+            size = max(size, self._size(first))
+            now = float(first.course.tally.time)
+            report(Progress(now, first.plan.end, int(first.course.tally.steps), 0.0))
+            if (k + 1) % 64 == 0:
+                self._look(first)
+        self._look(first)
+        return out
+
+    def _advance(self, motion: Motion, engine: Any, steps: int) -> None:
+        code, hinge = engine.advance(motion.output.window, steps)
+        if code != Outcome.DONE:
+            kind, why = failure(motion, code, hinge)
+            raise kind(why)
+        error = motion.packed.callbacks.error
+        if error is not None:
+            raise error
+
+    def _look(self, motion: Motion) -> None:
+        """Stop where energies do not balance, or the step has become too long."""
+        motion.audit()
+        motion.recheck(motion.packed.numbering.outward(motion.course.u))
+
+    def _size(self, motion: Motion) -> float:
+        return self._distance(motion.course.u, motion.course.v)
+
+    def _distance(self, u: NDArray, v: NDArray) -> float:
+        return math.hypot(float(np.linalg.norm(u)), self._speed * float(np.linalg.norm(v)))
+
+
+def _arrays(motion: Motion) -> tuple[NDArray, NDArray, NDArray]:
+    """What a motion goes on from: displacement, velocity and acceleration, in memory."""
+    course = motion.course
+    return course.u, course.v, course.carry

@@ -1,0 +1,142 @@
+"""A motion that goes on from stretch to stretch, while what drives it changes."""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case, State
+from foldyn.dynamics import METHODS, critical_step, prepare
+from foldyn.dynamics.progress import Reporter
+from foldyn.dynamics.timing import DEFAULT_FRACTION
+from foldyn.errors import InputError
+from foldyn.results import Quantity
+from foldyn.values import choice, number, of_kind, show
+
+PER_PERIOD = 64  # samples in a period of the drive, from which amplitudes are read
+
+
+class Stretch(NamedTuple):
+    """Samples of a stretch of a motion."""
+
+    time: NDArray[np.float64]  # (k,) s
+    displacement: NDArray[np.float64]  # (k, n, 3) m
+    velocity: NDArray[np.float64]  # (k, n, 3) m/s
+
+
+@dataclass(frozen=True)
+class Run:
+    """Where a motion stands, and how it is integrated.
+
+    Parameters
+    ----------
+    method, dt, tolerance :
+        As of `simulate`, `dt` the largest step (s), shortened to divide the sampling interval.
+    state : State, optional
+        Where it stands; rest by default.
+    """
+
+    method: str
+    dt: float | None
+    tolerance: float | None
+    state: State | None
+
+    def __post_init__(self) -> None:
+        """Check what every stretch takes."""
+        choice("method", self.method, METHODS)
+        if self.state is not None:
+            of_kind("initial", self.state, State)
+
+    def advanced(
+        self, case: Case, duration: float, every: float, longest: float, start: float = 0.0,
+        report: Reporter | None = None,
+    ) -> tuple[Stretch, Run]:  # fmt: skip
+        """Go on with a case for a duration (s), sampled `every` so many seconds.
+
+        longest : step (s) of methods with fixed steps where the user gives none.
+        """
+        dt, method = self.dt, METHODS[self.method]
+        if dt is None and not (method.implicit or method.adaptive):
+            dt = step_of(case, self.method, self.state, longest)
+        if dt is not None:
+            dt = divisor(every, dt)
+        found = prepare(
+            case, duration, self.method, dt, every, self.state, tolerance=self.tolerance,
+            start=start,
+        ).samples(report)  # fmt: skip
+        memory = found.memory[-1].copy() if found.memory.size else None
+        end = State(found.displacement[-1].copy(), found.velocity[-1].copy(), memory)
+        stretch = Stretch(found.time, found.displacement, found.velocity)
+        return stretch, replace(self, state=end)
+
+
+def step_of(case: Case, method: str, state: State | None, longest: float) -> float:
+    """Step (s) of a method with fixed steps: half the critical one about a state, or `longest`."""
+    at = None if state is None else state.displacement
+    return min(DEFAULT_FRACTION * critical_step(case, method, at), longest)
+
+
+def divisor(interval: float, dt: float) -> float:
+    """The longest step (s) up to dt that divides an interval (s)."""
+    dt = number("dt", dt, above=0.0, unit="s")
+    return interval / math.ceil(interval / dt * (1.0 - 1e-12))
+
+
+def check_measure(measure: Any) -> Quantity:
+    """Refuse what gives no number of a state."""
+    of_kind("measure", measure, Quantity)
+    if measure.function is None or measure.dims:
+        raise InputError(
+            ": must have a function of displacement, velocity and time that gives one number",
+            "measure",
+        )
+    return measure
+
+
+def measured(measure: Quantity, stretch: Stretch) -> NDArray[np.float64]:
+    """Values (k,) of a measure at the samples of a stretch."""
+    assert measure.function is not None
+    values = [measure.function(u, v, float(t)) for t, u, v in zip(*stretch, strict=True)]
+    try:
+        found = np.array(values, float)
+    except (TypeError, ValueError):
+        found = np.zeros((0, 0))
+    if found.ndim != 1 or not np.isfinite(found).all():
+        raise InputError(f": gave {show(values[0])}; it must give a finite number", "measure")
+    return found
+
+
+def extremes(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Largest and smallest values (k,) about each evenly spaced sample (k,).
+
+    At a turning point the top of the parabola through three samples, else the sample itself.
+    """
+    top = values.copy()
+    before, now, after = values[:-2], values[1:-1], values[2:]
+    slope, bend = 0.5 * (after - before), before - 2.0 * now + after
+    turns = (now - before) * (after - now) < 0.0
+    top[1:-1][turns] -= 0.5 * slope[turns] ** 2 / bend[turns]
+    return np.maximum(values, top), np.minimum(values, top)
+
+
+@contextmanager
+def told_once() -> Iterator[None]:
+    """Of warnings that differ in their numbers alone, as motion after motion gives, the first."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    known = set()
+    for one in caught:
+        text = str(one.message)
+        kind = one.category, re.sub(r"[-+\d.e%]+", "", text)
+        if kind not in known:
+            warnings.warn(text, one.category, stacklevel=4)
+        known.add(kind)

@@ -1,0 +1,217 @@
+"""`swept_sine`: the motion under a sine whose frequency changes all the time."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.attractors.diagram import FREQUENCY, SWEEPS
+from foldyn.attractors.drive import at_frequency, driven_frequency, with_histories
+from foldyn.attractors.jumps import Jump, jump_variables, jumps_between
+from foldyn.attractors.run import Run, Stretch, check_measure, extremes, measured, told_once
+from foldyn.cases import Case, Chirp, Harmonic, State
+from foldyn.dynamics.progress import Reporter, reporter
+from foldyn.errors import InputError
+from foldyn.linear.time_domain import overall
+from foldyn.results import Quantity
+from foldyn.results.dataset import result_dataset
+from foldyn.results.quantities import variable
+from foldyn.values import choice, number, numbers, of_kind, whole
+
+if TYPE_CHECKING:
+    import xarray
+
+PER_CYCLE = 48  # samples in a cycle of the highest frequency
+FEWEST = 10  # cycles in a sweep
+
+
+def swept_sine(
+    case: Case,
+    measure: Quantity,
+    frequencies: ArrayLike,
+    duration: float,
+    *,
+    sweep: str = "both",
+    settle: int = 50,
+    resolution: float = 0.01,
+    initial: State | None = None,
+    method: str = "rk4",
+    dt: float | None = None,
+    tolerance: float | None = None,
+    progress: bool | Reporter | None = None,
+) -> xarray.Dataset:
+    """Motion while the frequency of the drive goes slowly up, or down, and its amplitude by cycle.
+
+    The harmonic histories of the case become chirps, whose frequency changes in a straight line.
+
+    Parameters
+    ----------
+    case : Case
+        With `Harmonic` histories of loads or supports.
+    measure : Quantity
+        As of `bifurcation_diagram`.
+    frequencies : (float, float)
+        The lower and the higher one (Hz), of the slowest of these histories: others keep their
+        ratio to it, all their phases.
+    duration : float
+        Of a sweep from one to the other (s).
+    sweep : {"up", "down", "both"}
+        Which way; "both" goes up first, and down from there.
+    settle : int
+        Cycles at the first frequency before each sweep.
+    resolution : float
+        Relative width in frequency within which a change of the amplitude by over 20 % of the
+        larger one is a jump. A sweep that is so slow that a vibration decays within it shows jumps.
+    initial : State, optional
+        Where the motion starts; rest by default.
+    method, dt, tolerance :
+        As of `simulate`, `dt` the largest step (s).
+    progress : bool or callable, optional
+        True shows a bar; a callable gets a `Progress`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Along `sweep` and `cycle`: `frequency` (Hz), one over the time that the cycle takes, and
+        `amplitude`, half the distance of the measure's extremes in it. Cycles are numbered along
+        the frequency, upward. Along `jump` as of `bifurcation_diagram`.
+
+    Raises
+    ------
+    InputError
+        An argument out of range, nothing that drives the case, a sweep of fewer than ten cycles.
+    ComputationError
+        The motion fails.
+
+    Notes
+    -----
+    A sweep runs past a fold before it jumps, the further the faster it is; `bifurcation_diagram`
+    waits at each frequency.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> s = fd.discretize(fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.1, 1.0))
+    >>> supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")]
+    >>> push = fd.Force([0, 1], (1.0, 0, 0), history=fd.Harmonic(5.0))
+    >>> case = fd.Case(s, supports, [push], damping=fd.Rayleigh(alpha=20.0))
+    >>> ridge = fd.Quantity("m", "height of the ridge", function=lambda u, v, t: u[2, 2])
+    >>> dict(swept_sine(case, ridge, (5.0, 10.0), 2.0).amplitude.sizes)
+    {'sweep': 2, 'cycle': 15}
+    """
+    began = time.perf_counter()
+    of_kind("case", case, Case)
+    check_measure(measure)
+    driven_frequency(case)
+    ends = numbers("frequencies", frequencies)
+    if ends.shape != (2,) or not 0.0 < ends[0] < ends[1]:
+        raise InputError(
+            ": must be two frequencies (Hz) above 0, the lower one first", "frequencies"
+        )
+    duration = number("duration", duration, above=0.0, unit="s")
+    if duration * ends[0] < FEWEST:
+        raise InputError(
+            f" = {duration:g} s: holds fewer than {FEWEST} cycles of {ends[0]:g} Hz; sweep slower",
+            "duration",
+        )
+    choice("sweep", sweep, SWEEPS)
+    settle = whole("settle", settle, least=0)
+    resolution = number("resolution", resolution, above=0.0)
+    run = Run(method, dt, tolerance, initial)
+    ways = ["up", "down"] if sweep == "both" else [sweep]
+    frequency, amplitude, jumps = [], [], list[Jump]()
+    report, close = reporter(progress)
+    try:
+        with told_once():
+            for k, way in enumerate(ways):
+                first, last = (ends if way == "up" else ends[::-1]).tolist()
+                line, before = Line(first, last, duration), k * duration
+                tell = overall(report, before, len(ways) * duration)
+                stretch, run = _glide(case, line, settle, run, 1.0 / (PER_CYCLE * ends[1]), tell)
+                own = _amplitudes(stretch.time, measured(measure, stretch), line.cycles)
+                rates = 1.0 / np.diff(line.cycles)
+                jumps += jumps_between(way, rates, own, resolution)
+                order = slice(None, None, 1 if way == "up" else -1)
+                frequency.append(rates[order])
+                amplitude.append(own[order])
+    finally:
+        close()
+    along, text = ("sweep", "cycle"), measure.text or "measure"
+    data = {
+        "amplitude": variable(along, amplitude, measure.units, f"amplitude of {text}"),
+        **jump_variables(jumps, FREQUENCY, measure),
+    }
+    coordinates = {
+        "sweep": variable(("sweep",), np.array(ways), "", "sweep"),
+        "frequency": variable(along, frequency, FREQUENCY.units, FREQUENCY.text),
+    }
+    facts = {
+        "method": method, "duration": duration, "settle": settle, "resolution": resolution,
+        "wall_seconds": time.perf_counter() - began,
+    }  # fmt: skip
+    return result_dataset("swept_sine", case, data, coordinates, facts)
+
+
+class Line(NamedTuple):
+    """A frequency (Hz) that goes in a straight line from `start` to `end` in `duration` (s)."""
+
+    start: float
+    end: float
+    duration: float
+
+    @property
+    def slope(self) -> float:
+        """Change of the frequency (Hz/s)."""
+        return (self.end - self.start) / self.duration
+
+    @property
+    def cycles(self) -> NDArray[np.float64]:
+        """Times (s) at which a cycle begins, and at which the last one ends."""
+        count = int(0.5 * (self.start + self.end) * self.duration * (1.0 + 1e-12))
+        turns = np.arange(count + 1)
+        root = np.sqrt(self.start**2 + 2.0 * self.slope * turns)
+        return 2.0 * turns / (self.start + root)
+
+    def chirp(self, lowest: float) -> Callable[[Harmonic], Chirp]:
+        """Turn a harmonic history into one along this line, the lowest of its frequencies (Hz).
+
+        It goes on for a cycle after the end, so that nothing jumps there.
+        """
+        more = 1.0 / max(self.start, self.end)
+        length, end = self.duration + more, self.end + self.slope * more
+
+        def made(own: Harmonic) -> Chirp:
+            ratio = own.frequency / lowest
+            return Chirp(ratio * self.start, ratio * end, length, own.phase)
+
+        return made
+
+
+def _glide(
+    case: Case, line: Line, settle: int, run: Run, longest: float, report: Reporter
+) -> tuple[Stretch, Run]:
+    """Motion along a line of frequencies, after `settle` cycles at the first one.
+
+    longest : between samples, and step where the user gives none (s).
+    """
+    if settle:
+        wait = settle / line.start
+        _, run = run.advanced(at_frequency(case, line.start), wait, wait, longest)
+    swept = with_histories(case, line.chirp(driven_frequency(case)))
+    length = float(line.cycles[-1])
+    every = length / math.ceil(length / longest)
+    return run.advanced(swept, length, every, longest, report=report)
+
+
+def _amplitudes(
+    times: NDArray[np.float64], values: NDArray[np.float64], cycles: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Half the distance of the extremes in each cycle."""
+    top, bottom = extremes(values)
+    first = np.searchsorted(times, cycles[:-1] * (1.0 - 1e-12))
+    return 0.5 * (np.maximum.reduceat(top, first) - np.minimum.reduceat(bottom, first))
