@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+import foldyn as fd
 from foldyn.algebra import eigen
 from foldyn.algebra.eigen import Pencil
 from foldyn.algebra.solvers import SOLVERS
@@ -166,3 +167,17 @@ def test_rounding_of_an_eigenvalue_is_estimated_from_above():
     moved = np.abs(Pencil(sparse.csc_array(rounded), mass).quotients(found.shapes) - found.values)
     scale = np.finfo(float).eps / np.finfo(np.float32).eps
     assert (moved * scale < Pencil(stiffness, mass).noise(found.shapes)).all()
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_few_modes_of_many_massless_dofs(count):
+    """18 modes beside edges without mass: fewer than the basis of iterations has vectors."""
+    pattern = fd.patterns.kresling(sides=6, radius=0.04, height=0.06, twist=30)
+    sheet = fd.Sheet(1.2e9, 0.2, 0.24e-3, 667.0)
+    tower = fd.Case(
+        fd.discretize(pattern, sheet, preset="n5b8e"),
+        [fd.Fix(range(6))],
+        masses=[fd.PointMass(range(6, 12), 0.05)],
+    )
+    found, more = fd.modes(tower, count).frequency, fd.modes(tower, 12).frequency
+    np.testing.assert_allclose(found, more[:count], rtol=1e-9)

@@ -33,6 +33,7 @@ DENSE = 60  # dofs up to which all modes are found at once (the other way is as 
 SHIFT = 1e-10  # of the pencil's scale: the first shift below zero
 LOWER = 16.0  # times the last: the next shift
 LOWERINGS = 12
+LEAST_BASIS = 20  # vectors of Lanczos's basis at least: more than there are modes break it down
 GUARD = 3  # modes beyond those asked for, among which a gap is sought
 GAP = 1e-6  # relative distance of eigenvalues that a count can tell apart
 ROUNDS = 12  # of searches for missed modes
@@ -134,7 +135,8 @@ def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> S
         raise InputError(f" = {count}: the case has only {pencil.finite} free dofs", "count")
     if not np.isfinite(pencil.stiffness.data).all():
         raise ComputationError("modes: the tangent in this state is not finite")
-    if pencil.size <= DENSE or count + GUARD >= pencil.finite // 2:
+    basis = max(2 * (count + GUARD) + 1, LEAST_BASIS)
+    if pencil.size <= DENSE or basis >= pencil.finite - known.shape[1]:
         if pencil.size > MOST_DENSE:
             raise InputError(
                 f" = {count}: ask for fewer than half of the modes of {pencil.size} free dofs",
