@@ -79,6 +79,8 @@ from foldyn.live import View as View, view as view
 from foldyn.gradients import sensitivity as sensitivity
 from foldyn.linear import (
     Fidelity as Fidelity,
+    UnitCell as UnitCell,
+    bands as bands,
     fidelity as fidelity,
     frf as frf,
     mac as mac,
@@ -97,6 +99,7 @@ from foldyn.materials import (
 )
 from foldyn.patterns import (
     Pattern as Pattern,
+    Screw as Screw,
     convex as convex,
     thicken as thicken,
     welded as welded,

@@ -189,6 +189,10 @@ class _Writer:
                 {"name": name, "creases": self.store(f"tables_family{i}_creases", rows)}
                 for i, (name, rows) in enumerate(pattern.families.items())
             ]
+        if pattern.periods:
+            table["periods"] = [
+                self.store(f"tables_period{k}", pairs) for k, pairs in enumerate(pattern.periods)
+            ]
         if pattern.custom:
             try:
                 table["custom"] = json.dumps(pattern.custom)
@@ -353,6 +357,7 @@ def _stored_pattern(table: Mapping[str, Any]) -> Pattern:
     pattern = Pattern(
         table["vertices"], faces, letters, table["name"], boards, table.get("fold_angles"),
         custom=json.loads(table.get("custom", "{}")), welds=table.get("welds", ()),
+        periods=table.get("periods", ()),
     )  # fmt: skip
     if "families" not in table:
         return pattern

@@ -1,5 +1,7 @@
 """Small vibrations about an equilibrium: modes and frequency response."""
 
+from foldyn.linear.band_gaps import band_gaps
+from foldyn.linear.band_structure import bands
 from foldyn.linear.character import character
 from foldyn.linear.compared import ComparedMode, Fidelity
 from foldyn.linear.fidelity import fidelity
@@ -13,6 +15,7 @@ from foldyn.linear.peaks_of import Peak, peaks_of
 from foldyn.linear.refinement import Refinement, refinement
 from foldyn.linear.stepped_sine import SteppedSine
 from foldyn.linear.transients import BurstRandom, Impulse
+from foldyn.linear.unit_cell import UnitCell
 
 __all__ = [
     "METHODS",
@@ -27,6 +30,9 @@ __all__ = [
     "Peak",
     "Refinement",
     "SteppedSine",
+    "UnitCell",
+    "band_gaps",
+    "bands",
     "character",
     "convert",
     "equivalent_slope",

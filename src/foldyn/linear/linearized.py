@@ -210,7 +210,7 @@ def linearize(
     inner = amplitudes(case.structure, body, point.dofs, internal)
     free = np.concatenate([case.free_dofs, body.hidden, inner.dofs])
     exact = body.tangent(point.dofs)
-    change, soft = _slope_change(case, body, point.dofs, amplitude)
+    change, soft = slope_change(case, body, point.dofs, amplitude)
     if soft:
         warnings.warn(
             f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
@@ -269,7 +269,7 @@ def _symmetric(loads: sparse.csr_array, free: NDArray) -> sparse.csr_array:
     return sparse.csr_array(0.5 * (loads + loads.T))
 
 
-def _slope_change(
+def slope_change(
     case: Case, body: Assembly, q: NDArray, amplitude: float | None
 ) -> tuple[sparse.csr_array | None, int]:
     """What to add to the tangent (m, m) for other slopes, and how many hinges are soft.

@@ -22,6 +22,7 @@ from foldyn.patterns.generators.waterbomb import waterbomb
 from foldyn.patterns.generators.yoshimura import yoshimura
 from foldyn.patterns.generators.zipper_tubes import zipper_tubes
 from foldyn.patterns.pattern import Pattern
+from foldyn.patterns.screw import Screw
 from foldyn.patterns.thick import thicken
 
 GENERATORS: dict[str, Callable[..., Pattern]] = {
@@ -49,6 +50,7 @@ __all__ = [
     "Boards",
     "FlatFoldability",
     "Pattern",
+    "Screw",
     "arc_miura",
     "convex",
     "curved_pleat",

@@ -1,4 +1,4 @@
-"""What a pattern may say of its creases beside their letters: angles to fold to, families."""
+"""What a pattern may say beside the letters of creases: angles to fold to, families, periods."""
 
 from __future__ import annotations
 
@@ -207,3 +207,34 @@ def crease_values(
             )
         values[rows], chosen[rows] = value, True
     return values, chosen
+
+
+def periods(given: Any, count: int) -> tuple[NDArray[np.int64], ...]:
+    """Pairs (m, 2) of vertices and their images under each period; `given` as `Pattern` takes it.
+
+    count : of the vertices.
+    """
+    found = []
+    for k, pairs in enumerate(listed("periods", given, "pairs of vertices for each motion")):
+        rows = listed(
+            f"periods[{k}]", pairs, "pairs of a vertex and its image, as [(0, 6), (1, 7)]"
+        )
+        try:
+            array = np.array(rows)
+        except ValueError:
+            array = np.zeros(0)
+        good = array.ndim == 2 and array.shape[1:] == (2,) and array.dtype.kind in "iu"
+        if not good or not len(array):
+            raise InputError(
+                f" = {show(pairs)}: give pairs of a vertex and its image, as [(0, 6), (1, 7)]",
+                f"periods[{k}]",
+            )
+        beyond = array[(array < 0) | (array >= count)]
+        if beyond.size:
+            raise InputError(
+                f": there is no vertex {beyond[0]}; there are {count}", f"periods[{k}]"
+            )
+        array = array.astype(np.int64)
+        array.setflags(write=False)
+        found.append(array)
+    return tuple(found)

@@ -65,6 +65,9 @@ class Pattern(Transforms):
     welds : sequence of (vertex, vertex)
         Edges of two panels across which the sheet runs on: they are no creases but lines in it,
         as along the facets of a curved panel; see `welded`.
+    periods : sequence of sequences of (vertex, vertex)
+        One or two motions that bring the pattern beside itself, each as the pairs of a vertex and
+        the one where it comes to lie; they hold in every folded state. See `foldyn.UnitCell`.
 
     Attributes
     ----------
@@ -125,6 +128,7 @@ class Pattern(Transforms):
     families: Mapping[str, NDArray[np.int64]]
     custom: Mapping[str, Any]
     welds: NDArray[np.int64]
+    periods: tuple[NDArray[np.int64], ...]
     flipped: tuple[bool, ...] = field(init=False)
     edges: NDArray[np.int64] = field(init=False)
     creases: NDArray[np.int64] = field(init=False)
@@ -160,6 +164,7 @@ class Pattern(Transforms):
         families: Mapping[str, Sequence[tuple[int, int]]] | None = None,
         custom: Mapping[str, Any] | None = None,
         welds: Sequence[tuple[int, int]] | NDArray[np.integer] = (),
+        periods: Sequence[Sequence[tuple[int, int]] | NDArray[np.integer]] = (),
     ) -> None:
         if not isinstance(name, str):
             raise InputError(f"name = {name!r}: give a string.")
@@ -200,6 +205,7 @@ class Pattern(Transforms):
             "fold_angles": crease_data.fold_angles(fold_angles, topology.creases, words),
             "families": named,
             "custom": dict(custom or {}),
+            "periods": crease_data.periods(periods, len(points)),
             "dihedrals": dihedrals,
             "weld_dihedrals": bent,
             "flat_dihedrals": flat,

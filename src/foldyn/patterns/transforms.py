@@ -40,6 +40,7 @@ class Transforms:
         creases: NDArray[np.int64]
         boundary: NDArray[np.int64]
         welds: NDArray[np.int64]
+        periods: tuple[NDArray[np.int64], ...]
         crease_faces: NDArray[np.int64]
         dihedrals: NDArray[np.float64]
         size: float
@@ -220,9 +221,12 @@ class Transforms:
             "families": {name: self.creases[rows] for name, rows in self.families.items()},
             "custom": self.custom,
             "welds": self.welds,
+            "periods": self.periods,
         }
         if "faces" in values:
             own["custom"] = {k: v for k, v in self.custom.items() if k != FACE_ORDERS}
+        if len(values.get("vertices", self.vertices)) != len(self.vertices):
+            own["periods"] = ()  # which are said of the vertices by number
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
             return type(self)(**{**own, **values})
@@ -268,7 +272,7 @@ def _joined(
         welds += numbers_[sheet.welds].tolist()
     bare = first.changed(
         vertices=glued.vertices, faces=faces, assignments=None, fold_angles=None,
-        families=None, custom=None, welds=welds,
+        families=None, custom=None, welds=welds, periods=(),
     )  # fmt: skip
     flat = np.abs(bare.dihedrals - np.pi) < FLAT
     for k, pair in enumerate(bare.creases.tolist()):

@@ -1,6 +1,10 @@
 # Public names and where they live; loaded when they are first used (facade.py)
 
 from foldyn.plots.animation import animate as animate, animate_modes as animate_modes
+from foldyn.plots.bands import (
+    plot_bands as plot_bands,
+    plot_iso_frequency as plot_iso_frequency,
+)
 from foldyn.plots.boards import draw_boards as draw_boards
 from foldyn.plots.designs import (
     draw_sensitivity as draw_sensitivity,

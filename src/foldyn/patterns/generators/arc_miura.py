@@ -15,7 +15,7 @@ from foldyn.patterns.generators.arguments import (
     fold_dihedral,
     sizes,
 )
-from foldyn.patterns.generators.grid import indices, sheet
+from foldyn.patterns.generators.grid import indices, opposite, sheet
 from foldyn.patterns.generators.miura import miura_letters
 from foldyn.patterns.pattern import Pattern
 
@@ -105,4 +105,4 @@ def arc_miura(
     place = corner + np.where(i % 2, shift, 0.0)
     letters = miura_letters(2 * nx, 2 * ny) if flat else None
     places = [s * i, np.real(place), np.imag(place)]
-    return sheet("arc miura", places, ("zigzag", "straight"), letters)
+    return sheet("arc miura", places, ("zigzag", "straight"), letters, opposite(2 * nx, 2 * ny))

@@ -22,6 +22,7 @@ def assembled(
     letters: Mapping[str, str] | None = None,
     angles: Mapping[str, float] | None = None,
     custom: Mapping[str, Any] | None = None,
+    periods: Sequence[Sequence[Edge]] = (),
 ) -> Pattern:
     """Pattern of which each family may name edges of one panel too, which are left out.
 
@@ -38,7 +39,8 @@ def assembled(
     angles : mapping, optional
         Angle (rad) to fold each family to, valleys positive.
     custom : mapping, optional
-        As `Pattern` takes it.
+    periods : sequence of sequences of vertex pairs
+        Both as `Pattern` takes them.
 
     Returns
     -------
@@ -63,4 +65,5 @@ def assembled(
         fold_angles=each(angles) if angles else None,
         families=creases,
         custom=custom,
+        periods=periods,
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from foldyn.errors import within
 from foldyn.patterns.generators.arguments import angle_between, check_size, fold_dihedral
-from foldyn.patterns.generators.grid import indices, sheet
+from foldyn.patterns.generators.grid import indices, opposite, sheet
 from foldyn.patterns.pattern import Pattern
 from foldyn.values import length, whole
 
@@ -83,4 +83,6 @@ def curved_pleat(
     letters = None
     if flat:
         letters = curved_pleat(pleats, segments, a, radius, arc, (180 + steepest) / 2).assignments
-    return sheet("curved pleat", [x, y + a * math.cos(tilt) * j, z], ("curve", "ruling"), letters)
+    places = [x, y + a * math.cos(tilt) * j, z]
+    periods = opposite(segments, pleats)[1:] if pleats % 2 == 0 else ()
+    return sheet("curved pleat", places, ("curve", "ruling"), letters, periods)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from foldyn.errors import within
 from foldyn.patterns.generators.arguments import acute, cell_counts, fold_dihedral, sizes
-from foldyn.patterns.generators.grid import indices, sheet
+from foldyn.patterns.generators.grid import indices, opposite, sheet
 from foldyn.patterns.pattern import Pattern
 
 
@@ -61,6 +61,6 @@ def eggbox(
     along_y = a * math.sin(gamma) * math.sin(half)
     s = b * math.sin(gamma) * math.cos(half) / cos_y
     i, j = indices(2 * nx, 2 * ny)
-    return sheet(
-        "eggbox", [s * i, along_y * j, h1 * (j % 2) + h2 * (i % 2)], ("along_x", "along_y")
-    )
+    places = [s * i, along_y * j, h1 * (j % 2) + h2 * (i % 2)]
+    families = "along_x", "along_y"
+    return sheet("eggbox", places, families, periods=opposite(2 * nx, 2 * ny))

@@ -25,11 +25,20 @@ def lines(columns: int, rows: int) -> tuple[list[Edge], list[Edge]]:
     return along_x, along_y
 
 
+def opposite(columns: int, rows: int) -> tuple[list[Edge], list[Edge]]:
+    """Vertices at the lower end of each row, and of each column, with those at the other end."""
+    step = rows + 1
+    along_x = [(j, columns * step + j) for j in range(step)]
+    along_y = [(i * step, i * step + rows) for i in range(columns + 1)]
+    return along_x, along_y
+
+
 def sheet(
     name: str,
     places: Sequence[ArrayLike],
     families: tuple[str, str],
     assignments: Mapping[Edge, str] | Sequence[str] | None = None,
+    periods: Sequence[Sequence[Edge]] = (),
 ) -> Pattern:
     """Sheet of quadrilaterals, front to +z, panels along x first.
 
@@ -41,7 +50,8 @@ def sheet(
     families : tuple of two str
         What to call the creases along x and those along y.
     assignments : mapping or sequence of str, optional
-        As `Pattern` takes them.
+    periods : sequence of sequences of vertex pairs
+        Both as `Pattern` takes them.
 
     Returns
     -------
@@ -57,4 +67,6 @@ def sheet(
     ]
     both = zip(families, lines(columns, rows), strict=True)
     groups = {family: pairs for family, pairs in both if pairs}
-    return Pattern(vertices.reshape(-1, 3), faces, assignments, name, families=groups)
+    return Pattern(
+        vertices.reshape(-1, 3), faces, assignments, name, families=groups, periods=periods
+    )

@@ -107,4 +107,6 @@ def kresling(
                 families["diagonal"].append((bottom, top_next))
             families["side"].append((bottom, top))
             families["ring"].append((bottom, bottom_next))
-    return assembled("kresling", vertices, faces, families)
+    upward = [(m, storeys * sides + m) for m in range(sides)]
+    periods = [] if alternating and storeys % 2 else [upward]
+    return assembled("kresling", vertices, faces, families, periods=periods)

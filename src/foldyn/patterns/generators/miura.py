@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from foldyn.errors import within
 from foldyn.patterns.generators.arguments import acute, cell_counts, fold_dihedral, sizes
-from foldyn.patterns.generators.grid import indices, lines, sheet
+from foldyn.patterns.generators.grid import indices, lines, opposite, sheet
 from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.topology import Edge
 
@@ -74,7 +74,7 @@ def miura(
     i, j = indices(2 * nx, 2 * ny)
     places = [s * i, along_y * j + v * (i % 2), h * (j % 2)]
     letters = miura_letters(2 * nx, 2 * ny) if dihedral == 180 else None
-    return sheet("miura", places, ("zigzag", "straight"), letters)
+    return sheet("miura", places, ("zigzag", "straight"), letters, opposite(2 * nx, 2 * ny))
 
 
 def miura_letters(columns: int, rows: int) -> dict[Edge, str]:

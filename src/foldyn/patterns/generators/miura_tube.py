@@ -59,7 +59,9 @@ def miura_tube(
     with within("miura_tube: "):
         vertices = tube(cells, a, b, panel_angle, dihedral)
     faces, families = tube_panels(len(vertices) // 4)
-    return assembled("miura tube", vertices, faces, families)
+    last = len(vertices) - 4
+    along = [(corner, last + corner) for corner in range(4)]
+    return assembled("miura tube", vertices, faces, families, periods=[along])
 
 
 def tube(cells: int, a: float, b: float, panel_angle: float, dihedral: float) -> NDArray:

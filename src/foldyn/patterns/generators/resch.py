@@ -101,7 +101,16 @@ def resch(cells: Sequence[int] = (3, 3), a: float = 1.0, dihedral: float = 120.0
             families["tile"] += [(left, middle[2]), (tips[1], left)]
             families["tile"] += [(right, middle[2]), (tips[2], right)]
     angles = CLOSED if dihedral == 180 else None
-    return assembled("resch", vertices, faces, families, LETTERS, angles)
+    steps = (counts[0], -(counts[0] // 2)), (0, counts[1])
+    periods = [
+        [
+            (v, found[m + i, n + j, k])
+            for (m, n, k), v in found.items()
+            if (m + i, n + j, k) in found
+        ]
+        for i, j in steps
+    ]
+    return assembled("resch", vertices, faces, families, LETTERS, angles, periods=periods)
 
 
 @dataclass(frozen=True)

@@ -93,6 +93,8 @@ def waterbomb(
     ]
     faces: list[tuple[int, ...]] = []
     families: dict[str, list[Edge]] = {"diagonal": [], "middle": [], "side": [], "row": []}
+    across = [(row * line, row * line + 2 * nx) for row in range(ny + 1)]
+    upward = [(k, ny * line + k) for k in range(line)]
     for row in range(ny):
         low, high = row * line, (row + 1) * line
         for column in range(1 - row % 2, line, 2):
@@ -116,9 +118,12 @@ def waterbomb(
                 ]
                 families["diagonal"] += [(low + right, center), (high + right, center)]
                 families["side"].append((low + right, high + right))
+        if row % 2:  # its first and its last half base
+            across.append((len(vertices) - nx - 1, len(vertices) - 1))
         if row:
             families["row"] += [(low + left, low + left + 1) for left in range(line - 1)]
-    return assembled("waterbomb", vertices, faces, families, LETTERS)
+    periods = [across] if ny % 2 else [across, upward]
+    return assembled("waterbomb", vertices, faces, families, LETTERS, periods=periods)
 
 
 def _height(dihedral: float, h: float, w: float) -> float:

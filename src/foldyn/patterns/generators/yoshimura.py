@@ -84,4 +84,7 @@ def yoshimura(
         for k in range(1, nx):
             faces.append((short + k - 1, long + k, short + k)[::up])
             families["ring"].append((short + k - 1, short + k))
-    return assembled("yoshimura", vertices, faces, families, {"ring": "V", "diagonal": "M"})
+    letters = {"ring": "V", "diagonal": "M"}
+    upward = [(k, first[ny] + k) for k in range(nx + 1)]
+    periods = [] if ny % 2 else [upward]
+    return assembled("yoshimura", vertices, faces, families, letters, periods=periods)

@@ -82,7 +82,12 @@ def zipper_tubes(
         for c in (0, 1)
     ]
     vertices, custom = np.concatenate([one, other]), {TIES: ties}
-    return assembled("zipper tubes", vertices, [*faces, *more], {**both, **named}, custom=custom)
+    along = [(c, first - 4 + c) for c in range(4)]
+    along += [(2 * first - 4 + c, first + c) for c in range(4)]  # the second tube runs back
+    return assembled(
+        "zipper tubes", vertices, [*faces, *more], {**both, **named}, custom=custom,
+        periods=[along],
+    )  # fmt: skip
 
 
 def _turned(one: NDArray, lean: float) -> NDArray[np.float64]:

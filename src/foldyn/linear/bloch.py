@@ -1,0 +1,186 @@
+"""Matrices of Bloch waves: K(k) = sum over R of K_R exp(i k . R), and so M, C and constraints.
+
+K_R is what the displacements of cell R exert on the dofs of cell 0, taken from the patch about it
+(`cell_patch`); displacements of cell R are told in axes turned with it. K_-R is the transpose of K_R,
+so that K(k) is Hermitian: this is checked, and with it that the cells are alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.errors import InputError
+
+ALIKE = 1e-8  # of the largest entry: how far K_-R may be from the transpose of K_R
+
+
+class Hops(NamedTuple):
+    """A matrix A(k) = sum over R of A_R exp(i k . R), (r, n), by its places.
+
+    Attributes
+    ----------
+    rows, columns : (p,)
+        Places that are not zero for some R.
+    values : sparse (p, s)
+        Their values for each R.
+    shape : (int, int)
+    """
+
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    values: sparse.csr_array
+    shape: tuple[int, int]
+
+    def at(self, factors: NDArray) -> NDArray:
+        """A (r, n) for the factors (s,) of the R: exp(i k . R), or derivatives of it."""
+        out = np.zeros(self.shape, factors.dtype)
+        out[self.rows, self.columns] = self.values @ factors
+        return out
+
+    def sparse_at(self, factors: NDArray) -> sparse.csc_array:
+        """The same as a sparse matrix."""
+        entries = (self.values @ factors, (self.rows, self.columns))
+        return sparse.csc_array(sparse.coo_array(entries, self.shape))
+
+    @property
+    def empty(self) -> bool:
+        """Whether it is zero."""
+        return not len(self.rows)
+
+
+def hops(
+    matrix: sparse.sparray, rows: NDArray, unit: NDArray, number: NDArray, count: int, steps: int
+) -> Hops:
+    """A matrix (m, m) of a patch, its rows those of cell 0.
+
+    rows : (n,) rows of the dofs of cell 0, in their order.
+    unit, number : (m,) dof of cell 0 that stands for each, -1 for none, and number of its R.
+    """
+    own = sparse.coo_array(sparse.csr_array(matrix)[rows])
+    return collected(own.row, unit[own.col], number[own.col], own.data, (len(rows), count), steps)
+
+
+def collected(
+    row: NDArray, column: NDArray, number: NDArray, value: NDArray, shape: tuple[int, int],
+    steps: int,
+) -> Hops:  # fmt: skip
+    """The same from entries, which add up."""
+    kept = (column >= 0) & (value != 0.0)
+    row, column, number, value = row[kept], column[kept], number[kept], value[kept]
+    places, place = np.unique(row.astype(np.int64) * shape[1] + column, return_inverse=True)
+    values = sparse.csr_array(sparse.coo_array((value, (place, number)), (len(places), steps)))
+    return Hops(places // shape[1], places % shape[1], values, shape)
+
+
+@dataclass(frozen=True, eq=False)
+class Bloch:
+    """Matrices of the n dofs of a cell.
+
+    Attributes
+    ----------
+    steps : (s, d)
+        R of the cells that reach cell 0; they come with their opposites.
+    stiffness, mass, damping : Hops
+        (n, n).
+    ties : Hops
+        (k, n), the constraints of links and rigid panels.
+    hidden : (n,) bool
+        Dofs without mass.
+    stiffness_sizes : float
+        Largest entry, N/m.
+    """
+
+    steps: NDArray[np.int64]
+    stiffness: Hops
+    mass: Hops
+    damping: Hops
+    ties: Hops
+    hidden: NDArray[np.bool_]
+    held: NDArray[np.bool_] = field(repr=False)
+
+    @property
+    def size(self) -> int:
+        """n."""
+        return self.stiffness.shape[0]
+
+    def factors(self, phase: NDArray) -> NDArray[np.complex128]:
+        """exp(i k . R), (s,)."""
+        return np.exp(1j * (self.steps @ phase))
+
+    def slopes(self, phase: NDArray, period: int) -> NDArray[np.complex128]:
+        """Their derivatives by one phase."""
+        return 1j * self.steps[:, period] * self.factors(phase)
+
+    @cached_property
+    def lumped(self) -> NDArray[np.float64] | None:
+        """Masses (n,), kg, where they are the same for all k and not coupled; else None."""
+        mass, here = self.mass, np.flatnonzero((self.steps == 0).all(axis=1))
+        if (mass.rows != mass.columns).any() or mass.values.nnz != len(mass.rows):
+            return None
+        values = mass.values[:, here].toarray()[:, 0]
+        if (values == 0.0).any():
+            return None
+        return np.bincount(mass.rows, values, self.size)
+
+
+def hermitian(own: Hops, steps: NDArray, what: str, noise: float = 0.0) -> Hops:
+    """The Hermitian part of a matrix; refuses one that differs from it by more than rounding."""
+    opposite = _opposites(steps)
+    entries = own.values.tocoo()
+    row, column = own.rows[entries.row], own.columns[entries.row]
+    both = collected(
+        np.concatenate([row, column]), np.concatenate([column, row]),
+        np.concatenate([entries.col, opposite[entries.col]]),
+        0.5 * np.concatenate([entries.data, entries.data]), own.shape, len(steps),
+    )  # fmt: skip
+    skew = collected(
+        np.concatenate([row, column]), np.concatenate([column, row]),
+        np.concatenate([entries.col, opposite[entries.col]]),
+        0.5 * np.concatenate([entries.data, -entries.data]), own.shape, len(steps),
+    )  # fmt: skip
+    largest = np.abs(own.values.data).max(initial=0.0)
+    off = np.abs(skew.values.data)
+    if off.max(initial=0.0) > max(ALIKE * largest, noise):
+        raise NotAlike(what, float(off.max() / largest), skew, int(off.argmax()))
+    return both
+
+
+class NotAlike(InputError):
+    """Matrices of different cells that differ."""
+
+    def __init__(self, what: str, share: float, skew: Hops, entry: int) -> None:
+        self.place = int(np.searchsorted(skew.values.indptr, entry, side="right") - 1)
+        self.dofs = int(skew.rows[self.place]), int(skew.columns[self.place])
+        super().__init__(
+            f": the {what} of one cell differs from that of the next by {share:.2g} of its largest "
+            f"entry, at dofs {self.dofs}; a support, or the state, does not repeat",
+            "case",
+        )
+
+
+def _opposites(steps: NDArray) -> NDArray[np.int64]:
+    """Number of -R for each R."""
+    where = {tuple(row): k for k, row in enumerate(steps.tolist())}
+    return np.array([where[tuple(-x for x in row)] for row in steps.tolist()])
+
+
+def steps_of(offsets: Sequence[NDArray]) -> tuple[NDArray[np.int64], list[NDArray[np.int64]]]:
+    """All R (s, d) among some (m, d), with their opposites; and the numbers (m,) of each."""
+    every = np.concatenate([*offsets, *(-each for each in offsets)])
+    steps, number = np.unique(every, axis=0, return_inverse=True)
+    bounds = np.cumsum([len(each) for each in offsets])
+    return steps, np.split(np.ravel(number)[: bounds[-1]], bounds[:-1])
+
+
+def null_space(rows: NDArray) -> NDArray[np.complex128]:
+    """Orthonormal motions (n, m) that meet constraints (k, n)."""
+    _, sizes, motions = np.linalg.svd(rows)
+    rank = int((sizes > 1e-10 * sizes.max(initial=0.0)).sum())
+    return motions[rank:].conj().T

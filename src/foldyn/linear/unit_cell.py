@@ -1,0 +1,370 @@
+"""`UnitCell`: a case that repeats under translations or a screw motion, and its Brillouin zone.
+
+The pattern repeats under one or two motions g_1, g_2 that commute. Each vertex v is a copy of one
+that stands for all of its kind, v = g^R u with whole numbers R: two that belong to the same kind
+are one vertex of the repeated sheet, as are the edges between them. Wave vectors are phases k (rad)
+per period: a Bloch wave moves copy R of a vertex as Q^R a exp(i k . R), with Q the rotation of the
+motion (F. Bloch, Z. Phys. 52, 1929; with rotations, C. T. White, D. H. Robertson, J. W. Mintmire,
+Phys. Rev. B 47, 1993).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import product
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.cases import Case
+from foldyn.errors import InputError
+from foldyn.linear.zone import zone_grid, zone_path
+from foldyn.patterns.screw import Screw, motion_between, translation
+from foldyn.patterns.tiling import half_edges
+from foldyn.patterns.tiling import periods as translations_of
+from foldyn.values import number, numbers, of_kind, show
+
+if TYPE_CHECKING:
+    import xarray
+
+NEAR_MISS = 0.05  # of the pattern's size: how near an image is to a vertex that it was to meet
+COMMUTE = 10.0  # times the tolerance: how far two orders of two motions may lead apart
+SHOWN = 6  # vertices that a message names
+
+
+class Copies(NamedTuple):
+    """Each vertex as a copy of one that stands for all of its kind.
+
+    Attributes
+    ----------
+    kind : ndarray of int, shape (n,)
+        Number of the vertex that stands for it, among those that do, increasing.
+    offset : ndarray of int, shape (n, d)
+        R, how many of each motion bring that one to it.
+    first : ndarray of int, shape (m,)
+        The vertices that stand for others, by kind.
+    """
+
+    kind: NDArray[np.int64]
+    offset: NDArray[np.int64]
+    first: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class UnitCell:
+    """A case of which a sheet, a chain or a tube consists.
+
+    Its supports, point masses, springs, dashpots and damping repeat with it. What is said of a node
+    holds for its partners on the other side of the cell too: it is one node of the repeated sheet,
+    and counts once where one support or mass names several of them. Loads count for the state alone.
+
+    Parameters
+    ----------
+    case : Case
+        Its structure as `discretize` or `shell` makes it. Creases between cells have the stiffness
+        and the law of the others, and their letters by the dihedral.
+    vectors : sequence of sequences of float, shape (d, 3), optional
+        One or two translations (m) from a cell to the next: a chain or a sheet.
+    screw : Screw, optional
+        Instead of them, or beside one of them: a screw motion from a cell to the next, for tubes
+        and rings.
+    tolerance : float
+        Distance, as a fraction of the pattern's size, at which vertices lie in the same place.
+
+    Attributes
+    ----------
+    motions : tuple of Screw
+        From a cell to the next, one or two; those of the pattern (`Pattern.periods`) where neither
+        vectors nor a screw are given, or two translations that are found.
+    vectors : ndarray, shape (d, 3)
+        Their shifts (m).
+    dimensions : int
+        How many, d.
+    copies : Copies
+        Which vertices belong together.
+
+    Raises
+    ------
+    InputError
+        The pattern does not repeat, or not under the motions that are given: the message names the
+        vertices without a partner.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> sheet = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3, density=1000.0)
+    >>> pattern = fd.patterns.miura(a=0.03, b=0.03)
+    >>> cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet)))
+    >>> cell.vectors.round(4).tolist()
+    [[0.0393, 0.0, 0.0], [0.0, 0.0397, 0.0]]
+    >>> fd.bands(cell, cell.path("X-M", 3), count=2).frequency.shape
+    (3, 2)
+    """
+
+    case: Case
+    vectors: Any = None
+    screw: Screw | None = None
+    tolerance: float = 1e-6
+    motions: tuple[Screw, ...] = field(init=False)
+    copies: Copies = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        pattern = of_kind("case", self.case, Case).structure.pattern
+        if pattern is None:
+            raise InputError(": its structure has no pattern that could repeat", "case")
+        near = number("tolerance", self.tolerance, above=0.0) * pattern.size
+        motions, pairs = self._found(pattern, near)
+        _check_commuting(pattern.vertices, motions, near)
+        pairs += _partners(pattern, motions, near, {v for rows in pairs for v in rows[:2]})
+        _check_all(pattern, motions, pairs, near, "screw" if self.screw else "vectors")
+        object.__setattr__(self, "motions", motions)
+        object.__setattr__(self, "vectors", np.array([motion.vector for motion in motions]))
+        object.__setattr__(self, "copies", _copies(len(pattern.vertices), len(motions), pairs))
+
+    def _found(self, pattern: Any, near: float) -> tuple[tuple[Screw, ...], list[tuple]]:
+        """The motions, and pairs of vertices that are known to belong together."""
+        if self.vectors is not None or self.screw is not None:
+            given = [] if self.vectors is None else list(map(translation, _steps(self.vectors)))
+            if self.screw is not None:
+                given.append(of_kind("screw", self.screw, Screw))
+            if len(given) > 2:
+                raise InputError(": give at most two, or one beside a screw", "vectors")
+            return tuple(given), []
+        if not pattern.periods:
+            try:
+                steps = translations_of(
+                    pattern.vertices, half_edges(pattern.faces, pattern.boundary), near
+                )
+            except InputError:
+                raise InputError(
+                    ": the pattern does not say how it repeats, and no two translations bring its "
+                    "boundary together; give them, or one for a chain, as in "
+                    "vectors=[(0.1, 0, 0)], or screw=fd.Screw(...)",
+                    "vectors",
+                ) from None
+            return tuple(map(translation, steps)), []
+        return self._marked(pattern, near)
+
+    def _marked(self, pattern: Any, near: float) -> tuple[tuple[Screw, ...], list[tuple]]:
+        motions, pairs = [], []
+        for k, rows in enumerate(pattern.periods):
+            motion, off = motion_between(
+                pattern.vertices[rows[:, 0]], pattern.vertices[rows[:, 1]], near
+            )
+            wrong = rows[off > near]
+            if len(wrong):
+                raise InputError(
+                    f": no motion brings vertices {_named(wrong[:, 0])} to "
+                    f"{_named(wrong[:, 1])}, which the pattern says is its period {k}: they are "
+                    f"off by up to {off.max():.2g} m; this shape does not repeat",
+                    "case",
+                )
+            motions.append(motion)
+            step = tuple(int(j == k) for j in range(len(pattern.periods)))
+            pairs += [(v, w, step) for v, w in rows.tolist()]
+        return tuple(motions), pairs
+
+    @property
+    def dimensions(self) -> int:
+        """How many motions repeat it."""
+        return len(self.motions)
+
+    # ------------------------------------------------------------------ copies
+    def images(self, points: ArrayLike, step: Sequence[int]) -> NDArray[np.float64]:
+        """Where points (n, 3), m, lie in cell R of the repeated sheet, R = step (d,)."""
+        return images(self.motions, points, step)
+
+    @cached_property
+    def kinds(self) -> int:
+        """Vertices of a cell of the repeated sheet, each counted once."""
+        return len(self.copies.first)
+
+    # ------------------------------------------------------------------ Brillouin zone
+    def path(self, points: str, count: int = 60) -> xarray.DataArray:
+        """Phases along a path through the Brillouin zone.
+
+        Parameters
+        ----------
+        points : str
+            Names of points joined by "-": "G" (no phase), "X" (pi along the first period), "Y" (pi
+            along the second) and "M" (pi along both) of a sheet; "G" and "X" of a chain or tube. A
+            hexagonal lattice has "K" too, the corner of its zone.
+        count : int
+            How many phases in all, corners among them.
+
+        Returns
+        -------
+        xarray.DataArray
+            Phases (phase, period), rad, with the coordinate `distance` along the path, rad, and
+            the attributes `ticks` (its values at the points) and `tick_labels`.
+
+        Raises
+        ------
+        InputError
+            An unknown point, or fewer phases than points.
+        """
+        return zone_path(self.vectors, points, count)
+
+    def grid(self, count: int = 24) -> xarray.DataArray:
+        """Phases all over the Brillouin zone, from -pi to pi along each period.
+
+        Parameters
+        ----------
+        count : int
+            Phases along each period, at least 2; without the end at pi, which is that at -pi.
+
+        Returns
+        -------
+        xarray.DataArray
+            Phases (phase, period), rad; the attribute `grid` says how many there are along each.
+        """
+        return zone_grid(self.dimensions, count)
+
+
+def images(motions: Sequence[Screw], points: ArrayLike, step: Sequence[int]) -> NDArray[np.float64]:
+    """Where motions, each as often as `step` says, bring points (n, 3), m."""
+    out = np.asarray(points, float)
+    for motion, power in zip(motions, step, strict=True):
+        out = motion.images(out, int(power))
+    return out
+
+
+def rotation(motions: Sequence[Screw], step: Sequence[int]) -> NDArray[np.float64]:
+    """Rotation (3, 3) of motions, each as often as `step` says."""
+    out = np.eye(3)
+    for motion, power in zip(motions, step, strict=True):
+        out = motion.rotation(int(power)) @ out
+    return out
+
+
+def _steps(vectors: Any) -> NDArray[np.float64]:
+    """Translations (d, 3) as they are given, one or two that are not parallel."""
+    array = numbers("vectors", vectors)
+    array = array[None] if array.ndim == 1 else array
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) > 2 or not len(array):
+        raise InputError(
+            f" = {show(vectors)}: give one or two translations, as in [(0.1, 0, 0), (0, 0.1, 0)]",
+            "vectors",
+        )
+    sizes = np.linalg.svd(array, compute_uv=False)
+    if sizes[-1] <= 1e-9 * sizes[0] or sizes[0] == 0.0:
+        raise InputError(f" = {show(vectors)}: must not be zero or parallel", "vectors")
+    return array
+
+
+def _check_commuting(vertices: NDArray, motions: Sequence[Screw], near: float) -> None:
+    if len(motions) < 2:
+        return
+    one, two = motions
+    apart = one.images(two.images(vertices)) - two.images(one.images(vertices))
+    if np.abs(apart).max() > COMMUTE * near:
+        raise InputError(
+            ": the two motions lead to different places in the two orders, and a lattice needs "
+            "motions that commute: translations, or a screw and a translation along its axis",
+            "screw" if any(motion.turns for motion in motions) else "vectors",
+        )
+
+
+def _partners(
+    pattern: Any, motions: Sequence[Screw], near: float, known: set[int]
+) -> list[tuple[int, int, tuple[int, ...]]]:
+    """Pairs of vertices (v, w, R), w = g^R v, of boundary edges that meet edges of other cells.
+
+    known : vertices whose partners are known.
+    """
+    from scipy.spatial import cKDTree
+
+    rim = half_edges(pattern.faces, pattern.boundary)
+    rim = rim[[not (a in known and b in known) for a, b in rim.tolist()]]
+    if not len(rim):
+        return []
+    points = pattern.vertices
+    tree, pairs = cKDTree(points[rim[:, ::-1]].reshape(-1, 6)), []
+    for step in product((-1, 0, 1), repeat=len(motions)):
+        if step <= (0,) * len(motions):
+            continue
+        moved = images(motions, points, step)[rim].reshape(-1, 6)
+        for e, matches in enumerate(tree.query_ball_point(moved, near * np.sqrt(2.0))):
+            for f in matches:
+                pairs += [(int(v), int(w), step) for v, w in zip(rim[e], rim[f][::-1], strict=True)]
+    return pairs
+
+
+def _check_all(
+    pattern: Any, motions: Sequence[Screw], pairs: Sequence[tuple], near: float, field: str
+) -> None:
+    """Refuse motions under which nothing meets, or some vertices just miss their partners."""
+    from scipy.spatial import cKDTree
+
+    rim = np.unique(pattern.boundary)
+    tree = cKDTree(pattern.vertices[rim])
+    neighbors: dict[int, set[int]] = {}
+    for a, b in pattern.boundary.tolist():
+        neighbors.setdefault(a, set()).add(b)
+        neighbors.setdefault(b, set()).add(a)
+    for k, motion in enumerate(motions):
+        met = {v for v, _, step in pairs if step[k]}
+        distance, nearest = tree.query(motion.images(pattern.vertices[rim]))
+        if not met:
+            best = int(distance.argmin())
+            raise InputError(
+                f": motion {k} brings no boundary edge of the pattern to another one; of its "
+                f"vertices, {rim[best]} comes nearest to one, {rim[nearest[best]]}, at a distance "
+                f"of {distance[best]:.3g} m; give the motion from a cell to the next",
+                field,
+            )
+        starts = {v for v, _, step in pairs if step[k] > 0}
+        missed = [
+            (v, w, gap)
+            for v, w, gap in zip(rim.tolist(), rim[nearest].tolist(), distance, strict=True)
+            if near < gap < NEAR_MISS * pattern.size and v not in starts and w != v
+            and neighbors[v] & starts
+        ]  # fmt: skip
+        if missed:
+            raise InputError(
+                f": vertices {_named([v for v, _, _ in missed])} have no partner under motion {k}: "
+                f"they come near {_named([w for _, w, _ in missed])}, but are off by up to "
+                f"{max(gap for _, _, gap in missed):.2g} m; correct the pattern or the motion, or "
+                "give a larger tolerance",
+                field,
+            )
+
+
+def _copies(count: int, dimensions: int, pairs: Sequence[tuple]) -> Copies:
+    """Kinds of vertices from pairs (v, w, R) with w = g^R v."""
+    beside: dict[int, list[tuple[int, NDArray]]] = {}
+    for v, w, step in pairs:
+        beside.setdefault(v, []).append((w, np.array(step)))
+        beside.setdefault(w, []).append((v, -np.array(step)))
+    kind, first = np.full(count, -1), []
+    offset = np.zeros((count, dimensions), np.int64)
+    for start in range(count):
+        if kind[start] >= 0:
+            continue
+        kind[start] = len(first)
+        first.append(start)
+        queue = deque([start])
+        while queue:
+            v = queue.popleft()
+            for w, step in beside.get(v, ()):
+                if kind[w] < 0:
+                    kind[w], offset[w] = kind[start], offset[v] + step
+                    queue.append(w)
+                elif (offset[w] != offset[v] + step).any():
+                    raise InputError(
+                        f": vertices {v} and {w} belong together in two ways; a vertex must not be "
+                        "its own copy: the motions are too short, or lead to the axis",
+                        "case",
+                    )
+    return Copies(kind, offset, np.array(first, np.int64))
+
+
+def _named(vertices: Sequence[int] | NDArray) -> str:
+    """Some vertices for a message."""
+    listed = [str(int(v)) for v in vertices]
+    more = f" and {len(listed) - SHOWN} more" if len(listed) > SHOWN else ""
+    return ", ".join(listed[:SHOWN]) + more

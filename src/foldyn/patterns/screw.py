@@ -1,0 +1,130 @@
+"""Rigid motions that bring a pattern beside itself: translations and screws.
+
+By Chasles' theorem every proper motion is a screw, a rotation about an axis and a shift along it;
+without the rotation it is a translation. Its powers have their axis in common, so that copies of a
+pattern are as far apart as they should be, however many there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from foldyn.arguments import Check, Checked
+from foldyn.errors import InputError
+from foldyn.values import number, show, vector
+
+SPREAD = 1e-6  # of their size: how far points must reach across a line to tell how they turn
+STILL = 1e-9  # rad: turns that count as none
+
+
+def _direction(name: str, value: ArrayLike) -> tuple[float, float, float]:
+    """Return a direction, one of the axes by its name or a vector that is not zero."""
+    if isinstance(value, str):
+        if value not in ("x", "y", "z"):
+            raise InputError(f' = {show(value)}: give "x", "y", "z" or three numbers', name)
+        return tuple(np.eye(3)["xyz".index(value)].tolist())  # type: ignore[return-value]
+    return vector(name, value, nonzero=True)
+
+
+@dataclass(frozen=True)
+class Screw(Checked):
+    """A rotation about an axis by the right-hand rule, and a shift along the axis.
+
+    Parameters
+    ----------
+    axis : {"x", "y", "z"} or sequence of float, shape (3,)
+        Direction of the axis, of any length.
+    angle : float
+        Turn (degrees); 0 makes it a translation.
+    shift : float
+        Shift (m) along the axis.
+    point : sequence of float, shape (3,)
+        Any point on the axis (m).
+
+    Raises
+    ------
+    InputError
+        An argument of the wrong kind, or neither a turn nor a shift.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> fd.Screw("z", 30.0, 0.5).images([[1.0, 0.0, 0.0]], 3).round(12).tolist()
+    [[0.0, 1.0, 1.5]]
+    """
+
+    axis: Annotated[str | Sequence[float], Check(_direction)]
+    angle: Annotated[float, Check(number, unit="degrees")]
+    shift: Annotated[float, Check(number, unit="m")]
+    point: Annotated[Sequence[float], Check(vector, unit="m")] = (0.0, 0.0, 0.0)
+
+    def agree(self) -> None:
+        """Ask for a motion."""
+        if self.angle == 0.0 and self.shift == 0.0:
+            raise InputError(" = 0: neither turns nor shifts; give one of the two", "shift")
+
+    @property
+    def unit(self) -> NDArray[np.float64]:
+        """Unit vector (3,) along the axis."""
+        return np.array(self.axis) / np.linalg.norm(self.axis)
+
+    @property
+    def vector(self) -> NDArray[np.float64]:
+        """Its shift (3,), m."""
+        return self.shift * self.unit
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is more than a translation."""
+        return self.angle != 0.0
+
+    def rotation(self, power: int = 1) -> NDArray[np.float64]:
+        """Rotation (3, 3) of so many of these motions."""
+        if not self.turns or power == 0:
+            return np.eye(3)
+        return Rotation.from_rotvec(power * np.radians(self.angle) * self.unit).as_matrix()
+
+    def images(self, points: ArrayLike, power: int = 1) -> NDArray[np.float64]:
+        """Where so many of these motions bring points (n, 3), m."""
+        points, center = np.asarray(points, float), np.array(self.point)
+        if not self.turns:
+            return points + power * self.vector
+        return (points - center) @ self.rotation(power).T + center + power * self.vector
+
+
+def translation(vector: ArrayLike) -> Screw:
+    """The screw without a turn that is a translation (3,), m."""
+    step = np.asarray(vector, float)
+    return Screw(tuple(step.tolist()), 0.0, float(np.linalg.norm(step)))
+
+
+def motion_between(points: NDArray, images: NDArray, tolerance: float) -> tuple[Screw, NDArray]:
+    """Motion that brings points (m, 3) to their images (m, 3), and what each is off (m,), m.
+
+    A translation where one does within the tolerance, m, or where the points are too few or too
+    nearly on a line to tell a turn; else the screw of least squares (Kabsch, Acta Cryst. A 32,
+    1976).
+    """
+    step = (images - points).mean(axis=0)
+    off = np.linalg.norm(points + step - images, axis=1)
+    from_center, to_center = points - points.mean(axis=0), images - images.mean(axis=0)
+    spread = np.linalg.svd(from_center, compute_uv=False)
+    if off.max() <= tolerance or len(points) < 3 or spread[1] <= SPREAD * spread[0]:
+        return translation(step), off
+    turn = Rotation.align_vectors(to_center, from_center)[0]
+    rotation, about = turn.as_matrix(), turn.as_rotvec()
+    angle = float(np.linalg.norm(about))
+    if angle < STILL:
+        return translation(step), off
+    axis = about / angle
+    move = images.mean(axis=0) - rotation @ points.mean(axis=0)
+    shift = float(move @ axis)
+    point = np.linalg.lstsq(np.eye(3) - rotation, move - shift * axis, rcond=None)[0]
+    found = Screw(tuple(axis.tolist()), float(np.degrees(angle)), shift, tuple(point.tolist()))
+    return found, np.linalg.norm(found.images(points) - images, axis=1)

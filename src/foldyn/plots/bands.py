@@ -1,0 +1,137 @@
+"""Bands of repeated sheets: along a path of the Brillouin zone, and as lines of one frequency."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from foldyn.errors import InputError
+from foldyn.linear.band_gaps import ALL, band_gaps, frequencies_of
+from foldyn.plots import style
+from foldyn.values import whole
+
+GAP = "0.88"  # gray of full gaps
+
+
+def plot_bands(bands: xr.Dataset, gaps: bool = True, title: str = "") -> Figure:
+    """Draw bands along a path of the Brillouin zone.
+
+    Parameters
+    ----------
+    bands : xarray.Dataset
+        From `foldyn.bands`, along a path (`UnitCell.path`) or along phases of one period.
+    gaps : bool
+        Whether full gaps are shaded.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Frequencies over the phase, a line for each band; with the share of motion along z as its
+        color, if the bands have a polarization.
+
+    Raises
+    ------
+    InputError
+        Not what `foldyn.bands` returns, or phases of a grid, which lie on no path.
+    """
+    frequencies_of(bands)
+    along, label = _along(bands)
+    figure = style.new_figure(6.4, 4.4, title)
+    axes = figure.add_subplot()
+    style.frame(axes, label, "frequency (Hz)")
+    if gaps:
+        found = band_gaps(bands)
+        for k in np.flatnonzero(found["direction"].values == ALL):
+            axes.axhspan(float(found["bottom"][k]), float(found["top"][k]), color=GAP, lw=0.0)
+    values = bands["frequency"].values
+    for band in range(values.shape[1]):
+        if "polarization" in bands:
+            share = bands["polarization"].values[:, band, 2]
+            dots = axes.scatter(
+                along, values[:, band], c=share, s=9.0, vmin=0.0, vmax=1.0, cmap="viridis", zorder=3
+            )
+        else:
+            axes.plot(along, values[:, band], color=style.line_style(band)["color"], lw=1.4)
+    if "polarization" in bands and values.shape[1]:
+        figure.colorbar(dots, ax=axes, label="share of motion along z", pad=0.02)
+    axes.set_xlim(along.min(), along.max())
+    axes.set_ylim(bottom=0.0)
+    if "ticks" in bands.attrs:
+        names = bands.attrs["tick_labels"].replace("G", "Γ").split("-")
+        axes.set_xticks(np.atleast_1d(bands.attrs["ticks"]), names)
+        axes.set_xlabel("")
+        axes.grid(True, axis="x", color="0.6", lw=0.8)
+    return figure
+
+
+def plot_iso_frequency(
+    bands: xr.Dataset, band: int = 1, levels: int = 12, title: str = ""
+) -> Figure:
+    """Draw lines of one frequency over the Brillouin zone of a sheet.
+
+    Parameters
+    ----------
+    bands : xarray.Dataset
+        From `foldyn.bands` at the phases of `UnitCell.grid`.
+    band : int
+        Number of the band, from 1, in the order of frequency.
+    levels : int
+        How many lines.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Contours of the frequency (Hz) over the phases along the two periods; group velocities are
+        at right angles to them where the periods are.
+
+    Raises
+    ------
+    InputError
+        Phases that are no grid, or a band that is not there.
+    """
+    frequency = frequencies_of(bands)
+    shape = np.atleast_1d(bands.attrs.get("grid", ()))
+    if len(shape) != 2:
+        raise InputError(": lines of one frequency need phases of cell.grid(n)", "bands")
+    band = whole("band", band, least=1)
+    if band > frequency.shape[1]:
+        raise InputError(f" = {band}: there are {frequency.shape[1]} bands", "band")
+    phases = bands["wave_vector"].values.reshape(*shape, 2)
+    values = frequency[:, band - 1].reshape(*shape)
+    x, y, z = (_closed(each) for each in (phases[..., 0], phases[..., 1], values))
+    x[-1], y[:, -1] = np.pi, np.pi
+    figure = style.new_figure(5.2, 4.4, title)
+    axes = figure.add_subplot()
+    style.frame(axes, "phase along period 1 (rad)", "phase along period 2 (rad)")
+    lines = axes.contour(x, y, z, levels=whole("levels", levels, least=1), cmap="viridis")
+    axes.clabel(lines, fontsize=7)
+    axes.set_aspect("equal")
+    ticks, names = [-np.pi, 0.0, np.pi], ["-π", "0", "π"]
+    axes.set_xticks(ticks, names)
+    axes.set_yticks(ticks, names)
+    return figure
+
+
+def _closed(values: np.ndarray) -> np.ndarray:
+    """Values (n, m) of a grid with those at pi, which are those at -pi."""
+    values = np.concatenate([values, values[:1]])
+    return np.concatenate([values, values[:, :1]], axis=1)
+
+
+def _along(bands: xr.Dataset) -> tuple[np.ndarray, str]:
+    if "distance" in bands.coords:
+        return bands["distance"].values, "along the path (rad)"
+    phases: Any = bands["wave_vector"].values
+    if phases.shape[1] == 1:
+        return phases[:, 0], "phase per period (rad)"
+    raise InputError(
+        ": its phases lie on no path; take those of cell.path, or plot_iso_frequency for a grid",
+        "bands",
+    )
