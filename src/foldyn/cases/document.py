@@ -189,6 +189,11 @@ class _Writer:
                 {"name": name, "creases": self.store(f"tables_family{i}_creases", rows)}
                 for i, (name, rows) in enumerate(pattern.families.items())
             ]
+        if pattern.rim_families:
+            table["rim_families"] = [
+                {"name": name, "edges": self.store(f"tables_rim_family{i}_edges", rows)}
+                for i, (name, rows) in enumerate(pattern.rim_families.items())
+            ]
         if pattern.periods:
             table["periods"] = [
                 self.store(f"tables_period{k}", pairs) for k, pairs in enumerate(pattern.periods)
@@ -359,10 +364,9 @@ def _stored_pattern(table: Mapping[str, Any]) -> Pattern:
         custom=json.loads(table.get("custom", "{}")), welds=table.get("welds", ()),
         periods=table.get("periods", ()),
     )  # fmt: skip
-    if "families" not in table:
-        return pattern
-    named = {each["name"]: pattern.creases[each["creases"]] for each in table["families"]}
-    return pattern.changed(families=named)
+    named = {each["name"]: pattern.creases[each["creases"]] for each in table.get("families", ())}
+    rim = {each["name"]: pattern.boundary[each["edges"]] for each in table.get("rim_families", ())}
+    return pattern.changed(families=named, rim_families=rim) if named or rim else pattern
 
 
 def _resolve(value: Any, arrays: Mapping[str, NDArray]) -> Any:

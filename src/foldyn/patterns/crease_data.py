@@ -111,27 +111,29 @@ def _angle(value: Any) -> float:
     return float(value)
 
 
-def families(given: Any, creases: NDArray[np.int64]) -> Mapping[str, NDArray[np.int64]]:
-    """Rows of the creases of each family; `given` as `Pattern` takes it."""
+def families(
+    given: Any, creases: NDArray[np.int64], field: str = "families", what: str = "a crease"
+) -> Mapping[str, NDArray[np.int64]]:
+    """Rows of the creases (or other edges) of each family; `given` as `Pattern` takes it."""
     if given is None:
         return {}
     if not isinstance(given, Mapping):
-        raise InputError(f" = {given!r}: give a mapping from names to creases", "families")
+        raise InputError(f" = {given!r}: give a mapping from names to creases", field)
     row, rows = edge_lookup(creases), {}
     for name, members in given.items():
         if not isinstance(name, str) or not name or name in ASSIGNED:
             raise InputError(
                 f": {name!r} is no name for a family: give text other than {', '.join(ASSIGNED)}",
-                "families",
+                field,
             )
-        place = f"families[{name!r}]"
+        place = f"{field}[{name!r}]"
         members = listed(place, members, "pairs of vertices, as [(0, 1)]")
         pairs = [vertex_pair(place, member) for member in members]
         strange = [pair for pair in pairs if pair not in row]
         if strange:
             raise InputError(
-                f": {strange[0]} is not a crease; name the two vertices of each",
-                f"families[{name!r}]",
+                f": {strange[0]} is not {what}; name the two vertices of each",
+                place,
             )
         rows[name] = np.array(sorted({row[pair] for pair in pairs}), dtype=np.int64)
         rows[name].setflags(write=False)

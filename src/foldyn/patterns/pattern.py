@@ -65,6 +65,9 @@ class Pattern(Transforms):
     welds : sequence of (vertex, vertex)
         Edges of two panels across which the sheet runs on: they are no creases but lines in it,
         as along the facets of a curved panel; see `welded`.
+    rim_families : mapping, optional
+        Boundary edges by the family that they belong to where another panel is put beside them,
+        each with vertex pairs.
     periods : sequence of sequences of (vertex, vertex)
         One or two motions that bring the pattern beside itself, each as the pairs of a vertex and
         the one where it comes to lie; they hold in every folded state. See `foldyn.UnitCell`.
@@ -75,8 +78,8 @@ class Pattern(Transforms):
         The letter of each crease.
     fold_angles : ndarray, shape (nc,)
         Angle to fold each crease to (rad, pi less the dihedral), NaN where none is given.
-    families : mapping
-        Rows of `creases`, by the name of their family.
+    families, rim_families : mapping
+        Rows of `creases` and of `boundary`, by the name of their family.
     flipped : tuple of bool
         For each face, whether its winding was reversed. A reversed face keeps its first
         vertex: (v1, v2, v3, v4) becomes (v1, v4, v3, v2).
@@ -129,6 +132,7 @@ class Pattern(Transforms):
     custom: Mapping[str, Any]
     welds: NDArray[np.int64]
     periods: tuple[NDArray[np.int64], ...]
+    rim_families: Mapping[str, NDArray[np.int64]]
     flipped: tuple[bool, ...] = field(init=False)
     edges: NDArray[np.int64] = field(init=False)
     creases: NDArray[np.int64] = field(init=False)
@@ -165,6 +169,7 @@ class Pattern(Transforms):
         custom: Mapping[str, Any] | None = None,
         welds: Sequence[tuple[int, int]] | NDArray[np.integer] = (),
         periods: Sequence[Sequence[tuple[int, int]] | NDArray[np.integer]] = (),
+        rim_families: Mapping[str, Sequence[tuple[int, int]]] | None = None,
     ) -> None:
         if not isinstance(name, str):
             raise InputError(f"name = {name!r}: give a string.")
@@ -205,6 +210,9 @@ class Pattern(Transforms):
             "fold_angles": crease_data.fold_angles(fold_angles, topology.creases, words),
             "families": named,
             "custom": dict(custom or {}),
+            "rim_families": crease_data.families(
+                rim_families, topology.boundary, "rim_families", "a boundary edge"
+            ),
             "periods": crease_data.periods(periods, len(points)),
             "dihedrals": dihedrals,
             "weld_dihedrals": bent,

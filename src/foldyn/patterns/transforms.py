@@ -41,6 +41,7 @@ class Transforms:
         boundary: NDArray[np.int64]
         welds: NDArray[np.int64]
         periods: tuple[NDArray[np.int64], ...]
+        rim_families: Mapping[str, NDArray[np.int64]]
         crease_faces: NDArray[np.int64]
         dihedrals: NDArray[np.float64]
         size: float
@@ -222,14 +223,20 @@ class Transforms:
             "custom": self.custom,
             "welds": self.welds,
             "periods": self.periods,
+            "rim_families": self._rim(),
         }
         if "faces" in values:
             own["custom"] = {k: v for k, v in self.custom.items() if k != FACE_ORDERS}
+            own["rim_families"] = None  # which may be inside now
         if len(values.get("vertices", self.vertices)) != len(self.vertices):
             own["periods"] = ()  # which are said of the vertices by number
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
             return type(self)(**{**own, **values})
+
+    def _rim(self) -> dict[str, NDArray[np.int64]]:
+        """Boundary edges (m, 2) of each family."""
+        return {name: self.boundary[rows] for name, rows in self.rim_families.items()}
 
     def _placed(self, place: Any, factor: float = 1.0, turned: bool = False) -> Self:
         """The pattern with its points put elsewhere; with panels listed the other way around."""
@@ -248,8 +255,9 @@ class Transforms:
                 boards.offsets, place(np.concatenate(corners)), factor * boards.thickness
             )
         return self.changed(
-            vertices=place(self.vertices), faces=faces, boards=boards, custom=self.custom
-        )
+            vertices=place(self.vertices), faces=faces, boards=boards, custom=self.custom,
+            rim_families=self._rim(),
+        )  # fmt: skip
 
 
 def _joined(
@@ -272,7 +280,7 @@ def _joined(
         welds += numbers_[sheet.welds].tolist()
     bare = first.changed(
         vertices=glued.vertices, faces=faces, assignments=None, fold_angles=None,
-        families=None, custom=None, welds=welds, periods=(),
+        families=None, custom=None, welds=welds, periods=(), rim_families=None,
     )  # fmt: skip
     flat = np.abs(bare.dihedrals - np.pi) < FLAT
     for k, pair in enumerate(bare.creases.tolist()):

@@ -53,6 +53,12 @@ def assembled(
         if (inner := [edge_of(*pair) for pair in pairs if panels[edge_of(*pair)] == 2])
     }
 
+    rims = {
+        family: rim
+        for family, pairs in families.items()
+        if (rim := [edge_of(*pair) for pair in pairs if panels[edge_of(*pair)] == 1])
+    }
+
     def each(values: Mapping[str, T]) -> dict[Edge, T]:
         return {pair: values[f] for f, pairs in creases.items() if f in values for pair in pairs}
 
@@ -66,4 +72,5 @@ def assembled(
         families=creases,
         custom=custom,
         periods=periods,
+        rim_families=rims,
     )

@@ -67,6 +67,9 @@ def sheet(
     ]
     both = zip(families, lines(columns, rows), strict=True)
     groups = {family: pairs for family, pairs in both if pairs}
+    along_x = [(m * step + n, (m + 1) * step + n) for m in range(columns) for n in (0, rows)]
+    along_y = [(m * step + n, m * step + n + 1) for m in (0, columns) for n in range(rows)]
     return Pattern(
-        vertices.reshape(-1, 3), faces, assignments, name, families=groups, periods=periods
-    )
+        vertices.reshape(-1, 3), faces, assignments, name, families=groups, periods=periods,
+        rim_families=dict(zip(families, (along_x, along_y), strict=True)),
+    )  # fmt: skip

@@ -1,0 +1,211 @@
+"""Panels, edges and vertices of a cell as those of all cells, and patches of them.
+
+A vertex of the repeated sheet is one of a kind in a cell: (R, kind). Vertices are ordered by cell
+first, then by kind, and so are panels. Two of them so stand in the same order in all cells, and
+with them whatever a discretization decides by the order of numbers: directions of hinges, signs of
+rotations, ties.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.linear.unit_cell import UnitCell
+from foldyn.patterns import Pattern
+from foldyn.patterns.topology import around, edge_lookup, edge_of
+
+RINGS = 2  # of panels about those at the nodes of the cell
+FLAT = 1e-6  # rad from pi: a crease between cells that has no letter by its dihedral
+
+Step = tuple[int, ...]  # R
+Vertex = tuple[Step, int]  # cell and kind
+Panel = tuple[Step, int]  # cell and number
+Site = tuple[Step, tuple[Any, ...]]  # cell, and what stands for all copies of a node or hidden dof
+Kind = tuple[int, int, Step]  # of an edge: kinds of its vertices, R from the first to the second
+
+
+def plus(one: Step, two: Step) -> Step:
+    """Sum of two R."""
+    return tuple(a + b for a, b in zip(one, two, strict=True))
+
+
+def minus(one: Step, two: Step) -> Step:
+    """Difference of two R."""
+    return tuple(a - b for a, b in zip(one, two, strict=True))
+
+
+class Edge(NamedTuple):
+    """An edge by its kind, the same in all cells, and the cell of its first vertex."""
+
+    kind: Kind
+    step: Step
+
+
+def edge_between(one: Vertex, two: Vertex) -> Edge:
+    """The edge of two vertices."""
+    low, high = sorted((one, two))
+    return Edge((low[1], high[1], minus(high[0], low[0])), low[0])
+
+
+def kinds_of(pairs: NDArray, vertices: Sequence[Vertex]) -> list[Kind]:
+    """Kinds of edges (m, 2) between numbered vertices."""
+    return [edge_between(vertices[a], vertices[b]).kind for a, b in pairs.tolist()]
+
+
+class Lattice:
+    """A cell whose panels, edges and vertices are those of all cells.
+
+    Parameters
+    ----------
+    cell : UnitCell
+
+    Attributes
+    ----------
+    vertices : list of Vertex
+        The cell's own.
+    faces : list of list of Vertex
+        Corners of each panel, moved to where the first of them is in cell 0.
+    steps : list of Step
+        From where the panel of the pattern itself stands in that numbering.
+    beside : dict
+        Panels at each kind of edge, each with the cell where the edge is if the panel is in cell 0.
+
+    Raises
+    ------
+    InputError
+        Panels that are copies of each other, or more than two at an edge.
+    """
+
+    def __init__(self, cell: UnitCell) -> None:
+        pattern: Pattern = cell.case.structure.pattern
+        self.cell, self.pattern, self.zero = cell, pattern, (0,) * cell.dimensions
+        offsets = map(tuple, cell.copies.offset.tolist())
+        self.vertices: list[Vertex] = list(zip(offsets, cell.copies.kind.tolist(), strict=True))
+        self.faces: list[list[Vertex]] = []
+        self.steps: list[Step] = []
+        twins: dict[tuple[Vertex, ...], int] = {}
+        for f, face in enumerate(pattern.faces):
+            corners = [self.vertices[v] for v in face]
+            base = min(corners)[0]
+            moved = [(minus(step, base), kind) for step, kind in corners]
+            twin = twins.setdefault(tuple(sorted(moved)), f)
+            if twin != f:
+                raise InputError(
+                    f": panels {twin} and {f} are copies of each other under these motions, so "
+                    "that the pattern is more than one cell; give longer motions, or one cell",
+                    "case",
+                )
+            self.faces.append(moved)
+            self.steps.append(base)
+        self.beside: dict[Kind, list[tuple[int, Step]]] = {}
+        for f in range(len(self.faces)):
+            for edge in self._edges(f):
+                self.beside.setdefault(edge.kind, []).append((f, edge.step))
+        for (one, two, _), panels in self.beside.items():
+            if len(panels) > 2:
+                a, b = cell.copies.first[[one, two]].tolist()
+                raise InputError(
+                    f": {len(panels)} panels would meet at the edge of vertices {a} and {b} and "
+                    "their copies; at most two may",
+                    "case",
+                )
+
+    def _edges(self, f: int) -> Iterator[Edge]:
+        face = self.faces[f]
+        return (edge_between(a, b) for a, b in zip(face, [*face[1:], face[0]], strict=True))
+
+    def edge(self, a: int, b: int) -> Edge:
+        """The edge of two vertices of the pattern."""
+        return edge_between(self.vertices[a], self.vertices[b])
+
+    def seams(self) -> list[tuple[int, int]]:
+        """Boundary edges of the pattern that are creases between cells, one of each kind."""
+        kinds: dict[Kind, tuple[int, int]] = {}
+        for a, b in self.pattern.boundary.tolist():
+            kind = self.edge(a, b).kind
+            if len(self.beside[kind]) == 2:
+                kinds.setdefault(kind, (a, b))
+        return list(kinds.values())
+
+    def families(self) -> dict[str, set[Kind]]:
+        """Kinds of the edges of each family, of creases between cells too."""
+        own = self.pattern
+        found = {}
+        for name, rows in own.families.items():
+            rim = own.boundary[own.rim_families.get(name, np.zeros(0, np.int64))]
+            pairs = np.concatenate([own.creases[rows], rim])
+            found[name] = set(kinds_of(pairs, self.vertices))
+        return found
+
+    # ------------------------------------------------------------------ a patch
+    def around_cell(self) -> list[Panel]:
+        """Panels about cell 0, in order: those at its nodes, and rings across their edges."""
+        found = {
+            (minus(self.zero, step), f) for f, face in enumerate(self.faces) for step, _ in face
+        }
+        for _ in range(RINGS):
+            found |= {other for panel in found for other in self._across(*panel)}
+        return sorted(found)
+
+    def _across(self, step: Step, f: int) -> Iterator[Panel]:
+        """Panels at the edges of one."""
+        for edge in self._edges(f):
+            for other, at in self.beside[edge.kind]:
+                yield minus(plus(step, edge.step), at), other
+
+    def vertices_of(self, panels: Iterable[Panel]) -> set[Vertex]:
+        """Vertices of panels."""
+        return {(plus(step, at), kind) for step, f in panels for at, kind in self.faces[f]}
+
+    def patch_pattern(self, panels: Sequence[Panel], vertices: Sequence[Vertex]) -> Pattern:
+        """Panels as a pattern, with the letters, families and welds of the cell's.
+
+        Creases between cells have the letter of their dihedral, "U" where it is flat.
+        """
+        own, cell = self.pattern, self.cell
+        number = {vertex: k for k, vertex in enumerate(vertices)}
+        places = own.vertices[cell.copies.first]
+        points = np.empty((len(vertices), 3))
+        steps = np.array([step for step, _ in vertices]).reshape(-1, cell.dimensions)
+        kinds = np.array([kind for _, kind in vertices])
+        for step in np.unique(steps, axis=0):
+            rows = (steps == step).all(axis=1)
+            points[rows] = cell.images(places[kinds[rows]], step)
+        faces = [[number[plus(step, at), kind] for at, kind in self.faces[f]] for step, f in panels]
+        welded = set(kinds_of(own.welds, self.vertices))
+        letters = dict(zip(kinds_of(own.creases, self.vertices), own.assignments, strict=True))
+        sides = [edge_of(a, b) for face in faces for a, b in around(face)]
+        shared, times = np.unique(np.array(sides), axis=0, return_counts=True)
+        shared = shared[times == 2]
+        welds = [kind in welded for kind in kinds_of(shared, vertices)]
+        with warnings.catch_warnings():  # it is doubted by the cell's own pattern
+            warnings.simplefilter("ignore", FoldynWarning)
+            bare = Pattern(points, faces, name=own.name, welds=shared[welds])
+            if any(bare.flipped):
+                raise InputError(
+                    ": cells show their fronts on different sides by turns; take two of them for "
+                    "one cell",
+                    "case",
+                )
+            flat = np.abs(bare.dihedrals - np.pi) < FLAT
+            of_crease = kinds_of(bare.creases, vertices)
+            geometric = np.where(flat, "U", np.array(bare.assignments, np.str_))
+            given = {
+                pair: letters.get(kind, letter)
+                for pair, kind, letter in zip(
+                    edge_lookup(bare.creases), of_crease, geometric.tolist(), strict=True
+                )
+            }
+            families = {
+                name: [tuple(bare.creases[k]) for k, kind in enumerate(of_crease) if kind in own_]
+                for name, own_ in self.families().items()
+            }
+            return bare.changed(
+                assignments=given, families={k: pairs for k, pairs in families.items() if pairs}
+            )
