@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from foldyn.analyses.casefile import CaseFile, Output
 from foldyn.analyses.conversion import converted, flagged, remodeled
+from foldyn.analyses.keys import replaced
 from foldyn.analyses.messages import describe, dotted
 from foldyn.analyses.pattern_section import FACES, FACETS, HINGES, READING
 from foldyn.analyses.registry import ANALYSES, schema_of
@@ -182,7 +183,8 @@ def case_of_document(
     shown = {name: value for name, value in schema.output if name not in ("nodes", "every")}
     case_file = CaseFile(
         path, schema.title, pattern, sheet, schema.model.kind, masses, analysis,
-        Output(nodes, chosen is not None, **shown), schema, make, cases, text,
+        Output(nodes, chosen is not None, **shown), schema, make,
+        lambda values: case_of_document(path, replaced(document, values), text), cases, text,
     )  # fmt: skip
     start = getattr(schema, "initial", None)
     if start is not None and start.file is None:

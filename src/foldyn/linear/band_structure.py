@@ -207,7 +207,7 @@ def bands(
         shape exp(i k . R), turned with a screw), and `polarization` (shares along x, y, z). Coordinate
         `wave_vector` (phase, period), rad, and what the phases bring (`distance`; attributes
         `ticks`, `tick_labels`, `grid`). Attributes: `vectors` (m) of the state, `angles` (degrees),
-        `residual`.
+        `axes` and `points` (m) of the motions from a cell to the next, `residual`.
 
     Raises
     ------
@@ -290,6 +290,8 @@ def bands(
         "kind": "bands",
         "vectors": linear.vectors,
         "angles": np.array([motion.angle for motion in linear.motions]),
+        "axes": np.array([motion.unit for motion in linear.motions]),
+        "points": np.array([motion.point for motion in linear.motions]),
         "residual": linear.residual,
         "tracked": int(asked[3]),
     }
