@@ -196,7 +196,8 @@ class _Writer:
             ]
         if pattern.periods:
             table["periods"] = [
-                self.store(f"tables_period{k}", pairs) for k, pairs in enumerate(pattern.periods)
+                self.store(f"tables_period{k}", pairs.ravel())
+                for k, pairs in enumerate(pattern.periods)
             ]
         if pattern.custom:
             try:
@@ -362,7 +363,7 @@ def _stored_pattern(table: Mapping[str, Any]) -> Pattern:
     pattern = Pattern(
         table["vertices"], faces, letters, table["name"], boards, table.get("fold_angles"),
         custom=json.loads(table.get("custom", "{}")), welds=table.get("welds", ()),
-        periods=table.get("periods", ()),
+        periods=[np.reshape(pairs, (-1, 2)) for pairs in table.get("periods", ())],
     )  # fmt: skip
     named = {each["name"]: pattern.creases[each["creases"]] for each in table.get("families", ())}
     rim = {each["name"]: pattern.boundary[each["edges"]] for each in table.get("rim_families", ())}

@@ -2,6 +2,7 @@
 
 from foldyn.linear.band_gaps import band_gaps
 from foldyn.linear.band_structure import bands
+from foldyn.linear.cell_equilibrium import relaxed
 from foldyn.linear.character import character
 from foldyn.linear.compared import ComparedMode, Fidelity
 from foldyn.linear.fidelity import fidelity
@@ -44,4 +45,5 @@ __all__ = [
     "pair_modes",
     "peaks_of",
     "refinement",
+    "relaxed",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -85,7 +86,7 @@ def legs(bands: Any) -> dict[str, NDArray[np.int64]]:
         return found
     names, ticks = bands.attrs["tick_labels"].split("-"), np.atleast_1d(bands.attrs["ticks"])
     distance = bands["distance"].values
-    for k, (a, b) in enumerate(zip(ticks[:-1], ticks[1:], strict=True)):
+    for k, (a, b) in enumerate(pairwise(ticks.tolist())):
         slack = 1e-9 * distance[-1]
         rows = every[(distance >= a - slack) & (distance <= b + slack)]
         name = f"{names[k]}-{names[k + 1]}"

@@ -32,6 +32,7 @@ EPS = float(np.finfo(float).eps)
 ROUNDING = 1e-15  # of |phi|' |K| |phi|: what counts as zero
 DEGENERATE = 1e-7  # of the largest of some eigenvalues: bands that meet
 SHIFT = 1e-6  # of the pencil's scale: the shift below zero
+NOISE = 30.0  # times the rounding of the largest entries: what counts as zero, too
 TURN = 2.0 * np.pi
 
 
@@ -57,9 +58,7 @@ class Solver:
     def free(self) -> NDArray[np.int64]:
         """Dofs with mass that are not held."""
         bloch = self.bloch
-        held = np.zeros(bloch.size, bool)
-        held[: len(bloch.held)] = bloch.held
-        return np.flatnonzero(~held & ~bloch.hidden)
+        return np.flatnonzero(~bloch.held & ~bloch.hidden)
 
     def waves(self, phase: NDArray) -> Waves:
         """The lowest waves of a phase (d,)."""
@@ -102,9 +101,7 @@ class Solver:
         """The same by Lanczos iteration about a shift below zero."""
         bloch = self.bloch
         factors = bloch.factors(phase)
-        held = np.zeros(bloch.size, bool)
-        held[: len(bloch.held)] = bloch.held
-        kept = np.flatnonzero(~held)
+        kept = np.flatnonzero(~bloch.held)
         stiffness = bloch.stiffness.sparse_at(factors)[kept][:, kept]
         mass = bloch.mass.sparse_at(factors)[kept][:, kept]
         scale = stiffness.diagonal().real.sum() / mass.diagonal().real.sum()
@@ -133,26 +130,22 @@ def lowest_dense(
     stiffness: NDArray, mass: NDArray, lumped: NDArray | None, count: int
 ) -> tuple[NDArray, NDArray, float]:
     """Lowest eigenvalues (k,), motions (n, k) with phi^H M phi = 1, and rounding of the values."""
+    diagonal = np.diag(mass).real if lumped is None else lumped
+    noise = NOISE * EPS * float((np.diag(stiffness).real / diagonal).max())
     wanted = [0, count - 1]
-    if lumped is not None:
-        root = 1.0 / np.sqrt(lumped)
-        scaled = root[:, None] * stiffness * root
-        noise = EPS * float(np.abs(scaled).sum(axis=0).max())
-        values, motions = linalg.eigh(
-            scaled, subset_by_index=wanted, overwrite_a=True, check_finite=False
-        )
-        return values, root[:, None] * motions, noise
-    try:
-        lower = linalg.cholesky(mass, lower=True, check_finite=False)
-    except linalg.LinAlgError:
-        raise ComputationError("a free node of the cell has no mass") from None
-    half = linalg.solve_triangular(lower, stiffness, lower=True, check_finite=False)
-    scaled = linalg.solve_triangular(lower, half.conj().T, lower=True, check_finite=False)
-    noise = EPS * float(np.abs(scaled).sum(axis=0).max())
+    if lumped is None:
+        try:
+            values, motions = linalg.eigh(
+                stiffness, mass, subset_by_index=wanted, check_finite=False
+            )
+        except linalg.LinAlgError:
+            raise ComputationError("a free node of the cell has no mass") from None
+        return values, motions, noise
+    root = 1.0 / np.sqrt(lumped)
     values, motions = linalg.eigh(
-        scaled, subset_by_index=wanted, overwrite_a=True, check_finite=False
+        root[:, None] * stiffness * root, subset_by_index=wanted, driver="evx", check_finite=False
     )
-    return values, linalg.solve_triangular(lower, motions, trans="C", lower=True), noise
+    return values, root[:, None] * motions, noise
 
 
 def bands(
@@ -170,8 +163,8 @@ def bands(
 ) -> xarray.Dataset:
     """Frequencies of Bloch waves: the bands of a repeated case.
 
-    Solves K(k) phi = lambda M(k) phi for the lowest eigenvalues lambda = (2 pi f)^2, K the tangent of
-    the repeated sheet in the state.
+    Solves K(k) phi = lambda M(k) phi for the lowest eigenvalues lambda = (2 pi f)^2, K the tangent
+    of the repeated sheet in the state.
 
     Parameters
     ----------
@@ -201,13 +194,14 @@ def bands(
     -------
     xarray.Dataset
         Dimensions phase, band, and period, node, axis where they are needed. `frequency` (Hz; nan
-        of unstable waves), `eigenvalue` (rad2/s2); on request `slope` (d omega/d k, rad/s per rad of
-        each period) and `group_velocity` (m/s, along x, y, z: the shifts of the periods times their
-        slopes), `shape` (complex, phi^H M phi = 1 kg m2 in a cell; node R of the sheet moves as
-        shape exp(i k . R), turned with a screw), and `polarization` (shares along x, y, z). Coordinate
-        `wave_vector` (phase, period), rad, and what the phases bring (`distance`; attributes
-        `ticks`, `tick_labels`, `grid`). Attributes: `vectors` (m) of the state, `angles` (degrees),
-        `axes` and `points` (m) of the motions from a cell to the next, `residual`.
+        of unstable waves), `eigenvalue` (rad2/s2); on request `slope` (d omega/d k, rad/s per rad
+        of each period; nan where omega is 0) and `group_velocity` (m/s, along x, y, z: the shifts
+        of the periods times their slopes), `shape` (complex, phi^H M phi = 1 kg m2 in a cell; copy
+        R of a node moves as shape exp(i k . R), turned with a screw), and `polarization` (shares
+        along x, y, z). Coordinate `wave_vector` (phase, period), rad, and what the phases bring
+        (`distance`; attributes `ticks`, `tick_labels`, `grid`). Attributes: `vectors` (m) of the
+        state, `angles` (degrees), `axes` and `points` (m) of the motions from a cell to the next,
+        `residual`.
 
     Raises
     ------
@@ -313,11 +307,11 @@ def waves_at(solver: Solver, phases: NDArray) -> list[Waves]:
 def slopes_of(bloch: Bloch, phase: NDArray, waves: Waves) -> NDArray[np.float64]:
     """d omega/d k (k, d), rad/s per rad, of waves by the Hellmann-Feynman theorem.
 
-    d lambda = phi^H (dK - lambda dM) phi, with the forces of constraints that change with the phase;
-    waves of one frequency are those combinations that go on along each period by themselves. nan
-    where the frequency is zero: bands have corners there.
+    d lambda = phi^H (dK - lambda dM) phi, with the forces of constraints that change with the
+    phase. Of waves of one frequency it takes the combinations that go on along each period by
+    themselves. nan where the frequency is zero: bands have corners there.
     """
-    values, shapes = waves
+    values = waves.values
     out = np.empty((len(values), bloch.steps.shape[1]))
     with np.errstate(divide="ignore", invalid="ignore"):
         per_omega = np.where(values > 0.0, 0.5 / np.sqrt(values), np.nan)
@@ -340,9 +334,7 @@ def eigenvalue_slopes(
     change = change - mean * (shapes.conj().T @ (bloch.mass.sparse_at(slope) @ shapes))
     if not bloch.ties.empty:
         factors = bloch.factors(phase)
-        free = np.ones(bloch.size, bool)
-        free[: len(bloch.held)] = ~bloch.held
-        free[bloch.hidden] = False
+        free = ~bloch.held & ~bloch.hidden
         force = bloch.stiffness.sparse_at(factors) @ shapes
         force = force - (bloch.mass.sparse_at(factors) @ shapes) * values
         rows = bloch.ties.at(factors)[:, free]

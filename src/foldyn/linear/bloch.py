@@ -1,14 +1,13 @@
 """Matrices of Bloch waves: K(k) = sum over R of K_R exp(i k . R), and so M, C and constraints.
 
 K_R is what the displacements of cell R exert on the dofs of cell 0, taken from the patch about it
-(`cell_patch`); displacements of cell R are told in axes turned with it. K_-R is the transpose of K_R,
-so that K(k) is Hermitian: this is checked, and with it that the cells are alike.
+(`cell_patch`); displacements of cell R are told in axes turned with it. K_-R is the transpose of
+K_R, so that K(k) is Hermitian: this is checked, and with it that the cells are alike.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -91,10 +90,8 @@ class Bloch:
         (n, n).
     ties : Hops
         (k, n), the constraints of links and rigid panels.
-    hidden : (n,) bool
-        Dofs without mass.
-    stiffness_sizes : float
-        Largest entry, N/m.
+    hidden, held : (n,) bool
+        Dofs without mass, and those that supports hold.
     """
 
     steps: NDArray[np.int64]
@@ -103,11 +100,11 @@ class Bloch:
     damping: Hops
     ties: Hops
     hidden: NDArray[np.bool_]
-    held: NDArray[np.bool_] = field(repr=False)
+    held: NDArray[np.bool_]
 
     @property
     def size(self) -> int:
-        """n."""
+        """Number n of the dofs."""
         return self.stiffness.shape[0]
 
     def factors(self, phase: NDArray) -> NDArray[np.complex128]:
@@ -130,7 +127,7 @@ class Bloch:
         return np.bincount(mass.rows, values, self.size)
 
 
-def hermitian(own: Hops, steps: NDArray, what: str, noise: float = 0.0) -> Hops:
+def hermitian(own: Hops, steps: NDArray, what: str) -> Hops:
     """The Hermitian part of a matrix; refuses one that differs from it by more than rounding."""
     opposite = _opposites(steps)
     entries = own.values.tocoo()
@@ -147,22 +144,33 @@ def hermitian(own: Hops, steps: NDArray, what: str, noise: float = 0.0) -> Hops:
     )  # fmt: skip
     largest = np.abs(own.values.data).max(initial=0.0)
     off = np.abs(skew.values.data)
-    if off.max(initial=0.0) > max(ALIKE * largest, noise):
-        raise NotAlike(what, float(off.max() / largest), skew, int(off.argmax()))
+    if off.max(initial=0.0) > ALIKE * largest:
+        place = int(np.searchsorted(skew.values.indptr, off.argmax(), side="right")) - 1
+        dofs = int(skew.rows[place]), int(skew.columns[place])
+        raise NotAlikeError(what, float(off.max() / largest), dofs)
     return both
 
 
-class NotAlike(InputError):
-    """Matrices of different cells that differ."""
+class NotAlikeError(InputError):
+    """Matrices of different cells that differ; `dofs` are where they do most."""
 
-    def __init__(self, what: str, share: float, skew: Hops, entry: int) -> None:
-        self.place = int(np.searchsorted(skew.values.indptr, entry, side="right") - 1)
-        self.dofs = int(skew.rows[self.place]), int(skew.columns[self.place])
-        super().__init__(
-            f": the {what} of one cell differs from that of the next by {share:.2g} of its largest "
-            f"entry, at dofs {self.dofs}; a support, or the state, does not repeat",
-            "case",
+    def __init__(self, what: str, share: float, dofs: tuple[int, int]) -> None:
+        self.what, self.share, self.dofs = what, share, dofs
+        super().__init__(self._message("dofs {} and {}".format(*dofs)), "case")
+
+    def _message(self, where: str) -> str:
+        return (
+            f": the {self.what} of one cell differs from that of the next by {self.share:.2g} of "
+            f"its largest entry, at {where}; a support, a panel or the state does not repeat"
         )
+
+    def naming(self, first: NDArray) -> InputError:
+        """The same that names nodes, by the node (m,) that each of cell 0 is."""
+        names = [
+            f"node {first[dof // 3]}" if dof < 3 * len(first) else "a rotation of a panel's edge"
+            for dof in self.dofs
+        ]
+        return InputError(self._message(" and ".join(names)), "case")
 
 
 def _opposites(steps: NDArray) -> NDArray[np.int64]:
@@ -171,12 +179,10 @@ def _opposites(steps: NDArray) -> NDArray[np.int64]:
     return np.array([where[tuple(-x for x in row)] for row in steps.tolist()])
 
 
-def steps_of(offsets: Sequence[NDArray]) -> tuple[NDArray[np.int64], list[NDArray[np.int64]]]:
-    """All R (s, d) among some (m, d), with their opposites; and the numbers (m,) of each."""
-    every = np.concatenate([*offsets, *(-each for each in offsets)])
-    steps, number = np.unique(every, axis=0, return_inverse=True)
-    bounds = np.cumsum([len(each) for each in offsets])
-    return steps, np.split(np.ravel(number)[: bounds[-1]], bounds[:-1])
+def steps_of(offset: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """All R (s, d) among some (m, d), with their opposites; and the number (m,) of each."""
+    steps, number = np.unique(np.concatenate([offset, -offset]), axis=0, return_inverse=True)
+    return steps, np.ravel(number)[: len(offset)]
 
 
 def null_space(rows: NDArray) -> NDArray[np.complex128]:

@@ -21,7 +21,7 @@ from foldyn.cases import Case
 from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.cell_supports import Repeated, tied_vertices
-from foldyn.linear.lattice import Lattice, Panel, Site, Step, Vertex, edge_between, kinds_of, minus
+from foldyn.linear.lattice import Lattice, Panel, Site, Vertex, edge_between, kinds_of, minus
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.materials.inelastic_law import memory_of
 from foldyn.patterns import Pattern
@@ -61,6 +61,16 @@ class Patch:
     def hidden(self) -> int:
         """Hidden dofs of a cell."""
         return int(self.hidden_unit.max(initial=-1)) + 1
+
+    @property
+    def own_nodes(self) -> NDArray[np.int64]:
+        """Nodes of cell 0 among those of the patch."""
+        return np.flatnonzero((self.step == 0).all(axis=1))
+
+    @property
+    def determined(self) -> NDArray[np.bool_]:
+        """Whether each of them (m, 3) is held along each axis, or follows others."""
+        return self.case.constraints.determined[self.own_nodes]
 
     def own_pairs(self, k: int) -> NDArray[np.int64]:
         """Pairs (m, 2) of nodes of the cell's own structure, the second one period k further."""

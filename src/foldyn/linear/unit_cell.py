@@ -60,7 +60,8 @@ class UnitCell:
 
     Its supports, point masses, springs, dashpots and damping repeat with it. What is said of a node
     holds for its partners on the other side of the cell too: it is one node of the repeated sheet,
-    and counts once where one support or mass names several of them. Loads count for the state alone.
+    and counts once where one support or mass names several of them. Loads count for the state
+    alone.
 
     Parameters
     ----------
@@ -167,6 +168,11 @@ class UnitCell:
             step = tuple(int(j == k) for j in range(len(pattern.periods)))
             pairs += [(v, w, step) for v, w in rows.tolist()]
         return tuple(motions), pairs
+
+    @property
+    def near(self) -> float:
+        """Distance (m) at which points lie in the same place."""
+        return self.tolerance * self.case.structure.pattern.size
 
     @property
     def dimensions(self) -> int:
