@@ -5,6 +5,8 @@ from foldyn.linear.band_structure import bands
 from foldyn.linear.cell_equilibrium import relaxed
 from foldyn.linear.character import character
 from foldyn.linear.compared import ComparedMode, Fidelity
+from foldyn.linear.damped_bands import damped_bands
+from foldyn.linear.evanescent import attenuation
 from foldyn.linear.fidelity import fidelity
 from foldyn.linear.frequency_domain import Modal
 from foldyn.linear.frf import METHODS, convert, frf
@@ -32,10 +34,12 @@ __all__ = [
     "Refinement",
     "SteppedSine",
     "UnitCell",
+    "attenuation",
     "band_gaps",
     "bands",
     "character",
     "convert",
+    "damped_bands",
     "equivalent_slope",
     "fidelity",
     "frf",

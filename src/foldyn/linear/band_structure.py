@@ -80,7 +80,13 @@ class Solver:
         if not bloch.ties.empty:
             basis = null_space(bloch.ties.at(factors)[:, free])
             own, inert, lumped = basis.conj().T @ own @ basis, basis.conj().T @ inert @ basis, None
-        values, motions, noise = lowest_dense(own, inert, lumped, min(self.count, len(own)))
+        if len(own) < self.count:
+            raise InputError(
+                f" = {self.count}: supports, links and rigid panels leave {len(own)} motions at "
+                f"the phases {phase.round(6).tolist()}; ask for no more bands",
+                "count",
+            )
+        values, motions, noise = lowest_dense(own, inert, lumped, self.count)
         if basis is not None:
             motions = basis @ motions
         shapes = np.zeros((bloch.size, len(values)), complex)
@@ -237,9 +243,6 @@ def bands(
     began = time.perf_counter()
     linear = linearize_cell(cell, state, secant, load_factor)
     solver = Solver(linear.bloch, count)
-    most = len(solver.free)
-    if count > most:
-        raise InputError(f" = {count}: this cell has {most} bands at most", "count")
     found = waves_at(solver, given)
     if asked[3]:
         found = tracked(linear.bloch, given, found)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,10 +13,10 @@ from foldyn.errors import ComputationError, InputError
 from foldyn.linear.cell_patch import cell_patch
 from foldyn.linear.cell_reach import CellReach
 from foldyn.linear.linearized_cell import deformed_motions, folded_body, spread
-from foldyn.linear.unit_cell import UnitCell, images
-from foldyn.patterns.screw import Screw, translation
+from foldyn.linear.unit_cell import UnitCell, check_commuting, images
+from foldyn.patterns.screw import Screw, of_twist, translation
 from foldyn.statics.tracing import displacement_of
-from foldyn.values import number, numbers, of_kind, whole
+from foldyn.values import listed, number, of_kind, vector, whole
 
 ITERATIONS = 40
 BALANCED = 1e-12  # of the bars' EA: the largest force left
@@ -27,8 +26,7 @@ NULL = 1e-11  # of the largest stiffness: motions that nothing resists
 
 def relaxed(
     cell: UnitCell,
-    vectors: Any = None,
-    screw: Screw | None = None,
+    motions: Sequence[Any] | None = None,
     state: State | None = None,
     load_factor: float = 1.0,
     steps: int = 4,
@@ -41,17 +39,16 @@ def relaxed(
     Parameters
     ----------
     cell : UnitCell
-    vectors : array_like, shape (d, 3), optional
-        Translations (m) from a cell to the next in the state, for those motions of the cell that are
-        translations; those at rest by default.
-    screw : Screw, optional
-        The screw from a cell to the next in the state, about the same axis as that at rest.
+    motions : sequence of Screw or array_like of shape (3,), optional
+        The motion from a cell to the next in the state for each of the cell's: a translation by its
+        vector (m), or a screw; a translation that becomes a rotation bends the sheet evenly. Those
+        at rest, or in the state given, by default.
     state : State, optional
-        From where the search begins, if it repeats; its periods are kept where none are given.
+        From where the search begins; it repeats.
     load_factor : float
         How far actuated folds are folded.
     steps : int
-        Of the way from the rest state, or from the state given.
+        Of the way there.
 
     Returns
     -------
@@ -61,7 +58,7 @@ def relaxed(
     Raises
     ------
     InputError
-        Periods that do not fit the cell.
+        Motions that do not fit the cell.
     ComputationError
         No equilibrium is found.
 
@@ -71,7 +68,7 @@ def relaxed(
     >>> sheet = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3, density=1000.0)
     >>> pattern = fd.patterns.miura(a=0.03, b=0.03)
     >>> cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet)))
-    >>> pulled = fd.linear.relaxed(cell, vectors=1.01 * cell.vectors)
+    >>> pulled = fd.linear.relaxed(cell, 1.01 * cell.vectors)
     >>> fd.bands(cell, [[0.5, 0.5]], count=1, state=pulled).vectors.round(5).tolist()
     [[0.03967, 0.0, 0.0], [0.0, 0.04008, 0.0]]
     """
@@ -79,93 +76,51 @@ def relaxed(
     patch = cell_patch(cell)
     steps, load_factor = whole("steps", steps, least=1), number("load_factor", load_factor)
     rest = cell.case.structure.nodes
-    place, begin = rest, cell.motions
+    place, now = rest, cell.motions
     if state is not None:
         displacement = displacement_of(of_kind("state", state, State), cell.case, "state")
-        place, begin = rest + displacement, deformed_motions(cell, patch, displacement)
-    end = _given(cell, begin, vectors, screw)
-    first = np.array([images(begin, place[v], -patch.own_step[v]) for v in patch.first.tolist()])
-    first, now = first.reshape(-1, 3), begin
+        place, now = rest + displacement, deformed_motions(cell, patch, displacement)
+    end = now if motions is None else _given(cell, motions)
+    first = np.array([images(now, place[v], -patch.own_step[v]) for v in patch.first.tolist()])
+    first, begin = first.reshape(-1, 3), np.array([motion.twist for motion in now])
+    way = np.array([motion.twist for motion in end]) - begin
     for k in range(1, steps + 1):
-        then = tuple(_between(one, two, k / steps) for one, two in zip(begin, end, strict=True))
+        share = k / steps
+        then = end if k == steps else tuple(map(of_twist, begin + share * way))
         first = _carried(first, now, then)
-        factor = load_factor if state is not None else load_factor * k / steps
+        factor = load_factor * (1.0 if state is not None else share)
         reach = CellReach(patch, then, folded_body(cell, patch, factor))
         first, now = _newton(reach, patch, then, first), then
     moved = spread(end, first, patch.own_unit, patch.own_step) - rest
     return State(displacement=moved)
 
 
-def _given(
-    cell: UnitCell, begin: Sequence[Screw], vectors: Any, screw: Screw | None
-) -> tuple[Screw, ...]:
+def _given(cell: UnitCell, motions: Any) -> tuple[Screw, ...]:
     """The motions at the end."""
-    ways = [k for k, motion in enumerate(cell.motions) if not motion.turns]
-    turns = [k for k, motion in enumerate(cell.motions) if motion.turns]
-    end = list(begin)
-    if vectors is not None:
-        array = np.atleast_2d(numbers("vectors", vectors))
-        if array.shape != (len(ways), 3):
-            raise InputError(
-                f": shape {array.shape}; give a vector (m) for each of the {len(ways)} translations "
-                "of the cell",
-                "vectors",
-            )
-        for k, vector in zip(ways, array, strict=True):
-            end[k] = translation(vector)
-    if screw is not None:
-        of_kind("screw", screw, Screw)
-        if len(turns) != 1:
-            raise InputError(f": the cell has {len(turns)} screws that could change", "screw")
-        own = begin[turns[0]]
-        gap = np.array(screw.point) - np.array(own.point)
-        along = float(own.unit @ screw.unit)
-        off = np.linalg.norm(gap - (gap @ own.unit) * own.unit)
-        if abs(along - 1.0) > 1e-9 or off > cell.near:
-            raise InputError(
-                ": must turn about the axis of the cell's own screw, in the same sense", "screw"
-            )
-        end[turns[0]] = replace(own, angle=screw.angle, shift=screw.shift)
-    return tuple(end)
-
-
-def _between(one: Screw, two: Screw, share: float) -> Screw:
-    """A motion on the way from one to another."""
-    if share == 1.0:
-        return two
-    if not one.turns:
-        return translation((1.0 - share) * one.vector + share * two.vector)
-    return replace(
-        one,
-        angle=(1.0 - share) * one.angle + share * two.angle,
-        shift=(1.0 - share) * one.shift + share * two.shift,
-    )
+    given = [
+        motion if isinstance(motion, Screw) else translation(vector(f"motions[{k}]", motion))
+        for k, motion in enumerate(listed("motions", motions, "screws or vectors (m)"))
+    ]
+    if len(given) != cell.dimensions:
+        raise InputError(f": {len(given)} of them; the cell has {cell.dimensions}", "motions")
+    check_commuting(cell.case.structure.nodes, given, cell.near, "motions")
+    return tuple(given)
 
 
 def _carried(points: NDArray, one: Sequence[Screw], two: Sequence[Screw]) -> NDArray[np.float64]:
-    """Points (m, 3) as an even deformation takes them along from motions to others."""
-    out = points
-    ways = [(a.vector, b.vector) for a, b in zip(one, two, strict=True) if not a.turns]
-    if ways:
-        before, after = (np.array(each) for each in zip(*ways, strict=True))
-        out = out + out @ np.linalg.pinv(before) @ (after - before)
-    for a, b in zip(one, two, strict=True):
-        if a.turns and a.shift != 0.0:
-            place = (out - np.array(a.point)) @ a.unit / a.shift
-            change = b.angle - a.angle, b.shift - a.shift
-            out = np.array(
-                [
-                    _part(a, *(share * each for each in change)).images(point)
-                    if any(change) and share != 0.0
-                    else point
-                    for point, share in zip(out, place, strict=True)
-                ]
-            )
+    """Points (m, 3) as an even deformation takes them along from motions to others.
+
+    Each goes back along the first ones by its place among the cells, and forth along the others.
+    """
+    shifts = np.array([motion.vector for motion in one])
+    place = (points - points.mean(axis=0)) @ np.linalg.pinv(shifts)
+    back, forth = (np.array([motion.twist for motion in each]) for each in (one, two))
+    out = np.empty_like(points)
+    for k, (point, share) in enumerate(zip(points, place, strict=True)):
+        for twist in (-share @ back, share @ forth):
+            point = of_twist(twist).images(point) if twist.any() else point
+        out[k] = point
     return out
-
-
-def _part(motion: Screw, angle: float, shift: float) -> Screw:
-    return replace(motion, angle=angle, shift=shift)
 
 
 def _newton(
@@ -181,9 +136,11 @@ def _newton(
 
     q = dofs(first)
     left = reach.projected(reach.forces(q))
+    done = False
     for _ in range(ITERATIONS):
-        if np.abs(left).max(initial=0.0) <= enough:
+        if done:
             return first
+        done = np.abs(left).max(initial=0.0) <= enough  # one more step leaves rounding alone
         stiffness = moves.T @ reach.hops(reach.body.step_tangent(q)).at(ones) @ moves
         values, shapes = np.linalg.eigh(0.5 * (stiffness + stiffness.T))
         kept = np.abs(values) > NULL * np.abs(values).max()
@@ -197,12 +154,14 @@ def _newton(
             except ComputationError:
                 continue
             new = reach.projected(reach.forces(q_new))
-            if np.linalg.norm(new) < np.linalg.norm(left) or np.abs(new).max() <= enough:
+            if np.linalg.norm(new) < np.linalg.norm(left):
                 break
         else:
+            if done:
+                return first
             break
         first, q, left = trial, q_new, new
     raise ComputationError(
         f"no equilibrium with these periods: {np.abs(left).max():.2g} N are left; take more steps, "
-        "or periods nearer to those at rest"
+        "or motions nearer to those at rest"
     )

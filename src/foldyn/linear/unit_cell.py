@@ -119,7 +119,7 @@ class UnitCell:
             raise InputError(": its structure has no pattern that could repeat", "case")
         near = number("tolerance", self.tolerance, above=0.0) * pattern.size
         motions, pairs = self._found(pattern, near)
-        _check_commuting(pattern.vertices, motions, near)
+        check_commuting(pattern.vertices, motions, near, "screw" if self.screw else "vectors")
         pairs += _partners(pattern, motions, near, {v for rows in pairs for v in rows[:2]})
         _check_all(pattern, motions, pairs, near, "screw" if self.screw else "vectors")
         object.__setattr__(self, "motions", motions)
@@ -262,7 +262,10 @@ def _steps(vectors: Any) -> NDArray[np.float64]:
     return array
 
 
-def _check_commuting(vertices: NDArray, motions: Sequence[Screw], near: float) -> None:
+def check_commuting(
+    vertices: NDArray, motions: Sequence[Screw], near: float, field: str
+) -> None:
+    """Refuse two motions that lead to different places in different orders."""
     if len(motions) < 2:
         return
     one, two = motions
@@ -271,7 +274,7 @@ def _check_commuting(vertices: NDArray, motions: Sequence[Screw], near: float) -
         raise InputError(
             ": the two motions lead to different places in the two orders, and a lattice needs "
             "motions that commute: translations, or a screw and a translation along its axis",
-            "screw" if any(motion.turns for motion in motions) else "vectors",
+            field,
         )
 
 

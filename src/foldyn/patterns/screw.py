@@ -84,6 +84,12 @@ class Screw(Checked):
         """Whether it is more than a translation."""
         return self.angle != 0.0
 
+    @property
+    def twist(self) -> NDArray[np.float64]:
+        """Rotation vector (rad) and displacement rate of the origin (m), (6,): its logarithm."""
+        turn = np.radians(self.angle) * self.unit
+        return np.concatenate([turn, self.vector - np.cross(turn, self.point)])
+
     def rotation(self, power: int = 1) -> NDArray[np.float64]:
         """Rotation (3, 3) of so many of these motions."""
         if not self.turns or power == 0:
@@ -102,6 +108,18 @@ def translation(vector: ArrayLike) -> Screw:
     """The screw without a turn that is a translation (3,), m."""
     step = np.asarray(vector, float)
     return Screw(tuple(step.tolist()), 0.0, float(np.linalg.norm(step)))
+
+
+def of_twist(twist: NDArray) -> Screw:
+    """The motion of a twist (6,); see `Screw.twist`."""
+    turn, move = twist[:3], twist[3:]
+    angle = float(np.linalg.norm(turn))
+    if angle < STILL:
+        return translation(move)
+    axis = turn / angle
+    point = np.cross(turn, move) / angle**2
+    shift = float(move @ axis)
+    return Screw(tuple(axis.tolist()), float(np.degrees(angle)), shift, tuple(point.tolist()))
 
 
 def motion_between(points: NDArray, images: NDArray, tolerance: float) -> tuple[Screw, NDArray]:

@@ -1,0 +1,130 @@
+"""Damped Bloch waves: complex frequencies at real phases.
+
+Waves phi exp(s t) of a phase k solve (s^2 M(k) + s C(k) + K(k)) phi = 0. The lowest ones are found
+by Arnoldi iteration about a shift on the positive real axis, where the matrix is positive definite.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+from scipy.sparse.linalg import LinearOperator, eigs
+
+from foldyn.cases import State
+from foldyn.errors import InputError
+from foldyn.linear.bloch import Bloch, null_space
+from foldyn.linear.linearized_cell import linearize_cell
+from foldyn.linear.unit_cell import UnitCell
+from foldyn.linear.zone import checked_phases
+from foldyn.values import whole
+
+if TYPE_CHECKING:
+    import xarray
+
+SHIFT = 1e-4  # of the root of the pencil's scale
+NOISE = 1e-3  # of the shift: what counts as zero
+SPARE = 4  # eigenvalues beyond those asked for
+TURN = 2.0 * np.pi
+
+
+def damped_bands(
+    cell: UnitCell,
+    phases: Any,
+    count: int = 6,
+    state: State | None = None,
+    *,
+    secant: float | None = None,
+    load_factor: float = 1.0,
+) -> xarray.Dataset:
+    """Bands of a repeated case with its damping: complex frequencies at real phases.
+
+    Parameters
+    ----------
+    cell, phases, count, state, secant, load_factor
+        As in `bands`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions phase, band, in the order of |s|. `rate` (s, complex, 1/s), `frequency` (Hz,
+        |Im s| / 2 pi; 0 of waves that creep back) and `damping_ratio` (-Re s / |s|; 1 of those; nan
+        of rigid motions). Coordinates and attributes as of `bands`.
+
+    Raises
+    ------
+    InputError
+        As of `bands`.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> sheet = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3, density=1000.0)
+    >>> pattern = fd.patterns.miura(a=0.03, b=0.03)
+    >>> case = fd.Case(fd.discretize(pattern, sheet), damping=fd.Rayleigh(alpha=100.0))
+    >>> found = fd.linear.damped_bands(fd.UnitCell(case), [[1.0, 0.0]], count=1)
+    >>> round(float(found.rate.real[0, 0]), 6)
+    -50.0
+    """
+    import xarray
+
+    given = checked_phases(phases, cell.dimensions if isinstance(cell, UnitCell) else 1)
+    count = whole("count", count, least=1)
+    linear = linearize_cell(cell, state, secant, load_factor)
+    rates = np.array([damped_rates(linear.bloch, phase, count) for phase in given])
+    size = np.abs(rates)
+    ratio = np.divide(-rates.real, size, out=np.full(size.shape, np.nan), where=size > 0.0)
+    coords: dict[str, Any] = {
+        "band": ("band", 1 + np.arange(count)),
+        "wave_vector": (("phase", "period"), given, {"units": "rad"}),
+    }
+    attributes: dict[str, Any] = {"kind": "damped_bands", "vectors": linear.vectors}
+    if isinstance(phases, xarray.DataArray):
+        if "distance" in phases.coords:
+            coords["distance"] = phases.coords["distance"]
+        attributes |= {k: v for k, v in phases.attrs.items() if k != "units"}
+    return xarray.Dataset(
+        {
+            "rate": (("phase", "band"), rates, {"units": "1/s"}),
+            "frequency": (("phase", "band"), np.abs(rates.imag) / TURN, {"units": "Hz"}),
+            "damping_ratio": (("phase", "band"), ratio),
+        },
+        coords,
+        attributes,
+    )
+
+
+def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex128]:
+    """The lowest s (count,), 1/s, one of each pair, by |s|."""
+    factors = bloch.factors(phase)
+    free = np.flatnonzero(~bloch.held)
+    basis = np.eye(len(free))
+    if not bloch.ties.empty:
+        basis = null_space(bloch.ties.at(factors)[:, free])
+    stiffness, damping, mass = (
+        basis.conj().T @ part.at(factors)[np.ix_(free, free)] @ basis
+        for part in (bloch.stiffness, bloch.damping, bloch.mass)
+    )
+    size = len(stiffness)
+    wanted = 2 * count + SPARE
+    if wanted >= 2 * size - 1:
+        raise InputError(f" = {count}: the cell has too few dofs for so many", "count")
+    scale = np.trace(stiffness).real / np.trace(mass).real
+    shift = SHIFT * np.sqrt(scale)
+    factor = linalg.lu_factor(stiffness + shift * damping + shift**2 * mass)
+
+    def solve(x: NDArray) -> NDArray:
+        """(A - shift B)^-1 B x of the linear problem in phi and s phi."""
+        f, g = x[:size], x[size:]
+        u = -linalg.lu_solve(factor, mass @ g + damping @ f + shift * (mass @ f))
+        return np.concatenate([u, f + shift * u])
+
+    start = np.random.default_rng(0).normal(size=2 * size) + 0j
+    operator = LinearOperator((2 * size, 2 * size), solve, dtype=complex)
+    found = shift + 1.0 / eigs(operator, wanted, v0=start, return_eigenvectors=False)
+    noise = NOISE * shift  # a double root of zero is one to the root of rounding
+    found = np.where(np.abs(found) <= noise, 0.0, found)
+    upper = found[found.imag >= -noise]
+    return upper[np.argsort(np.abs(upper), kind="stable")][:count]

@@ -1,0 +1,213 @@
+"""Waves of a given frequency: those that travel, and those that decay from cell to cell.
+
+With the dynamic stiffness D_s = K_s + i omega C_s - omega^2 M_s of cells s periods apart along one
+direction, phases along the other one given, a wave u lambda^s needs
+
+    sum over s of lambda^s D_s u = 0,    lambda = exp(i k),
+
+a polynomial eigenvalue problem in lambda, quadratic where only neighbors reach each other. Dofs
+that reach no other cell are condensed. Im k is the attenuation (Np per cell); k and -k come
+together.
+(B. R. Mace, E. Manconi, J. Sound Vib. 318, 2008.)
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from foldyn.cases import State
+from foldyn.errors import InputError
+from foldyn.linear.bloch import Bloch
+from foldyn.linear.linearized_cell import linearize_cell
+from foldyn.linear.unit_cell import UnitCell
+from foldyn.values import number, numbers, whole
+
+if TYPE_CHECKING:
+    import xarray
+
+TRAVELS = 1e-6  # Np per cell: attenuation of a wave that travels
+FASTEST = 40.0  # Np per cell beyond which rounding is all that is left of a wave
+TURN = 2.0 * np.pi
+
+
+class Reach(NamedTuple):
+    """A matrix by the distance of cells: steps (s,) from -r to r, and blocks (s, n, n)."""
+
+    steps: NDArray[np.int64]
+    blocks: NDArray
+
+
+def attenuation(
+    cell: UnitCell,
+    frequencies: Any,
+    direction: int = 0,
+    phase: float = 0.0,
+    count: int = 6,
+    state: State | None = None,
+    *,
+    secant: float | None = None,
+    load_factor: float = 1.0,
+) -> xarray.Dataset:
+    """Complex phases of the waves of given frequencies along one direction, and their attenuation.
+
+    Parameters
+    ----------
+    cell : UnitCell
+        Its damping counts, and makes all waves decay.
+    frequencies : float or array_like, shape (n,)
+        Frequencies (Hz), above 0.
+    direction : int
+        Along which period: 0 or 1.
+    phase : float
+        Phase (rad) along the other period of a sheet.
+    count : int
+        How many waves, those that decay least.
+    state, secant, load_factor
+        As in `bands`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions frequency, wave. `phase` (complex, rad per cell; the real part from -pi to pi,
+        the imaginary part not negative: waves that decay in the direction; of those that
+        travel, the ones with a phase from 0 to pi where the other period has no phase), nan where
+        there are fewer; and `attenuation` (Np per cell) of the wave that decays least, 0 where one travels:
+        motions of this frequency fall by exp(-attenuation) from cell to cell.
+
+    Raises
+    ------
+    InputError
+        An argument out of range; a state that does not repeat.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> sheet = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3, density=1000.0)
+    >>> pattern = fd.patterns.miura(a=0.03, b=0.03)
+    >>> cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet)))
+    >>> found = fd.linear.attenuation(cell, [800.0, 1200.0], phase=3.14159)
+    >>> (found.attenuation > 0.01).values.tolist()
+    [False, True]
+    """
+    import xarray
+
+    linear = linearize_cell(cell, state, secant, load_factor)
+    wanted = np.atleast_1d(numbers("frequencies", frequencies))
+    if wanted.ndim != 1 or not len(wanted) or (wanted <= 0.0).any():
+        raise InputError(": give numbers above 0 (Hz)", "frequencies")
+    count, phase = whole("count", count, least=1), number("phase", phase)
+    direction = whole("direction", direction, least=0)
+    if direction >= cell.dimensions:
+        raise InputError(
+            f" = {direction}: the cell has {cell.dimensions} period"
+            f"{'s, 0 and 1' if cell.dimensions > 1 else ', 0'}",
+            "direction",
+        )
+    if phase and cell.dimensions == 1:
+        raise InputError(f" = {phase:g}: the cell has no other period", "phase")
+    parts = [
+        along(linear.bloch, part, direction, phase)
+        for part in (linear.bloch.stiffness, linear.bloch.damping, linear.bloch.mass)
+    ]
+    ties = along(linear.bloch, linear.bloch.ties, direction, phase)
+    kept = np.flatnonzero(~linear.bloch.held)
+    out = np.full((len(wanted), count), np.nan + 0j)
+    for row, omega in enumerate(TURN * wanted):
+        stiffness, damping, mass = (each.blocks[:, kept[:, None], kept] for each in parts)
+        dynamic = stiffness + 1j * omega * damping - omega**2 * mass
+        blocks = _bordered(dynamic, ties.blocks[:, :, kept])
+        found = phases_of(Reach(parts[0].steps, blocks), linear.bloch.ties.empty)
+        found = _forward(found, both=phase == 0.0)[:count]
+        out[row, : len(found)] = found
+    least = np.nan_to_num(out.imag.min(axis=1, initial=FASTEST, where=~np.isnan(out.imag)), nan=0.0)
+    return xarray.Dataset(
+        {
+            "phase": (("frequency", "wave"), out, {"units": "rad"}),
+            "attenuation": (
+                "frequency", np.where(least <= TRAVELS, 0.0, least), {"units": "Np"},
+            ),
+        },
+        {"frequency": ("frequency", wanted, {"units": "Hz"}), "wave": 1 + np.arange(count)},
+        {"kind": "attenuation", "direction": direction, "other_phase": phase},
+    )  # fmt: skip
+
+
+def along(bloch: Bloch, matrix: Any, direction: int, phase: float) -> Reach:
+    """Blocks of a matrix by cells along a direction, summed with a phase along the other one."""
+    steps = bloch.steps[:, direction]
+    other = np.delete(bloch.steps, direction, axis=1).sum(axis=1)
+    reach = int(np.abs(steps).max(initial=0))
+    every = np.arange(-reach, reach + 1)
+    factors = np.exp(1j * phase * other)
+    blocks = np.array([matrix.at(np.where(steps == step, factors, 0.0)) for step in every])
+    return Reach(every, blocks)
+
+
+def _bordered(dynamic: NDArray, ties: NDArray) -> NDArray[np.complex128]:
+    """Blocks with the forces of constraints (s, k, n) as further unknowns."""
+    count = ties.shape[1]
+    if not count:
+        return dynamic
+    scale = np.abs(dynamic).max()
+    turned = ties[::-1].conj().transpose(0, 2, 1)  # G^H at 1 / lambda*
+    none = np.zeros((len(ties), count, count))
+    return np.concatenate(
+        [
+            np.concatenate([dynamic, scale * turned], axis=2),
+            np.concatenate([scale * ties, none], axis=2),
+        ],
+        axis=1,
+    )
+
+
+def phases_of(reach: Reach, condense: bool = True) -> NDArray[np.complex128]:
+    """All complex phases k of waves u exp(i k s), those that decay too fast to tell left out.
+
+    condense : whether unknowns that reach no other cell are eliminated first.
+    """
+    steps, blocks = reach
+    far = blocks[steps != 0]
+    coupled = (np.abs(far).sum(axis=(0, 1)) + np.abs(far).sum(axis=(0, 2))) > 0.0
+    coupled |= not condense
+    b, i = np.flatnonzero(coupled), np.flatnonzero(~coupled)
+    own = blocks[steps == 0][0]
+    reduced = blocks[:, b[:, None], b].astype(complex)
+    if len(i):
+        follow = np.linalg.solve(own[np.ix_(i, i)], own[np.ix_(i, b)])
+        reduced[steps == 0] -= own[np.ix_(b, i)] @ follow
+    used = np.flatnonzero(np.abs(reduced).sum(axis=(1, 2)))
+    low, high = int(used.min()), int(used.max())
+    reduced, order, size = reduced[low : high + 1], high - low, len(b)
+    if not order or not size:
+        return np.zeros(0, complex)
+    scale = 1.0 / np.sqrt(np.abs(reduced).max(axis=(0, 2)))
+    reduced = scale[:, None] * reduced * scale
+    left, right = np.zeros((2, order * size, order * size), complex)
+    eye = np.eye(size)
+    for k in range(order - 1):  # lambda^(k+1) u follows lambda^k u
+        left[k * size : (k + 1) * size, (k + 1) * size : (k + 2) * size] = eye
+        right[k * size : (k + 1) * size, k * size : (k + 1) * size] = eye
+    for k in range(order):
+        left[-size:, k * size : (k + 1) * size] = -reduced[k]
+    right[-size:, -size:] = reduced[order]
+    above, below = linalg.eig(left, right, right=False, homogeneous_eigvals=True)
+    told = (np.abs(above) > np.exp(-FASTEST) * np.abs(below)) & (
+        np.abs(below) > np.exp(-FASTEST) * np.abs(above)
+    )
+    return -1j * np.log(above[told] / below[told])
+
+
+def _forward(phases: NDArray, both: bool) -> NDArray[np.complex128]:
+    """Waves that decay in the direction, the least first, and those that travel.
+
+    both : whether waves with k and -k have one frequency, of which one is told.
+    """
+    kept = phases.imag > TRAVELS
+    travels = np.abs(phases.imag) <= TRAVELS
+    kept |= travels & (phases.real >= -TRAVELS if both else True)
+    found = np.where(travels, phases.real + 0j, phases)[kept]
+    return found[np.lexsort((found.real, found.imag))]
