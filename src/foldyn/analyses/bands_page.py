@@ -74,11 +74,16 @@ def _gaps(results: ByRule) -> Table:
 def _notes(result: xarray.Dataset) -> str:
     """Notes on the numbers."""
     notes = [
-        "Bands are small vibrations of the sheet that repeats the cell without end, as waves with a "
-        "phase per period. Node R cells away moves as the Bloch mode times exp(i k R). The result "
-        "carries the case of its cell."
+        "Bands are small vibrations of a sheet of cells without end, as waves with a phase k per "
+        "period: R cells away, nodes move as the Bloch mode times exp(i k R). The result carries "
+        "the case of its cell."
     ]
-    if "zone_frequency" not in result:
+    if "damped_ratio" in result:
+        notes.append(
+            "Bands and gaps are those without damping; damping ratios are of the waves with it, in "
+            "the order of their frequencies."
+        )
+    if "zone_frequency" not in result and result.sizes["period"] > 1:
         notes.append(
             "Full gaps are those at all wave vectors of the path. The greatest and least "
             "frequencies of bands may lie beside it: analysis.zone computes the whole zone."

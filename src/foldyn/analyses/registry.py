@@ -21,8 +21,13 @@ from foldyn.values import choice
 ANALYSES: Mapping[str, type[Analysis]] = {
     analysis.kind: analysis
     for analysis in (
-        MotionAnalysis, PathAnalysis, ModesAnalysis, FrfAnalysis, BandsAnalysis, FidelityAnalysis,
-    )  # fmt: skip
+        MotionAnalysis,
+        PathAnalysis,
+        ModesAnalysis,
+        FrfAnalysis,
+        BandsAnalysis,
+        FidelityAnalysis,
+    )
 }
 """By the name that `analysis.kind` has for them."""
 

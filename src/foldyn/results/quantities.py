@@ -128,7 +128,9 @@ BANDS: Mapping[str, Quantity] = {
     "polarization": Quantity(
         "1", "share of the direction in the kinetic energy", ("phase", "band", "axis")
     ),
-    "shape": Quantity("m", "Bloch mode, of the modal mass 1 kg m2 in a cell", ("phase", "band", *PLACE)),
+    "shape": Quantity(
+        "m", "Bloch mode, of the modal mass 1 kg m2 in a cell", ("phase", "band", *PLACE)
+    ),
     "position": Quantity("m", "position in the state", PLACE),
     "displacement": Quantity("m", "displacement of the state from the rest position", PLACE),
     "period_shift": Quantity("m", "shift from a cell to the next", ("period", "axis")),
@@ -137,6 +139,10 @@ BANDS: Mapping[str, Quantity] = {
     "period_point": Quantity("m", "point on the axis of the turn", ("period", "axis")),
     "residual": Quantity("1", "residual of the state as a fraction of the forces at play"),
     "zone_frequency": Quantity("Hz", "frequency in the whole zone", ("zone", "band")),
+    "damped_frequency": Quantity("Hz", "frequency of the damped wave", ("phase", "band")),
+    "damped_ratio": Quantity("1", "damping ratio of the wave", ("phase", "band")),
+    "attenuation": Quantity("Np", "attenuation from cell to cell", ("leg", "level")),
+    "level_frequency": Quantity("Hz", "frequency of the attenuation", ("level",)),
 }
 """What bands have, each along the dimension `state` too where they are of several states."""
 GAPS: Mapping[str, Quantity] = {
@@ -190,6 +196,7 @@ def energies_of(case: Any) -> dict[str, Quantity]:
 REASONS: Mapping[str, str] = {
     "frequency": "an unstable mode grows instead of swinging",
     "zone_frequency": "an unstable wave grows instead of swinging",
+    "damped_ratio": "a rigid motion does not swing",
     "group_velocity": "bands have corners where the frequency is zero",
     "damping_ratio": "a rigid or an unstable mode does not swing",
     "receptance": "a resonance without damping, a body free to move at 0 Hz, or no convergence",

@@ -31,8 +31,9 @@ def waves(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
     "frequency" (state, phase, band), Hz; "displacement", Bloch modes of every k-th phase, real and
     imaginary parts (state, band, phase / k, 2, node, axis), the largest displacement of each being
     1; "places" (state, node, axis), m; "maps" (state, period, 3, 4), to the next cell; "gaps", the
-    full ones, as rows of the state, the band below, bottom and top (Hz); "zone", frequencies (state,
-    band, n, n).
+    full ones, as rows of the state, the band below, bottom and top (Hz); where they are computed
+    "zone", frequencies (state, band, n, n), "damping" (state, phase, band), "attenuation" (state,
+    leg, level) and "levels" (state, level), Hz.
     """
     several = result if "state" in result.dims else result.expand_dims("state")
     first = several.transpose("state", "phase", "band", ...)
@@ -54,11 +55,21 @@ def waves(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
     if "zone_frequency" in result and first.sizes["period"] == 2:
         zone = np.nan_to_num(first["zone_frequency"].transpose("state", "band", "zone").values)
         about["zone"] = arrays.changing(f"{key}.zone", zone.reshape(count * bands, -1), OF_ZONE)
+    if "damped_ratio" in result:
+        about["damping"] = arrays.exact(f"{key}.damping", first["damped_ratio"].values, "f4")
+    if "attenuation" in result:
+        decay = first["attenuation"].transpose("state", "leg", "level").values
+        levels = first["level_frequency"].transpose("state", "level").values
+        about |= {
+            "attenuation": arrays.exact(f"{key}.decay", decay, "f4"),
+            "levels": arrays.exact(f"{key}.levels", levels, "f4"),
+            "legs": [str(leg).replace("G", "Γ") for leg in result["leg"].values],
+        }
     return about
 
 
 def smooth(shapes: NDArray) -> NDArray:
-    """Shapes (..., phase, node, axis) of the size 1, each turned to be in phase with the last one."""
+    """Shapes (..., phase, node, axis) of the size 1, each in phase with the one before it."""
     size = np.linalg.norm(shapes, axis=-1).max(axis=-1)
     out = shapes / np.where(size > 0.0, size, 1.0)[..., None, None]
     for k in range(1, out.shape[-3]):
@@ -108,7 +119,9 @@ def about_waves(result: xr.Dataset, triangles: int) -> dict[str, Any]:
     }  # fmt: skip
     if "state" in result.dims:
         own = result["state"].attrs
-        unit = {"degrees": "°"}.get(own.get("units", ""), f" {own['units']}" if "units" in own else "")
+        unit = {"degrees": "°"}.get(
+            own.get("units", ""), f" {own['units']}" if "units" in own else ""
+        )
         about |= {
             "states": result["state"].values.tolist(), "varied": own["long_name"], "unit": unit,
         }  # fmt: skip

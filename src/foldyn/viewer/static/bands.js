@@ -6,6 +6,7 @@ import { contour, levels } from "./contours.js";
 import { number } from "./numbers.js";
 
 const REACH = 0.12; // largest motion, in sizes of the cell
+const ARRAYS = ["frequency", "places", "maps", "damping", "attenuation", "levels"];
 const LINES = 8; // of one frequency
 
 export class Bands extends Analysis {
@@ -17,14 +18,13 @@ export class Bands extends Analysis {
     this.sheets ??= new Map();
     const { cells } = this.page.about;
     if (!this.sheets.has(sheet)) this.sheets.set(sheet, repeated(sheet, cells));
+    const parts = await Promise.all(ARRAYS.map(async (name) => [name, about[name] ? await store.get(about[name]) : null]));
     const result = new Waves(about, this.sheets.get(sheet), {
       displacement: await store.changing(about.displacement),
-      frequency: await store.get(about.frequency),
-      places: await store.get(about.places),
-      maps: await store.get(about.maps),
       zone: about.zone ? await store.changing(about.zone) : null,
-      fields: {}, energies: {}, largest: 1,
+      ...Object.fromEntries(parts), fields: {}, energies: {},
     });
+    result.largest = 1;
     result.rest(0, cells);
     return result;
   }
@@ -127,15 +127,21 @@ export class Bands extends Analysis {
 
   draw(host) {
     this.path(host);
+    this.decay(host);
+    this.damping(host);
     this.gaps(host);
     this.zone(host);
+  }
+
+  // The greatest frequency of all states.
+  get highest() {
+    return 1.04 * Math.max(...this.page.shown.map(({ frequency }) => frequency.reduce((top, f) => (f > top ? f : top), 0))) || 1;
   }
 
   path(host) {
     const { page } = this;
     const { about, shown } = page;
     const [, , bands] = shown[0].sizes;
-    const most = Math.max(...shown.map(({ frequency }) => frequency.reduce((top, f) => (f > top ? f : top), 0)));
     const curves = shown.flatMap((result, r) => Array.from({ length: bands }, (_, band) => ({
       name: shown.length > 1 ? (band ? "" : result.name) : `${band + 1}`,
       color: CURVES[page.theme][(shown.length > 1 ? result.index : band) % 8], dash: DASHES[r % 5],
@@ -150,13 +156,45 @@ export class Bands extends Analysis {
     this.chart(host, {
       label: "frequencies of the bands along the path", xlabel: "", ylabel: "frequency (Hz)", curves, free: true,
       all: true, height: 330, ticks: { x: about.ticks }, seek,
-      ranges: { x: [0, about.path.at(-1)], y: [0, 1.04 * most || 1] },
+      ranges: { x: [0, about.path.at(-1)], y: [0, this.highest] },
       shaded: shown[0].gaps.filter(([state]) => state === this.state).map(([, , low, high]) => [low, high]),
       follow: () => {
         const at = shown[0].kept(this.phase);
         return [0, curves.map((_, j) => (j % bands === this.band
           ? [about.path[at], shown[Math.floor(j / bands)].hertz(this.state, at, this.band)] : [NaN, NaN]))];
       },
+    });
+  }
+
+  // Attenuation of waves of a frequency along legs of the path.
+  decay(host) {
+    const [{ attenuation, levels: every, legs }] = this.page.shown;
+    if (!attenuation) return;
+    const count = attenuation.length / legs.length / (this.page.about.states.length || 1);
+    const from = (values, row) => [...values.subarray(row * count, (row + 1) * count)];
+    const curves = legs.map((name, leg) => ({
+      name, color: CURVES[this.page.theme][leg % 8], dash: DASHES[leg % 5],
+      x: from(attenuation, this.state * legs.length + leg), y: from(every, this.state),
+    }));
+    const reach = 1.04 * Math.max(...curves.flatMap(({ x }) => x)) || 1;
+    this.chart(host, {
+      label: "attenuation of waves by frequency", xlabel: "attenuation (Np per cell)", ylabel: "frequency (Hz)", curves,
+      free: true, height: 300, ranges: { x: [0, reach], y: [0, this.highest] }, follow: () => [0, []],
+    });
+  }
+
+  damping(host) {
+    const { about, shown: [{ damping, sizes: [, phases, bands] }] } = this.page;
+    if (!damping) return;
+    const curves = Array.from({ length: bands }, (_, band) => ({
+      name: `${band + 1}`, color: CURVES[this.page.theme][band % 8], dash: DASHES[0],
+      x: about.path, y: about.path.map((_, k) => 100 * damping[(this.state * phases + k) * bands + band]),
+    }));
+    const sorted = curves.flatMap(({ y }) => y).filter(Number.isFinite).sort((a, b) => a - b);
+    const most = 1.3 * sorted[Math.floor(0.9 * sorted.length)] || 1; // ratios grow without end toward Γ
+    this.chart(host, {
+      label: "damping ratios of the waves along the path", xlabel: "", ylabel: "damping (%)", curves, free: true,
+      ticks: { x: about.ticks }, ranges: { x: [0, about.path.at(-1)], y: [0, most] }, follow: () => [0, []],
     });
   }
 

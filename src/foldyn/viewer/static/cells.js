@@ -69,7 +69,9 @@ export class Waves extends Result {
       turned(map, place, sheet.nodes, 3 * count * c, true);
       return map;
     });
-    sheet.box = [0, 1, 2].map((d) => extremes(sheet.nodes, d));
+    const ends = [0, 1, 2].map((d) => extremes(sheet.nodes, d));
+    for (let j = 0; j < sheet.nodes.length; j++) sheet.nodes[j] -= (ends[j % 3][0] + ends[j % 3][1]) / 2; // states share a center
+    sheet.box = ends.map(([low, high]) => [(low - high) / 2, (high - low) / 2]);
   }
 
   // Nodes at a moment of a wave: Re(shape exp(i (wave . R - phase))), turned with the cells.

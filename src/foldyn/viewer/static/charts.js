@@ -102,6 +102,9 @@ export class Chart {
     ctx.save();
     ctx.lineWidth = 1.8 * devicePixelRatio;
     ctx.strokeStyle = color;
+    ctx.beginPath();
+    ctx.rect(plot.bbox.left, plot.bbox.top, plot.bbox.width, plot.bbox.height);
+    ctx.clip();
     for (let k = 1, start = 0; k <= x.length; k++) {
       const kind = (j) => !stable || (stable[j - 1] && stable[j]);
       if (k < x.length && k > start + 1 && kind(k) === kind(k - 1)) continue;

@@ -7,10 +7,12 @@ export function contour(values, n, level) {
   for (let i = 0; i < n; i++) {
     for (let j = 0; j < n; j++) {
       const corners = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-      for (const three of [[0, 1, 2], [0, 2, 3]]) {
+      const middle = [0, 1, 2].map((d) => corners.reduce((sum, corner) => sum + corner[d] / 4, 0));
+      for (let k = 0; k < 4; k++) {
+        const three = [corners[k], corners[(k + 1) % 4], middle];
         const ends = [];
-        three.forEach((k, s) => {
-          const [a, b] = [corners[k], corners[three[(s + 1) % 3]]];
+        three.forEach((a, s) => {
+          const b = three[(s + 1) % 3];
           if ((a[2] < level) === (b[2] < level)) return;
           const part = (level - a[2]) / (b[2] - a[2]);
           ends.push(a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]));
