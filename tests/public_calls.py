@@ -30,6 +30,12 @@ def sheet() -> fd.Sheet:
 
 
 @cache
+def cell() -> fd.UnitCell:
+    """The sheet of which that is a pleat."""
+    return fd.UnitCell(fd.Case(fd.discretize(pattern(), sheet())))
+
+
+@cache
 def case() -> fd.Case:
     """One side held, the other pushed."""
     made = fd.discretize(pattern(), sheet())
@@ -105,6 +111,14 @@ DATA: Calls = {
     "Pattern": (fd.Pattern, {
         "vertices": POINTS, "faces": PANELS, "assignments": {(1, 2): "V"}, "name": "two",
         "fold_angles": [0.5], "families": {"middle": [(1, 2)]}, "welds": [],
+        "periods": [[(0, 4), (3, 5)]], "rim_families": {"rim": [(0, 1)]},
+    }),
+    "Screw": (fd.Screw, {
+        "axis": (0.0, 0.5, 1.0), "angle": 30.0, "shift": 0.5, "point": (0.0, 0.5, 0.0),
+    }),
+    "UnitCell": (fd.UnitCell, {
+        "case": fd.Case(fd.discretize(pattern(), sheet())), "vectors": [(3.0**0.5, 0.0, 0.0)],
+        "screw": None, "tolerance": 0.5**20,
     }),
     "Case": (fd.Case, {
         "structure": fd.discretize(pattern(), sheet()), "supports": [fd.Fix([0, 1, 2, 3])],
@@ -213,6 +227,11 @@ def solved(folder: Path) -> Calls:
             "case": case(), "drive": fd.Force([4], (0, 0, 1.0)), "frequencies": [1.0, 2.0],
             "state": None, "method": "direct", "secant": None, "amplitude": 1.0,
             "load_factor": 1.0, "internal": 0, "progress": None,
+        }),
+        "bands": (fd.bands, {
+            "cell": cell(), "phases": [[0.5]], "count": 2, "state": fd.State(), "secant": 2.0,
+            "group_velocity": True, "shape": True, "polarization": True, "load_factor": 1.0,
+            "track": False,
         }),
         "fold": (fd.fold, {
             "pattern": fd.Pattern(POINTS, PANELS, {(1, 2): "V"}), "fraction": 0.5, "angles": None,

@@ -46,7 +46,8 @@ def calls(tmp_path_factory):
 
 
 SOLVED = (
-    "simulate", "simulate_many", "trace", "switch_branch", "landscape", "modes", "frf", "fold",
+    "simulate", "simulate_many", "trace", "switch_branch", "landscape", "modes", "frf", "bands",
+    "fold",
     "critical_step", "initial_state", "mac", "case_of", "save", "load", "export", "view",
     "read_case", "read_pattern", "diagnose", "write_pattern", "sweep", "sensitivity", "design",
     "fit", "fidelity",

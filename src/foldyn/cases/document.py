@@ -196,7 +196,7 @@ class _Writer:
             ]
         if pattern.periods:
             table["periods"] = [
-                self.store(f"tables_period{k}_pairs", pairs.ravel())
+                self.store(f"tables_period{k}_vertices", pairs.ravel())
                 for k, pairs in enumerate(pattern.periods)
             ]
         if pattern.custom:

@@ -6,7 +6,7 @@ import time
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from threadpoolctl import threadpool_limits
 from foldyn.cases import State
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.linear.bloch import Bloch, null_space
+from foldyn.linear.group_velocity import Waves, slopes_of
 from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
 from foldyn.linear.tracking import tracked
 from foldyn.linear.unit_cell import UnitCell
@@ -27,20 +28,13 @@ from foldyn.workers import processors
 if TYPE_CHECKING:
     import xarray
 
-DENSE = 900  # dofs up to which all of a problem is solved in full
+DENSE = 500  # dofs up to which a problem is solved with full matrices
+GUARD = 3  # waves beyond those asked for, that none is missed where several coincide
 EPS = float(np.finfo(float).eps)
 ROUNDING = 1e-15  # of |phi|' |K| |phi|: what counts as zero
-DEGENERATE = 1e-7  # of the largest of some eigenvalues: bands that meet
 SHIFT = 1e-6  # of the pencil's scale: the shift below zero
 NOISE = 30.0  # times the rounding of the largest entries: what counts as zero, too
 TURN = 2.0 * np.pi
-
-
-class Waves(NamedTuple):
-    """Waves of one phase: eigenvalues (k,), rad2/s2, and motions (n, k) of all dofs of a cell."""
-
-    values: NDArray
-    shapes: NDArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +109,9 @@ class Solver:
         factor = splu(sparse.csc_array(stiffness - shift * mass))
         inverse = LinearOperator(stiffness.shape, factor.solve, dtype=complex)
         values, motions = eigsh(
-            stiffness, self.count, mass, sigma=shift, OPinv=inverse, v0=_start(len(kept))
+            stiffness, self.count + GUARD, mass, sigma=shift, OPinv=inverse, v0=_start(len(kept))
         )
-        order = np.argsort(values)
+        order = np.argsort(values)[: self.count]
         motions = motions[:, order]
         size = np.sqrt(np.einsum("ik,ik->k", motions.conj(), mass @ motions).real)
         shapes = np.zeros((bloch.size, self.count), complex)
@@ -305,59 +299,6 @@ def waves_at(solver: Solver, phases: NDArray) -> list[Waves]:
     """Waves of each phase (n, d), on all processors."""
     with threadpool_limits(1), ThreadPoolExecutor(processors()) as pool:
         return list(pool.map(solver.waves, phases))
-
-
-def slopes_of(bloch: Bloch, phase: NDArray, waves: Waves) -> NDArray[np.float64]:
-    """d omega/d k (k, d), rad/s per rad, of waves by the Hellmann-Feynman theorem.
-
-    d lambda = phi^H (dK - lambda dM) phi, with the forces of constraints that change with the
-    phase. Of waves of one frequency it takes the combinations that go on along each period by
-    themselves. nan where the frequency is zero: bands have corners there.
-    """
-    values = waves.values
-    out = np.empty((len(values), bloch.steps.shape[1]))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        per_omega = np.where(values > 0.0, 0.5 / np.sqrt(values), np.nan)
-    for period in range(out.shape[1]):
-        change = eigenvalue_slopes(bloch, phase, waves, np.eye(out.shape[1])[period])
-        for group in degenerate(values):
-            own = change[np.ix_(group, group)]
-            out[group, period] = np.linalg.eigvalsh(own) if len(group) > 1 else own[0, 0].real
-    return out * per_omega[:, None]
-
-
-def eigenvalue_slopes(
-    bloch: Bloch, phase: NDArray, waves: Waves, way: NDArray
-) -> NDArray[np.complex128]:
-    """phi^H (dK - lambda dM) phi, (k, k), along a direction (d,) of the phases."""
-    values, shapes = waves
-    slope = sum(way[j] * bloch.slopes(phase, j) for j in range(len(way)))
-    mean = 0.5 * (values[:, None] + values)
-    change = shapes.conj().T @ (bloch.stiffness.sparse_at(slope) @ shapes)
-    change = change - mean * (shapes.conj().T @ (bloch.mass.sparse_at(slope) @ shapes))
-    if not bloch.ties.empty:
-        factors = bloch.factors(phase)
-        free = ~bloch.held & ~bloch.hidden
-        force = bloch.stiffness.sparse_at(factors) @ shapes
-        force = force - (bloch.mass.sparse_at(factors) @ shapes) * values
-        rows = bloch.ties.at(factors)[:, free]
-        push = -np.linalg.lstsq(rows.conj().T, force[free], rcond=None)[0]
-        turning = push.conj().T @ (bloch.ties.sparse_at(slope) @ shapes)
-        change = change + turning + turning.conj().T
-    return 0.5 * (change + change.conj().T)
-
-
-def degenerate(values: NDArray) -> list[list[int]]:
-    """Numbers of eigenvalues in groups that are one to rounding; they are increasing in each."""
-    order = np.argsort(values)
-    near = DEGENERATE * np.abs(values).max(initial=0.0)
-    groups: list[list[int]] = []
-    for k in order.tolist():
-        if groups and values[k] - values[groups[-1][-1]] <= near * 1e-3:
-            groups[-1].append(k)
-        else:
-            groups.append([k])
-    return groups
 
 
 def polarizations(linear: LinearizedCell, phase: NDArray, waves: Waves) -> NDArray[np.float64]:

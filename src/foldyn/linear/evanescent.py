@@ -75,8 +75,8 @@ def attenuation(
         Dimensions frequency, wave. `phase` (complex, rad per cell; the real part from -pi to pi,
         the imaginary part not negative: waves that decay in the direction; of those that
         travel, the ones with a phase from 0 to pi where the other period has no phase), nan where
-        there are fewer; and `attenuation` (Np per cell) of the wave that decays least, 0 where one travels:
-        motions of this frequency fall by exp(-attenuation) from cell to cell.
+        there are fewer; and `attenuation` (Np per cell) of the wave that decays least, 0 where one
+        travels: motions of this frequency fall by exp(-attenuation) from cell to cell.
 
     Raises
     ------

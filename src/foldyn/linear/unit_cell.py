@@ -54,7 +54,7 @@ class Copies(NamedTuple):
     first: NDArray[np.int64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class UnitCell:
     """A case of which a sheet, a chain or a tube consists.
 
@@ -111,13 +111,15 @@ class UnitCell:
     screw: Screw | None = None
     tolerance: float = 1e-6
     motions: tuple[Screw, ...] = field(init=False)
-    copies: Copies = field(init=False, repr=False)
+    copies: Copies = field(init=False)
 
     def __post_init__(self) -> None:
         pattern = of_kind("case", self.case, Case).structure.pattern
         if pattern is None:
             raise InputError(": its structure has no pattern that could repeat", "case")
-        near = number("tolerance", self.tolerance, above=0.0) * pattern.size
+        tolerance = number("tolerance", self.tolerance, above=0.0)
+        object.__setattr__(self, "tolerance", tolerance)
+        near = tolerance * pattern.size
         motions, pairs = self._found(pattern, near)
         check_commuting(pattern.vertices, motions, near, "screw" if self.screw else "vectors")
         pairs += _partners(pattern, motions, near, {v for rows in pairs for v in rows[:2]})
@@ -125,6 +127,14 @@ class UnitCell:
         object.__setattr__(self, "motions", motions)
         object.__setattr__(self, "vectors", np.array([motion.vector for motion in motions]))
         object.__setattr__(self, "copies", _copies(len(pattern.vertices), len(motions), pairs))
+
+    def __repr__(self) -> str:
+        """One line: how large it is, and how it repeats."""
+        ways = ["screw" if motion.turns else "translation" for motion in self.motions]
+        return (
+            f"<UnitCell: {self.kinds} vertices, {len(self.case.structure.pattern.faces)} panels, "
+            f"{' and '.join(ways)}>"
+        )
 
     def _found(self, pattern: Any, near: float) -> tuple[tuple[Screw, ...], list[tuple]]:
         """The motions, and pairs of vertices that are known to belong together."""
@@ -262,9 +272,7 @@ def _steps(vectors: Any) -> NDArray[np.float64]:
     return array
 
 
-def check_commuting(
-    vertices: NDArray, motions: Sequence[Screw], near: float, field: str
-) -> None:
+def check_commuting(vertices: NDArray, motions: Sequence[Screw], near: float, field: str) -> None:
     """Refuse two motions that lead to different places in different orders."""
     if len(motions) < 2:
         return
@@ -316,21 +324,12 @@ def _check_all(
         neighbors.setdefault(a, set()).add(b)
         neighbors.setdefault(b, set()).add(a)
     for k, motion in enumerate(motions):
-        met = {v for v, _, step in pairs if step[k]}
         distance, nearest = tree.query(motion.images(pattern.vertices[rim]))
-        if not met:
-            best = int(distance.argmin())
-            raise InputError(
-                f": motion {k} brings no boundary edge of the pattern to another one; of its "
-                f"vertices, {rim[best]} comes nearest to one, {rim[nearest[best]]}, at a distance "
-                f"of {distance[best]:.3g} m; give the motion from a cell to the next",
-                field,
-            )
-        starts = {v for v, _, step in pairs if step[k] > 0}
+        starts = {v for v, _, step in pairs if step[k] > 0} | set(rim[distance <= near].tolist())
         missed = [
             (v, w, gap)
             for v, w, gap in zip(rim.tolist(), rim[nearest].tolist(), distance, strict=True)
-            if near < gap < NEAR_MISS * pattern.size and v not in starts and w != v
+            if near < gap < NEAR_MISS * pattern.size and w != v and v not in starts
             and neighbors[v] & starts
         ]  # fmt: skip
         if missed:
@@ -341,6 +340,23 @@ def _check_all(
                 "give a larger tolerance",
                 field,
             )
+        if any(step[k] for _, _, step in pairs):
+            continue
+        best = int(distance.argmin())
+        a, b = rim[best], rim[nearest[best]]
+        if distance[best] <= near:
+            raise InputError(
+                f": motion {k} brings vertex {a} to {b}, but no boundary edge of the pattern to "
+                "another one: it has more than one cell, or copies touch at points alone; give "
+                "motions that put it beside itself",
+                field,
+            )
+        raise InputError(
+            f": motion {k} brings no boundary edge of the pattern to another one; of its vertices, "
+            f"{a} comes nearest to one, {b}, at a distance of {distance[best]:.3g} m; give the "
+            "motion from a cell to the next",
+            field,
+        )
 
 
 def _copies(count: int, dimensions: int, pairs: Sequence[tuple]) -> Copies:

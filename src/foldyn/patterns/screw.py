@@ -145,4 +145,10 @@ def motion_between(points: NDArray, images: NDArray, tolerance: float) -> tuple[
     shift = float(move @ axis)
     point = np.linalg.lstsq(np.eye(3) - rotation, move - shift * axis, rcond=None)[0]
     found = Screw(tuple(axis.tolist()), float(np.degrees(angle)), shift, tuple(point.tolist()))
-    return found, np.linalg.norm(found.images(points) - images, axis=1)
+    left = np.linalg.norm(found.images(points) - images, axis=1)
+    if left.max() > tolerance:  # of no motion: most of them may still say which are wrong
+        usual = np.median(images - points, axis=0)
+        off = np.linalg.norm(points + usual - images, axis=1)
+        if 2 * (off <= tolerance).sum() > len(off):
+            return translation(usual), off
+    return found, left

@@ -1,0 +1,85 @@
+"""How the frequencies of Bloch waves change with their phases, by the Hellmann-Feynman theorem.
+
+For waves with phi^H M phi = 1, d lambda = phi^H (dK - lambda dM) phi; constraints G(k) phi = 0 add
+the work of their forces in dG phi. Of waves of one frequency those combinations go on along a
+direction for which the matrix of these numbers is diagonal.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.linear.bloch import Bloch
+
+DEGENERATE = 1e-10  # of the largest of some eigenvalues: those that are one
+
+
+class Waves(NamedTuple):
+    """Waves of one phase: eigenvalues (k,), rad2/s2, and motions (n, k) of all dofs of a cell."""
+
+    values: NDArray
+    shapes: NDArray
+
+
+def slopes_of(bloch: Bloch, phase: NDArray, waves: Waves) -> NDArray[np.float64]:
+    """d omega/d k (k, d), rad/s per rad, of waves by the Hellmann-Feynman theorem.
+
+    d lambda = phi^H (dK - lambda dM) phi, with the forces of constraints that change with the
+    phase. Of waves of one frequency it takes the combinations that go on along each period by
+    themselves. nan where the frequency is zero: bands have corners there.
+    """
+    values = waves.values
+    out = np.empty((len(values), bloch.steps.shape[1]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        per_omega = np.where(values > 0.0, 0.5 / np.sqrt(values), np.nan)
+    for period in range(out.shape[1]):
+        change = eigenvalue_slopes(bloch, phase, waves, np.eye(out.shape[1])[period])
+        for group in degenerate(values):
+            own = change[np.ix_(group, group)]
+            out[group, period] = np.linalg.eigvalsh(own) if len(group) > 1 else own[0, 0].real
+    return out * per_omega[:, None]
+
+
+def eigenvalue_slopes(
+    bloch: Bloch, phase: NDArray, waves: Waves, way: NDArray
+) -> NDArray[np.complex128]:
+    """phi^H (dK - lambda dM) phi, (k, k), along a direction (d,) of the phases."""
+    values, shapes = waves
+    slope = sum(way[j] * bloch.slopes(phase, j) for j in range(len(way)))
+    mean = 0.5 * (values[:, None] + values)
+    change = shapes.conj().T @ (bloch.stiffness.sparse_at(slope) @ shapes)
+    change = change - mean * (shapes.conj().T @ (bloch.mass.sparse_at(slope) @ shapes))
+    if not bloch.ties.empty:
+        factors = bloch.factors(phase)
+        free = ~bloch.held & ~bloch.hidden
+        force = bloch.stiffness.sparse_at(factors) @ shapes
+        force = force - (bloch.mass.sparse_at(factors) @ shapes) * values
+        rows = bloch.ties.at(factors)[:, free]
+        push = -np.linalg.lstsq(rows.conj().T, force[free], rcond=None)[0]
+        turning = push.conj().T @ (bloch.ties.sparse_at(slope) @ shapes)
+        change = change + turning + turning.conj().T
+    return 0.5 * (change + change.conj().T)
+
+
+def degenerate(values: NDArray) -> list[list[int]]:
+    """Numbers of eigenvalues in groups that are one to rounding, increasing in each."""
+    order = np.argsort(values, kind="stable")
+    near = DEGENERATE * np.abs(values).max(initial=0.0)
+    gaps = np.flatnonzero(np.diff(values[order]) > near) + 1
+    return [sorted(group.tolist()) for group in np.split(order, gaps)]
+
+
+def separated(bloch: Bloch, phase: NDArray, waves: Waves, way: NDArray) -> Waves:
+    """The waves with those of one frequency combined as they go on along a direction (d,)."""
+    groups = [group for group in degenerate(waves.values) if len(group) > 1]
+    if not groups or not way.any():
+        return waves
+    change = eigenvalue_slopes(bloch, phase, waves, way)
+    shapes = waves.shapes.copy()
+    for group in groups:
+        turned = np.linalg.eigh(change[np.ix_(group, group)])[1]
+        shapes[:, group] = waves.shapes[:, group] @ turned
+    return Waves(waves.values, shapes)
