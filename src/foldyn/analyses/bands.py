@@ -21,7 +21,7 @@ from foldyn.analyses.vibration import About, Secant, VibrationSchema, bar_closed
 from foldyn.cases import Case
 from foldyn.cases.loads import Actuate
 from foldyn.errors import InputError
-from foldyn.linear import attenuation, band_gaps, bands, damped_bands
+from foldyn.linear import UnitCell, attenuation, band_gaps, bands, damped_bands
 from foldyn.linear.band_gaps import ALL
 from foldyn.patterns.screw import Screw
 from foldyn.results.dataset import bands_dataset
@@ -102,8 +102,7 @@ class BandsAnalysis(Analysis):
         """See `Analysis`."""
         given = {**self.arguments, **changes}
         states = cell_states(case_file, mass, given)
-        cell = states[0].cell
-        path = cell.path(given["path"] or AROUND[cell.dimensions], given["points"])
+        path = _path(states[0].cell, given["path"], given["points"])
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
             found = []
@@ -127,6 +126,15 @@ class BandsAnalysis(Analysis):
         )
 
     sections = staticmethod(bands_sections)
+
+
+def _path(cell: UnitCell, points: str | None, count: int) -> xarray.DataArray:
+    """Phases along the path of a file."""
+    try:
+        return cell.path(AROUND[cell.dimensions] if points is None else points, count)
+    except InputError as error:  # which has other names for the keys
+        key = {"points": "path", "count": "points"}[error.key]
+        raise InputError(error.reason, key) from None
 
 
 def _bands(state: CellState, path: xarray.DataArray, given: Mapping[str, Any]) -> xarray.Dataset:

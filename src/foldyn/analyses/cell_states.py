@@ -141,12 +141,17 @@ def cell_states(case_file: CaseFile, mass: str, given: Mapping[str, Any]) -> lis
 
 @contextmanager
 def _placed(vary: Varied | None, value: Any) -> Iterator[None]:
+    if vary is None:
+        yield
+        return
+    where = f"{vary.key} = {show(value)}"
     try:
         yield
-    except (InputError, ComputationError) as error:
-        if vary is None:
-            raise
-        raise type(error)(f"with {vary.key} = {show(value)}: {error}") from None
+    except InputError as error:
+        reason = f"{error.reason} (with {where})"
+        raise InputError(reason, error.field, error.file, error.others) from None
+    except ComputationError as error:
+        raise ComputationError(f"{where}: {error}") from None
 
 
 def coordinate(vary: Varied) -> tuple[str, NDArray, dict[str, str]]:

@@ -100,10 +100,10 @@ def parser() -> argparse.ArgumentParser:
 
     bands = commands.add_parser(
         "bands",
-        help="bands of Bloch waves in the sheet that repeats the pattern of a case file of any kind",
-        description="Frequencies of Bloch waves in a sheet, chain or tube whose cell is the pattern "
-        "of a case file of any kind; what its [analysis] says, if it is of kind bands, holds unless "
-        "given here.",
+        help="bands of the sheet, chain or tube that repeats the pattern of a case file",
+        description="Frequencies of Bloch waves in a sheet, chain or tube whose cell is the "
+        "pattern of a case file of any kind; what its [analysis] says, if it is of kind bands, "
+        "holds unless given here.",
     )
     _add_common(bands, "bands", film=False)
     bands.add_argument("--count", type=integer, help="how many bands (default: 6)")

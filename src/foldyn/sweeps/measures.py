@@ -437,9 +437,7 @@ def _of_band(values: NDArray, band: int) -> NDArray:
 
 def _one_state(result: xr.Dataset) -> None:
     if "state" in result.dims:
-        raise InputError(
-            "is of one state; leave out analysis.vary, and vary its key in the sweep"
-        )
+        raise InputError("is of one state; leave out analysis.vary, and vary its key in the sweep")
 
 
 # ------------------------------------------------------------- comparison with the shell
