@@ -171,3 +171,18 @@ def test_files_of_other_kinds_are_cells_without_supports_and_loads(tmp_path):
     cell = cell_at(60.0)
     own = fd.bands(cell, cell.path("G-X", 4), 3)
     np.testing.assert_array_equal(read.run()["frequency"], own["frequency"])
+
+
+def test_a_stored_state_that_does_not_repeat_is_named(tmp_path):
+    """One corner that is pushed up moves no other one."""
+    cell = cell_at(60.0)
+    held = [fd.Fix([0, 2, 6], "xyz"), fd.Impose([8], "z", 0.02)]
+    path = fd.trace(fd.Case(cell.case.structure, held), load_factors=[0.0, 1.0])
+    fd.save(path, tmp_path / "path.nc")
+    text = BANDS_TEXT + '[initial]\nfile = "path.nc"\n'
+    few = {"zone": 0, "attenuation": 0, "points": 5}
+    found = case_file(tmp_path, text, vary={"initial.at": [0]}, **few).run()
+    own = fd.bands(cell, cell.path("G-X-M-Y-G", 5), 5)
+    np.testing.assert_allclose(found["frequency"][0], own["frequency"], rtol=1e-6, atol=1e-9)
+    with pytest.raises(InputError, match=r"initial: does not repeat.*\(with initial\.at = 1\)"):
+        case_file(tmp_path, text, vary={"initial.at": [0, 1]}, **few).run()

@@ -109,9 +109,14 @@ class CellState:
 
     @contextmanager
     def placed(self) -> Iterator[None]:
-        """Say in which state something is wrong."""
+        """Say in which state something is wrong, and that a stored one is."""
         with _placed(self.varied, self.value):
-            yield
+            try:
+                yield
+            except InputError as error:
+                if error.field != "state" or not self.start:
+                    raise
+                raise InputError(error.reason, "initial") from None
 
 
 def cell_states(case_file: CaseFile, mass: str, given: Mapping[str, Any]) -> list[CellState]:

@@ -381,7 +381,7 @@ def _gap_center(result: xr.Dataset, case: Case, band: int, leg: str = ALL) -> fl
 @_measure(BANDS, doc="width of the gap above a band over its middle; below 0: an overlap")
 def _relative_gap(result: xr.Dataset, case: Case, band: int, leg: str = ALL) -> float:
     bottom, top = _gap_ends(result, band, leg)
-    return 2.0 * (top - bottom) / (bottom + top) if top > 0.0 else np.nan
+    return 2.0 * (top - bottom) / (bottom + top) if bottom + top > 0.0 else np.nan
 
 
 @_measure(BANDS, units="Hz", doc="width of the widest full gap")
