@@ -154,7 +154,7 @@ export class Bands extends Analysis {
       if (this.band !== before && shown[0].zone) page.charts();
     };
     this.chart(host, {
-      label: "frequencies of the bands along the path", xlabel: "", ylabel: "frequency (Hz)", curves, free: true,
+      label: "frequencies of the bands along the path", xlabel: "wave vector", ylabel: "frequency (Hz)", curves, free: true,
       all: true, height: 330, ticks: { x: about.ticks }, seek,
       ranges: { x: [0, about.path.at(-1)], y: [0, this.highest] },
       shaded: shown[0].gaps.filter(([state]) => state === this.state).map(([, , low, high]) => [low, high]),
@@ -193,7 +193,7 @@ export class Bands extends Analysis {
     const sorted = curves.flatMap(({ y }) => y).filter(Number.isFinite).sort((a, b) => a - b);
     const most = 1.3 * sorted[Math.floor(0.9 * sorted.length)] || 1; // ratios grow without end toward Γ
     this.chart(host, {
-      label: "damping ratios of the waves along the path", xlabel: "", ylabel: "damping (%)", curves, free: true,
+      label: "damping ratios of the waves along the path", xlabel: "wave vector", ylabel: "damping (%)", curves, free: true,
       ticks: { x: about.ticks }, ranges: { x: [0, about.path.at(-1)], y: [0, most] }, follow: () => [0, []],
     });
   }
