@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import foldyn as fd
-from foldyn.linear.band_structure import Solver
 from foldyn.linear.bloch import null_space
 from foldyn.linear.linearized_cell import linearize_cell
+from foldyn.linear.wave_solver import WaveSolver
 
 SHEET = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3, density=1000.0)
 CENTIMETERS = {"miura": {"a": 0.03, "b": 0.031}, "eggbox": {"a": 0.03, "b": 0.04}}
@@ -45,11 +45,11 @@ def eigenvalues(cell: fd.UnitCell, phases: Any, **state: Any) -> NDArray[np.floa
     bloch = linearize_cell(cell, **state).bloch
     found = []
     for phase in np.atleast_2d(phases):
-        count = len(Solver(bloch, 1).free)
+        free = WaveSolver(bloch, 1).free
+        count = len(free)
         if not bloch.ties.empty:
-            free = Solver(bloch, 1).free
             count = null_space(bloch.ties.at(bloch.factors(phase))[:, free]).shape[1]
-        found.append(Solver(bloch, count).waves(phase).values)
+        found.append(WaveSolver(bloch, count).waves(phase).values)
     return np.sort(np.concatenate(found))
 
 

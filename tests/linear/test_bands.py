@@ -285,7 +285,7 @@ def test_large_cells_are_solved_as_small_ones_are(monkeypatch):
     pattern = fd.patterns.miura(a=0.03, b=0.031)
     cell = fd.UnitCell(fd.Case(fd.shell(pattern, SHEET, divisions=2)))
     full = fd.bands(cell, [[0.7, 0.4], [0.0, 0.0]], 8, track=False)
-    monkeypatch.setattr("foldyn.linear.band_structure.DENSE", 1)
+    monkeypatch.setattr("foldyn.linear.wave_solver.DENSE", 1)
     few = fd.bands(cell, [[0.7, 0.4], [0.0, 0.0]], 8, track=False)
     top = float(full.eigenvalue.max())
     assert few.eigenvalue.values == pytest.approx(full.eigenvalue.values, abs=1e-9 * top)

@@ -4,148 +4,25 @@ from __future__ import annotations
 
 import time
 import warnings
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, sparse
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
-from threadpoolctl import threadpool_limits
 
 from foldyn.cases import State
-from foldyn.errors import ComputationError, FoldynWarning, InputError
-from foldyn.linear.bloch import Bloch, null_space
+from foldyn.errors import FoldynWarning
 from foldyn.linear.group_velocity import Waves, slopes_of
-from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
+from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.tracking import tracked
 from foldyn.linear.unit_cell import UnitCell
+from foldyn.linear.wave_solver import WaveSolver
 from foldyn.linear.zone import checked_phases
 from foldyn.values import flag, whole
-from foldyn.workers import processors
 
 if TYPE_CHECKING:
     import xarray
 
-DENSE = 500  # dofs up to which a problem is solved with full matrices
-GUARD = 3  # waves beyond those asked for, that none is missed where several coincide
-EPS = float(np.finfo(float).eps)
-ROUNDING = 1e-15  # of |phi|' |K| |phi|: what counts as zero
-SHIFT = 1e-6  # of the pencil's scale: the shift below zero
-NOISE = 30.0  # times the rounding of the largest entries: what counts as zero, too
 TURN = 2.0 * np.pi
-
-
-@dataclass(frozen=True, eq=False)
-class Solver:
-    """Solves for the waves of a cell, one phase after the other.
-
-    The dofs that are free keep their order; hidden ones are condensed, constraints met by motions
-    that span what they leave.
-    """
-
-    bloch: Bloch
-    count: int
-
-    @property
-    def free(self) -> NDArray[np.int64]:
-        """Dofs with mass that are not held."""
-        bloch = self.bloch
-        return np.flatnonzero(~bloch.held & ~bloch.hidden)
-
-    def waves(self, phase: NDArray) -> Waves:
-        """The lowest waves of a phase (d,)."""
-        bloch = self.bloch
-        if bloch.size > DENSE and bloch.ties.empty:
-            return self._sparse(phase)
-        factors = bloch.factors(phase)
-        stiffness, mass = bloch.stiffness.at(factors), bloch.mass.at(factors)
-        free, hidden = self.free, np.flatnonzero(bloch.hidden)
-        own = stiffness[np.ix_(free, free)]
-        follow = np.zeros((0, len(free)))
-        if len(hidden):
-            across = stiffness[np.ix_(hidden, free)]
-            follow = -linalg.solve(stiffness[np.ix_(hidden, hidden)], across, assume_a="her")
-            own = own + across.conj().T @ follow
-        inert = mass[np.ix_(free, free)]
-        lumped = None if bloch.lumped is None else bloch.lumped[free]
-        basis = None
-        if not bloch.ties.empty:
-            basis = null_space(bloch.ties.at(factors)[:, free])
-            own, inert, lumped = basis.conj().T @ own @ basis, basis.conj().T @ inert @ basis, None
-        if len(own) < self.count:
-            raise InputError(
-                f" = {self.count}: supports, links and rigid panels leave {len(own)} motions at "
-                f"the phases {phase.round(6).tolist()}; ask for no more bands",
-                "count",
-            )
-        values, motions, noise = lowest_dense(own, inert, lumped, self.count)
-        if basis is not None:
-            motions = basis @ motions
-        shapes = np.zeros((bloch.size, len(values)), complex)
-        shapes[free] = motions
-        if len(hidden):
-            shapes[hidden] = follow @ motions
-        return Waves(self._rounded(values, shapes, stiffness, noise), shapes)
-
-    def _rounded(
-        self, values: NDArray, shapes: NDArray, stiffness: Any, least: float = 0.0
-    ) -> NDArray:
-        """Eigenvalues with those that are zero to rounding as zeros."""
-        size = np.abs(shapes)
-        noise = ROUNDING * np.einsum("ik,ik->k", size, abs(stiffness) @ size)
-        return np.where(np.abs(values) <= np.maximum(noise, least), 0.0, values)
-
-    def _sparse(self, phase: NDArray) -> Waves:
-        """The same by Lanczos iteration about a shift below zero."""
-        bloch = self.bloch
-        factors = bloch.factors(phase)
-        kept = np.flatnonzero(~bloch.held)
-        stiffness = bloch.stiffness.sparse_at(factors)[kept][:, kept]
-        mass = bloch.mass.sparse_at(factors)[kept][:, kept]
-        scale = stiffness.diagonal().real.sum() / mass.diagonal().real.sum()
-        shift = -SHIFT * scale
-        factor = splu(sparse.csc_array(stiffness - shift * mass))
-        inverse = LinearOperator(stiffness.shape, factor.solve, dtype=complex)
-        values, motions = eigsh(
-            stiffness, self.count + GUARD, mass, sigma=shift, OPinv=inverse, v0=_start(len(kept))
-        )
-        order = np.argsort(values)[: self.count]
-        motions = motions[:, order]
-        size = np.sqrt(np.einsum("ik,ik->k", motions.conj(), mass @ motions).real)
-        shapes = np.zeros((bloch.size, self.count), complex)
-        shapes[kept] = motions / size
-        whole_stiffness = bloch.stiffness.sparse_at(factors)
-        return Waves(self._rounded(values[order], shapes, whole_stiffness), shapes)
-
-
-def _start(size: int) -> NDArray[np.complex128]:
-    """Where the iteration begins: the same every time."""
-    parts = np.random.default_rng(0).normal(size=(2, size))
-    return parts[0] + 1j * parts[1]
-
-
-def lowest_dense(
-    stiffness: NDArray, mass: NDArray, lumped: NDArray | None, count: int
-) -> tuple[NDArray, NDArray, float]:
-    """Lowest eigenvalues (k,), motions (n, k) with phi^H M phi = 1, and rounding of the values."""
-    diagonal = np.diag(mass).real if lumped is None else lumped
-    noise = NOISE * EPS * float((np.diag(stiffness).real / diagonal).max())
-    wanted = [0, count - 1]
-    if lumped is None:
-        try:
-            values, motions = linalg.eigh(
-                stiffness, mass, subset_by_index=wanted, check_finite=False
-            )
-        except linalg.LinAlgError:
-            raise ComputationError("a free node of the cell has no mass") from None
-        return values, motions, noise
-    root = 1.0 / np.sqrt(lumped)
-    values, motions = linalg.eigh(
-        root[:, None] * stiffness * root, subset_by_index=wanted, driver="evx", check_finite=False
-    )
-    return values, root[:, None] * motions, noise
 
 
 def bands(
@@ -236,8 +113,7 @@ def bands(
     count = whole("count", count, least=1)
     began = time.perf_counter()
     linear = linearize_cell(cell, state, secant, load_factor)
-    solver = Solver(linear.bloch, count)
-    found = waves_at(solver, given)
+    found = WaveSolver(linear.bloch, count).at(given)
     if asked[3]:
         found = tracked(linear.bloch, given, found)
     values = np.array([each.values for each in found])
@@ -269,7 +145,7 @@ def bands(
         shapes = [linear.expanded(w.shapes, k) for k, w in zip(given, found, strict=True)]
         data["shape"] = (("phase", "band", "node", "axis"), np.array(shapes), {"units": "m"})
     if asked[2]:
-        shares = [polarizations(linear, k, w) for k, w in zip(given, found, strict=True)]
+        shares = [polarizations(linear.nodes, each) for each in found]
         data["polarization"] = (("phase", "band", "axis"), np.array(shares), {"units": ""})
     coords: dict[str, Any] = {
         "band": ("band", 1 + np.arange(count)),
@@ -295,16 +171,8 @@ def bands(
     return xarray.Dataset(data, coords, attributes)
 
 
-def waves_at(solver: Solver, phases: NDArray) -> list[Waves]:
-    """Waves of each phase (n, d), on all processors."""
-    with threadpool_limits(1), ThreadPoolExecutor(processors()) as pool:
-        return list(pool.map(solver.waves, phases))
-
-
-def polarizations(linear: LinearizedCell, phase: NDArray, waves: Waves) -> NDArray[np.float64]:
-    """Shares (k, 3) of the directions in the kinetic energy of waves."""
-    count = 3 * linear.nodes
-    momentum = (linear.bloch.mass.sparse_at(linear.bloch.factors(phase)) @ waves.shapes)[:count]
-    energy = (waves.shapes[:count].conj() * momentum).real
-    shares = energy.reshape(linear.nodes, 3, -1).sum(axis=0).T
+def polarizations(nodes: int, waves: Waves) -> NDArray[np.float64]:
+    """Shares (k, 3) of the directions in the kinetic energy of waves of so many nodes."""
+    energy = (waves.shapes.conj() * waves.momentum)[: 3 * nodes].real
+    shares = energy.reshape(nodes, 3, -1).sum(axis=0).T
     return shares / shares.sum(axis=1, keepdims=True)

@@ -124,7 +124,26 @@ class Bloch:
         values = mass.values[:, here].toarray()[:, 0]
         if (values == 0.0).any():
             return None
-        return np.bincount(mass.rows, values, self.size)
+        return np.bincount(mass.rows, values, self.size).astype(float)
+
+    @cached_property
+    def nodal(self) -> Hops | None:
+        """The mass of nodes (n/3, n/3), kg, where it serves the three axes alike; else None."""
+        mass, nodes = self.mass, int((~self.hidden).sum()) // 3
+        axis = mass.rows % 3
+        if (axis != mass.columns % 3).any() or mass.rows.max(initial=0) >= 3 * nodes:
+            return None
+        parts = [np.flatnonzero(axis == k) for k in range(3)]
+        rows, columns, values = zip(
+            *((mass.rows[p] // 3, mass.columns[p] // 3, mass.values[p]) for p in parts), strict=True
+        )
+        alike = all(
+            np.array_equal(rows[0], rows[k])
+            and np.array_equal(columns[0], columns[k])
+            and abs(values[0] - values[k]).max() <= ALIKE * abs(values[0]).max()
+            for k in (1, 2)
+        )
+        return Hops(rows[0], columns[0], values[0], (nodes, nodes)) if alike else None
 
 
 def hermitian(own: Hops, steps: NDArray, what: str) -> Hops:

@@ -138,7 +138,7 @@ class Repeated:
         ):
             return [replace(part, nodes=self._nodes(nodes, field))]
         if getattr(part, "axes", None) is not None:
-            part = [replace(part, axes=None, direction=axis) for axis in part.axes]
+            part = [replace(part, axes=None, direction=axis) for axis in part.axes or ""]
         elif part.direction is None:  # alike in all directions
             return [replace(part, nodes=self._nodes(nodes, field))]
         first: dict[Any, Step] = {}  # partners count once

@@ -126,5 +126,5 @@ def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex
     found = shift + 1.0 / eigs(operator, wanted, v0=start, return_eigenvectors=False)
     noise = NOISE * shift  # a double root of zero is one to the root of rounding
     found = np.where(np.abs(found) <= noise, 0.0, found)
-    upper = found[found.imag >= -noise]
+    upper = found[np.imag(found) >= -noise]
     return upper[np.argsort(np.abs(upper), kind="stable")][:count]

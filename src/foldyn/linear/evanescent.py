@@ -123,7 +123,8 @@ def attenuation(
         found = phases_of(Reach(parts[0].steps, blocks), linear.bloch.ties.empty)
         found = _forward(found, both=phase == 0.0)[:count]
         out[row, : len(found)] = found
-    least = np.nan_to_num(out.imag.min(axis=1, initial=FASTEST, where=~np.isnan(out.imag)), nan=0.0)
+    decay = np.imag(out)
+    least = decay.min(axis=1, initial=FASTEST, where=~np.isnan(decay))
     return xarray.Dataset(
         {
             "phase": (("frequency", "wave"), out, {"units": "rad"}),
@@ -151,17 +152,18 @@ def _bordered(dynamic: NDArray, ties: NDArray) -> NDArray[np.complex128]:
     """Blocks with the forces of constraints (s, k, n) as further unknowns."""
     count = ties.shape[1]
     if not count:
-        return dynamic
+        return dynamic.astype(complex)
     scale = np.abs(dynamic).max()
     turned = ties[::-1].conj().transpose(0, 2, 1)  # G^H at 1 / lambda*
     none = np.zeros((len(ties), count, count))
-    return np.concatenate(
+    out = np.concatenate(
         [
             np.concatenate([dynamic, scale * turned], axis=2),
             np.concatenate([scale * ties, none], axis=2),
         ],
         axis=1,
     )
+    return out.astype(complex)
 
 
 def phases_of(reach: Reach, condense: bool = True) -> NDArray[np.complex128]:
@@ -206,8 +208,8 @@ def _forward(phases: NDArray, both: bool) -> NDArray[np.complex128]:
 
     both : whether waves with k and -k have one frequency, of which one is told.
     """
-    kept = phases.imag > TRAVELS
-    travels = np.abs(phases.imag) <= TRAVELS
-    kept |= travels & (phases.real >= -TRAVELS if both else True)
-    found = np.where(travels, phases.real + 0j, phases)[kept]
-    return found[np.lexsort((found.real, found.imag))]
+    real, decay = np.real(phases), np.imag(phases)
+    travels = np.abs(decay) <= TRAVELS
+    kept = (decay > TRAVELS) | (travels & (real >= -TRAVELS if both else True))
+    found = np.where(travels, real + 0j, phases)[kept]
+    return found[np.lexsort((np.real(found), np.imag(found)))]

@@ -18,10 +18,23 @@ DEGENERATE = 1e-10  # of the largest of some eigenvalues: those that are one
 
 
 class Waves(NamedTuple):
-    """Waves of one phase: eigenvalues (k,), rad2/s2, and motions (n, k) of all dofs of a cell."""
+    """Waves of one phase.
+
+    Attributes
+    ----------
+    values : (k,)
+        Eigenvalues, rad2/s2.
+    shapes, momentum : (n, k)
+        Motions phi of all dofs of a cell, phi^H M phi = 1, and M phi.
+    """
 
     values: NDArray
     shapes: NDArray
+    momentum: NDArray
+
+    def ordered(self, order: NDArray) -> Waves:
+        """The same in another order."""
+        return Waves(self.values[order], self.shapes[:, order], self.momentum[:, order])
 
 
 def slopes_of(bloch: Bloch, phase: NDArray, waves: Waves) -> NDArray[np.float64]:
@@ -47,8 +60,8 @@ def eigenvalue_slopes(
     bloch: Bloch, phase: NDArray, waves: Waves, way: NDArray
 ) -> NDArray[np.complex128]:
     """phi^H (dK - lambda dM) phi, (k, k), along a direction (d,) of the phases."""
-    values, shapes = waves
-    slope = sum(way[j] * bloch.slopes(phase, j) for j in range(len(way)))
+    values, shapes, momentum = waves
+    slope = np.sum([part * bloch.slopes(phase, j) for j, part in enumerate(way)], axis=0)
     mean = 0.5 * (values[:, None] + values)
     change = shapes.conj().T @ (bloch.stiffness.sparse_at(slope) @ shapes)
     change = change - mean * (shapes.conj().T @ (bloch.mass.sparse_at(slope) @ shapes))
@@ -56,7 +69,7 @@ def eigenvalue_slopes(
         factors = bloch.factors(phase)
         free = ~bloch.held & ~bloch.hidden
         force = bloch.stiffness.sparse_at(factors) @ shapes
-        force = force - (bloch.mass.sparse_at(factors) @ shapes) * values
+        force = force - momentum * values
         rows = bloch.ties.at(factors)[:, free]
         push = -np.linalg.lstsq(rows.conj().T, force[free], rcond=None)[0]
         turning = push.conj().T @ (bloch.ties.sparse_at(slope) @ shapes)
@@ -78,8 +91,7 @@ def separated(bloch: Bloch, phase: NDArray, waves: Waves, way: NDArray) -> Waves
     if not groups or not way.any():
         return waves
     change = eigenvalue_slopes(bloch, phase, waves, way)
-    shapes = waves.shapes.copy()
+    turn = np.eye(len(waves.values), dtype=complex)
     for group in groups:
-        turned = np.linalg.eigh(change[np.ix_(group, group)])[1]
-        shapes[:, group] = waves.shapes[:, group] @ turned
-    return Waves(waves.values, shapes)
+        turn[np.ix_(group, group)] = np.linalg.eigh(change[np.ix_(group, group)])[1]
+    return Waves(waves.values, waves.shapes @ turn, waves.momentum @ turn)

@@ -24,8 +24,6 @@ def tracked(bloch: Bloch, phases: NDArray, waves: Sequence[Waves]) -> list[Waves
         way = phases[k] - phases[k - 1]
         before = separated(bloch, phases[k - 1], out[-1], way)
         here = separated(bloch, phases[k], waves[k], way)
-        mass = bloch.mass.sparse_at(bloch.factors(phases[k]))
-        overlap = np.abs(before.shapes.conj().T @ (mass @ here.shapes)) ** 2
-        order = linear_sum_assignment(overlap, maximize=True)[1]
-        out.append(Waves(here.values[order], here.shapes[:, order]))
+        overlap = np.abs(before.shapes.conj().T @ here.momentum) ** 2
+        out.append(here.ordered(linear_sum_assignment(overlap, maximize=True)[1]))
     return out

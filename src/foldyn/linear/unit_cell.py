@@ -241,7 +241,9 @@ class UnitCell:
         return zone_grid(self.dimensions, count)
 
 
-def images(motions: Sequence[Screw], points: ArrayLike, step: Sequence[int]) -> NDArray[np.float64]:
+def images(
+    motions: Sequence[Screw], points: ArrayLike, step: Sequence[int] | NDArray[np.int64]
+) -> NDArray[np.float64]:
     """Where motions, each as often as `step` says, bring points (n, 3), m."""
     out = np.asarray(points, float)
     for motion, power in zip(motions, step, strict=True):
@@ -249,7 +251,9 @@ def images(motions: Sequence[Screw], points: ArrayLike, step: Sequence[int]) -> 
     return out
 
 
-def rotation(motions: Sequence[Screw], step: Sequence[int]) -> NDArray[np.float64]:
+def rotation(
+    motions: Sequence[Screw], step: Sequence[int] | NDArray[np.int64]
+) -> NDArray[np.float64]:
     """Rotation (3, 3) of motions, each as often as `step` says."""
     out = np.eye(3)
     for motion, power in zip(motions, step, strict=True):
