@@ -74,7 +74,7 @@ def test_frequencies_and_damping_of_modes(results):
 
 def test_gaps_of_bands_are_those_of_the_table(results):
     """Signed: a gap of the table where it is above 0, an overlap of neighbors below."""
-    case_file, bands = results["bands"]
+    _, bands = results["bands"]
     where = zip(bands["gap_direction"].values, bands["gap_below"].values, strict=True)
     table = {pair: k for k, pair in enumerate(where)}
     assert ("X-M", 4) in table

@@ -44,7 +44,7 @@ def waves(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
     about = {
         "frequency": arrays.exact(f"{key}.f", first["frequency"].values, "f4"),
         "displacement": arrays.changing(
-            f"{key}.u", np.stack([kept.real, kept.imag], axis=1), OF_SHAPES
+            f"{key}.u", np.stack([np.real(kept), np.imag(kept)], axis=1), OF_SHAPES
         ),
         "every": every,
         "sizes": [count, phases, bands],
