@@ -301,7 +301,7 @@ def _check_vertices(schema: Any, count: int) -> None:
     }
     until = getattr(schema.analysis, "until", None)
     places |= {} if until is None else {"analysis.until.node": (until.node,)}
-    places["output.nodes"] = schema.output.nodes
+    places["output.nodes"] = getattr(schema.output, "nodes", None)
     for place, nodes in places.items():
         if nodes is None or isinstance(nodes, str):
             continue

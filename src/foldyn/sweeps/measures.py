@@ -356,7 +356,7 @@ def _band_frequencies(result: xr.Dataset, case: Case) -> NDArray:
     return _in_order(result)
 
 
-@_measure(BANDS, units="Hz", doc="frequency at a point of the path")
+@_measure(BANDS, units="Hz", doc="frequency")
 def _band(result: xr.Dataset, case: Case, band: int, point: str) -> float:
     ticks = np.atleast_1d(result.attrs["ticks"])
     at = dict(zip(result.attrs["tick_labels"].split("-"), ticks.tolist(), strict=True))
@@ -366,19 +366,19 @@ def _band(result: xr.Dataset, case: Case, band: int, point: str) -> float:
     return float(_of_band(_in_order(result), band)[k])
 
 
-@_measure(BANDS, units="Hz", doc="width of the gap above a band; below 0: an overlap")
+@_measure(BANDS, units="Hz", doc="width of the gap above")
 def _band_gap(result: xr.Dataset, case: Case, band: int, leg: str = ALL) -> float:
     bottom, top = _gap_ends(result, band, leg)
     return top - bottom
 
 
-@_measure(BANDS, units="Hz", doc="middle of the gap above a band")
+@_measure(BANDS, units="Hz", doc="middle of the gap above")
 def _gap_center(result: xr.Dataset, case: Case, band: int, leg: str = ALL) -> float:
     bottom, top = _gap_ends(result, band, leg)
     return 0.5 * (bottom + top)
 
 
-@_measure(BANDS, doc="width of the gap above a band over its middle; below 0: an overlap")
+@_measure(BANDS, doc="relative width of the gap above")
 def _relative_gap(result: xr.Dataset, case: Case, band: int, leg: str = ALL) -> float:
     bottom, top = _gap_ends(result, band, leg)
     return 2.0 * (top - bottom) / (bottom + top) if bottom + top > 0.0 else np.nan

@@ -75,14 +75,15 @@ export class Analysis {
     return this.plots;
   }
 
-  // A chart in a new place, with the names of its curves below if there are several. `follow` tells
-  // it the moment: its place along the curves, and the curves' points there.
+  // A chart in a new place, with the names of its curves below if there are several, and unless
+  // `named` is false. `follow` tells it the moment: its place along the curves, and the curves' points
+  // there.
   chart(host, options) {
     const place = document.createElement("div");
     host.append(place);
     const plot = new Chart(place, options);
     plot.follow = () => plot.show(...options.follow(plot));
-    if (options.curves.length > 1) host.append(keys(plot, this.hidden, this.plots.length));
+    if (options.curves.length > 1 && options.named !== false) host.append(keys(plot, this.hidden, this.plots.length));
     this.plots.push(plot);
     return plot;
   }

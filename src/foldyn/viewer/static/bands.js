@@ -142,9 +142,9 @@ export class Bands extends Analysis {
     const { page } = this;
     const { about, shown } = page;
     const [, , bands] = shown[0].sizes;
-    const curves = shown.flatMap((result, r) => Array.from({ length: bands }, (_, band) => ({
-      name: shown.length > 1 ? (band ? "" : result.name) : `${band + 1}`,
-      color: CURVES[page.theme][(shown.length > 1 ? result.index : band) % 8], dash: DASHES[r % 5],
+    const curves = shown.flatMap((result) => Array.from({ length: bands }, (_, band) => ({
+      name: shown.length > 1 ? `${result.name}, band ${band + 1}` : `${band + 1}`,
+      color: CURVES[page.theme][(shown.length > 1 ? result.index : band) % 8], dash: [],
       x: about.path, y: about.path.map((_, k) => result.hertz(this.state, k, band)),
     })));
     const seek = (k, curve) => {
@@ -155,7 +155,7 @@ export class Bands extends Analysis {
     };
     this.chart(host, {
       label: "frequencies of the bands along the path", xlabel: "wave vector", ylabel: "frequency (Hz)", curves, free: true,
-      all: true, height: 330, ticks: { x: about.ticks }, seek,
+      all: true, named: shown.length < 2, height: 330, ticks: { x: about.ticks }, seek,
       ranges: { x: [0, about.path.at(-1)], y: [0, this.highest] },
       shaded: shown[0].gaps.filter(([state]) => state === this.state).map(([, , low, high]) => [low, high]),
       follow: () => {
@@ -173,7 +173,7 @@ export class Bands extends Analysis {
     const count = attenuation.length / legs.length / (this.page.about.states.length || 1);
     const from = (values, row) => [...values.subarray(row * count, (row + 1) * count)];
     const curves = legs.map((name, leg) => ({
-      name, color: CURVES[this.page.theme][leg % 8], dash: DASHES[leg % 5],
+      name, color: CURVES[this.page.theme][leg % 8], dash: [],
       x: from(attenuation, this.state * legs.length + leg), y: from(every, this.state),
     }));
     const reach = 1.04 * Math.max(...curves.flatMap(({ x }) => x)) || 1;
@@ -187,7 +187,7 @@ export class Bands extends Analysis {
     const { about, shown: [{ damping, sizes: [, phases, bands] }] } = this.page;
     if (!damping) return;
     const curves = Array.from({ length: bands }, (_, band) => ({
-      name: `${band + 1}`, color: CURVES[this.page.theme][band % 8], dash: DASHES[0],
+      name: `${band + 1}`, color: CURVES[this.page.theme][band % 8], dash: [],
       x: about.path, y: about.path.map((_, k) => 100 * damping[(this.state * phases + k) * bands + band]),
     }));
     const sorted = curves.flatMap(({ y }) => y).filter(Number.isFinite).sort((a, b) => a - b);
@@ -231,7 +231,8 @@ export class Bands extends Analysis {
     const colors = ramp("sequential");
     const lines = levels(low, high, LINES);
     const curves = lines.map((level, k) => {
-      const at = 4 * Math.round(70 + (170 * k) / (lines.length - 1 || 1));
+      const from = this.page.theme === "dark" ? 20 : 70;
+      const at = 4 * Math.round(from + (160 * k) / (lines.length - 1 || 1));
       const pieces = contour(values, n, level);
       return {
         name: `${number(level, 4)} Hz`, color: `rgb(${[...colors.slice(at, at + 3)].join(", ")})`, dash: [],
