@@ -51,7 +51,7 @@ def test_states_have_the_bands_of_their_cells(found):
         zone = fd.bands(cell, cell.grid(6), 5, track=False)
         np.testing.assert_array_equal(here["zone_frequency"], zone["frequency"])
         np.testing.assert_array_equal(here["position"], cell.case.structure.nodes)
-        np.testing.assert_allclose(here["period_shift"], cell.vectors)
+        np.testing.assert_allclose(here["vectors"], cell.vectors)
 
 
 def test_gaps_are_those_of_the_whole_zone_and_of_legs(found):
@@ -106,7 +106,7 @@ def test_stretched_periods_are_those_of_the_state(tmp_path):
     np.testing.assert_allclose(
         pulled["frequency"][0], rest["frequency"][0], rtol=0, atol=1e-6 * top
     )
-    shifts = pulled["period_shift"].values
+    shifts = pulled["vectors"].values
     np.testing.assert_allclose(shifts[1], 1.005 * shifts[0], rtol=1e-9, atol=1e-12)
     assert (np.abs(pulled["frequency"][1] - pulled["frequency"][0]).max() > 1e-3 * top).item()
 
@@ -127,7 +127,7 @@ screw = {{ axis = "z", angle = 30, shift = 0.05 }}
     marked = fd.bands(cell, cell.path("G-X", 5))["eigenvalue"].values
     noise = 1e-9 * np.abs(marked).max()
     np.testing.assert_allclose(np.sort(own["eigenvalue"]), np.sort(marked), rtol=0, atol=noise)
-    assert own["period_turn"].values.tolist() == [30.0]
+    assert own["angles"].values.tolist() == [30.0]
 
 
 @pytest.mark.parametrize(

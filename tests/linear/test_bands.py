@@ -295,7 +295,19 @@ def test_states_that_are_no_equilibrium_are_told():
     moved = kresling().case.structure.nodes * [0.0, 0.0, 0.001]
     with pytest.warns(FoldynWarning, match="no equilibrium of the repeated sheet"):
         b = fd.bands(kresling(), [[0.5]], 2, state=fd.State(moved))
-    assert b.attrs["vectors"] == pytest.approx(np.array([[0.0, 0.0, 0.03003]]))
+    assert b.vectors.values == pytest.approx(np.array([[0.0, 0.0, 0.03003]]))
+
+
+def test_bands_are_stored_with_their_case(tmp_path):
+    b = fd.bands(miura(), miura().path("G-X", 3), 2, shape=True)
+    fd.save(b, tmp_path / "bands.nc")
+    again = fd.load(tmp_path / "bands.nc")
+    assert np.array_equal(again["shape"].values, b["shape"].values)
+    assert again.attrs["tick_labels"] == "G-X"
+    cell = fd.UnitCell(fd.case_of(again))
+    assert fd.bands(cell, again.wave_vector, 2).frequency.values == pytest.approx(
+        b.frequency.values, abs=1e-6
+    )
 
 
 def test_bands_refuse_what_they_cannot_do():

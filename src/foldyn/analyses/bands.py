@@ -33,12 +33,6 @@ MOST_ZONE = 200
 MOST_LEVELS = 10_000
 ABOVE = 1.05
 """Where the frequencies of an attenuation spectrum end, over the highest one of the bands."""
-OF_STATE = {
-    "period_shift": "vectors", "period_turn": "angles", "period_axis": "axes",
-    "period_point": "points", "residual": "residual",
-}  # fmt: skip
-"""Variables that `bands` has as attributes."""
-OF_WAVES = tuple(name for name in BANDS if name not in OF_STATE)
 COORDINATES = ("distance", "wave_vector", "zone_wave_vector", "leg")
 
 
@@ -155,9 +149,8 @@ def _bands(state: CellState, path: xarray.DataArray, given: Mapping[str, Any]) -
         damped = damped_bands(cell, path, count, **own)
         found["damped_frequency"] = ("phase", "band"), damped["frequency"].values
         found["damped_ratio"] = ("phase", "band"), damped["damping_ratio"].values
-    moved = state.displacement(own.get("state"))
-    found["displacement"] = ("node", "axis"), moved
-    found["position"] = ("node", "axis"), cell.case.structure.nodes + moved
+    found["position"] = found["rest_position"] + found["displacement"]
+    found["residual"] = (), found.attrs["residual"]
     return found.assign_attrs(gaps=gaps, wall_seconds=time.perf_counter() - began)
 
 
@@ -192,8 +185,7 @@ def _joined(
     def over(values: Sequence[Any]) -> NDArray:
         return np.asarray(values[0]) if vary is None else np.stack(values)
 
-    values = {name: over([one[name].values for one in found]) for name in OF_WAVES if name in first}
-    values |= {name: over([one.attrs[of] for one in found]) for name, of in OF_STATE.items()}
+    values = {name: over([one[name].values for one in found]) for name in BANDS if name in first}
     parts = [
         one.attrs["gaps"].assign(state=("gap", np.full(one.attrs["gaps"].sizes["gap"], k)))
         for k, one in enumerate(found)

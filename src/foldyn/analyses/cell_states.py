@@ -102,11 +102,6 @@ class CellState:
         ]  # fmt: skip
         return relaxed(cell, motions, state)
 
-    def displacement(self, state: State | None) -> NDArray[np.float64]:
-        """Displacements (n, 3) of a state, m."""
-        nodes = self.cell.case.structure.nodes
-        return np.zeros_like(nodes) if state is None else np.asarray(state.displacement, float)
-
     @contextmanager
     def placed(self) -> Iterator[None]:
         """Say in which state something is wrong, and that a stored one is."""

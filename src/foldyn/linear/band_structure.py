@@ -16,7 +16,8 @@ from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.tracking import tracked
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.linear.wave_solver import WaveSolver
-from foldyn.linear.zone import checked_phases
+from foldyn.linear.zone import checked_phases, of_phases
+from foldyn.results.dataset import result_dataset
 from foldyn.values import flag, whole
 
 if TYPE_CHECKING:
@@ -76,9 +77,9 @@ def bands(
         of the periods times their slopes), `shape` (complex, phi^H M phi = 1 kg m2 in a cell; copy
         R of a node moves as shape exp(i k . R), turned with a screw), and `polarization` (shares
         along x, y, z). Coordinate `wave_vector` (phase, period), rad, and what the phases bring
-        (`distance`; attributes `ticks`, `tick_labels`, `grid`). Attributes: `vectors` (m) of the
-        state, `angles` (degrees), `axes` and `points` (m) of the motions from a cell to the next,
-        `residual`.
+        (`distance`; attributes `ticks`, `tick_labels`, `grid`). Of the state: `vectors` (period,
+        axis), m, and `angles` (period), degrees, from a cell to the next, `axes` and `points` (m)
+        of screws, and `displacement`. Like other results it holds its case.
 
     Raises
     ------
@@ -99,14 +100,12 @@ def bands(
     --------
     >>> import foldyn as fd
     >>> sheet = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3, density=1000.0)
-    >>> pattern = fd.patterns.eggbox(a=0.03, b=0.03)
+    >>> pattern = fd.patterns.miura(a=0.03, b=0.03)
     >>> cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet)))
     >>> b = fd.bands(cell, cell.path("G-X-M-G", 12), count=4)
     >>> dict(b.frequency.sizes)
     {'phase': 12, 'band': 4}
     """
-    import xarray
-
     given = checked_phases(phases, cell.dimensions if isinstance(cell, UnitCell) else 1)
     asked = [flag(*pair) for pair in (("group_velocity", group_velocity), ("shape", shape),
              ("polarization", polarization), ("track", track))]  # fmt: skip
@@ -131,48 +130,33 @@ def bands(
         "frequency": (("phase", "band"), frequency, {"units": "Hz"}),
         "eigenvalue": (("phase", "band"), values, {"units": "rad2/s2"}),
     }
+    each = list(zip(given, found, strict=True))
     if asked[0]:
-        slopes = np.array(
-            [slopes_of(linear.bloch, k, w) for k, w in zip(given, found, strict=True)]
-        )
-        data["slope"] = (
-            ("phase", "band", "period"), slopes, {"units": "rad/s per rad"},
-        )  # fmt: skip
-        data["group_velocity"] = (
-            ("phase", "band", "axis"), slopes @ linear.vectors, {"units": "m/s"},
-        )  # fmt: skip
+        slopes = np.array([slopes_of(linear.bloch, phase, waves) for phase, waves in each])
+        speeds = slopes @ linear.vectors
+        data["slope"] = (("phase", "band", "period"), slopes, {"units": "rad/s"})
+        data["group_velocity"] = (("phase", "band", "axis"), speeds, {"units": "m/s"})
     if asked[1]:
-        shapes = [linear.expanded(w.shapes, k) for k, w in zip(given, found, strict=True)]
-        data["shape"] = (("phase", "band", "node", "axis"), np.array(shapes), {"units": "m"})
+        shapes = np.array([linear.expanded(waves.shapes, phase) for phase, waves in each])
+        data["shape"] = (("phase", "band", "node", "axis"), shapes, {"units": "m"})
     if asked[2]:
-        shares = [polarizations(linear.nodes, each) for each in found]
-        data["polarization"] = (("phase", "band", "axis"), np.array(shares), {"units": ""})
-    coords: dict[str, Any] = {
-        "band": ("band", 1 + np.arange(count)),
-        "wave_vector": (("phase", "period"), given, {"units": "rad"}),
-    }
-    if any("axis" in each[0] for each in data.values()):
-        coords["axis"] = ("axis", list("xyz"))
-    attributes: dict[str, Any] = {
-        "kind": "bands",
-        "vectors": linear.vectors,
-        "angles": np.array([motion.angle for motion in linear.motions]),
-        "axes": np.array([motion.unit for motion in linear.motions]),
-        "points": np.array([motion.point for motion in linear.motions]),
-        "residual": linear.residual,
+        shares = np.array([polarizations(linear.nodes, waves) for waves in found])
+        data["polarization"] = (("phase", "band", "axis"), shares, {"units": "1"})
+    along, attributes = of_phases(phases, given)
+    along["band"] = ("band", 1 + np.arange(count))
+    facts = {
+        "count": count,
         "tracked": int(asked[3]),
+        "secant": secant,
+        "residual": linear.residual,
+        "wall_seconds": time.perf_counter() - began,
     }
-    if isinstance(phases, xarray.DataArray):
-        if "distance" in phases.coords:
-            coords["distance"] = phases.coords["distance"]
-        attributes |= {key: phases.attrs[key] for key in ("ticks", "tick_labels", "grid")
-                       if key in phases.attrs}  # fmt: skip
-    attributes["wall_seconds"] = time.perf_counter() - began
-    return xarray.Dataset(data, coords, attributes)
+    result = result_dataset("bands", cell.case, data | linear.variables, along, facts)
+    return result.assign_attrs(attributes)
 
 
 def polarizations(nodes: int, waves: Waves) -> NDArray[np.float64]:
     """Shares (k, 3) of the directions in the kinetic energy of waves of so many nodes."""
-    energy = (waves.shapes.conj() * waves.momentum)[: 3 * nodes].real
-    shares = energy.reshape(nodes, 3, -1).sum(axis=0).T
+    energy = (waves.shapes.conj() * waves.momentum)[: 3 * nodes]
+    shares = np.real(energy).reshape(nodes, 3, -1).sum(axis=0).T
     return shares / shares.sum(axis=1, keepdims=True)

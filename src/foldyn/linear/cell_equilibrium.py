@@ -69,7 +69,7 @@ def relaxed(
     >>> pattern = fd.patterns.miura(a=0.03, b=0.03)
     >>> cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet)))
     >>> pulled = fd.linear.relaxed(cell, 1.01 * cell.vectors)
-    >>> fd.bands(cell, [[0.5, 0.5]], count=1, state=pulled).vectors.round(5).tolist()
+    >>> fd.bands(cell, [[0.5, 0.5]], count=1, state=pulled).vectors.values.round(5).tolist()
     [[0.03967, 0.0, 0.0], [0.0, 0.04008, 0.0]]
     """
     of_kind("cell", cell, UnitCell)

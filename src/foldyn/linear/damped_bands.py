@@ -18,7 +18,8 @@ from foldyn.errors import InputError
 from foldyn.linear.bloch import Bloch, null_space
 from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.unit_cell import UnitCell
-from foldyn.linear.zone import checked_phases
+from foldyn.linear.zone import checked_phases, of_phases
+from foldyn.results.dataset import result_dataset
 from foldyn.values import whole
 
 if TYPE_CHECKING:
@@ -69,32 +70,22 @@ def damped_bands(
     >>> round(float(found.rate.real[0, 0]), 6)
     -50.0
     """
-    import xarray
-
     given = checked_phases(phases, cell.dimensions if isinstance(cell, UnitCell) else 1)
     count = whole("count", count, least=1)
     linear = linearize_cell(cell, state, secant, load_factor)
     rates = np.array([damped_rates(linear.bloch, phase, count) for phase in given])
     size = np.abs(rates)
     ratio = np.divide(-rates.real, size, out=np.full(size.shape, np.nan), where=size > 0.0)
-    coords: dict[str, Any] = {
-        "band": ("band", 1 + np.arange(count)),
-        "wave_vector": (("phase", "period"), given, {"units": "rad"}),
+    along, attributes = of_phases(phases, given)
+    along["band"] = ("band", 1 + np.arange(count))
+    data: dict[str, Any] = {
+        "rate": (("phase", "band"), rates, {"units": "1/s"}),
+        "frequency": (("phase", "band"), np.abs(rates.imag) / TURN, {"units": "Hz"}),
+        "damping_ratio": (("phase", "band"), ratio, {"units": "1"}),
     }
-    attributes: dict[str, Any] = {"kind": "damped_bands", "vectors": linear.vectors}
-    if isinstance(phases, xarray.DataArray):
-        if "distance" in phases.coords:
-            coords["distance"] = phases.coords["distance"]
-        attributes |= {k: v for k, v in phases.attrs.items() if k != "units"}
-    return xarray.Dataset(
-        {
-            "rate": (("phase", "band"), rates, {"units": "1/s"}),
-            "frequency": (("phase", "band"), np.abs(rates.imag) / TURN, {"units": "Hz"}),
-            "damping_ratio": (("phase", "band"), ratio),
-        },
-        coords,
-        attributes,
-    )
+    facts = {"count": count, "secant": secant}
+    result = result_dataset("damped_bands", cell.case, data | linear.variables, along, facts)
+    return result.assign_attrs(attributes)
 
 
 def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex128]:

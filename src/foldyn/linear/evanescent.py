@@ -24,6 +24,7 @@ from foldyn.errors import InputError
 from foldyn.linear.bloch import Bloch
 from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.unit_cell import UnitCell
+from foldyn.results.dataset import result_dataset
 from foldyn.values import number, numbers, whole
 
 if TYPE_CHECKING:
@@ -89,12 +90,10 @@ def attenuation(
     >>> sheet = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3, density=1000.0)
     >>> pattern = fd.patterns.miura(a=0.03, b=0.03)
     >>> cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet)))
-    >>> found = fd.linear.attenuation(cell, [800.0, 1200.0], phase=3.14159)
+    >>> found = fd.linear.attenuation(cell, [1700.0, 1200.0], phase=3.14159)
     >>> (found.attenuation > 0.01).values.tolist()
     [False, True]
     """
-    import xarray
-
     linear = linearize_cell(cell, state, secant, load_factor)
     wanted = np.atleast_1d(numbers("frequencies", frequencies))
     if wanted.ndim != 1 or not len(wanted) or (wanted <= 0.0).any():
@@ -125,16 +124,16 @@ def attenuation(
         out[row, : len(found)] = found
     decay = np.imag(out)
     least = decay.min(axis=1, initial=FASTEST, where=~np.isnan(decay))
-    return xarray.Dataset(
-        {
-            "phase": (("frequency", "wave"), out, {"units": "rad"}),
-            "attenuation": (
-                "frequency", np.where(least <= TRAVELS, 0.0, least), {"units": "Np"},
-            ),
-        },
-        {"frequency": ("frequency", wanted, {"units": "Hz"}), "wave": 1 + np.arange(count)},
-        {"kind": "attenuation", "direction": direction, "other_phase": phase},
-    )  # fmt: skip
+    data: dict[str, Any] = {
+        "phase": (("frequency", "wave"), out, {"units": "rad"}),
+        "attenuation": ("frequency", np.where(least <= TRAVELS, 0.0, least), {"units": "Np"}),
+    }
+    run = {
+        "frequency": ("frequency", wanted, {"units": "Hz"}),
+        "wave": ("wave", 1 + np.arange(count)),
+    }
+    facts = {"count": count, "secant": secant, "direction": direction, "other_phase": phase}
+    return result_dataset("attenuation", cell.case, data | linear.variables, run, facts)
 
 
 def along(bloch: Bloch, matrix: Any, direction: int, phase: float) -> Reach:

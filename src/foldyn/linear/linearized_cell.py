@@ -73,6 +73,21 @@ class LinearizedCell:
         """Shifts (d, 3) from a cell to the next in the state, m."""
         return np.array([motion.vector for motion in self.motions])
 
+    @property
+    def variables(self) -> dict[str, Any]:
+        """What results tell of the state."""
+        angles, axes, points = (
+            np.array([getattr(motion, name) for motion in self.motions])
+            for name in ("angle", "unit", "point")
+        )
+        return {
+            "vectors": (("period", "axis"), self.vectors, {"units": "m"}),
+            "angles": ("period", angles, {"units": "degrees"}),
+            "axes": (("period", "axis"), axes, {"units": "1"}),
+            "points": (("period", "axis"), points, {"units": "m"}),
+            "displacement": (("node", "axis"), self.displacement, {"units": "m"}),
+        }
+
     def expanded(self, shapes: NDArray, phase: NDArray) -> NDArray[np.complex128]:
         """Shapes (k, n, 3) at the nodes of the cell's own structure from those (m, k) of dofs."""
         count, patch = shapes.shape[1], self.patch

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import xarray
@@ -11,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import InputError
 from foldyn.values import numbers, show, whole
 
+OF_PHASES = ("ticks", "tick_labels", "grid")
+"""Attributes of phases, which bands take over."""
 HEXAGONAL = 1e-6  # how exactly lengths and angle of a hexagonal lattice must be right
 
 
@@ -85,6 +88,16 @@ def special_points(vectors: NDArray) -> dict[str, NDArray]:
         if alike and abs(abs(cosine) - 0.5) < HEXAGONAL:
             found["K"] = 2.0 * pi / 3.0 * np.array([1.0, -1.0 if cosine > 0.0 else 1.0])
     return found
+
+
+def of_phases(phases: object, given: NDArray) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Coordinates and attributes that results have of their phases (n, d)."""
+    along: dict[str, Any] = {"wave_vector": (("phase", "period"), given, {"units": "rad"})}
+    if not isinstance(phases, xarray.DataArray):
+        return along, {}
+    if "distance" in phases.coords:
+        along["distance"] = phases.coords["distance"]
+    return along, {key: value for key, value in phases.attrs.items() if key in OF_PHASES}
 
 
 def checked_phases(phases: object, dimensions: int) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
@@ -14,7 +15,7 @@ from foldyn.patterns.boards import Boards
 from foldyn.patterns.generators.arguments import check_size
 from foldyn.patterns.tiling import glue, half_edges
 from foldyn.patterns.tiling import periods as periods_of
-from foldyn.patterns.topology import edge_lookup, edge_of
+from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.values import number, numbers, show, vector, whole
 
 FLAT = 1e-6  # rad from pi: a crease between copies that is given no letter by its dihedral
@@ -227,7 +228,7 @@ class Transforms:
         }
         if "faces" in values:
             own["custom"] = {k: v for k, v in self.custom.items() if k != FACE_ORDERS}
-            own["rim_families"] = None  # which may be inside now
+            own["rim_families"] = _still_at_the_rim(self._rim(), values["faces"])
         if len(values.get("vertices", self.vertices)) != len(self.vertices):
             own["periods"] = ()  # which are said of the vertices by number
         with warnings.catch_warnings():
@@ -258,6 +259,22 @@ class Transforms:
             vertices=place(self.vertices), faces=faces, boards=boards, custom=self.custom,
             rim_families=self._rim(),
         )  # fmt: skip
+
+
+def _still_at_the_rim(
+    families: Mapping[str, NDArray], faces: Any
+) -> dict[str, list[list[int]]] | None:
+    """Families of boundary edges without those that are none of other faces."""
+    if not families:
+        return None
+    try:
+        count = Counter(edge_of(a, b) for face in faces for a, b in around(list(face)))
+    except (TypeError, IndexError):  # which `Pattern` refuses by name
+        return None
+    return {
+        name: [pair for pair in pairs.tolist() if count[pair[0], pair[1]] == 1]
+        for name, pairs in families.items()
+    }
 
 
 def _joined(

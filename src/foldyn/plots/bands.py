@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from foldyn.errors import InputError
@@ -49,16 +50,16 @@ def plot_bands(bands: xr.Dataset, gaps: bool = True, title: str = "") -> Figure:
         for k in np.flatnonzero(found["direction"].values == ALL):
             axes.axhspan(float(found["bottom"][k]), float(found["top"][k]), color=GAP, lw=0.0)
     values = bands["frequency"].values
-    for band in range(values.shape[1]):
-        if "polarization" in bands:
-            share = bands["polarization"].values[:, band, 2]
-            dots = axes.scatter(
-                along, values[:, band], c=share, s=9.0, vmin=0.0, vmax=1.0, cmap="viridis", zorder=3
-            )
-        else:
-            axes.plot(along, values[:, band], color=style.line_style(band)["color"], lw=1.4)
-    if "polarization" in bands and values.shape[1]:
-        figure.colorbar(dots, ax=axes, label="share of motion along z", pad=0.02)
+    if "polarization" in bands:
+        lines = _colored(along, values, bands["polarization"].values[..., 2])
+        axes.add_collection(lines)
+        bar = figure.colorbar(lines, ax=axes, pad=0.02)
+        bar.set_label("share of motion along z", **style.TEXT)
+        bar.ax.tick_params(labelsize=style.TICK)
+        axes.set_ylim(0.0, 1.05 * float(np.nanmax(values)))
+    else:
+        for band, line in enumerate(values.T):
+            axes.plot(along, line, color=style.line_style(band)["color"], lw=1.4)
     axes.set_xlim(along.min(), along.max())
     axes.set_ylim(bottom=0.0)
     if "ticks" in bands.attrs:
@@ -117,6 +118,16 @@ def plot_iso_frequency(
     axes.set_xticks(ticks, names)
     axes.set_yticks(ticks, names)
     return figure
+
+
+def _colored(along: np.ndarray, values: np.ndarray, shares: np.ndarray) -> LineCollection:
+    """Lines of bands (phase, band) in pieces from phase to phase, colored by shares."""
+    points = np.stack([np.broadcast_to(along[:, None], values.shape), values], axis=-1)
+    pieces = np.stack([points[:-1], points[1:]], axis=2).reshape(-1, 2, 2)
+    lines = LineCollection(list(pieces), cmap="viridis", linewidths=1.6, capstyle="round")
+    lines.set_array(0.5 * (shares[:-1] + shares[1:]).ravel())
+    lines.set_clim(0.0, 1.0)
+    return lines
 
 
 def _closed(values: np.ndarray) -> np.ndarray:

@@ -8,6 +8,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from foldyn.errors import InputError
+from foldyn.linear.band_gaps import ALL, band_gaps
 from foldyn.patterns.screw import Screw
 from foldyn.viewer.arrays import Arrays
 
@@ -21,8 +23,8 @@ MOST_TRIANGLES = 6_000
 """Triangles of the cells shown together, unless a single cell has more."""
 CELLS = {1: 8, 2: 4}
 """Cells that are shown along each period, by how many periods there are."""
-FULL = "all"
-"""Direction of gaps that are there at every wave vector."""
+EDGES = ("below", "bottom", "top")
+PATH = "take phases of cell.path"
 
 
 def waves(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
@@ -35,8 +37,13 @@ def waves(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
     "zone", frequencies (state, band, n, n), "damping" (state, phase, band), "attenuation" (state,
     leg, level) and "levels" (state, level), Hz.
     """
+    for name, remedy in (("shape", "compute them with shape=True"), ("distance", PATH)):
+        if name not in result:
+            raise InputError(f"result: bands without {name} have no page; {remedy}")
     several = result if "state" in result.dims else result.expand_dims("state")
     first = several.transpose("state", "phase", "band", ...)
+    if "position" not in first:
+        first = first.assign(position=first["rest_position"] + first["displacement"])
     count, phases, bands = (first.sizes[dim] for dim in ("state", "phase", "band"))
     shapes = first["shape"].transpose("state", "band", "phase", "node", "axis").values
     every = min(max(1, -(-2 * shapes.size // MOST_NUMBERS)), max(1, (phases - 1) // 2))
@@ -82,10 +89,10 @@ def smooth(shapes: NDArray) -> NDArray:
 def maps(result: xr.Dataset) -> NDArray[np.float64]:
     """Affine maps (state, period, 3, 4) from a cell to the next: rotation and shift, m."""
     shift, axis, point = (
-        result[f"period_{name}"].transpose("state", "period", "axis").values
-        for name in ("shift", "axis", "point")
+        result[name].transpose("state", "period", "axis").values
+        for name in ("vectors", "axes", "points")
     )
-    turn = result["period_turn"].transpose("state", "period").values
+    turn = result["angles"].transpose("state", "period").values
     out = np.zeros((*turn.shape, 3, 4))
     for at in np.ndindex(turn.shape):
         along = float(shift[at] @ axis[at])
@@ -97,8 +104,13 @@ def maps(result: xr.Dataset) -> NDArray[np.float64]:
 
 def full_gaps(result: xr.Dataset) -> list[list[float]]:
     """Full gaps: number of the state, of the band below, bottom and top (Hz)."""
-    chosen = result.isel(gap=result["gap_direction"].values == FULL)
-    rows = [chosen[f"gap_{name}"].values for name in ("state", "below", "bottom", "top")]
+    if "gap_direction" in result:
+        chosen = result.isel(gap=result["gap_direction"].values == ALL)
+        rows = [chosen[f"gap_{name}"].values for name in ("state", *EDGES)]
+    else:
+        found = band_gaps(result)
+        found = found.isel(gap=found["direction"].values == ALL)
+        rows = [np.zeros(found.sizes["gap"]), *(found[key].values for key in EDGES)]
     return [[float(f"{value:.6g}") for value in row] for row in zip(*rows, strict=True)]
 
 
