@@ -292,7 +292,7 @@ def _thick(pattern: Pattern, sheet: Sheet, offset: Any) -> Pattern:
 
 def _check_vertices(schema: Any, count: int) -> None:
     """Refuse nodes of a shell's mesh: what a case file says is meant for every mesh."""
-    places = {
+    places: dict[str, Any] = {
         f"{name}[{i}].{key}": np.ravel(given).tolist()
         for name in ("supports", "loads", "masses", "drive")
         for i, part in enumerate(getattr(schema, name, ()))
