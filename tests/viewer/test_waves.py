@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 from decode import changing, decoded
@@ -36,6 +38,16 @@ def test_modes_are_those_of_the_result_but_for_size_and_phase(part):
     overlap = np.einsum("...na,...na->...", own.conj(), found)
     turned = own * np.exp(1j * np.angle(overlap))[..., None, None]
     assert np.abs(turned - found).max() < 2.0 * OF_SHAPES
+
+
+def test_of_many_modes_every_kth_is_kept(monkeypatch, part):
+    monkeypatch.setattr(import_module("foldyn.viewer.waves"), "MOST_NUMBERS", 3000)
+    shown = results("bands")
+    fewer = stage(shown, {name: fd.case_of(one) for name, one in shown.items()}, "title", [0])
+    (about,) = fewer.about["results"]
+    assert about["every"] > 1
+    kept, all_of_them = np.abs(shapes_of(fewer)), np.abs(shapes_of(part))
+    assert np.abs(kept - all_of_them[:, :, :: about["every"]]).max() < 2.0 * OF_SHAPES
 
 
 def test_modes_go_on_smoothly_and_have_one_size():

@@ -114,7 +114,7 @@ export class Bands extends Analysis {
 
   clock() {
     const [first] = this.page.shown;
-    return `band ${this.band + 1}, ${number(first.hertz(this.state, this.phase, this.band), 4)} Hz`;
+    return `band ${this.band + 1}, ${number(first.hertz(this.state, first.kept(this.phase), this.band), 4)} Hz`;
   }
 
   words() {
