@@ -13,13 +13,21 @@ import signal
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from threading import Thread
 from typing import Any, Generic, Self, TypeVar
+
+from threadpoolctl import threadpool_limits
 
 from foldyn import ram_limit
 from foldyn.errors import ComputationError
@@ -39,6 +47,15 @@ def processors() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def in_threads(do: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+    """What is computed for each item, by threads on all processors.
+
+    It pays where that is linear algebra, which runs without Python's lock, on one thread each.
+    """
+    with threadpool_limits(1), ThreadPoolExecutor(processors()) as pool:
+        return list(pool.map(do, items))
 
 
 class Workers(Generic[Item, Result]):

@@ -103,6 +103,30 @@ def test_supports_and_masses_repeat_and_partners_count_once():
     assert_alike(with_attachments((1, 1)), with_attachments((2, 1)), (2, 1))
 
 
+def on_turning_supports(storeys):
+    """A tower on springs and rollers that turn with its rings."""
+    pattern = fd.patterns.kresling(sides=5, radius=0.03, height=0.03, storeys=storeys)
+    supports = []
+    for ring in range(storeys):
+        angle = np.radians(30.0 * ring)
+        way = (np.cos(angle), np.sin(angle), 0.3)
+        supports.append(fd.Spring(500.0, nodes=[5 * ring], direction=way))
+        supports.append(fd.Fix([5 * ring + 2], direction=way))
+    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET), supports))
+
+
+def test_directions_turn_with_a_screw():
+    assert_alike(on_turning_supports(1), on_turning_supports(2), (2,))
+
+
+def zipper(cells):
+    """Two tubes whose walls are tied."""
+    pattern = fd.patterns.zipper_tubes(cells=cells, a=0.03, b=0.03)
+    ties = pattern.custom["foldyn:ties"]
+    links = [fd.Link([node], to=corners) for node, corners in ties]
+    return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET), links))
+
+
 def riding(storeys):
     """A tower whose rings are plates on three of their corners."""
     pattern = fd.patterns.kresling(sides=6, radius=0.03, height=0.03, storeys=storeys)
@@ -113,6 +137,7 @@ def riding(storeys):
 
 def test_links_repeat():
     assert_alike(riding(1), riding(2), (2,))
+    assert_alike(zipper(1), zipper(2), (2,))
 
 
 def test_a_closed_ring_has_the_waves_of_its_sector():

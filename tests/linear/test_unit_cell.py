@@ -42,6 +42,13 @@ def test_generators_say_how_they_repeat(name):
     assert (b.frequency.values > 0.0).all()
 
 
+def test_other_generators_do_not_repeat():
+    """The corners of a square twist and a flasher's rim are no panels of a neighbor."""
+    others = {name for name, make in GENERATORS.items() if name not in REPEATING}
+    assert others == {"square_twist", "flasher"}
+    assert not any(GENERATORS[name]().periods for name in others)
+
+
 @pytest.mark.parametrize("name", TWISTED)
 def test_tubes_repeat_under_screws(name):
     pattern = GENERATORS[name](**TWISTED[name]).scaled(0.03)
@@ -55,6 +62,11 @@ def test_periods_stay_with_a_pattern_that_is_moved_and_folded(tmp_path):
         fd.patterns.miura(a=0.03, b=0.03, dihedral=100),
     ):  # fmt: skip
         assert cell_of(made).dimensions == 2
+    flat = fd.patterns.miura(a=0.03, b=0.03, dihedral=180)
+    folded = fd.fold(flat, fraction=0.5).pattern
+    assert len(folded.faces) == 4
+    assert cell_of(folded).vectors.shape == (2, 3)
+    assert folded.rim_families.keys() == flat.rim_families.keys()
     case = fd.Case(fd.discretize(pattern, SHEET))
     fd.save(fd.modes(case, 2), tmp_path / "modes.nc")
     again = fd.case_of(fd.load(tmp_path / "modes.nc")).structure.pattern

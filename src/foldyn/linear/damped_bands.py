@@ -21,6 +21,7 @@ from foldyn.linear.unit_cell import UnitCell
 from foldyn.linear.zone import checked_phases, of_phases
 from foldyn.results.dataset import result_dataset
 from foldyn.values import whole
+from foldyn.workers import in_threads
 
 if TYPE_CHECKING:
     import xarray
@@ -73,7 +74,7 @@ def damped_bands(
     given = checked_phases(phases, cell.dimensions if isinstance(cell, UnitCell) else 1)
     count = whole("count", count, least=1)
     linear = linearize_cell(cell, state, secant, load_factor)
-    rates = np.array([damped_rates(linear.bloch, phase, count) for phase in given])
+    rates = np.array(in_threads(lambda phase: damped_rates(linear.bloch, phase, count), given))
     size = np.abs(rates)
     ratio = np.divide(-rates.real, size, out=np.full(size.shape, np.nan), where=size > 0.0)
     along, attributes = of_phases(phases, given)

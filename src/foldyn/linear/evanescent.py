@@ -26,6 +26,7 @@ from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.results.dataset import result_dataset
 from foldyn.values import number, numbers, whole
+from foldyn.workers import in_threads
 
 if TYPE_CHECKING:
     import xarray
@@ -114,14 +115,18 @@ def attenuation(
     ]
     ties = along(linear.bloch, linear.bloch.ties, direction, phase)
     kept = np.flatnonzero(~linear.bloch.held)
-    out = np.full((len(wanted), count), np.nan + 0j)
-    for row, omega in enumerate(TURN * wanted):
+
+    def waves(frequency: float) -> NDArray[np.complex128]:
+        """Phases (count,) of a frequency, Hz."""
+        omega = TURN * frequency
         stiffness, damping, mass = (each.blocks[:, kept[:, None], kept] for each in parts)
         dynamic = stiffness + 1j * omega * damping - omega**2 * mass
         blocks = _bordered(dynamic, ties.blocks[:, :, kept])
         found = phases_of(Reach(parts[0].steps, blocks), linear.bloch.ties.empty)
         found = _forward(found, both=phase == 0.0)[:count]
-        out[row, : len(found)] = found
+        return np.pad(found, (0, count - len(found)), constant_values=np.nan)
+
+    out = np.array(in_threads(waves, wanted))
     decay = np.imag(out)
     least = decay.min(axis=1, initial=FASTEST, where=~np.isnan(decay))
     data: dict[str, Any] = {

@@ -161,11 +161,14 @@ class UnitCell:
         return self._marked(pattern, near)
 
     def _marked(self, pattern: Any, near: float) -> tuple[tuple[Screw, ...], list[tuple]]:
-        motions, pairs = [], []
+        """The motions that the pattern names, and pairs; those of a seam are one vertex."""
+        motions, found = [], []
         for k, rows in enumerate(pattern.periods):
-            motion, off = motion_between(
-                pattern.vertices[rows[:, 0]], pattern.vertices[rows[:, 1]], near
-            )
+            points, ends = pattern.vertices[rows[:, 0]], pattern.vertices[rows[:, 1]]
+            if np.abs(ends - points).max() <= near:
+                found.append((rows, None))
+                continue
+            motion, off = motion_between(points, ends, near)
             wrong = rows[off > near]
             if len(wrong):
                 raise InputError(
@@ -174,9 +177,15 @@ class UnitCell:
                     f"off by up to {off.max():.2g} m; this shape does not repeat",
                     "case",
                 )
+            found.append((rows, len(motions)))
             motions.append(motion)
-            step = tuple(int(j == k) for j in range(len(pattern.periods)))
-            pairs += [(v, w, step) for v, w in rows.tolist()]
+        if not motions:
+            raise InputError(": the pattern closes, and does not go on anywhere", "case")
+        pairs = [
+            (v, w, tuple(int(j == k) for j in range(len(motions))))
+            for rows, k in found
+            for v, w in rows.tolist()
+        ]
         return tuple(motions), pairs
 
     @property

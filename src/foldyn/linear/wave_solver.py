@@ -7,7 +7,6 @@ third as large. Large ones are solved by Lanczos iteration about a shift below z
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
-from threadpoolctl import threadpool_limits
 
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.bloch import Bloch, null_space
 from foldyn.linear.group_velocity import Waves
-from foldyn.workers import processors
+from foldyn.workers import in_threads
 
 DENSE = 500  # dofs up to which a problem is solved with full matrices
 GUARD = 3  # waves beyond those asked for, that none is missed where several coincide
@@ -49,8 +47,7 @@ class WaveSolver:
 
     def at(self, phases: NDArray) -> list[Waves]:
         """Waves of each phase (n, d), on all processors."""
-        with threadpool_limits(1), ThreadPoolExecutor(processors()) as pool:
-            return list(pool.map(self.waves, phases))
+        return in_threads(self.waves, phases)
 
     def waves(self, phase: NDArray) -> Waves:
         """Waves of a phase (d,)."""
