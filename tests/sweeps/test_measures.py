@@ -104,6 +104,25 @@ def test_gaps_of_bands_are_those_of_the_table(results):
             take(results, "bands", text)
 
 
+def test_gaps_along_stretched_states_are_kept(tmp_path):
+    """A sweep over the stretch goes on from its folder; 1 is the state at rest."""
+    (tmp_path / "case.toml").write_text(BANDS.replace("zone = 6\nattenuation = 20\n", ""))
+    found = []
+    for _ in range(2):
+        swept = fd.sweep(
+            tmp_path / "case.toml", {"analysis.stretch": [1.0, 1.002]}, ["band_gap[4,X-M]"],
+            processes=1, folder=tmp_path / "points", progress=found.append,
+        )  # fmt: skip
+    assert (found[1].found, found[3].found) == (0, 2)
+    rest = fd.read_case(tmp_path / "case.toml").run()
+    width = rest["gap_width"].values[
+        (rest["gap_direction"].values == "X-M") & (rest["gap_below"].values == 4)
+    ]
+    values = swept["band_gap_4_X-M"].values
+    np.testing.assert_allclose(values[:1], width, rtol=1e-6)
+    assert abs(values[1] / values[0] - 1.0) > 1e-4
+
+
 def test_a_response_peaks_and_is_damped_as_its_mode(results):
     """alpha = 0.2 1/s: damping ratio alpha/(2 w) of mass-proportional damping."""
     _, modes = results["modes"]

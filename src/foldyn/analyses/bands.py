@@ -47,8 +47,8 @@ class BandsSection(Section):
     path: str | None = None
     points: Count = 60
     count: Count = 6
-    zone: Annotated[int, Field(ge=0, le=MOST_ZONE)] = 0
-    attenuation: Annotated[int, Field(ge=0, le=MOST_LEVELS)] = 0
+    zone: Annotated[int, Field(ge=2, le=MOST_ZONE)] | None = None
+    attenuation: Annotated[int, Field(ge=1, le=MOST_LEVELS)] | None = None
     vary: Annotated[Any, PlainValidator(one_key)] = None
     state: About = "rest"
     stretch: Annotated[Any, PlainValidator(stretches)] = None
@@ -137,12 +137,13 @@ def _bands(state: CellState, path: xarray.DataArray, given: Mapping[str, Any]) -
     found = bands(cell, path, count, group_velocity=True, shape=True, polarization=True, **own)
     gaps = band_gaps(found)
     if given["zone"]:
-        zone = bands(cell, cell.grid(given["zone"]), count, track=False, **own)
-        both = [one["frequency"].reset_coords(drop=True).to_dataset() for one in (found, zone)]
-        full = band_gaps(xarray.concat(both, "phase"))
+        zone = cell.grid(given["zone"]).values
+        values = _in_zone(cell, zone, given["zone"], count, own)
+        every = np.concatenate([found["frequency"].values, values])
+        full = band_gaps(xarray.Dataset({"frequency": (("phase", "band"), every)}))
         gaps = xarray.concat([full, gaps.isel(gap=gaps["direction"].values != ALL)], "gap")
-        found["zone_frequency"] = ("zone", "band"), zone["frequency"].values
-        found.coords["zone_wave_vector"] = ("zone", "period"), zone["wave_vector"].values
+        found["zone_frequency"] = ("zone", "band"), values
+        found.coords["zone_wave_vector"] = ("zone", "period"), zone
     if given["attenuation"]:
         _attenuate(found, cell, given["attenuation"], own)
     if cell.case.damped:
@@ -152,6 +153,20 @@ def _bands(state: CellState, path: xarray.DataArray, given: Mapping[str, Any]) -
     found["position"] = found["rest_position"] + found["displacement"]
     found["residual"] = (), found.attrs["residual"]
     return found.assign_attrs(gaps=gaps, wall_seconds=time.perf_counter() - began)
+
+
+def _in_zone(
+    cell: UnitCell, phases: NDArray, side: int, count: int, own: Mapping[str, Any]
+) -> NDArray[np.float64]:
+    """Frequencies (phase, band), Hz, at phases of a grid, half of them by reciprocity."""
+    shape = [side] * cell.dimensions
+    places = np.indices(shape).reshape(cell.dimensions, -1)
+    opposite = np.ravel_multi_index(tuple(-places % side), shape)  # of -k
+    half = np.flatnonzero(np.arange(len(opposite)) <= opposite)
+    values = np.empty((len(phases), count))
+    found = bands(cell, phases[half], count, track=False, **own)["frequency"].values
+    values[half] = values[opposite[half]] = found
+    return values
 
 
 def _attenuate(found: xarray.Dataset, cell: Any, count: int, own: Mapping[str, Any]) -> None:

@@ -76,8 +76,8 @@ def _notes(result: xarray.Dataset) -> str:
     notes = [
         "Bands are small vibrations of a sheet of cells without end, as waves with a phase k per "
         "period: R cells away, nodes move as the Bloch mode times exp(i k R). The result carries "
-        "the case of its cell. Curves follow the shapes of waves through crossings; gaps count bands "
-        "in the order of frequency."
+        "the case of its cell. Curves follow the shapes of waves through crossings; gaps count "
+        "bands in the order of frequency."
     ]
     if "damped_ratio" in result:
         notes.append(
