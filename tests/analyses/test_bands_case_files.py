@@ -113,6 +113,18 @@ def test_stretched_periods_are_those_of_the_state(tmp_path):
     assert (np.abs(pulled["frequency"][1] - pulled["frequency"][0]).max() > 1e-3 * top).item()
 
 
+def test_one_of_the_periods_makes_a_chain(tmp_path):
+    few = {"zone": None, "points": 5, "vary": None, "attenuation": None}
+    chain = case_file(tmp_path, periods=[1], **few).run()
+    cell = cell_at(60.0)
+    given = case_file(tmp_path, vectors=cell.vectors[1:].tolist(), **few).run()
+    np.testing.assert_array_equal(chain["frequency"], given["frequency"])
+    assert chain.sizes["period"] == 1
+    tower = '[pattern]\nkind = "kresling"\n' + MIURA_TEXT.partition('miura"')[2]
+    tower += '[analysis]\nkind = "bands"\nperiods = [0]\npoints = 3\n'
+    assert case_file(tmp_path, tower).run()["angles"].values == pytest.approx(30.0)
+
+
 def test_a_screw_of_the_file_is_that_of_the_generator(tmp_path):
     tower = fd.patterns.kresling(sides=4, radius=0.05, height=0.05, twist=30)
     text = f"""[pattern]
@@ -129,7 +141,7 @@ screw = {{ axis = "z", angle = 30, shift = 0.05 }}
     marked = fd.bands(cell, cell.path("G-X", 5))["eigenvalue"].values
     noise = 1e-9 * np.abs(marked).max()
     np.testing.assert_allclose(np.sort(own["eigenvalue"]), np.sort(marked), rtol=0, atol=noise)
-    assert own["angles"].values.tolist() == [30.0]
+    assert own["angles"].values == pytest.approx(30.0)
 
 
 @pytest.mark.parametrize(
@@ -137,6 +149,8 @@ screw = {{ axis = "z", angle = 30, shift = 0.05 }}
     [
         ({"path": "G-Z"}, r'analysis\.path = "G-Z": "Z" is no point'),
         ({"points": 2}, r"analysis\.points = 2: must be a whole number, at least 5"),
+        ({"periods": [2]}, r"analysis\.periods = .*: the pattern has the periods 0 to 1"),
+        ({"periods": [0], "vectors": [[1.0, 0, 0]]}, r"analysis\.periods: chooses among"),
         ({"zone": 1}, r"analysis\.zone = 1: must be at least 2"),
         ({"count": 0}, r"analysis\.count = 0: must be at least 1"),
         ({"count": 900}, r"analysis\.count = 900: .*\(with pattern\.dihedral = 60\)"),

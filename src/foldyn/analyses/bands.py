@@ -15,7 +15,14 @@ from pydantic import Field, PlainValidator, model_validator
 from foldyn.analyses.bands_page import bands_sections
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
-from foldyn.analyses.cell_states import CellState, cell_states, coordinate, one_key, stretches
+from foldyn.analyses.cell_states import (
+    CellState,
+    cell_states,
+    coordinate,
+    one_key,
+    some_periods,
+    stretches,
+)
 from foldyn.analyses.sections import Count, Positive, Section, section_of
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, bar_closed
 from foldyn.cases import Case
@@ -54,6 +61,7 @@ class BandsSection(Section):
     stretch: Annotated[Any, PlainValidator(stretches)] = None
     turn: float | None = None
     secant: Secant = None
+    periods: Annotated[Any, PlainValidator(some_periods)] = None
     vectors: Any = None
     screw: ScrewSection | None = None
     tolerance: Positive = 1e-6

@@ -13,16 +13,17 @@ from numpy.typing import NDArray
 from foldyn.analyses.casefile import CaseFile
 from foldyn.analyses.ranges import Varied, varied
 from foldyn.analyses.vibration import about
-from foldyn.cases import State
+from foldyn.cases import Case, State
 from foldyn.cases.units import unit_of
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear import UnitCell, relaxed
 from foldyn.patterns.screw import Screw
-from foldyn.values import number_or_list, one_or_each, show
+from foldyn.values import indices, number_or_list, one_or_each, show
 
 MOST_STATES = 200
 ASIDE = ("analysis", "output", "sweep", "design", "title")
 """Tables and keys that make no other state,"""
+PERIODS = "periods"
 STATED = ("stretch", "turn")
 """but for these of [analysis]."""
 
@@ -46,6 +47,11 @@ def one_key(value: Any) -> Varied:
 def stretches(value: Any) -> Any:
     """One factor on the periods, or one for each."""
     return number_or_list("", value, "period", above=0.0)
+
+
+def some_periods(value: Any) -> tuple[int, ...]:
+    """Numbers of periods of the pattern."""
+    return indices("", value, "period", "of the pattern")
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,12 +129,9 @@ def cell_states(case_file: CaseFile, mass: str, given: Mapping[str, Any]) -> lis
             here, own = case_file, given
             if vary is not None:
                 here = case_file.with_values({vary.key: value})
+            if vary is not None and vary.key.startswith("analysis."):
                 own = {**given, **{key: here.analysis.arguments[key] for key in STATED}}
-            screw = given["screw"]
-            cell = UnitCell(
-                here.case(mass), given["vectors"],
-                None if screw is None else Screw(**screw.model_dump()), given["tolerance"],
-            )  # fmt: skip
+            cell = _cell(here.case(mass), given)
             states.append(CellState(cell, about(here, mass), own, vary, value))
     if len({len(state.cell.case.structure.nodes) for state in states}) > 1:
         raise InputError(
@@ -137,6 +140,28 @@ def cell_states(case_file: CaseFile, mass: str, given: Mapping[str, Any]) -> lis
             "vary",
         )
     return states
+
+
+def _cell(case: Case, given: Mapping[str, Any]) -> UnitCell:
+    """The cell of a case, which repeats as the file says."""
+    vectors, tolerance = given["vectors"], given["tolerance"]
+    screw = None if given["screw"] is None else Screw(**given["screw"].model_dump())
+    if given["periods"] is None:
+        return UnitCell(case, vectors, screw, tolerance)
+    if vectors is not None or screw is not None:
+        raise InputError(
+            ": chooses among those of the pattern; leave out vectors and screw", PERIODS
+        )
+    motions = UnitCell(case, tolerance=tolerance).motions
+    chosen = given["periods"]
+    if not 0 <= min(chosen) <= max(chosen) < len(motions):
+        raise InputError(
+            f" = {show(chosen)}: the pattern has the periods 0 to {len(motions) - 1}", PERIODS
+        )
+    kept = [motions[k] for k in chosen]
+    vectors = [motion.vector for motion in kept if not motion.turns]
+    screw = next((motion for motion in kept if motion.turns), None)
+    return UnitCell(case, np.array(vectors) if vectors else None, screw, tolerance)
 
 
 @contextmanager
