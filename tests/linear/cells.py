@@ -15,7 +15,6 @@ from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.wave_solver import WaveSolver
 
 SHEET = fd.Sheet(youngs_modulus=1e9, poissons_ratio=0.3, thickness=1e-3, density=1000.0)
-CENTIMETERS = {"miura": {"a": 0.03, "b": 0.031}, "eggbox": {"a": 0.03, "b": 0.04}}
 
 
 @cache
@@ -38,6 +37,16 @@ def kresling(storeys: int = 1, sides: int = 5, **options: Any) -> fd.UnitCell:
     """Storeys of a tower."""
     pattern = fd.patterns.kresling(sides=sides, radius=0.03, height=0.03, storeys=storeys)
     return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET, **options)))
+
+
+@cache
+def squares(count: int = 1) -> fd.UnitCell:
+    """Cells of one panel each, so that creases reach beyond the next cell."""
+    side = 0.03
+    points = [(side * i, side * j, 0.0) for i in range(count + 1) for j in (0, 1)]
+    faces = [(2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1) for i in range(count)]
+    structure = fd.discretize(fd.Pattern(points, faces), SHEET)
+    return fd.UnitCell(fd.Case(structure), vectors=[(count * side, 0, 0), (0, side, 0)])
 
 
 def eigenvalues(cell: fd.UnitCell, phases: Any, **state: Any) -> NDArray[np.float64]:

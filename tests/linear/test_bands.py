@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cells import SHEET, chain, eigenvalues, kresling, miura, of_ring
+from cells import SHEET, chain, eigenvalues, kresling, miura, of_ring, squares
+from scipy.optimize import brentq
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
@@ -36,6 +37,10 @@ def test_supercells_have_the_waves_of_one_cell(mass):
     assert_alike(kresling(mass=mass), kresling(3, mass=mass), (3,))
 
 
+def test_supercells_do_so_where_a_cell_is_one_panel():
+    assert_alike(squares(), squares(3), (3, 1))
+
+
 @pytest.mark.parametrize("mass", RULES)
 def test_supercells_do_so_in_prestressed_states(mass):
     stretch = np.array([[1.01, 0.004, 0.0], [0.0, 0.99, 0.0], [0.0, 0.0, 1.0]])
@@ -50,6 +55,24 @@ def test_supercells_do_so_in_prestressed_states(mass):
         for n, c in enumerate(cells, 1)
     ]
     assert_alike(*cells, (2,), states)
+
+
+def bending(along, across, height, curvature):
+    """Motions that bend a sheet evenly along its first period, about a height (m)."""
+    turn = np.array([0.0, curvature * along[0], 0.0])
+    twist = np.concatenate([turn, along - np.cross(turn, [0.0, 0.0, height])])
+    return [of_twist(twist), translation(across)]
+
+
+def test_supercells_do_so_on_bent_sheets():
+    """Translations that become rotations."""
+    cells, states = (miura(), miura((2, 1))), []
+    for cell in cells:
+        height = cell.case.structure.nodes[:, 2].mean()
+        states.append({"state": fd.linear.relaxed(cell, bending(*cell.vectors, height, 5.0))})
+    assert_alike(*cells, (2, 1), states)
+    b = fd.bands(cells[0], [[0.5, 0.5]], 1, **states[0])
+    assert b.angles.values == pytest.approx([np.degrees(5.0 * cells[0].vectors[0, 0]), 0.0])
 
 
 def pair_of(make, **options):
@@ -149,6 +172,25 @@ def test_a_closed_ring_has_the_waves_of_its_sector():
     own = eigenvalues(cell, of_ring((6,)))
     top = whole.eigenvalue.values[-1]
     np.testing.assert_allclose(own, whole.eigenvalue.values, rtol=0.0, atol=EXACT * top)
+
+
+@pytest.mark.matrix
+def test_a_closed_tube_has_the_waves_of_its_sector():
+    """A waterbomb sheet of nine bases that closes: its seam is a crease like the others."""
+
+    def cell(bases, dihedral):
+        pattern = fd.patterns.waterbomb(cells=(bases, 2), a=0.03, b=0.02, dihedral=dihedral)
+        return fd.UnitCell(fd.Case(fd.discretize(pattern, SHEET)))
+
+    def open_by(dihedral):
+        return cell(1, dihedral).motions[0].angle - 40.0
+
+    dihedral = brentq(open_by, 119.0, 120.0, xtol=1e-12)
+    sector, tube = cell(1, dihedral), cell(9, dihedral)
+    assert (sector.dimensions, tube.dimensions) == (2, 1)
+    own = eigenvalues(sector, [(2.0 * np.pi * j / 9, 0.7) for j in range(9)])
+    whole = eigenvalues(tube, [[0.7]])
+    np.testing.assert_allclose(own, whole, rtol=0.0, atol=EXACT * whole[-1])
 
 
 @pytest.mark.parametrize(
@@ -279,10 +321,8 @@ def test_long_waves_are_those_of_the_homogenized_sheet():
         return sheet.energy([translation(along + g * length * np.eye(3)[1]), translation(across)])
 
     def bent(k):
-        turn = np.array([0.0, k * length, 0.0])
-        height = np.array([0.0, 0.0, sheet.sheets[0].nodes[:, 2].mean()])
-        twist = np.concatenate([turn, along - np.cross(turn, height)])
-        return sheet.energy([of_twist(twist), translation(across)])
+        height = sheet.sheets[0].nodes[:, 2].mean()
+        return sheet.energy(bending(along, across, height, k))
 
     static = [stiffness(bent, 0.05), stiffness(stretched, 1e-4), stiffness(sheared, 1e-4)]
     speeds = np.sqrt(np.array(static) / sheet.areal_density)

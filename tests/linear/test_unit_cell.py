@@ -170,14 +170,12 @@ def test_states_that_do_not_repeat_name_nodes():
     cell = miura()
     moved = np.zeros_like(cell.case.structure.nodes)
     moved[8] = [0.0, 0.0, 1e-4]
-    with pytest.raises(
-        InputError, match=r"state: does not repeat: no translation .* nodes \d and 8"
-    ):
+    with pytest.raises(InputError, match=r"state: does not repeat: no motion .* nodes \d and 8"):
         fd.bands(cell, [[0.5, 0.5]], state=fd.State(moved))
     storey = kresling()
     moved = np.zeros_like(storey.case.structure.nodes)
     moved[7] = [0.0, 0.0, 1e-4]
-    with pytest.raises(InputError, match=r"no screw motion .* nodes 2 and 7 are off"):
+    with pytest.raises(InputError, match=r"no motion .* nodes 2 and 7 are off"):
         fd.bands(storey, [[0.5]], state=fd.State(moved))
     with pytest.raises(InputError, match="state: "):
         fd.bands(storey, [[0.5]], state="equilibrium")

@@ -26,7 +26,7 @@ from foldyn.linear.bloch import Bloch, NotAlikeError, hermitian
 from foldyn.linear.cell_patch import Patch, cell_patch
 from foldyn.linear.cell_reach import CellReach
 from foldyn.linear.linearized import slope_change
-from foldyn.linear.unit_cell import UnitCell, images, rotation
+from foldyn.linear.unit_cell import UnitCell, check_commuting, images, rotation
 from foldyn.mechanics.assembly import Assembly
 from foldyn.patterns.screw import Screw, motion_between
 from foldyn.statics.tracing import displacement_of
@@ -217,21 +217,17 @@ def deformed_motions(cell: UnitCell, patch: Patch, displacement: NDArray) -> tup
             found.append(motion)
             continue
         moved, off = motion_between(place[one], place[two], near)
-        if moved.turns and not motion.turns:
-            off = np.linalg.norm(
-                place[two] - place[one] - (place[two] - place[one]).mean(0), axis=1
-            )
         if off.max() > near:
             worst = int(off.argmax())
-            kind = "screw motion" if motion.turns else "translation"
             raise InputError(
-                f": does not repeat: no {kind} brings the nodes at one side of the cell to their "
+                f": does not repeat: no motion brings the nodes at one side of the cell to their "
                 f"partners at the other; nodes {one[worst]} and {two[worst]} are off by "
                 f"{off[worst]:.2g} m, as are {int((off > near).sum())} of {len(off)} pairs. A cell "
                 "with free sides has no such state; see foldyn.linear.relaxed",
                 "state",
             )
         found.append(moved)
+    check_commuting(place, found, near, "state")
     return tuple(found)
 
 
