@@ -13,6 +13,7 @@ from case_texts import MIURA_TEXT
 from foldyn.analyses.reading import case_of_document, read_as
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.band_gaps import legs
+from foldyn.live.view_requests import computed, offered
 
 BANDS_TEXT = f"""{MIURA_TEXT}[analysis]
 kind = "bands"
@@ -169,6 +170,20 @@ screw = {{ axis = "z", angle = 30, shift = 0.05 }}
 def test_what_a_file_gets_wrong_is_named(tmp_path, analysis, message):
     with pytest.raises(InputError, match=message):
         case_file(tmp_path, **{"zone": None, "attenuation": None, **analysis}).run()
+
+
+def test_bands_have_no_derivatives(tmp_path):
+    (tmp_path / "case.toml").write_text(BANDS_TEXT)
+    with pytest.raises(InputError, match='= "bands": bands have no derivatives; sweep'):
+        fd.sensitivity(tmp_path / "case.toml", {"sheet.thickness": 0.01}, "band_gap[4]")
+
+
+def test_the_viewer_shows_one_state(tmp_path):
+    document = tomllib.loads(BANDS_TEXT)
+    assert next(iter(offered(document))) == "bands"
+    document["analysis"] |= {"zone": 2, "points": 5}
+    _, result = computed(tmp_path / "case.toml", document, "bands")
+    assert "state" not in result.dims
 
 
 def test_loads_other_than_folds_are_refused(tmp_path):

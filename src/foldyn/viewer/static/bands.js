@@ -29,11 +29,19 @@ export class Bands extends Analysis {
     return result;
   }
 
+  get band() {
+    return this.page.band ?? 0; // the page keeps it when results are replaced
+  }
+
+  set band(band) {
+    this.page.band = band;
+  }
+
   prepare() {
     const { about } = this.page;
     this.range = [0, about.path.length - 1];
     this.state = Math.min(this.state ?? Math.floor(about.states.length / 2), Math.max(0, about.states.length - 1));
-    this.band ??= 0;
+    this.band = Math.min(this.band, this.page.results[0].sizes[2] - 1);
     const [, corner] = about.ticks;
     this.page.moment ??= Math.max(1, about.path.findIndex((along) => along >= 0.6 * corner[0]));
     this.slider();
