@@ -150,7 +150,7 @@ def test_the_laws_page_shows_one_model_in_python_and_in_a_case_file():
 
 
 def test_the_path_of_the_case_file_page_can_be_followed(tmp_path):
-    *_, slow, _ = blocks("case-file.md", "toml")
+    *_, slow, _, _ = blocks("case-file.md", "toml")
     case_file = case_of_page(tmp_path, without_loads() + slow)
     path = fd.trace(case_file.case(), **case_file.analysis.arguments)
     moved = path.displacement.sel(node=7, axis="x").values
@@ -159,13 +159,22 @@ def test_the_path_of_the_case_file_page_can_be_followed(tmp_path):
 
 
 def test_the_response_of_the_case_file_page_can_be_computed(tmp_path):
-    *_, shaken = blocks("case-file.md", "toml")
+    *_, shaken, _ = blocks("case-file.md", "toml")
     case_file = case_of_page(tmp_path, without_loads() + shaken)
     response = fd.linear.frf(case_file.case(), **case_file.analysis.arguments)
     (drive,) = case_file.analysis.arguments["drive"]
     assert response.attrs["drive_force"] == pytest.approx(0.001 * 3)  # on three vertices
     assert drive.nodes == "xmax"
     assert case_file.output.quantity == "mobility"
+
+
+def test_the_bands_of_the_case_file_page_are_those_of_its_states(tmp_path):
+    *_, repeated = blocks("case-file.md", "toml")
+    bare = re.sub(r"^\[\[supports\]\]\n(.+\n)*", "", without_loads(), flags=re.M)
+    plain = bare.replace('preset = "herkal"\n', "")  # whose bends have no slope
+    found = case_of_page(tmp_path, plain + repeated).run(points=5, zone=2)
+    assert found["state"].values.tolist() == [40, 60, 80, 100, 120]
+    assert found.sizes["band"] == 5
 
 
 def test_compress_release_vibrate_of_the_statics_page():

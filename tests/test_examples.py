@@ -130,6 +130,16 @@ def kresling_chain(found):
     assert float(motion.dissipated[-1]) > 0.0
 
 
+def miura_bands(found):
+    """The full gap is there while folded and closes as the sheet unfolds; the path agrees."""
+    width = np.array(found["top"]) - found["bottom"]
+    assert (width[:8] > 3.0).all() and (width[8:] < 0.0).all()
+    full = found["gaps"].isel(gap=found["gaps"]["direction"].values == "all")
+    (at,) = np.flatnonzero(found["dihedrals"] == 60)
+    assert full["below"].values.tolist() == [found["below"]]
+    assert float(full["width"][0]) == pytest.approx(width[at], rel=0.02)
+
+
 def point_mass(found):
     """f = sqrt(k / (M + c m)) / 2 pi: one k and one c for all weights, peaks at the frequencies."""
     line = 1.0 / np.sqrt(found["slope"] * found["added"] + found["start"])
@@ -176,7 +186,7 @@ def thick_panel(found):
 
 CHECKS = (
     bilayer, case_study_1, clamped, contact_tower, crane, deployment, design_frequencies,
-    design_kresling, design_miura, fidelity, kresling_chain, point_mass,
+    design_kresling, design_miura, fidelity, kresling_chain, miura_bands, point_mass,
     pressure, snap_through, sweep, thick_panel,
 )  # fmt: skip
 

@@ -1,6 +1,8 @@
-"""`foldyn modes` and `foldyn frf`: case files of any kind, with what the command line adds."""
+"""`foldyn modes`, `frf` and `bands`: case files of any kind, with what the command line adds."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -142,9 +144,29 @@ def test_a_state_from_a_result(workplace, miura) -> None:
     np.testing.assert_array_equal(about.values, path.values[-1])
 
 
+def test_the_bands_of_the_cell_of_a_motion_and_the_table_of_its_gaps(workplace, miura) -> None:
+    workplace.write(changed(miura, 'model = { mass = "panel" }; damping ='))
+    path = ("--path", "X-M-G", "--points", "9", "--count", "5")
+    done = workplace.call("bands", "case.toml", "--no-figures", *path)
+    assert done.status == 0
+    assert "leaves out [[supports]], [[loads]]" in done.err
+    assert done.new == ["case-bands", "case-bands/result.nc"]
+    assert "panel: 5 bands at 9 wave vectors, 0 full gaps" in done.out
+    stored = fd.load("case-bands/result.nc")
+    cell = fd.UnitCell(fd.case_of(stored))
+    own = fd.bands(cell, cell.path("X-M-G", 9), 5)
+    np.testing.assert_allclose(stored["frequency"], own["frequency"], rtol=1e-9, atol=1e-9)
+    workplace.good("convert", "case-bands/result.nc", "gaps.csv", "--rows", "gap")
+    rows = Path("gaps.csv").read_text().splitlines()
+    assert "gap_bottom [Hz]" in rows[0]
+    assert len(rows) - 1 == len(fd.linear.band_gaps(own)["gap"])
+
+
 @pytest.mark.parametrize(
     ("arguments", "edits", "message"),
     [
+        ("bands --path G-Q", "", 'analysis.path = "G-Q": "Q" is no point'),
+        ("bands --points 1", "", "analysis.points = 1: must be a whole number, at least 5"),
         ("frf", "", "at which frequencies? Give --frequencies FIRST LAST COUNT"),
         ("modes --count 0", "", "analysis.count = 0: must be at least 1"),
         (f"frf {FEW} --method drect", "", "analysis.method = \"drect\": did you mean 'direct'?"),
@@ -176,7 +198,7 @@ def test_a_file_that_is_no_case_file(read) -> None:
             read(text, "modes")
 
 
-@pytest.mark.parametrize("command", ["modes", "frf"])
+@pytest.mark.parametrize("command", ["modes", "frf", "bands"])
 def test_help_tells_the_options(capsys, command) -> None:
     with pytest.raises(SystemExit) as left:
         main([command, "--help"])

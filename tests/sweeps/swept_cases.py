@@ -8,7 +8,7 @@ import time
 
 from numba.core.dispatcher import Dispatcher
 
-from case_texts import HELD_FOLD_TEXT, HELD_MIURA_TEXT, MODES_TEXT
+from case_texts import HELD_FOLD_TEXT, HELD_MIURA_TEXT, MIURA_TEXT, MODES_TEXT
 
 MODES = MODES_TEXT
 DAMPED = HELD_MIURA_TEXT + "[damping]\nalpha = 0.2\n"
@@ -30,6 +30,13 @@ dt = 0.02
 method = "newmark"
 [output]
 every = 0.02
+"""
+BANDS = f"""{MIURA_TEXT}[analysis]
+kind = "bands"
+count = 5
+points = 17
+zone = 6
+attenuation = 20
 """
 PATH = f"""{HELD_FOLD_TEXT}[model]
 bend_law = "linear"

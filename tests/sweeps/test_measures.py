@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from swept_cases import FRF, MODES, MOTION, PATH
+from swept_cases import BANDS, FRF, MODES, MOTION, PATH
 
 import foldyn as fd
 from foldyn.analyses import ANALYSES
@@ -16,9 +16,10 @@ from foldyn.sweeps import MEASURES
 from foldyn.sweeps.measure import asked, own_measure
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-TEXTS = {"modes": MODES, "frf": FRF, "dynamics": MOTION, "statics": PATH}
+TEXTS = {"modes": MODES, "frf": FRF, "dynamics": MOTION, "statics": PATH, "bands": BANDS}
 GIVEN = {
     "node": "8", "axis": "z", "mode": "1", "model": "own", "frequency": "0.3", "time": "0.01",
+    "band": "1", "point": "X", "leg": "X-M",
 }  # fmt: skip
 
 
@@ -69,6 +70,57 @@ def test_frequencies_and_damping_of_modes(results):
     assert share == modes["effective_mass"].sel(mode=1, axis="z")
     with pytest.raises(InputError, match=r"raise analysis\.count"):
         take(results, "modes", "frequency[9]")
+
+
+def test_gaps_of_bands_are_those_of_the_table(results):
+    """Signed: a gap of the table where it is above 0, an overlap of neighbors below."""
+    _, bands = results["bands"]
+    where = zip(bands["gap_direction"].values, bands["gap_below"].values, strict=True)
+    table = {pair: k for k, pair in enumerate(where)}
+    assert ("X-M", 4) in table
+    for leg in ("all", "G-X", "X-M", "M-Y", "Y-G"):
+        for band in range(1, 5):
+            width, center, share = (
+                float(take(results, "bands", f"{name}[{band},{leg}]"))
+                for name in ("band_gap", "gap_center", "relative_gap")
+            )
+            assert (width > 1e-3 * center) == ((leg, band) in table)
+            np.testing.assert_allclose(share, width / center)
+            if (leg, band) in table:
+                k = table[leg, band]
+                np.testing.assert_allclose(width, bands["gap_width"][k])
+                middle = 0.5 * (bands["gap_bottom"][k] + bands["gap_top"][k])
+                np.testing.assert_allclose(center, middle)
+    widths = [take(results, "bands", f"band_gap[{band}]") for band in range(1, 5)]
+    assert take(results, "bands", "widest_gap") == max(widths)
+    corner = np.sort(bands["frequency"].values[4])  # the first leg has a quarter of the points
+    assert take(results, "bands", "band[3,X]") == corner[2]
+    for text, message in (
+        ("band[3,K]", "has the points G, X, M, Y"),
+        ("band_gap[5]", r"raise analysis\.count"),
+        ("band_gap[1,G-M]", "has the legs all, G-X"),
+    ):
+        with pytest.raises(InputError, match=message):
+            take(results, "bands", text)
+
+
+def test_gaps_along_stretched_states_are_kept(tmp_path):
+    """A sweep over the stretch goes on from its folder; 1 is the state at rest."""
+    (tmp_path / "case.toml").write_text(BANDS.replace("zone = 6\nattenuation = 20\n", ""))
+    found = []
+    for _ in range(2):
+        swept = fd.sweep(
+            tmp_path / "case.toml", {"analysis.stretch": [1.0, 1.002]}, ["band_gap[4,X-M]"],
+            processes=1, folder=tmp_path / "points", progress=found.append,
+        )  # fmt: skip
+    assert (found[1].found, found[3].found) == (0, 2)
+    rest = fd.read_case(tmp_path / "case.toml").run()
+    width = rest["gap_width"].values[
+        (rest["gap_direction"].values == "X-M") & (rest["gap_below"].values == 4)
+    ]
+    values = swept["band_gap_4_X-M"].values
+    np.testing.assert_allclose(values[:1], width, rtol=1e-6)
+    assert abs(values[1] / values[0] - 1.0) > 1e-4
 
 
 def test_a_response_peaks_and_is_damped_as_its_mode(results):

@@ -3,19 +3,39 @@
 from __future__ import annotations
 
 import io
+import tomllib
 from functools import cache
+from pathlib import Path
 
 from PIL import Image
 
 import foldyn as fd
+from foldyn.analyses.reading import case_of_document
 from foldyn.experiment.camera import Camera
 from foldyn.report import write_report
 from foldyn.viewer import Backdrop, projection, stage
 
-KINDS = ("motion", "path", "modes", "response")
+KINDS = ("motion", "path", "modes", "response", "bands")
 ALL = (*KINDS, "film")
 PAINTERS = ("webgl", "plain")
 """What a page may be asked for."""
+BANDS = """[pattern]
+kind = "miura"
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1.0
+[damping]
+alpha = 0.1
+[analysis]
+kind = "bands"
+count = 4
+points = 13
+zone = 6
+attenuation = 10
+vary = { "pattern.dihedral" = [60, 120] }
+"""
 PAGE = "document.querySelector('.foldyn').page"
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
 
@@ -29,6 +49,11 @@ def case(loaded=True, **options):
     return fd.Case(structure, supports, [push] if loaded else [], fd.Rayleigh(alpha=0.1))
 
 
+def bands_file():
+    """A case file of bands."""
+    return case_of_document(Path("bands.toml"), tomllib.loads(BANDS))
+
+
 @cache
 def results(kind):
     rules = ("circumcenter", "panel")
@@ -36,6 +61,8 @@ def results(kind):
         return {rule: fd.simulate(case(mass=rule), 3.0, every=0.01) for rule in rules}
     if kind == "path":
         return {"fold": fd.trace(case(), load_factors=[0.5, 1.0, 1.5, 2.0])}
+    if kind == "bands":
+        return {"sheet": bands_file().run()}
     if kind == "modes":
         return {rule: fd.modes(case(loaded=False, mass=rule), 4) for rule in rules}
     drive = [fd.Force([0, 1], (-1.0, 0.0, 0.0))]

@@ -199,6 +199,8 @@ class CaseFile:
     analysis : Analysis
         What to compute; its `arguments` are those of `simulate`, `trace`, `modes` or `frf`.
     output : Output
+    with_values : callable
+        The file with other values of some keys, by key: ``with_values({"pattern.dihedral": 80})``.
     text : str
         What the file said when it was read; "" of a document that was not read from one.
     """
@@ -213,6 +215,7 @@ class CaseFile:
     output: Output
     _schema: CaseSchema = field(repr=False)
     _make: Callable[[str], Case] = field(repr=False)
+    with_values: Callable[[Mapping[str, Any]], CaseFile] = field(repr=False)
     _cases: dict[str, Case] = field(repr=False)
     text: str = field(default="", repr=False)
 

@@ -47,10 +47,36 @@ def compared(path: Path, document: Document) -> Document:
     return {**kept, "analysis": {"kind": "fidelity"}}
 
 
+def unbounded(path: Path, document: Document, state: str) -> Document:
+    """The document as a cell of a sheet without end, which its supports would hold everywhere.
+
+    Supports and what acts are left out with a warning, but for creases that fold, where the state
+    is an equilibrium.
+    """
+    loads = document.get("loads", [])
+    kept_loads = [_without(each, "history") for each in loads if "creases" in each]
+    kept_loads = [] if state == "rest" else kept_loads
+    left = [f"[{name}]" for name in ("contact", "initial", "drive") if name in document]
+    left += ["[[supports]]"] if document.get("supports") else []
+    left += ["[[loads]]"] if len(loads) > len(kept_loads) else []
+    if left:
+        warnings.warn(
+            f"{path}: foldyn bands leaves out {', '.join(left)}: the pattern repeats without end, "
+            'and what holds or loads one cell would be in all of them (a file of kind "bands" may '
+            "have supports)",
+            FoldynWarning,
+            stacklevel=3,
+        )
+    kept = _without(document, "contact", "initial", "drive", "output", "supports", "loads")
+    return {**kept, "loads": kept_loads, "analysis": {"kind": "bands"}}
+
+
 def converted(path: Path, document: Document, kind: str, state: str) -> Document:
     """The document as one of another kind; what has no place there is left out, with a warning."""
     if kind == "fidelity":
         return compared(path, document)
+    if kind == "bands":
+        return unbounded(path, document, state)
     left: list[str] = []
     atrest = state == "rest"
     supports, bases = _supports(document.get("supports", []), atrest, left)

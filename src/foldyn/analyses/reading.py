@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from foldyn.analyses.casefile import CaseFile, Output
 from foldyn.analyses.conversion import converted, flagged, remodeled
+from foldyn.analyses.keys import replaced
 from foldyn.analyses.messages import describe, dotted
 from foldyn.analyses.pattern_section import FACES, FACETS, HINGES, READING
 from foldyn.analyses.registry import ANALYSES, schema_of
@@ -81,7 +82,7 @@ def read_as(
     Parameters
     ----------
     path : Path
-    kind : {"modes", "frf", "fidelity"}
+    kind : {"modes", "frf", "bands", "fidelity"}
     flags : mapping
         Keys of [analysis] that the command line gives instead of the file; `state` may be a
         result's file, too.
@@ -186,7 +187,8 @@ def case_of_document(
     shown = {name: value for name, value in schema.output if name not in ("nodes", "every")}
     case_file = CaseFile(
         path, schema.title, pattern, sheet, schema.model.kind, masses, analysis,
-        Output(nodes, chosen is not None, **shown), schema, make, cases, text,
+        Output(nodes, chosen is not None, **shown), schema, make,
+        lambda values: case_of_document(path, replaced(document, values), text), cases, text,
     )  # fmt: skip
     start = getattr(schema, "initial", None)
     if start is not None and start.file is None:
@@ -294,7 +296,7 @@ def _thick(pattern: Pattern, sheet: Sheet, offset: Any) -> Pattern:
 
 def _check_vertices(schema: Any, count: int) -> None:
     """Refuse nodes of a shell's mesh: what a case file says is meant for every mesh."""
-    places = {
+    places: dict[str, Any] = {
         f"{name}[{i}].{key}": np.ravel(given).tolist()
         for name in ("supports", "loads", "masses", "drive")
         for i, part in enumerate(getattr(schema, name, ()))
@@ -303,7 +305,7 @@ def _check_vertices(schema: Any, count: int) -> None:
     }
     until = getattr(schema.analysis, "until", None)
     places |= {} if until is None else {"analysis.until.node": (until.node,)}
-    places["output.nodes"] = schema.output.nodes
+    places["output.nodes"] = getattr(schema.output, "nodes", None)
     for place, nodes in places.items():
         if nodes is None or isinstance(nodes, str):
             continue

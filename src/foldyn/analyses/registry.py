@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator
 
+from foldyn.analyses.bands import BandsAnalysis
 from foldyn.analyses.casefile import Analysis
 from foldyn.analyses.fidelity import FidelityAnalysis
 from foldyn.analyses.frf import FrfAnalysis
@@ -19,7 +20,14 @@ from foldyn.values import choice
 
 ANALYSES: Mapping[str, type[Analysis]] = {
     analysis.kind: analysis
-    for analysis in (MotionAnalysis, PathAnalysis, ModesAnalysis, FrfAnalysis, FidelityAnalysis)
+    for analysis in (
+        MotionAnalysis,
+        PathAnalysis,
+        ModesAnalysis,
+        FrfAnalysis,
+        BandsAnalysis,
+        FidelityAnalysis,
+    )
 }
 """By the name that `analysis.kind` has for them."""
 

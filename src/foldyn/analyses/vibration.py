@@ -53,7 +53,7 @@ class VibrationSchema(CaseSchema):
                 "leave it out",
                 "analysis.secant",
             )
-        if self.model.kind == SHELL and self.analysis.internal:
+        if self.model.kind == SHELL and getattr(self.analysis, "internal", 0):
             raise InputError(
                 f" = {show(self.analysis.internal)}: is for the panels of bars and hinges; leave "
                 "it out",

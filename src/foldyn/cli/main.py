@@ -98,6 +98,31 @@ def parser() -> argparse.ArgumentParser:
     frf.add_argument("--method", help="direct (default), modal, impulse, ...: see the case file")
     _add_state(frf)
 
+    bands = commands.add_parser(
+        "bands",
+        help="bands of the sheet, chain or tube that repeats the pattern of a case file",
+        description="Frequencies of Bloch waves in a sheet, chain or tube whose cell is the "
+        "pattern of a case file of any kind; what its [analysis] says, if it is of kind bands, "
+        "holds unless given here.",
+    )
+    _add_common(bands, "bands", film=False)
+    bands.add_argument("--count", type=integer, help="how many bands (default: 6)")
+    bands.add_argument(
+        "--path",
+        metavar="G-X-M-G",
+        help="points of the Brillouin zone (default: G-X-M-Y-G; of a chain or tube G-X)",
+    )
+    bands.add_argument(
+        "--points", type=integer, metavar="N", help="wave vectors along the path (default: 60)"
+    )
+    bands.add_argument(
+        "--zone", type=integer, metavar="N", help="wave vectors along each period of the whole zone"
+    )
+    bands.add_argument(
+        "--attenuation", type=integer, metavar="N", help="frequencies of an attenuation spectrum"
+    )
+    _add_state(bands, internal=False)
+
     fidelity = commands.add_parser(
         "fidelity",
         help="models of bars and hinges beside the shell, for a case file of any kind",
@@ -157,10 +182,11 @@ def _add_case(command: argparse.ArgumentParser, results: str) -> None:
     add_figures(command)
 
 
-def _add_common(command: argparse.ArgumentParser, results: str) -> None:
+def _add_common(command: argparse.ArgumentParser, results: str, film: bool = True) -> None:
     """Add what commands on case files of either model take."""
     _add_case(command, results)
-    add_film(command)
+    if film:
+        add_film(command)
     command.add_argument(
         "--model",
         metavar="bars_and_hinges|shell",
@@ -171,7 +197,7 @@ def _add_common(command: argparse.ArgumentParser, results: str) -> None:
     )
 
 
-def _add_state(command: argparse.ArgumentParser) -> None:
+def _add_state(command: argparse.ArgumentParser, internal: bool = True) -> None:
     """Add the options for the state about which a structure vibrates."""
     command.add_argument(
         "--state",
@@ -180,6 +206,8 @@ def _add_state(command: argparse.ArgumentParser) -> None:
         "state of a result (NetCDF)",
     )
     _add_secant(command)
+    if not internal:
+        return
     command.add_argument(
         "--internal",
         type=integer,

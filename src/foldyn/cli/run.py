@@ -128,7 +128,8 @@ def _read(path: Path, given: Namespace) -> CaseFile:
     model = given.model, given.divisions
     if given.command == "run":
         return read_case(path, *model)
-    names = ("count", "method", "state", "secant", "internal")
+    names = ("count", "method", "state", "secant", "internal", "path", "points", "zone")
+    names += ("attenuation",)
     keys = {key: getattr(given, key, None) for key in names}
     if getattr(given, "frequencies", None) is not None:
         first, last, count = given.frequencies

@@ -18,6 +18,7 @@ ALONG = {
     "path": "step",
     "modes": "mode",
     "frf": "frequency",
+    "bands": "phase",
     "fidelity": "mode",
     "folding": "step",
 }

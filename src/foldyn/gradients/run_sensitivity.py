@@ -225,6 +225,12 @@ def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None
             f' = {show(analysis)}: say what is computed, as {{"kind": "modes", "count": 4}}',
             "analysis",
         )
+    if analysis["kind"] == "bands":
+        raise InputError(
+            ' = "bands": bands have no derivatives; sweep the parameters (foldyn.sweep), or search '
+            'with foldyn.design and method = "cma", which needs none',
+            "analysis.kind",
+        )
     kind = choice("analysis.kind", analysis["kind"], tuple(KINDS))
     arguments = {name: value for name, value in analysis.items() if name != "kind"}
     known = [*signature(FUNCTIONS[kind]).parameters.values()][1:]

@@ -76,10 +76,15 @@ class LinearizedCell:
     @property
     def variables(self) -> dict[str, Any]:
         """What results tell of the state."""
-        angles = np.array([motion.angle for motion in self.motions])
+        angles, axes, points = (
+            np.array([getattr(motion, name) for motion in self.motions])
+            for name in ("angle", "unit", "point")
+        )
         return {
             "vectors": (("period", "axis"), self.vectors, {"units": "m"}),
             "angles": ("period", angles, {"units": "degrees"}),
+            "axes": (("period", "axis"), axes, {"units": "1"}),
+            "points": (("period", "axis"), points, {"units": "m"}),
             "displacement": (("node", "axis"), self.displacement, {"units": "m"}),
         }
 

@@ -27,10 +27,10 @@ HEIGHT = 820
 """Pixels of a view in a notebook."""
 TITLES: Mapping[str, str] = {
     "trajectory": "Motion", "path": "Static curve", "modes": "Modes", "frf": "Frequency response",
-    "folding": "Folding",
+    "folding": "Folding", "bands": "Bands",
 }  # fmt: skip
 """What results are called, by their kind."""
-MOVING = "a motion, a path, modes, a frequency response or a folding"
+MOVING = "a motion, a path, modes, a frequency response, bands or a folding"
 
 
 @dataclass(frozen=True)

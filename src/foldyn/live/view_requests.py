@@ -23,6 +23,7 @@ KINDS: Mapping[str, str] = {
     "frf": "Frequency response",
     "statics": "Static curve",
     "dynamics": "Short motion",
+    "bands": "Bands",
 }
 """What can be computed, by the kind of analysis, as the page calls it."""
 STEPS, PERIODS, FREQUENCIES, COUNT = 10, 10.0, 200, 6
@@ -47,6 +48,7 @@ def offered(document: Document) -> dict[str, str]:
         "frf": driven or based,
         "statics": bool(document.get("loads")) or (imposed and not based),
         "dynamics": bool(document.get("loads")) or imposed or based,
+        "bands": False,  # of files of this kind alone: few patterns repeat
     }
     kinds = [kind for kind in KINDS if kind == own or possible[kind]]
     return {kind: KINDS[kind] for kind in sorted(kinds, key=lambda kind: kind != own)}
@@ -80,6 +82,9 @@ def computed(path: Path, document: Document, kind: str) -> tuple[CaseFile, xr.Da
 
 def _as_kind(path: Path, document: Document, kind: str) -> Document:
     """The document as one of a kind, quick to compute where the file is of another."""
+    if document["analysis"]["kind"] == kind == "bands":  # one state: sliders make the others
+        analysis = {k: value for k, value in document["analysis"].items() if k != "vary"}
+        return {**document, "analysis": analysis}
     if document["analysis"]["kind"] == kind:
         return document
     make = {"modes": _modes, "frf": _response, "statics": _curve, "dynamics": _motion}[kind]

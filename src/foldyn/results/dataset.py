@@ -15,11 +15,13 @@ from foldyn.cases.document import Document, pattern_document, to_document
 from foldyn.patterns import Pattern
 from foldyn.results.attributes import facts, own_attributes
 from foldyn.results.quantities import (
+    BANDS,
     CONTINUATIONS,
     CROSSINGS,
     ESTIMATES,
     FIDELITY,
     FOLDING,
+    GAPS,
     INTERNAL,
     MODES,
     MOTION,
@@ -246,6 +248,38 @@ def frf_dataset(
     data["drive"] = variable(PLACE, drive, driven, "amplitude of the drive")
     along = {"frequency": ("frequency", np.array(frequency, float), {"units": "Hz"})}
     return result_dataset("frf", case, data, along, statistics)
+
+
+def bands_dataset(
+    case: Case,
+    values: Mapping[str, ArrayLike],
+    gaps: Mapping[str, ArrayLike],
+    along: Mapping[str, Any],
+    statistics: Mapping[str, Any],
+) -> xr.Dataset:
+    """Dataset of the bands of a repeated case, which carries its own case.
+
+    Parameters
+    ----------
+    case : Case
+        A cell.
+    values : mapping of str to array_like
+        Variables of `quantities.BANDS`, with the states for a first dimension where `along` has the
+        coordinate "state".
+    gaps : mapping of str to array_like
+        Variables of `quantities.GAPS`.
+    along : mapping
+        Coordinates of the dimensions state, phase, band and zone.
+    statistics : mapping
+        Facts about the computation, each stored as an attribute.
+    """
+    first = ("state",) if "state" in along else ()
+    data = {
+        name: variable((*first, *BANDS[name].dims), array, BANDS[name].units, BANDS[name].text)
+        for name, array in values.items()
+    }
+    data |= variables(GAPS, "gap", gaps)
+    return result_dataset("bands", case, data, along, statistics)
 
 
 def fidelity_dataset(

@@ -119,6 +119,42 @@ ESTIMATES: Mapping[str, Quantity] = {
     "unsteadiness": Quantity("1", "relative error that transients leave, estimated"),
 }
 """and what its method adds to it."""
+BANDS: Mapping[str, Quantity] = {
+    "frequency": Quantity("Hz", "frequency", ("phase", "band")),
+    "eigenvalue": Quantity(
+        "rad2/s2", "square of the angular frequency (negative: unstable)", ("phase", "band")
+    ),
+    "group_velocity": Quantity("m/s", "group velocity", ("phase", "band", "axis")),
+    "polarization": Quantity(
+        "1", "share of the direction in the kinetic energy", ("phase", "band", "axis")
+    ),
+    "shape": Quantity(
+        "m", "Bloch mode, of the modal mass 1 kg m2 in a cell", ("phase", "band", *PLACE)
+    ),
+    "position": Quantity("m", "position in the state", PLACE),
+    "displacement": Quantity("m", "displacement of the state from the rest position", PLACE),
+    "residual": Quantity("1", "residual of the state as a fraction of the forces at play"),
+    "vectors": Quantity("m", "shift from a cell to the next", ("period", "axis")),
+    "angles": Quantity("degrees", "turn from a cell to the next", ("period",)),
+    "axes": Quantity("1", "axis of the turn", ("period", "axis")),
+    "points": Quantity("m", "point on the axis of the turn", ("period", "axis")),
+    "zone_frequency": Quantity("Hz", "frequency in the whole zone", ("zone", "band")),
+    "damped_frequency": Quantity("Hz", "frequency of the damped wave", ("phase", "band")),
+    "damped_ratio": Quantity("1", "damping ratio of the wave", ("phase", "band")),
+    "attenuation": Quantity("Np", "attenuation from cell to cell", ("leg", "level")),
+    "level_frequency": Quantity("Hz", "frequency of the attenuation", ("level",)),
+}
+"""What bands have, each along the dimension `state` too where they are of several states."""
+GAPS: Mapping[str, Quantity] = {
+    "gap_state": Quantity(text="number of the state, from 0"),
+    "gap_direction": Quantity(text="all, or the part of the path along which no wave travels"),
+    "gap_below": Quantity(text="number of the band below (0: none)"),
+    "gap_bottom": Quantity("Hz", "bottom of the gap"),
+    "gap_top": Quantity("Hz", "top of the gap"),
+    "gap_width": Quantity("Hz", "width of the gap"),
+    "gap_relative_width": Quantity("1", "width of the gap over its middle"),
+}
+"""What they have besides along the dimension `gap`."""
 FIDELITY: Mapping[str, Quantity] = {
     "frequency": Quantity("Hz", "frequency of the shell, extrapolated from its meshes", ("mode",)),
     "mesh_error": Quantity("1", "error of the finest mesh (nan: not converged)", ("mode",)),
@@ -159,6 +195,10 @@ def energies_of(case: Any) -> dict[str, Quantity]:
 
 REASONS: Mapping[str, str] = {
     "frequency": "an unstable mode grows instead of swinging",
+    "zone_frequency": "an unstable wave grows instead of swinging",
+    "damped_ratio": "a rigid motion does not swing",
+    "slope": "bands have corners where the frequency is zero",
+    "group_velocity": "bands have corners where the frequency is zero",
     "damping_ratio": "a rigid or an unstable mode does not swing",
     "receptance": "a resonance without damping, a body free to move at 0 Hz, or no convergence",
     "transmissibility": "a resonance without damping, or no convergence",

@@ -20,9 +20,11 @@ from foldyn.cases.directions import AXES
 from foldyn.errors import FoldynError, InputError
 from foldyn.values import choice, number, show, suggest
 
-NODE, AXIS, MODE, MODEL = "node", "axis", "mode", "model"
+NODE, AXIS, MODE, BAND = "node", "axis", "mode", "band"
+WORDS = ("model", "point", "leg")
+"""Arguments that are names of the result,"""
 REALS = {"time": "s", "displacement": "m", "frequency": "Hz"}
-"""Arguments that a measure may have."""
+"""and that are numbers, with their units."""
 _ASKED = re.compile(r"([A-Za-z_]\w*)(?:\[([^\[\]]*)\])?\Z")
 _NAME = re.compile(r"[A-Za-z_]\w*\Z")
 _OWN = re.compile(r"(?:([A-Za-z_]\w*)=)?(.+):([A-Za-z_]\w*)\Z")
@@ -47,8 +49,8 @@ class Measure:
     dims : tuple of str
         Dimensions of an array; their lengths may differ from point to point.
     takes : tuple of str
-        Arguments, in their order: "node", "axis", "mode", "model", "time", "displacement",
-        "frequency".
+        Arguments, in their order: "node", "axis", "mode", "band", "model", "point", "leg",
+        "time", "displacement", "frequency".
     needs : int
         How many of them must be given.
     through : callable, optional
@@ -178,7 +180,7 @@ def asked(text: str, known: Mapping[str, Measure]) -> Asked:
 def _argument(text: str, what: str, word: str) -> Any:
     if what == AXIS:
         return choice(f" = {show(text)}: axis", word, AXES)
-    if what == MODEL:
+    if what in WORDS:
         return word
     if what in REALS:
         try:
@@ -187,7 +189,7 @@ def _argument(text: str, what: str, word: str) -> Any:
             raise InputError(
                 f" = {show(text)}: {what} = {show(word)}: give a number, {REALS[what]}"
             ) from None
-    least = 1 if what == MODE else 0
+    least = 1 if what in (MODE, BAND) else 0
     if not (word.isascii() and word.isdecimal()) or int(word) < least:
         raise InputError(f" = {show(text)}: {what} = {show(word)}: give a number from {least} on")
     return int(word)

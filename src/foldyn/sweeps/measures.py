@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
+from foldyn.linear.band_gaps import ALL, frequencies_of, legs
 from foldyn.linear.frf import quantity_of
 from foldyn.linear.peaks_of import kind_of, resonances
 from foldyn.signals import (
@@ -25,11 +26,12 @@ from foldyn.signals import (
 )
 from foldyn.statics import Landscape, landscape
 from foldyn.statics.load_at import load_at
-from foldyn.sweeps.measure import MODE, Measure
+from foldyn.sweeps.measure import BAND, MODE, Measure
 from foldyn.viewer.fields import bar_strain
 
 F = TypeVar("F", bound=Callable[..., Any])
 MOTION, PATH, MODES, FRF, FIDELITY = "dynamics", "statics", "modes", "frf", "fidelity"
+BANDS = "bands"
 PROMINENT = 0.05
 """Least prominence of a peak of a spectrum, as a part of its maximum."""
 CURVES, MOVED = (FRF, MOTION), (MOTION, PATH)
@@ -346,6 +348,96 @@ def _barrier(found: Landscape, case: Case) -> float:
 )
 def _barrier_back(found: Landscape, case: Case) -> float:
     return found.barrier(1, 0) if len(found.stable) > 1 else np.nan
+
+
+# --------------------------------------------------------------------------- bands
+@_measure(BANDS, units="Hz", doc="frequency", dims=("phase", BAND))
+def _band_frequencies(result: xr.Dataset, case: Case) -> NDArray:
+    return _in_order(result)
+
+
+@_measure(BANDS, units="Hz", doc="frequency")
+def _band(result: xr.Dataset, case: Case, band: int, point: str) -> float:
+    ticks = np.atleast_1d(result.attrs["ticks"])
+    at = dict(zip(result.attrs["tick_labels"].split("-"), ticks.tolist(), strict=True))
+    if point not in at:
+        raise InputError(f"the path has the points {', '.join(at)}")
+    k = int(np.abs(result["distance"].values - at[point]).argmin())
+    return float(_of_band(_in_order(result), band)[k])
+
+
+@_measure(BANDS, units="Hz", doc="width of the gap above")
+def _band_gap(result: xr.Dataset, case: Case, band: int, leg: str = ALL) -> float:
+    bottom, top = _gap_ends(result, band, leg)
+    return top - bottom
+
+
+@_measure(BANDS, units="Hz", doc="middle of the gap above")
+def _gap_center(result: xr.Dataset, case: Case, band: int, leg: str = ALL) -> float:
+    bottom, top = _gap_ends(result, band, leg)
+    return 0.5 * (bottom + top)
+
+
+@_measure(BANDS, doc="relative width of the gap above")
+def _relative_gap(result: xr.Dataset, case: Case, band: int, leg: str = ALL) -> float:
+    bottom, top = _gap_ends(result, band, leg)
+    return 2.0 * (top - bottom) / (bottom + top) if bottom + top > 0.0 else np.nan
+
+
+@_measure(BANDS, units="Hz", doc="width of the widest full gap")
+def _widest_gap(result: xr.Dataset, case: Case) -> float:
+    count = result.sizes[BAND]
+    return max((_band_gap(result, case, band) for band in range(1, count)), default=0.0)
+
+
+@_measure(BANDS, units="Np", doc="attenuation from cell to cell at a frequency")
+def _attenuation(result: xr.Dataset, case: Case, leg: str, frequency: float) -> float:
+    _one_state(result)
+    if "attenuation" not in result:
+        raise InputError("is computed where analysis.attenuation says at how many frequencies")
+    if leg not in result["leg"].values:
+        raise InputError(f"is known along {', '.join(map(str, result['leg'].values))}")
+    levels = result["level_frequency"].values
+    if not 0.0 < frequency <= levels[-1]:
+        raise InputError(f"is known up to {levels[-1]:g} Hz")
+    return float(np.interp(frequency, levels, result["attenuation"].sel(leg=leg).values))
+
+
+@_measure(BANDS, doc="unstable bands")
+def _unstable_bands(result: xr.Dataset, case: Case) -> int:
+    _one_state(result)
+    return int((result["eigenvalue"] < 0.0).any("phase").sum())
+
+
+def _gap_ends(result: xr.Dataset, band: int, leg: str) -> tuple[float, float]:
+    """Where a band ends and the next one begins (Hz), along a leg of the path or in all."""
+    values, known = _in_order(result), legs(result)
+    if leg not in known:
+        raise InputError(f"the path has the legs {', '.join(known)}")
+    values = values[known[leg]]
+    if leg == ALL and "zone_frequency" in result:
+        zone = result["zone_frequency"].transpose("zone", BAND).values
+        values = np.vstack([values, np.sort(np.nan_to_num(zone), axis=1)])
+    if band == result.sizes[BAND]:
+        raise InputError(f"there are {band} bands, none above this one; raise analysis.count")
+    return float(_of_band(values, band).max()), float(values[:, band].min())
+
+
+def _in_order(result: xr.Dataset) -> NDArray:
+    """Frequencies (phase, band), Hz, in increasing order at each phase."""
+    _one_state(result)
+    return frequencies_of(result)
+
+
+def _of_band(values: NDArray, band: int) -> NDArray:
+    if band > values.shape[1]:
+        raise InputError(f"there are {values.shape[1]} bands; raise analysis.count")
+    return values[:, band - 1]
+
+
+def _one_state(result: xr.Dataset) -> None:
+    if "state" in result.dims:
+        raise InputError("is of one state; leave out analysis.vary, and vary its key in the sweep")
 
 
 # ------------------------------------------------------------- comparison with the shell

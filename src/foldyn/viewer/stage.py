@@ -26,6 +26,7 @@ from foldyn.viewer.backdrop import Backdrop
 from foldyn.viewer.fields import Field, energies, fields, folding_fields
 from foldyn.viewer.scripts import in_page
 from foldyn.viewer.sheet import bare_sheet, sheet
+from foldyn.viewer.waves import about_waves, waves
 
 OF_SIZE, OF_LARGEST, OF_COLORS = 5e-5, 1e-3, 4e-3
 """Errors of the page's displacements over the sheet's size and over the largest of them, of which
@@ -75,7 +76,7 @@ def stage(
     results: Results, cases: Mapping[str, Case], title: str, nodes: list[int],
     backdrop: Backdrop | None = None,
 ) -> Stage:  # fmt: skip
-    """Show results of one kind, by name: motions, paths, foldings, modes or responses.
+    """Show results of one kind, by name: motions, paths, foldings, modes, responses or bands.
 
     cases : of the results but for foldings, which have none.
     nodes : those to begin with; the first is chosen.
@@ -83,7 +84,7 @@ def stage(
     """
     arrays, sheets, listed = Arrays(), {}, []
     kind = _kind(next(iter(results.values())))
-    node = None if kind == "modes" or not nodes else nodes[0]
+    node = None if kind in ("modes", "bands") or not nodes else nodes[0]
     about = {"title": title, "kind": kind, "version": __version__, "node": node}
     keys: dict[int, str] = {}
     with _threads().limit(limits=1, user_api="blas"):  # small matrices
@@ -128,12 +129,14 @@ def rest_stage(shown: Pattern | Case, title: str) -> Stage:
 def _kind(result: xr.Dataset) -> str:
     if "share" in result.coords:
         return "folding"
+    if "band" in result.sizes:
+        return "bands"
     for name, kind in (("time", "motion"), ("step", "path"), ("mode", "modes")):
         if name in result.sizes:
             return kind
     if "frequency" in result.sizes:
         return "response"
-    raise InputError("result: it is no motion, path, folding, modes or frequency response")
+    raise InputError("result: it is no motion, path, folding, modes, frequency response or bands")
 
 
 def _motion(
@@ -231,8 +234,15 @@ def _response(
     ]
 
 
+def _bands(
+    arrays: Arrays, key: str, case: Case, result: xr.Dataset, own: dict[str, Any]
+) -> list[dict[str, Any]]:
+    return [own | waves(arrays, key, result)]
+
+
 _LISTED: Mapping[str, Callable[..., list[dict[str, Any]]]] = {
     "motion": _motion, "path": _path, "folding": _folding, "modes": _modes, "response": _response,
+    "bands": _bands,
 }  # fmt: skip
 
 
@@ -247,6 +257,9 @@ def _more(
     """The axis to begin with, the unit of a response, and how alike modes are."""
     if kind == "modes":
         return {"axis": 0, "mac": _likeness(results, cases)}
+    if kind == "bands":
+        structure = next(iter(cases.values())).structure
+        return about_waves(next(iter(results.values())), len(structure.triangles))
     name = _measured(next(iter(results.values()))) if kind == "response" else "displacement"
     moved = [
         np.abs(result[name].sel(node=nodes[:1] or [0]).transpose(..., "axis").values)

@@ -1,4 +1,5 @@
 // Kinds of results by their names.
+import { Bands } from "./bands.js";
 import { Folding } from "./folding.js";
 import { Modes } from "./modes.js";
 import { Motion } from "./motion.js";
@@ -7,5 +8,6 @@ import { FrequencyResponse } from "./response.js";
 import { Shape } from "./shape.js";
 
 export const ANALYSES = {
-  motion: Motion, path: Path, folding: Folding, modes: Modes, response: FrequencyResponse, shape: Shape,
+  motion: Motion, path: Path, folding: Folding, modes: Modes, response: FrequencyResponse, bands: Bands,
+  shape: Shape,
 };

@@ -3,7 +3,7 @@ import { Chart, keys } from "./charts.js";
 import { CURVES, DASHES } from "./colors.js";
 import { at, greatest } from "./curves.js";
 import { number, readable, titled } from "./numbers.js";
-import { boxOfMotion } from "./result.js";
+import { Result, boxOfMotion } from "./result.js";
 
 export const SHOWING = 8; // s, that a motion takes on the page
 export const TURNS = 0.6; // per second, of what swings
@@ -16,7 +16,8 @@ export class Analysis {
   most = 4; // results that are shown to begin with
   fields = [["displacement", "displacement"]];
   overlays = true;
-  curves = true; // charts of the chosen node
+  curves = true; // charts beside the view
+  nodal = true; // of the chosen node
   moves = true;
   hidden = new Set(); // names of curves that a reader has switched off
 
@@ -25,6 +26,11 @@ export class Analysis {
   }
 
   prepare() {}
+
+  // A result from its description.
+  loaded(about, sheet, store) {
+    return Result.load(about, sheet, store);
+  }
 
   box(results) {
     return boxOfMotion(results, this.page.scale);
@@ -46,6 +52,11 @@ export class Analysis {
     return 1;
   }
 
+  // Put the nodes of a result where they are now; returns their displacements, before the factor.
+  move(result, factor) {
+    return result.move(this.moment(result), this.page.phase, factor);
+  }
+
   // Part of the range that has passed, and the moment at one.
   get part() {
     const [low, high] = this.range;
@@ -64,14 +75,15 @@ export class Analysis {
     return this.plots;
   }
 
-  // A chart in a new place, with the names of its curves below if there are several. `follow` tells
-  // it the moment: its place along the curves, and the curves' points there.
+  // A chart in a new place, with the names of its curves below if there are several, and unless
+  // `named` is false. `follow` tells it the moment: its place along the curves, and the curves' points
+  // there.
   chart(host, options) {
     const place = document.createElement("div");
     host.append(place);
     const plot = new Chart(place, options);
     plot.follow = () => plot.show(...options.follow(plot));
-    if (options.curves.length > 1) host.append(keys(plot, this.hidden, this.plots.length));
+    if (options.curves.length > 1 && options.named !== false) host.append(keys(plot, this.hidden, this.plots.length));
     this.plots.push(plot);
     return plot;
   }

@@ -9,10 +9,15 @@ const power = (value) => 10 ** Math.floor(Math.log10(value));
 export class Chart {
   // curves: { name, color, dash, x, y, stable? }; options: `seek` is told the place that a reader
   // points at, `free` says that curves may turn back, `log` that the vertical axis is logarithmic,
-  // `decades` how many of it are shown at most, and `words` what 0, 1, 2, ... along the horizontal
-  // axis stand for.
-  constructor(host, { label, xlabel, ylabel, curves, seek, free = false, log = false, decades = null, words = [] }) {
-    Object.assign(this, { host, curves, free, xlabel, ylabel });
+  // `decades` how many of it are shown at most, `words` what 0, 1, 2, ... along the horizontal axis
+  // stand for. Of curves that may turn back: `ticks` are places with names along an axis ([[x, name],
+  // ...]), `ranges` the ends of both axes, `shaded` stretches of the vertical one, and `all` says
+  // that a reader points at any curve, whose number `seek` is told too.
+  constructor(host, {
+    label, xlabel, ylabel, curves, seek, free = false, log = false, decades = null, words = [],
+    ticks = {}, ranges = {}, shaded = [], all = false, height = null,
+  }) {
+    Object.assign(this, { host, curves, free, xlabel, ylabel, shaded, all });
     host.setAttribute("role", "img");
     host.setAttribute("aria-label", label);
     const axis = (text, size) => ({
@@ -32,16 +37,19 @@ export class Chart {
     }));
     this.plot = new uPlot({
       mode: free ? 2 : 1,
-      width: Math.max(200, host.clientWidth), height: Math.max(190, 60 + 6.5 * ylabel.length), padding: [10, 12, 0, 0],
+      width: Math.max(200, host.clientWidth), height: height ?? Math.max(190, 60 + 6.5 * ylabel.length), padding: [10, 12, 0, 0],
       cursor: { show: !free, drag: { x: false, y: false }, points: { size: 6 } },
       legend: { show: false },
       scales: {
-        x: { time: false, ...(words.length && { range: [-0.5, words.length - 0.5] }) },
-        y: log ? { distr: 3, ...(decades && { range: (_, low, high) => [power(Math.max(low, high * 10 ** -decades)), high * 1.5] }) } : {},
+        x: { time: false, ...(words.length && { range: [-0.5, words.length - 0.5] }), ...(ranges.x && { range: ranges.x }) },
+        y: ranges.y ? { range: ranges.y } : log ? { distr: 3, ...(decades && { range: (_, low, high) => [power(Math.max(low, high * 10 ** -decades)), high * 1.5] }) } : {},
       },
-      axes: [{ ...axis(xlabel, 30), ...(words.length && named(words)) }, axis(ylabel, 54)],
+      axes: [
+        { ...axis(xlabel, 30), ...(words.length && named(words.map((word, k) => [k, word]))), ...(ticks.x && named(ticks.x)) },
+        { ...axis(ylabel, 54), ...(ticks.y && named(ticks.y)) },
+      ],
       series: [free ? {} : { label: xlabel }, ...series],
-      hooks: { draw: [() => this.mark()] },
+      hooks: { drawClear: [() => this.shade()], draw: [() => this.mark()] },
     }, free ? [null, ...curves.map(({ x, y }) => [x, y])] : aligned(curves), host);
     if (seek) this.point(seek);
   }
@@ -52,7 +60,7 @@ export class Chart {
     const point = (event) => {
       if (!event.buttons) return;
       const box = over.getBoundingClientRect();
-      seek(this.nearest(event.clientX - box.left, event.clientY - box.top));
+      seek(...this.nearest(event.clientX - box.left, event.clientY - box.top));
     };
     over.addEventListener("pointerdown", (event) => {
       over.setPointerCapture(event.pointerId);
@@ -61,16 +69,30 @@ export class Chart {
     over.addEventListener("pointermove", point);
   }
 
-  // Value at a place of the chart, or the number of the nearest point of the first curve.
+  // Value at a place of the chart, or the number of the nearest point and of its curve: of the
+  // first one, or of `all` that are shown.
   nearest(px, py) {
-    if (!this.free) return this.plot.posToVal(px, "x");
-    let [best, least] = [0, Infinity];
-    const { x, y } = this.curves[0];
-    for (let k = 0; k < x.length; k++) {
-      const apart = Math.hypot(this.plot.valToPos(x[k], "x") - px, this.plot.valToPos(y[k], "y") - py);
-      if (apart < least) [best, least] = [k, apart];
+    if (!this.free) return [this.plot.posToVal(px, "x")];
+    let [best, curve, least] = [0, 0, Infinity];
+    (this.all ? this.curves : this.curves.slice(0, 1)).forEach(({ x, y }, j) => {
+      if (this.all && !this.plot.series[j + 1].show) return;
+      for (let k = 0; k < x.length; k++) {
+        const apart = Math.hypot(this.plot.valToPos(x[k], "x") - px, this.plot.valToPos(y[k], "y") - py);
+        if (apart < least) [best, curve, least] = [k, j, apart];
+      }
+    });
+    return [best, curve];
+  }
+
+  shade() {
+    const { ctx, bbox } = this.plot;
+    ctx.save();
+    ctx.fillStyle = css(this.host, "--grid");
+    for (const [low, high] of this.shaded) {
+      const [top, bottom] = [high, low].map((y) => this.plot.valToPos(y, "y", true));
+      ctx.fillRect(bbox.left, top, bbox.width, bottom - top);
     }
-    return best;
+    ctx.restore();
   }
 
   // A curve that turns back, dashed where it is unstable.
@@ -80,13 +102,21 @@ export class Chart {
     ctx.save();
     ctx.lineWidth = 1.8 * devicePixelRatio;
     ctx.strokeStyle = color;
+    ctx.beginPath();
+    ctx.rect(plot.bbox.left, plot.bbox.top, plot.bbox.width, plot.bbox.height);
+    ctx.clip();
     for (let k = 1, start = 0; k <= x.length; k++) {
       const kind = (j) => !stable || (stable[j - 1] && stable[j]);
       if (k < x.length && k > start + 1 && kind(k) === kind(k - 1)) continue;
       if (k - 1 > start) {
         ctx.setLineDash(kind(start + 1) ? [] : [5 * devicePixelRatio, 4 * devicePixelRatio]);
         ctx.beginPath();
-        for (let j = start; j < k; j++) ctx.lineTo(...at(j));
+        for (let j = start, down = false; j < k; j++) {
+          const [across, up] = at(j);
+          const there = Number.isFinite(across) && Number.isFinite(up); // else there is a break
+          if (there) ctx[down ? "lineTo" : "moveTo"](across, up);
+          down = there;
+        }
         ctx.stroke();
         start = k - 1;
       }
@@ -141,8 +171,8 @@ export class Chart {
   }
 }
 
-// Ticks that are words.
-const named = (words) => ({ splits: () => words.map((_, k) => k), values: () => words });
+// Ticks that are words, each at its place.
+const named = (ticks) => ({ splits: () => ticks.map(([at]) => at), values: () => ticks.map(([, word]) => word) });
 
 // Columns of curves over one horizontal axis.
 function aligned(curves) {

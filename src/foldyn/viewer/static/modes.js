@@ -8,6 +8,7 @@ export class Modes extends Analysis {
   most = 6;
   overlays = false;
   curves = false;
+  nodal = false;
 
   prepare() {
     this.range = [0, 1];

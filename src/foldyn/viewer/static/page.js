@@ -5,7 +5,7 @@ import { Store } from "./data.js";
 import { savePicture, saveTable, saveVector } from "./files.js";
 import { Legend } from "./legend.js";
 import { number } from "./numbers.js";
-import { Result, loadedSheet } from "./result.js";
+import { loadedSheet } from "./result.js";
 import { Shape } from "./shape.js";
 import { View } from "./view.js";
 
@@ -77,7 +77,7 @@ export class Page {
     const sheets = {};
     for (const [key, sheet] of Object.entries(about.sheets)) sheets[key] = await loadedSheet(sheet, store);
     const results = await Promise.all(
-      about.results.map((each) => Result.load(each, sheets[each.sheet], store)),
+      about.results.map((each) => this.analysis.loaded(each, sheets[each.sheet], store)),
     );
     this.pictures = await Promise.all((about.backdrop?.pictures ?? []).map(loadedPicture));
     this.camera.photograph = about.backdrop ?? null;
@@ -175,7 +175,8 @@ export class Page {
     this.$("scaled").textContent = number(this.scale, 2);
     this.$("layouts").hidden = this.results.length < 2 || !this.analysis.overlays;
     this.$("which").hidden = this.results.length < 2 || !this.analysis.curves;
-    this.$("direction").hidden = this.$("save-curves").hidden = !this.analysis.curves;
+    this.$("save-curves").hidden = !this.analysis.curves;
+    this.$("direction").hidden = !this.analysis.nodal;
     this.$("play").hidden = !this.analysis.moves;
     for (const name of ["field", "ghost", "scale"]) this.$(name).parentElement.hidden = !this.analysis.moves;
     this.$("ghost").checked = this.ghost = !this.about.backdrop && this.results[0].sheet.edges.length < 20000;
@@ -379,7 +380,7 @@ export class Page {
     if (!this.ready) return;
     for (const result of this.shown) {
       const factor = this.scale * this.analysis.swing(result);
-      const moved = result.move(this.analysis.moment(result), this.phase, factor);
+      const moved = this.analysis.move(result, factor);
       result.shown = this.field
         ? result.levels(this.field, this.analysis.moment(result), moved, this.top) : null;
     }

@@ -5,16 +5,10 @@ import { readable } from "./numbers.js";
 
 class Plot extends Chart {
   walk(plot, curve) {
-    const { ctx, bbox } = plot;
+    const { ctx } = plot;
     ctx.save();
-    if (curve.dots) {
-      this.dot(plot, curve);
-    } else {
-      ctx.beginPath();
-      ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-      ctx.clip();
-      super.walk(plot, curve);
-    }
+    if (curve.dots) this.dot(plot, curve);
+    else super.walk(plot, curve);
     ctx.restore();
     return null;
   }

@@ -148,7 +148,7 @@ function meanLength({ along, crease }) {
 }
 
 // Least and greatest coordinate along an axis.
-function extremes(nodes, axis) {
+export function extremes(nodes, axis) {
   let [low, high] = [Infinity, -Infinity];
   for (let k = axis; k < nodes.length; k += 3) {
     low = Math.min(low, nodes[k]);

@@ -4,6 +4,7 @@ import { Analysis } from "./analysis.js";
 export class Shape extends Analysis {
   fields = [];
   curves = false;
+  nodal = false;
   moves = false;
 
   prepare() {

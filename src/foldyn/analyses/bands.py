@@ -1,0 +1,226 @@
+"""Bands of a repeated case: [analysis] of kind "bands", arguments of `UnitCell` and `bands`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Annotated, Any, Self
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+from pydantic import Field, PlainValidator, model_validator
+
+from foldyn.analyses.bands_page import bands_sections
+from foldyn.analyses.bars import bar
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
+from foldyn.analyses.cell_states import (
+    CellState,
+    cell_states,
+    coordinate,
+    one_key,
+    some_periods,
+    stretches,
+)
+from foldyn.analyses.sections import Count, Positive, Section, section_of
+from foldyn.analyses.vibration import About, Secant, VibrationSchema, bar_closed
+from foldyn.cases import Case
+from foldyn.cases.loads import Actuate
+from foldyn.errors import InputError
+from foldyn.linear import UnitCell, attenuation, band_gaps, bands, damped_bands
+from foldyn.linear.band_gaps import ALL
+from foldyn.patterns.screw import Screw
+from foldyn.results.dataset import bands_dataset
+from foldyn.results.quantities import BANDS, GAPS
+
+AROUND = {1: "G-X", 2: "G-X-M-Y-G"}
+"""Paths around the zone by its dimensions, where a file names none."""
+MOST_ZONE = 200
+MOST_LEVELS = 10_000
+ABOVE = 1.05
+"""Where the frequencies of an attenuation spectrum end, over the highest one of the bands."""
+COORDINATES = ("distance", "wave_vector", "zone_wave_vector", "leg")
+
+
+class ScrewSection(section_of(Screw)):
+    """[analysis.screw]: arguments of `Screw`."""
+
+
+class BandsSection(Section):
+    """[analysis] of kind "bands"."""
+
+    kind: str
+    path: str | None = None
+    points: Count = 60
+    count: Count = 6
+    zone: Annotated[int, Field(ge=2, le=MOST_ZONE)] | None = None
+    attenuation: Annotated[int, Field(ge=1, le=MOST_LEVELS)] | None = None
+    vary: Annotated[Any, PlainValidator(one_key)] = None
+    state: About = "rest"
+    stretch: Annotated[Any, PlainValidator(stretches)] = None
+    turn: float | None = None
+    secant: Secant = None
+    periods: Annotated[Any, PlainValidator(some_periods)] = None
+    vectors: Any = None
+    screw: ScrewSection | None = None
+    tolerance: Positive = 1e-6
+
+
+class BandsOutput(Section):
+    """[output] of bands, which has no keys."""
+
+
+class BandsSchema(VibrationSchema):
+    """A case file of kind "bands"."""
+
+    analysis: BandsSection
+    output: BandsOutput = BandsOutput()
+
+    @model_validator(mode="after")
+    def _folds_only(self) -> Self:
+        for i, load in enumerate(self.loads):
+            if self.initial is None and not isinstance(load, Actuate):
+                raise InputError(
+                    ": equilibria of cells that repeat are under folded creases and stretched "
+                    "periods alone; leave it out, or compute a path and name its result in "
+                    "initial.file",
+                    f"loads[{i}]",
+                )
+        return self
+
+
+class BandsAnalysis(Analysis):
+    """Frequencies of Bloch waves, in one state or in several."""
+
+    kind = "bands"
+    moving = True
+    schema = BandsSchema
+    needs_density = "bands need"
+    takes = ("path", "points", "count", "zone", "attenuation", "stretch", "turn", "secant")
+    files = ("bands",)
+
+    def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
+        """See `Analysis`."""
+        given = {**self.arguments, **changes}
+        states = cell_states(case_file, mass, given)
+        path = _path(states[0].cell, given["path"], given["points"])
+
+        def compute(progress: bool, begun: Begun) -> xarray.Dataset:
+            found = []
+            with bar_closed(bar(progress, total=len(states), desc="states")) as reached:
+                for state in states:
+                    with state.placed():
+                        found.append(_bands(state, path, given))
+                    begun()
+                    reached.update()
+            return _joined(case_file.case(mass), states, found)
+
+        return compute
+
+    def line(self, name: str, result: xarray.Dataset) -> str:
+        """How many bands and gaps, and the effort."""
+        of = f" in {result.sizes['state']} states" if "state" in result.sizes else ""
+        full = int((result["gap_direction"] == ALL).sum())
+        return (
+            f"  {name}: {counted(result.sizes['band'], 'band')} at {result.sizes['phase']} wave "
+            f"vectors{of}, {counted(full, 'full gap')}, {result.attrs['wall_seconds']:.1f} s"
+        )
+
+    sections = staticmethod(bands_sections)
+
+
+def _path(cell: UnitCell, points: str | None, count: int) -> xarray.DataArray:
+    """Phases along the path of a file."""
+    try:
+        return cell.path(AROUND[cell.dimensions] if points is None else points, count)
+    except InputError as error:  # which has other names for the keys
+        key = {"points": "path", "count": "points"}[error.key]
+        raise InputError(error.reason, key) from None
+
+
+def _bands(state: CellState, path: xarray.DataArray, given: Mapping[str, Any]) -> xarray.Dataset:
+    """What the file asks for in one state."""
+    began, cell, count, own = time.perf_counter(), state.cell, given["count"], state.arguments()
+    found = bands(cell, path, count, group_velocity=True, shape=True, polarization=True, **own)
+    gaps = band_gaps(found)
+    if given["zone"]:
+        zone = cell.grid(given["zone"]).values
+        values = _in_zone(cell, zone, given["zone"], count, own)
+        every = np.concatenate([found["frequency"].values, values])
+        full = band_gaps(xarray.Dataset({"frequency": (("phase", "band"), every)}))
+        gaps = xarray.concat([full, gaps.isel(gap=gaps["direction"].values != ALL)], "gap")
+        found["zone_frequency"] = ("zone", "band"), values
+        found.coords["zone_wave_vector"] = ("zone", "period"), zone
+    if given["attenuation"]:
+        _attenuate(found, cell, given["attenuation"], own)
+    if cell.case.damped:
+        damped = damped_bands(cell, path, count, **own)
+        found["damped_frequency"] = ("phase", "band"), damped["frequency"].values
+        found["damped_ratio"] = ("phase", "band"), damped["damping_ratio"].values
+    found["position"] = found["rest_position"] + found["displacement"]
+    found["residual"] = (), found.attrs["residual"]
+    return found.assign_attrs(gaps=gaps, wall_seconds=time.perf_counter() - began)
+
+
+def _in_zone(
+    cell: UnitCell, phases: NDArray, side: int, count: int, own: Mapping[str, Any]
+) -> NDArray[np.float64]:
+    """Frequencies (phase, band), Hz, at phases of a grid, half of them by reciprocity."""
+    shape = [side] * cell.dimensions
+    places = np.indices(shape).reshape(cell.dimensions, -1)
+    opposite = np.ravel_multi_index(tuple(-places % side), shape)  # of -k
+    half = np.flatnonzero(np.arange(len(opposite)) <= opposite)
+    values = np.empty((len(phases), count))
+    found = bands(cell, phases[half], count, track=False, **own)["frequency"].values
+    values[half] = values[opposite[half]] = found
+    return values
+
+
+def _attenuate(found: xarray.Dataset, cell: Any, count: int, own: Mapping[str, Any]) -> None:
+    """Add the attenuation along the legs of the path that follow one period."""
+    names = found.attrs["tick_labels"].split("-")
+    corners = np.searchsorted(found["distance"].values, found.attrs["ticks"] - 1e-9)
+    levels = np.linspace(0.0, ABOVE * np.nanmax(found["frequency"].values), count + 1)[1:]
+    legs: dict[str, NDArray] = {}
+    for k, (a, b) in enumerate(pairwise(found["wave_vector"].values[corners])):
+        along = np.flatnonzero(a != b)
+        if len(along) == 1:
+            other = {"phase": float(a[1 - along[0]])} if len(a) > 1 else {}
+            spectrum = attenuation(cell, levels, int(along[0]), **other, **own)
+            legs.setdefault(f"{names[k]}-{names[k + 1]}", spectrum["attenuation"].values)
+    if not legs:
+        raise InputError(
+            ": no leg of the path follows one period, as G-X does; change the path or leave it out",
+            "attenuation",
+        )
+    found["attenuation"] = ("leg", "level"), np.array(list(legs.values()))
+    found["level_frequency"] = "level", levels
+    found.coords["leg"] = "leg", np.array(list(legs))
+
+
+def _joined(
+    case: Case, states: Sequence[CellState], found: Sequence[xarray.Dataset]
+) -> xarray.Dataset:
+    """One result of the bands of all states."""
+    first, vary = found[0], states[0].varied
+
+    def over(values: Sequence[Any]) -> NDArray:
+        return np.asarray(values[0]) if vary is None else np.stack(values)
+
+    values = {name: over([one[name].values for one in found]) for name in BANDS if name in first}
+    parts = [
+        one.attrs["gaps"].assign(state=("gap", np.full(one.attrs["gaps"].sizes["gap"], k)))
+        for k, one in enumerate(found)
+    ]
+    gaps = {
+        name: np.concatenate([one[name.removeprefix("gap_")].values for one in parts])
+        for name in GAPS
+    }
+    along: dict[str, Any] = {"band": ("band", first["band"].values, {"long_name": "band"})}
+    along |= {name: first[name].variable for name in COORDINATES if name in first.coords}
+    if vary is not None:
+        along["state"] = coordinate(vary)
+    facts = {name: first.attrs[name] for name in ("ticks", "tick_labels", "tracked")}
+    facts["wall_seconds"] = sum(one.attrs["wall_seconds"] for one in found)
+    return bands_dataset(case, values, gaps, along, facts)
