@@ -174,6 +174,7 @@ def _bowing(mesh: PanelMesh, edge: int, resistance: float) -> NDArray:
     start, end = mesh.x[mesh.at[edge]], mesh.x[mesh.at[(edge + 1) % len(mesh.at)]]
     length = float(np.linalg.norm(end - start))
     place = np.linalg.norm(mesh.x[points] - start, axis=1)
+    fade = 1.0
     if mesh.radius is None:
         wave = np.pi / length * np.arange(1, len(points) + 1)
         shapes = 2.0 / (len(points) + 1) * np.sin(np.outer(wave, place))
@@ -186,8 +187,8 @@ def _bowing(mesh: PanelMesh, edge: int, resistance: float) -> NDArray:
         shapes = -2.0 / length * np.diff(slopes, axis=1) / wave[:, None] ** 2
         # the shortest ones fade, as a last whole wave would make the stiffness jump with the length
         part = np.clip(1.5 - number / count, 0.0, 1.0)
-        resistance = resistance * part**2 * (3.0 - 2.0 * part)
-    return (shapes.T * (resistance * wave**3 * 0.5 * length)) @ shapes
+        fade = part**2 * (3.0 - 2.0 * part)
+    return (shapes.T * (fade * resistance * wave**3 * 0.5 * length)) @ shapes
 
 
 def _moves(panel: Outline, mesh: PanelMesh) -> tuple[sparse.csr_array, int]:
