@@ -89,7 +89,7 @@ def test_an_absorbing_end_sends_hardly_anything_back(reflected):
         (lambda: LongWaves((0, 0, 1), [[1.0]], np.eye(2)), "mass"),
         (lambda: LongWaves((0, 0, 1), [[1.0]], [[0.0]]), "mass"),
         (lambda: LongWaves((0, 0, 0), [[1.0]], [[1.0]]), "axis"),
-        (lambda: long_waves(cell(), along=1), "along"),
+        (lambda: long_waves(cell(), along=1), "along = 1: the cell has 1 period, 0"),
         (lambda: long_waves("cell"), "cell"),
         (lambda: absorbing_end(UNIT.chain(1), [0, 99], long_waves(cell())), "nodes"),
         (lambda: absorbing_end(UNIT.chain(1), [0], "waves"), "waves"),
@@ -106,8 +106,11 @@ def test_nodes_on_the_axis_are_refused():
         absorbing_end(UNIT.chain(1), [0, 1], waves)
 
 
-def test_a_chain_that_is_held_has_no_long_waves():
+@pytest.mark.parametrize(
+    "support", [fd.Fix(range(6), "z"), fd.Fix([0]), fd.Spring(5.0, nodes=[0], direction="z")]
+)
+def test_a_chain_that_is_held_has_no_long_waves(support):
     case = UNIT.case(UNIT.structure(1), [0])
-    held = fd.Case(case.structure, [fd.Fix(range(6), "z")], masses=case.masses)
-    with pytest.raises(ComputationError, match="hold none"):
+    held = fd.Case(case.structure, [support], masses=case.masses)
+    with pytest.raises(ComputationError, match="hold none of its nodes along the chain or about"):
         long_waves(fd.UnitCell(held))

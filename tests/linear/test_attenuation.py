@@ -97,6 +97,17 @@ def test_gaps_are_listed():
         band_gaps({})
 
 
+def test_damped_bands_are_as_many_as_there_are_motions():
+    cell = fd.UnitCell(fd.Case(miura().case.structure, damping=fd.Rayleigh(alpha=50.0)))
+    found = damped_bands(cell, [[0.9, 0.4]], 24)
+    every = fd.bands(cell, [[0.9, 0.4]], 24).eigenvalue.values
+    assert np.sort(np.abs(found.rate.values) ** 2) == pytest.approx(np.sort(every), rel=1e-6)
+    with pytest.raises(InputError, match=r"count = 25: .* leave 24 motions at the phases"):
+        damped_bands(cell, [[0.9, 0.4]], 25)
+    with pytest.raises(InputError, match="cell: got Case, give a UnitCell"):
+        damped_bands(cell.case, [[0.9, 0.4]])
+
+
 def test_attenuation_refuses_what_is_not_there():
     for given, match in (
         ({"frequencies": [0.0]}, "frequencies: give numbers above 0"),

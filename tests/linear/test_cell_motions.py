@@ -191,7 +191,7 @@ def test_cells_of_a_ring_are_found_and_do_not_advance():
         (lambda run: space_time(run, fd.UnitCell(miura((1, 1)))), "1 of these cells"),
         (lambda run: space_time(run, "cell"), "UnitCell"),
         (lambda run: space_time(run, cell(), "radial"), "component"),
-        (lambda run: space_time(run, cell(), along=1), "repeats under 1 motion"),
+        (lambda run: space_time(run, cell(), along=1), "along = 1: the cell has 1 period"),
         (lambda run: space_time(run.drop_vars("velocity"), cell()), "velocity"),
         (lambda run: space_time(5, cell()), "give a motion"),
         (lambda run: wave_spectrum(run, cell(), "rotation"), "component"),

@@ -109,6 +109,22 @@ def test_screws_and_their_logarithms():
     assert of_twist(translation((1.0, 2.0, 3.0)).twist).vector == pytest.approx([1.0, 2.0, 3.0])
 
 
+@pytest.mark.filterwarnings("error")
+def test_computed_angles_are_not_doubted():
+    """A turn of pi/3 degrees is one in radians if a user gives it, but not if it is computed."""
+    turn = np.radians(np.pi / 3.0) * np.array([0.0, 0.0, 1.0])
+    screw = of_twist(np.concatenate([turn, [0.0, 0.0, 1.0]]))
+    assert screw.angle == pytest.approx(np.pi / 3.0)
+    points = np.random.default_rng(0).normal(size=(5, 3))
+    assert motion_between(points, screw.images(points), 1e-9)[0].angle == pytest.approx(np.pi / 3)
+
+
+def test_screws_that_move_nothing_are_refused():
+    for angle in (0.0, -720.0):
+        with pytest.raises(InputError, match=r"shift = 0, angle = -?\d+: leave all in its place"):
+            fd.Screw("z", angle, 0.0)
+
+
 # ---------------------------------------------------------------------- the zone
 def test_paths_go_through_their_points():
     phases = miura().path("G-X-M-G", 61)
@@ -144,6 +160,8 @@ def test_wrong_vectors_name_the_nearest_vertices():
     double = fd.patterns.miura(cells=(2, 1), a=0.03, b=0.031)
     with pytest.raises(InputError, match=r"brings vertex 0 to 6, .* more than one cell"):
         cell_of(double, vectors=[own[0]])
+    with pytest.raises(InputError, match=r"tolerance = 0.5: must be less than 0.05"):
+        fd.UnitCell(case, tolerance=0.5)
     both = double.changed(periods=[[(v, v + 6) for v in range(9)]])
     with pytest.raises(InputError, match=r"panels 0 and 2 are copies of each other"):
         fd.bands(cell_of(both), [[0.5]])
@@ -210,6 +228,8 @@ def test_models_that_do_not_repeat_are_refused():
 def test_periods_that_cannot_be_reached_are_told():
     with pytest.raises(InputError, match="motions: 1 of them; the cell has 2"):
         fd.linear.relaxed(miura(), miura().vectors[:1])
+    with pytest.raises(InputError, match=r"motions\[1\] = .*: must not be zero"):
+        fd.linear.relaxed(miura(), [miura().vectors[0], (0.0, 0.0, 0.0)])
     with pytest.raises(ComputationError, match="no equilibrium with these periods"):
         fd.linear.relaxed(chain(), [[1e-6, 0.0, 0.0]], steps=1)
 

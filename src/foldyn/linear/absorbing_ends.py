@@ -23,10 +23,11 @@ from foldyn.cases import Case, Dashpot, State
 from foldyn.cases.selection import Nodes, resolve_nodes
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.bloch import Bloch, null_space
+from foldyn.linear.group_velocity import Waves
 from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.linear.wave_solver import WaveSolver
-from foldyn.values import numbers, of_kind, vector, whole
+from foldyn.values import numbers, of_kind, vector
 
 PHASE = 1e-3  # rad per cell: a long wave
 LEAST = 0.5  # share of a wave's kinetic energy in sections that move as rigid bodies
@@ -128,10 +129,7 @@ def long_waves(cell: UnitCell, state: State | None = None, along: int = 0) -> Lo
     >>> fd.linear.long_waves(cell).speeds.shape
     (2,)
     """
-    of_kind("cell", cell, UnitCell)
-    along = whole("along", along, least=0)
-    if along >= cell.dimensions:
-        raise InputError(f" = {along}: the cell repeats under {cell.dimensions} motions", "along")
+    along = of_kind("cell", cell, UnitCell).period("along", along)
     linear = linearize_cell(cell, state)
     motion = linear.motions[along]
     phase = PHASE * np.eye(cell.dimensions)[along]
@@ -141,15 +139,23 @@ def long_waves(cell: UnitCell, state: State | None = None, along: int = 0) -> Lo
     basis[: 3 * linear.nodes] = rigid.reshape(-1, rigid.shape[2])
     momenta = linear.bloch.mass.sparse_at(linear.bloch.factors(0.0 * phase)).real @ basis
     mass = basis.T @ momenta
-    waves = WaveSolver(linear.bloch, _lowest(linear.bloch, phase)).waves(phase)
-    parts = momenta.T @ waves.shapes
-    share = np.einsum("ij,ij->j", parts.conj(), np.linalg.solve(mass, parts)).real
+    solver = WaveSolver(linear.bloch, _lowest(linear.bloch, phase))
+
+    def rigid_part(waves: Waves) -> tuple[NDArray, NDArray]:
+        """Momenta (k, m) of sections that move as rigid bodies, and their share (m,) of waves."""
+        parts = momenta.T @ waves.shapes
+        return parts, np.einsum("ij,ij->j", parts.conj(), np.linalg.solve(mass, parts)).real
+
+    waves, still = solver.waves(phase), solver.waves(0.0 * phase)
+    parts, share = rigid_part(waves)
     chosen = np.flatnonzero(share > LEAST)[: len(mass)]
-    if len(chosen) < len(mass) or (waves.values[chosen] <= 0.0).any():
+    lowest = waves.values[chosen].min(initial=0.0 if len(chosen) < len(mass) else np.inf)
+    free = rigid_part(still)[1][np.abs(still.values) < LEAST * lowest].sum()
+    if free < len(mass) - LEAST:
         raise ComputationError(
-            f"only {len(chosen)} of {len(mass)} waves of a phase of {PHASE} rad move sections of "
-            "the chain as rigid bodies, or one is unstable: hold none of its nodes along the "
-            "chain, and take a stable state"
+            f"the sections of the chain do not move freely in {len(mass)} ways as rigid bodies, or "
+            "are unstable: hold none of its nodes along the chain"
+            f"{' or about it' if motion.turns else ''}, and take a stable state"
         )
     squares = waves.values[chosen] / PHASE**2
     scaled = parts[:, chosen] / np.sqrt(share[chosen])

@@ -18,7 +18,7 @@ from foldyn.linear.unit_cell import UnitCell
 from foldyn.linear.wave_solver import WaveSolver
 from foldyn.linear.zone import checked_phases, of_phases
 from foldyn.results.dataset import result_dataset
-from foldyn.values import flag, whole
+from foldyn.values import flag, of_kind, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -106,7 +106,7 @@ def bands(
     >>> dict(b.frequency.sizes)
     {'phase': 12, 'band': 4}
     """
-    given = checked_phases(phases, cell.dimensions if isinstance(cell, UnitCell) else 1)
+    given = checked_phases(phases, of_kind("cell", cell, UnitCell).dimensions)
     asked = [flag(*pair) for pair in (("group_velocity", group_velocity), ("shape", shape),
              ("polarization", polarization), ("track", track))]  # fmt: skip
     count = whole("count", count, least=1)

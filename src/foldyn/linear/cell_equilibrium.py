@@ -98,7 +98,9 @@ def relaxed(
 def _given(cell: UnitCell, motions: Any) -> tuple[Screw, ...]:
     """The motions at the end."""
     given = [
-        motion if isinstance(motion, Screw) else translation(vector(f"motions[{k}]", motion))
+        motion
+        if isinstance(motion, Screw)
+        else translation(vector(f"motions[{k}]", motion, nonzero=True))
         for k, motion in enumerate(listed("motions", motions, "screws or vectors (m)"))
     ]
     if len(given) != cell.dimensions:

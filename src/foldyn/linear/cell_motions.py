@@ -18,7 +18,7 @@ from foldyn.patterns.screw import Screw
 from foldyn.results.contents import check_variable
 from foldyn.signals import sampling_interval, wavenumber_spectrum
 from foldyn.signals.records import Window
-from foldyn.values import choice, of_kind, whole
+from foldyn.values import choice, of_kind
 
 if TYPE_CHECKING:
     import xarray
@@ -60,10 +60,7 @@ def cells_of(positions: NDArray, cell: UnitCell, along: int = 0) -> Cells:
     """
     from scipy.spatial import cKDTree
 
-    of_kind("cell", cell, UnitCell)
-    along = whole("along", along, least=0)
-    if along >= cell.dimensions:
-        raise InputError(f" = {along}: the cell repeats under {cell.dimensions} motions", "along")
+    along = of_kind("cell", cell, UnitCell).period("along", along)
     motion = cell.motions[along]
     near = cell.tolerance * float(np.ptp(positions, axis=0).max())
     distance, partner = cKDTree(positions).query(motion.images(positions))
@@ -80,8 +77,8 @@ def cells_of(positions: NDArray, cell: UnitCell, along: int = 0) -> Cells:
     longest = max(map(len, rows), default=0)
     if longest < FEWEST:
         raise InputError(
-            f": {longest} of these cells are in a row in the structure, {FEWEST} are needed; give "
-            "a longer chain, and the cell that it repeats",
+            f": the structure has at most {longest} of these cells in a row, and needs {FEWEST}; "
+            "give a longer chain, and the cell that it repeats",
             "cell",
         )
     rows = [row for row in rows if len(row) >= longest - 1]

@@ -14,13 +14,13 @@ from scipy import linalg
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from foldyn.cases import State
-from foldyn.errors import InputError
 from foldyn.linear.bloch import Bloch, null_space
 from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.unit_cell import UnitCell
+from foldyn.linear.wave_solver import check_count
 from foldyn.linear.zone import checked_phases, of_phases
 from foldyn.results.dataset import result_dataset
-from foldyn.values import whole
+from foldyn.values import of_kind, whole
 from foldyn.workers import in_threads
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def damped_bands(
     >>> round(float(found.rate.real[0, 0]), 6)
     -50.0
     """
-    given = checked_phases(phases, cell.dimensions if isinstance(cell, UnitCell) else 1)
+    given = checked_phases(phases, of_kind("cell", cell, UnitCell).dimensions)
     count = whole("count", count, least=1)
     linear = linearize_cell(cell, state, secant, load_factor)
     rates = np.array(in_threads(lambda phase: damped_rates(linear.bloch, phase, count), given))
@@ -101,9 +101,9 @@ def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex
         for part in (bloch.stiffness, bloch.damping, bloch.mass)
     )
     size = len(stiffness)
-    wanted = 2 * count + SPARE
-    if wanted >= 2 * size - 1:
-        raise InputError(f" = {count}: the cell has too few dofs for so many", "count")
+    most = size - int(bloch.hidden.sum())
+    check_count(count, most, phase)
+    wanted = min(2 * count + SPARE, 2 * most)
     scale = np.trace(stiffness).real / np.trace(mass).real
     shift = SHIFT * np.sqrt(scale)
     factor = linalg.lu_factor(stiffness + shift * damping + shift**2 * mass)
@@ -114,7 +114,9 @@ def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex
         u = -linalg.lu_solve(factor, mass @ g + damping @ f + shift * (mass @ f))
         return np.concatenate([u, f + shift * u])
 
-    if size <= DENSE:  # where iterations over clusters of bands may not converge
+    if (
+        size <= DENSE or wanted >= 2 * size - 1
+    ):  # where iterations over clusters of bands may not converge
         inverse = linalg.eigvals(solve(np.eye(2 * size)))
         found = shift + 1.0 / inverse[np.argsort(-np.abs(inverse))[:wanted]]
     else:

@@ -100,13 +100,7 @@ def attenuation(
     if wanted.ndim != 1 or not len(wanted) or (wanted <= 0.0).any():
         raise InputError(": give numbers above 0 (Hz)", "frequencies")
     count, phase = whole("count", count, least=1), number("phase", phase)
-    direction = whole("direction", direction, least=0)
-    if direction >= cell.dimensions:
-        raise InputError(
-            f" = {direction}: the cell has {cell.dimensions} period"
-            f"{'s, 0 and 1' if cell.dimensions > 1 else ', 0'}",
-            "direction",
-        )
+    direction = cell.period("direction", direction)
     if phase and cell.dimensions == 1:
         raise InputError(f" = {phase:g}: the cell has no other period", "phase")
     parts = [

@@ -126,6 +126,7 @@ def linearize_cell(
         The state is no equilibrium; hinges have no slope.
     """
     of_kind("cell", cell, UnitCell)
+    load_factor = number("load_factor", load_factor)
     amplitude = None
     if secant is not None:
         amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
@@ -276,7 +277,6 @@ def folded_body(cell: UnitCell, patch: Patch, factor: float) -> Assembly:
             "that of a cell; leave them out",
             "loads",
         )
-    factor = number("load_factor", factor)
     body: Any = patch.case.elastic_body
     terms = patch.case.rest_terms
     if not terms:

@@ -26,7 +26,7 @@ from foldyn.linear.zone import zone_grid, zone_path
 from foldyn.patterns.screw import Screw, motion_between, translation
 from foldyn.patterns.tiling import half_edges
 from foldyn.patterns.tiling import periods as translations_of
-from foldyn.values import number, numbers, of_kind, show
+from foldyn.values import number, numbers, of_kind, show, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -74,7 +74,8 @@ class UnitCell:
         Instead of them, or beside one of them: a screw motion from a cell to the next, for tubes
         and rings.
     tolerance : float
-        Distance, as a fraction of the pattern's size, at which vertices lie in the same place.
+        Distance, as a fraction of the pattern's size (below 0.05), at which vertices lie in the
+        same place.
 
     Attributes
     ----------
@@ -117,7 +118,7 @@ class UnitCell:
         pattern = of_kind("case", self.case, Case).structure.pattern
         if pattern is None:
             raise InputError(": its structure has no pattern that could repeat", "case")
-        tolerance = number("tolerance", self.tolerance, above=0.0)
+        tolerance = number("tolerance", self.tolerance, above=0.0, below=NEAR_MISS)
         object.__setattr__(self, "tolerance", tolerance)
         near = tolerance * pattern.size
         motions, pairs = self._found(pattern, near)
@@ -197,6 +198,14 @@ class UnitCell:
     def dimensions(self) -> int:
         """How many motions repeat it."""
         return len(self.motions)
+
+    def period(self, name: str, value: Any) -> int:
+        """Number of one of the motions, given as an argument of that name."""
+        number_ = whole(name, value, least=0)
+        if number_ >= self.dimensions:
+            known = "periods, 0 and 1" if self.dimensions > 1 else "period, 0"
+            raise InputError(f" = {number_}: the cell has {self.dimensions} {known}", name)
+        return number_
 
     # ------------------------------------------------------------------ copies
     def images(self, points: ArrayLike, step: Sequence[int]) -> NDArray[np.float64]:

@@ -79,7 +79,7 @@ class WaveSolver:
         wanted = {"subset_by_index": [0, self.count - 1], "check_finite": False}
         diagonal = np.real(np.diag(stiffness))
         if bloch.ties.empty and bloch.lumped is not None:
-            self._check(len(free), phase)
+            check_count(self.count, len(free), phase)
             mass = bloch.lumped[free]
             root = 1.0 / np.sqrt(mass)
             scaled = root[:, None] * stiffness * root
@@ -87,7 +87,7 @@ class WaveSolver:
             motions = root[:, None] * own
             return values, motions, mass[:, None] * motions, _zero(diagonal / mass)
         if bloch.ties.empty and bloch.nodal is not None and len(free) == 3 * bloch.nodal.shape[0]:
-            self._check(len(free), phase)
+            check_count(self.count, len(free), phase)
             nodal = bloch.nodal.at(factors)
             inverse = _inverse_root(nodal)
             scaled = _by_nodes(inverse, _by_nodes(inverse, stiffness).conj().T)
@@ -100,7 +100,7 @@ class WaveSolver:
         if not bloch.ties.empty:
             basis = null_space(bloch.ties.at(factors)[:, free])
             stiffness = basis.conj().T @ stiffness @ basis
-        self._check(basis.shape[1], phase)
+        check_count(self.count, basis.shape[1], phase)
         own_mass = basis.conj().T @ mass @ basis
         try:
             values, own = linalg.eigh(stiffness, own_mass, **wanted)
@@ -109,19 +109,11 @@ class WaveSolver:
         scale = np.real(np.diag(stiffness)) / np.real(np.diag(own_mass))
         return values, basis @ own, mass @ (basis @ own), _zero(scale)
 
-    def _check(self, most: int, phase: NDArray) -> None:
-        if most < self.count:
-            raise InputError(
-                f" = {self.count}: supports, links and rigid panels leave {most} motions at the "
-                f"phases {phase.round(6).tolist()}; ask for no more bands",
-                "count",
-            )
-
     def _lanczos(self, phase: NDArray) -> Waves:
         """The same for large matrices."""
         bloch = self.bloch
         factors, kept = bloch.factors(phase), np.flatnonzero(~bloch.held)
-        self._check(len(self.free) - GUARD - 1, phase)
+        check_count(self.count, len(self.free) - GUARD - 1, phase)
         whole, whole_mass = bloch.stiffness.sparse_at(factors), bloch.mass.sparse_at(factors)
         stiffness, mass = (part[kept][:, kept] for part in (whole, whole_mass))
         shift = -SHIFT * float(stiffness.diagonal().real.sum() / mass.diagonal().real.sum())
@@ -140,6 +132,16 @@ class WaveSolver:
         shapes, values = shapes / size, values[order]
         values = np.where(np.abs(values) <= _noise(whole, shapes), 0.0, values)
         return Waves(values, shapes, momentum / size)
+
+
+def check_count(count: int, most: int, phase: NDArray) -> None:
+    """Refuse more bands than a cell has motions at a phase (d,)."""
+    if most < count:
+        raise InputError(
+            f" = {count}: supports, links and rigid panels leave {most} motions at the phases "
+            f"{phase.round(6).tolist()}; ask for no more bands",
+            "count",
+        )
 
 
 def _zero(scale: NDArray) -> float:

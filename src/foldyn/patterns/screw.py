@@ -7,6 +7,8 @@ pattern are as far apart as they should be, however many there are.
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
@@ -16,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from foldyn.arguments import Check, Checked
-from foldyn.errors import InputError
+from foldyn.errors import InputError, UnitsWarning
 from foldyn.values import number, show, vector
 
 SPREAD = 1e-6  # of their size: how far points must reach across a line to tell how they turn
@@ -66,8 +68,11 @@ class Screw(Checked):
 
     def agree(self) -> None:
         """Ask for a motion."""
-        if self.angle == 0.0 and self.shift == 0.0:
-            raise InputError(" = 0: neither turns nor shifts; give one of the two", "shift")
+        if self.angle % 360.0 == 0.0 and self.shift == 0.0:
+            raise InputError(
+                f" = 0, angle = {self.angle:g}: leave all in its place; give a turn or a shift",
+                "shift",
+            )
 
     @property
     def unit(self) -> NDArray[np.float64]:
@@ -118,8 +123,14 @@ def of_twist(twist: NDArray) -> Screw:
         return translation(move)
     axis = turn / angle
     point = np.cross(turn, move) / angle**2
-    shift = float(move @ axis)
-    return Screw(tuple(axis.tolist()), float(np.degrees(angle)), shift, tuple(point.tolist()))
+    return _screw(axis, angle, float(move @ axis), point)
+
+
+def _screw(axis: NDArray, angle: float, shift: float, point: NDArray) -> Screw:
+    """A screw of a computed angle (rad), which is not doubted."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnitsWarning)
+        return Screw(tuple(axis.tolist()), math.degrees(angle), shift, tuple(point.tolist()))
 
 
 def motion_between(points: NDArray, images: NDArray, tolerance: float) -> tuple[Screw, NDArray]:
@@ -144,7 +155,7 @@ def motion_between(points: NDArray, images: NDArray, tolerance: float) -> tuple[
     move = images.mean(axis=0) - rotation @ points.mean(axis=0)
     shift = float(move @ axis)
     point = np.linalg.lstsq(np.eye(3) - rotation, move - shift * axis, rcond=None)[0]
-    found = Screw(tuple(axis.tolist()), float(np.degrees(angle)), shift, tuple(point.tolist()))
+    found = _screw(axis, angle, shift, point)
     left = np.linalg.norm(found.images(points) - images, axis=1)
     if left.max() > tolerance:  # of no motion: most of them may still say which are wrong
         usual = np.median(images - points, axis=0)
