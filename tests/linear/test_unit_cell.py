@@ -243,3 +243,16 @@ def test_zones_refuse_unknown_points():
         miura().path("G")
     with pytest.raises(InputError, match="count"):
         miura().path("G-X-M", 2)
+
+
+@pytest.mark.filterwarnings("error:.*no equilibrium")
+@pytest.mark.filterwarnings("ignore:the state is unstable")
+@pytest.mark.parametrize("preset", [None, "n5b8e"])
+def test_compressed_sheets_that_are_unstable_are_in_equilibrium(preset):
+    """Panels of thin sheets buckle: states of equal strain are there, though unstable."""
+    thin = fd.Sheet(1e9, 0.3, 1e-4, density=1000.0)
+    pattern = fd.patterns.eggbox().scaled(0.03)
+    cell = fd.UnitCell(fd.Case(fd.discretize(pattern, thin, preset=preset)))
+    along, across = cell.vectors
+    state = fd.linear.relaxed(cell, [0.8 * along, across])
+    assert fd.bands(cell, [[0.5, 0.5]], 2, state=state).attrs["residual"] == 0.0

@@ -12,14 +12,13 @@ from foldyn.cases import State
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.cell_patch import cell_patch
 from foldyn.linear.cell_reach import CellReach
-from foldyn.linear.linearized_cell import deformed_motions, folded_body, spread
+from foldyn.linear.linearized_cell import ROUNDING, deformed_motions, folded_body, spread
 from foldyn.linear.unit_cell import UnitCell, check_commuting, images
 from foldyn.patterns.screw import Screw, of_twist, translation
 from foldyn.statics.tracing import displacement_of
 from foldyn.values import listed, number, of_kind, vector, whole
 
 ITERATIONS = 40
-BALANCED = 1e-12  # of the bars' EA: the largest force left
 HALVINGS = 12
 NULL = 1e-11  # of the largest stiffness: motions that nothing resists
 
@@ -130,11 +129,24 @@ def _newton(
 ) -> NDArray[np.float64]:
     """Places (m, 3) of the nodes of cell 0 in equilibrium, from others."""
     rest, moves = patch.case.structure.nodes, reach.moves
-    free, enough = ~reach.hidden, BALANCED * float(reach.body.scale().max())
+    free, enough = ~reach.hidden, ROUNDING * float(reach.body.scale().max())
     ones = np.ones(len(reach.steps))
 
     def dofs(points: NDArray) -> NDArray:
         return reach.balanced(spread(motions, points, patch.unit, patch.step) - rest)
+
+    def better(first: NDArray, step: NDArray, left: NDArray) -> tuple[NDArray, ...] | None:
+        """Places nearer to equilibrium on the way of a step, their dofs, and the forces left."""
+        for halving in range(HALVINGS):
+            trial = first + 0.5**halving * step
+            try:
+                q = dofs(trial)
+            except ComputationError:
+                continue
+            new = reach.projected(reach.forces(q))
+            if np.linalg.norm(new) < np.linalg.norm(left):
+                return trial, q, new
+        return None
 
     q = dofs(first)
     left = reach.projected(reach.forces(q))
@@ -147,22 +159,16 @@ def _newton(
         values, shapes = np.linalg.eigh(0.5 * (stiffness + stiffness.T))
         kept = np.abs(values) > NULL * np.abs(values).max()
         push = shapes[:, kept].T @ left
-        step = -moves @ (shapes[:, kept] @ (push / np.abs(values[kept])))
-        step = step[free].reshape(-1, 3)
-        for halving in range(HALVINGS):
-            trial = first + 0.5**halving * step
-            try:
-                q_new = dofs(trial)
-            except ComputationError:
-                continue
-            new = reach.projected(reach.forces(q_new))
-            if np.linalg.norm(new) < np.linalg.norm(left):
+        # downhill, and if that leads nowhere to the next equilibrium, be it an unstable one
+        for slopes in (np.abs(values[kept]), values[kept]):
+            step = (-moves @ (shapes[:, kept] @ (push / slopes)))[free].reshape(-1, 3)
+            if found := better(first, step, left):
                 break
         else:
-            if done:
-                return first
             break
-        first, q, left = trial, q_new, new
+        first, q, left = found
+    if done:
+        return first
     raise ComputationError(
         f"no equilibrium with these periods: {np.abs(left).max():.2g} N are left; take more steps, "
         "or motions nearer to those at rest"

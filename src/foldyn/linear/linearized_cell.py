@@ -33,7 +33,7 @@ from foldyn.statics.tracing import displacement_of
 from foldyn.values import number, of_kind
 
 BALANCED = 1e-6  # of the forces at play: the largest residual of a state taken for an equilibrium
-ROUNDING = 1e-13  # of the bars' EA: forces that count as none
+ROUNDING = 1e-12  # of the bars' EA: forces that count as none
 SLACK = 10.0  # times the tolerance: how far partners may be from each other's copies in a state
 PLACES = "None (the rest state), or a State, as fd.initial_state(path)"
 
