@@ -7,7 +7,7 @@ import pytest
 from cells import SHEET, chain, kresling, miura
 
 import foldyn as fd
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.patterns import GENERATORS
 from foldyn.patterns.screw import motion_between, of_twist, translation
 
@@ -256,3 +256,28 @@ def test_compressed_sheets_that_are_unstable_are_in_equilibrium(preset):
     along, across = cell.vectors
     state = fd.linear.relaxed(cell, [0.8 * along, across])
     assert fd.bands(cell, [[0.5, 0.5]], 2, state=state).attrs["residual"] == 0.0
+
+
+@pytest.mark.filterwarnings("error")
+def test_small_changes_of_periods_count():
+    """Below the tolerance at which vertices meet."""
+    cell, tower = miura(), kresling()
+    state = fd.linear.relaxed(cell, (1.0 + 1e-7) * cell.vectors)
+    b = fd.bands(cell, [[0.5, 0.5]], 2, state=state)
+    assert b.vectors.values[0, 0] / cell.vectors[0, 0] - 1.0 == pytest.approx(1e-7, rel=1e-6)
+    screw = tower.motions[0]
+    state = fd.linear.relaxed(tower, [fd.Screw("z", screw.angle + 1e-6, screw.shift)])
+    b = fd.bands(tower, [[0.5]], 2, state=state)
+    assert float(b.angles[0]) - screw.angle == pytest.approx(1e-6, rel=1e-5)
+
+
+def test_states_on_a_line_keep_a_given_screw():
+    """Where pairs cannot tell a turn, and nodes move by less than the tolerance."""
+    pattern = fd.patterns.waterbomb(cells=(1, 2)).scaled(0.03)
+    screw = cell_of(pattern).motions[0]
+    strip = fd.patterns.waterbomb(cells=(1, 1)).scaled(0.03)
+    cell = cell_of(strip, screw=screw)
+    moved = np.random.default_rng(0).normal(scale=1e-10, size=cell.case.structure.nodes.shape)
+    with pytest.warns(FoldynWarning, match="no equilibrium"):
+        b = fd.bands(cell, [[0.5]], 2, state=fd.State(moved))
+    assert float(b.angles[0]) == pytest.approx(screw.angle, abs=1e-4)

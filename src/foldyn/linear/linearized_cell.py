@@ -34,6 +34,7 @@ from foldyn.values import number, of_kind
 
 BALANCED = 1e-6  # of the forces at play: the largest residual of a state taken for an equilibrium
 ROUNDING = 1e-12  # of the bars' EA: forces that count as none
+SAME = 1e-12  # of the pattern's size: changes of a motion that rounding makes
 SLACK = 10.0  # times the tolerance: how far partners may be from each other's copies in a state
 PLACES = "None (the rest state), or a State, as fd.initial_state(path)"
 
@@ -203,7 +204,7 @@ def deformed_motions(cell: UnitCell, patch: Patch, displacement: NDArray) -> tup
         There are none.
     """
     rest = cell.case.structure.nodes
-    place, near = rest + displacement, cell.near
+    place, near, pattern = rest + displacement, cell.near, cell.case.structure.pattern
     found = []
     for k, motion in enumerate(cell.motions):
         one, two = patch.own_pairs(k).T
@@ -213,11 +214,13 @@ def deformed_motions(cell: UnitCell, patch: Patch, displacement: NDArray) -> tup
                 "does not say what becomes of it",
                 "state",
             )
-        off = np.linalg.norm(motion.images(place[one]) - place[two], axis=1)
-        if off.max() <= near:  # which is kept as it was given
-            found.append(motion)
-            continue
-        moved, off = motion_between(place[one], place[two], near)
+        change = displacement[one] @ motion.rotation().T - displacement[two]
+        moved, off = motion, np.linalg.norm(change, axis=1)
+        if off.max() > SAME * pattern.size:
+            other, left = motion_between(place[one], place[two], SAME * pattern.size)
+            # a turn that comes or goes with a small change is noise, or pairs on a line hide it
+            if off.max() > near or other.turns == motion.turns:
+                moved, off = other, left
         if off.max() > near:
             worst = int(off.argmax())
             raise InputError(
