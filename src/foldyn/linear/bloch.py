@@ -1,7 +1,7 @@
 """Matrices of Bloch waves: K(k) = sum over R of K_R exp(i k . R), and so M, C and constraints.
 
 K_R is what the displacements of cell R exert on the dofs of cell 0, taken from the patch about it
-(`cell_patch`); displacements of cell R are told in axes turned with it. K_-R is the transpose of
+(`cell_patch`); displacements of cell R are given in axes turned with it. K_-R is the transpose of
 K_R, so that K(k) is Hermitian: this is checked, and with it that the cells are alike.
 """
 
@@ -151,16 +151,16 @@ def hermitian(own: Hops, steps: NDArray, what: str) -> Hops:
     opposite = _opposites(steps)
     entries = own.values.tocoo()
     row, column = own.rows[entries.row], own.columns[entries.row]
-    both = collected(
-        np.concatenate([row, column]), np.concatenate([column, row]),
-        np.concatenate([entries.col, opposite[entries.col]]),
-        0.5 * np.concatenate([entries.data, entries.data]), own.shape, len(steps),
-    )  # fmt: skip
-    skew = collected(
-        np.concatenate([row, column]), np.concatenate([column, row]),
-        np.concatenate([entries.col, opposite[entries.col]]),
-        0.5 * np.concatenate([entries.data, -entries.data]), own.shape, len(steps),
-    )  # fmt: skip
+
+    def half(sign: float) -> Hops:
+        """Half the sum of the matrix and its adjoint, or half their difference."""
+        return collected(
+            np.concatenate([row, column]), np.concatenate([column, row]),
+            np.concatenate([entries.col, opposite[entries.col]]),
+            0.5 * np.concatenate([entries.data, sign * entries.data]), own.shape, len(steps),
+        )  # fmt: skip
+
+    both, skew = half(1.0), half(-1.0)
     largest = np.abs(own.values.data).max(initial=0.0)
     off = np.abs(skew.values.data)
     if off.max(initial=0.0) > ALIKE * largest:

@@ -1,8 +1,8 @@
 """What each cell of a finite chain or sheet does: over time, in waves, and from end to end.
 
-A finite chain is made by repeating the pattern of a cell (`storeys`, `cells`). Its nodes are told
-from each other by the motion that brings a cell to the next one, and displacements of cell n are
-told in the axes of cell 0, turned back with the screw, as those of Bloch waves.
+A finite chain is made by repeating the pattern of a cell (`storeys`, `cells`). The motion
+that brings a cell to the next one says which node belongs to which cell, and displacements of cell
+n are given in the axes of cell 0, turned back with the screw, as those of Bloch waves.
 """
 
 from __future__ import annotations

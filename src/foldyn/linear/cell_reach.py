@@ -1,6 +1,6 @@
 """The dofs of a patch as those of a cell and its neighbors.
 
-Displacements of cell R are told in axes turned with it, so that those of a wave differ from cell to
+Displacements of cell R are given in axes turned with it, so that those of a wave differ from cell to
 cell by a factor alone.
 """
 

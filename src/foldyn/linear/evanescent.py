@@ -165,7 +165,7 @@ def _bordered(dynamic: NDArray, ties: NDArray) -> NDArray[np.complex128]:
 
 
 def phases_of(reach: Reach, condense: bool = True) -> NDArray[np.complex128]:
-    """All complex phases k of waves u exp(i k s), those that decay too fast to tell left out.
+    """All complex phases k of waves u exp(i k s), without those that decay too fast to resolve.
 
     condense : whether unknowns that reach no other cell are eliminated first.
     """
@@ -195,16 +195,16 @@ def phases_of(reach: Reach, condense: bool = True) -> NDArray[np.complex128]:
         left[-size:, k * size : (k + 1) * size] = -reduced[k]
     right[-size:, -size:] = reduced[order]
     above, below = linalg.eig(left, right, right=False, homogeneous_eigvals=True)
-    told = (np.abs(above) > np.exp(-FASTEST) * np.abs(below)) & (
+    resolved = (np.abs(above) > np.exp(-FASTEST) * np.abs(below)) & (
         np.abs(below) > np.exp(-FASTEST) * np.abs(above)
     )
-    return -1j * np.log(above[told] / below[told])
+    return -1j * np.log(above[resolved] / below[resolved])
 
 
 def _forward(phases: NDArray, both: bool) -> NDArray[np.complex128]:
     """Waves that decay in the direction, the least first, and those that travel.
 
-    both : whether waves with k and -k have one frequency, of which one is told.
+    both : whether waves with k and -k have one frequency, of which one is kept.
     """
     real, decay = np.real(phases), np.imag(phases)
     travels = np.abs(decay) <= TRAVELS

@@ -82,7 +82,7 @@ def _dispersion(
             "A cell between rigid plates has two degrees of freedom, its elongation and its twist, "
             "and the chain the frequencies omega = 2 |sin(kappa/2)| sqrt(eig(K, M)). With the "
             "static stiffness K of one cell and without creases this agrees with the bands of the "
-            f"chain to {100 * free:.2g} %, which is what the springs of the plates give way. The "
+            f"chain to {100 * free:.2g} %, because the springs of the plates give way. The "
             "creases at the plates are folds between two cells, which the unit does not have: with "
             f"them the slow band deviates by up to {100 * slow:.2g} %, the fast one by "
             f"{100 * fast:.2g} %."
