@@ -1,7 +1,7 @@
 """The dofs of a patch as those of a cell and its neighbors.
 
-Displacements of cell R are given in axes turned with it, so that those of a wave differ from cell to
-cell by a factor alone.
+Displacements of cell R are given in axes turned with it, so that those of a wave differ from cell
+to cell by a factor alone.
 """
 
 from __future__ import annotations
