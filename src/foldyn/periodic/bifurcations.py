@@ -36,7 +36,7 @@ def events(family: Any, step: Step, of: Multipliers) -> list[Event]:
     of : multipliers (2k,) of a point.
     """
     one, other = step.before, step.after
-    found = []
+    found: list[tuple[str, Callable[[Point], float]]] = []
     if one.side != other.side:
         found.append((PITCHFORK, lambda point: point.side * _nearest(of(point), 1.0)))
     elif one.tangent[-1] * other.tangent[-1] < 0.0:
@@ -50,8 +50,7 @@ def events(family: Any, step: Step, of: Multipliers) -> list[Event]:
         found.append((TORUS, lambda point: float(_padded(_moduli(of(point)), place + 1)[place] - 1.0)))
     events = []
     for name, value in found:
-        point = located(family, one, step.length, value)
-        events.append((name, other if point is None else point))
+        events.append((name, located(family, one, other, step.length, value)))
     along = [_along(one, point) for _, point in events]
     return [Event(*events[k]) for k in np.argsort(along, kind="stable")]
 

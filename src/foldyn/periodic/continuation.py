@@ -9,6 +9,7 @@ motion there and |dp| over the range of the parameter.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -20,9 +21,11 @@ from scipy.optimize import brentq
 ITERATIONS = 8  # of Newton's method in a step
 EASY = 4  # iterations up to which the next step is longer
 GROWTH, CUT = 1.5, 0.5
+NOISE = 10.0  # times the rounding of the residual: enough where branches cross
 STRAIGHT = np.cos(np.radians(25.0))  # between tangents at both ends of a step
 SMALLEST = 1e-5  # of the longest step: the branch is lost
 LOCATED = 1e-11  # of a step: how exactly special points are found
+NEAR = 0.2  # of a step: how far beside it a point may lie that it passes
 
 
 class Family(Protocol):
@@ -119,7 +122,7 @@ def corrected(
             return None
         z, p = z + step[:-1], p + float(step[-1])
         change = float(np.sqrt(_weights(family, z) @ step**2))
-        if change <= family.tolerance or (iteration and norm <= family.rounding):
+        if change <= family.tolerance or (iteration and norm <= NOISE * family.rounding):
             return z, p, iteration + 1
         if iteration > 1 and change > 2.0 * last:
             return None
@@ -134,9 +137,9 @@ def point_at(family: Family, z: NDArray, p: float, along: NDArray, iterations: i
     factors = _bordered(family, z, p, row / np.abs(row).max())
     right = np.zeros(len(row))
     right[-1] = 1.0
-    tangent = lu_solve(factors, right, check_finite=False)
-    tangent *= np.sign(tangent @ row) / np.sqrt(weights @ tangent**2)
-    return Point(z, p, tangent, _side(_bordered(family, z, p, weights * tangent)), iterations)
+    tangent = lu_solve(factors, right, check_finite=False)  # goes the way of the row
+    tangent /= np.sqrt(weights @ tangent**2)
+    return Point(z, p, tangent, _side(factors), iterations)
 
 
 def ahead(family: Family, point: Point, length: float) -> Point | None:
@@ -148,25 +151,25 @@ def ahead(family: Family, point: Point, length: float) -> Point | None:
 
 
 def located(
-    family: Family, point: Point, end: float, value: Callable[[Point], float]
-) -> Point | None:
-    """The point within a length from another at which a function of points changes its sign."""
-    found: dict[float, Point] = {0.0: point}
+    family: Family, point: Point, other: Point, length: float, value: Callable[[Point], float]
+) -> Point:
+    """The point between two, a length apart, at which a function of points changes its sign.
 
-    def at(length: float) -> float:
-        if length not in found:
-            other = ahead(family, point, length)
-            if other is None:
+    Where branches cross, Newton's method fails very near to the point: the nearest found counts.
+    """
+    found = {0.0: point, length: other}
+
+    def at(ahead_by: float) -> float:
+        if ahead_by not in found:
+            reached = ahead(family, point, ahead_by)
+            if reached is None:
                 raise ArithmeticError
-            found[length] = other
-        return value(found[length])
+            found[ahead_by] = reached
+        return value(found[ahead_by])
 
-    try:
-        root = float(brentq(at, 0.0, end, xtol=LOCATED * end, rtol=1e-14, maxiter=60))
-        at(root)
-    except (ArithmeticError, ValueError):
-        return None
-    return found[root]
+    with suppress(ArithmeticError, ValueError):
+        brentq(at, 0.0, length, xtol=LOCATED * length, rtol=1e-14, maxiter=60)
+    return min(found.values(), key=lambda one: abs(value(one)))
 
 
 @dataclass(frozen=True)
@@ -196,6 +199,8 @@ def steps(
 ) -> Iterator[Step | str]:
     """Follow a family until a function of points is above 0, and stop there exactly.
 
+    A closed curve ends before it comes back to where it began.
+
     Yields
     ------
     Step or str
@@ -203,7 +208,7 @@ def steps(
         points.
     """
     point, length = first, stride.first
-    for _ in range(stride.most):
+    for taken in range(stride.most):
         other = ahead(family, point, length)
         while other is None or _turns(family, point, other):
             length *= CUT
@@ -212,11 +217,14 @@ def steps(
                 return
             other = ahead(family, point, length)
         if outside(other) > 0.0:
-            end = located(family, point, length, outside) if outside(point) < 0.0 else None
-            if end is not None:
-                yield Step(point, end, _distance(family, point, end), True)
+            if outside(point) < 0.0:
+                end = located(family, point, other, length, outside)
+                yield Step(point, end, _along(family, point, end), True)
             return
-        yield Step(point, other, length, False)
+        step = Step(point, other, length, False)
+        if taken > 1 and _passes(family, step, first):
+            return  # it is closed
+        yield step
         point = other
         if other.iterations <= EASY:
             length = min(length * GROWTH, stride.longest)
@@ -225,10 +233,20 @@ def steps(
     yield LONG
 
 
-def _distance(family: Family, one: Point, other: Point) -> float:
-    """Length along the tangent of the first."""
+def _along(family: Family, one: Point, other: Point) -> float:
+    """How far one point is from another along the tangent there."""
     apart = np.append(other.z - one.z, other.p - one.p)
     return float((_weights(family, one.z) * one.tangent) @ apart)
+
+
+def _passes(family: Family, step: Step, first: Point) -> bool:
+    """Whether a step passes a point in the direction in which the curve left it."""
+    along, weights = _along(family, step.before, first), _weights(family, step.before.z)
+    if not 0.0 < along <= step.length or (weights * step.before.tangent) @ first.tangent <= 0.0:
+        return False
+    apart = np.append(first.z - step.before.z, first.p - step.before.p)
+    beside = weights @ apart**2 - along**2
+    return bool(beside <= (NEAR * step.length) ** 2)
 
 
 def _turns(family: Family, one: Point, other: Point) -> bool:

@@ -19,8 +19,12 @@ from foldyn.cases import Case
 from foldyn.dynamics.dampers import damping_terms
 from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of, modal_rows
+from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import following_force, following_tangent, joined
+from foldyn.mechanics.tangent import add_tangent
+from foldyn.mechanics.term import Term, nodal
 from foldyn.periodic.drive import Drive, check_damping, check_periodic
+from foldyn.structures.bars_hinges import BarsHingesTerm
 
 EPS = float(np.finfo(float).eps)
 
@@ -56,8 +60,8 @@ class Equation:
         free, total = case.free_dofs, self.body.size
         whole = case.constraints.extended(total) if case.constraints else sparse.eye_array(total)
         self.basis = sparse.csr_array(sparse.csc_array(whole)[:, free])
-        self.plain = not case.constraints
         self.size = len(free)
+        self._tangents = _Tangents(self.body, self.basis, None if case.constraints else free)
         nodal = mass_of(case)
         self.mass = (self.basis.T @ nodal @ self.basis).toarray()
         terms = damping_terms(case, None, modal_rows(case)) if driven else []
@@ -90,6 +94,56 @@ class Equation:
         flat = displacement.reshape(len(displacement), -1) - instants.moved
         ties = self.case.constraints
         return np.array([ties.coordinates(u)[self.case.free_dofs] for u in flat])
+
+
+class _Tangents:
+    """Tangents of a body as dense matrices on the unknowns, without sparse ones in between.
+
+    Those are made where nothing ties the dofs together: each entry then has one place.
+    """
+
+    def __init__(self, body: Assembly, basis: sparse.csr_array, free: NDArray | None) -> None:
+        self._basis, self._terms = basis, {}
+        self._sheet: tuple[NDArray, NDArray] | None = None
+        if free is None:
+            return
+        rank = np.full(body.size, -1)
+        rank[free] = np.arange(len(free))
+        if isinstance(body.sheet, BarsHingesTerm):
+            pattern, axis = body.sheet.sparsity, np.arange(3)
+            node = np.repeat(np.arange(len(pattern.indptr) - 1), np.diff(pattern.indptr))
+            row = np.broadcast_to((3 * node[:, None] + axis)[:, :, None], (len(node), 3, 3))
+            column = np.broadcast_to((3 * pattern.indices[:, None] + axis)[:, None], row.shape)
+            self._sheet = _places(rank, row.ravel(), column.ravel())
+        for k, term in enumerate(body.others):
+            if type(term).tangent is Term.tangent:
+                self._terms[k] = _places(rank, *term.places)
+
+    def put(self, body: Assembly, u: NDArray, out: NDArray) -> None:
+        """Add the tangent at displacements u (m,) to `out` (k, k)."""
+        flat, sheet = out.reshape(-1), body.sheet
+        if self._sheet is not None and isinstance(sheet, BarsHingesTerm):
+            kept, place = self._sheet
+            data = np.zeros((len(sheet.sparsity.indices), 3, 3))
+            add_tangent(sheet.model, sheet.sparsity, nodal(u), -np.inf, data)
+            flat[place] += data.ravel()[kept]
+        else:
+            out += self._dense(sheet.tangent(u))
+        for k, term in enumerate(body.others):
+            if k in self._terms:
+                kept, place = self._terms[k]
+                np.add.at(flat, place, term.entries(u)[kept])
+            else:
+                out += self._dense(term.tangent(u))
+
+    def _dense(self, tangent: sparse.csr_array) -> NDArray:
+        return (self._basis.T @ tangent @ self._basis).toarray()
+
+
+def _places(rank: NDArray, row: NDArray, column: NDArray) -> tuple[NDArray, NDArray]:
+    """Which entries of a matrix of all dofs are kept, and their places among those kept."""
+    kept = np.flatnonzero((rank[row] >= 0) & (rank[column] >= 0))
+    return kept, rank[row[kept]] * (rank.max() + 1) + rank[column[kept]]
 
 
 class Instants:
@@ -137,16 +191,12 @@ class Instants:
     def tangents(self, x: NDArray) -> NDArray:
         """Derivative (s, k, k) of f, N/m."""
         equation, following = self.equation, self.equation._following
-        basis, free = equation.basis, equation.case.free_dofs
-        out = np.empty((len(x), equation.size, equation.size))
+        out = np.zeros((len(x), equation.size, equation.size))
         for j, u, body in self._each(x):
-            tangent = body.tangent(u)
+            equation._tangents.put(body, u, out[j])
             if following.acts:
-                tangent = tangent + following_tangent(following, u, self._factor[j])
-            if equation.plain:
-                out[j] = tangent.toarray()[np.ix_(free, free)]
-            else:
-                out[j] = (basis.T @ tangent @ basis).toarray()
+                added = following_tangent(following, u, self._factor[j])
+                out[j] += (equation.basis.T @ added @ equation.basis).toarray()
         return out
 
     def driving(self, omega: float) -> NDArray:

@@ -76,7 +76,8 @@ class Orbit:
         balance = Balance(equation, fourier, self.multiple)
         x, at = fourier.real_of(self.amplitudes), balance.instants(self.level)
         missing = fourier.complex_of(balance.residual(x, self.omega, at))[kept + 1 :]
-        mean = at.tangents(fourier.values @ x).mean(axis=0)
+        few = equation.at(self.multiple * fourier.phase[::4], self.level)
+        mean = few.tangents(fourier.values[::4] @ x).mean(axis=0)
         w, added = self.omega / self.multiple, 0.0
         for j, left in enumerate(missing, kept + 1):
             matrix = mean - (j * w) ** 2 * equation.mass + 1j * j * w * equation.damping

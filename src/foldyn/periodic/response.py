@@ -16,7 +16,7 @@ from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter, reporter
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.periodic.balance import Balance
-from foldyn.periodic.bifurcations import DOUBLING, PITCHFORK, events
+from foldyn.periodic.bifurcations import DOUBLING, PITCHFORK, Event, events
 from foldyn.periodic.continuation import (
     LONG,
     LOST,
@@ -184,7 +184,8 @@ class _Tracer:
         self.low, self.high = min(ends), max(ends)
         self.span, self.count = self.high - self.low, count
         self.found: list[_Found] = []
-        self.forks: list[tuple[float, NDArray]] = []
+        self.forks: list[Event] = []  # at which branches cross or begin
+        self.met: list[Event] = []  # those to which a branch has come back
         self.branch, self.complete = 0, True
 
     def family(self, balance: Balance) -> Any:
@@ -214,8 +215,13 @@ class _Tracer:
             orbit.equation, orbit.amplitudes, orbit.omega, orbit.multiple, orbit.level, self.count
         )
 
-    def follow(self, family: Any, first: Point, depth: int, report: Reporter) -> None:
-        """Follow a branch, then those that fork off, to a depth."""
+    def follow(
+        self, family: Any, first: Point, depth: int, report: Reporter, origin: Point | None = None
+    ) -> None:
+        """Follow a branch from its first point, then those that fork off, to a depth.
+
+        origin : the bifurcation, of this family, from which it comes.
+        """
         branch, kept, forks = self.branch, [], []
         known: dict[int, tuple[Point, NDArray]] = {}
 
@@ -230,37 +236,36 @@ class _Tracer:
         def outside(point: Point) -> float:
             return max(self.low - point.p, point.p - self.high)
 
-        keep(first)
-        ended = False
+        for point in (first,) if origin is None else (origin, first):
+            keep(point)
         for step in steps(family, first, self.stride, outside):
             if not isinstance(step, Step):
                 self._warn(step, kept[-1].point.p)
                 break
-            met = False
+            back = None
             for event in events(family, step, of):
-                keep(event.point, event.name)
-                met = met or (branch > 0 and self._is_known(event.name, event.point))
-                if event.name in (PITCHFORK, DOUBLING) and not met:
+                back = back or self._known(event, branch)
+                keep(event.point, "" if back else event.name)
+                if event.name in (PITCHFORK, DOUBLING) and not back:
                     forks.append(event)
-            if met:  # back on the curve from which it came
-                ended = True
+            if back:  # on the curve from which it came
+                self.met.append(back)
                 break
             keep(step.after)
-            ended = ended or step.last
-            known.clear()
-            of(step.after)
+            known = {id(step.after): known[id(step.after)]}
             done = min(max(abs(step.after.p - self.ends[0]) / self.span, 0.0), 1.0)
             report(Progress(done, 1.0, len(self.found) + len(kept), 0.0))
         self.found += kept
-        self.forks += [(event.point.p, event.point.z) for event in forks]
-        if depth:
-            for event in forks:
+        self.forks += forks
+        for event in forks if depth else ():
+            if event not in self.met:
                 self._fork(family, event, depth - 1, report)
 
-    def _is_known(self, name: str, point: Point) -> bool:
-        return name == PITCHFORK and any(
-            abs(p - point.p) <= MEETS * self.span for p, _ in self.forks
-        )
+    def _known(self, event: Event, branch: int) -> Event | None:
+        """The bifurcation of another branch at which a branch ends."""
+        near = MEETS * self.span
+        same = (one for one in self.forks if abs(one.point.p - event.point.p) <= near)
+        return next(same, None) if branch and event.name == PITCHFORK else None
 
     def _warn(self, why: str, p: float) -> None:
         self.complete = False
@@ -271,7 +276,7 @@ class _Tracer:
         }
         warnings.warn(f"the branch at {p:.6g} {texts[why]}", FoldynWarning, stacklevel=5)
 
-    def _fork(self, family: Any, event: Any, depth: int, report: Reporter) -> None:
+    def _fork(self, family: Any, event: Event, depth: int, report: Reporter) -> None:
         """Follow the branch that leaves a bifurcation."""
         point, old = event.point, family.balance
         if event.name == DOUBLING:
@@ -280,16 +285,15 @@ class _Tracer:
             amplitudes = old.fourier.complex_of(point.z.reshape(old.shape))
             spread = np.zeros((fourier.harmonics + 1, old.shape[1]), complex)
             spread[::2] = amplitudes
-            z = fourier.real_of(spread).ravel()
-        else:
-            z = point.z
-        _, _, rows = np.linalg.svd(family.jacobian(z, point.p))
-        across = rows[-1] * family.size(z)
-        first = branch_point(family, z, point.p, across, AWAY)
+            along = np.append(np.zeros(spread.size * 2 - old.shape[1]), 1.0)
+            point = Point(fourier.real_of(spread).ravel(), point.p, along, 0.0)
+        _, _, rows = np.linalg.svd(family.jacobian(point.z, point.p))
+        across = rows[-1] * family.size(point.z)
+        first = branch_point(family, point.z, point.p, across, AWAY)
         if first is None or not self.low <= first.p <= self.high:
             return
         self.branch = max(found.branch for found in self.found) + 1
-        self.follow(family, first, depth, report)
+        self.follow(family, first, depth, report, point)
 
 
 def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
