@@ -106,73 +106,75 @@ class Free(ByFrequency):
 
 
 class InResonance(_OfBalance):
-    """Forced motions along the level of the drive at the frequency of their phase resonance.
+    """Forced motions in phase resonance, along the logarithm of the level of the drive.
 
-    There the drive does no reactive work: the mean of its force times the displacement vanishes
-    (Peeters, Kerschen and Golinval, Mech. Syst. Signal Process. 25, 2011). The last unknown is the
-    frequency over `scale` (Hz), so that it counts as much as displacements of the sheet's size.
+    Their frequency is that at which the drive does no reactive work: the mean over a period of its
+    force, as it acts on the sheet in its state, times the displacement vanishes (Peeters, Kerschen
+    and Golinval, Mech. Syst. Signal Process. 25, 2011). The last unknown is the frequency over
+    `unit`, so that it counts as much as displacements of the sheet's size.
+
+    Parameters
+    ----------
+    place : ndarray, shape (k,)
+        Unknowns of the state.
+    frequency : float
+        About that of the resonance, Hz.
     """
 
-    def __init__(self, balance: Balance, span: float, tolerance: float, scale: float) -> None:
-        super().__init__(balance, span, tolerance)
-        self.scale = scale / balance.equation.length
-        count, k = balance.shape
-        still = np.zeros((len(balance.fourier.phase), k))
-        self._still = still
-        self._weights = np.zeros((count, k))
+    def __init__(
+        self, balance: Balance, tolerance: float, place: NDArray, frequency: float
+    ) -> None:
+        super().__init__(balance, 1.0, tolerance)
+        equation, fourier = balance.equation, balance.fourier
+        self.unit = frequency / equation.length
+        self._heavy = float(np.diag(equation.mass).max()) * (TURN * frequency) ** 2  # N/m
+        at = balance.instants()
+        still = at.forces(np.tile(place, (len(fourier.phase), 1)))
+        self._force = [fourier.fit @ part for part in (still, at.drag, at.inertia)]
 
     def frequency(self, z: NDArray) -> float:
         """Of a motion, Hz."""
-        return float(z[-1]) * self.scale
+        return float(z[-1]) * self.unit
 
-    def begin(self, place: NDArray) -> None:
-        """Take the force of the drive, at level 1, on the sheet at unknowns (k,)."""
-        fourier = self.balance.fourier
-        at, still = self.instants(1.0), np.tile(place, (len(fourier.phase), 1))
-        self._force = at, still
-
-    def _quadrature(self, z: NDArray) -> tuple[float, NDArray]:
-        """Reactive work at level 1 over that possible, and its derivative (c, k)."""
-        fourier, (at, still) = self.balance.fourier, self._force
-        force = fourier.fit @ (at.forces(still) + at.driving(TURN * self.frequency(z)))
+    def _reactive(self, z: NDArray) -> tuple[float, NDArray]:
+        """Reactive work over the size of the force at level 1, m, and its derivative (c, k)."""
+        omega = TURN * self.frequency(z)
+        still, drag, inertia = self._force
+        force = still + omega * drag + omega**2 * inertia
         force[0] = 0.0
         force /= np.linalg.norm(force)
         return float((force * self.coefficients(z)).sum()), force
 
+    def _own(self, z: NDArray, level: float) -> tuple[NDArray, float, Instants]:
+        return self.coefficients(z), TURN * self.frequency(z), self.instants(level)
+
     def residual(self, z: NDArray, p: float) -> NDArray:
         """See `Family`."""
-        own = self.balance.residual(
-            self.coefficients(z), TURN * self.frequency(z), self.instants(p)
-        ).ravel()
-        return np.append(own, self._heavy * self._quadrature(z)[0])
-
-    @property
-    def _heavy(self) -> float:
-        """Force per displacement, N/m, that gives the last equation the unit of the others."""
-        return float(np.abs(np.diag(self.balance.equation.mass)).max()) * (TURN * self.scale) ** 2
+        left = self.balance.residual(*self._own(z, np.exp(p)))
+        return np.append(left.ravel(), self._heavy * self._reactive(z)[0])
 
     def jacobian(self, z: NDArray, p: float) -> NDArray:
         """See `Family`."""
-        x, omega, at = self.coefficients(z), TURN * self.frequency(z), self.instants(p)
-        n = x.size
+        own, n = self._own(z, np.exp(p)), len(z) - 1
         out = np.empty((n + 1, n + 1))
-        out[:n, :n] = self.balance.jacobian(x, omega, at)
-        out[:n, n] = TURN * self.scale * self.balance.frequency_slope(x, omega, at).ravel()
-        out[n, :n] = self._heavy * self._quadrature(z)[1].ravel()
+        out[:n, :n] = self.balance.jacobian(*own)
+        out[:n, n] = TURN * self.unit * self.balance.frequency_slope(*own).ravel()
+        out[n, :n] = self._heavy * self._reactive(z)[1].ravel()
         step = np.zeros(n + 1)
         step[n] = PROBE * z[-1]
-        change = self._quadrature(z + step)[0] - self._quadrature(z - step)[0]
+        change = self._reactive(z + step)[0] - self._reactive(z - step)[0]
         out[n, n] = self._heavy * change / (2.0 * step[n])
         return out
 
     def slope(self, z: NDArray, p: float) -> NDArray:
         """See `Family`."""
-        x, omega = self.coefficients(z), TURN * self.frequency(z)
+        x, omega, _ = self._own(z, np.exp(p))
         up, down = (
-            self.balance.residual(x, omega, self.balance.instants(p + d)) for d in (PROBE, -PROBE)
+            self.balance.residual(x, omega, self.balance.instants(np.exp(p + d)))
+            for d in (PROBE, -PROBE)
         )
         return np.append((up - down).ravel() / (2.0 * PROBE), 0.0)
 
     def orbit(self, z: NDArray, p: float) -> Orbit:
         """The motion."""
-        return self.orbit_at(z, TURN * self.frequency(z), p)
+        return self.orbit_at(z, TURN * self.frequency(z), float(np.exp(p)))

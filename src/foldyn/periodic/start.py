@@ -56,10 +56,10 @@ def coefficients(balance: Balance, start: Any, omega: float, level: float = 1.0)
     mean = equation.at(np.zeros(1), 0.0)
     x = np.zeros(balance.shape)
     x[0] = equation.unknowns(place[None], mean)[0]
-    return x + _linear(balance, x, omega, level)
+    return x + linear_response(balance, x, omega, level)
 
 
-def _linear(balance: Balance, x: NDArray, omega: float, level: float) -> NDArray:
+def linear_response(balance: Balance, x: NDArray, omega: float, level: float) -> NDArray:
     """First step (c, k) of small motions about a state, with slopes where hinges have none."""
     equation, fourier = balance.equation, balance.fourier
     residual = balance.residual(x, omega, balance.instants(level))
