@@ -12,6 +12,7 @@ base frequency is that of the drive over `multiple`, so that longer periods than
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -36,8 +37,12 @@ class Balance:
         self.equation, self.fourier, self.multiple = equation, fourier, multiple
         self.shape = len(fourier.order), equation.size
         self._bends = fourier.curvature[:, None]
-        pairs = fourier.fit[:, None, :] * fourier.values.T[None, :, :]
-        self._pairs = np.ascontiguousarray(pairs.reshape(-1, len(fourier.phase)))
+
+    @cached_property
+    def _pairs(self) -> NDArray:
+        """P times G at each sample (c c, s)."""
+        pairs = self.fourier.fit[:, None, :] * self.fourier.values.T[None, :, :]
+        return np.ascontiguousarray(pairs.reshape(-1, len(self.fourier.phase)))
 
     def instants(self, level: float = 1.0) -> Instants:
         """The equation at the samples, all that varies times a level."""

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 METHODS = ("harmonic_balance", "shooting")
 TRUNCATED = 1e-3  # of the motion: what twice as many harmonics would add, above which to warn
 FEW = 3  # harmonics of the motion from which shooting starts
+ROUNDING = 1e-14  # of the motion: harmonics of what shooting finds that are none
 TURN = 2.0 * math.pi
 
 
@@ -191,10 +192,13 @@ def _shot(
             f"method = 'shooting': does not converge at {omega / TURN:g} Hz; give more steps, or "
             "take method = 'harmonic_balance'"
         )
-    states, last = shooting.period(found.x)
+    states = shooting.period(found.x)[0]
     count = len(states) - 1
     amplitudes = np.fft.rfft(states[:-1, : equation.size], axis=0)[: (count + 1) // 2] / count
     amplitudes[1:] *= 2.0
-    floquet = np.linalg.eigvals(last)
-    order = np.argsort(-np.abs(floquet), kind="stable")
-    return Orbit(equation, amplitudes, omega, longer), floquet[order], found.iterations
+    size = np.linalg.norm(amplitudes, axis=1)
+    tail = np.sqrt(np.cumsum(size[::-1] ** 2)[::-1])  # of the harmonics from each on
+    kept = max(int((tail > ROUNDING * tail[0]).sum()), 2)
+    orbit = Orbit(equation, amplitudes[:kept], omega, longer)
+    floquet = multipliers(equation, orbit.amplitudes, omega, longer, steps=steps)
+    return orbit, floquet, found.iterations

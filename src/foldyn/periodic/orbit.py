@@ -72,7 +72,7 @@ class Orbit:
         The residual at the further harmonics over the mean dynamic stiffness there.
         """
         kept, equation = len(self.amplitudes) - 1, self.equation
-        fourier = Fourier(2 * kept)
+        fourier = Fourier(2 * kept + 1)  # even ones alone may vanish by symmetry
         balance = Balance(equation, fourier, self.multiple)
         x, at = fourier.real_of(self.amplitudes), balance.instants(self.level)
         missing = fourier.complex_of(balance.residual(x, self.omega, at))[kept + 1 :]

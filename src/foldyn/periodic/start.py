@@ -21,6 +21,7 @@ from foldyn.statics.tracing import displacement_of
 
 FLOOR = float(equivalent_slope(0.0, np.radians(1.0)))
 """Slope of superlinear hinges at rest in a first guess: that of a swing of one degree."""
+LITTLE = 1e-4  # of the drive, whose forces are proportional to it
 FIRST, LEAST = 0.1, 1e-3  # steps of the level of the drive
 PLACES = "None, a State, or a result of periodic_motion or response_curve"
 
@@ -62,7 +63,10 @@ def coefficients(balance: Balance, start: Any, omega: float, level: float = 1.0)
 def linear_response(balance: Balance, x: NDArray, omega: float, level: float) -> NDArray:
     """First step (c, k) of small motions about a state, with slopes where hinges have none."""
     equation, fourier = balance.equation, balance.fourier
-    residual = balance.residual(x, omega, balance.instants(level))
+    still, little = (
+        balance.residual(x, omega, balance.instants(share * level)) for share in (0.0, LITTLE)
+    )
+    residual = still + (little - still) / LITTLE
     u = equation.basis @ x[0]
     tangent = equation.basis.T @ equation.body.tangent(u, FLOOR) @ equation.basis
     w = omega / balance.multiple
