@@ -49,7 +49,7 @@ SOLVED = (
     "simulate", "simulate_many", "trace", "switch_branch", "landscape", "modes", "frf", "fold",
     "critical_step", "initial_state", "mac", "case_of", "save", "load", "export", "view",
     "read_case", "read_pattern", "diagnose", "write_pattern", "sweep", "sensitivity", "design",
-    "fit", "fidelity",
+    "fit", "fidelity", "periodic_motion", "response_curve", "backbone",
 )  # fmt: skip
 """Calls of `solved`, which computes."""
 NAMES = (*DATA, *PATTERNS, *SOLVED)

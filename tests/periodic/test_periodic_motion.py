@@ -6,7 +6,6 @@ from duffing import NODE, mass, oscillator
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.periodic import periodic_motion
 
 PANEL = {"a": 1.0, "b": 1.0, "dihedral": 60}
 
@@ -22,7 +21,7 @@ def difference(one, other):
 
 @pytest.fixture(scope="module")
 def strong():
-    return periodic_motion(oscillator(), harmonics=25)
+    return fd.periodic_motion(oscillator(), harmonics=25)
 
 
 def fold(loads=(), supports=(), mass_rule="panel", alpha=0.5):
@@ -35,23 +34,25 @@ def fold(loads=(), supports=(), mass_rule="panel", alpha=0.5):
 
 
 def test_harmonics_converge_spectrally_to_what_shooting_finds(strong):
-    shot = periodic_motion(oscillator(), method="shooting", steps=256)
+    shot = fd.periodic_motion(oscillator(), method="shooting", steps=256)
     assert difference(strong, shot) < 1e-8
-    errors = [difference(periodic_motion(oscillator(), harmonics=n), strong) for n in (3, 5, 7, 9)]
+    errors = [
+        difference(fd.periodic_motion(oscillator(), harmonics=n), strong) for n in (3, 5, 7, 9)
+    ]
     assert all(after < 0.2 * before for before, after in zip(errors, errors[1:], strict=False))
     assert abs(shot.floquet.values[0]) == pytest.approx(abs(strong.floquet.values[0]), rel=1e-6)
 
 
 def test_estimate_of_what_is_missing_is_near_the_truth(strong):
     for harmonics in (3, 5):
-        with_few = periodic_motion(oscillator(), harmonics=harmonics)
+        with_few = fd.periodic_motion(oscillator(), harmonics=harmonics)
         found = with_few.attrs["truncation"]
         assert 0.3 * found < difference(with_few, strong) < 3.0 * found
 
 
 def test_small_motions_are_the_linear_response_and_decay_as_the_damping_says():
     case = oscillator(force=1e-6, frequency=0.2)
-    one = periodic_motion(case, harmonics=3)
+    one = fd.periodic_motion(case, harmonics=3)
     still = fd.Case(case.structure, case.supports, damping=case.damping)
     linear = fd.frf(still, fd.Force([NODE], (0, 0, 1e-6)), [0.2])
     expected = -1j * linear.receptance.values[0, NODE, 2] * linear.attrs["drive_force"]
@@ -64,14 +65,14 @@ def test_small_motions_are_the_linear_response_and_decay_as_the_damping_says():
 
 @pytest.mark.parametrize("dashpot", [0.0, 0.3])
 def test_product_of_the_multipliers_is_that_of_liouville(dashpot):
-    one = periodic_motion(oscillator(dashpot=dashpot), harmonics=9)
+    one = fd.periodic_motion(oscillator(dashpot=dashpot), harmonics=9)
     expected = -(0.1 + dashpot / mass()) / 0.25
     assert np.log(np.abs(one.floquet.values)).sum() == pytest.approx(expected, rel=1e-8)
 
 
 def test_product_holds_for_a_stiff_sheet_with_drag():
     push = fd.Force([0, 1], (1e-3, 0, 0), history=fd.Harmonic(0.4))
-    one = periodic_motion(fold([push]), harmonics=7)
+    one = fd.periodic_motion(fold([push]), harmonics=7)
     free = len(one.floquet) / 2
     total = np.log(np.abs(one.floquet.values)).sum()
     assert total == pytest.approx(-0.5 * free / 0.4, rel=1e-8)
@@ -115,16 +116,14 @@ DRIVES = {
             fd.Force([0], (5e-4, 0, 0), history=fd.Harmonic(1.2, phase=30.0)),
         ]
     ),
-    "linked": fold(
-        [fd.Force([0], (2e-3, 0, 0), history=fd.Harmonic(0.4))], [fd.Link([0, 1], "x")]
-    ),
+    "linked": fold([fd.Force([0], (2e-3, 0, 0), history=fd.Harmonic(0.4))], [fd.Link([0, 1], "x")]),
 }
 
 
 @pytest.mark.parametrize("name", DRIVES)
 def test_simulation_from_a_point_of_it_comes_back(name):
     case = DRIVES[name]
-    one = periodic_motion(case, harmonics=12)
+    one = fd.periodic_motion(case, harmonics=12)
     period = 1.0 / one.attrs["frequency"]
     run = fd.simulate(case, period, initial=at_start(one), every=period / 4)
     assert run.displacement.values[-1] == pytest.approx(one.displacement.values[0], abs=2e-5)
@@ -137,12 +136,14 @@ def test_start_takes_a_motion_or_a_state():
     case = oscillator(height=0.2, spring=False, force=1e-4)
     well = np.zeros((3, 3))
     well[NODE, 2] = -0.4
-    near, other = (periodic_motion(case, start=s) for s in (None, fd.State(well)))
-    shift = other.displacement.values[:, NODE, 2].mean() - near.displacement.values[:, NODE, 2].mean()
+    near, other = (fd.periodic_motion(case, start=s) for s in (None, fd.State(well)))
+    shift = (
+        other.displacement.values[:, NODE, 2].mean() - near.displacement.values[:, NODE, 2].mean()
+    )
     assert shift == pytest.approx(-0.4, abs=0.01)
-    again = periodic_motion(case, start=other)
+    again = fd.periodic_motion(case, start=other)
     assert difference(again, other) < 1e-9
-    doubled = periodic_motion(case, start=other, periods=2)
+    doubled = fd.periodic_motion(case, start=other, periods=2)
     assert doubled.displacement.values[::2] == pytest.approx(
         np.tile(other.displacement.values[::4], (2, 1, 1))[::1], abs=1e-9
     )
@@ -150,7 +151,7 @@ def test_start_takes_a_motion_or_a_state():
 
 def test_few_harmonics_are_warned_of():
     with pytest.warns(FoldynWarning, match="harmonics = 1: twice as many would change"):
-        periodic_motion(oscillator(force=3.0, frequency=0.1), harmonics=1)
+        fd.periodic_motion(oscillator(force=3.0, frequency=0.1), harmonics=1)
 
 
 def test_a_result_is_saved_and_loaded(tmp_path, strong):
@@ -186,7 +187,7 @@ REFUSED = {
 @pytest.mark.parametrize("message", REFUSED)
 def test_what_it_cannot_follow_is_refused(message):
     with pytest.raises(InputError, match=message):
-        periodic_motion(REFUSED[message])
+        fd.periodic_motion(REFUSED[message])
 
 
 def test_arguments_out_of_range_are_refused():
@@ -195,4 +196,4 @@ def test_arguments_out_of_range_are_refused():
         ("steps", 1), ("tolerance", 2.0),
     ):  # fmt: skip
         with pytest.raises(InputError, match=field):
-            periodic_motion(oscillator(), **{field: value})
+            fd.periodic_motion(oscillator(), **{field: value})

@@ -27,7 +27,8 @@ class Event(NamedTuple):
     point: Point
 
 
-Multipliers = Callable[[Point], NDArray]
+Found = NDArray[np.complex128]
+Multipliers = Callable[[Point], Found]
 
 
 def events(family: Any, step: Step, of: Multipliers) -> list[Event]:
@@ -43,14 +44,12 @@ def events(family: Any, step: Step, of: Multipliers) -> list[Event]:
         found.append((FOLD, lambda point: float(point.tangent[-1])))
     if _parity(of(one)) != _parity(of(other)):
         found.append((DOUBLING, lambda point: _parity(of(point)) * _nearest(of(point), -1.0)))
-    pairs = _moduli(of(one)), _moduli(of(other))
-    counts = [int((modulus > 1.0).sum()) for modulus in pairs]
-    if counts[0] != counts[1] and _both_complex(pairs, max(counts)):
-        place = max(counts) - 1
-        found.append((TORUS, lambda point: float(_padded(_moduli(of(point)), place + 1)[place] - 1.0)))
-    events = []
-    for name, value in found:
-        events.append((name, located(family, one, other, step.length, value)))
+    moduli = _moduli(of(one)), _moduli(of(other))
+    counts = [int((pairs > 1.0).sum()) for pairs in moduli]
+    # a pair that crosses has not met on the real axis: it is one at both ends
+    if counts[0] != counts[1] and min(map(len, moduli)) >= max(counts):
+        found.append((TORUS, lambda point: _modulus(_moduli(of(point)), max(counts)) - 1.0))
+    events = [(name, located(family, one, other, step.length, value)) for name, value in found]
     along = [_along(one, point) for _, point in events]
     return [Event(*events[k]) for k in np.argsort(along, kind="stable")]
 
@@ -59,27 +58,23 @@ def _along(one: Point, point: Point) -> float:
     return float(np.append(point.z - one.z, point.p - one.p) @ one.tangent)
 
 
-def _nearest(found: NDArray, value: float) -> float:
+def _nearest(found: Found, value: float) -> float:
     """Distance of the real multiplier that is nearest to a value; of any if none is real."""
     real = found[np.abs(found.imag) <= REAL].real
     return float(np.abs((real if len(real) else found) - value).min())
 
 
-def _parity(found: NDArray) -> float:
+def _parity(found: Found) -> float:
     """Sign of det(monodromy + 1): -1 with an odd number of multipliers below -1."""
     real = found[np.abs(found.imag) <= REAL].real
     return -1.0 if np.count_nonzero(real < -1.0) % 2 else 1.0
 
 
-def _moduli(found: NDArray) -> NDArray:
+def _moduli(found: Found) -> NDArray:
     """Moduli of the multipliers with a positive imaginary part, the largest first."""
     return -np.sort(-np.abs(found[found.imag > REAL]))
 
 
-def _padded(moduli: NDArray, count: int) -> NDArray:
-    return np.append(moduli, np.zeros(max(count - len(moduli), 0)))
-
-
-def _both_complex(pairs: tuple[NDArray, NDArray], count: int) -> bool:
-    """Whether the pair that crosses is one at both ends, and has not met on the real axis."""
-    return all(len(moduli) >= count for moduli in pairs)
+def _modulus(moduli: NDArray, place: int) -> float:
+    """One of them, counted from 1; 0 where there are fewer."""
+    return float(moduli[place - 1]) if len(moduli) >= place else 0.0

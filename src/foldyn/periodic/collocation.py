@@ -88,9 +88,7 @@ class Stages:
         return np.concatenate([after, v + h * np.tensordot(tableau.b, a, 1)])
 
 
-def monodromy(
-    equation: Equation, stiffness: NDArray, w: float, drag: float
-) -> NDArray:
+def monodromy(equation: Equation, stiffness: NDArray, w: float, drag: float) -> NDArray:
     """Matrix (2k, 2k) of small motions (x, dx/dtau) over a period, for tangents (steps, 3, k, k).
 
     w : base frequency, rad/s; drag : 1/s. The factor exp(-drag t / 2) is taken out of the motion
@@ -158,10 +156,15 @@ class Shooting:
         stages, h, k = self._stages, self._stages.h, self.equation.size
         x, v, driven = y[:k], y[k:], at.driving(self.omega)
         ahead, last = x + h * RADAU.c[:, None] * v, np.inf
-        stiffness, factors = None, None
+        stiffness, factors = np.zeros(0), None
         for iteration in range(ITERATIONS):
             stage = ahead + h**2 * RADAU.aa @ a
-            left = a @ stages.mass + (v + h * RADAU.a @ a) @ stages.damping.T + at.forces(stage) + driven
+            left = (
+                a @ stages.mass
+                + (v + h * RADAU.a @ a) @ stages.damping.T
+                + at.forces(stage)
+                + driven
+            )
             stiffness = at.tangents(stage)
             factors = stages.factors(stiffness)
             step = lu_solve(factors, left.ravel()).reshape(a.shape)

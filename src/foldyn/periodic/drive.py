@@ -123,7 +123,9 @@ class Drive:
             out[2, :, k] = -level * order**2 * np.sin(angle)
         return out
 
-    def sums(self, terms: list[tuple[NDArray, Any]], phase: NDArray, level: float, size: int) -> Any:
+    def sums(
+        self, terms: list[tuple[NDArray, Any]], phase: NDArray, level: float, size: int
+    ) -> Any:
         """Sums (3, s, size) of some terms and their two derivatives at phases (s,)."""
         shapes = np.zeros((len(terms), size))
         for shape, (vector, _) in zip(shapes, terms, strict=True):

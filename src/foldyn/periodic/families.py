@@ -85,7 +85,10 @@ class ByLevel(_OfBalance):
 
     def slope(self, z: NDArray, p: float) -> NDArray:
         """See `Family`; by differences, exact where loads are proportional to the level."""
-        x, (up, down) = self.coefficients(z), (self.balance.instants(p + d) for d in (PROBE, -PROBE))
+        x, (up, down) = (
+            self.coefficients(z),
+            (self.balance.instants(p + d) for d in (PROBE, -PROBE)),
+        )
         change = self.balance.residual(x, self.omega, up) - self.balance.residual(
             x, self.omega, down
         )

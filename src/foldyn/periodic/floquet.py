@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.periodic.collocation import monodromy, stage_phases
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.fourier import values_of
-from foldyn.periodic.collocation import monodromy, stage_phases
 
 STEPS = 64  # in a period of the drive
 NEUTRAL = 1e-6  # above 1: what is rounding in an undamped motion

@@ -88,7 +88,7 @@ class Fourier:
         out[1:] = coefficients[1::2] - 1j * coefficients[2::2]
         return out
 
-    def real_of(self, amplitudes: NDArray) -> NDArray:
+    def real_of(self, amplitudes: NDArray[np.complex128]) -> NDArray:
         """Coefficients (c, ...) of amplitudes (any number, ...); others are zero or left out."""
         kept = min(len(amplitudes), self.harmonics + 1)
         out = np.zeros((len(self.order), *amplitudes.shape[1:]))

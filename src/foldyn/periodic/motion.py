@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, State
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.periodic.balance import Balance, newton
+from foldyn.periodic.collocation import Shooting
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.floquet import STEPS, is_stable, multipliers
 from foldyn.periodic.fourier import Fourier, values_of
-from foldyn.periodic.collocation import Shooting
 from foldyn.periodic.orbit import SHOWN, Orbit
 from foldyn.periodic.start import balanced, coefficients, orbit_of
 from foldyn.ram_limit import check_memory

@@ -233,7 +233,9 @@ def _resonant(
     x = np.zeros(balance.shape)
     x[0] = place
     response = linear_response(balance, x, omega, 1.0)
-    size = np.linalg.norm((equation.basis @ response[1:].T).reshape(-1, 3, len(response) - 1), axis=1)
+    size = np.linalg.norm(
+        (equation.basis @ response[1:].T).reshape(-1, 3, len(response) - 1), axis=1
+    )
     goal = np.linalg.norm((equation.basis @ motion).reshape(-1, 3), axis=1).max()
     if not size.max() > 0.0:
         raise InputError(": the drive does not move the sheet", "case")

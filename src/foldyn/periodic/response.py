@@ -328,4 +328,3 @@ def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
     }
     units = "m" if measure is None else measure.units
     return points_dataset("response_curve", case, values, facts, units)
-

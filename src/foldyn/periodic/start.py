@@ -8,11 +8,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from foldyn.cases import Case, Constant, State
+from foldyn.cases import Case, Constant
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.linearized import equivalent_slope
 from foldyn.periodic.balance import AtFrequency, Balance, Converged, newton
-from foldyn.periodic.equation import Equation
 from foldyn.periodic.fourier import values_of
 from foldyn.periodic.orbit import Orbit
 from foldyn.statics import trace
@@ -114,9 +113,7 @@ def balanced(
     return _grown(balance, x, omega, tolerance, level) if found is None else found
 
 
-def _grown(
-    balance: Balance, x: NDArray, omega: float, tolerance: float, level: float
-) -> Converged:
+def _grown(balance: Balance, x: NDArray, omega: float, tolerance: float, level: float) -> Converged:
     """Increase the drive step by step, as far as it takes."""
     still = np.zeros(balance.shape)
     still[0] = x[0]
