@@ -19,7 +19,7 @@ from foldyn.mechanics.term import Term
 from foldyn.statics.rigid import free_rigid_motions
 
 WHOLE = 1e-9  # relative distance of a ratio of frequencies from a whole number
-Histories = list[Constant | Harmonic]
+Terms = list[tuple[Any, Any]]
 
 
 def check_periodic(case: Case, name: str) -> None:
@@ -81,10 +81,10 @@ class Drive:
     """
 
     def __init__(self, case: Case) -> None:
-        self.loads: list[tuple[NDArray, Any]] = list(case.load_terms)
-        self.moves: list[tuple[NDArray, Any]] = [*case.imposed_terms, *case.base_terms]
-        self.turns: list[tuple[NDArray, Any]] = list(case.rest_terms)
-        self.following = list(case.following_terms)
+        self.loads: Terms = list(case.load_terms)
+        self.moves: Terms = [*case.imposed_terms, *case.base_terms]
+        self.turns: Terms = list(case.rest_terms)
+        self.following: Terms = list(case.following_terms)
         every = (*self.loads, *self.moves, *self.turns, *self.following)
         self._histories = [history for _, history in every]
         for history in self._histories:
@@ -109,7 +109,7 @@ class Drive:
         """Whether anything drives the case."""
         return not math.isnan(self.frequency)
 
-    def factors(self, terms: list[tuple[Any, Any]], phase: NDArray, level: float) -> NDArray:
+    def factors(self, terms: Terms, phase: NDArray, level: float) -> NDArray:
         """Factors (3, s, k) of some terms, and their two derivatives, at phases (s,)."""
         out = np.zeros((3, len(phase), len(terms)))
         for k, (_, history) in enumerate(terms):
@@ -123,9 +123,7 @@ class Drive:
             out[2, :, k] = -level * order**2 * np.sin(angle)
         return out
 
-    def sums(
-        self, terms: list[tuple[NDArray, Any]], phase: NDArray, level: float, size: int
-    ) -> Any:
+    def sums(self, terms: Terms, phase: NDArray, level: float, size: int) -> NDArray:
         """Sums (3, s, size) of some terms and their two derivatives at phases (s,)."""
         shapes = np.zeros((len(terms), size))
         for shape, (vector, _) in zip(shapes, terms, strict=True):

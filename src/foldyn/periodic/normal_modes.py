@@ -233,13 +233,10 @@ def _resonant(
     x = np.zeros(balance.shape)
     x[0] = place
     response = linear_response(balance, x, omega, 1.0)
-    size = np.linalg.norm(
-        (equation.basis @ response[1:].T).reshape(-1, 3, len(response) - 1), axis=1
-    )
-    goal = np.linalg.norm((equation.basis @ motion).reshape(-1, 3), axis=1).max()
-    if not size.max() > 0.0:
+    size = _reach(equation, response[1:])
+    if not size > 0.0:
         raise InputError(": the drive does not move the sheet", "case")
-    level = float(goal / size.max())
+    level = _reach(equation, motion[None]) / size
     found = balanced(balance, x + level * response, omega, tolerance, level)
     family = InResonance(balance, tolerance, place, frequency)
     z, p = np.append(found.x, frequency / family.unit), math.log(level)
@@ -254,6 +251,12 @@ def _resonant(
     return family, point_at(family, *near[:2], row, near[2])
 
 
+def _reach(equation: Equation, motions: NDArray) -> float:
+    """Largest displacement of a node in motions (j, k) of the unknowns."""
+    nodes = (motions @ equation.basis.T).reshape(len(motions), -1, 3)
+    return float(np.linalg.norm(nodes, axis=2).max())
+
+
 def _follow(
     family: Any, first: Point, stride: Stride, reached: Callable[[Point], float], ends: NDArray,
     report: Reporter,
@@ -264,8 +267,8 @@ def _follow(
         if not isinstance(step, Step):
             remedy = "a smaller longest_step, or more harmonics" if step == LOST else "most_points"
             warnings.warn(
-                f"the backbone ends at an amplitude of {reached(kept[-1]):.3g} m; the points before "
-                f"are kept. Remedy: {remedy}",
+                f"the backbone ends at an amplitude of {reached(kept[-1]):.3g} m; the points "
+                f"before are kept. Remedy: {remedy}",
                 FoldynWarning,
                 stacklevel=3,
             )

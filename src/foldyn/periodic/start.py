@@ -46,7 +46,7 @@ def equilibrium(case: Case) -> NDArray:
 
 def coefficients(balance: Balance, start: Any, omega: float, level: float = 1.0) -> NDArray:
     """Coefficients (c, k) to begin with: of a motion, or of small ones about a state."""
-    equation, fourier = balance.equation, balance.fourier
+    equation = balance.equation
     if isinstance(start, xr.Dataset):
         return _of_result(balance, start, level)
     if start is None:
