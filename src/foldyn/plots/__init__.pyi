@@ -35,6 +35,10 @@ from foldyn.plots.readings import (
     moved_supports as moved_supports,
     total_reaction as total_reaction,
 )
+from foldyn.plots.response_curves import (
+    plot_backbone as plot_backbone,
+    plot_response_curve as plot_response_curve,
+)
 from foldyn.plots.structure import draw_structure as draw_structure
 from foldyn.plots.sweeps import (
     plot_main_effects as plot_main_effects,
