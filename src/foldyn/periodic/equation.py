@@ -103,7 +103,8 @@ class _Tangents:
     """
 
     def __init__(self, body: Assembly, basis: sparse.csr_array, free: NDArray | None) -> None:
-        self._basis, self._terms = basis, {}
+        self._basis = basis
+        self._terms: dict[int, tuple[NDArray, NDArray, NDArray]] = {}
         self._sheet: tuple[NDArray, NDArray] | None = None
         if free is None:
             return
@@ -117,7 +118,9 @@ class _Tangents:
             self._sheet = _places(rank, row.ravel(), column.ravel())
         for k, term in enumerate(body.others):
             if type(term).tangent is Term.tangent:
-                self._terms[k] = _places(rank, *term.places)
+                kept, place = _places(rank, *term.places)
+                own, of = np.unique(place, return_inverse=True)  # several may have one place
+                self._terms[k] = kept, of, own
 
     def put(self, body: Assembly, u: NDArray, out: NDArray) -> None:
         """Add the tangent at displacements u (m,) to `out` (k, k)."""
@@ -131,8 +134,8 @@ class _Tangents:
             out += self._dense(sheet.tangent(u))
         for k, term in enumerate(body.others):
             if k in self._terms:
-                kept, place = self._terms[k]
-                np.add.at(flat, place, term.entries(u)[kept])
+                kept, place, own = self._terms[k]
+                flat[own] += np.bincount(place, term.entries(u)[kept], len(own))
             else:
                 out += self._dense(term.tangent(u))
 
