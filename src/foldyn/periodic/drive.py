@@ -22,13 +22,13 @@ WHOLE = 1e-9  # relative distance of a ratio of frequencies from a whole number
 Terms = list[tuple[Any, Any]]
 
 
-def check_periodic(case: Case, name: str) -> None:
-    """Refuse what `name` cannot follow exactly over a period.
+def check_smooth(case: Case, name: str) -> None:
+    """Refuse what `name` cannot follow exactly.
 
     Raises
     ------
     InputError
-        Contact, laws with memory, unknowns without mass, free rigid motions.
+        Contact, laws with memory, unknowns without mass.
     """
     case.check_movable()
     if case.contact is not None:
@@ -48,6 +48,10 @@ def check_periodic(case: Case, name: str) -> None:
             f"structure: {name} takes bars and hinges, and this model has unknowns without mass "
             'beside them; take scheme = "n5b8" or "n4b5"'
         )
+
+
+def check_held(case: Case, name: str) -> None:
+    """Refuse supports that let the whole drift, so that it has no place to come back to."""
     nodes, body = case.structure.nodes, case.body
     if free_rigid_motions(nodes, case.constraints, body.holds(np.zeros(body.size))).shape[1]:
         raise InputError(

@@ -23,7 +23,7 @@ from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import following_force, following_tangent, joined
 from foldyn.mechanics.tangent import add_tangent
 from foldyn.mechanics.term import Term, nodal
-from foldyn.periodic.drive import Drive, check_damping, check_periodic
+from foldyn.periodic.drive import Drive, check_damping, check_held, check_smooth
 from foldyn.structures.bars_hinges import BarsHingesTerm
 
 EPS = float(np.finfo(float).eps)
@@ -39,6 +39,8 @@ class Equation:
         Who asks, for messages.
     driven : bool
         False leaves out all that varies, and the damping.
+    drifts : bool
+        Whether supports may let the whole move.
 
     Attributes
     ----------
@@ -52,8 +54,10 @@ class Equation:
         The part alpha M of the damping, 1/s.
     """
 
-    def __init__(self, case: Case, name: str, driven: bool = True) -> None:
-        check_periodic(case, name)
+    def __init__(self, case: Case, name: str, driven: bool = True, drifts: bool = False) -> None:
+        check_smooth(case, name)
+        if not drifts:
+            check_held(case, name)
         check_mass(case.mass, case.constraints.determined)
         self.case, self.body, self.drive = case, case.body, Drive(case)
         self.level = 1.0 if driven else 0.0

@@ -31,7 +31,7 @@ from foldyn.periodic.families import ByFrequency, ByLevel
 from foldyn.periodic.floquet import STEPS, is_stable, multipliers
 from foldyn.periodic.fourier import Fourier
 from foldyn.periodic.motion import balance_of, warn_of_truncation
-from foldyn.periodic.orbit import measured
+from foldyn.periodic.orbit import check_measure, measured
 from foldyn.periodic.start import balanced, coefficients
 from foldyn.results import Quantity
 from foldyn.results.periodic_dataset import points_dataset
@@ -133,7 +133,7 @@ def response_curve(
     """
     began = time.perf_counter()
     of_kind("case", case, Case)
-    _check_measure(measure)
+    check_measure(measure)
     by, ends = _range(frequencies, amplitudes)
     tolerance = number("tolerance", tolerance, above=0.0, below=1.0)
     longest = number("longest_step", longest_step, above=0.0, most=1.0)
@@ -149,17 +149,6 @@ def response_curve(
     finally:
         close()
     return _dataset(case, tracer, measure, began)
-
-
-def _check_measure(measure: Any) -> None:
-    if measure is None:
-        return
-    of_kind("measure", measure, Quantity)
-    if measure.function is None or measure.dims:
-        raise InputError(
-            ": must have a function of displacement, velocity and time that gives one number",
-            "measure",
-        )
 
 
 def _range(frequencies: Any, amplitudes: Any) -> tuple[str, tuple[float, float]]:

@@ -157,7 +157,4 @@ def _pieces(stable: NDArray[np.bool_], marked: NDArray[np.bool_]) -> list[tuple[
     segment = np.where(marked[:-1], stable[1:], stable[:-1])
     ends = np.flatnonzero(np.diff(segment)) + 1
     edges = [0, *ends.tolist(), count - 1]
-    return [
-        (np.arange(first, last + 1), bool(segment[first]))
-        for first, last in pairwise(edges)
-    ]
+    return [(np.arange(first, last + 1), bool(segment[first])) for first, last in pairwise(edges)]

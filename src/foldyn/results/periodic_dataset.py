@@ -100,3 +100,62 @@ def points_dataset(
         count = np.asarray(values["coefficient"]).shape[1]
         along["harmonic"] = ("harmonic", np.arange(count), {"long_name": "harmonic"})
     return result_dataset(kind, case, data, along, statistics)
+
+
+def section_dataset(
+    case: Case, displacement: NDArray, velocity: NDArray, statistics: Mapping[str, Any]
+) -> xr.Dataset:
+    """Dataset of states (m, n, 3) at the start of each period of the drive."""
+    data = variables(MOTION, "period", {"displacement": displacement, "velocity": velocity})
+    along = {"period": ("period", np.arange(len(displacement)), {"long_name": "period"})}
+    return result_dataset("section", case, data, along, statistics)
+
+
+def stepped_dataset(
+    case: Case, frequency: NDArray, section: NDArray, amplitude: NDArray, jump: NDArray,
+    statistics: Mapping[str, Any], units: str,
+) -> xr.Dataset:  # fmt: skip
+    """Dataset of motions at one frequency (m,) after the other; section (m, periods)."""
+    data = {
+        "section": variable(("frequency", "period"), section, units, "at the start of a period"),
+        "amplitude": variable(("frequency",), amplitude, units, POINTS["amplitude"].text),
+        "jump": variable(("frequency",), jump, "", "whether the amplitude has jumped"),
+    }
+    along = {
+        "frequency": ("frequency", frequency, {"units": "Hz", "long_name": "frequency"}),
+        "period": ("period", np.arange(section.shape[1]), {"long_name": "period"}),
+    }
+    return result_dataset("stepped_sine", case, data, along, statistics)
+
+
+def exponent_dataset(
+    case: Case, exponent: float, uncertainty: float, growth: NDArray, statistics: Mapping[str, Any]
+) -> xr.Dataset:
+    """Dataset of a Lyapunov exponent (1/s) and the growth (m,) of a deviation in each period."""
+    data = {
+        "exponent": variable((), exponent, "1/s", "largest Lyapunov exponent"),
+        "uncertainty": variable((), uncertainty, "1/s", "standard error of the exponent"),
+        "growth": variable(("period",), growth, "1", "logarithm of the growth of a deviation"),
+    }
+    along = {"period": ("period", np.arange(len(growth)), {"long_name": "period"})}
+    return result_dataset("lyapunov_exponent", case, data, along, statistics)
+
+
+def basins_dataset(
+    case: Case, a: NDArray, b: NDArray, attractor: NDArray, displacement: NDArray,
+    velocity: NDArray, statistics: Mapping[str, Any],
+) -> xr.Dataset:  # fmt: skip
+    """Dataset of the attractor (a, b) of each start, and a state (attractor, n, 3) on each."""
+    text = "attractor (-1: unsettled)"
+    share = [float((attractor == k).mean()) for k in range(len(displacement))]
+    data = {
+        "basin": variable(("a", "b"), attractor, "", text),
+        "share": variable(("attractor",), np.array(share), "1", "share of the starts"),
+        **variables(MOTION, "attractor", {"displacement": displacement, "velocity": velocity}),
+    }
+    along = {
+        "a": ("a", a, {"long_name": "along the first direction"}),
+        "b": ("b", b, {"long_name": "along the second direction"}),
+        "attractor": ("attractor", np.arange(len(displacement)), {"long_name": "attractor"}),
+    }
+    return result_dataset("basins", case, data, along, statistics)
