@@ -270,16 +270,16 @@ def solved(folder: Path) -> Calls:
         }),
         "periodic_motion": (fd.periodic_motion, {
             "case": shaken(), "frequency": 1.0, "harmonics": 1, "method": "harmonic_balance",
-            "start": None, "periods": 1, "steps": 8, "tolerance": 1e-6,
+            "start": None, "periods": 1, "modes": None, "steps": 8, "tolerance": 1e-6,
         }),
         "response_curve": (fd.response_curve, {
             "case": shaken(), "frequencies": (1.0, 1.02), "harmonics": 1, "measure": None,
-            "amplitudes": None, "start": None, "periods": 1, "branches": 0, "longest_step": 1.0,
-            "most_points": 4, "steps": 8, "tolerance": 1e-6, "progress": None,
+            "amplitudes": None, "start": None, "periods": 1, "modes": None, "branches": 0,
+            "longest_step": 1.0, "most_points": 4, "steps": 8, "tolerance": 1e-6, "progress": None,
         }),
         "backbone": (fd.backbone, {
             "case": shaken(), "mode": 1, "amplitudes": (1e-6, 2e-6), "harmonics": 1,
-            "damped": False, "state": None, "longest_step": 1.0, "most_points": 4,
+            "damped": False, "state": None, "modes": None, "longest_step": 1.0, "most_points": 4,
             "tolerance": 1e-6, "progress": None,
         }),
     }  # fmt: skip

@@ -4,7 +4,7 @@
 
 f holds the internal forces less the loads, W = 2 pi times the frequency of the drive, and s2, s1
 what supports do that move: M and C times the derivatives of their motion with respect to theta.
-Displacements of all dofs are u = B x + U(theta), forces on the unknowns B' times those on all.
+Displacements of all dofs are u = u0 + B x + U(theta), forces on the unknowns B' times those on all.
 """
 
 from __future__ import annotations
@@ -19,12 +19,9 @@ from foldyn.cases import Case
 from foldyn.dynamics.dampers import damping_terms
 from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of, modal_rows
-from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import following_force, following_tangent, joined
-from foldyn.mechanics.tangent import add_tangent
-from foldyn.mechanics.term import Term, nodal
 from foldyn.periodic.drive import Drive, check_damping, check_held, check_smooth
-from foldyn.structures.bars_hinges import BarsHingesTerm
+from foldyn.periodic.tangents import Tangents
 
 EPS = float(np.finfo(float).eps)
 
@@ -46,8 +43,12 @@ class Equation:
     ----------
     size : int
         Number k of unknowns.
-    basis : sparse (m, k)
+    basis : sparse or dense (m, k)
         B.
+    offset : (m,)
+        Displacements where all unknowns and the drive are zero, m.
+    whole : Equation
+        That of which this is a reduction; itself if it is none.
     mass, damping : (k, k)
         M (kg) and C (N s/m).
     alpha : float
@@ -64,18 +65,20 @@ class Equation:
         free, total = case.free_dofs, self.body.size
         whole = case.constraints.extended(total) if case.constraints else sparse.eye_array(total)
         self.basis = sparse.csr_array(sparse.csc_array(whole)[:, free])
-        self.size = len(free)
-        self._tangents = _Tangents(self.body, self.basis, None if case.constraints else free)
+        self.size, self.offset = len(free), np.zeros(total)
+        self.whole: Equation = self
+        self._tangents = Tangents(self.body, self.basis, None if case.constraints else free)
         nodal = mass_of(case)
-        self.mass = (self.basis.T @ nodal @ self.basis).toarray()
+        self.mass = self.projected(nodal)
         terms = damping_terms(case, None, modal_rows(case)) if driven else []
         check_damping(terms, name)
         self.alpha = case.rayleigh.alpha if driven else 0.0
         drag = nodal * self.alpha
         for term in terms:
             drag = drag + term.damping(np.zeros(total))
-        self.damping = (self.basis.T @ drag @ self.basis).toarray()
+        self.damping = self.projected(drag)
         self._moved = sparse.csr_array(self.basis.T @ nodal), sparse.csr_array(self.basis.T @ drag)
+        self._back = np.zeros((0, 0))  # of a reduced equation: its unknowns per those of the whole
         parts = [(part, k) for k, (part, _) in enumerate(self.drive.following)]
         self._following = joined(parts)
 
@@ -93,64 +96,17 @@ class Equation:
         """The equation at phases (s,) of the drive, all that varies times a level."""
         return Instants(self, phase, level * self.level)
 
+    def projected(self, matrix: sparse.csr_array) -> NDArray:
+        """B' K B (k, k) of a matrix of all dofs."""
+        found = self.basis.T @ (matrix @ self.basis)
+        return found.toarray() if sparse.issparse(found) else found
+
     def unknowns(self, displacement: NDArray, instants: Instants) -> NDArray:
         """Unknowns (s, k) of displacements (s, n, 3) of all nodes at some instants."""
-        flat = displacement.reshape(len(displacement), -1) - instants.moved
+        flat = displacement.reshape(len(displacement), -1) - instants.moved - self.offset
         ties = self.case.constraints
-        return np.array([ties.coordinates(u)[self.case.free_dofs] for u in flat])
-
-
-class _Tangents:
-    """Tangents of a body as dense matrices on the unknowns, without sparse ones in between.
-
-    Those are made where nothing ties the dofs together: each entry then has one place.
-    """
-
-    def __init__(self, body: Assembly, basis: sparse.csr_array, free: NDArray | None) -> None:
-        self._basis = basis
-        self._terms: dict[int, tuple[NDArray, NDArray, NDArray]] = {}
-        self._sheet: tuple[NDArray, NDArray] | None = None
-        if free is None:
-            return
-        rank = np.full(body.size, -1)
-        rank[free] = np.arange(len(free))
-        if isinstance(body.sheet, BarsHingesTerm):
-            pattern, axis = body.sheet.sparsity, np.arange(3)
-            node = np.repeat(np.arange(len(pattern.indptr) - 1), np.diff(pattern.indptr))
-            row = np.broadcast_to((3 * node[:, None] + axis)[:, :, None], (len(node), 3, 3))
-            column = np.broadcast_to((3 * pattern.indices[:, None] + axis)[:, None], row.shape)
-            self._sheet = _places(rank, row.ravel(), column.ravel())
-        for k, term in enumerate(body.others):
-            if type(term).tangent is Term.tangent:
-                kept, place = _places(rank, *term.places)
-                own, of = np.unique(place, return_inverse=True)  # several may have one place
-                self._terms[k] = kept, of, own
-
-    def put(self, body: Assembly, u: NDArray, out: NDArray) -> None:
-        """Add the tangent at displacements u (m,) to `out` (k, k)."""
-        flat, sheet = out.reshape(-1), body.sheet
-        if self._sheet is not None and isinstance(sheet, BarsHingesTerm):
-            kept, place = self._sheet
-            data = np.zeros((len(sheet.sparsity.indices), 3, 3))
-            add_tangent(sheet.model, sheet.sparsity, nodal(u), -np.inf, data)
-            flat[place] += data.ravel()[kept]
-        else:
-            out += self._dense(sheet.tangent(u))
-        for k, term in enumerate(body.others):
-            if k in self._terms:
-                kept, place, own = self._terms[k]
-                flat[own] += np.bincount(place, term.entries(u)[kept], len(own))
-            else:
-                out += self._dense(term.tangent(u))
-
-    def _dense(self, tangent: sparse.csr_array) -> NDArray:
-        return (self._basis.T @ tangent @ self._basis).toarray()
-
-
-def _places(rank: NDArray, row: NDArray, column: NDArray) -> tuple[NDArray, NDArray]:
-    """Which entries of a matrix of all dofs are kept, and their places among those kept."""
-    kept = np.flatnonzero((rank[row] >= 0) & (rank[column] >= 0))
-    return kept, rank[row[kept]] * (rank.max() + 1) + rank[column[kept]]
+        found = np.array([ties.coordinates(u)[self.case.free_dofs] for u in flat])
+        return found if self.whole is self else found @ self._back.T
 
 
 class Instants:
@@ -179,7 +135,7 @@ class Instants:
 
     def displacements(self, x: NDArray) -> NDArray:
         """Of all dofs (s, m) from unknowns (s, k), m."""
-        return x @ self.equation.basis.T + self.moved
+        return x @ self.equation.basis.T + self.moved + self.equation.offset
 
     def _each(self, x: NDArray):
         """Number, displacement and body of each instant."""
@@ -203,7 +159,7 @@ class Instants:
             equation._tangents.put(body, u, out[j])
             if following.acts:
                 added = following_tangent(following, u, self._factor[j])
-                out[j] += (equation.basis.T @ added @ equation.basis).toarray()
+                out[j] += equation.projected(added)
         return out
 
     def driving(self, omega: float) -> NDArray:

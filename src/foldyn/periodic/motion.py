@@ -18,7 +18,8 @@ from foldyn.periodic.equation import Equation
 from foldyn.periodic.floquet import STEPS, is_stable, multipliers
 from foldyn.periodic.fourier import Fourier, values_of
 from foldyn.periodic.orbit import SHOWN, Orbit
-from foldyn.periodic.start import balanced, coefficients, orbit_of
+from foldyn.periodic.reduction import reduced
+from foldyn.periodic.start import balanced, coefficients, equilibrium, orbit_of
 from foldyn.ram_limit import check_memory
 from foldyn.results.periodic_dataset import periodic_dataset
 from foldyn.values import choice, number, of_kind, whole
@@ -41,6 +42,7 @@ def periodic_motion(
     *,
     start: State | xarray.Dataset | None = None,
     periods: int = 1,
+    modes: int | None = None,
     steps: int = STEPS,
     tolerance: float = 1e-9,
 ) -> xarray.Dataset:
@@ -67,6 +69,10 @@ def periodic_motion(
         one of `response_curve`. The equilibrium under the constant loads by default.
     periods : int
         Periods of the drive in one of the motion: 2 after a period doubling.
+    modes : int, optional
+        Compute in the span of so many modes about the start (about the equilibrium, if it is a
+        motion), their derivatives and the static response to the drive, in place of all free
+        dofs: for big sheets.
     steps : int
         Of integration in a period of the drive, for shooting and for the multipliers.
     tolerance : float
@@ -80,7 +86,8 @@ def periodic_motion(
         (multiplier), the largest first, eigenvalues of the monodromy matrix that integrates the
         variational equation; `stable`; `periods`. Attributes: `frequency`, `truncation` (what
         twice as many harmonics would add, as a fraction of the motion, estimated from the residual
-        there) and facts about the run.
+        there), with `modes` also `reduction` (what the dofs left out would add, likewise) and
+        facts about the run.
 
     Raises
     ------
@@ -117,7 +124,8 @@ def periodic_motion(
     choice("method", method, METHODS)
     tolerance = number("tolerance", tolerance, above=0.0, below=1.0)
     steps = whole("steps", steps, least=4)
-    balance = balance_of(case, "fd.periodic_motion", harmonics, whole("periods", periods, least=1))
+    periods = whole("periods", periods, least=1)
+    balance = balance_of(case, "fd.periodic_motion", harmonics, periods, modes, start)
     omega = TURN * frequency_of(balance, frequency)
     if method == "shooting":
         orbit, floquet, spent = _shot(balance, start, omega, steps, tolerance)
@@ -137,6 +145,8 @@ def periodic_motion(
         "steps": steps,
         "iterations": spent,
         "truncation": truncation,
+        "modes": modes,
+        "reduction": None if modes is None else orbit.reduction(),
         "multipliers": "variational equation integrated by Gauss's method of order 6",
         "wall_seconds": time.perf_counter() - began,
     }
@@ -146,7 +156,10 @@ def periodic_motion(
     )  # fmt: skip
 
 
-def balance_of(case: Case, name: str, harmonics: int, periods: int = 1) -> Balance:
+def balance_of(
+    case: Case, name: str, harmonics: int, periods: int = 1, modes: int | None = None,
+    start: Any = None,
+) -> Balance:  # fmt: skip
     """Balance of a driven case; InputError without a drive, or where it does not fit in memory."""
     harmonics = whole("harmonics", harmonics, least=1)
     equation = Equation(case, name)
@@ -155,9 +168,20 @@ def balance_of(case: Case, name: str, harmonics: int, periods: int = 1) -> Balan
             f"case: nothing drives it: {name} takes loads or supports that have a history such as "
             "fd.Harmonic(frequency=3.0)"
         )
+    equation = on_modes(equation, modes, start)
     size = (2 * harmonics + 1) * equation.size
     check_memory("harmonics", f"a matrix of {size} unknowns", 24.0 * size**2, "take fewer")
     return Balance(equation, Fourier(harmonics), periods)
+
+
+def on_modes(equation: Equation, modes: int | None, start: Any) -> Equation:
+    """The equation reduced to some modes about a start, or itself without a number of them."""
+    if modes is None:
+        return equation
+    count, case = whole("modes", modes, least=1), equation.case
+    if isinstance(start, State):
+        return reduced(equation, count, start.of_nodes("displacement", case.structure.nodes.shape))
+    return reduced(equation, count, equilibrium(case))
 
 
 def frequency_of(balance: Balance, given: float | None) -> float:

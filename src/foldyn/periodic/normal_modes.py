@@ -22,7 +22,7 @@ from foldyn.periodic.equation import Equation
 from foldyn.periodic.families import Free, InResonance
 from foldyn.periodic.floquet import STEPS, is_stable, multipliers
 from foldyn.periodic.fourier import Fourier, values_of
-from foldyn.periodic.motion import balance_of, warn_of_truncation
+from foldyn.periodic.motion import balance_of, on_modes, warn_of_truncation
 from foldyn.periodic.orbit import FINE, Orbit
 from foldyn.periodic.start import FLOOR, balanced, equilibrium, linear_response
 from foldyn.ram_limit import check_memory
@@ -46,6 +46,7 @@ def backbone(
     *,
     damped: bool = False,
     state: State | None = None,
+    modes: int | None = None,
     longest_step: float = 0.3,
     most_points: int = 500,
     tolerance: float = 1e-9,
@@ -73,6 +74,8 @@ def backbone(
     state : State, optional
         Near which the equilibrium lies about which it vibrates; rest by default. Constant loads
         act.
+    modes : int, optional
+        As for `periodic_motion`, about this state.
     longest_step : float
         Length of a step, of which a growth of the motion by its own size counts 1.
     most_points : int
@@ -86,9 +89,10 @@ def backbone(
     -------
     xarray.Dataset
         Along `point`: `frequency` (Hz, coordinate), `amplitude` (m), `coefficient` (harmonic, node,
-        axis) as in `periodic_motion`, `truncation`; of the undamped case `energy` (J) above that of
-        the equilibrium and `energy_drift`, its largest change along the motion as a fraction; of
-        the damped one `level`, the factor on the drive, `floquet` and `stable`. Attributes:
+        axis) as in `periodic_motion`, `truncation`, with `modes` also `reduction`. Of the undamped
+        case `energy` (J) above that of the equilibrium and `energy_drift`, its largest change along
+        the motion as a fraction; of the damped one `level`, the factor on the drive, `floquet` and
+        `stable`. Attributes:
         `linear_frequency` (Hz), `complete`, 1 if the last amplitude is reached, and facts.
 
     Raises
@@ -130,9 +134,9 @@ def backbone(
     tolerance = number("tolerance", tolerance, above=0.0, below=1.0)
     damped = flag("damped", damped)
     if damped:
-        balance = balance_of(case, "fd.backbone", harmonics)
+        balance = balance_of(case, "fd.backbone", harmonics, modes=modes, start=state)
     else:
-        balance = _undamped(case, whole("harmonics", harmonics, least=1))
+        balance = _undamped(case, whole("harmonics", harmonics, least=1), modes, state)
     place, frequency, shape = _mode(balance.equation, state, mode)
     begin = _resonant if damped else _free
     family, first = begin(balance, place, frequency, shape * ends[0], tolerance)
@@ -160,8 +164,8 @@ def backbone(
     return points_dataset("backbone", case, values, facts)
 
 
-def _undamped(case: Case, harmonics: int) -> Balance:
-    equation = Equation(case, "fd.backbone", driven=False)
+def _undamped(case: Case, harmonics: int, modes: int | None, state: Any) -> Balance:
+    equation = on_modes(Equation(case, "fd.backbone", driven=False), modes, state)
     size = (harmonics + 1) * equation.size
     check_memory("harmonics", f"a matrix of {size} unknowns", 24.0 * size**2, "take fewer")
     return Balance(equation, Fourier(harmonics, even=True))
@@ -182,7 +186,7 @@ def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, ND
     soft = equation.body.sheet.soft_hinges(at.displacements(place[None])[0])
     if len(soft.offset):  # the slope at rest is none
         floored = equation.body.tangent(at.displacements(place[None])[0], FLOOR)
-        stiffness = (equation.basis.T @ floored @ equation.basis).toarray()
+        stiffness = equation.projected(floored)
     value, vector = eigh(stiffness, equation.mass, subset_by_index=[mode - 1, mode - 1])
     if not value[0] > 0.0:
         raise ComputationError(
@@ -292,7 +296,11 @@ def _values(orbits: list[Orbit], place: NDArray) -> dict[str, Any]:
 
 
 def _common(orbits: list[Orbit]) -> dict[str, Any]:
+    reduction = {}
+    if orbits[0].equation.whole is not orbits[0].equation:
+        reduction = {"reduction": np.array([orbit.reduction() for orbit in orbits])}
     return {
+        **reduction,
         "frequency": np.array([orbit.omega / TURN for orbit in orbits]),
         "coefficient": np.array([orbit.node_amplitudes() for orbit in orbits]),
         "truncation": np.array([orbit.truncation() for orbit in orbits]),

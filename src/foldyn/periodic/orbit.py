@@ -88,6 +88,30 @@ class Orbit:
         size = float(np.linalg.norm(self.amplitudes[1:]))
         return np.sqrt(added) / size if size else 0.0
 
+    def reduction(self) -> float:
+        """What the unknowns left out would add, as a fraction of the motion, estimated likewise.
+
+        0 of an equation that is whole.
+        """
+        whole = self.equation.whole
+        if whole is self.equation:
+            return 0.0
+        fourier = Fourier(len(self.amplitudes) - 1)
+        balance, phase = Balance(whole, fourier, self.multiple), fourier.phase
+        at = balance.instants(self.level)
+        states = whole.unknowns(self.displacement(phase), at)
+        x = fourier.fit @ states
+        left = fourier.complex_of(balance.residual(x, self.omega, at))
+        few = whole.at(self.multiple * phase[::4], self.level)
+        mean, w = few.tangents(states[::4]).mean(axis=0), self.omega / self.multiple
+        added = np.array(
+            [
+                np.linalg.solve(mean - (j * w) ** 2 * whole.mass + 1j * j * w * whole.damping, one)
+                for j, one in enumerate(left)
+            ]
+        )
+        return float(np.linalg.norm(added) / np.linalg.norm(fourier.complex_of(x)[1:]))
+
 
 def swing(values: NDArray) -> NDArray:
     """Half the distance (...) between the extremes of samples (s, ...) of a period.

@@ -65,6 +65,7 @@ def response_curve(
     amplitudes: Sequence[float] | None = None,
     start: State | xarray.Dataset | None = None,
     periods: int = 1,
+    modes: int | None = None,
     branches: int = 1,
     longest_step: float = 0.1,
     most_points: int = 500,
@@ -96,6 +97,8 @@ def response_curve(
         Where to begin at the first end; see `periodic_motion`.
     periods : int
         Periods of the drive in one of the motion.
+    modes : int, optional
+        As for `periodic_motion`.
     branches : int
         How many times branches are followed that fork off at a pitchfork (one of the two, which
         are mirror images) or a period doubling: 0 none, 1 those of the curve, 2 theirs too.
@@ -115,8 +118,9 @@ def response_curve(
         Along `point`: `frequency` (coordinate), `level` (factor on the drive), `amplitude` of the
         measure, `stable`, `bifurcation` ("fold", "pitchfork", "period doubling", "Neimark-Sacker"
         or ""), `branch` (0 for the curve itself), `periods`, `floquet` (multiplier), `coefficient`
-        (harmonic, node, axis) as in `periodic_motion`, of the motion's own frequency, and
-        `truncation`. ``periodic_motion(case, f, start=curve.isel(point=3))`` gives the motion.
+        (harmonic, node, axis) as in `periodic_motion`, of the motion's own frequency, `truncation`,
+        with `modes` also `reduction`. Of a point,
+        ``periodic_motion(case, f, start=curve.isel(point=3))`` gives the motion.
         Attributes: `complete`, 1 if every branch came to an end of the range, and facts.
 
     Raises
@@ -139,7 +143,8 @@ def response_curve(
     longest = number("longest_step", longest_step, above=0.0, most=1.0)
     stride = Stride(FIRST * longest, longest, whole("most_points", most_points, least=2))
     branches = whole("branches", branches, least=0)
-    balance = balance_of(case, "fd.response_curve", harmonics, whole("periods", periods, least=1))
+    periods = whole("periods", periods, least=1)
+    balance = balance_of(case, "fd.response_curve", harmonics, periods, modes, start)
     tracer = _Tracer(by, ends, stride, whole("steps", steps, least=4), tolerance)
     report, close = reporter(progress)
     try:
@@ -306,11 +311,15 @@ def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
         "coefficient": coefficient,
         "truncation": truncation,
     }
+    equation = tracer.found[0].family.balance.equation
+    if equation.whole is not equation:
+        values["reduction"] = np.array([orbit.reduction() for orbit in orbits])
     harmonics = tracer.found[0].family.balance.fourier.harmonics
     warn_of_truncation(float(truncation.max()), harmonics, "harmonics")
     facts = {
         "by": tracer.by,
         "harmonics": harmonics,
+        "unknowns": equation.size,
         "complete": tracer.complete,
         "measure": "largest displacement" if measure is None else measure.text or "measure",
         "wall_seconds": time.perf_counter() - began,

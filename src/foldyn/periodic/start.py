@@ -66,8 +66,8 @@ def linear_response(balance: Balance, x: NDArray, omega: float, level: float) ->
         balance.residual(x, omega, balance.instants(share * level)) for share in (0.0, LITTLE)
     )
     residual = still + (little - still) / LITTLE
-    u = equation.basis @ x[0]
-    tangent = equation.basis.T @ equation.body.tangent(u, FLOOR) @ equation.basis
+    u = equation.basis @ x[0] + equation.offset
+    tangent = equation.projected(equation.body.tangent(u, FLOOR))
     w = omega / balance.multiple
     amplitudes = fourier.complex_of(residual)
     for j in range(len(amplitudes)):

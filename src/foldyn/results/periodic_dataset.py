@@ -29,6 +29,7 @@ POINTS: Mapping[str, Quantity] = {
     "floquet": Quantity("1", "Floquet multiplier", ("multiplier",)),
     "coefficient": Quantity("m", "complex amplitude of a harmonic of the motion", HARMONICS),
     "truncation": Quantity("1", "what twice as many harmonics would add, estimated"),
+    "reduction": Quantity("1", "what the dofs left out would add, estimated"),
     "energy": Quantity("J", "energy above that at rest"),
     "energy_drift": Quantity("1", "largest change of the energy along the motion"),
 }
