@@ -81,7 +81,7 @@ def read_as(
     Parameters
     ----------
     path : Path
-    kind : {"modes", "frf", "fidelity"}
+    kind : {"modes", "frf", "fidelity", "response"}
     flags : mapping
         Keys of [analysis] that the command line gives instead of the file; `state` may be a
         result's file, too.

@@ -13,13 +13,21 @@ from foldyn.analyses.frf import FrfAnalysis
 from foldyn.analyses.modes import ModesAnalysis
 from foldyn.analyses.motion import MotionAnalysis
 from foldyn.analyses.path import PathAnalysis
+from foldyn.analyses.response import ResponseAnalysis
 from foldyn.analyses.sections import CaseSchema
 from foldyn.errors import InputError
 from foldyn.values import choice
 
 ANALYSES: Mapping[str, type[Analysis]] = {
     analysis.kind: analysis
-    for analysis in (MotionAnalysis, PathAnalysis, ModesAnalysis, FrfAnalysis, FidelityAnalysis)
+    for analysis in (
+        MotionAnalysis,
+        PathAnalysis,
+        ModesAnalysis,
+        FrfAnalysis,
+        FidelityAnalysis,
+        ResponseAnalysis,
+    )
 }
 """By the name that `analysis.kind` has for them."""
 
