@@ -75,6 +75,9 @@ def test_the_command_takes_any_kind_and_writes_a_page(tmp_path):
     page = (folder / "report.html").read_text("utf-8")
     assert "Bifurcations, and both ends of each branch" in page
     assert (folder / "response_curve.png").exists()
+    again = ["response", str(path), "--out", str(folder), *flags, "--replace"]
+    assert main(again) == 0
+    assert "Dots: motions that were found" in (folder / "report.html").read_text("utf-8")
 
 
 @pytest.mark.parametrize(

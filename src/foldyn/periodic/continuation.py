@@ -16,7 +16,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
-from scipy.optimize import brentq
 
 ITERATIONS = 8  # of Newton's method in a step
 EASY = 4  # iterations up to which the next step is longer
@@ -157,6 +156,8 @@ def located(
 
     Where branches cross, Newton's method fails very near to the point: the nearest found counts.
     """
+    from scipy.optimize import brentq
+
     found = {0.0: point, length: other}
 
     def at(ahead_by: float) -> float:
