@@ -57,7 +57,8 @@ def test_folds_are_those_of_the_scalar_equation(curve):
 def test_folds_of_one_harmonic_are_the_textbook_ones():
     # Duffing's frequency equation (Nayfeh and Mook, Nonlinear Oscillations, 1979, section 4.1; here
     # by harmonic balance): ((k + 3/4 k3 a^2 - m w^2)^2 + (c w)^2) a^2 = F^2 has vertical tangents
-    with pytest.warns(FoldynWarning, match="harmonics = 1"):
+    few = pytest.warns(FoldynWarning, match="harmonics = 1")
+    with few, pytest.warns(FoldynWarning, match="no multiplier is 1 at the folds"):
         one = fd.response_curve(oscillator(), frequencies=(0.1, 0.6), harmonics=1)
     m, k3, c = mass(), cubic(), ALPHA * mass()
     for found in (marked(one, "fold").isel(point=k) for k in range(2)):

@@ -83,6 +83,7 @@ def test_both_wells_have_a_basin_and_they_mirror_each_other(coarse):
     assert (found + mirrored == 1).all()
 
 
+@pytest.mark.matrix
 @pytest.mark.filterwarnings("ignore:the energy balance")  # of the start on the saddle
 def test_boundary_of_basins_does_not_depend_on_the_grid(coarse):
     found, finer = coarse.basin.values, bistable(15).basin.values

@@ -17,6 +17,8 @@ from foldyn.periodic.continuation import Point, Step, located
 
 FOLD, PITCHFORK = "fold", "pitchfork"
 DOUBLING, TORUS = "period doubling", "Neimark-Sacker"
+SURE = {FOLD: 1e-6, PITCHFORK: 1e-3, DOUBLING: 1e-3, TORUS: 1e-3}
+"""How near to zero what tells a bifurcation must come."""
 REAL = 1e-9  # imaginary part of a multiplier that is real
 
 
@@ -49,7 +51,11 @@ def events(family: Any, step: Step, of: Multipliers) -> list[Event]:
     # a pair that crosses has not met on the real axis: it is one at both ends
     if counts[0] != counts[1] and min(map(len, moduli)) >= max(counts):
         found.append((TORUS, lambda point: _modulus(_moduli(of(point)), max(counts)) - 1.0))
-    events = [(name, located(family, one, other, step.length, value)) for name, value in found]
+    events = []
+    for name, value in found:
+        point = located(family, one, other, step.length, value)
+        if abs(value(point)) <= SURE[name]:  # pairs may meet on the real axis instead
+            events.append((name, point))
     along = [_along(one, point) for _, point in events]
     return [Event(*events[k]) for k in np.argsort(along, kind="stable")]
 

@@ -251,8 +251,11 @@ def _passes(family: Family, step: Step, first: Point) -> bool:
 
 
 def _turns(family: Family, one: Point, other: Point) -> bool:
-    """Whether the tangent turns too far from one point to the other."""
+    """Whether the curve turns too far from one point to the other, or jumps to another curve."""
     weights = _weights(family, one.z)
+    apart = np.append(other.z - one.z, other.p - one.p)
+    if _along(family, one, other) < STRAIGHT * np.sqrt(weights @ apart**2):
+        return True
     lengths = np.sqrt((weights @ one.tangent**2) * (weights @ other.tangent**2))
     return bool((weights * one.tangent) @ other.tangent < STRAIGHT * lengths)
 

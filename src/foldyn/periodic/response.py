@@ -16,7 +16,7 @@ from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter, reporter
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.periodic.balance import Balance
-from foldyn.periodic.bifurcations import DOUBLING, PITCHFORK, Event, events
+from foldyn.periodic.bifurcations import DOUBLING, FOLD, PITCHFORK, Event, events
 from foldyn.periodic.continuation import (
     LONG,
     LOST,
@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 
 FIRST = 0.2  # of the longest step
 AWAY = 0.05  # of the motion: how far a branch is entered
+APART = 1e-2  # from 1: multiplier of a fold that is none
+NAMED = 5  # folds that a warning lists
 MEETS = 1e-4  # of the range of the parameter: where branches meet at one point
 
 
@@ -133,7 +135,8 @@ def response_curve(
     Warns
     -----
     FoldynWarning
-        A branch is lost, or has too many points (those found are kept); too few harmonics.
+        A branch is lost, or has too many points (those found are kept); too few harmonics: what
+        twice as many would add, or folds at which no multiplier is 1.
     """
     began = time.perf_counter()
     of_kind("case", case, Case)
@@ -290,6 +293,22 @@ class _Tracer:
         self.follow(family, first, depth, report, point)
 
 
+def _warn_of_folds(found: list[_Found]) -> None:
+    """Warn of folds of the Fourier series alone, at which no multiplier is 1."""
+    at = [
+        f"{one.point.p:.6g}"
+        for one in found
+        if one.bifurcation == FOLD and np.abs(one.floquet - 1.0).min() > APART
+    ]
+    if at:
+        warnings.warn(
+            f"harmonics: no multiplier is 1 at the folds at {', '.join(at[:NAMED])}, which a "
+            "longer series may not have: give more harmonics (or more steps)",
+            FoldynWarning,
+            stacklevel=4,
+        )
+
+
 def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
     orbits = [found.family.orbit(found.point.z, found.point.p) for found in tracer.found]
     nodes = [orbit.node_amplitudes() for orbit in orbits]
@@ -314,6 +333,7 @@ def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
     equation = tracer.found[0].family.balance.equation
     if equation.whole is not equation:
         values["reduction"] = np.array([orbit.reduction() for orbit in orbits])
+    _warn_of_folds(tracer.found)
     harmonics = tracer.found[0].family.balance.fourier.harmonics
     warn_of_truncation(float(truncation.max()), harmonics, "harmonics")
     facts = {
