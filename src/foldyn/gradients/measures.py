@@ -16,8 +16,15 @@ from foldyn.gradients.numbers import Gradient
 from foldyn.linear.frf import quantity_of
 from foldyn.signals.peaks import magnitude_curve
 from foldyn.statics import Equilibrium, Landscape, landscape
-from foldyn.sweeps.measure import Asked
-from foldyn.sweeps.measures import curve_of, frequency_of, highest, sampled, time_of
+from foldyn.sweeps.measure import Asked, asked
+from foldyn.sweeps.measures import (
+    MEASURES,
+    curve_of,
+    frequency_of,
+    highest,
+    sampled,
+    time_of,
+)
 from foldyn.viewer.fields import bar_strain
 
 Seeds = dict[str, NDArray]
@@ -332,7 +339,24 @@ DERIVATIVES: Mapping[str, Derivative] = {
 """By the name of the measure."""
 
 
-def derivative_of(asked: Asked) -> Derivative:
+def one_number(text: str, kind: Any) -> Asked:
+    """A measure of the registry that is one number of results of a kind.
+
+    Raises
+    ------
+    InputError
+        There is none, or it is none.
+    """
+    one = asked(text, MEASURES)
+    kinds = one.measure.kinds
+    if kinds and kind not in kinds:
+        raise InputError(f": {text} is of results of kind {' or '.join(kinds)}, not {kind}")
+    if one.measure.dims:
+        raise InputError(f": {text} is an array; ask for one of its numbers, as frequency[1]")
+    return one
+
+
+def derivative_of(one: Asked) -> Derivative:
     """Derivative of a measure.
 
     Raises
@@ -340,10 +364,10 @@ def derivative_of(asked: Asked) -> Derivative:
     InputError
         It has none.
     """
-    found = DERIVATIVES.get(asked.measure.name)
+    found = DERIVATIVES.get(one.measure.name)
     if found is None:
         raise InputError(
-            f"{asked.text}: has no derivative; those that have one are {', '.join(DERIVATIVES)}. "
+            f": {one.text} has no derivative; those that have one are {', '.join(DERIVATIVES)}. "
             'Give your own with its derivative, as {"tip": (function, derivative)}, or use '
             'method = "cma", which needs none'
         )
