@@ -82,7 +82,7 @@ def test_laws_of_a_miura_cell(structure):
     fold, bend, bar = figure.axes
     hinge = ("dihedral (degrees)", "moment (N m)")
     labels = [(a.get_xlabel(), a.get_ylabel()) for a in (fold, bend, bar)]
-    assert labels == [hinge, hinge, ("stretch (-)", "stress (Pa)")]
+    assert labels == [hinge, hinge, ("stretch (-)", "second Piola-Kirchhoff stress (Pa)")]
     # A bend is superlinear: k sgn(d) |d|^(4/3) about the flat panel.
     curve = bend.get_lines()[0]
     d = np.radians(curve.get_xdata()) - np.pi

@@ -286,3 +286,17 @@ def test_a_law_of_single_bars_has_single_bars():
     assert fd.discretize(pattern, RUBBER, bar_law="ogden").options.membrane == "bars"
     assert fd.discretize(pattern, RUBBER, membrane="bars").bar_law.name == "ogden"
     assert fd.discretize(pattern, RUBBER, bar_law="linear").options.membrane == "panel"
+
+
+def test_stiffness_follows_the_length_without_jumps():
+    """The slope is the same by small and smaller steps, which whole waves would break by 6e-4."""
+    sheet = fd.Sheet(3e9, 0.3, 1e-3, 800.0)
+
+    def first(a: float) -> float:
+        pattern = fd.patterns.miura(a=a, b=0.03, dihedral=100.0)
+        made = fd.discretize(pattern, sheet, preset="n5b8e")
+        return np.log(fd.modes(fd.Case(made, [fd.Fix("xmin")]), 1)["frequency"].item())
+
+    a, steps = 0.0301, 0.0301 * np.array([1e-3, 3e-4, 1e-4])
+    slopes = [(first(a + step) - first(a - step)) / (2.0 * step) for step in steps]
+    assert np.ptp(slopes) < 3e-6 * abs(slopes[-1]), slopes

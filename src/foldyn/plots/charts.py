@@ -91,10 +91,9 @@ class Chart:
 
     def about(self) -> dict[str, Any]:
         """What a page's script reads."""
-        words = ", ".join(f"{k}: {word}" for k, word in enumerate(self.words))
         return {
-            "xlabel": f"{self.xlabel}: {words}" if words else self.xlabel, "ylabel": self.ylabel,
-            "title": self.title, "reach": self.reach,
+            "xlabel": self.xlabel, "ylabel": self.ylabel, "title": self.title,
+            "reach": self.reach, "words": list(self.words),
             "curves": [curve.about() for curve in self.curves],
         }  # fmt: skip
 

@@ -35,8 +35,8 @@ def law_charts(
         modulus, x = structure.sheet.youngs_modulus, np.linspace(*stretch, POINTS)
         y = modulus * np.asarray(structure.bar_law.stress(x))
         curves = [Curve(f"bar: E {modulus:.4g} Pa", x, y), _at_rest([(1.0, 0.0)])]
-        title = f"bars: {structure.bar_law.name} (second Piola-Kirchhoff stress)"
-        charts.append(Chart("stretch (-)", "stress (Pa)", curves, title, zero=True))
+        title, label = f"bars: {structure.bar_law.name}", "second Piola-Kirchhoff stress (Pa)"
+        charts.append(Chart("stretch (-)", label, curves, title, zero=True))
     return charts
 
 

@@ -178,10 +178,15 @@ def _bowing(mesh: PanelMesh, edge: int, resistance: float) -> NDArray:
         wave = np.pi / length * np.arange(1, len(points) + 1)
         shapes = 2.0 / (len(points) + 1) * np.sin(np.outer(wave, place))
     else:  # of bows that are linear between the points
-        wave = np.pi / length * np.arange(1, int(WAVES * length / mesh.radius))
+        count = WAVES * length / mesh.radius
+        number = np.arange(1, int(np.ceil(1.5 * count)))
+        wave = np.pi / length * number
         at = np.concatenate([[0.0], place, [length]])
         slopes = np.diff(np.sin(np.outer(wave, at)), axis=1) / np.diff(at)
         shapes = -2.0 / length * np.diff(slopes, axis=1) / wave[:, None] ** 2
+        # the shortest ones fade, as a last whole wave would make the stiffness jump with the length
+        part = np.clip(1.5 - number / count, 0.0, 1.0)
+        resistance = resistance * part**2 * (3.0 - 2.0 * part)
     return (shapes.T * (resistance * wave**3 * 0.5 * length)) @ shapes
 
 

@@ -9,8 +9,9 @@ const power = (value) => 10 ** Math.floor(Math.log10(value));
 export class Chart {
   // curves: { name, color, dash, x, y, stable? }; options: `seek` is told the place that a reader
   // points at, `free` says that curves may turn back, `log` that the vertical axis is logarithmic,
-  // and `decades` how many of it are shown at most.
-  constructor(host, { label, xlabel, ylabel, curves, seek, free = false, log = false, decades = null }) {
+  // `decades` how many of it are shown at most, and `words` what 0, 1, 2, ... along the horizontal
+  // axis stand for.
+  constructor(host, { label, xlabel, ylabel, curves, seek, free = false, log = false, decades = null, words = [] }) {
     Object.assign(this, { host, curves, free, xlabel, ylabel });
     host.setAttribute("role", "img");
     host.setAttribute("aria-label", label);
@@ -31,14 +32,14 @@ export class Chart {
     }));
     this.plot = new uPlot({
       mode: free ? 2 : 1,
-      width: Math.max(200, host.clientWidth), height: 190, padding: [10, 12, 0, 0],
+      width: Math.max(200, host.clientWidth), height: Math.max(190, 60 + 6.5 * ylabel.length), padding: [10, 12, 0, 0],
       cursor: { show: !free, drag: { x: false, y: false }, points: { size: 6 } },
       legend: { show: false },
       scales: {
-        x: { time: false },
+        x: { time: false, ...(words.length && { range: [-0.5, words.length - 0.5] }) },
         y: log ? { distr: 3, ...(decades && { range: (_, low, high) => [power(Math.max(low, high * 10 ** -decades)), high * 1.5] }) } : {},
       },
-      axes: [axis(xlabel, 30), axis(ylabel, 54)],
+      axes: [{ ...axis(xlabel, 30), ...(words.length && named(words)) }, axis(ylabel, 54)],
       series: [free ? {} : { label: xlabel }, ...series],
       hooks: { draw: [() => this.mark()] },
     }, free ? [null, ...curves.map(({ x, y }) => [x, y])] : aligned(curves), host);
@@ -140,6 +141,9 @@ export class Chart {
   }
 }
 
+// Ticks that are words.
+const named = (words) => ({ splits: () => words.map((_, k) => k), values: () => words });
+
 // Columns of curves over one horizontal axis.
 function aligned(curves) {
   const same = curves.every(({ x }) => x.length === curves[0].x.length
@@ -154,6 +158,7 @@ export function keys({ plot, curves }, hidden, number) {
   const row = document.createElement("p");
   row.className = "keys";
   curves.forEach(({ name, color, dash }, k) => {
+    if (!name) return;
     const key = Object.assign(document.createElement("button"), { type: "button" });
     const own = (key.dataset.key = `${number} ${name}`);
     const set = (show) => {

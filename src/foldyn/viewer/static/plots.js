@@ -41,7 +41,7 @@ function scaled(label, values, reach = 0) {
 
 function drawPlot(host, theme) {
   const about = JSON.parse(host.dataset.plot);
-  const { title, curves: given } = about;
+  const { title, words, curves: given } = about;
   const [xlabel, across] = scaled(about.xlabel, given.map(({ x }) => x));
   const [ylabel, up] = scaled(about.ylabel, given.map(({ y }) => y), about.reach);
   const reach = up * about.reach;
@@ -52,8 +52,8 @@ function drawPlot(host, theme) {
   host.chart?.remove();
   host.replaceChildren();
   const place = host.appendChild(document.createElement("div"));
-  const label = `${title || ylabel} over ${xlabel}: ${curves.map(({ name }) => name).join("; ")}`;
-  host.chart = new Plot(place, { label, xlabel, ylabel, curves, free: true });
+  const label = `${title || ylabel} over ${xlabel}: ${curves.map(({ name }) => name).filter(Boolean).join("; ")}`;
+  host.chart = new Plot(place, { label, xlabel, ylabel, curves, words, free: true });
   host.append(keys(host.chart, (host.off ??= new Set()), 0));
   if (reach) host.chart.plot.setScale("y", { min: -reach, max: reach });
 }
