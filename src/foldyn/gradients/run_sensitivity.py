@@ -159,7 +159,7 @@ def sensitivity(
     direction = None if along is None else _direction(along, design)
     if direction is not None and isinstance(found, ModesGradient):
         found = found.along(lambda gradient: _rate(slopes, direction, gradient))
-    parts = _Parts(found, case, design, slopes)
+    parts = _Parts(found, case, design, slopes, {})
     values, gradients = zip(*(parts.of(one) for one in wanted), strict=True)
     data: dict[str, Any] = {"value": ("measure", np.array(values))}
     if direction is None:
@@ -396,13 +396,13 @@ class _Parts(NamedTuple):
     case: Case
     design: Parameters
     slopes: dict[str, Any]
+    shared: dict[Any, Any]  # what measures have come through
 
     def of(self, one: Wanted) -> tuple[float, dict[str, NDArray]]:
         """Value of a number, and its derivatives by all entries of each parameter."""
-        result, shared = self.found.result, dict[Any, Any]()
-        values = {}
+        result, values = self.found.result, {}
         for name, (measure, _) in one.measures.items():
-            value = measure.of(result, self.case, shared)
+            value = measure.of(result, self.case, self.shared)
             if value.ndim:
                 raise InputError(f"{measure.text}: is an array; ask for one of its numbers")
             values[name] = float(value)
@@ -415,14 +415,16 @@ class _Parts(NamedTuple):
             for variable, seed in own.items():
                 _add(seeds, variable, seed, parts[name])
             if derivative.frozen:
-                frozen = derivative.frozen(result, self.case, **measure.arguments)
+                subject = self.shared.get(measure.measure.through, result)
+                frozen = derivative.frozen(subject, self.case, **measure.arguments)
                 for key, slope in self._explicit(frozen).items():
                     explicit[key] += parts[name] * slope
         with said_of(one.text):
             gradient = dict(self.found.backward(seeds)) if seeds else self._nothing
         for name, (measure, derivative) in one.measures.items():
             if derivative.numbers:
-                own = derivative.numbers(result, self.case, **measure.arguments)
+                subject = self.shared.get(measure.measure.through, result)
+                own = derivative.numbers(subject, self.case, **measure.arguments)
                 for key, by in own.items():
                     _add(gradient, key, by, parts[name])
         return value, {
