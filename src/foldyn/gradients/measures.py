@@ -15,9 +15,16 @@ from foldyn.errors import InputError
 from foldyn.gradients.numbers import Gradient
 from foldyn.linear.frf import quantity_of
 from foldyn.signals.peaks import magnitude_curve
-from foldyn.statics import Equilibrium, Landscape, landscape
-from foldyn.sweeps.measure import Asked
-from foldyn.sweeps.measures import curve_of, frequency_of, highest, sampled, time_of
+from foldyn.statics import Equilibrium, Landscape
+from foldyn.sweeps.measure import Asked, asked
+from foldyn.sweeps.measures import (
+    MEASURES,
+    curve_of,
+    frequency_of,
+    highest,
+    sampled,
+    time_of,
+)
 from foldyn.viewer.fields import bar_strain
 
 Seeds = dict[str, NDArray]
@@ -28,9 +35,10 @@ class Derivative(NamedTuple):
     """The derivative of a measure.
 
     seeds : of a result and a case, with the measure's arguments.
-    frozen : of a measure that also takes numbers of the case itself: of the result and the case,
-        the measure as a function of another case, where the result stays as it is.
-    numbers : of the result and the case, the derivatives of such a measure by numbers of the case.
+    frozen : of a measure that also takes numbers of the case itself: of the result, or what
+        measures come through, and the case, the measure as a function of another case, where the
+        result stays as it is.
+    numbers : of the same the derivatives of such a measure by numbers of the case.
     """
 
     seeds: Callable[..., Seeds]
@@ -223,14 +231,14 @@ def _load_at(result: xr.Dataset, case: Case, node: int, axis: str, displacement:
 def _between_states(pair: Callable[[Landscape], tuple[Equilibrium, Equilibrium]]) -> Derivative:
     """Energy of a state above that of another, both without force: it has no other derivative."""
 
-    def frozen(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
-        high, low = (state.displacement for state in pair(landscape(result, case)))
+    def frozen(found: Landscape, case: Case) -> Callable[[Case], float]:
+        high, low = (state.displacement for state in pair(found))
         return lambda other: _energy(other, high) - _energy(other, low)
 
-    def numbers(result: xr.Dataset, case: Case) -> Gradient:
+    def numbers(landscape: Landscape, case: Case) -> Gradient:
         if not case.imposed_terms:
             return {}
-        high, low = pair(landscape(result, case))
+        high, low = pair(landscape)
         motion = sum((vector for vector, _ in case.imposed_terms), np.zeros_like(high.displacement))
         size = np.abs(motion).max()
         found = {}
@@ -332,7 +340,24 @@ DERIVATIVES: Mapping[str, Derivative] = {
 """By the name of the measure."""
 
 
-def derivative_of(asked: Asked) -> Derivative:
+def one_number(text: str, kind: Any) -> Asked:
+    """A measure of the registry that is one number of results of a kind.
+
+    Raises
+    ------
+    InputError
+        There is none, or it is none.
+    """
+    one = asked(text, MEASURES)
+    kinds = one.measure.kinds
+    if kinds and kind not in kinds:
+        raise InputError(f": {text} is of results of kind {' or '.join(kinds)}, not {kind}")
+    if one.measure.dims:
+        raise InputError(f": {text} is an array; ask for one of its numbers, as frequency[1]")
+    return one
+
+
+def derivative_of(one: Asked) -> Derivative:
     """Derivative of a measure.
 
     Raises
@@ -340,10 +365,10 @@ def derivative_of(asked: Asked) -> Derivative:
     InputError
         It has none.
     """
-    found = DERIVATIVES.get(asked.measure.name)
+    found = DERIVATIVES.get(one.measure.name)
     if found is None:
         raise InputError(
-            f"{asked.text}: has no derivative; those that have one are {', '.join(DERIVATIVES)}. "
+            f": {one.text} has no derivative; those that have one are {', '.join(DERIVATIVES)}. "
             'Give your own with its derivative, as {"tip": (function, derivative)}, or use '
             'method = "cma", which needs none'
         )
