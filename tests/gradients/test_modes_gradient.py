@@ -60,6 +60,16 @@ def test_how_near_panels_are_at_rest():
     with pytest.raises(InputError, match="has no finite value"):
         fd.sensitivity(cell, {"density": 900.0}, "clearance", MODES)
 
+    def crossed(height: float) -> fd.Case:
+        square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+        points = np.vstack([square, square[:, [0, 2, 1]] + np.array([0.3, 0.4, height])])
+        pattern = fd.Pattern(points, [(0, 1, 2, 3), (4, 5, 6, 7)])
+        return fd.Case(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0)), [fd.Fix([0, 1, 3])])
+
+    assert fd.sensitivity(crossed, {"height": 0.2}, "clearance", MODES)["gradient_height"] == 1.0
+    with pytest.raises(InputError, match="panels touch or cross"):
+        fd.sensitivity(crossed, {"height": -0.5}, "clearance", MODES)
+
 
 @pytest.mark.parametrize("seed", [3, 4])
 def test_the_remainder_falls_with_the_second_order(seed):
