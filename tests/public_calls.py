@@ -57,6 +57,16 @@ def at_rest(k: float) -> fd.State:
 
 
 LIFT = fd.Quantity("m", "lift", function=lambda u, v, t: u[4, 2])
+
+
+@cache
+def shaken() -> fd.Case:
+    """The same with linear bends, the other side pushed to and fro."""
+    made = fd.discretize(pattern(), sheet(), bend_law="linear")
+    push = fd.Force([4, 5], (0, 0, 1e-6), history=fd.Harmonic(2.0))
+    return fd.Case(made, [fd.Fix([0, 1, 2, 3])], [push], fd.Rayleigh(alpha=1.0))
+
+
 DATA: Calls = {
     "Sheet": (fd.Sheet, {
         "youngs_modulus": 1e6, "poissons_ratio": 0.25, "thickness": 0.5, "density": 1000.0,
@@ -314,5 +324,19 @@ def solved(folder: Path) -> Calls:
             "case": case(), "count": 2, "divisions": [2, 3], "models": ["none"], "secant": 2.0,
             "vertex_radius": 1e-3,
             "progress": print,
+        }),
+        "periodic_motion": (fd.periodic_motion, {
+            "case": shaken(), "frequency": 1.0, "harmonics": 1, "method": "harmonic_balance",
+            "start": None, "periods": 1, "modes": None, "steps": 8, "tolerance": 1e-6,
+        }),
+        "response_curve": (fd.response_curve, {
+            "case": shaken(), "frequencies": (1.0, 1.02), "harmonics": 1, "measure": None,
+            "amplitudes": None, "start": None, "periods": 1, "modes": None, "branches": 0,
+            "longest_step": 1.0, "most_points": 4, "steps": 8, "tolerance": 1e-6, "progress": None,
+        }),
+        "backbone": (fd.backbone, {
+            "case": shaken(), "mode": 1, "amplitudes": (1e-6, 2e-6), "harmonics": 1,
+            "damped": False, "state": None, "modes": None, "longest_step": 1.0, "most_points": 4,
+            "tolerance": 1e-6, "progress": None,
         }),
     }  # fmt: skip

@@ -49,6 +49,17 @@ def without_loads() -> str:
     return page.replace('mass = ["circumcenter", "consistent"]\n', "")
 
 
+@pytest.mark.matrix
+def test_page_on_nonlinear_vibration_shows_what_it_says(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = executed(*blocks("nonlinear-vibration.md", "python"))
+    assert names["folds"].frequency.values == pytest.approx([0.6321, 0.6273], abs=1e-4)
+    assert names["curve"].attrs["complete"] == 1
+    assert names["one"].stable
+    assert np.ptp(names["seen"].displacement.values, axis=0).max() < 0.01
+    assert names["up"].jump.values.sum() <= 1
+
+
 @pytest.fixture(scope="module")
 def tutorial(tmp_path_factory):
     """The names that the tutorial makes, what it prints, and its folder."""

@@ -120,6 +120,19 @@ def fidelity(found):
     assert "use it" in result.advice
 
 
+def jumping_resonance(found):
+    """Only the strongest force bends the curve over, and the swing grows less than the force."""
+    curves = list(found["curves"].values())
+    assert [int((one.bifurcation == "fold").sum()) for one in curves] == [0, 0, 2]
+    swings = [float(one.amplitude.max()) for one in curves]
+    assert 1.5 < swings[1] / swings[0] < 2.0
+    assert 1.5 < swings[2] / swings[1] < 2.0
+    spine = found["spine"]
+    peak = curves[-1].isel(point=int(curves[-1].amplitude.values.argmax()))
+    assert abs(float(peak.frequency / spine.frequency[0]) - 1.0) > 0.03
+    assert float(spine.frequency[-1]) > float(spine.frequency[0])
+
+
 def kresling_chain(found):
     """The rarefaction is the faster one and leads at last; the end absorbs energy."""
     strain, motion = found["strain"], found["motion"]
@@ -186,8 +199,8 @@ def thick_panel(found):
 
 CHECKS = (
     bilayer, case_study_1, clamped, contact_tower, crane, deployment, design_frequencies,
-    design_kresling, design_miura, fidelity, kresling_chain, miura_bands, point_mass,
-    pressure, snap_through, sweep, thick_panel,
+    design_kresling, design_miura, fidelity, jumping_resonance, kresling_chain, miura_bands,
+    point_mass, pressure, snap_through, sweep, thick_panel,
 )  # fmt: skip
 
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 import foldyn as fd
-from foldyn.writing import remove_leftovers, scratch, whole, write_text
+from foldyn.errors import InputError
+from foldyn.writing import made_folder, remove_leftovers, scratch, whole, write_text
 
 SOURCE = str(Path(fd.__file__).parents[1])
 
@@ -118,3 +119,11 @@ def test_hdf5_stands_a_full_disk_wherever_it_comes(tmp_path) -> None:
     command, source = [sys.executable, "-c", LIMITED], {**os.environ, "PYTHONPATH": SOURCE}
     done = subprocess.run(command, cwd=tmp_path, env=source, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_folder_that_is_a_file_is_refused(tmp_path):
+    (tmp_path / "word").write_text("taken")
+    for place in ("word", "word/below"):
+        with pytest.raises(InputError, match=r"folder = .*give the path of a folder"):
+            made_folder(tmp_path / place)
+    assert made_folder(tmp_path / "new" / "one").is_dir()

@@ -17,6 +17,7 @@ from foldyn import (
     materials as materials,
     mechanics as mechanics,
     patterns as patterns,
+    periodic as periodic,
     plots as plots,
     report as report,
     results as results,
@@ -111,6 +112,11 @@ from foldyn.patterns import (
     convex as convex,
     thicken as thicken,
     welded as welded,
+)
+from foldyn.periodic import (
+    backbone as backbone,
+    periodic_motion as periodic_motion,
+    response_curve as response_curve,
 )
 from foldyn.results import (
     Quantity as Quantity,

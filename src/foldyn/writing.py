@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from foldyn.errors import InputError
+
 _LEFT = re.compile(r"\..+\.(\d+)\.tmp(\.\w+)?")
 
 
@@ -55,6 +57,24 @@ def scratch(folder: Path, name: str) -> Iterator[Path]:
         yield made
     finally:
         shutil.rmtree(made, ignore_errors=True)
+
+
+def made_folder(folder: str | os.PathLike[str], field: str = "folder") -> Path:
+    """A folder to write into, made where there is none and cleared of what was left half written.
+
+    Raises
+    ------
+    InputError
+        It is a file, or cannot be made.
+    """
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        why = "is a file" if path.is_file() else f"cannot be made ({error.strerror})"
+        raise InputError(f" = {str(path)!r}: {why}; give the path of a folder", field) from error
+    remove_leftovers(path)
+    return path
 
 
 def remove_leftovers(*folders: Path) -> None:

@@ -214,6 +214,8 @@ MODES = {"kind": "modes", "count": 3}
         ({"minimize": "frequensy[1]"}, "no measure frequensy; did you mean 'frequency'"),
         ({"minimize": "limit_load"}, "limit_load is of results of kind statics, not modes"),
         ({"subject_to": ["frequency[1]"]}, r"subject_to\[0\] = .*compares nothing"),
+        ({"subject_to": ["mass = 3"]}, r"subject_to\[0\] = .*cannot be read; .*mass <= 0.1"),
+        ({"subject_to": ["rigid_modes <= 0"]}, r"subject_to\[0\]: rigid_modes has no derivative"),
         ({"subject_to": 3}, "subject_to = 3"),
         ({"bounds": {}}, "bounds = .*: give each parameter its bounds"),
         ({"bounds": {"thickness": 0.1}}, "bounds.thickness = 0.1: must be a lower and an upper"),

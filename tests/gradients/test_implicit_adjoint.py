@@ -77,6 +77,22 @@ def imposed(way: float, **given: Any) -> fd.Case:
     return case(extra=extra, pushed=(4,), **given)
 
 
+def linked(**given: Any) -> fd.Case:
+    """Corners that move alike."""
+    return case(extra=(fd.Link([4, 5], "xz"),), **given)
+
+
+def pulled(way: float, **given: Any) -> fd.Case:
+    """Both corners are moved, one of them by the other."""
+    moved = fd.Impose([5], "z", way, history=fd.Ramp(0.04, smooth=True))
+    return case(extra=(fd.Link([4, 5], "z"), moved), pushed=(4,), **given)
+
+
+def inclined(**given: Any) -> fd.Case:
+    """A corner that slides along an inclined plane."""
+    return case(extra=(fd.Fix([5], direction=(0.3, 0.5, 1.0)),), **given)
+
+
 BASIC = {"dihedral": 72.0, "thickness": 0.051, "force": 2.9}
 CASES = {
     "bars": (case, BASIC | {"alpha": 2.2, "beta": 1.1e-3}),
@@ -88,6 +104,9 @@ CASES = {
     "plates": (lambda **g: case(model="n5b8e", **g), BASIC | {"alpha": 2.2}),
     "panels": (lambda **g: case(membrane="panel", **g), {"force": 2.9, "alpha": 2.2}),
     "shell": (lambda **g: case(model="shell", **g), BASIC),
+    "linked": (linked, BASIC | {"alpha": 2.2}),
+    "inclined": (inclined, BASIC),
+    "pulled": (pulled, BASIC | {"way": 0.02}),
 }
 
 
@@ -99,7 +118,8 @@ ARRAYS = {
 
 def measures_of(name: str) -> list[str]:
     """What is not given: a corner that is moved has a given motion."""
-    return ["displacement[4,z]", "velocity[4,x]"] if name == "imposed" else TIP
+    given = {"imposed": ["displacement[4,z]", "velocity[4,x]"], "pulled": ["displacement[4,x]"]}
+    return given.get(name, TIP)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -110,16 +130,19 @@ def test_gradients_are_those_of_the_motion(name: str, method: str) -> None:
     assert max(errors.values()) < 1e-8, errors
 
 
+@pytest.mark.parametrize(("build", "more"), [(shaken, {"way": 0.05}), (linked, {})])
 @pytest.mark.parametrize("method", ["rk4", "central_difference"])
-def test_explicit_methods_go_through_supports_that_move_a_consistent_mass(method: str) -> None:
+def test_explicit_methods_go_through_a_consistent_mass(
+    method: str, build: Any, more: dict[str, float]
+) -> None:
+    """Of supports that move, and of corners that are tied."""
     motion = {"kind": "dynamics", "duration": 2e-3, "method": method, "dt": 1e-4}
     measures = ["velocity[4,z]", "mean_square[4,x]"]
-    values = {"dihedral": 72.0, "way": 0.05, "alpha": 2.2}
-    errors = Design(shaken, values, measures, motion).errors()
+    errors = Design(build, {"dihedral": 72.0, "alpha": 2.2} | more, measures, motion).errors()
     assert max(errors.values()) < 1e-7, errors
 
 
-@pytest.mark.parametrize("name", ["jump", "dampers", "lumped"])
+@pytest.mark.parametrize("name", ["jump", "dampers", "lumped", "linked"])
 def test_central_differences(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(central_difference_adjoint, "ROOM", 5e4)  # segments of some hundred steps
     build, values = CASES[name]
@@ -218,18 +241,13 @@ def test_a_motion_that_goes_on_with_what_another_knew_is_refused() -> None:
 
 
 # ------------------------------------------------------------------ motions beside one
-def linked(**given: Any) -> fd.Case:
-    """Corners that move alike."""
-    return case(extra=(fd.Link([4, 5], "x"),), **given)
-
-
 def blown(pressure: float, **given: Any) -> fd.Case:
     """Under a pressure that follows the panels."""
     made = case(**given)
     return replace(made, loads=[*made.loads, fd.Pressure(pressure, history=PULSE)])
 
 
-BESIDE = CASES | {"linked": (linked, BASIC), "blown": (blown, BASIC | {"pressure": 2.0})}
+BESIDE = CASES | {"blown": (blown, BASIC | {"pressure": 2.0})}
 
 
 def compare_beside(name: str, method: str, least: float = 2e-6) -> None:
@@ -272,3 +290,11 @@ def test_what_has_no_motions_beside_it() -> None:
     coarse = Asked(folded, given | {"dt": 0.006})
     with pytest.raises(InputError, match="other steps"):
         motions(prepare(folded, **given), Asked(folded, given), [coarse], 1e-4)
+
+
+def test_what_changes_a_constraint_has_no_gradient() -> None:
+    def tilted(tilt: float) -> fd.Case:
+        return case(extra=(fd.Fix([5], direction=(tilt, 0.5, 1.0)),))
+
+    with pytest.raises(InputError, match=r"changes numbers of the case \(constraints\)"):
+        sensitivity(tilted, {"tilt": 0.3}, "displacement[4,z]", MOTION | {"method": "newmark"})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.gradients import equilibrium
 from foldyn.gradients.equilibrium import Balance
+from foldyn.statics import landscape
+from foldyn.sweeps.measures import MEASURES
 
 TIP = 8  # on the upper ring
 
@@ -57,6 +60,12 @@ def test_equilibria_where_supports_move():
     values = {"drop": 0.01, "stiffness": STIFFNESS, "height": 0.06, "twist": 30.0}
     measures = ["displacement[8,x]", "strain_energy"]
     errors = Design(tower, values, measures, MOVED).errors()
+    assert max(errors.values()) < 1e-6, errors
+
+
+def test_panels_that_come_near_each_other():
+    values = {"drop": 0.01, "stiffness": STIFFNESS, "height": 0.06, "twist": 30.0}
+    errors = Design(tower, values, ["clearance"], MOVED).errors()
     assert max(errors.values()) < 1e-6, errors
 
 
@@ -136,3 +145,17 @@ def test_numbers_of_one_equilibrium_share_the_factors(monkeypatch: pytest.Monkey
     measures = [f"displacement[{TIP},{axis}]" for axis in "xyz"]
     fd.sensitivity(tower, {"height": 0.06}, measures, {"kind": "statics", "load_factors": [0.01]})
     assert len(count) == 1
+
+
+def test_barriers_share_the_landscape(monkeypatch: pytest.MonkeyPatch) -> None:
+    count: list[int] = []
+
+    def counted(result: Any, case: fd.Case) -> Any:
+        count.append(1)
+        return landscape(result, case)
+
+    for name in ("barrier", "barrier_back"):
+        monkeypatch.setitem(MEASURES, name, replace(MEASURES[name], through=counted))
+    found = fd.sensitivity(tower, {"stiffness": 6e-3}, ["barrier", "barrier_back"], SNAP)
+    assert len(count) == 1
+    assert found["gradient_stiffness"].values.all()

@@ -147,6 +147,17 @@ def test_a_parameter_of_zero_needs_a_size():
     assert found["gradient_force"].values[0] != 0.0
 
 
+def test_measures_of_an_expression_take_their_own_arguments():
+    """Whichever comes first: the mass, which has none, or a frequency."""
+    values, texts = {"panel_angle": 60.0, "thickness": 0.02}, ["mass", "frequency[1]"]
+    pairs = "mass * frequency[1]", "frequency[1] * mass"
+    found = fd.sensitivity(cell, values, [*texts, *pairs], MODES)
+    mass, frequency, *products = found["gradient_thickness"].values
+    expected = mass * found["value"].values[1] + frequency * found["value"].values[0]
+    np.testing.assert_allclose(products, expected, rtol=1e-12)
+    assert abs(mass) > 0.0
+
+
 # ------------------------------------------------------------------ bad input
 @pytest.mark.parametrize(
     ("build", "values", "measures", "analysis", "told"),
@@ -156,6 +167,14 @@ def test_a_parameter_of_zero_needs_a_size():
         (cell, {}, "frequency[1]", MODES, "parameters = .*give a mapping of names"),
         (cell, {"panel_angle": "wide"}, "frequency[1]", MODES, "panel_angle = 'wide'|\"wide\""),
         (cell, {"panel_angle": np.nan}, "frequency[1]", MODES, "finite number"),
+        (cell, {"panel_angle": "60"}, "frequency[1]", MODES, "panel_angle = .60.: must be numbers"),
+        (
+            cell,
+            {"panel_angle": 60.0},
+            "velocity[5,x]",
+            MODES,
+            "results of kind dynamics, not modes",
+        ),
         (cell, {"panel_angle": 60.0}, "frequence[1]", MODES, "no measure frequence"),
         (cell, {"panel_angle": 60.0}, [], MODES, "measures: none"),
         (cell, {"panel_angle": 60.0}, "frequency[1]", None, "say what is computed"),

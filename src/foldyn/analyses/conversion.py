@@ -71,12 +71,28 @@ def unbounded(path: Path, document: Document, state: str) -> Document:
     return {**kept, "loads": kept_loads, "analysis": {"kind": "bands"}}
 
 
+def driven(path: Path, document: Document) -> Document:
+    """The document as a response curve under its harmonic histories."""
+    left = [f"[{name}]" for name in ("initial", "drive") if name in document]
+    if left:
+        warnings.warn(
+            f"{path}: foldyn response leaves out {', '.join(left)}: periodic motions have no "
+            "start, and [[loads]] and [[supports]] with a harmonic history drive them",
+            FoldynWarning,
+            stacklevel=3,
+        )
+    kept = _without(document, "initial", "drive", "output")
+    return {**kept, "analysis": {"kind": "response"}}
+
+
 def converted(path: Path, document: Document, kind: str, state: str) -> Document:
     """The document as one of another kind; what has no place there is left out, with a warning."""
     if kind == "fidelity":
         return compared(path, document)
     if kind == "bands":
         return unbounded(path, document, state)
+    if kind == "response":
+        return driven(path, document)
     left: list[str] = []
     atrest = state == "rest"
     supports, bases = _supports(document.get("supports", []), atrest, left)

@@ -82,7 +82,7 @@ def read_as(
     Parameters
     ----------
     path : Path
-    kind : {"modes", "frf", "bands", "fidelity"}
+    kind : {"modes", "frf", "response", "bands", "fidelity"}
     flags : mapping
         Keys of [analysis] that the command line gives instead of the file; `state` may be a
         result's file, too.

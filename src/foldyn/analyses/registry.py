@@ -14,6 +14,7 @@ from foldyn.analyses.frf import FrfAnalysis
 from foldyn.analyses.modes import ModesAnalysis
 from foldyn.analyses.motion import MotionAnalysis
 from foldyn.analyses.path import PathAnalysis
+from foldyn.analyses.response import ResponseAnalysis
 from foldyn.analyses.sections import CaseSchema
 from foldyn.errors import InputError
 from foldyn.values import choice
@@ -25,6 +26,7 @@ ANALYSES: Mapping[str, type[Analysis]] = {
         PathAnalysis,
         ModesAnalysis,
         FrfAnalysis,
+        ResponseAnalysis,
         BandsAnalysis,
         FidelityAnalysis,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, cast
 
@@ -47,9 +47,13 @@ def drive_frequency(case: Case) -> float:
     InputError
         The others are no multiples of it, so that the drive has no period.
     """
-    found = [part.history.frequency for part in _driven_parts(case)]
-    lowest = min(found, default=0.0)
-    for frequency in found:
+    return lowest_frequency([part.history.frequency for part in _driven_parts(case)])
+
+
+def lowest_frequency(frequencies: Sequence[float]) -> float:
+    """The lowest of some (Hz), of which all others must be multiples; 0.0 where there are none."""
+    lowest = min(frequencies, default=0.0)
+    for frequency in frequencies:
         ratio = frequency / lowest
         if abs(ratio - round(ratio)) > WHOLE * ratio:
             raise InputError(

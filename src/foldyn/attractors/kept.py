@@ -19,7 +19,7 @@ from foldyn.program import program
 from foldyn.results.seal import seal, sound
 from foldyn.store import Store, name_of
 from foldyn.values import show
-from foldyn.writing import remove_leftovers, whole
+from foldyn.writing import made_folder, whole
 
 
 class KeptEnds:
@@ -47,7 +47,6 @@ class KeptEnds:
             return
         if not isinstance(folder, str | os.PathLike):
             raise InputError(f" = {show(folder)}: give the path of a folder", "folder")
-        self._folder = Path(folder)
         document = to_document(case)
         if document.obstacles:
             raise InputError(
@@ -58,8 +57,7 @@ class KeptEnds:
         self._about = {
             "program": program("attractors"), "case": document.sections, "arrays": arrays, **how,
         }  # fmt: skip
-        self._folder.mkdir(parents=True, exist_ok=True)
-        remove_leftovers(self._folder)
+        self._folder = made_folder(folder)
 
     def of(self, starts: Sequence[State], compute: Callable[[], NDArray]) -> NDArray[np.float64]:
         """Ends of motions from some starts: kept ones, or those that are computed."""

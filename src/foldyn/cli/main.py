@@ -98,6 +98,27 @@ def parser() -> argparse.ArgumentParser:
     frf.add_argument("--method", help="direct (default), modal, impulse, ...: see the case file")
     _add_state(frf)
 
+    response = commands.add_parser(
+        "response",
+        help="response curve of a case file of any kind",
+        description="Periodic motions of the structure of a case file of any kind under its "
+        "harmonic histories, along their frequency, with stability and bifurcations; what its "
+        "[analysis] says, if it is of kind response, holds unless given here.",
+    )
+    _add_case(response, "response")
+    response.set_defaults(model=None)
+    for name, text in (("frequencies", "frequencies (Hz)"), ("amplitudes", "factor on the drive")):
+        response.add_argument(
+            f"--{name}", type=number, nargs=2, metavar=("FIRST", "LAST"), help=f"ends of the {text}"
+        )
+    response.add_argument("--harmonics", type=integer, help="of the drive's frequency (default: 9)")
+    response.add_argument(
+        "--modes", type=integer, help="compute in the span of so many modes, for big sheets"
+    )
+    response.add_argument(
+        "--branches", type=integer, help="how many times branches are followed (default: 1)"
+    )
+
     bands = commands.add_parser(
         "bands",
         help="bands of the sheet, chain or tube that repeats the pattern of a case file",

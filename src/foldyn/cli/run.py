@@ -125,6 +125,10 @@ def _read(path: Path, given: Namespace) -> CaseFile:
         names = ("count", "divisions", "models", "secant", "vertex_radius")
         keys = {key: getattr(given, key) for key in names}
         return read_as(path, given.command, keys)
+    if given.command == "response":
+        names = ("frequencies", "amplitudes", "harmonics", "modes", "branches")
+        keys = {key: getattr(given, key) for key in names}
+        return read_as(path, given.command, keys)
     model = given.model, given.divisions
     if given.command == "run":
         return read_case(path, *model)

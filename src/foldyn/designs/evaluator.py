@@ -20,13 +20,13 @@ from foldyn.analyses.reading import read_document, validated
 from foldyn.cases import Case
 from foldyn.designs.space import Space
 from foldyn.errors import ComputationError, FoldynError, FoldynWarning, InputError, within
+from foldyn.gradients.measures import derivative_of, one_number
 from foldyn.gradients.run_sensitivity import FUNCTIONS, case_file_at, sensitivity
 from foldyn.input_files import path_of
 from foldyn.program import program
 from foldyn.sweeps.evaluations import Evaluation
 from foldyn.sweeps.job import ASIDE, Job, code_of
-from foldyn.sweeps.measure import Asked, asked
-from foldyn.sweeps.measures import MEASURES
+from foldyn.sweeps.measure import Asked
 from foldyn.values import choice, show
 
 COMPUTING = ("analyses", "results", "sweeps", "gradients", "designs")
@@ -113,11 +113,13 @@ class Measured:
 
 
 def measured(
-    build: Source, analysis: Mapping[str, Any] | None, places: Mapping[str, str], space: Space
-) -> Measured:
+    build: Source, analysis: Mapping[str, Any] | None, places: Mapping[str, str], space: Space,
+    gradient: bool,
+) -> Measured:  # fmt: skip
     """Check what is to be computed of each design.
 
     places : measures, each with the argument that asks for it.
+    gradient : whether derivatives will be.
 
     Raises
     ------
@@ -145,19 +147,10 @@ def measured(
     measures = []
     for name, place in places.items():
         with within(place):
-            measures.append(_measure(name, kind))
+            measures.append(one_number(name, kind))
+            if gradient:
+                derivative_of(measures[-1])
     return Measured(build, analysis, tuple(measures), space, document)
-
-
-def _measure(name: str, kind: Any) -> Asked:
-    """A measure that is one number of results of a kind."""
-    one = asked(name, MEASURES)
-    kinds = one.measure.kinds
-    if kinds and kind not in kinds:
-        raise InputError(f": {name} is of results of kind {' or '.join(kinds)}, not {kind}")
-    if one.measure.dims:
-        raise InputError(f": {name} is an array; ask for one of its numbers, as frequency[1]")
-    return one
 
 
 def _check_keys(path: Path, document: Mapping[str, Any], space: Space) -> None:

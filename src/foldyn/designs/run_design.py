@@ -176,7 +176,7 @@ def plan_of(
         whole("seed", seed, least=0, most=2**31),
     )
     whole("starts", starts, least=1, most=MOST)
-    evaluator = measured(build, analysis, problem.places, space)
+    evaluator = measured(build, analysis, problem.places, space, METHODS[method].gradient)
     return Plan(problem, space, first, evaluator, method, settings, starts)
 
 

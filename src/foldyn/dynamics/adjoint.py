@@ -137,7 +137,6 @@ def refuse(motion: Any) -> None:
         "contact, which switches on and off": system.touches,
         "rest angles that turn in time (Actuate, Temperature)": system.turns,
         "loads that depend on the displacement (Pressure, CreaseMoment)": system.follows,
-        "constraints (Link, rigid panels)": len(system.ties.slave) > 0,
         "supports that move at the start, and a mass matrix that is not diagonal": (
             not packed.mass.lumped and bool(motion.start[1][motion.case.fixed].any())
         ),

@@ -41,6 +41,7 @@ from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.newton import SAME_STEP
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.motion_state import samples
+from foldyn.dynamics.ties import hand_over
 from foldyn.dynamics.timing import jumps
 from foldyn.errors import ComputationError, InputError
 
@@ -163,6 +164,7 @@ class ImplicitAdjoint(Adjoint):
         shape = self._scheme.shift.shape
         free = np.zeros(shape, bool)
         free.ravel()[self._matrix.free] = True
+        free.ravel()[packed.system.ties.slave] = True  # their share reaches their masters
         self._kinds = free, free & ~self._scheme.massless[:, None]  # and with mass
         # derivatives by the acceleration where it has come to, and z of the step after that
         self._by_a, self._z = np.zeros(shape), np.zeros(shape)
@@ -210,6 +212,7 @@ class ImplicitAdjoint(Adjoint):
             by_w = by_v - self._rate
             by_shift = np.where(heavy, curvature * (self._by_a + h * gamma * by_w), by_w / h)
             left = free * (by_u - self._product + by_shift - mass * inertia)
+            hand_over(self._system.ties, left.reshape(-1))
             norm = float(np.linalg.norm(left))
             first = first or norm
             if norm <= TOLERANCE * first or (norm > STALL * last and not kept):
@@ -274,6 +277,12 @@ def _refuse(motion: Any) -> None:
             ": goes on from the end of another motion, whose acceleration has no derivative; give "
             "its displacement and velocity alone, fd.State(displacement, velocity)",
             "initial",
+        )
+    ties, massless = motion.packed.system.ties, motion.packed.mass.diagonal <= 0.0
+    if massless[np.append(ties.slave, ties.masters.dof) // 3].any():
+        raise InputError(
+            "there are no gradients of motions in which constraints tie nodes without mass; give "
+            "them mass, or vary the parameters by fd.sweep"
         )
     if len(motion.packed.body.hidden) and _jumps_within(motion):
         raise InputError(

@@ -99,17 +99,17 @@ def parse(text: str) -> Expression:
     """
     if not isinstance(text, str) or not text.strip():
         raise InputError(f" = {show(text)}: must be an expression of measures; {EXAMPLE}")
-    tree = _read(text)
+    tree = _read(text, EXAMPLE)
     if isinstance(tree, ast.Compare):
         _refuse(text, tree, "is a comparison; one belongs in subject_to, an expression here")
     return _expression(text.strip(), tree, text)
 
 
-def _read(text: str) -> ast.expr:
+def _read(text: str, example: str) -> ast.expr:
     try:
         return trees.parse(text.strip())
     except InputError as error:
-        raise InputError(f" = {show(text)}: {error}; {EXAMPLE}") from None
+        raise InputError(f" = {show(text)}: {error}; {example}") from None
 
 
 def _expression(own: str, tree: ast.expr, text: str) -> Expression:
@@ -303,7 +303,7 @@ def constraint(text: str) -> Constraint:
     example = 'write for example "frequency[1] == 12" or "mass <= 0.1"'
     if not isinstance(text, str) or not text.strip():
         raise InputError(f" = {show(text)}: must be a constraint; {example}")
-    tree = _read(text)
+    tree = _read(text, example)
     if not isinstance(tree, ast.Compare):
         raise InputError(f" = {show(text)}: compares nothing; {example}")
     if len(tree.ops) != 1:

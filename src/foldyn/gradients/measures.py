@@ -14,10 +14,19 @@ from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.gradients.numbers import Gradient
 from foldyn.linear.frf import quantity_of
+from foldyn.mechanics.contact.clearance import Clearance
 from foldyn.signals.peaks import magnitude_curve
-from foldyn.statics import Equilibrium, Landscape, landscape
-from foldyn.sweeps.measure import Asked
-from foldyn.sweeps.measures import curve_of, frequency_of, highest, sampled, time_of
+from foldyn.statics import Equilibrium, Landscape
+from foldyn.sweeps.measure import Asked, asked
+from foldyn.sweeps.measures import (
+    MEASURES,
+    closest_panels,
+    curve_of,
+    frequency_of,
+    highest,
+    sampled,
+    time_of,
+)
 from foldyn.viewer.fields import bar_strain
 
 Seeds = dict[str, NDArray]
@@ -28,9 +37,10 @@ class Derivative(NamedTuple):
     """The derivative of a measure.
 
     seeds : of a result and a case, with the measure's arguments.
-    frozen : of a measure that also takes numbers of the case itself: of the result and the case,
-        the measure as a function of another case, where the result stays as it is.
-    numbers : of the result and the case, the derivatives of such a measure by numbers of the case.
+    frozen : of a measure that also takes numbers of the case itself: of the result, or what
+        measures come through, and the case, the measure as a function of another case, where the
+        result stays as it is.
+    numbers : of the same the derivatives of such a measure by numbers of the case.
     """
 
     seeds: Callable[..., Seeds]
@@ -178,6 +188,35 @@ def _strain_of(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
     return lambda other: abs(found.strain(other)[1])
 
 
+def _clearance(result: xr.Dataset, case: Case) -> Seeds:
+    sample, found = _apart(result, case)
+    if "displacement" not in result or "mode" in result.dims:
+        return {}
+    moved = _all_moved(result)
+    vector = found.weights @ (case.structure.nodes + moved[sample])[found.nodes]
+    out = np.zeros_like(moved)
+    out[sample, found.nodes] = np.outer(found.weights, vector / found.distance)
+    return {"displacement": out}
+
+
+def _apart(result: xr.Dataset, case: Case) -> tuple[int, Clearance]:
+    sample, found = closest_panels(result, case)
+    if not found.distance > 0.0:
+        raise InputError("is 0, where panels touch or cross, and a distance has no derivative")
+    return sample, found
+
+
+def _clearance_of(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
+    sample, found = _apart(result, case)
+    moved = _all_moved(result)[sample] if "mode" not in result.dims else 0.0
+
+    def distance(other: Case) -> float:
+        places = (other.structure.nodes + moved)[found.nodes]
+        return float(np.linalg.norm(found.weights @ places))
+
+    return distance
+
+
 def _reaction(result: xr.Dataset, case: Case, axis: str) -> Seeds:
     out = np.zeros((result.sizes["step"], len(case.reaction_dofs)))
     out[-1, (result["support_axis"] == axis).values] = 1.0
@@ -223,14 +262,14 @@ def _load_at(result: xr.Dataset, case: Case, node: int, axis: str, displacement:
 def _between_states(pair: Callable[[Landscape], tuple[Equilibrium, Equilibrium]]) -> Derivative:
     """Energy of a state above that of another, both without force: it has no other derivative."""
 
-    def frozen(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
-        high, low = (state.displacement for state in pair(landscape(result, case)))
+    def frozen(found: Landscape, case: Case) -> Callable[[Case], float]:
+        high, low = (state.displacement for state in pair(found))
         return lambda other: _energy(other, high) - _energy(other, low)
 
-    def numbers(result: xr.Dataset, case: Case) -> Gradient:
+    def numbers(landscape: Landscape, case: Case) -> Gradient:
         if not case.imposed_terms:
             return {}
-        high, low = pair(landscape(result, case))
+        high, low = pair(landscape)
         motion = sum((vector for vector, _ in case.imposed_terms), np.zeros_like(high.displacement))
         size = np.abs(motion).max()
         found = {}
@@ -320,6 +359,7 @@ DERIVATIVES: Mapping[str, Derivative] = {
     "largest_displacement": Derivative(_largest_displacement),
     "strain": Derivative(_strain, frozen=_strain_of),
     "strain_energy": Derivative(_strain_energy, frozen=_strain_energy_of),
+    "clearance": Derivative(_clearance, frozen=_clearance_of),
     "reaction": Derivative(_reaction),
     "limit_load": Derivative(_limit_load),
     "load_at": Derivative(_load_at),
@@ -332,7 +372,24 @@ DERIVATIVES: Mapping[str, Derivative] = {
 """By the name of the measure."""
 
 
-def derivative_of(asked: Asked) -> Derivative:
+def one_number(text: str, kind: Any) -> Asked:
+    """A measure of the registry that is one number of results of a kind.
+
+    Raises
+    ------
+    InputError
+        There is none, or it is none.
+    """
+    one = asked(text, MEASURES)
+    kinds = one.measure.kinds
+    if kinds and kind not in kinds:
+        raise InputError(f": {text} is of results of kind {' or '.join(kinds)}, not {kind}")
+    if one.measure.dims:
+        raise InputError(f": {text} is an array; ask for one of its numbers, as frequency[1]")
+    return one
+
+
+def derivative_of(one: Asked) -> Derivative:
     """Derivative of a measure.
 
     Raises
@@ -340,10 +397,10 @@ def derivative_of(asked: Asked) -> Derivative:
     InputError
         It has none.
     """
-    found = DERIVATIVES.get(asked.measure.name)
+    found = DERIVATIVES.get(one.measure.name)
     if found is None:
         raise InputError(
-            f"{asked.text}: has no derivative; those that have one are {', '.join(DERIVATIVES)}. "
+            f": {one.text} has no derivative; those that have one are {', '.join(DERIVATIVES)}. "
             'Give your own with its derivative, as {"tip": (function, derivative)}, or use '
             'method = "cma", which needs none'
         )

@@ -4,6 +4,7 @@ Differences of them are derivatives. A neighbor's equilibria, modes or responses
 steps with the factors of the matrix of the one result: no path is followed and no mode searched
 for, so that each costs a few solutions. They go on until the steps are small: after the first one
 bars are strained by what is of second order in the motion, and they are far stiffer than creases.
+Neighbors of a motion go along with it, step by step (`dynamics.companions`).
 """
 
 from __future__ import annotations

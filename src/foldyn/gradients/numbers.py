@@ -54,6 +54,9 @@ def numbers_of_motion(packed: Packed, start: tuple[NDArray, NDArray]) -> Arrays:
         "start.displacement": start[0],
         "start.velocity": start[1],
     }
+    ties = system.ties
+    if len(ties.slave):  # no solver has derivatives by what they tie
+        numbers["constraints"] = ties.masters.value
     waves = system.waves._asdict()
     waves = {f"histories.{key}": np.asarray(waves[key]) for key in waves if key != "address"}
     layout = {
@@ -65,6 +68,8 @@ def numbers_of_motion(packed: Packed, start: tuple[NDArray, NDArray]) -> Arrays:
         "mass.columns": mass.indices,
         "mass.rows": mass.indptr,
         "order": system.order,
+        "constraints.slaves": ties.slave,
+        "constraints.masters": ties.masters.dof,
     }
     return Arrays(numbers, layout)
 

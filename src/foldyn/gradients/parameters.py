@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from foldyn.errors import FoldynError, InputError, within
 from foldyn.gradients.numbers import Gradient
 from foldyn.mechanics.pullback import Arrays
-from foldyn.values import show
+from foldyn.values import numbers, show
 
 STEP = 1e-3  # of the size of a parameter
 MATCHES = 1e-4  # relative: how well the entries are told apart, and the check holds
@@ -240,13 +240,10 @@ def checked(values: Values, argument: str = "parameters") -> dict[str, NDArray]:
     found = {}
     for name, value in values.items():
         with within(f"{argument}."):
-            try:
-                array = np.array(value, dtype=float)
-            except (TypeError, ValueError):
-                raise InputError(f" = {show(value)}: give a number or an array", name) from None
-            if array.ndim > 1 or not array.size or not np.isfinite(array).all():
+            array = np.array(numbers(name, value))
+            if array.ndim > 1 or not array.size:
                 raise InputError(
-                    f" = {show(value)}: give a finite number, or an array of one dimension", name
+                    f" = {show(value)}: give a number, or an array of one dimension", name
                 )
         found[name] = array
     return found

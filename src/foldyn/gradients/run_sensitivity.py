@@ -24,7 +24,7 @@ from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import InputError, within
 from foldyn.gradients.expressions import Expression, parse
 from foldyn.gradients.frf import FrfGradient
-from foldyn.gradients.measures import Derivative, Seeds, derivative_of
+from foldyn.gradients.measures import Derivative, Seeds, derivative_of, one_number
 from foldyn.gradients.modes import ModesGradient
 from foldyn.gradients.motion import MotionGradient
 from foldyn.gradients.numbers import Gradient
@@ -36,8 +36,7 @@ from foldyn.mechanics.pullback import Arrays
 from foldyn.statics import trace
 from foldyn.structures import Structure
 from foldyn.sweeps.job import ASIDE
-from foldyn.sweeps.measure import Asked, asked, of_callable
-from foldyn.sweeps.measures import MEASURES
+from foldyn.sweeps.measure import Asked, of_callable
 from foldyn.values import choice, listed, of_kind, show
 
 if TYPE_CHECKING:
@@ -151,7 +150,7 @@ def sensitivity(
     began = time.perf_counter()
     source = source_of(build, parameters, analysis)
     design = Parameters(source.build, source.values, _sizes(sizes))
-    wanted = _wanted(measures)
+    wanted = _wanted(measures, source.kind)
     case = design.case()
     found = source.analyse(case)
     slopes = design.slopes(found.numbers)
@@ -160,7 +159,7 @@ def sensitivity(
     direction = None if along is None else _direction(along, design)
     if direction is not None and isinstance(found, ModesGradient):
         found = found.along(lambda gradient: _rate(slopes, direction, gradient))
-    parts = _Parts(found, case, design, slopes)
+    parts = _Parts(found, case, design, slopes, {})
     values, gradients = zip(*(parts.of(one) for one in wanted), strict=True)
     data: dict[str, Any] = {"value": ("measure", np.array(values))}
     if direction is None:
@@ -349,25 +348,25 @@ class Wanted(NamedTuple):
     measures: dict[str, tuple[Asked, Derivative]]
 
 
-def _wanted(measures: Any) -> list[Wanted]:
+def _wanted(measures: Any, kind: str) -> list[Wanted]:
     if isinstance(measures, Mapping):
         return [_own(name, pair) for name, pair in measures.items()]
     texts = [measures] if isinstance(measures, str) else listed("measures", measures, "measures")
     found = []
     for k, text in enumerate(texts):
         with within(f"measures[{k}]"):
-            found.append(wanted(text))
+            found.append(_of_registry(text, kind))
     if not found:
         raise InputError(': none; give at least one, as "frequency[1]"', "measures")
     return found
 
 
-def wanted(text: str) -> Wanted:
+def _of_registry(text: str, kind: str) -> Wanted:
     """An expression of measures of the registry."""
     expression = parse(text)
     measures = {}
     for name in expression.measures:
-        one = asked(name, MEASURES)
+        one = one_number(name, kind)
         measures[name] = one, derivative_of(one)
     return Wanted(text, expression, measures)
 
@@ -403,13 +402,13 @@ class _Parts(NamedTuple):
     case: Case
     design: Parameters
     slopes: dict[str, Any]
+    shared: dict[Any, Any]  # what measures have come through
 
     def of(self, one: Wanted) -> tuple[float, dict[str, NDArray]]:
         """Value of a number, and its derivatives by all entries of each parameter."""
-        result, shared = self.found.result, dict[Any, Any]()
-        values = {}
+        result, values = self.found.result, {}
         for name, (measure, _) in one.measures.items():
-            value = measure.of(result, self.case, shared)
+            value = measure.of(result, self.case, self.shared)
             if value.ndim:
                 raise InputError(f"{measure.text}: is an array; ask for one of its numbers")
             values[name] = float(value)
@@ -422,14 +421,16 @@ class _Parts(NamedTuple):
             for variable, seed in own.items():
                 _add(seeds, variable, seed, parts[name])
             if derivative.frozen:
-                frozen = derivative.frozen(result, self.case, **measure.arguments)
+                subject = self.shared.get(measure.measure.through, result)
+                frozen = derivative.frozen(subject, self.case, **measure.arguments)
                 for key, slope in self._explicit(frozen).items():
                     explicit[key] += parts[name] * slope
         with said_of(one.text):
             gradient = dict(self.found.backward(seeds)) if seeds else self._nothing
-        for name, (_, derivative) in one.measures.items():
+        for name, (measure, derivative) in one.measures.items():
             if derivative.numbers:
-                own = derivative.numbers(result, self.case, **measure.arguments)
+                subject = self.shared.get(measure.measure.through, result)
+                own = derivative.numbers(subject, self.case, **measure.arguments)
                 for key, by in own.items():
                     _add(gradient, key, by, parts[name])
         return value, {

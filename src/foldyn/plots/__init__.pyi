@@ -46,6 +46,10 @@ from foldyn.plots.readings import (
     moved_supports as moved_supports,
     total_reaction as total_reaction,
 )
+from foldyn.plots.response_curves import (
+    plot_backbone as plot_backbone,
+    plot_response_curve as plot_response_curve,
+)
 from foldyn.plots.space_time import (
     plot_space_time as plot_space_time,
     plot_transmission as plot_transmission,

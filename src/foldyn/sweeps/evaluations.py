@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from foldyn.results.seal import seal, sound
 from foldyn.store import Store, name_of
 from foldyn.sweeps.pool import Pool
-from foldyn.writing import remove_leftovers, whole
+from foldyn.writing import made_folder, whole
 
 Point = TypeVar("Point")
 _VALUE = "value "  # before the names of values, in files
@@ -68,13 +68,10 @@ class Evaluations(Generic[Point]):
         tell: Callable[[Point, Evaluation, bool], None] | None = None,
     ) -> None:
         self.pool, self.stamp, self.tell = pool, stamp, tell
-        self.folder = None if folder is None else Path(folder)
+        self.folder = None if folder is None else made_folder(folder)
         self.computed = self.found = 0
         self._known: dict[Point, Evaluation] = {}
         self._lock = Lock()
-        if self.folder is not None:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            remove_leftovers(self.folder)
 
     def at(
         self,

@@ -366,9 +366,16 @@ def _runs(
         key = json.dumps([str(own), dict(one.changes)], sort_keys=True, default=str)
         if key not in groups:
             content = document if one.case is None else read_document(own)
-            groups[key] = own, replaced(content, one.changes), []
+            content = replaced(content, {**_mass_rule(content), **one.changes})
+            groups[key] = own, content, []
         groups[key][2].append(i)
     return [PredictedRun(own, content, tuple(members)) for own, content, members in groups.values()]
+
+
+def _mass_rule(document: Mapping[str, Any]) -> dict[str, Any]:
+    """The mass rule that counts, where a file compares several: cases of others are not made."""
+    rules = value_at(document, "model.mass")
+    return {"model.mass": rules[0]} if isinstance(rules, list) and rules else {}
 
 
 def _check(one: Measurement, case_file: CaseFile) -> None:

@@ -1,0 +1,174 @@
+"""Response curves: [analysis] of kind "response", arguments of `response_curve`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Self
+
+import numpy as np
+import xarray
+from pydantic import Field, PlainValidator, model_validator
+
+from foldyn import plots
+from foldyn.analyses.bars import bar
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
+from foldyn.analyses.sections import CaseSchema, Count, Section
+from foldyn.analyses.vibration import bar_closed
+from foldyn.dynamics import Progress
+from foldyn.errors import InputError
+from foldyn.periodic import response_curve
+from foldyn.periodic.drive import Drive
+from foldyn.plots.charts import Chart, Curve
+from foldyn.report.album import Album, ByRule, by_mass_rule
+from foldyn.report.charts import Charts
+from foldyn.report.sections import Heading, Table
+from foldyn.report.sections import Section as PageSection
+from foldyn.values import number, show
+
+
+def _ends(value: Any) -> list[float] | None:
+    if value is None:
+        return None
+    if not isinstance(value, list) or len(value) != 2:
+        raise InputError(f" = {show(value)}: must be two numbers, as in [2.0, 5.0]")
+    ends = [number(f"[{k}]", one, above=0.0) for k, one in enumerate(value)]
+    if ends[0] == ends[1]:
+        raise InputError(f" = {show(value)}: must be two different numbers")
+    return ends
+
+
+class ResponseSection(Section):
+    """[analysis] of kind "response"."""
+
+    kind: str
+    frequencies: Annotated[Any, PlainValidator(_ends)] = None
+    amplitudes: Annotated[Any, PlainValidator(_ends)] = None
+    harmonics: Count = 9
+    modes: Count | None = None
+    branches: Annotated[int, Field(ge=0)] = 1
+    longest_step: Annotated[float, Field(gt=0, le=1)] = 0.1
+    most_points: Annotated[int, Field(ge=2)] = 500
+
+    @model_validator(mode="after")
+    def _goes_along_one(self) -> Self:
+        if (self.frequencies is None) == (self.amplitudes is None):
+            raise InputError(
+                ": give both ends of the frequencies (Hz), as frequencies = [2.0, 5.0], or of a "
+                "factor on the drive, as amplitudes = [0.1, 2.0]",
+                ".frequencies",
+            )
+        return self
+
+
+class ResponseOutput(Section):
+    """[output] of kind "response", which has no keys."""
+
+
+class ResponseSchema(CaseSchema):
+    """A case file of kind "response"."""
+
+    analysis: ResponseSection
+    output: ResponseOutput = Field(default_factory=ResponseOutput)
+
+
+class ResponseAnalysis(Analysis):
+    """Periodic motions along the frequency or the amplitude of the drive."""
+
+    kind = "response"
+    schema = ResponseSchema
+    needs_density = "a response curve needs"
+    takes = arguments_of(response_curve)
+    files = ("response_curve",)
+
+    def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
+        """See `Analysis`."""
+        case, given = case_file.case(mass), {**self.arguments, **changes}
+        Drive(case)  # refuses other histories
+
+        def compute(progress: bool, begun: Begun) -> xarray.Dataset:
+            begun()
+
+            def tell(now: Progress) -> None:
+                reached.update(now.time - reached.n)
+
+            layout = "{desc}: {percentage:3.0f} %|{bar}| [{elapsed}<{remaining}]"
+            shown = bar(progress, total=1.0, desc="response curve", bar_format=layout)
+            with bar_closed(shown) as reached:
+                return response_curve(case, progress=tell, **given)
+
+        return compute
+
+    def line(self, name: str, result: xarray.Dataset) -> str:
+        """Points, bifurcations and effort."""
+        marked = int((result["bifurcation"].values != "").sum())
+        return (
+            f"  {name}: {counted(result.sizes['point'], 'point')}, "
+            f"{counted(marked, 'bifurcation')}, {result.attrs['wall_seconds']:.1f} s"
+        )
+
+    @staticmethod
+    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[PageSection]:
+        """See `Analysis`."""
+        first = next(iter(results))
+        yield from album.structure(
+            case_file.case(first), "The pattern with its nodes, supports and loads."
+        )
+        yield Heading("The curve")
+        curves = results if len(results) > 1 else results[first]
+        yield from album.figure(
+            "response_curve",
+            "Largest displacement in a period, half the distance between its extremes. Solid: "
+            "stable motions, dashed: unstable ones.",
+            lambda: plots.plot_response_curve(curves),
+            Charts([_chart(results)], "Dots: motions that were found."),
+        )
+        yield Heading("The numbers")
+        yield _bifurcations(results)
+        yield by_mass_rule(
+            results,
+            {
+                "harmonics": "harmonics", "unknowns": "unknowns", "complete": "complete",
+                "time (s)": "wall_seconds",
+            },
+            f"{case_file.path.name}: the computation",
+        )  # fmt: skip
+
+
+def _chart(results: ByRule) -> Chart:
+    """The curve as dots, for a page without figures."""
+    along, label = (
+        ("frequency", "frequency of the drive (Hz)")
+        if next(iter(results.values())).attrs["by"] == "frequencies"
+        else ("level", "factor on the drive")
+    )
+    curves = []
+    for rule, result in results.items():
+        names, stable = result["bifurcation"].values, result["stable"].values
+        kinds = {"stable": (names == "") & stable, "unstable": (names == "") & ~stable}
+        kinds |= {str(name): names == name for name in np.unique(names[names != ""])}
+        of = f", {rule}" if len(results) > 1 else ""
+        x, y = result[along].values, result["amplitude"].values
+        curves += [Curve(f"{kind}{of}", x[at], y[at], True) for kind, at in kinds.items()]
+    return Chart(label, "amplitude (m)", [one for one in curves if np.size(one.x)])
+
+
+def _bifurcations(results: ByRule) -> Table:
+    """Where motions gain or lose stability, and the ends of each branch."""
+    header = ["mass rule", "branch", "point", "frequency (Hz)", "factor", "amplitude (m)"]
+    rows = [
+        [
+            rule, int(result["branch"][k]), str(result["bifurcation"].values[k]) or "end",
+            float(result["frequency"][k]), float(result["level"][k]),
+            float(result["amplitude"][k]),
+        ]
+        for rule, result in results.items() for k in _told(result)
+    ]  # fmt: skip
+    return Table(header, rows, "Bifurcations, and both ends of each branch", digits=5)
+
+
+def _told(result: xarray.Dataset) -> list[int]:
+    """Numbers of the points that the table shows."""
+    branch = result["branch"].values
+    edges = np.flatnonzero(np.diff(branch))
+    ends = {0, len(branch) - 1, *edges.tolist(), *(edges + 1).tolist()}
+    return sorted(ends | set(np.flatnonzero(result["bifurcation"].values != "").tolist()))

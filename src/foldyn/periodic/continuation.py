@@ -1,0 +1,276 @@
+"""Pseudo-arclength continuation of a family of motions, R(z, p) = 0.
+
+A step goes ahead along the unit tangent and comes back to the curve at right angles to it (Keller,
+in Applications of Bifurcation Theory, ed. Rabinowitz, 1977; Seydel, Practical Bifurcation and
+Stability Analysis, 3rd ed. 2010, chapter 4). Lengths are measured as |dz| over the size of the
+motion there and |dp| over the range of the parameter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lu_factor, lu_solve
+
+ITERATIONS = 8  # of Newton's method in a step
+EASY = 4  # iterations up to which the next step is longer
+GROWTH, CUT = 1.5, 0.5
+NOISE = 10.0  # times the rounding of the residual: enough where branches cross
+STRAIGHT = np.cos(np.radians(25.0))  # between tangents at both ends of a step
+SMALLEST = 1e-5  # of the longest step: the branch is lost
+LOCATED = 1e-11  # of a step: how exactly special points are found
+NEAR = 0.2  # of a step: how far beside it a point may lie that it passes
+
+
+class Family(Protocol):
+    """Motions along a parameter.
+
+    Attributes
+    ----------
+    span : float
+        Range of the parameter.
+    rounding : float
+        Norm of the residual's rounding errors.
+    tolerance : float
+        Last step of Newton's method, as a fraction of the motion.
+    """
+
+    span: float
+    rounding: float
+    tolerance: float
+
+    def residual(self, z: NDArray, p: float) -> NDArray:
+        """R (n,)."""
+        ...
+
+    def jacobian(self, z: NDArray, p: float) -> NDArray:
+        """Derivative (n, n) with respect to z."""
+        ...
+
+    def slope(self, z: NDArray, p: float) -> NDArray:
+        """Derivative (n,) with respect to p."""
+        ...
+
+    def size(self, z: NDArray) -> float:
+        """Norm of what moves."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A motion of a family.
+
+    Attributes
+    ----------
+    z, p
+        Unknowns (n,) and parameter.
+    tangent : ndarray, shape (n + 1,)
+        Unit tangent of the curve, dz and dp.
+    side : float
+        Sign of the determinant of the bordered matrix: it changes where branches cross.
+    iterations : int
+    """
+
+    z: NDArray
+    p: float
+    tangent: NDArray
+    side: float
+    iterations: int = 0
+
+
+def _weights(family: Family, z: NDArray) -> NDArray:
+    """Weights (n + 1,) of the squares in the length of a step at z."""
+    return np.append(np.full(len(z), family.size(z) ** -2.0), family.span**-2.0)
+
+
+def _bordered(family: Family, z: NDArray, p: float, row: NDArray):
+    """Factors of the derivative with a further row."""
+    n = len(z)
+    matrix = np.empty((n + 1, n + 1))
+    matrix[:n, :n] = family.jacobian(z, p)
+    matrix[:n, n] = family.slope(z, p)
+    matrix[n] = row
+    return lu_factor(matrix, overwrite_a=True, check_finite=False)
+
+
+def _side(factors) -> float:
+    """Sign of a determinant."""
+    lu, swaps = factors
+    odd = np.count_nonzero(swaps != np.arange(len(swaps))) % 2
+    return float(np.prod(np.sign(np.diag(lu))) * (-1.0 if odd else 1.0))
+
+
+def corrected(
+    family: Family, z: NDArray, p: float, row: NDArray, most: int = ITERATIONS
+) -> tuple[NDArray, float, int] | None:
+    """Nearest motion on the plane through (z, p) at right angles to a row (n + 1,), or None."""
+    z, p, last = z.copy(), p, np.inf
+    for iteration in range(most):
+        residual = family.residual(z, p)
+        norm = float(np.linalg.norm(residual))
+        if not np.isfinite(norm):
+            return None
+        factors = _bordered(family, z, p, row)
+        step = -lu_solve(factors, np.append(residual, 0.0), check_finite=False)
+        if not np.isfinite(step).all():
+            return None
+        z, p = z + step[:-1], p + float(step[-1])
+        change = float(np.sqrt(_weights(family, z) @ step**2))
+        if change <= family.tolerance or (iteration and norm <= NOISE * family.rounding):
+            return z, p, iteration + 1
+        if iteration > 1 and change > 2.0 * last:
+            return None
+        last = change
+    return None
+
+
+def point_at(family: Family, z: NDArray, p: float, along: NDArray, iterations: int = 0) -> Point:
+    """Point of a motion with the tangent that goes the way of `along` (n + 1,)."""
+    weights = _weights(family, z)
+    row = weights * along
+    factors = _bordered(family, z, p, row / np.abs(row).max())
+    right = np.zeros(len(row))
+    right[-1] = 1.0
+    tangent = lu_solve(factors, right, check_finite=False)  # goes the way of the row
+    tangent /= np.sqrt(weights @ tangent**2)
+    return Point(z, p, tangent, _side(factors), iterations)
+
+
+def ahead(family: Family, point: Point, length: float) -> Point | None:
+    """The point a length further along the curve, or None."""
+    z, p = point.z + length * point.tangent[:-1], point.p + length * float(point.tangent[-1])
+    row = _weights(family, point.z) * point.tangent
+    found = corrected(family, z, p, row / np.abs(row).max())
+    return None if found is None else point_at(family, *found[:2], point.tangent, found[2])
+
+
+def located(
+    family: Family, point: Point, other: Point, length: float, value: Callable[[Point], float]
+) -> Point:
+    """The point between two, a length apart, at which a function of points changes its sign.
+
+    Where branches cross, Newton's method fails very near to the point: the nearest found counts.
+    """
+    from scipy.optimize import brentq
+
+    found = {0.0: point, length: other}
+
+    def at(ahead_by: float) -> float:
+        if ahead_by not in found:
+            reached = ahead(family, point, ahead_by)
+            if reached is None:
+                raise ArithmeticError
+            found[ahead_by] = reached
+        return value(found[ahead_by])
+
+    with suppress(ArithmeticError, ValueError):
+        brentq(at, 0.0, length, xtol=LOCATED * length, rtol=1e-14, maxiter=60)
+    return min(found.values(), key=lambda one: abs(value(one)))
+
+
+@dataclass(frozen=True)
+class Stride:
+    """How long steps are."""
+
+    first: float
+    longest: float
+    most: int  # points
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A step along a family: its ends, its length, and whether it leaves what is asked for."""
+
+    before: Point
+    after: Point
+    length: float
+    last: bool
+
+
+LOST, LONG = "lost", "long"
+
+
+def steps(
+    family: Family, first: Point, stride: Stride, outside: Callable[[Point], float]
+) -> Iterator[Step | str]:
+    """Follow a family until a function of points is above 0, and stop there exactly.
+
+    A closed curve ends before it comes back to where it began.
+
+    Yields
+    ------
+    Step or str
+        At last, instead of a step, LOST where no further point is found, LONG after the most
+        points.
+    """
+    point, length = first, stride.first
+    for taken in range(stride.most):
+        other = ahead(family, point, length)
+        while other is None or _turns(family, point, other):
+            length *= CUT
+            if length < SMALLEST * stride.longest:
+                yield LOST
+                return
+            other = ahead(family, point, length)
+        if outside(other) > 0.0:
+            if outside(point) < 0.0:
+                end = located(family, point, other, length, outside)
+                yield Step(point, end, _along(family, point, end), True)
+            return
+        step = Step(point, other, length, False)
+        if taken > 1 and _passes(family, step, first):
+            return  # it is closed
+        yield step
+        point = other
+        if other.iterations <= EASY:
+            length = min(length * GROWTH, stride.longest)
+        elif other.iterations > EASY + 2:
+            length *= CUT
+    yield LONG
+
+
+def _along(family: Family, one: Point, other: Point) -> float:
+    """How far one point is from another along the tangent there."""
+    apart = np.append(other.z - one.z, other.p - one.p)
+    return float((_weights(family, one.z) * one.tangent) @ apart)
+
+
+def _passes(family: Family, step: Step, first: Point) -> bool:
+    """Whether a step passes a point in the direction in which the curve left it."""
+    along, weights = _along(family, step.before, first), _weights(family, step.before.z)
+    if not 0.0 < along <= step.length or (weights * step.before.tangent) @ first.tangent <= 0.0:
+        return False
+    apart = np.append(first.z - step.before.z, first.p - step.before.p)
+    beside = weights @ apart**2 - along**2
+    return bool(beside <= (NEAR * step.length) ** 2)
+
+
+def _turns(family: Family, one: Point, other: Point) -> bool:
+    """Whether the curve turns too far from one point to the other, or jumps to another curve."""
+    weights = _weights(family, one.z)
+    apart = np.append(other.z - one.z, other.p - one.p)
+    if _along(family, one, other) < STRAIGHT * np.sqrt(weights @ apart**2):
+        return True
+    lengths = np.sqrt((weights @ one.tangent**2) * (weights @ other.tangent**2))
+    return bool((weights * one.tangent) @ other.tangent < STRAIGHT * lengths)
+
+
+def branch_point(family: Family, z: NDArray, p: float, across: NDArray, far: float) -> Any:
+    """First point of a branch that leaves (z, p) along a direction across (n,), or None.
+
+    far : length of the step, as a fraction of the motion (or in units of z where nothing moves).
+    """
+    size = float(np.linalg.norm(across))
+    row = np.append(across / size, 0.0)
+    for shrink in (1.0, 0.3, 0.1, 0.03):
+        reach = shrink * far * across / size
+        found = corrected(family, z + reach, p, row, 2 * ITERATIONS)
+        if found is not None:
+            along = np.append(found[0] - z, found[1] - p)
+            return point_at(family, *found[:2], along, found[2])
+    return None

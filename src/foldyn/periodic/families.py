@@ -1,0 +1,183 @@
+"""Families of periodic motions that continuation follows; see `continuation.Family`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.periodic.balance import Balance
+from foldyn.periodic.equation import Instants
+from foldyn.periodic.orbit import Orbit
+
+TURN = 2.0 * np.pi
+PROBE = 1e-4  # of the level, or of the frequency: for derivatives that have no formula
+LEAST = 1e-12  # of the sheet's length: a motion is never taken as smaller
+
+
+class _OfBalance:
+    """What families of a balance have in common."""
+
+    def __init__(self, balance: Balance, span: float, tolerance: float) -> None:
+        self.balance, self.span, self.tolerance = balance, span, tolerance
+        self.rounding = balance.rounding()
+        self._kept: tuple[float, Instants] | None = None
+
+    def coefficients(self, z: NDArray) -> NDArray:
+        """Of the motion (c, k)."""
+        return z[: self.balance.shape[0] * self.balance.shape[1]].reshape(self.balance.shape)
+
+    def instants(self, level: float) -> Instants:
+        """The equation at the samples; that of the last level is kept."""
+        if self._kept is None or self._kept[0] != level:
+            self._kept = level, self.balance.instants(level)
+        return self._kept[1]
+
+    def size(self, z: NDArray) -> float:
+        """Norm of what moves."""
+        moving = float(np.linalg.norm(self.coefficients(z)[1:]))
+        return max(moving, LEAST * self.balance.equation.length)
+
+    def orbit_at(self, z: NDArray, omega: float, level: float) -> Orbit:
+        """The motion."""
+        amplitudes = self.balance.fourier.complex_of(self.coefficients(z))
+        return Orbit(self.balance.equation, amplitudes, omega, self.balance.multiple, level)
+
+
+class ByFrequency(_OfBalance):
+    """Forced motions along the frequency (Hz) of the drive."""
+
+    level = 1.0
+
+    def residual(self, z: NDArray, p: float) -> NDArray:
+        """See `Family`."""
+        x, at = self.coefficients(z), self.instants(self.level)
+        return self.balance.residual(x, TURN * p, at).ravel()
+
+    def jacobian(self, z: NDArray, p: float) -> NDArray:
+        """See `Family`."""
+        x, at = self.coefficients(z), self.instants(self.level)
+        return self.balance.jacobian(x, TURN * p, at)
+
+    def slope(self, z: NDArray, p: float) -> NDArray:
+        """See `Family`."""
+        x, at = self.coefficients(z), self.instants(self.level)
+        return TURN * self.balance.frequency_slope(x, TURN * p, at).ravel()
+
+    def orbit(self, z: NDArray, p: float) -> Orbit:
+        """The motion."""
+        return self.orbit_at(z, TURN * p, self.level)
+
+
+class ByLevel(_OfBalance):
+    """Forced motions of one frequency along the level of the drive."""
+
+    def __init__(self, balance: Balance, span: float, tolerance: float, frequency: float) -> None:
+        super().__init__(balance, span, tolerance)
+        self.omega = TURN * frequency
+
+    def residual(self, z: NDArray, p: float) -> NDArray:
+        """See `Family`."""
+        return self.balance.residual(self.coefficients(z), self.omega, self.instants(p)).ravel()
+
+    def jacobian(self, z: NDArray, p: float) -> NDArray:
+        """See `Family`."""
+        return self.balance.jacobian(self.coefficients(z), self.omega, self.instants(p))
+
+    def slope(self, z: NDArray, p: float) -> NDArray:
+        """See `Family`; by differences, exact where loads are proportional to the level."""
+        x, (up, down) = (
+            self.coefficients(z),
+            (self.balance.instants(p + d) for d in (PROBE, -PROBE)),
+        )
+        change = self.balance.residual(x, self.omega, up) - self.balance.residual(
+            x, self.omega, down
+        )
+        return change.ravel() / (2.0 * PROBE)
+
+    def orbit(self, z: NDArray, p: float) -> Orbit:
+        """The motion."""
+        return self.orbit_at(z, self.omega, p)
+
+
+class Free(ByFrequency):
+    """Motions of an undamped sheet that nothing drives, along their frequency (Hz).
+
+    An even series leaves their phase no freedom: they begin at rest, and come back to it.
+    """
+
+    level = 0.0
+
+
+class InResonance(_OfBalance):
+    """Forced motions in phase resonance, along the logarithm of the level of the drive.
+
+    Their frequency is that at which the drive does no reactive work: the mean over a period of its
+    force, as it acts on the sheet in its state, times the displacement vanishes (Peeters, Kerschen
+    and Golinval, Mech. Syst. Signal Process. 25, 2011). The last unknown is the frequency over
+    `unit`, so that it counts as much as displacements of the sheet's size.
+
+    Parameters
+    ----------
+    place : ndarray, shape (k,)
+        Unknowns of the state.
+    frequency : float
+        About that of the resonance, Hz.
+    """
+
+    def __init__(
+        self, balance: Balance, tolerance: float, place: NDArray, frequency: float
+    ) -> None:
+        super().__init__(balance, 1.0, tolerance)
+        equation, fourier = balance.equation, balance.fourier
+        self.unit = frequency / equation.length
+        self._heavy = float(np.diag(equation.mass).max()) * (TURN * frequency) ** 2  # N/m
+        at = balance.instants()
+        still = at.forces(np.tile(place, (len(fourier.phase), 1)))
+        self._force = [fourier.fit @ part for part in (still, at.drag, at.inertia)]
+
+    def frequency(self, z: NDArray) -> float:
+        """Of a motion, Hz."""
+        return float(z[-1]) * self.unit
+
+    def _reactive(self, z: NDArray) -> tuple[float, NDArray]:
+        """Reactive work over the size of the force at level 1, m, and its derivative (c, k)."""
+        omega = TURN * self.frequency(z)
+        still, drag, inertia = self._force
+        force = still + omega * drag + omega**2 * inertia
+        force[0] = 0.0
+        force /= np.linalg.norm(force)
+        return float((force * self.coefficients(z)).sum()), force
+
+    def _own(self, z: NDArray, level: float) -> tuple[NDArray, float, Instants]:
+        return self.coefficients(z), TURN * self.frequency(z), self.instants(level)
+
+    def residual(self, z: NDArray, p: float) -> NDArray:
+        """See `Family`."""
+        left = self.balance.residual(*self._own(z, np.exp(p)))
+        return np.append(left.ravel(), self._heavy * self._reactive(z)[0])
+
+    def jacobian(self, z: NDArray, p: float) -> NDArray:
+        """See `Family`."""
+        own, n = self._own(z, np.exp(p)), len(z) - 1
+        out = np.empty((n + 1, n + 1))
+        out[:n, :n] = self.balance.jacobian(*own)
+        out[:n, n] = TURN * self.unit * self.balance.frequency_slope(*own).ravel()
+        out[n, :n] = self._heavy * self._reactive(z)[1].ravel()
+        step = np.zeros(n + 1)
+        step[n] = PROBE * z[-1]
+        change = self._reactive(z + step)[0] - self._reactive(z - step)[0]
+        out[n, n] = self._heavy * change / (2.0 * step[n])
+        return out
+
+    def slope(self, z: NDArray, p: float) -> NDArray:
+        """See `Family`."""
+        x, omega, _ = self._own(z, np.exp(p))
+        up, down = (
+            self.balance.residual(x, omega, self.balance.instants(np.exp(p + d)))
+            for d in (PROBE, -PROBE)
+        )
+        return np.append((up - down).ravel() / (2.0 * PROBE), 0.0)
+
+    def orbit(self, z: NDArray, p: float) -> Orbit:
+        """The motion."""
+        return self.orbit_at(z, TURN * self.frequency(z), float(np.exp(p)))

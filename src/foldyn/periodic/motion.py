@@ -1,0 +1,228 @@
+"""`periodic_motion`: the steady response of a case to its harmonic histories."""
+
+from __future__ import annotations
+
+import math
+import time
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case, State
+from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.periodic.balance import Balance, newton
+from foldyn.periodic.collocation import Shooting
+from foldyn.periodic.equation import Equation
+from foldyn.periodic.floquet import STEPS, is_stable, multipliers
+from foldyn.periodic.fourier import Fourier, values_of
+from foldyn.periodic.orbit import SHOWN, Orbit
+from foldyn.periodic.reduction import reduced
+from foldyn.periodic.start import balanced, coefficients, equilibrium, orbit_of
+from foldyn.ram_limit import check_memory
+from foldyn.results.periodic_dataset import periodic_dataset
+from foldyn.values import choice, number, of_kind, whole
+
+if TYPE_CHECKING:
+    import xarray
+
+METHODS = ("harmonic_balance", "shooting")
+TRUNCATED = 1e-3  # of the motion: what twice as many harmonics would add, above which to warn
+FEW = 3  # harmonics of the motion from which shooting starts
+ROUNDING = 1e-14  # of the motion: harmonics of what shooting finds that are none
+TURN = 2.0 * math.pi
+
+
+def periodic_motion(
+    case: Case,
+    frequency: float | None = None,
+    harmonics: int = 9,
+    method: str = "harmonic_balance",
+    *,
+    start: State | xarray.Dataset | None = None,
+    periods: int = 1,
+    modes: int | None = None,
+    steps: int = STEPS,
+    tolerance: float = 1e-9,
+) -> xarray.Dataset:
+    """Periodic motion of a case under its harmonic histories, and whether it is stable.
+
+    Solves M u'' + C u' + F(u, t) = p(t) with the exact internal forces F. Several motions may exist
+    at a frequency: `start` chooses one, `response_curve` finds those that hang together.
+
+    Parameters
+    ----------
+    case : Case
+        With `Harmonic` histories of forces, base motions, imposed displacements or actuated
+        creases; other histories are constant.
+    frequency : float, optional
+        Of the slowest of these histories (Hz); others keep their ratio to it, all their phases.
+        That of the case by default.
+    harmonics : int
+        Of the motion's own frequency.
+    method : {"harmonic_balance", "shooting"}
+        A Fourier series whose equation holds in the mean over each harmonic, or the start from
+        which integration over a period (Gauss's method of order 6) comes back to itself.
+    start : State or xarray.Dataset, optional
+        Where to begin: small motions about a state, or a result of `periodic_motion` or a point of
+        one of `response_curve`. The equilibrium under the constant loads by default.
+    periods : int
+        Periods of the drive in one of the motion: 2 after a period doubling.
+    modes : int, optional
+        Compute in the span of so many modes about the start (about the equilibrium, if it is a
+        motion), their derivatives and the static response to the drive, in place of all free
+        dofs: for big sheets.
+    steps : int
+        Of integration in a period of the drive, for shooting and for the multipliers.
+    tolerance : float
+        Last step of Newton's method, as a fraction of the motion.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over one period `displacement`, `velocity` (time, node, axis); `coefficient` (harmonic,
+        node, axis), complex amplitudes c_j of the motion Re sum c_j exp(2 pi i j t / T); `floquet`
+        (multiplier), the largest first, eigenvalues of the monodromy matrix that integrates the
+        variational equation; `stable`; `periods`. Attributes: `frequency`, `truncation` (what
+        twice as many harmonics would add, as a fraction of the motion, estimated from the residual
+        there), with `modes` also `reduction` (what the dofs left out would add, likewise) and
+        facts about the run.
+
+    Raises
+    ------
+    InputError
+        An argument out of range; nothing drives the case, or not harmonically; contact, laws with
+        memory, damping with a matrix that varies, massless unknowns, or supports that let it drift.
+    ComputationError
+        No motion is found.
+
+    Warns
+    -----
+    FoldynWarning
+        There are too few harmonics.
+
+    Notes
+    -----
+    Bases swing about where they stand at rest. Motions with few harmonics of stiff sheets are
+    smooth, so that the multipliers of vibrations faster than the steps resolve tell the decay of
+    alpha M, but no phase.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
+    >>> s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), bend_law="linear")
+    >>> push = fd.Force([0, 1], (1e-3, 0, 0), history=fd.Harmonic(0.5))
+    >>> supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")]
+    >>> one = periodic_motion(fd.Case(s, supports, [push], fd.Rayleigh(alpha=0.5)), harmonics=5)
+    >>> bool(one.stable)
+    True
+    """
+    began = time.perf_counter()
+    of_kind("case", case, Case)
+    choice("method", method, METHODS)
+    tolerance = number("tolerance", tolerance, above=0.0, below=1.0)
+    steps = whole("steps", steps, least=4)
+    periods = whole("periods", periods, least=1)
+    balance = balance_of(case, "fd.periodic_motion", harmonics, periods, modes, start)
+    omega = TURN * frequency_of(balance, frequency)
+    if method == "shooting":
+        orbit, floquet, spent = _shot(balance, start, omega, steps, tolerance)
+    else:
+        x = coefficients(balance, start, omega)
+        found = balanced(balance, x, omega, tolerance)
+        orbit, spent = orbit_of(balance, found.x, omega), found.iterations
+        floquet = multipliers(balance.equation, orbit.amplitudes, omega, periods, steps=steps)
+    truncation = orbit.truncation()
+    warn_of_truncation(truncation, len(orbit.amplitudes) - 1, "harmonics")
+    phase = TURN * np.arange(SHOWN) / SHOWN
+    motion = {"displacement": orbit.displacement(phase), "velocity": orbit.velocity(phase)}
+    facts = {
+        "method": method,
+        "frequency": omega / TURN,
+        "harmonics": len(orbit.amplitudes) - 1,
+        "steps": steps,
+        "iterations": spent,
+        "truncation": truncation,
+        "modes": modes,
+        "reduction": None if modes is None else orbit.reduction(),
+        "multipliers": "variational equation integrated by Gauss's method of order 6",
+        "wall_seconds": time.perf_counter() - began,
+    }
+    return periodic_dataset(
+        case, phase / TURN * orbit.period, motion, orbit.node_amplitudes(), floquet,
+        is_stable(floquet), periods, facts,
+    )  # fmt: skip
+
+
+def balance_of(
+    case: Case, name: str, harmonics: int, periods: int = 1, modes: int | None = None,
+    start: Any = None,
+) -> Balance:  # fmt: skip
+    """Balance of a driven case; InputError without a drive, or where it does not fit in memory."""
+    harmonics = whole("harmonics", harmonics, least=1)
+    equation = Equation(case, name)
+    if not equation.drive.varies:
+        raise InputError(
+            f"case: nothing drives it: {name} takes loads or supports that have a history such as "
+            "fd.Harmonic(frequency=3.0)"
+        )
+    equation = on_modes(equation, modes, start)
+    size = (2 * harmonics + 1) * equation.size
+    check_memory("harmonics", f"a matrix of {size} unknowns", 24.0 * size**2, "take fewer")
+    return Balance(equation, Fourier(harmonics), periods)
+
+
+def on_modes(equation: Equation, modes: int | None, start: Any) -> Equation:
+    """The equation reduced to some modes about a start, or itself without a number of them."""
+    if modes is None:
+        return equation
+    count, case = whole("modes", modes, least=1), equation.case
+    if isinstance(start, State):
+        return reduced(equation, count, start.of_nodes("displacement", case.structure.nodes.shape))
+    return reduced(equation, count, equilibrium(case))
+
+
+def frequency_of(balance: Balance, given: float | None) -> float:
+    """Frequency (Hz) of the drive: the given one, or that of the case."""
+    own = balance.equation.drive.frequency
+    return own if given is None else number("frequency", given, above=0.0, unit="Hz")
+
+
+def warn_of_truncation(truncation: float, harmonics: int, field: str) -> None:
+    """Warn where a motion needs more harmonics."""
+    if truncation > TRUNCATED:
+        warnings.warn(
+            f"{field} = {harmonics}: twice as many would change the motion by about "
+            f"{truncation:.1g} of it; give more",
+            FoldynWarning,
+            stacklevel=3,
+        )
+
+
+def _shot(
+    balance: Balance, start: Any, omega: float, steps: int, tolerance: float
+) -> tuple[Orbit, NDArray, int]:
+    """Motion by shooting from one of few harmonics, its multipliers, and iterations spent."""
+    equation, longer = balance.equation, balance.multiple
+    few = Balance(equation, Fourier(min(balance.fourier.harmonics, FEW * longer)), longer)
+    near = orbit_of(few, balanced(few, coefficients(few, start, omega), omega, 1e-3).x, omega)
+    shooting = Shooting(equation, omega, steps, longer)
+    begin = [values_of(near.amplitudes, np.zeros(1), k)[0] for k in (0, 1)]
+    found = newton(shooting, np.concatenate(begin), tolerance)
+    if found is None:
+        raise ComputationError(
+            f"method = 'shooting': does not converge at {omega / TURN:g} Hz; give more steps, or "
+            "take method = 'harmonic_balance'"
+        )
+    states = shooting.period(found.x)[0]
+    count = len(states) - 1
+    amplitudes = np.fft.rfft(states[:-1, : equation.size], axis=0)[: (count + 1) // 2] / count
+    amplitudes[1:] *= 2.0
+    size = np.linalg.norm(amplitudes, axis=1)
+    tail = np.sqrt(np.cumsum(size[::-1] ** 2)[::-1])  # of the harmonics from each on
+    kept = max(int((tail > ROUNDING * tail[0]).sum()), 2)
+    orbit = Orbit(equation, amplitudes[:kept], omega, longer)
+    floquet = multipliers(equation, orbit.amplitudes, omega, longer, steps=steps)
+    return orbit, floquet, found.iterations

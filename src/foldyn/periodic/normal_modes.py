@@ -1,0 +1,331 @@
+"""`backbone`: how the frequency of a vibration changes with its amplitude."""
+
+from __future__ import annotations
+
+import math
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from foldyn.cases import Case, State
+from foldyn.dynamics import Progress
+from foldyn.dynamics.progress import Reporter, reporter
+from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.periodic.balance import Balance
+from foldyn.periodic.continuation import LOST, Point, Step, Stride, corrected, point_at, steps
+from foldyn.periodic.equation import Equation
+from foldyn.periodic.families import Free, InResonance
+from foldyn.periodic.floquet import STEPS, is_stable, multipliers
+from foldyn.periodic.fourier import Fourier, values_of
+from foldyn.periodic.motion import balance_of, on_modes, warn_of_truncation
+from foldyn.periodic.orbit import FINE, Orbit
+from foldyn.periodic.start import FLOOR, balanced, equilibrium, linear_response
+from foldyn.ram_limit import check_memory
+from foldyn.results.periodic_dataset import points_dataset
+from foldyn.statics.tracing import displacement_of
+from foldyn.values import flag, number, numbers, of_kind, whole
+
+if TYPE_CHECKING:
+    import xarray
+
+FIRST = 0.3  # of the longest step
+TURN = 2.0 * np.pi
+SAMPLES = 16  # of half a period, at which the energy is compared
+
+
+def backbone(
+    case: Case,
+    mode: int = 1,
+    amplitudes: Sequence[float] = (1e-6, 1e-3),
+    harmonics: int = 9,
+    *,
+    damped: bool = False,
+    state: State | None = None,
+    modes: int | None = None,
+    longest_step: float = 0.3,
+    most_points: int = 500,
+    tolerance: float = 1e-9,
+    progress: bool | Reporter | None = None,
+) -> xarray.Dataset:
+    """Frequency of the vibration that begins as a linear mode, as its amplitude grows.
+
+    Nonlinear normal modes are the periodic motions of the undamped sheet that nothing drives
+    (Kerschen, Peeters, Golinval and Vakakis, Mech. Syst. Signal Process. 23, 2009).
+
+    Parameters
+    ----------
+    case : Case
+        As for `periodic_motion`. Without `damped` its damping and harmonic histories play no part.
+    mode : int
+        Number of the mode, from 1, as in `modes`.
+    amplitudes : (float, float)
+        First and last amplitude: the largest displacement of any node from the equilibrium, m.
+    harmonics : int
+        Of the motion's frequency.
+    damped : bool
+        The damped case under its harmonic histories in phase resonance, where a force and the
+        displacement it works on are a quarter of a period apart, instead of the undamped one: what
+        the peaks of response curves follow.
+    state : State, optional
+        Near which the equilibrium lies about which it vibrates; rest by default. Constant loads
+        act.
+    modes : int, optional
+        As for `periodic_motion`, about this state.
+    longest_step : float
+        Length of a step, of which a growth of the motion by its own size counts 1.
+    most_points : int
+        At most.
+    tolerance : float
+        Last step of Newton's method, as a fraction of the motion.
+    progress : bool or callable, optional
+        True shows a bar; a callable gets a `Progress`, in which `steps` counts points.
+
+    Returns
+    -------
+    xarray.Dataset
+        Along `point`: `frequency` (Hz, coordinate), `amplitude` (m), `coefficient` (harmonic, node,
+        axis) as in `periodic_motion`, `truncation`, with `modes` also `reduction`. Of the undamped
+        case `energy` (J) above that of the equilibrium and `energy_drift`, its largest change along
+        the motion as a fraction; of the damped one `level`, the factor on the drive, `floquet` and
+        `stable`. Attributes:
+        `linear_frequency` (Hz), `complete`, 1 if the last amplitude is reached, and facts.
+
+    Raises
+    ------
+    InputError
+        As of `periodic_motion`.
+    ComputationError
+        The equilibrium is unstable, or the first motion is not found.
+
+    Warns
+    -----
+    FoldynWarning
+        The backbone is lost before the last amplitude (the points found are kept); too few
+        harmonics.
+
+    Notes
+    -----
+    Normal modes are sought among motions that come to rest twice in a period, cosines alone. Where
+    one resonates with another, the backbone turns back and goes on as that of both.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
+    >>> s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), bend_law="linear")
+    >>> case = fd.Case(s, [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")])
+    >>> spine = backbone(case, amplitudes=(1e-6, 0.05), harmonics=5)
+    >>> bool(spine.frequency[-1] > spine.frequency[0])
+    False
+    """
+    began = time.perf_counter()
+    of_kind("case", case, Case)
+    mode = whole("mode", mode, least=1)
+    ends = numbers("amplitudes", amplitudes)
+    if ends.shape != (2,) or not 0.0 < ends[0] < ends[1]:
+        raise InputError(f" = {amplitudes!r}: must be two increasing numbers above 0", "amplitudes")
+    longest = number("longest_step", longest_step, above=0.0, most=1.0)
+    stride = Stride(FIRST * longest, longest, whole("most_points", most_points, least=2))
+    tolerance = number("tolerance", tolerance, above=0.0, below=1.0)
+    damped = flag("damped", damped)
+    if damped:
+        balance = balance_of(case, "fd.backbone", harmonics, modes=modes, start=state)
+    else:
+        balance = _undamped(case, whole("harmonics", harmonics, least=1), modes, state)
+    place, frequency, shape = _mode(balance.equation, state, mode)
+    begin = _resonant if damped else _free
+    family, first = begin(balance, place, frequency, shape * ends[0], tolerance)
+
+    def reached(point: Point) -> float:
+        return _largest(family.orbit(point.z, point.p), place)
+
+    report, close = reporter(progress)
+    try:
+        kept, complete = _follow(family, first, stride, reached, ends, report)
+    finally:
+        close()
+    facts = {
+        "mode": mode,
+        "harmonics": balance.fourier.harmonics,
+        "damped": damped,
+        "linear_frequency": frequency,
+        "complete": complete,
+    }
+    orbits = [family.orbit(point.z, point.p) for point in kept]
+    values = _values(orbits, place) if not damped else _damped_values(orbits)
+    values["amplitude"] = np.array([_largest(orbit, place) for orbit in orbits])
+    warn_of_truncation(float(values["truncation"].max()), balance.fourier.harmonics, "harmonics")
+    facts["wall_seconds"] = time.perf_counter() - began
+    return points_dataset("backbone", case, values, facts)
+
+
+def _undamped(case: Case, harmonics: int, modes: int | None, state: Any) -> Balance:
+    equation = on_modes(Equation(case, "fd.backbone", driven=False), modes, state)
+    size = (harmonics + 1) * equation.size
+    check_memory("harmonics", f"a matrix of {size} unknowns", 24.0 * size**2, "take fewer")
+    return Balance(equation, Fourier(harmonics, even=True))
+
+
+def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, NDArray]:
+    """Equilibrium (k,), frequency (Hz) and shape (k,) of a mode: its largest node moves by 1."""
+    case = equation.case
+    if state is None:
+        displacement = equilibrium(case)
+    else:
+        displacement = displacement_of(state, case, "state", "a State, as fd.initial_state(path)")
+    at = equation.at(np.zeros(1), 0.0)
+    place = equation.unknowns(displacement[None], at)[0]
+    stiffness = _settled(equation, at, place)
+    if mode > equation.size:
+        raise InputError(f" = {mode}: there are {equation.size} modes", "mode")
+    soft = equation.body.sheet.soft_hinges(at.displacements(place[None])[0])
+    if len(soft.offset):  # the slope at rest is none
+        floored = equation.body.tangent(at.displacements(place[None])[0], FLOOR)
+        stiffness = equation.projected(floored)
+    value, vector = eigh(stiffness, equation.mass, subset_by_index=[mode - 1, mode - 1])
+    if not value[0] > 0.0:
+        raise ComputationError(
+            f"mode {mode} does not swing: the equilibrium is unstable, or nothing resists it; take "
+            "a state near a stable one, or another mode"
+        )
+    nodes = (equation.basis @ vector[:, 0]).reshape(-1, 3)
+    largest = np.linalg.norm(nodes, axis=1).max()
+    return place, math.sqrt(value[0]) / TURN, vector[:, 0] / largest
+
+
+def _settled(equation: Equation, at: Any, place: NDArray) -> NDArray:
+    """Move unknowns (k,) into equilibrium, and give the stiffness (k, k) there."""
+    for _ in range(20):
+        stiffness = at.tangents(place[None])[0]
+        force = at.forces(place[None])[0]
+        if np.linalg.norm(force) <= 4.0 * equation.rounding:
+            break
+        step = np.linalg.lstsq(stiffness, -force, rcond=None)[0]
+        place += step
+        if np.linalg.norm(step) <= 1e-13 * equation.length:
+            break
+    return stiffness
+
+
+def _free(
+    balance: Balance, place: NDArray, frequency: float, motion: NDArray, tolerance: float
+) -> tuple[Free, Point]:
+    """Family of normal modes, and the one that is nearly a linear mode of a motion (k,)."""
+    family = Free(balance, frequency, tolerance)
+    x = np.zeros(balance.shape)
+    x[0], x[1] = place, motion
+    along = np.zeros(x.size + 1)
+    along[len(motion) : 2 * len(motion)] = motion
+    found = corrected(family, x.ravel(), frequency, along / np.abs(along).max(), 30)
+    if found is None:
+        raise ComputationError(
+            f"no normal mode is found at the first amplitude, near {frequency:.6g} Hz; take another"
+        )
+    return family, point_at(family, *found[:2], along, found[2])
+
+
+def _resonant(
+    balance: Balance, place: NDArray, frequency: float, motion: NDArray, tolerance: float
+) -> tuple[InResonance, Point]:
+    """Family of motions in phase resonance, and that whose amplitude is about that of a mode."""
+    equation, omega = balance.equation, TURN * frequency
+    x = np.zeros(balance.shape)
+    x[0] = place
+    response = linear_response(balance, x, omega, 1.0)
+    size = _reach(equation, response[1:])
+    if not size > 0.0:
+        raise InputError(": the drive does not move the sheet", "case")
+    level = _reach(equation, motion[None]) / size
+    found = balanced(balance, x + level * response, omega, tolerance, level)
+    family = InResonance(balance, tolerance, place, frequency)
+    z, p = np.append(found.x, frequency / family.unit), math.log(level)
+    row = np.zeros(len(z) + 1)
+    row[-1] = 1.0
+    near = corrected(family, z, p, row, 30)
+    if near is None:
+        raise ComputationError(
+            f"no phase resonance is found near {frequency:.6g} Hz at the first amplitude: the mode "
+            "is hardly driven, or others are near; drive it where it moves most"
+        )
+    return family, point_at(family, *near[:2], row, near[2])
+
+
+def _reach(equation: Equation, motions: NDArray) -> float:
+    """Largest displacement of a node in motions (j, k) of the unknowns."""
+    nodes = (motions @ equation.basis.T).reshape(len(motions), -1, 3)
+    return float(np.linalg.norm(nodes, axis=2).max())
+
+
+def _follow(
+    family: Any, first: Point, stride: Stride, reached: Callable[[Point], float], ends: NDArray,
+    report: Reporter,
+) -> tuple[list[Point], bool]:  # fmt: skip
+    """Points from the first to the last amplitude, and whether it is reached."""
+    kept, whole_way = [first], math.log(ends[1] / ends[0])
+    for step in steps(family, first, stride, lambda point: reached(point) / ends[1] - 1.0):
+        if not isinstance(step, Step):
+            remedy = "a smaller longest_step, or more harmonics" if step == LOST else "most_points"
+            warnings.warn(
+                f"the backbone ends at an amplitude of {reached(kept[-1]):.3g} m; the points "
+                f"before are kept. Remedy: {remedy}",
+                FoldynWarning,
+                stacklevel=3,
+            )
+            return kept, False
+        kept.append(step.after)
+        done = math.log(reached(step.after) / ends[0]) / whole_way
+        report(Progress(min(max(done, 0.0), 1.0), 1.0, len(kept), 0.0))
+    return kept, True
+
+
+def _largest(orbit: Orbit, place: NDArray) -> float:
+    """Largest displacement of any node from the equilibrium (k,) in a motion, m."""
+    phase = TURN * np.arange(FINE) / FINE
+    mean = orbit.equation.at(np.zeros(1), 0.0).displacements(place[None]).reshape(1, -1, 3)
+    return float(np.linalg.norm(orbit.displacement(phase) - mean, axis=2).max())
+
+
+def _values(orbits: list[Orbit], place: NDArray) -> dict[str, Any]:
+    energies = np.array([_energy(orbit, place) for orbit in orbits])
+    return _common(orbits) | {"energy": energies[:, 0], "energy_drift": energies[:, 1]}
+
+
+def _common(orbits: list[Orbit]) -> dict[str, Any]:
+    reduction = {}
+    if orbits[0].equation.whole is not orbits[0].equation:
+        reduction = {"reduction": np.array([orbit.reduction() for orbit in orbits])}
+    return {
+        **reduction,
+        "frequency": np.array([orbit.omega / TURN for orbit in orbits]),
+        "coefficient": np.array([orbit.node_amplitudes() for orbit in orbits]),
+        "truncation": np.array([orbit.truncation() for orbit in orbits]),
+    }
+
+
+def _damped_values(orbits: list[Orbit]) -> dict[str, Any]:
+    floquet = np.array(
+        [
+            multipliers(one.equation, one.amplitudes, one.omega, level=one.level, steps=STEPS)
+            for one in orbits
+        ]
+    )
+    return _common(orbits) | {
+        "level": np.array([orbit.level for orbit in orbits]),
+        "floquet": floquet,
+        "stable": np.array([is_stable(row) for row in floquet]),
+    }
+
+
+def _energy(orbit: Orbit, place: NDArray) -> tuple[float, float]:
+    """Energy (J) above the equilibrium, and its largest change along the motion over it."""
+    phase, equation = np.pi * np.arange(SAMPLES + 1) / SAMPLES, orbit.equation
+    x = values_of(orbit.amplitudes, phase)
+    v = orbit.omega * values_of(orbit.amplitudes, phase, 1)
+    stored = equation.at(phase, 0.0).energies(x) - equation.at(phase[:1], 0.0).energies(place[None])
+    total = stored + 0.5 * np.einsum("ji,ik,jk->j", v, equation.mass, v)
+    return float(total[0]), float(np.ptp(total) / total.mean())

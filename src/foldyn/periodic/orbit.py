@@ -1,0 +1,158 @@
+"""A periodic motion on the unknowns of an equation, and what is made of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.periodic.balance import Balance
+from foldyn.periodic.equation import Equation
+from foldyn.periodic.fourier import Fourier, values_of
+from foldyn.results import Quantity
+from foldyn.values import of_kind
+
+SHOWN = 128  # samples of a period in results
+FINE = 256  # samples among which extremes are sought
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A periodic motion.
+
+    Attributes
+    ----------
+    equation : Equation
+    amplitudes : ndarray, complex, shape (h + 1, k)
+        Of exp(i j tau) in the unknowns, m; tau is the phase of the motion's own period.
+    omega : float
+        Of the drive, rad/s; of the motion itself where nothing drives it.
+    multiple : int
+        Periods of the drive in one of the motion.
+    level : float
+        Factor on all that varies.
+    """
+
+    equation: Equation
+    amplitudes: NDArray
+    omega: float
+    multiple: int = 1
+    level: float = 1.0
+
+    @property
+    def period(self) -> float:
+        """Of the motion, s."""
+        return 2.0 * np.pi * self.multiple / self.omega
+
+    def displacement(self, phase: NDArray) -> NDArray:
+        """Of all nodes (s, n, 3) at phases (s,) of the motion, m."""
+        at = self.equation.at(self.multiple * phase, self.level)
+        return at.displacements(values_of(self.amplitudes, phase)).reshape(len(phase), -1, 3)
+
+    def velocity(self, phase: NDArray) -> NDArray:
+        """The same of the velocity, m/s."""
+        drive, size = self.equation.drive, self.equation.body.size
+        level = self.level * self.equation.level
+        moved = drive.sums(drive.moves, self.multiple * phase, level, size)[1]
+        own = values_of(self.amplitudes, phase, 1) @ self.equation.basis.T / self.multiple
+        return self.omega * (own + moved).reshape(len(phase), -1, 3)
+
+    def node_amplitudes(self) -> NDArray:
+        """Amplitudes (h + 1, n, 3) of all nodes, with what supports do, m."""
+        most = max(len(self.amplitudes) - 1, self.multiple * self.equation.drive.highest)
+        count = 2 * most + 2
+        values = self.displacement(2.0 * np.pi * np.arange(count) / count)
+        found = np.fft.rfft(values, axis=0)[: most + 1] / count
+        found[1:] *= 2.0
+        return found
+
+    def truncation(self) -> float:
+        """What twice as many harmonics would add, as a fraction of the motion, estimated.
+
+        The residual at the further harmonics over the mean dynamic stiffness there.
+        """
+        kept, equation = len(self.amplitudes) - 1, self.equation
+        fourier = Fourier(2 * kept + 1)  # even ones alone may vanish by symmetry
+        balance = Balance(equation, fourier, self.multiple)
+        x, at = fourier.real_of(self.amplitudes), balance.instants(self.level)
+        missing = fourier.complex_of(balance.residual(x, self.omega, at))[kept + 1 :]
+        few = equation.at(self.multiple * fourier.phase[::4], self.level)
+        mean = few.tangents(fourier.values[::4] @ x).mean(axis=0)
+        w, added = self.omega / self.multiple, 0.0
+        for j, left in enumerate(missing, kept + 1):
+            matrix = mean - (j * w) ** 2 * equation.mass + 1j * j * w * equation.damping
+            added += float(np.linalg.norm(np.linalg.solve(matrix, left)) ** 2)
+        size = float(np.linalg.norm(self.amplitudes[1:]))
+        return np.sqrt(added) / size if size else 0.0
+
+    def reduction(self) -> float:
+        """What the unknowns left out would add, as a fraction of the motion, estimated likewise.
+
+        0 of an equation that is whole.
+        """
+        whole = self.equation.whole
+        if whole is self.equation:
+            return 0.0
+        fourier = Fourier(len(self.amplitudes) - 1)
+        balance, phase = Balance(whole, fourier, self.multiple), fourier.phase
+        at = balance.instants(self.level)
+        states = whole.unknowns(self.displacement(phase), at)
+        x = fourier.fit @ states
+        left = fourier.complex_of(balance.residual(x, self.omega, at))
+        few = whole.at(self.multiple * phase[::4], self.level)
+        mean, w = few.tangents(states[::4]).mean(axis=0), self.omega / self.multiple
+        added = np.array(
+            [
+                np.linalg.solve(mean - (j * w) ** 2 * whole.mass + 1j * j * w * whole.damping, one)
+                for j, one in enumerate(left)
+            ]
+        )
+        return float(np.linalg.norm(added) / np.linalg.norm(fourier.complex_of(x)[1:]))
+
+
+def swing(values: NDArray) -> NDArray:
+    """Half the distance (...) between the extremes of samples (s, ...) of a period.
+
+    A parabola through the largest sample and its neighbors finds each.
+    """
+    return 0.5 * (_peak(values) + _peak(-values))
+
+
+def _peak(values: NDArray) -> NDArray:
+    at = values.argmax(axis=0)[None]
+    before, here, after = (
+        np.take_along_axis(values, (at + shift) % len(values), 0)[0] for shift in (-1, 0, 1)
+    )
+    bend = before - 2.0 * here + after
+    with np.errstate(divide="ignore", invalid="ignore"):
+        above = np.where(bend < 0.0, -((after - before) ** 2) / (8.0 * bend), 0.0)
+    return here + above
+
+
+def measured(orbit: Orbit, measure: Any) -> float:
+    """Amplitude of a measure, a `Quantity` with a function, or of the node that swings most."""
+    phase = 2.0 * np.pi * np.arange(FINE) / FINE
+    u = orbit.displacement(phase)
+    if measure is None:
+        return float(swing(u).max())
+    v, time = orbit.velocity(phase), phase / (2.0 * np.pi) * orbit.period
+    values = [
+        float(measure.function(one, rate, float(t)))
+        for one, rate, t in zip(u, v, time, strict=True)
+    ]
+    return float(swing(np.array(values)))
+
+
+def check_measure(measure: Any) -> None:
+    """Refuse what gives no number."""
+    if measure is None:
+        return
+    of_kind("measure", measure, Quantity)
+    if measure.function is None or measure.dims:
+        raise InputError(
+            ": must have a function of displacement, velocity and time that gives one number",
+            "measure",
+        )

@@ -1,0 +1,123 @@
+"""Few unknowns for big sheets: modes, and how they change as the sheet moves along them.
+
+A folded sheet moves along curves: bars and panels that hardly stretch make nodes follow arcs, which
+no sum of modes does. Modal derivatives add the second order (Idelsohn and Cardona, Comput. Methods
+Appl. Mech. Eng. 49, 1985): with K the tangent and dK/dq_i its change along mode i,
+
+    theta_ij = -K^-1 (dK/dq_j) phi_i.
+
+The static responses to the drive complete them. Moving supports carry the sheet along as they would
+slowly.
+"""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, eigh
+
+from foldyn.errors import ComputationError, InputError
+from foldyn.periodic.equation import Equation, Instants
+from foldyn.periodic.tangents import Tangents
+
+PROBE = 1e-3  # of the sheet's size: how far the largest node moves to find a derivative
+LITTLE = 1e-4  # of the drive, for its static response
+DEPENDENT = 1e-6  # singular value, over the largest, of vectors that add nothing
+
+
+def reduced(equation: Equation, modes: int, displacement: NDArray) -> Equation:
+    """The equation on the span of the lowest modes about a state and their derivatives.
+
+    Parameters
+    ----------
+    equation : Equation
+    modes : int
+    displacement : ndarray, shape (n, 3)
+        The state, m.
+
+    Returns
+    -------
+    Equation
+        `whole` is the one that is given.
+    """
+    still = equation.at(np.zeros(1), 0.0)
+    place = equation.unknowns(displacement[None], still)[0]
+    if modes >= equation.size:
+        raise InputError(
+            f" = {modes}: must be below the number of unknowns, {equation.size}", "modes"
+        )
+    stiffness = still.tangents(place[None])[0]
+    try:
+        factors = cho_factor(stiffness)
+    except np.linalg.LinAlgError:
+        raise ComputationError(
+            "modes: the sheet is not stable in the state about which its modes are taken, or has "
+            "bends without stiffness there; start from a stable state, with bend_law = 'linear'"
+        ) from None
+    shapes = eigh(stiffness, equation.mass, subset_by_index=[0, modes - 1])[1]
+    vectors = [*shapes.T, *_derivatives(equation, still, place, shapes, factors)]
+    vectors += _static(equation, place, factors)
+    basis = _independent(equation.mass, np.array(vectors).T)
+    return _projected(equation, place, basis, stiffness, factors)
+
+
+def _derivatives(
+    equation: Equation, still: Instants, place: NDArray, shapes: NDArray, factors
+) -> list[NDArray]:
+    found = []
+    for j, shape in enumerate(shapes.T):
+        nodes = (equation.basis @ shape).reshape(-1, 3)
+        step = PROBE * equation.length / np.linalg.norm(nodes, axis=1).max()
+        up, down = (still.tangents((place + s * shape)[None])[0] for s in (step, -step))
+        change = (up - down) / (2.0 * step)
+        found += [cho_solve(factors, -change @ other) for other in shapes.T[: j + 1]]
+    return found
+
+
+def _static(equation: Equation, place: NDArray, factors) -> list[NDArray]:
+    """Responses to small drives that stand still, at two phases a quarter apart."""
+    phase = np.array([0.0, 0.5 * np.pi])
+    there = np.tile(place, (2, 1))
+    none, little = (equation.at(phase, level).forces(there) for level in (0.0, LITTLE))
+    return [cho_solve(factors, -force) for force in (little - none) / LITTLE if force.any()]
+
+
+def _independent(mass: NDArray, vectors: NDArray) -> NDArray:
+    """M-orthonormal vectors (k, r) that span others, without those that add nothing."""
+    vectors = vectors / np.sqrt(np.einsum("ij,ik,kj->j", vectors, mass, vectors))
+    value, turned = np.linalg.eigh(vectors.T @ mass @ vectors)
+    kept = value > DEPENDENT**2 * value[-1]
+    return vectors @ (turned[:, kept] / np.sqrt(value[kept]))
+
+
+def _projected(
+    equation: Equation, place: NDArray, basis: NDArray, stiffness: NDArray, factors
+) -> Equation:
+    out = copy.copy(equation)
+    for name in ("rounding", "length"):  # what was found for the whole one
+        out.__dict__.pop(name, None)
+    out.whole, out.drive = equation, copy.copy(equation.drive)
+    out.drive.moves = [
+        (_carried(equation, place, np.ravel(shape), factors), history)
+        for shape, history in equation.drive.moves
+    ]
+    free = None if equation.case.constraints else equation.case.free_dofs
+    out._tangents = Tangents(equation.body, equation.basis, free, basis)
+    out.basis = equation.basis @ basis
+    out.offset = equation.basis @ place
+    out.size = basis.shape[1]
+    out.mass, out.damping = (basis.T @ part @ basis for part in (equation.mass, equation.damping))
+    mass, drag = equation._moved
+    out._moved = basis.T @ mass, basis.T @ drag
+    out._back = basis.T @ equation.mass
+    return out
+
+
+def _carried(equation: Equation, place: NDArray, shape: NDArray, factors) -> NDArray:
+    """Displacements (m,) when supports move slowly by a shape (m,), whatever follows them."""
+    tangent = equation.body.tangent(equation.basis @ place)
+    full = np.zeros(tangent.shape[0])
+    full[: len(shape)] = shape
+    return full - equation.basis @ cho_solve(factors, equation.basis.T @ (tangent @ full))

@@ -1,0 +1,348 @@
+"""`response_curve`: periodic motions along the frequency or the amplitude of the drive."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case, State
+from foldyn.dynamics import Progress
+from foldyn.dynamics.progress import Reporter, reporter
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.periodic.balance import Balance
+from foldyn.periodic.bifurcations import DOUBLING, FOLD, PITCHFORK, Event, events
+from foldyn.periodic.continuation import (
+    LONG,
+    LOST,
+    Point,
+    Step,
+    Stride,
+    branch_point,
+    point_at,
+    steps,
+)
+from foldyn.periodic.families import ByFrequency, ByLevel
+from foldyn.periodic.floquet import STEPS, is_stable, multipliers
+from foldyn.periodic.fourier import Fourier
+from foldyn.periodic.motion import balance_of, warn_of_truncation
+from foldyn.periodic.orbit import check_measure, measured
+from foldyn.periodic.start import balanced, coefficients
+from foldyn.results import Quantity
+from foldyn.results.periodic_dataset import points_dataset
+from foldyn.values import number, numbers, of_kind, whole
+
+if TYPE_CHECKING:
+    import xarray
+
+FIRST = 0.2  # of the longest step
+AWAY = 0.05  # of the motion: how far a branch is entered
+APART = 1e-2  # from 1: multiplier of a fold that is none
+NAMED = 5  # folds that a warning lists
+MEETS = 1e-4  # of the range of the parameter: where branches meet at one point
+
+
+@dataclass(eq=False)
+class _Found:
+    """A point of the curve, as it is kept."""
+
+    family: Any
+    point: Point
+    branch: int
+    bifurcation: str = ""
+    floquet: NDArray = field(default_factory=lambda: np.zeros(0))
+
+
+def response_curve(
+    case: Case,
+    frequencies: Sequence[float] | None = None,
+    harmonics: int = 9,
+    measure: Quantity | None = None,
+    *,
+    amplitudes: Sequence[float] | None = None,
+    start: State | xarray.Dataset | None = None,
+    periods: int = 1,
+    modes: int | None = None,
+    branches: int = 1,
+    longest_step: float = 0.1,
+    most_points: int = 500,
+    steps: int = STEPS,
+    tolerance: float = 1e-9,
+    progress: bool | Reporter | None = None,
+) -> xarray.Dataset:
+    """Periodic motions of a case along the frequency or the amplitude of its harmonic histories.
+
+    Continuation by pseudo-arclength from the first end to the second, through folds, with the
+    stability of each motion, and with the branches that fork off.
+
+    Parameters
+    ----------
+    case : Case
+        As for `periodic_motion`.
+    frequencies : (float, float)
+        Both ends (Hz); the curve begins at the first. Sizes and phases of the drive stay.
+    harmonics : int
+        Of the drive's frequency.
+    measure : Quantity, optional
+        Whose `function` of displacement (n, 3), m, velocity (n, 3), m/s, and time, s, the curve
+        shows: half the distance between its extremes in a period. By default the displacement of
+        the node and along the axis where it is largest.
+    amplitudes : (float, float), optional
+        Instead of frequencies: both ends of a factor on all harmonic histories, at the case's own
+        frequency.
+    start : State or xarray.Dataset, optional
+        Where to begin at the first end; see `periodic_motion`.
+    periods : int
+        Periods of the drive in one of the motion.
+    modes : int, optional
+        As for `periodic_motion`.
+    branches : int
+        How many times branches are followed that fork off at a pitchfork (one of the two, which
+        are mirror images) or a period doubling: 0 none, 1 those of the curve, 2 theirs too.
+    longest_step : float
+        Length of a step, of which a change of the whole motion by itself counts 1, and the range
+        of the frequencies 1.
+    most_points : int
+        On one branch.
+    steps, tolerance
+        As for `periodic_motion`.
+    progress : bool or callable, optional
+        True shows a bar; a callable gets a `Progress`, in which `steps` counts points.
+
+    Returns
+    -------
+    xarray.Dataset
+        Along `point`: `frequency` (coordinate), `level` (factor on the drive), `amplitude` of the
+        measure, `stable`, `bifurcation` ("fold", "pitchfork", "period doubling", "Neimark-Sacker"
+        or ""), `branch` (0 for the curve itself), `periods`, `floquet` (multiplier), `coefficient`
+        (harmonic, node, axis) as in `periodic_motion`, of the motion's own frequency, `truncation`,
+        with `modes` also `reduction`. Of a point,
+        ``periodic_motion(case, f, start=curve.isel(point=3))`` gives the motion.
+        Attributes: `complete`, 1 if every branch came to an end of the range, and facts.
+
+    Raises
+    ------
+    InputError
+        As of `periodic_motion`.
+    ComputationError
+        No motion is found at the first end.
+
+    Warns
+    -----
+    FoldynWarning
+        A branch is lost, or has too many points (those found are kept); too few harmonics: what
+        twice as many would add, or folds at which no multiplier is 1.
+    """
+    began = time.perf_counter()
+    of_kind("case", case, Case)
+    check_measure(measure)
+    by, ends = _range(frequencies, amplitudes)
+    tolerance = number("tolerance", tolerance, above=0.0, below=1.0)
+    longest = number("longest_step", longest_step, above=0.0, most=1.0)
+    stride = Stride(FIRST * longest, longest, whole("most_points", most_points, least=2))
+    branches = whole("branches", branches, least=0)
+    periods = whole("periods", periods, least=1)
+    balance = balance_of(case, "fd.response_curve", harmonics, periods, modes, start)
+    tracer = _Tracer(by, ends, stride, whole("steps", steps, least=4), tolerance)
+    report, close = reporter(progress)
+    try:
+        family = tracer.family(balance)
+        first = tracer.first(family, start)
+        tracer.follow(family, first, branches, report)
+    finally:
+        close()
+    return _dataset(case, tracer, measure, began)
+
+
+def _range(frequencies: Any, amplitudes: Any) -> tuple[str, tuple[float, float]]:
+    """What varies, and its ends."""
+    if (frequencies is None) == (amplitudes is None):
+        raise InputError(": give frequencies (Hz) or amplitudes, one of the two", "frequencies")
+    by, given = ("frequencies", frequencies) if amplitudes is None else ("amplitudes", amplitudes)
+    ends = numbers(by, given)
+    least = 0.0
+    if ends.shape != (2,) or ends[0] == ends[1] or ends.min() <= least:
+        raise InputError(f" = {given!r}: must be two different numbers above 0", by)
+    return by, (float(ends[0]), float(ends[1]))
+
+
+class _Tracer:
+    """Follows a curve and its branches, and keeps what it finds."""
+
+    def __init__(
+        self, by: str, ends: tuple[float, float], stride: Stride, count: int, tolerance: float
+    ) -> None:
+        self.by, self.ends, self.stride, self.tolerance = by, ends, stride, tolerance
+        self.low, self.high = min(ends), max(ends)
+        self.span, self.count = self.high - self.low, count
+        self.found: list[_Found] = []
+        self.forks: list[Event] = []  # at which branches cross or begin
+        self.met: list[Event] = []  # those to which a branch has come back
+        self.branch, self.complete = 0, True
+
+    def family(self, balance: Balance) -> Any:
+        """Motions of a balance along what varies."""
+        if self.by == "frequencies":
+            return ByFrequency(balance, self.span, self.tolerance)
+        frequency = balance.equation.drive.frequency
+        return ByLevel(balance, self.span, self.tolerance, frequency)
+
+    def first(self, family: Any, start: Any) -> Point:
+        """Point at the first end, looking to the second."""
+        balance, p = family.balance, self.ends[0]
+        if self.by == "frequencies":
+            omega, level = 2.0 * np.pi * p, 1.0
+        else:
+            omega, level = family.omega, p
+        x = coefficients(balance, start, omega, level)
+        z = balanced(balance, x, omega, self.tolerance, level).x
+        along = np.zeros(len(z) + 1)
+        along[-1] = np.sign(self.ends[1] - self.ends[0])
+        return point_at(family, z, p, along)
+
+    def multipliers(self, family: Any, point: Point) -> NDArray:
+        """Of a point."""
+        orbit = family.orbit(point.z, point.p)
+        return multipliers(
+            orbit.equation, orbit.amplitudes, orbit.omega, orbit.multiple, orbit.level, self.count
+        )
+
+    def follow(
+        self, family: Any, first: Point, depth: int, report: Reporter, origin: Point | None = None
+    ) -> None:
+        """Follow a branch from its first point, then those that fork off, to a depth.
+
+        origin : the bifurcation, of this family, from which it comes.
+        """
+        branch, kept, forks = self.branch, [], []
+        known: dict[int, tuple[Point, NDArray]] = {}
+
+        def of(point: Point) -> NDArray:
+            if id(point) not in known:
+                known[id(point)] = point, self.multipliers(family, point)
+            return known[id(point)][1]
+
+        def keep(point: Point, name: str = "") -> None:
+            kept.append(_Found(family, point, branch, name, of(point)))
+
+        def outside(point: Point) -> float:
+            return max(self.low - point.p, point.p - self.high)
+
+        for point in (first,) if origin is None else (origin, first):
+            keep(point)
+        for step in steps(family, first, self.stride, outside):
+            if not isinstance(step, Step):
+                self._warn(step, kept[-1].point.p)
+                break
+            back = None
+            for event in events(family, step, of):
+                back = back or self._known(event, branch)
+                keep(event.point, "" if back else event.name)
+                if event.name in (PITCHFORK, DOUBLING) and not back:
+                    forks.append(event)
+            if back:  # on the curve from which it came
+                self.met.append(back)
+                break
+            keep(step.after)
+            known = {id(step.after): known[id(step.after)]}
+            done = min(max(abs(step.after.p - self.ends[0]) / self.span, 0.0), 1.0)
+            report(Progress(done, 1.0, len(self.found) + len(kept), 0.0))
+        self.found += kept
+        self.forks += forks
+        for event in forks if depth else ():
+            if event not in self.met:
+                self._fork(family, event, depth - 1, report)
+
+    def _known(self, event: Event, branch: int) -> Event | None:
+        """The bifurcation of another branch at which a branch ends."""
+        near = MEETS * self.span
+        same = (one for one in self.forks if abs(one.point.p - event.point.p) <= near)
+        return next(same, None) if branch and event.name == PITCHFORK else None
+
+    def _warn(self, why: str, p: float) -> None:
+        self.complete = False
+        texts = {
+            LOST: "is lost: no further motion is found; the points before are kept. Remedies: a "
+            "smaller longest_step, or more harmonics",
+            LONG: f"has more than {self.stride.most} points, which are kept; give more most_points",
+        }
+        warnings.warn(f"the branch at {p:.6g} {texts[why]}", FoldynWarning, stacklevel=5)
+
+    def _fork(self, family: Any, event: Event, depth: int, report: Reporter) -> None:
+        """Follow the branch that leaves a bifurcation."""
+        point, old = event.point, family.balance
+        if event.name == DOUBLING:
+            fourier = Fourier(2 * old.fourier.harmonics)
+            family = self.family(Balance(old.equation, fourier, 2 * old.multiple))
+            amplitudes = old.fourier.complex_of(point.z.reshape(old.shape))
+            spread = np.zeros((fourier.harmonics + 1, old.shape[1]), complex)
+            spread[::2] = amplitudes
+            along = np.append(np.zeros(spread.size * 2 - old.shape[1]), 1.0)
+            point = Point(fourier.real_of(spread).ravel(), point.p, along, 0.0)
+        _, _, rows = np.linalg.svd(family.jacobian(point.z, point.p))
+        across = rows[-1] * family.size(point.z)
+        first = branch_point(family, point.z, point.p, across, AWAY)
+        if first is None or not self.low <= first.p <= self.high:
+            return
+        self.branch = max(found.branch for found in self.found) + 1
+        self.follow(family, first, depth, report, point)
+
+
+def _warn_of_folds(found: list[_Found]) -> None:
+    """Warn of folds of the Fourier series alone, at which no multiplier is 1."""
+    at = [
+        f"{one.point.p:.6g}"
+        for one in found
+        if one.bifurcation == FOLD and np.abs(one.floquet - 1.0).min() > APART
+    ]
+    if at:
+        warnings.warn(
+            f"harmonics: no multiplier is 1 at the folds at {', '.join(at[:NAMED])}, which a "
+            "longer series may not have: give more harmonics (or more steps)",
+            FoldynWarning,
+            stacklevel=4,
+        )
+
+
+def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
+    orbits = [found.family.orbit(found.point.z, found.point.p) for found in tracer.found]
+    nodes = [orbit.node_amplitudes() for orbit in orbits]
+    most = max(map(len, nodes))
+    coefficient = np.zeros((len(nodes), most, *nodes[0].shape[1:]), complex)
+    for row, own in zip(coefficient, nodes, strict=True):
+        row[: len(own)] = own
+    truncation = np.array([orbit.truncation() for orbit in orbits])
+    names = np.array([found.bifurcation for found in tracer.found], dtype="<U15")
+    values = {
+        "frequency": np.array([orbit.omega / (2.0 * np.pi) for orbit in orbits]),
+        "level": np.array([orbit.level for orbit in orbits]),
+        "amplitude": np.array([measured(orbit, measure) for orbit in orbits]),
+        "stable": np.array([is_stable(found.floquet) for found in tracer.found]),
+        "bifurcation": names,
+        "branch": np.array([found.branch for found in tracer.found]),
+        "periods": np.array([orbit.multiple for orbit in orbits]),
+        "floquet": np.array([found.floquet for found in tracer.found]),
+        "coefficient": coefficient,
+        "truncation": truncation,
+    }
+    equation = tracer.found[0].family.balance.equation
+    if equation.whole is not equation:
+        values["reduction"] = np.array([orbit.reduction() for orbit in orbits])
+    _warn_of_folds(tracer.found)
+    harmonics = tracer.found[0].family.balance.fourier.harmonics
+    warn_of_truncation(float(truncation.max()), harmonics, "harmonics")
+    facts = {
+        "by": tracer.by,
+        "harmonics": harmonics,
+        "unknowns": equation.size,
+        "complete": tracer.complete,
+        "measure": "largest displacement" if measure is None else measure.text or "measure",
+        "wall_seconds": time.perf_counter() - began,
+    }
+    units = "m" if measure is None else measure.units
+    return points_dataset("response_curve", case, values, facts, units)

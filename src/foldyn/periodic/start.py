@@ -1,0 +1,145 @@
+"""Where the search for a periodic motion begins, and how it gets to the motion."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn.cases import Case, Constant
+from foldyn.errors import ComputationError, InputError
+from foldyn.linear.linearized import equivalent_slope
+from foldyn.periodic.balance import AtFrequency, Balance, Converged, newton
+from foldyn.periodic.fourier import values_of
+from foldyn.periodic.orbit import Orbit
+from foldyn.statics import trace
+from foldyn.statics.equilibrium import drives
+from foldyn.statics.tracing import displacement_of
+
+FLOOR = float(equivalent_slope(0.0, np.radians(1.0)))
+"""Slope of superlinear hinges at rest in a first guess: that of a swing of one degree."""
+LITTLE = 1e-4  # of the drive, whose forces are proportional to it
+FIRST, LEAST = 0.1, 1e-3  # steps of the level of the drive
+PLACES = "None, a State, or a result of periodic_motion or response_curve"
+
+
+def still_case(case: Case) -> Case:
+    """The same without all that varies."""
+    loads = [load for load in case.loads if load.history == Constant()]
+    supports = [
+        support
+        for support in case.supports
+        if getattr(support, "history", None) in (None, Constant())
+    ]
+    return case.altered(loads=loads, supports=supports)
+
+
+def equilibrium(case: Case) -> NDArray:
+    """Displacement (n, 3) under the constant loads, near rest."""
+    still = still_case(case)
+    if not drives(still, ()):
+        return np.zeros_like(case.structure.nodes)
+    return trace(still, "newton", [0.0, 1.0])["displacement"].values[-1]
+
+
+def coefficients(balance: Balance, start: Any, omega: float, level: float = 1.0) -> NDArray:
+    """Coefficients (c, k) to begin with: of a motion, or of small ones about a state."""
+    equation = balance.equation
+    if isinstance(start, xr.Dataset):
+        return _of_result(balance, start, level)
+    if start is None:
+        place = equilibrium(equation.case)
+    else:
+        place = displacement_of(start, equation.case, "start", PLACES)
+    mean = equation.at(np.zeros(1), 0.0)
+    x = np.zeros(balance.shape)
+    x[0] = equation.unknowns(place[None], mean)[0]
+    return x + linear_response(balance, x, omega, level)
+
+
+def linear_response(balance: Balance, x: NDArray, omega: float, level: float) -> NDArray:
+    """First step (c, k) of small motions about a state, with slopes where hinges have none."""
+    equation, fourier = balance.equation, balance.fourier
+    still, little = (
+        balance.residual(x, omega, balance.instants(share * level)) for share in (0.0, LITTLE)
+    )
+    residual = still + (little - still) / LITTLE
+    u = equation.basis @ x[0] + equation.offset
+    tangent = equation.projected(equation.body.tangent(u, FLOOR))
+    w = omega / balance.multiple
+    amplitudes = fourier.complex_of(residual)
+    for j in range(len(amplitudes)):
+        matrix = tangent - (j * w) ** 2 * equation.mass + 1j * j * w * equation.damping
+        amplitudes[j] = np.linalg.lstsq(matrix, -amplitudes[j], rcond=None)[0]
+    return fourier.real_of(amplitudes)
+
+
+def _of_result(balance: Balance, start: xr.Dataset, level: float) -> NDArray:
+    found = start.variables.get("coefficient")
+    n = len(balance.equation.case.structure.nodes)
+    if found is None or found.dims != ("harmonic", "node", "axis") or found.shape[1:] != (n, 3):
+        raise InputError(
+            f": must be {PLACES} of this case (of a curve one point, as curve.isel(point=3))",
+            "start",
+        )
+    given, longer = np.asarray(found), balance.multiple
+    own = int(start.get("periods", 1))
+    if own != longer:  # the same motion in a longer period
+        if longer % own:
+            raise InputError(
+                f": its period is {own} of the drive; give periods = {own}, or a multiple", "start"
+            )
+        spread = np.zeros(((len(given) - 1) * (longer // own) + 1, n, 3), complex)
+        spread[:: longer // own] = given
+        given = spread
+    phase = balance.fourier.phase
+    at = balance.instants(level)
+    return balance.fourier.fit @ balance.equation.unknowns(values_of(given, phase), at)
+
+
+def balanced(
+    balance: Balance, x: NDArray, omega: float, tolerance: float, level: float = 1.0
+) -> Converged:
+    """The motion near coefficients (c, k), or the one that grows with the drive from none.
+
+    Raises
+    ------
+    ComputationError
+        Neither is found.
+    """
+    found = newton(AtFrequency(balance, omega, level), x.ravel(), tolerance)
+    return _grown(balance, x, omega, tolerance, level) if found is None else found
+
+
+def _grown(balance: Balance, x: NDArray, omega: float, tolerance: float, level: float) -> Converged:
+    """Increase the drive step by step, as far as it takes."""
+    still = np.zeros(balance.shape)
+    still[0] = x[0]
+    last, rate = still.ravel(), (x - still).ravel()  # at a share of the drive, per share
+    share, step, spent = 0.0, FIRST, 0
+    while share < 1.0:
+        target = min(share + step, 1.0)
+        guess = last + (target - share) * rate
+        found = newton(AtFrequency(balance, omega, target * level), guess, tolerance)
+        if found is None:
+            step *= 0.5
+            if step < LEAST:
+                raise ComputationError(
+                    f"frequency = {omega / (2.0 * np.pi):g} Hz: no periodic motion is found; the "
+                    f"search ends at {share:.2g} of the drive. Remedies: another start (a motion "
+                    "at a frequency nearby, or a State), fd.response_curve from a frequency off "
+                    "resonance, or more damping"
+                )
+            continue
+        spent += found.iterations
+        rate = (found.x - last) / (target - share)
+        last, share, step = found.x, target, 1.5 * step
+    return Converged(last, spent)
+
+
+def orbit_of(balance: Balance, x: NDArray, omega: float, level: float = 1.0) -> Orbit:
+    """Orbit of coefficients (c k,)."""
+    amplitudes = balance.fourier.complex_of(x.reshape(balance.shape))
+    return Orbit(balance.equation, amplitudes, omega, balance.multiple, level)

@@ -1,0 +1,160 @@
+"""Response curves with their stability and bifurcations, and backbones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.plots import style
+from foldyn.plots.given import by_label
+
+MARKERS = {"fold": "o", "pitchfork": "s", "period doubling": "D", "Neimark-Sacker": "^"}
+UNSTABLE = (0, (3, 1.6))
+SIZE = (6.4, 3.8)
+
+
+def plot_response_curve(
+    curves: xr.Dataset | Mapping[str, xr.Dataset],
+    backbone: xr.Dataset | None = None,
+    title: str = "",
+) -> Figure:
+    """Draw response curves: stable motions solid, unstable ones dashed, bifurcations marked.
+
+    Parameters
+    ----------
+    curves : xarray.Dataset, or mapping of str to xarray.Dataset
+        A result of `foldyn.response_curve`, or several by their labels.
+    backbone : xarray.Dataset, optional
+        A result of `foldyn.backbone` to be drawn behind them.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Amplitude over what varies: the frequency, or the factor on the drive.
+
+    Raises
+    ------
+    InputError
+        Something else than response curves of one kind.
+    """
+    labeled = by_label("curves", curves)
+    kinds = {_kind("curves", one, "response_curve", "by") for one in labeled.values()}
+    if len(kinds) > 1:
+        raise InputError(": some vary the frequency, some the amplitude; draw them apart", "curves")
+    along = "frequency" if kinds.pop() == "frequencies" else "level"
+    xlabel = "frequency of the drive (Hz)" if along == "frequency" else "factor on the drive"
+    figure = style.new_figure(*SIZE, title)
+    axes = figure.subplots()
+    style.frame(axes, xlabel, _amplitude(next(iter(labeled.values()))))
+    keys, kept = [], set()
+    for index, (label, curve) in enumerate(labeled.items()):
+        color = style.CYCLE[index % len(style.CYCLE)]
+        kept |= _draw(axes, curve, along, color)
+        if label:
+            keys.append(style.key(label, color=color))
+    if not all(curve["stable"].values.all() for curve in labeled.values()):
+        keys.append(style.key("unstable", color=style.GRAY, linestyle=UNSTABLE))
+    for name in (name for name in MARKERS if name in kept):
+        keys.append(style.key(name, **_mark(style.GRAY, name)))
+    if backbone is not None and along == "frequency":
+        _kind("backbone", backbone, "backbone", "mode")
+        look = {"color": style.GRAY, "linewidth": 1.0, "label": "backbone", "zorder": 1.0}
+        limits = axes.get_xlim(), axes.get_ylim()
+        keys += axes.plot(backbone["frequency"].values, backbone["amplitude"].values, **look)
+        axes.set(xlim=limits[0], ylim=limits[1])
+    style.exponents(axes)
+    return style.finish(figure, keys, 4, width=SIZE[0])
+
+
+def plot_backbone(backbones: xr.Dataset | Mapping[str, xr.Dataset], title: str = "") -> Figure:
+    """Draw backbones: frequency over amplitude and, of undamped ones, over energy.
+
+    Parameters
+    ----------
+    backbones : xarray.Dataset, or mapping of str to xarray.Dataset
+        A result of `foldyn.backbone`, or several by their labels.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Both axes of amplitude and energy are logarithmic.
+
+    Raises
+    ------
+    InputError
+        Something else than backbones.
+    """
+    labeled = by_label("backbones", backbones)
+    for one in labeled.values():
+        _kind("backbones", one, "backbone", "mode")
+    parts = ["amplitude", "energy"][: 1 + all("energy" in one for one in labeled.values())]
+    figure = style.new_figure(3.2 * len(parts) + 1.0, SIZE[1], title)
+    keys = []
+    for axes, name in zip(
+        np.atleast_1d(figure.subplots(1, len(parts), sharey=True)), parts, strict=True
+    ):
+        unit = {"amplitude": "amplitude (m)", "energy": "energy (J)"}[name]
+        style.frame(axes, unit, "frequency (Hz)" if name == "amplitude" else "")
+        axes.set_xscale("log")
+        keys = [
+            axes.plot(
+                one[name].values, one["frequency"].values, label=label, **style.line_style(k)
+            )[0]
+            for k, (label, one) in enumerate(labeled.items())
+        ]
+    return style.finish(figure, keys if any(labeled) else [], 4, width=figure.get_figwidth())
+
+
+def _kind(field: str, result: xr.Dataset, kind: str, attribute: str) -> str:
+    """An attribute of a result, which must be of a kind."""
+    if result.attrs.get("foldyn_result") != kind or attribute not in result.attrs:
+        raise InputError(f": must be a result of foldyn.{kind}", field)
+    return str(result.attrs[attribute])
+
+
+def _amplitude(curve: xr.Dataset) -> str:
+    unit = curve["amplitude"].attrs.get("units", "")
+    return f"amplitude of the {curve.attrs['measure']}" + (f" ({unit})" if unit else "")
+
+
+def _mark(color: str, name: str) -> dict:
+    return style.ring(color) | {"marker": MARKERS[name]}
+
+
+def _draw(axes: Axes, curve: xr.Dataset, along: str, color: str) -> set[str]:
+    """Draw a curve with its branches; the names of its bifurcations."""
+    x, y = curve[along].values, curve["amplitude"].values
+    names, branch = curve["bifurcation"].values, curve["branch"].values
+    for number in np.unique(branch):
+        own = np.flatnonzero(branch == number)
+        for part, stable in _pieces(curve["stable"].values[own], names[own] != ""):
+            look = {"linestyle": "solid" if stable else UNSTABLE, "linewidth": 1.5}
+            axes.plot(x[own[part]], y[own[part]], color=color, **look)
+    for name in MARKERS:
+        at = names == name
+        if at.any():
+            axes.plot(x[at], y[at], zorder=4.0, **_mark(color, name))
+    return set(names.tolist())
+
+
+def _pieces(stable: NDArray[np.bool_], marked: NDArray[np.bool_]) -> list[tuple[NDArray, bool]]:
+    """Numbers of the points of each stretch of one stability, which ends at bifurcations."""
+    count = len(stable)
+    if count == 1:
+        return [(np.array([0]), bool(stable[0]))]
+    # a motion at a bifurcation is neither: the other end of a segment says what it is
+    segment = np.where(marked[:-1], stable[1:], stable[:-1])
+    ends = np.flatnonzero(np.diff(segment)) + 1
+    edges = [0, *ends.tolist(), count - 1]
+    return [(np.arange(first, last + 1), bool(segment[first])) for first, last in pairwise(edges)]
