@@ -111,7 +111,7 @@ def test_damped_bands_are_as_many_as_there_are_motions():
 def test_attenuation_refuses_what_is_not_there():
     for given, match in (
         ({"frequencies": [0.0]}, "frequencies: give numbers above 0"),
-        ({"frequencies": [1.0], "direction": 1}, "direction = 1: the cell has 1 period, 0"),
+        ({"frequencies": [1.0], "along": 1}, "along = 1: the cell has 1 period, 0"),
         ({"frequencies": [1.0], "phase": 1.0}, "phase = 1: the cell has no other period"),
     ):
         with pytest.raises(InputError, match=match):

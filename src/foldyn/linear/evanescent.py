@@ -46,7 +46,7 @@ class Reach(NamedTuple):
 def attenuation(
     cell: UnitCell,
     frequencies: Any,
-    direction: int = 0,
+    along: int = 0,
     phase: float = 0.0,
     count: int = 6,
     state: State | None = None,
@@ -62,7 +62,7 @@ def attenuation(
         Its damping counts, and makes all waves decay.
     frequencies : float or array_like, shape (n,)
         Frequencies (Hz), above 0.
-    direction : int
+    along : int
         Along which period: 0 or 1.
     phase : float
         Phase (rad) along the other period of a sheet.
@@ -100,14 +100,14 @@ def attenuation(
     if wanted.ndim != 1 or not len(wanted) or (wanted <= 0.0).any():
         raise InputError(": give numbers above 0 (Hz)", "frequencies")
     count, phase = whole("count", count, least=1), number("phase", phase)
-    direction = cell.period("direction", direction)
+    along = cell.period("along", along)
     if phase and cell.dimensions == 1:
         raise InputError(f" = {phase:g}: the cell has no other period", "phase")
     parts = [
-        along(linear.bloch, part, direction, phase)
+        _blocks(linear.bloch, part, along, phase)
         for part in (linear.bloch.stiffness, linear.bloch.damping, linear.bloch.mass)
     ]
-    ties = along(linear.bloch, linear.bloch.ties, direction, phase)
+    ties = _blocks(linear.bloch, linear.bloch.ties, along, phase)
     kept = np.flatnonzero(~linear.bloch.held)
 
     def waves(frequency: float) -> NDArray[np.complex128]:
@@ -131,14 +131,14 @@ def attenuation(
         "frequency": ("frequency", wanted, {"units": "Hz"}),
         "wave": ("wave", 1 + np.arange(count)),
     }
-    facts = {"count": count, "secant": secant, "direction": direction, "other_phase": phase}
+    facts = {"count": count, "secant": secant, "along": along, "other_phase": phase}
     return result_dataset("attenuation", cell.case, data | linear.variables, run, facts)
 
 
-def along(bloch: Bloch, matrix: Any, direction: int, phase: float) -> Reach:
+def _blocks(bloch: Bloch, matrix: Any, along: int, phase: float) -> Reach:
     """Blocks of a matrix by cells along a direction, summed with a phase along the other one."""
-    steps = bloch.steps[:, direction]
-    other = np.delete(bloch.steps, direction, axis=1).sum(axis=1)
+    steps = bloch.steps[:, along]
+    other = np.delete(bloch.steps, along, axis=1).sum(axis=1)
     reach = int(np.abs(steps).max(initial=0))
     every = np.arange(-reach, reach + 1)
     factors = np.exp(1j * phase * other)
