@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from foldyn.jit.compiled import kernel
 from foldyn.mechanics.contact.distances import (
@@ -65,6 +64,8 @@ def clearance(points: NDArray, triangles: NDArray, panels: NDArray) -> Clearance
 
 def _near(corners: NDArray, panels: NDArray, meet: sparse.csr_array) -> NDArray[np.int64]:
     """Pairs of triangles (k, 2) of panels that do not meet, the closest ones among them."""
+    from scipy.spatial import cKDTree
+
     center = corners.mean(axis=1)
     radius = float(np.linalg.norm(corners - center[:, None], axis=2).max())
     tree = cKDTree(center)
