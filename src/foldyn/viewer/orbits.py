@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from foldyn.periodic.fourier import Fourier, values_of
 from foldyn.viewer.arrays import Arrays
 
 OF_MOTIONS = 1e-4
@@ -30,11 +31,8 @@ def orbits(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
     some = result.isel(point=chosen)
     amplitudes = some["coefficient"].transpose("point", "harmonic", "node", "axis").values
     size = np.array([largest(one) for one in amplitudes])
-    own = amplitudes / np.where(size > 0.0, size, 1.0)[:, None, None, None]
-    series = np.zeros((len(own), 2 * own.shape[1] - 1, *own.shape[2:]))
-    series[:, 2::2] = -own[:, 1:].imag
-    series[:, 1::2] = own[:, 1:].real
-    series[:, 0] = own[:, 0].real
+    own: Any = amplitudes / np.where(size > 0.0, size, 1.0)[:, None, None, None]
+    series = Fourier(own.shape[1] - 1).real_of(own.swapaxes(0, 1)).swapaxes(0, 1)
     count = len(chosen)
     return {
         "x": arrays.exact(f"{key}.x", some[along(result)].values, "f4"),
@@ -71,8 +69,7 @@ def points(result: xr.Dataset) -> NDArray[np.int64]:
 def largest(amplitudes: NDArray) -> float:
     """Largest displacement of any node in a period, of amplitudes (h + 1, n, 3) of exp(i k tau)."""
     phase = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
-    turned = np.exp(1j * np.multiply.outer(phase, np.arange(len(amplitudes))))
-    return float(np.linalg.norm(np.tensordot(turned, amplitudes, 1).real, axis=-1).max())
+    return float(np.linalg.norm(values_of(amplitudes, phase), axis=-1).max())
 
 
 def along(result: xr.Dataset) -> str:
