@@ -50,6 +50,29 @@ def test_gradients_by_the_shape_of_panels(preset):
     assert max(design.errors().values()) < 1e-6
 
 
+def test_how_near_panels_are_at_rest():
+    def folded(dihedral: float, panel_angle: float) -> fd.Case:
+        pattern = fd.patterns.miura((2, 1), panel_angle=panel_angle, dihedral=dihedral)
+        return fd.Case(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0)), [fd.Fix("xmin")])
+
+    values = {"dihedral": 43.0, "panel_angle": 63.0}
+    assert max(Design(folded, values, ["clearance"], MODES).errors().values()) < 1e-6
+    with pytest.raises(InputError, match="has no finite value"):
+        fd.sensitivity(cell, {"density": 900.0}, "clearance", MODES)
+
+    def crossed(height: float) -> fd.Case:
+        square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+        points = np.vstack([square, square[:, [0, 2, 1]] + np.array([0.3, 0.4, height])])
+        pattern = fd.Pattern(points, [(0, 1, 2, 3), (4, 5, 6, 7)])
+        return fd.Case(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0)), [fd.Fix([0, 1, 3])])
+
+    assert fd.sensitivity(crossed, {"height": 0.2}, "clearance", MODES)[
+        "gradient_height"
+    ].item() == pytest.approx(1.0)
+    with pytest.raises(InputError, match="panels touch or cross"):
+        fd.sensitivity(crossed, {"height": -0.5}, "clearance", MODES)
+
+
 @pytest.mark.parametrize("seed", [3, 4])
 def test_the_remainder_falls_with_the_second_order(seed):
     values = {"thickness": 0.02, "stiffness": np.full(4, 0.02)}

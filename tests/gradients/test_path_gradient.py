@@ -63,6 +63,12 @@ def test_equilibria_where_supports_move():
     assert max(errors.values()) < 1e-6, errors
 
 
+def test_panels_that_come_near_each_other():
+    values = {"drop": 0.01, "stiffness": STIFFNESS, "height": 0.06, "twist": 30.0}
+    errors = Design(tower, values, ["clearance"], MOVED).errors()
+    assert max(errors.values()) < 1e-6, errors
+
+
 def test_the_force_of_supports_is_the_slope_of_the_energy():
     """dE/d drop is the force on the plate (Castigliano)."""
     found = fd.sensitivity(tower, {"drop": 0.01, "spring": 900.0}, "strain_energy", MOVED)

@@ -52,6 +52,9 @@ def test_every_measure_can_be_taken_of_all_its_kinds(results, one, kind):
     assert value.ndim == len(one.dims)
     assert one.doc
     never = ("limit_load", "bifurcation_load", "barrier", "barrier_back")  # of a fold pushed a bit
+    if one.name == "clearance":  # of panels that all meet in one vertex
+        assert value > 0.0
+        return
     assert np.isnan(value) if one.name in never else np.isfinite(value).all()
 
 

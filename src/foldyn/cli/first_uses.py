@@ -21,6 +21,7 @@ from foldyn.errors import FoldynWarning
 from foldyn.experiment.tracking.corners import refine
 from foldyn.gradients.neighbors import Asked, motions
 from foldyn.materials.series import in_series
+from foldyn.mechanics.contact.clearance import clearance
 
 STEPS, SHORT, LONG = 4, 1e-4, 5e-3  # s, steps of explicit and implicit methods
 EXPLICIT = ("rk4", "central_difference", "dormand_prince")
@@ -150,12 +151,19 @@ def accompanied() -> None:
     motions(prepare(made, **given), asked, [asked], 1e-4)
 
 
+def apart() -> None:
+    """How far panels are from each other."""
+    made = case().structure
+    clearance(made.nodes, made.triangles, made.triangle_panel)
+
+
 STAGES: Sequence[Uses] = (
     {"bars and hinges": [vibrating, partial(moved, "rk4")]},
     {
         "contact": [
             partial(moved, *EXPLICIT, contact=RUBBING, **TOUCHING),
             partial(moved, *EXPLICIT, contact=ON_GROUND),
+            apart,
         ],
         "explicit methods": [
             partial(moved, *EXPLICIT, supports=[*SPRINGS, *TIED], damping=DAMPED),

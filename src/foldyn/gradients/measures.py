@@ -14,11 +14,13 @@ from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.gradients.numbers import Gradient
 from foldyn.linear.frf import quantity_of
+from foldyn.mechanics.contact.clearance import Clearance
 from foldyn.signals.peaks import magnitude_curve
 from foldyn.statics import Equilibrium, Landscape
 from foldyn.sweeps.measure import Asked, asked
 from foldyn.sweeps.measures import (
     MEASURES,
+    closest_panels,
     curve_of,
     frequency_of,
     highest,
@@ -186,6 +188,35 @@ def _strain_of(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
     return lambda other: abs(found.strain(other)[1])
 
 
+def _clearance(result: xr.Dataset, case: Case) -> Seeds:
+    sample, found = _apart(result, case)
+    if "displacement" not in result or "mode" in result.dims:
+        return {}
+    moved = _all_moved(result)
+    vector = found.weights @ (case.structure.nodes + moved[sample])[found.nodes]
+    out = np.zeros_like(moved)
+    out[sample, found.nodes] = np.outer(found.weights, vector / found.distance)
+    return {"displacement": out}
+
+
+def _apart(result: xr.Dataset, case: Case) -> tuple[int, Clearance]:
+    sample, found = closest_panels(result, case)
+    if not found.distance > 0.0:
+        raise InputError("is 0, where panels touch or cross, and a distance has no derivative")
+    return sample, found
+
+
+def _clearance_of(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
+    sample, found = _apart(result, case)
+    moved = _all_moved(result)[sample] if "mode" not in result.dims else 0.0
+
+    def distance(other: Case) -> float:
+        places = (other.structure.nodes + moved)[found.nodes]
+        return float(np.linalg.norm(found.weights @ places))
+
+    return distance
+
+
 def _reaction(result: xr.Dataset, case: Case, axis: str) -> Seeds:
     out = np.zeros((result.sizes["step"], len(case.reaction_dofs)))
     out[-1, (result["support_axis"] == axis).values] = 1.0
@@ -328,6 +359,7 @@ DERIVATIVES: Mapping[str, Derivative] = {
     "largest_displacement": Derivative(_largest_displacement),
     "strain": Derivative(_strain, frozen=_strain_of),
     "strain_energy": Derivative(_strain_energy, frozen=_strain_energy_of),
+    "clearance": Derivative(_clearance, frozen=_clearance_of),
     "reaction": Derivative(_reaction),
     "limit_load": Derivative(_limit_load),
     "load_at": Derivative(_load_at),

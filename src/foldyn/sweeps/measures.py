@@ -16,6 +16,7 @@ from foldyn.errors import InputError
 from foldyn.linear.band_gaps import ALL, frequencies_of, legs
 from foldyn.linear.frf import quantity_of
 from foldyn.linear.peaks_of import kind_of, resonances
+from foldyn.mechanics.contact.clearance import Clearance, clearance
 from foldyn.signals import (
     Peaks,
     find_peaks,
@@ -267,6 +268,21 @@ def _strain(result: xr.Dataset, case: Case) -> float:
         raise InputError("is of bars, and a shell has none")
     moved = sampled(result, "displacement").transpose(..., "node", "axis").values
     return float(np.abs(bar_strain(case.structure, moved)).max())
+
+
+@_measure(MODES, *MOVED, units="m", doc="least distance of panels that share no vertex")
+def _clearance(result: xr.Dataset, case: Case) -> float:
+    return closest_panels(result, case)[1].distance
+
+
+def closest_panels(result: xr.Dataset, case: Case) -> tuple[int, Clearance]:
+    """The sample (0: of modes, whose panels are at rest) in which panels are closest, and where."""
+    made, shapes = case.structure, np.zeros((1, 1, 3))
+    if "time" in result.dims or "step" in result.dims:
+        shapes = sampled(result, "displacement").transpose(..., "node", "axis").values
+    found = [clearance(made.nodes + u, made.triangles, made.triangle_panel) for u in shapes]
+    k = int(np.argmin([one.distance for one in found]))
+    return k, found[k]
 
 
 # --------------------------------------------------------------------------- paths

@@ -1,0 +1,114 @@
+"""Clearance: the least distance between panels that share no vertex, and where it is."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from foldyn.jit.compiled import kernel
+from foldyn.mechanics.contact.distances import (
+    apart,
+    between,
+    closest_of_segments,
+    closest_on_triangle,
+    dot,
+    point,
+)
+from foldyn.mechanics.crossings import crossing_panels
+
+NEIGHBORS = 32  # of a triangle's center, among which a first bound is looked for
+
+
+class Clearance(NamedTuple):
+    """The closest points of two panels, whose distance is the size of a sum over four nodes.
+
+    Attributes
+    ----------
+    distance : float
+        m; 0 where panels cross, inf where every two panels share a vertex.
+    nodes, weights : ndarray, shape (4,)
+        The vector between both points is the sum of the weights times the nodes' places.
+    """
+
+    distance: float
+    nodes: NDArray[np.int64]
+    weights: NDArray[np.float64]
+
+
+def clearance(points: NDArray, triangles: NDArray, panels: NDArray) -> Clearance:
+    """The least distance between two panels that share no node.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Places of all nodes (m).
+    triangles : ndarray of int, shape (m, 3)
+        Triangles into which panels are cut.
+    panels : ndarray of int, shape (m,)
+        The panel of each.
+    """
+    x = np.ascontiguousarray(points, float)
+    rows, owners = np.asarray(triangles, np.int64), np.asarray(panels, np.int64)
+    members = sparse.csr_array((np.ones(rows.size), (np.repeat(owners, 3), rows.ravel())))
+    meet = (members @ members.T).tocsr()
+    nodes, weights = np.zeros(4, np.int64), np.zeros(4)
+    pairs = _near(x[rows], owners, meet)
+    crossing = crossing_panels(x, rows, owners)
+    if len(crossing) and (_entries(meet, *crossing.T) == 0.0).any():
+        return Clearance(0.0, nodes, weights)
+    return Clearance(float(_closest(x, rows, pairs, nodes, weights)), nodes, weights)
+
+
+def _near(corners: NDArray, panels: NDArray, meet: sparse.csr_array) -> NDArray[np.int64]:
+    """Pairs of triangles (k, 2) of panels that do not meet, the closest ones among them."""
+    center = corners.mean(axis=1)
+    radius = float(np.linalg.norm(corners - center[:, None], axis=2).max())
+    tree = cKDTree(center)
+    far, beside = tree.query(center, min(NEIGHBORS, len(center)))
+    far, beside = far.reshape(len(center), -1), beside.reshape(len(center), -1)
+    free = _entries(meet, np.repeat(panels, far.shape[1]), panels[beside].ravel()) == 0.0
+    bound = np.min(far.ravel(), where=free, initial=np.inf)
+    reach = bound + 2.0 * radius if np.isfinite(bound) else np.inf
+    pairs = tree.query_pairs(reach, output_type="ndarray").astype(np.int64)
+    return pairs[_entries(meet, *panels[pairs].T) == 0.0]
+
+
+def _entries(matrix: sparse.csr_array, rows: NDArray, columns: NDArray) -> NDArray:
+    return np.asarray(matrix[rows, columns]).ravel()
+
+
+@kernel
+def _closest(x, triangles, pairs, nodes, weights):
+    """Least distance of some pairs of triangles; where it is goes into the last two arguments."""
+    best = np.inf
+    for k in range(len(pairs)):
+        for turn in range(2):
+            i, j = pairs[k, turn], pairs[k, 1 - turn]
+            a, b, c = triangles[j]
+            pa, pb, pc = point(x, a), point(x, b), point(x, c)
+            for corner in range(3):
+                v = triangles[i, corner]
+                p = point(x, v)
+                wa, wb, wc, _ = closest_on_triangle(p, pa, pb, pc)
+                r = apart(p, pa, pb, pc, wa, wb, wc)
+                if dot(r, r) < best:
+                    best = dot(r, r)
+                    nodes[0], nodes[1], nodes[2], nodes[3] = v, a, b, c
+                    weights[0], weights[1], weights[2], weights[3] = 1.0, -wa, -wb, -wc
+        for one in range(3):
+            a, b = triangles[pairs[k, 0], one], triangles[pairs[k, 0], (one + 1) % 3]
+            pa, pb = point(x, a), point(x, b)
+            for other in range(3):
+                c, d = triangles[pairs[k, 1], other], triangles[pairs[k, 1], (other + 1) % 3]
+                pc, pd = point(x, c), point(x, d)
+                s, t, _ = closest_of_segments(pa, pb, pc, pd)
+                r = between(pa, pb, pc, pd, s, t)
+                if dot(r, r) < best:
+                    best = dot(r, r)
+                    nodes[0], nodes[1], nodes[2], nodes[3] = a, b, c, d
+                    weights[0], weights[1], weights[2], weights[3] = 1.0 - s, s, t - 1.0, -t
+    return np.sqrt(best)
