@@ -56,8 +56,6 @@ def test_page_on_nonlinear_vibration_shows_what_it_says(tmp_path, monkeypatch):
     assert names["folds"].frequency.values == pytest.approx([0.6321, 0.6273], abs=1e-4)
     assert names["curve"].attrs["complete"] == 1
     assert names["one"].stable
-    assert np.ptp(names["seen"].displacement.values, axis=0).max() < 0.01
-    assert names["up"].jump.values.sum() <= 1
 
 
 @pytest.fixture(scope="module")

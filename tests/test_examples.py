@@ -120,6 +120,23 @@ def fidelity(found):
     assert "use it" in result.advice
 
 
+def hardening_miura(found):
+    """Mode 2 at twice mode 1 joins in: the second harmonic peaks there, the shift changes sign."""
+    assert 70.0 < found["resonant"] < 90.0
+    hardens = found["dihedrals"][np.array(found["shifts"]) > 0.0]
+    assert hardens.tolist() == [50, 60, 70, 140, 150]
+    first = [float(spine.frequency[0]) for spine in found["spines"]]
+    np.testing.assert_allclose(first, found["modes"][:, 0], rtol=1e-5)
+    parts = [np.abs(one.coefficient.values[-1]).max(axis=(1, 2)) for one in found["spines"]]
+    second = np.array([part[2] / part[1] for part in parts])
+    assert (np.diff(second[:3]) > 0.0).all() and (np.diff(second[3:]) < 0.0).all()
+    # at small amplitudes the shift grows with their square
+    small = fd.backbone(found["case"](110), amplitudes=(3e-6, 3e-4), harmonics=5)
+    off = small.frequency.values / small.frequency.values[0] - 1.0
+    factor = (off / small.amplitude.values**2)[-5:]
+    np.testing.assert_allclose(factor, factor[-1], rtol=0.02)
+
+
 def jumping_resonance(found):
     """Only the strongest force bends the curve over, and the swing grows less than the force."""
     curves = list(found["curves"].values())
@@ -199,8 +216,8 @@ def thick_panel(found):
 
 CHECKS = (
     bilayer, case_study_1, clamped, contact_tower, crane, deployment, design_frequencies,
-    design_kresling, design_miura, fidelity, jumping_resonance, kresling_chain, miura_bands,
-    point_mass, pressure, snap_through, sweep, thick_panel,
+    design_kresling, design_miura, fidelity, hardening_miura, jumping_resonance, kresling_chain,
+    miura_bands, point_mass, pressure, snap_through, sweep, thick_panel,
 )  # fmt: skip
 
 

@@ -37,3 +37,8 @@ def response():
 @cache
 def path():
     return fd.trace(case(), steps=4)
+
+
+@cache
+def backbone():
+    return fd.backbone(case().altered(loads=()), amplitudes=(1e-3, 0.01), harmonics=3)

@@ -6,7 +6,7 @@ import csv
 
 import numpy as np
 import pytest
-from small_results import modes, motion, path, response
+from small_results import backbone, modes, motion, path, response
 
 import foldyn as fd
 from foldyn.errors import InputError
@@ -34,6 +34,17 @@ def test_a_row_for_each_sample_and_node(tmp_path):
     for k, axis in enumerate("xyz"):
         found = frame[f"velocity_{axis} [m/s]"].to_numpy().reshape(shape)
         np.testing.assert_array_equal(found, run.velocity[:, :, k])
+
+
+def test_a_row_for_each_point_of_a_backbone_and_each_of_its_harmonics(tmp_path):
+    spine = backbone()
+    frame = table(spine, tmp_path)
+    for name, title in (("frequency", "frequency [Hz]"), ("amplitude", "amplitude [m]")):
+        np.testing.assert_array_equal(frame[title], spine[name])
+    parts = table(spine, tmp_path, rows="point,harmonic,node")
+    found = parts["coefficient_x_real [m]"] + 1j * parts["coefficient_x_imag [m]"]
+    wanted = spine.coefficient.transpose("point", "harmonic", "node", "axis")[..., 0]
+    np.testing.assert_array_equal(found, wanted.values.ravel())
 
 
 def test_numbers_have_all_their_digits(tmp_path):

@@ -7,6 +7,7 @@ import tomllib
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
 import foldyn as fd
@@ -15,7 +16,7 @@ from foldyn.experiment.camera import Camera
 from foldyn.report import write_report
 from foldyn.viewer import Backdrop, projection, stage
 
-KINDS = ("motion", "path", "modes", "response", "bands")
+KINDS = ("motion", "path", "modes", "response", "bands", "periodic")
 ALL = (*KINDS, "film")
 PAINTERS = ("webgl", "plain")
 """What a page may be asked for."""
@@ -54,6 +55,18 @@ def bands_file():
     return case_of_document(Path("bands.toml"), tomllib.loads(BANDS))
 
 
+def in_a_well():
+    """A triangle that snaps through, driven in one of its wells, where its period doubles."""
+    pattern = fd.Pattern([[0, 0, 0], [1, 0, 0], [0.5, 0.8, 0.2]], [[0, 1, 2]])
+    structure = fd.discretize(pattern, SHEET, scheme="n4b5", bar_law="linear", mass="panel")
+    supports = [fd.Fix([0, 1]), fd.Fix([2], "xy")]
+    (f,) = fd.modes(fd.Case(structure, supports), 1)["frequency"].values
+    omega = 2.0 * np.pi * f
+    force = 0.04 * structure.mass.toarray()[2, 2] * omega**2
+    push = fd.Force([2], (0, 0, force), history=fd.Harmonic(f))
+    return fd.Case(structure, supports, [push], fd.Rayleigh(alpha=0.15 * omega)), f
+
+
 @cache
 def results(kind):
     rules = ("circumcenter", "panel")
@@ -63,6 +76,9 @@ def results(kind):
         return {"fold": fd.trace(case(), load_factors=[0.5, 1.0, 1.5, 2.0])}
     if kind == "bands":
         return {"sheet": bands_file().run()}
+    if kind == "periodic":
+        driven, f = in_a_well()
+        return {"cell": fd.response_curve(driven, (1.2 * f, 0.8 * f), 5, longest_step=0.3)}
     if kind == "modes":
         return {rule: fd.modes(case(loaded=False, mass=rule), 4) for rule in rules}
     drive = [fd.Force([0, 1], (-1.0, 0.0, 0.0))]

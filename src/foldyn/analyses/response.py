@@ -18,9 +18,7 @@ from foldyn.dynamics import Progress
 from foldyn.errors import InputError
 from foldyn.periodic import response_curve
 from foldyn.periodic.drive import Drive
-from foldyn.plots.charts import Chart, Curve
 from foldyn.report.album import Album, ByRule, by_mass_rule
-from foldyn.report.charts import Charts
 from foldyn.report.sections import Heading, Table
 from foldyn.report.sections import Section as PageSection
 from foldyn.values import number, show
@@ -75,6 +73,7 @@ class ResponseAnalysis(Analysis):
     """Periodic motions along the frequency or the amplitude of the drive."""
 
     kind = "response"
+    moving = True
     schema = ResponseSchema
     needs_density = "a response curve needs"
     takes = arguments_of(response_curve)
@@ -120,7 +119,6 @@ class ResponseAnalysis(Analysis):
             "Largest displacement in a period, half the distance between its extremes. Solid: "
             "stable motions, dashed: unstable ones.",
             lambda: plots.plot_response_curve(curves),
-            Charts([_chart(results)], "Dots: motions that were found."),
         )
         yield Heading("The numbers")
         yield _bifurcations(results)
@@ -132,24 +130,6 @@ class ResponseAnalysis(Analysis):
             },
             f"{case_file.path.name}: the computation",
         )  # fmt: skip
-
-
-def _chart(results: ByRule) -> Chart:
-    """The curve as dots, for a page without figures."""
-    along, label = (
-        ("frequency", "frequency of the drive (Hz)")
-        if next(iter(results.values())).attrs["by"] == "frequencies"
-        else ("level", "factor on the drive")
-    )
-    curves = []
-    for rule, result in results.items():
-        names, stable = result["bifurcation"].values, result["stable"].values
-        kinds = {"stable": (names == "") & stable, "unstable": (names == "") & ~stable}
-        kinds |= {str(name): names == name for name in np.unique(names[names != ""])}
-        of = f", {rule}" if len(results) > 1 else ""
-        x, y = result[along].values, result["amplitude"].values
-        curves += [Curve(f"{kind}{of}", x[at], y[at], True) for kind, at in kinds.items()]
-    return Chart(label, "amplitude (m)", [one for one in curves if np.size(one.x)])
 
 
 def _bifurcations(results: ByRule) -> Table:

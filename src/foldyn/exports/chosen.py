@@ -21,6 +21,9 @@ ALONG = {
     "bands": "phase",
     "fidelity": "mode",
     "folding": "step",
+    "periodic_motion": "time",
+    "response_curve": "point",
+    "backbone": "point",
 }
 """The dimension along which a kind of results runs."""
 TABLES = "tables_"

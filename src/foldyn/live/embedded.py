@@ -27,10 +27,14 @@ HEIGHT = 820
 """Pixels of a view in a notebook."""
 TITLES: Mapping[str, str] = {
     "trajectory": "Motion", "path": "Static curve", "modes": "Modes", "frf": "Frequency response",
-    "folding": "Folding", "bands": "Bands",
+    "folding": "Folding", "bands": "Bands", "response_curve": "Response curve",
+    "backbone": "Backbone", "periodic_motion": "Periodic motion",
 }  # fmt: skip
 """What results are called, by their kind."""
-MOVING = "a motion, a path, modes, a frequency response, bands or a folding"
+MOVING = (
+    "a motion, a path, modes, a frequency response, bands, a folding, a response curve, a backbone "
+    "or a periodic motion"
+)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from typing import Any
 MODULES = (
     "data", "numbers", "colors", "camera", "gl", "painter", "annotations", "vector", "charts",
     "curves", "result", "view", "analysis", "motion", "path", "folding", "modes", "response",
-    "cells", "contours", "bands", "shape", "analyses", "legend", "files", "page", "plots", "tables",
+    "cells", "contours", "bands", "periodic", "shape", "analyses", "legend", "files", "page",
+    "plots", "tables",
 )  # fmt: skip
 """In an order in which each uses only those before it."""
 _IMPORT = re.compile(r"^import (\{[^;]*\}) from \"\./(\w+)\.js\";\n", re.MULTILINE)

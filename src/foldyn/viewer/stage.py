@@ -24,6 +24,7 @@ from foldyn.structures import Sheet, discretize
 from foldyn.viewer.arrays import Arrays
 from foldyn.viewer.backdrop import Backdrop
 from foldyn.viewer.fields import Field, energies, fields, folding_fields
+from foldyn.viewer.orbits import about_orbits, orbits
 from foldyn.viewer.scripts import in_page
 from foldyn.viewer.sheet import bare_sheet, sheet
 from foldyn.viewer.waves import about_waves, waves
@@ -76,7 +77,7 @@ def stage(
     results: Results, cases: Mapping[str, Case], title: str, nodes: list[int],
     backdrop: Backdrop | None = None,
 ) -> Stage:  # fmt: skip
-    """Show results of one kind, by name: motions, paths, foldings, modes, responses or bands.
+    """Show results of one kind, by name: motions, paths, modes, bands, and what else moves.
 
     cases : of the results but for foldings, which have none.
     nodes : those to begin with; the first is chosen.
@@ -131,12 +132,17 @@ def _kind(result: xr.Dataset) -> str:
         return "folding"
     if "band" in result.sizes:
         return "bands"
+    if "point" in result.sizes and "coefficient" in result:
+        return "periodic"
     for name, kind in (("time", "motion"), ("step", "path"), ("mode", "modes")):
         if name in result.sizes:
             return kind
     if "frequency" in result.sizes:
         return "response"
-    raise InputError("result: it is no motion, path, folding, modes, frequency response or bands")
+    raise InputError(
+        "result: it is no motion, path, folding, modes, frequency response, bands, response curve "
+        "or backbone"
+    )
 
 
 def _motion(
@@ -240,10 +246,23 @@ def _bands(
     return [own | waves(arrays, key, result)]
 
 
+def _periodic(
+    arrays: Arrays, key: str, case: Case, result: xr.Dataset, own: dict[str, Any]
+) -> list[dict[str, Any]]:
+    return [own | orbits(arrays, key, result)]
+
+
 _LISTED: Mapping[str, Callable[..., list[dict[str, Any]]]] = {
     "motion": _motion, "path": _path, "folding": _folding, "modes": _modes, "response": _response,
-    "bands": _bands,
+    "bands": _bands, "periodic": _periodic,
 }  # fmt: skip
+
+
+def _moved(kind: str, result: xr.Dataset) -> str:
+    """Name of what says how nodes move."""
+    if kind == "response":
+        return _measured(result)
+    return "coefficient" if kind == "periodic" else "displacement"
 
 
 def _measured(result: xr.Dataset) -> str:
@@ -260,14 +279,15 @@ def _more(
     if kind == "bands":
         structure = next(iter(cases.values())).structure
         return about_waves(next(iter(results.values())), len(structure.triangles))
-    name = _measured(next(iter(results.values()))) if kind == "response" else "displacement"
+    first = next(iter(results.values()))
+    name = _moved(kind, first)
     moved = [
         np.abs(result[name].sel(node=nodes[:1] or [0]).transpose(..., "axis").values)
         for result in results.values()
     ]
     largest = np.max([each.reshape(-1, 3).max(axis=0) for each in moved], axis=0)
-    unit = next(iter(results.values()))[name].attrs.get("units", "")
-    return {"axis": int(largest.argmax()), "unit": unit}
+    more = about_orbits(first) if kind == "periodic" else {}
+    return {"axis": int(largest.argmax()), "unit": first[name].attrs.get("units", ""), **more}
 
 
 def _likeness(results: Results, cases: Mapping[str, Case]) -> list[list[float | None]] | None:

@@ -4,10 +4,12 @@ import { number } from "./numbers.js";
 
 const css = (element, name) => getComputedStyle(element).getPropertyValue(name).trim();
 
+const MARK = 4.5; // radius of marks, pixels
+
 const power = (value) => 10 ** Math.floor(Math.log10(value));
 
 export class Chart {
-  // curves: { name, color, dash, x, y, stable? }; options: `seek` is told the place that a reader
+  // curves: { name, color, dash, x, y, stable?, marks? }, marks being [[point, sides, turn], ...]; options: `seek` is told the place that a reader
   // points at, `free` says that curves may turn back, `log` that the vertical axis is logarithmic,
   // `decades` how many of it are shown at most, `words` what 0, 1, 2, ... along the horizontal axis
   // stand for. Of curves that may turn back: `ticks` are places with names along an axis ([[x, name],
@@ -49,9 +51,19 @@ export class Chart {
         { ...axis(ylabel, 54), ...(ticks.y && named(ticks.y)) },
       ],
       series: [free ? {} : { label: xlabel }, ...series],
-      hooks: { drawClear: [() => this.shade()], draw: [() => this.mark()] },
-    }, free ? [null, ...curves.map(({ x, y }) => [x, y])] : aligned(curves), host);
+      hooks: { drawClear: [() => this.shade()], draw: [() => this.marks(), () => this.mark()] },
+    }, this.data(), host);
     if (seek) this.point(seek);
+  }
+
+  data() {
+    return this.free ? [null, ...this.curves.map(({ x, y }) => [x, y])] : aligned(this.curves);
+  }
+
+  // Other values of the same curves.
+  put(curves) {
+    this.curves = curves;
+    this.plot.setData(this.data());
   }
 
   point(seek) {
@@ -123,6 +135,29 @@ export class Chart {
     }
     ctx.restore();
     return null;
+  }
+
+  // Rings and polygons at points of curves.
+  marks() {
+    const { ctx } = this.plot;
+    ctx.save();
+    ctx.setLineDash([]);
+    ctx.lineWidth = 1.5 * devicePixelRatio;
+    this.curves.forEach(({ x, y, color, marks = [] }, j) => {
+      if (!this.plot.series[j + 1].show) return;
+      ctx.strokeStyle = color;
+      for (const [k, sides, turn] of marks) {
+        const [across, up] = [this.plot.valToPos(x[k], "x", true), this.plot.valToPos(y[k], "y", true)];
+        ctx.beginPath();
+        for (let side = 0; side < sides; side++) {
+          const angle = turn + (2 * Math.PI * side) / sides;
+          ctx.lineTo(across + MARK * devicePixelRatio * Math.cos(angle), up + MARK * devicePixelRatio * Math.sin(angle));
+        }
+        ctx.closePath();
+        ctx.stroke();
+      }
+    });
+    ctx.restore();
   }
 
   // Curves that are not switched off.

@@ -1,0 +1,91 @@
+"""Periodic motions along a response curve or a backbone, as a page shows them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn.periodic.fourier import Fourier, values_of
+from foldyn.viewer.arrays import Arrays
+
+OF_MOTIONS = 1e-4
+"""Errors of Fourier coefficients over the largest displacement of their motion."""
+MOST_NUMBERS = 10_000_000
+"""Numbers of all motions of a result: of more, every k-th point is left, and those with names."""
+SAMPLES = 64
+"""Of a period, among which the largest displacement is sought."""
+
+
+def orbits(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
+    """Description of the motions of one result, whose arrays get names that begin with key.
+
+    "x" and "y" (point), what varies and the amplitude; "sizes" (point), the largest displacement in
+    a period, m; "displacement", a_0, a_1, b_1, a_2, ... (point, coefficient) of every node and
+    axis, sums of a_k cos k tau + b_k sin k tau over the size; lists over the points: "stable",
+    "bifurcations", "branches" and "periods".
+    """
+    chosen = points(result)
+    some = result.isel(point=chosen)
+    amplitudes = some["coefficient"].transpose("point", "harmonic", "node", "axis").values
+    size = np.array([largest(one) for one in amplitudes])
+    own: Any = amplitudes / np.where(size > 0.0, size, 1.0)[:, None, None, None]
+    series = Fourier(own.shape[1] - 1).real_of(own.swapaxes(0, 1)).swapaxes(0, 1)
+    count = len(chosen)
+    return {
+        "x": arrays.exact(f"{key}.x", some[along(result)].values, "f4"),
+        "y": arrays.exact(f"{key}.y", some["amplitude"].values, "f4"),
+        "sizes": arrays.exact(f"{key}.sizes", size, "f4"),
+        "displacement": arrays.changing(
+            f"{key}.u", series.reshape(-1, *series.shape[2:]), OF_MOTIONS
+        ),
+        "stable": _listed(some, "stable", [None] * count),
+        "bifurcations": _listed(some, "bifurcation", [""] * count),
+        "branches": _listed(some, "branch", [0] * count),
+        "periods": _listed(some, "periods", [1] * count),
+    }
+
+
+def _listed(result: xr.Dataset, name: str, otherwise: list[Any]) -> list[Any]:
+    """Values over the points, which a backbone lacks."""
+    return result[name].values.tolist() if name in result else otherwise
+
+
+def points(result: xr.Dataset) -> NDArray[np.int64]:
+    """Numbers of the points that a page shows."""
+    count = result.sizes["point"]
+    every = -(-2 * result["coefficient"].size // MOST_NUMBERS)
+    kept = np.arange(count) % every == 0
+    if "branch" in result:
+        ends = np.flatnonzero(np.diff(result["branch"].values))
+        kept[ends] = kept[ends + 1] = True
+        kept |= result["bifurcation"].values != ""
+    kept[-1] = True
+    return np.flatnonzero(kept)
+
+
+def largest(amplitudes: NDArray) -> float:
+    """Largest displacement of any node in a period, of amplitudes (h + 1, n, 3) of exp(i k tau)."""
+    phase = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+    return float(np.linalg.norm(values_of(amplitudes, phase), axis=-1).max())
+
+
+def along(result: xr.Dataset) -> str:
+    """Name of what varies."""
+    return "level" if result.attrs.get("by") == "amplitudes" else "frequency"
+
+
+def about_orbits(result: xr.Dataset) -> dict[str, Any]:
+    """What all results of a page share: the names of the axes of the curve."""
+    driven = "by" in result.attrs
+    label = {"frequency": "frequency of the drive (Hz)", "level": "factor on the drive"}
+    measure = result.attrs.get("measure", "largest displacement")
+    return {
+        "along": label[along(result)] if driven else "frequency (Hz)",
+        "hertz": along(result) == "frequency",
+        "driven": driven,
+        "measure": f"amplitude of the {measure}",
+        "measured": result["amplitude"].attrs.get("units", ""),
+    }
