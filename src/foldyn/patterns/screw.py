@@ -15,7 +15,6 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from foldyn.arguments import Check, Checked
 from foldyn.errors import InputError, UnitsWarning
@@ -99,6 +98,8 @@ class Screw(Checked):
         """Rotation (3, 3) of so many of these motions."""
         if not self.turns or power == 0:
             return np.eye(3)
+        from scipy.spatial.transform import Rotation
+
         return Rotation.from_rotvec(power * np.radians(self.angle) * self.unit).as_matrix()
 
     def images(self, points: ArrayLike, power: int = 1) -> NDArray[np.float64]:
@@ -146,6 +147,8 @@ def motion_between(points: NDArray, images: NDArray, tolerance: float) -> tuple[
     spread = np.linalg.svd(from_center, compute_uv=False)
     if off.max() <= tolerance or len(points) < 3 or spread[1] <= SPREAD * spread[0]:
         return translation(step), off
+    from scipy.spatial.transform import Rotation
+
     turn = Rotation.align_vectors(to_center, from_center)[0]
     rotation, about = turn.as_matrix(), turn.as_rotvec()
     angle = float(np.linalg.norm(about))
