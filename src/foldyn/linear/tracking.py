@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from foldyn.linear.bloch import Bloch
 from foldyn.linear.group_velocity import Waves, separated
@@ -19,6 +18,8 @@ def tracked(bloch: Bloch, phases: NDArray, waves: Sequence[Waves]) -> list[Waves
     weight, is greatest; those of one frequency as they go on along the way from the one to the
     other. Bands that leave the lowest ones, at a crossing with one above, end there.
     """
+    from scipy.optimize import linear_sum_assignment
+
     out = [waves[0]]
     for k in range(1, len(waves)):
         way = phases[k] - phases[k - 1]
