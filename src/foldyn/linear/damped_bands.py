@@ -52,9 +52,9 @@ def damped_bands(
     Returns
     -------
     xarray.Dataset
-        Dimensions phase, band, in the order of |s|. `rate` (s, complex, 1/s), `frequency` (Hz,
-        |Im s| / 2 pi; 0 of waves that creep back) and `damping_ratio` (-Re s / |s|; 1 of those; nan
-        of rigid motions). Coordinates and attributes as of `bands`.
+        Dimensions phase, band, in the order of abs(s). `rate` (s, complex, 1/s), `frequency` (Hz,
+        abs(Im s) / 2 pi; 0 of waves that creep back) and `damping_ratio` (-Re s / abs(s); 1 of
+        those; nan of rigid motions). Coordinates and attributes as of `bands`.
 
     Raises
     ------
