@@ -108,12 +108,13 @@ def test_derivatives_are_those_of_whole_predictions(tmp_path, kind, monkeypatch)
     made = problem(path, data, parameters, {})
     values = np.array([*starts.values()]) * draw.uniform(0.97, 1.03, len(starts))
     predicted, slopes = map(np.concatenate, made.differentiate(values))
+    exact = 2e-5 if kind == "motions" else 1e-6  # rounding of a motion over the neighbor's change
     np.testing.assert_array_equal(predicted, np.concatenate(made.predict(values)))
     for k, (one, scale) in enumerate(zip(parameters, made.space.column("scale"), strict=True)):
         expected = scale * difference(made, values, k, 1e-3 * scale)
         least = 1e-2 * np.abs(predicted).max()  # of a parameter that changes nothing
         np.testing.assert_allclose(
-            scale * slopes[:, k], expected, 0.0, 1e-6 * max(np.abs(expected).max(), least),
+            scale * slopes[:, k], expected, 0.0, exact * max(np.abs(expected).max(), least),
             err_msg=one.key,
         )  # fmt: skip
 
