@@ -35,14 +35,9 @@ def compared(path: Path, document: Document) -> Document:
 
     A start and a drive have no place there, and are left out with a warning.
     """
-    left = [f"[{name}]" for name in ("initial", "drive") if name in document]
-    if left:
-        warnings.warn(
-            f"{path}: foldyn fidelity leaves out {', '.join(left)}: small vibrations about rest "
-            "are compared, and displacements under the loads",
-            FoldynWarning,
-            stacklevel=3,
-        )
+    left = _tables(document, "initial", "drive")
+    why = "small vibrations about rest are compared, and displacements under the loads"
+    _tell(path, "fidelity", left, why)
     kept = _without(document, "initial", "drive", "output")
     return {**kept, "analysis": {"kind": "fidelity"}}
 
@@ -56,33 +51,40 @@ def unbounded(path: Path, document: Document, state: str) -> Document:
     loads = document.get("loads", [])
     kept_loads = [_without(each, "history") for each in loads if "creases" in each]
     kept_loads = [] if state == "rest" else kept_loads
-    left = [f"[{name}]" for name in ("contact", "initial", "drive") if name in document]
+    left = _tables(document, "contact", "initial", "drive")
     left += ["[[supports]]"] if document.get("supports") else []
     left += ["[[loads]]"] if len(loads) > len(kept_loads) else []
-    if left:
-        warnings.warn(
-            f"{path}: foldyn bands leaves out {', '.join(left)}: the pattern repeats without end, "
-            'and what holds or loads one cell would be in all of them (a file of kind "bands" may '
-            "have supports)",
-            FoldynWarning,
-            stacklevel=3,
-        )
+    why = (
+        "the pattern repeats without end, and what holds or loads one cell would be in all of them "
+        '(a file of kind "bands" may have supports)'
+    )
+    _tell(path, "bands", left, why)
     kept = _without(document, "contact", "initial", "drive", "output", "supports", "loads")
     return {**kept, "loads": kept_loads, "analysis": {"kind": "bands"}}
 
 
 def driven(path: Path, document: Document) -> Document:
     """The document as a response curve under its harmonic histories."""
-    left = [f"[{name}]" for name in ("initial", "drive") if name in document]
-    if left:
-        warnings.warn(
-            f"{path}: foldyn response leaves out {', '.join(left)}: periodic motions have no "
-            "start, and [[loads]] and [[supports]] with a harmonic history drive them",
-            FoldynWarning,
-            stacklevel=3,
-        )
+    left = _tables(document, "initial", "drive")
+    why = (
+        "periodic motions have no start, and [[loads]] and [[supports]] with a harmonic history "
+        "drive them"
+    )
+    _tell(path, "response", left, why)
     kept = _without(document, "initial", "drive", "output")
     return {**kept, "analysis": {"kind": "response"}}
+
+
+def _tables(document: Document, *names: str) -> list[str]:
+    """Those of some tables that a document has."""
+    return [f"[{name}]" for name in names if name in document]
+
+
+def _tell(path: Path, command: str, left: list[str], why: str) -> None:
+    """Warn of what a command leaves out of a file, if it does."""
+    if left:
+        text = f"{path}: foldyn {command} leaves out {', '.join(left)}: {why}"
+        warnings.warn(text, FoldynWarning, stacklevel=4)
 
 
 def converted(path: Path, document: Document, kind: str, state: str) -> Document:
@@ -109,18 +111,13 @@ def converted(path: Path, document: Document, kind: str, state: str) -> Document
     left += [f"supports[{i}]" for i, _ in bases]
     if "initial" in document:
         left.append("[initial]")
-    if left:
-        why = (
-            "nothing acts or moves in the state of rest (--state equilibrium takes the equilibrium "
-            "under the loads)"
-            if atrest
-            else "what moves over time has no place in small vibrations about a state"
-        )
-        warnings.warn(
-            f"{path}: foldyn {kind} leaves out {', '.join(left)}: {why}",
-            FoldynWarning,
-            stacklevel=3,
-        )
+    why = (
+        "nothing acts or moves in the state of rest (--state equilibrium takes the equilibrium "
+        "under the loads)"
+        if atrest
+        else "what moves over time has no place in small vibrations about a state"
+    )
+    _tell(path, kind, left, why)
     kept = _without(document, "initial", "drive", "output")
     kept |= {"supports": supports, "loads": [] if atrest else loads, "analysis": {"kind": kind}}
     kept["output"] = _shown(document.get("output", {}), kind)

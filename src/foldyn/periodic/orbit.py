@@ -8,12 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import InputError
 from foldyn.periodic.balance import Balance
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.fourier import Fourier, values_of
-from foldyn.results import Quantity
-from foldyn.values import of_kind
 
 SHOWN = 128  # samples of a period in results
 FINE = 256  # samples among which extremes are sought
@@ -144,15 +141,3 @@ def measured(orbit: Orbit, measure: Any) -> float:
         for one, rate, t in zip(u, v, time, strict=True)
     ]
     return float(swing(np.array(values)))
-
-
-def check_measure(measure: Any) -> None:
-    """Refuse what gives no number."""
-    if measure is None:
-        return
-    of_kind("measure", measure, Quantity)
-    if measure.function is None or measure.dims:
-        raise InputError(
-            ": must have a function of displacement, velocity and time that gives one number",
-            "measure",
-        )

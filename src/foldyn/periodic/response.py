@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.attractors.run import check_measure
 from foldyn.cases import Case, State
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter, reporter
@@ -31,7 +32,7 @@ from foldyn.periodic.families import ByFrequency, ByLevel
 from foldyn.periodic.floquet import STEPS, is_stable, multipliers
 from foldyn.periodic.fourier import Fourier
 from foldyn.periodic.motion import balance_of, warn_of_truncation
-from foldyn.periodic.orbit import check_measure, measured
+from foldyn.periodic.orbit import measured
 from foldyn.periodic.start import balanced, coefficients
 from foldyn.results import Quantity
 from foldyn.results.periodic_dataset import points_dataset
@@ -140,7 +141,8 @@ def response_curve(
     """
     began = time.perf_counter()
     of_kind("case", case, Case)
-    check_measure(measure)
+    if measure is not None:
+        check_measure(measure)
     by, ends = _range(frequencies, amplitudes)
     tolerance = number("tolerance", tolerance, above=0.0, below=1.0)
     longest = number("longest_step", longest_step, above=0.0, most=1.0)
