@@ -127,10 +127,14 @@ def assemble(n, nodes, scale, force, tangent):
     return f, k.reshape(3 * n, 3 * n)
 
 
+FEW = ("hexagon", "kresling", "miura n5b8", "simple fold")
+
+
 @pytest.mark.parametrize(
     ("name", "amplitude"),
     [
-        pytest.param(name, amplitude, marks=() if amplitude == 0.15 else pytest.mark.matrix)
+        # JAX compiles each anew: all states of a model where it is compiled
+        pytest.param(name, amplitude, marks=() if name in FEW else pytest.mark.matrix)
         for name in sorted(name for name in MODELS if "coupled" not in name)
         for amplitude in (0.02, 0.15, 0.4)
     ],
