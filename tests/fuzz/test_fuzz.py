@@ -9,7 +9,7 @@ import pytest
 from fuzz_judge import fuzz
 from fuzz_targets import TARGETS
 
-SHORT = 40  # a few seconds
+SHORT = 20  # a few seconds
 MAIN = runpy.run_path(str(Path(__file__).with_name("__main__.py")))
 
 
