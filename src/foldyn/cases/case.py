@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.arguments import brief
+from foldyn.cases.air import Air
 from foldyn.cases.case_assembly import Damped, Loaded
 from foldyn.cases.clamped_edges import supported_points
 from foldyn.cases.contact import Contact
@@ -56,6 +57,8 @@ class Case(Loaded, Damped):
     contact : Contact, optional
         Panels that touch each other, and planes; without it they pass through each other. Motions
         and paths of equilibria take it.
+    air : Air, optional
+        The fluid around the sheet; vacuum by default.
 
     Attributes
     ----------
@@ -113,6 +116,7 @@ class Case(Loaded, Damped):
     damping: Damping | Sequence[Damping] = field(default_factory=Rayleigh)
     masses: Sequence[PointMass] = ()
     contact: Contact | None = None
+    air: Air | None = None
 
     def _repr_html_(self) -> str | None:
         """A picture for notebooks."""
@@ -132,6 +136,8 @@ class Case(Loaded, Damped):
         object.__setattr__(self, "damping", dampings(self.damping))
         if self.contact is not None and not isinstance(self.contact, Contact):
             raise InputError(f"contact = {show(self.contact)}: must be a Contact")
+        if self.air is not None and not isinstance(self.air, Air):
+            raise InputError(f"air = {show(self.air)}: must be an Air")
         self._check_selections()
         _ = self.base_terms, self.actuation_terms  # check the supports and the creases
         if self.constraints:

@@ -34,6 +34,7 @@ from foldyn.algebra.complex_symmetric import Gram
 from foldyn.algebra.solvers import check_fill
 from foldyn.arguments import brief
 from foldyn.cases import Case, State
+from foldyn.cases.air import refuse_air
 from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.inertia import check_mass
@@ -198,6 +199,7 @@ def linearize(
             "0, here and in the planes",
             "contact",
         )
+    refuse_air(case, "a linearization")
     amplitude = None
     if secant is not None:
         amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
