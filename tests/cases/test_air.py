@@ -1,14 +1,10 @@
 """Air as an argument: its drag coefficient, its place in case files, and what is refused."""
 
-import warnings
-
 import pytest
 
 import foldyn as fd
 from foldyn.cases.document import from_document, to_document
 from foldyn.errors import InputError
-from foldyn.gradients import sensitivity
-from foldyn.linear import UnitCell
 
 
 def plate(a=1.0, b=1.0):
@@ -41,8 +37,8 @@ def test_air_is_written_and_read():
         ({"velocity": (1, 2)}, "velocity .*: must be three numbers"),
         ({"drag_coefficient": -0.1}, "drag_coefficient = -0.1: must be at least 0"),
         ({"resolution": 3}, "resolution = 3: must be even"),
-        ({"resolution": 0}, "resolution = 0: must be at least 2"),
-        ({"added_mass": "far"}, "added_mass = 'far': must be true, false or 'local'"),
+        ({"resolution": 0}, "resolution = 0: must be a whole number of at least 2"),
+        ({"added_mass": "far"}, 'added_mass = "far": must be true, false or "local"'),
         ({"added_mass": False, "drag": False}, "drag: without added mass and drag nothing acts"),
     ],
 )

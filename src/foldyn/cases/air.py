@@ -23,7 +23,7 @@ Fluid Mechanics, 7th edition, table 7.3, after Hoerner (1965), Fluid-Dynamic Dra
 
 def _added_mass(name: str, value: Any) -> bool | str:
     if isinstance(value, str) and value != LOCAL:
-        raise InputError(f" = {show(value)}: must be true, false or {LOCAL!r}", name)
+        raise InputError(f" = {show(value)}: must be true, false or {show(LOCAL)}", name)
     return value if isinstance(value, str) else flag(name, value)
 
 
