@@ -9,7 +9,6 @@ from scipy.linalg import eigh
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import UnitCell, bands
-from foldyn.statics import landscape
 
 AIR = fd.Air(density=1.204)
 HEAVY = fd.Sheet(206e9, 0.3, 0.238, density=7850.0)
@@ -176,11 +175,9 @@ def test_what_does_not_take_air_refuses_it(sheet):
         bands(UnitCell(sheet.altered(supports=())), [(0.5, 0.0)])
     with pytest.raises(InputError, match="air"):
         fd.backbone(sheet)
-    with pytest.raises(InputError, match="modes.* air"):
+    with pytest.raises(InputError, match=r"modes.* air"):
         fd.sensitivity(_thick, {"thickness": 1e-4}, "frequency[1]", {"kind": "modes", "count": 1})
     windy = sheet.altered(air=fd.Air(velocity=(0, 0, 3)), loads=[fd.Force("xmax", (0, 0, 1e-3))])
     for call in (fd.modes, fd.trace):
-        with pytest.raises(InputError, match="air.velocity = .*: statics would leave wind out"):
+        with pytest.raises(InputError, match=r"air.velocity = .*: statics would leave wind out"):
             call(windy)
-    with pytest.raises(InputError, match="air"):
-        landscape(windy)

@@ -322,8 +322,8 @@ def _response_table(responses: Mapping[str, xr.Dataset], paper: Mapping[str, Tar
         rows.append([f"{target.what} (%)", target.value, *values])
     return Table(
         ["", "paper", "the paper's parameters, here", "the same in air", "fitted parameters"], rows,
-        "Peaks of the response, and damping by the half-power points as the paper has it; in vacuum "
-        "but for one column.",
+        "Peaks of the response, and damping by the half-power points as the paper has it, in "
+        "vacuum but for one column.",
         digits=3,
     )  # fmt: skip
 
