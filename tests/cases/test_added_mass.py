@@ -46,7 +46,7 @@ def heave(structure, resolution):
     ids=["square", "twice as long"],
 )
 def test_rectangles_have_the_published_mass_with_400_elements(ratio, published):
-    """rho pi/4 a^2 b times 0.579 and 0.757 (Patton 1965; Blevins 1979, table 14-4)."""
+    """rho pi/4 a^2 b times 0.579 and 0.757 (DNV-RP-C205, appendix D, rectangular plates)."""
     plate = plates(rectangle(1.0, ratio))
     found = heave(plate, 20) / (np.pi / 4 * ratio)
     assert found == pytest.approx(published, rel=0.01)
