@@ -9,6 +9,8 @@ from scipy.linalg import eigh
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import UnitCell, bands
+from foldyn.sweeps import MEASURES
+from foldyn.sweeps.measure import asked
 
 AIR = fd.Air(density=1.204)
 HEAVY = fd.Sheet(206e9, 0.3, 0.238, density=7850.0)
@@ -181,3 +183,37 @@ def test_what_does_not_take_air_refuses_it(sheet):
     for call in (fd.modes, fd.trace):
         with pytest.raises(InputError, match=r"air.velocity = .*: statics would leave wind out"):
             call(windy)
+
+
+def test_a_case_file_has_air(tmp_path, sheet):
+    text = """
+[pattern]
+kind = "miura"
+cells = [1, 1]
+a = 0.1
+b = 0.1
+panel_angle = 60
+dihedral = 90
+[sheet]
+youngs_modulus = 1.2e9
+poissons_ratio = 0.2
+thickness = 1e-4
+density = 700.0
+[[supports]]
+nodes = "xmin"
+[air]
+[analysis]
+kind = "modes"
+count = 2
+"""
+    (tmp_path / "air.toml").write_text(text)
+    file = fd.read_case(tmp_path / "air.toml")
+    found = file.run()
+    np.testing.assert_allclose(found.air_share, fd.modes(sheet, 2).air_share, rtol=1e-9)
+    fd.save(found, tmp_path / "air.nc")
+    assert fd.case_of(fd.load(tmp_path / "air.nc")).air == AIR
+    share = asked("air_share[1]", MEASURES).of(found, file.case(), {})
+    assert float(share) == float(found.air_share[0])
+    (tmp_path / "air.toml").write_text(text.replace("[air]", "[air]\ndensity = -1"))
+    with pytest.raises(InputError, match=r"air.density = -1: must be greater than 0 kg/m3"):
+        fd.read_case(tmp_path / "air.toml")
