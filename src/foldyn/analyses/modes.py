@@ -261,7 +261,7 @@ def _notes(modes: xarray.Dataset, case: Case) -> str:
             "Superlinear hinges have the slope that is equivalent to an oscillation by "
             f"{modes.attrs['secant']:g} degrees: the frequencies are those of that amplitude."
         )
-    if "air_share" in modes:
+    if case.air is not None and "air_share" in modes:
         share = 100.0 * modes["air_share"].values
         notes.append(
             f"The sheet is in a fluid of {case.air.density:.4g} kg/m3, which has {share.min():.2g} "
