@@ -18,6 +18,7 @@ from foldyn.dynamics import parts
 from foldyn.dynamics.explicit_contact import ContactParts, contact_parts, slow_contacts
 from foldyn.dynamics.inertia import lumped_energy
 from foldyn.dynamics.motion_state import (
+    AIR,
     DISSIPATED,
     HINGE,
     OUTCOME,
@@ -60,7 +61,7 @@ class Balance(NamedTuple):
     histories: int  # evaluates them
     turn: int  # moves rest angles,
     carry: int  # supports,
-    presses: bool  # and obstacles
+    presses: bool  # obstacles and air
     follow: int  # loads that depend on the displacement
     solve: int  # M^-1, unless M is diagonal,
     kinetic: int  # and the kinetic energy
@@ -101,8 +102,8 @@ class Equation(NamedTuple):
     balance: int  # contexts
     setting: int
     recording: int
-    powers: NDArray  # (2,) in and out at the last acceleration, W
-    before: NDArray  # (2,) and at the last step, for methods that keep them
+    powers: NDArray  # (3,) in, out and to the air at the last acceleration, W
+    before: NDArray  # (3,) and at the last step, for methods that keep them
     team: Team
     own: NDArray  # (2,)
     stage: NDArray  # (3, n, 3) memory of methods with several stages
@@ -154,8 +155,8 @@ def _acceleration(m, q, w, t, out, powers):
         power_in += value_at(m.moving_power, (m.setting,))
     if m.turning_power != 0:
         power_in += value_at(m.turning_power, (m.setting,))
-    both = numbers_at(powers, 2)
-    both[0], both[1] = power_in, power_out
+    found = numbers_at(powers, 3)
+    found[0], found[1], found[2] = power_in, power_out, m.terms.powers[2]
 
 
 # ------------------------------------------------------------------ what is seen of a motion
@@ -184,7 +185,8 @@ def acceleration(equation, q, w, t, a):
     """Acceleration q'' (n, 3) at time t, q and w the displacement and velocity without S f.
 
     q'' = - M^-1 (F_int + beta K0 v - p) - alpha w on free dofs. Returns the power of loads,
-    supports and actuators, and the power dissipated (W). The bracket stays in `Scratch.force`.
+    supports and actuators, and the power dissipated (W); the one that the air takes stays in
+    `equation.powers`, and the bracket in `Scratch.force`.
 
     A member of a team computes this for its own nodes, q and w changed there only.
     """
@@ -253,6 +255,7 @@ def observe(equation, course, plan, a, step):
     if team.number == 0:
         tally.work += total(team, WORK)
         tally.dissipated += total(team, DISSIPATED)
+        tally.air += total(team, AIR)
         tally.time = t
         tally.steps = step
         outcome = DONE
@@ -326,7 +329,7 @@ class EquationOfMotion:
             balance=balance.address,
             setting=whole.address,
             recording=0,
-            powers=np.zeros(2),
+            powers=np.zeros(3),
             before=s.powers,
             team=share.team,
             own=share.strips.own,

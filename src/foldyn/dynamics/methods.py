@@ -77,7 +77,7 @@ class Compiled:
     def start_with(self, powers: NDArray) -> None:
         """Take the powers (2,) in and out, W, at the last step from elsewhere."""
         for memory in self._memories:
-            memory.powers[:] = powers if memory is self._memories[0] else 0.0
+            memory.powers[:2] = powers if memory is self._memories[0] else 0.0
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""

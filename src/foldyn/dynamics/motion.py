@@ -170,7 +170,7 @@ class Motion:
 
     def _stretch(self, result: xarray.Dataset) -> str:
         """Warning where bars hold much of the strain energy; empty otherwise."""
-        names = audited(self.case.energy_groups)
+        names = audited(self.case.energy_groups, self.case.air is not None)
         found = stretch(self.case.structure, {name: result[name].values for name in names})
         if found is None:
             return ""
@@ -423,7 +423,7 @@ class Motion:
         """Samples stored so far, with the case, the statistics and the panels that cross."""
         crossings = crossings or self._crossings()
         out, sampled = self.output.first(self.stored)
-        names = audited(self.case.energy_groups)
+        names = audited(self.case.energy_groups, self.case.air is not None)
         energies: dict[str, NDArray] = dict(zip(names, out.energy.T, strict=True))
         result = trajectory_dataset(
             self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
