@@ -15,6 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.dynamics import parts
+from foldyn.dynamics.added_mass import (
+    kinetic_with_fluid,
+    observe_fluid,
+    solve_with_fluid,
+    turn_flow,
+)
 from foldyn.dynamics.explicit_contact import ContactParts, contact_parts, slow_contacts
 from foldyn.dynamics.inertia import lumped_energy
 from foldyn.dynamics.motion_state import (
@@ -63,6 +69,7 @@ class Balance(NamedTuple):
     carry: int  # supports,
     presses: bool  # obstacles and air
     follow: int  # loads that depend on the displacement
+    turn_flow: int  # what turning panels take from the fluid
     solve: int  # M^-1, unless M is diagonal,
     kinetic: int  # and the kinetic energy
     moving_power: int  # of supports
@@ -86,6 +93,8 @@ class Recording(NamedTuple):
     setting: Setting
     course: Course
     out: Samples
+    whole: int  # context of the setting
+    fluid: int  # adds what moves the fluid; 0 without added mass
 
 
 class Equation(NamedTuple):
@@ -134,6 +143,8 @@ def _acceleration(m, q, w, t, out, powers):
         power_in += load * speed[dof]
     if m.follow != 0:
         power_in += value_at(m.follow, (m.setting, u, v))
+    if m.turn_flow != 0:
+        run_at(m.turn_flow, (m.setting, u, v))
     kinetic = 0.0
     if m.alpha > 0.0:
         if m.kinetic != 0:
@@ -165,10 +176,12 @@ def _sample(r, u, v, a, t):
     m, course, out, rows = r.setting, r.course, r.out, r.setting.s.force.shape[0]
     k = course.tally.samples - out.first
     out.time[k] = t
+    fluid = value_at(r.fluid, (r.whole, v, a)) if r.fluid != 0 else 0.0
     record(
         m.terms, m.system, m.mass, rows_at(u, rows), rows_at(v, rows), rows_at(a, rows),
         course.tally, m.s, out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
     )  # fmt: skip
+    out.energy[k, out.energy.shape[1] - 3] += fluid
     states_of(m.terms, out.memory[k])
     sound = 0.0
     for c in range(out.energy.shape[1]):
@@ -312,7 +325,7 @@ class EquationOfMotion:
         called = [kind for kind in EVERY if limited or kind != LIMIT]
         system, mass, model = packed.system, packed.mass, Model(packed.body, work, called)
         self._model, self._course, share = model, course, model.share
-        self.setting = Setting(model.terms, system, mass, share, s)
+        self.setting = Setting(model.terms, system, mass, share, s, packed.added)
         self._whole = whole = Context(self.setting)
         self.balance = balance = Context(_balance(self.setting, whole))
         self._slow = slow = slow_contacts(packed, work, s, balance.value) if slows else None
@@ -342,7 +355,10 @@ class EquationOfMotion:
     def sampled(self, out: Samples) -> Context:
         """The equation with samples that go to `out`."""
         if self._out is not out:  # contexts are filled by Python: once for each window of samples
-            self._recording = recording = Context(Recording(self.setting, self._course, out))
+            whole = self._whole
+            fluid = observe_fluid.at(whole) if self.setting.added.acts else 0
+            given = self.setting, self._course, out, whole.address, fluid
+            self._recording = recording = Context(Recording(*given))
             self._sampled = Context(
                 self.still.value._replace(sample=_sample.at(recording), recording=recording.address)
             )
@@ -352,8 +368,10 @@ class EquationOfMotion:
 
 def _balance(setting: Setting, whole: Context) -> Balance:
     """What accelerations need of a case; `whole` is the context of the setting."""
-    terms, system, mass, share, s = setting
+    terms, system, mass, share, s, added = setting
     solve = parts.solve_constrained if len(mass.ties.slave) else parts.solve
+    solve, kinetic = (solve_with_fluid, kinetic_with_fluid) if added.acts else (solve, parts.kinetic)
+    diagonal = mass.lumped and not added.acts
     return Balance(
         terms=terms,
         setting=whole.address,
@@ -362,8 +380,9 @@ def _balance(setting: Setting, whole: Context) -> Balance:
         carry=parts.carry.at(whole) if system.moves else 0,
         presses=system.presses,
         follow=parts.follow.at(whole) if system.follows else 0,
-        solve=0 if mass.lumped else solve.at(whole),
-        kinetic=0 if mass.lumped or not system.alpha else parts.kinetic.at(whole),
+        turn_flow=turn_flow.at(whole) if added.acts else 0,
+        solve=0 if diagonal else solve.at(whole),
+        kinetic=0 if diagonal or not system.alpha else kinetic.at(whole),
         moving_power=parts.moving_power.at(whole) if system.moves else 0,
         turning_power=parts.turning_power.at(whole) if system.turns else 0,
         alpha=system.alpha,

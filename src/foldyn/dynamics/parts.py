@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from foldyn.cases.waveforms import evaluate
+from foldyn.dynamics.added_mass import AddedMass
 from foldyn.dynamics.actuation import offset_work, power_of_part, turn_part
 from foldyn.dynamics.inertia import Inertia, kinetic_energy, moving_energy, solve_mass, solve_tied
 from foldyn.dynamics.system import Scratch, System, carry_part, power_of_moved
@@ -38,6 +39,7 @@ class Setting(NamedTuple):
     mass: Inertia
     share: Share
     s: Scratch
+    added: AddedMass
 
 
 @addressed(NUMBER)

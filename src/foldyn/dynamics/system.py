@@ -20,6 +20,7 @@ from foldyn.cases import Case, History
 from foldyn.cases.waveforms import CONSTANT, Callbacks, Waveforms, evaluate
 from foldyn.cases.waveforms import pack as pack_waveforms
 from foldyn.dynamics.actuation import Actuators, actuators
+from foldyn.dynamics.added_mass import AddedMass, added_mass
 from foldyn.dynamics.dampers import air_terms, damping_terms
 from foldyn.dynamics.hereditary import with_memory
 from foldyn.dynamics.inertia import (
@@ -103,6 +104,7 @@ class Packed(NamedTuple):
     callbacks: Callbacks
     numbering: Numbering
     modal: ModalRows  # in the case's own order
+    added: AddedMass
 
     @property
     def model(self) -> Any:
@@ -162,7 +164,8 @@ def pack(
         alpha=float(case.rayleigh.alpha),
         lightness=lightness(mass) if case.contact is not None else np.zeros(0),
     )
-    return Packed(body, system, mass, callbacks, by, modal)
+    added = added_mass(case, by.rank, by.rows, len(body.hinges))
+    return Packed(body, system, mass, callbacks, by, modal, added)
 
 
 def _driven(case: Case, histories: list[History]) -> Assembly:
