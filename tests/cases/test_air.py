@@ -37,7 +37,7 @@ def test_air_is_written_and_read():
         ({"velocity": (1, 2)}, "velocity .*: must be three numbers"),
         ({"drag_coefficient": -0.1}, "drag_coefficient = -0.1: must be at least 0"),
         ({"resolution": 3}, "resolution = 3: must be even"),
-        ({"resolution": 0}, "resolution = 0: must be a whole number of at least 2"),
+        ({"resolution": 0}, "resolution = 0: must be a whole number, at least 2"),
         ({"added_mass": "far"}, 'added_mass = "far": must be true, false or "local"'),
         ({"added_mass": False, "drag": False}, "drag: without added mass and drag nothing acts"),
     ],
