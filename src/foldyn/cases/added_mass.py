@@ -21,6 +21,7 @@ from foldyn.mechanics.air.gaps import APART, JOINED, narrow_gap
 from foldyn.ram_limit import check_memory
 from foldyn.structures.boundary_elements import BoundaryElements, boundary_elements
 
+MOST_COUPLED = 6000  # dofs that a matrix may couple with all others
 COPIES = 3  # of the flow's matrix, while it is made
 
 
@@ -84,6 +85,27 @@ def fluid_at(case: Any, displacement: NDArray) -> Fluid:
     flow = case.air.density * flow_of(points, elements.triangles, elements.unknown, parts)
     catch = caught(points, elements.triangles, elements.unknown)
     return Fluid(structure.triangles, elements.under, elements.shares, catch, flow)
+
+
+def added_mass_at(case: Any, displacement: NDArray) -> sparse.csr_array | None:
+    """Added mass (3n, 3n) of a case at a displacement (n, 3), kg, or None without.
+
+    Raises
+    ------
+    InputError
+        Panels nearly touch; it couples too many dofs for a matrix.
+    """
+    if case.air is None or not case.air.added_mass:
+        return None
+    added = fluid_at(case, displacement).on(case.structure.nodes + displacement)
+    if case.air.added_mass is True and len(added.moving) > MOST_COUPLED:
+        raise InputError(
+            f": the fluid couples {len(added.moving)} dofs with each other, and matrices take "
+            f"{MOST_COUPLED} at most; take fewer divisions, the scheme n4b5, or added_mass = "
+            f'"{LOCAL}"',
+            "air",
+        )
+    return added.sparse
 
 
 def _check_gaps(pattern: Any, elements: BoundaryElements, points: NDArray) -> None:

@@ -34,7 +34,7 @@ from foldyn.algebra.complex_symmetric import Gram
 from foldyn.algebra.solvers import check_fill
 from foldyn.arguments import brief
 from foldyn.cases import Case, State
-from foldyn.cases.air import refuse_air
+from foldyn.cases.added_mass import added_mass_at
 from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.inertia import check_mass
@@ -82,7 +82,12 @@ class Linearized:
         Forces on the free dofs per unit displacement of the whole along x, y, z: those of springs
         to the ground and of planes that touch, N/m.
     inertia : (nf, 3)
-        Forces on the free dofs per unit acceleration of the whole along x, y, z, kg.
+        Forces on the free dofs per unit acceleration of the whole along x, y, z, but for those of
+        fluid, kg.
+    added : (nf, nf) or None
+        What of the mass is that of fluid around the sheet, kg.
+    pushed : (nf, 3)
+        Forces of that fluid per unit acceleration of the whole along x, y, z, kg.
     soft : int
         Hinges of the superlinear law that stand at their rest angle, where their slope vanishes;
         they count without stiffness. 0 with `secant`.
@@ -113,6 +118,8 @@ class Linearized:
     drag: NDArray
     ground: NDArray
     inertia: NDArray
+    added: sparse.csc_array | None
+    pushed: NDArray
     soft: int
     secant: float | None
     residual: float
@@ -199,7 +206,6 @@ def linearize(
             "0, here and in the planes",
             "contact",
         )
-    refuse_air(case, "a linearization")
     amplitude = None
     if secant is not None:
         amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
@@ -231,6 +237,9 @@ def linearize(
     if internal:
         more = inner.damped(more, case.crease_damping * body.sheet.fold_hinges().length)
     damping = case.rayleigh.matrix(mass, _reference(case, inner.stiffened(exact), internal))
+    added = _added(case, point.displacement, body, inner)
+    if added is not None:
+        mass = sparse.csr_array(mass + added)
     modal = _modal_rows(case, point.displacement, stiffness, mass, internal)
     if contact is not None:  # it damps nothing
         stiffness = sparse.csr_array(stiffness + inner.behind(contact.tangent(point.dofs)))
@@ -247,6 +256,8 @@ def linearize(
         drag=ties.force(more @ whole)[free],
         ground=ties.force(_ground(point.body, point.dofs, whole))[free],
         inertia=_inertia(case, whole, inner)[free],
+        added=None if added is None else _block(ties.matrix(added), free),
+        pushed=np.zeros((len(free), 3)) if added is None else ties.force(added @ whole)[free],
         soft=soft,
         secant=None if secant is None else float(secant),
         residual=point.relative,
@@ -295,6 +306,17 @@ def _ground(body: Assembly, q: NDArray, whole: NDArray) -> NDArray:
     return out
 
 
+def _added(
+    case: Case, displacement: NDArray, body: Assembly, inner: Amplitudes
+) -> sparse.csr_array | None:
+    """Mass of the fluid (m, m) at a displacement (n, 3), kg."""
+    added = added_mass_at(case, displacement)
+    if added is None:
+        return None
+    added.resize((body.size, body.size))
+    return inner.behind(added)
+
+
 def _inertia(case: Case, whole: NDArray, inner: Amplitudes) -> NDArray:
     """Forces (m, 3) on the unknowns per unit acceleration of the whole (m, 3)."""
     load = whole.copy()
@@ -317,7 +339,9 @@ def _modal_rows(
         body, rest = case.elastic_body, np.zeros_like(state)
         inner = amplitudes(case.structure, body, body.dofs(rest), internal)
         stiffness = inner.stiffened(body.tangent(body.dofs(rest)))
-        modal = rows_of(damping, case, stiffness, inner.massed(mass_of(case)), rest)
+        mass, added = inner.massed(mass_of(case)), _added(case, rest, body, inner)
+        mass = mass if added is None else sparse.csr_array(mass + added)
+        modal = rows_of(damping, case, stiffness, mass, rest)
     modal.warn()
     return np.pad(modal.rows, ((0, 0), (0, stiffness.shape[0] - modal.rows.shape[1])))
 

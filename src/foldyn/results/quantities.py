@@ -102,6 +102,7 @@ MODES: Mapping[str, Quantity] = {
     "effective_mass": Quantity("kg", "effective mass", ("axis",)),
 }
 INTERNAL: Mapping[str, Quantity] = {
+    "air_share": Quantity("1", "share of the air in the modal mass"),
     "internal_share": Quantity("1", "share of the strain energy in internal amplitudes of panels"),
     "between_shape": Quantity("m", "mode shape between nodes", ("between", "axis")),
 }
