@@ -252,7 +252,7 @@ def lacking(method: Integrator, case: Case) -> str:
     """What a method needs and a case lacks, in words; empty where nothing."""
     structure = case.structure
     if method.implicit and case.air is not None and case.air.added_mass:
-        return "the added mass of the air moves with the panels, which explicit methods alone take"
+        return "only explicit methods take the added mass of air (leave it out: added_mass = false)"
     if structure.massless and structure.condensed is None and not method.massless:
         return f"{structure.massless} have no mass, which this method needs"
     return ""
