@@ -18,7 +18,10 @@ MASS, PRESSING = 0.3 * SIDE**2, 0.5 * 20.0 * 1.2 * SIDE**2  # kg; 1/2 rho Cd A, 
 TERMINAL = np.sqrt(MASS * G / PRESSING)
 
 
-def plate(turn=np.eye(3), sheet=SHEET):
+UNTURNED = np.eye(3)
+
+
+def plate(turn=UNTURNED, sheet=SHEET):
     corners = SIDE * np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
     return fd.discretize(fd.Pattern(corners @ turn.T, [(0, 1, 2, 3)]), sheet)
 

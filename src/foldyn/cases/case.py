@@ -243,10 +243,10 @@ class Case(Loaded, Damped):
     @property
     def wind_terms(self) -> tuple[tuple[NDArray[np.float64], History], ...]:
         """Velocity (3,), m/s, of a wind that varies, and its history; none in others."""
-        air = self.air
-        if air is None or not air.blows or air.history.code == CONSTANT:
+        if self.air is None or not self.air.blows:
             return ()
-        return ((np.array(air.velocity, float), air.history),)
+        history = as_history(self.air.history)
+        return () if history.code == CONSTANT else ((np.array(self.air.velocity), history),)
 
     @property
     def energy_groups(self) -> Mapping[str, str]:

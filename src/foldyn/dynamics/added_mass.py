@@ -3,7 +3,8 @@
 B(u) takes the velocities of the nodes to the flux at the unknowns of the flow, by the area vectors
 of the panels' triangles, which follow the motion; F is the flow (`cases.added_mass`) in one state
 of folding. A sheet that turns as a whole keeps its F, so that nothing of its motion is lost; one
-that folds gets a new F when a hinge has turned by `TURN`. With F constant Lagrange's equations are
+that folds gets a new F when a hinge has turned by `TURN` (`renewed_flow`). With F constant
+Lagrange's equations are
 
     (M + B'F B) a + B'F B. v + B.'F w - d(q.B v)/du = p - F_int,   q = F w,
 
@@ -22,28 +23,30 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg import lapack
+from scipy.linalg import lapack, null_space
 
 from foldyn.cases import Case
 from foldyn.cases.added_mass import Fluid, fluid_at
-from foldyn.dynamics.inertia import Inertia, kinetic_energy, substitute
+from foldyn.dynamics.inertia import Inertia, kinetic_energy, substitute, times_mass
 from foldyn.errors import InputError
 from foldyn.jit.compiled import addressed, inner, kernel
 from foldyn.jit.context import rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.term import ADDRESS
 
-TURN = math.radians(2.0)  # of a hinge, after which the flow is found anew
+TURN = math.radians(3.0)  # of a hinge, after which the flow is found anew
 LOOK_EVERY = 16  # steps between two looks at that
 MOST = 1500  # unknowns of the flow
 TOLERANCE = 1e-13  # of the accelerations' residual
 ITERATIONS = 200
+SCALED = 0.25, 4.0  # by how much a new flow may change the energy of deforming, least and most
 
 
 class AddedMass(NamedTuple):
     """The flow about t triangles with u unknowns, and memory."""
 
     triangles: NDArray  # (t, 3) nodes
+    at_rest: NDArray  # (t, 3, 3) their places at rest, m
     sides: NDArray  # (t, 2, 3) rest vectors from the first corner to the others, m
     start: NDArray  # (u + 1,) first of the entries of each unknown: what it catches of
     corner: NDArray  # (k,) area vector . velocity of corners, 3 triangle + corner,
@@ -58,7 +61,7 @@ class AddedMass(NamedTuple):
     nodal: NDArray  # (2, rows, 3) memory
     vectors: NDArray  # (4, 3) memory of one triangle
     angle: NDArray  # (nh,) dihedrals where F was made, rad
-    made: NDArray  # (2,) how often it was since the start, and energies (J) that it changed by
+    made: NDArray  # (2,) how often it was since the start, and the energies (J) left over then
 
     @property
     def acts(self) -> bool:
@@ -78,14 +81,9 @@ def added_mass(
     InputError
         Too many unknowns; supports that move.
     """
-    air = case.air
+    air, nodes = case.air, case.structure.nodes
     if air is None or not air.added_mass:
-        whole, none, rows0 = np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 3))
-        return AddedMass(
-            whole.reshape(0, 3), np.zeros((0, 2, 3)), np.zeros(1, np.int64), whole, none,
-            *np.zeros((3, 0, 0)), rows0, rows0, none, np.zeros((6, 0)), np.zeros((2, 0, 3)), rows0,
-            none, np.zeros(2),
-        )  # fmt: skip
+        return _with_memory(np.zeros((0, 3)), nodes, sparse.csr_array((0, 0)), 0, 0)
     if case.imposed_terms or case.base_terms:
         raise InputError(
             ": motions with supports that move do not take added mass; give added_mass = false",
@@ -98,19 +96,39 @@ def added_mass(
             f"most {MOST}; lower it, or give added_mass = false",
             "air",
         )
-    nodes = case.structure.nodes
-    x = nodes if start is None else nodes + start
-    fluid = fluid_at(case, x - nodes)
-    count, corners = len(fluid.triangles), nodes[fluid.triangles]
-    catch = _catch(fluid, x)
+    fluid = fluid_at(case, np.zeros_like(nodes) if start is None else start)
+    catch = _catch(fluid, nodes if start is None else nodes + start)
+    added = _with_memory(fluid.triangles, nodes, catch, rows, hinges)
+    return added._replace(triangles=np.ascontiguousarray(rank[fluid.triangles], np.int64))
+
+
+def _with_memory(
+    triangles: NDArray, nodes: NDArray, catch: sparse.csr_array, rows: int, hinges: int
+) -> AddedMass:
+    """What catches (u, 3t) of triangles (t, 3) of nodes (n, 3) at rest, with memory."""
+    unknown, count = catch.shape[0], len(triangles)
+    corners = nodes[triangles.astype(np.int64)]
+    flow, resistance, guess = np.zeros((3, unknown, unknown))
+    area, rate = np.zeros((2, count, 3))
     return AddedMass(
-        np.ascontiguousarray(rank[fluid.triangles], np.int64),
-        np.ascontiguousarray(corners[:, 1:] - corners[:, :1]),
-        catch.indptr.astype(np.int64), catch.indices.astype(np.int64), catch.data,
-        *np.zeros((3, unknown, unknown)), *np.zeros((2, count, 3)), np.zeros(3 * count),
-        np.zeros((6, unknown)), np.zeros((2, rows, 3)), np.zeros((4, 3)),
-        np.zeros(hinges), np.zeros(2),
-    )  # fmt: skip
+        triangles=triangles.astype(np.int64),
+        at_rest=corners,
+        sides=np.ascontiguousarray(corners[:, 1:] - corners[:, :1]),
+        start=catch.indptr.astype(np.int64),
+        corner=catch.indices.astype(np.int64),
+        catch=catch.data,
+        flow=flow,
+        resistance=resistance,
+        guess=guess,
+        area=area,
+        rate=rate,
+        through=np.zeros(3 * count),
+        lines=np.zeros((6, unknown)),
+        nodal=np.zeros((2, rows, 3)),
+        vectors=np.zeros((4, 3)),
+        angle=np.zeros(hinges),
+        made=np.zeros(2),
+    )
 
 
 def _catch(fluid: Fluid, x: NDArray) -> sparse.csr_array:
@@ -135,8 +153,9 @@ def begin_flow(case: Case, packed: Any, course: Any, start: NDArray) -> None:
 def renewed_flow(case: Case, packed: Any, course: Any) -> bool:
     """Find the flow anew, and tell so, where a hinge has turned by `TURN` since it was found.
 
-    The momentum of sheet and fluid stays what it is, on every free dof, so that velocities jump.
-    What the kinetic energy changes by, the air has given or taken.
+    The momentum of sheet and fluid stays what it is, on every free dof, and so does their energy:
+    the work of the flow's change is done along the deforming part of the velocity, which keeps the
+    momenta. What cannot be done there, the air has given or taken.
     """
     own, mass, v = packed.added, packed.mass, course.v
     if np.abs(course.angle - own.angle).max(initial=0.0) <= TURN:
@@ -151,11 +170,40 @@ def renewed_flow(case: Case, packed: Any, course: Any) -> bool:
     press(own, lost - own.flow @ jump, push)
     solve(own, mass, push, change, line)
     v += change
-    after = whole_energy(own, mass, v)
-    course.tally.air += before - after
+    deforming = v - _rigid_part(packed, course)
+    missed, least = before - whole_energy(own, mass, v), whole_energy(own, mass, deforming)
+    if least > 0.0:
+        v += (math.sqrt(np.clip(1.0 + missed / least, *SCALED)) - 1.0) * deforming
+    left = before - whole_energy(own, mass, v)
+    course.tally.air += left
     own.angle[:] = course.angle
-    own.made[:] += 1.0, abs(after - before)
+    own.made[:] += 1.0, abs(left)
     return True
+
+
+def _rigid_part(packed: Any, course: Any) -> NDArray:
+    """The rigid motion (rows, 3) that supports permit and that has the momenta of sheet and fluid.
+
+    None where constraints tie dofs together.
+    """
+    own, system, v = packed.added, packed.system, course.v
+    if len(system.ties.slave):
+        return np.zeros_like(v)
+    place = np.zeros_like(v)
+    place[own.triangles] = own.at_rest
+    place += course.u
+    turns = [np.cross(axis, place) for axis in np.eye(3)]
+    shapes = np.stack([*(np.tile(axis, (len(v), 1)) for axis in np.eye(3)), *turns])
+    held = shapes.reshape(6, -1)[:, system.supported]
+    shapes = np.tensordot(null_space(held.T).T, shapes, 1)
+    pushes, speed = np.zeros((len(shapes), *v.shape)), np.zeros(len(own.flow))
+    for shape, force in zip(shapes, pushes, strict=True):
+        times_mass(packed.mass, shape, force)
+        flux(own, own.area, shape, speed)
+        press(own, own.flow @ speed, force)
+    inertia = np.tensordot(shapes, pushes, ((1, 2), (1, 2)))
+    rates = np.linalg.lstsq(inertia, np.tensordot(pushes, v, 2), rcond=None)[0]
+    return np.tensordot(rates, shapes, 1)
 
 
 def _find_flow(case: Case, own: AddedMass, mass: Inertia, outward: NDArray, u: NDArray) -> None:

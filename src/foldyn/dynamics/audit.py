@@ -41,7 +41,7 @@ def energy_error(energy: NDArray) -> NDArray:
 
 
 def energy_scale(energy: NDArray, air: bool) -> float:
-    """Largest energy at play (J): kinetic, change of strain, lost to the air, dissipated or work."""
+    """Largest energy at play (J): kinetic, change of strain, air, dissipated or work."""
     others = len(AUDITED) + air
     strain = energy[:, :-others].sum(axis=1)
     moving = np.column_stack([strain - strain[0], energy[:, -others:]])

@@ -44,7 +44,8 @@ def air_terms(case: Case, histories: Sequence[History]) -> list[Term]:
         return []
     structure, air = case.structure, case.air
     half = 0.5 * air.density * air.coefficient(structure)
-    term = AirDragTerm(air_drag(structure.nodes, structure.triangles, air.velocity), half)
+    wind = np.array(air.velocity, float)
+    term = AirDragTerm(air_drag(structure.nodes, structure.triangles, wind), half)
     return [
         term.driven(histories.index(history), len(histories)) for _, history in case.wind_terms
     ] or [term]

@@ -265,7 +265,11 @@ def _dataset(case: Case, out: Samples, outcome: list[str], facts: dict) -> xarra
     """The result."""
     known = {**MOTION, **energies_of(case)}
     values = {"displacement": out.displacement, "reaction": out.reaction, "velocity": out.velocity}
-    values |= zip(audited(case.energy_groups, case.air is not None), np.moveaxis(out.energy, 2, 0), strict=True)
+    values |= zip(
+        audited(case.energy_groups, case.air is not None),
+        np.moveaxis(out.energy, 2, 0),
+        strict=True,
+    )
     timed = variables(known, "time", values).items()
     data = {name: (("model", *dims), *about) for name, (dims, *about) in timed}
     data["outcome"] = variable(("model",), np.array(outcome), "", "what became of the motion")

@@ -370,7 +370,9 @@ def _balance(setting: Setting, whole: Context) -> Balance:
     """What accelerations need of a case; `whole` is the context of the setting."""
     terms, system, mass, share, s, added = setting
     solve = parts.solve_constrained if len(mass.ties.slave) else parts.solve
-    solve, kinetic = (solve_with_fluid, kinetic_with_fluid) if added.acts else (solve, parts.kinetic)
+    solve, kinetic = (
+        (solve_with_fluid, kinetic_with_fluid) if added.acts else (solve, parts.kinetic)
+    )
     diagonal = mass.lumped and not added.acts
     return Balance(
         terms=terms,

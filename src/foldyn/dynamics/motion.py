@@ -303,9 +303,8 @@ class Motion:
             report(Progress(now - plan.start, plan.end - plan.start, step, self.audit()))
             if step == plan.steps if plan.steps else now >= plan.end:
                 return
-            if self.packed.added.acts and isinstance(engine, Compiled) and step > done:
-                if step % LOOK_EVERY == 0 and renewed_flow(self.case, self.packed, course):
-                    engine.accelerate()
+            if self.packed.added.acts and step > done and step % LOOK_EVERY == 0:
+                self._renew_flow(engine)
             self._checkpoint_if_due(engine)
             if plan.steps and step % self.recheck_after == 0 and step > done:
                 place(system, course.u, course.v, now, memory)
@@ -313,6 +312,11 @@ class Motion:
             growth = REPORT_EVERY / max(clock, 1e-9)
             least = 1 if self.method.implicit else CHUNK
             length = max(least, min(int(length * min(growth, 8.0)), 100_000))
+
+    def _renew_flow(self, engine: Compiled | Implicit | OnCard) -> None:
+        """Find the flow of added mass anew, if the sheet has folded."""
+        if renewed_flow(self.case, self.packed, self.course) and isinstance(engine, Compiled):
+            engine.accelerate()
 
     def _continuations(self) -> dict[str, tuple[float, Continuation]]:
         """What an implicit method went on from, and needs to go on if it stands at a sample.

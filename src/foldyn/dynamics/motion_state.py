@@ -44,10 +44,10 @@ class StepPlan(NamedTuple):
 
 # What is counted along a motion: steps done, samples written, steps refused, force evaluations
 COUNTED = ("steps", "samples", "refused", "evaluations")
-# What is measured: work of the loads, energy dissipated and lost to the air (J), their powers at the
-# last step (W); the time reached, and of steps that vary the next one wanted, the last, shortest and longest (s);
-# the last one's error over the tolerance; the largest displacement (m), velocity (m/s) and kinetic
-# energy (J) so far
+# What is measured: work of the loads, energy dissipated and lost to the air (J), their powers at
+# the last step (W); the time reached, and of steps that vary the next one wanted, the last,
+# shortest and longest (s); the last one's error over the tolerance; the largest displacement (m),
+# velocity (m/s) and kinetic energy (J) so far
 MEASURED = (
     "work", "dissipated", "air", "power_in", "power_out", "power_air", "time", "wanted", "last",
     "shortest", "longest", "error", "farthest", "fastest", "kinetic",

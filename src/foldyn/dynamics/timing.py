@@ -187,7 +187,7 @@ def knots(case: Case) -> NDArray[np.float64]:
 
 
 def jumps(case: Case) -> tuple[float, ...]:
-    """Times (s) at which loads or the wind jump, or may: those that the user names of a function."""
+    """Times (s) at which loads or wind jump, or may: those that the user names of a function."""
     times: set[float] = set()
     for _, history in (*case.load_terms, *case.following_terms, *case.wind_terms):
         called = history.code == CALLED

@@ -40,7 +40,7 @@ def air_drag(x: NDArray, triangles: NDArray, wind: NDArray) -> AirDrag:
     return AirDrag(
         triangles=np.ascontiguousarray(triangles, np.int64),
         sides=np.ascontiguousarray(corners[:, 1:] - corners[:, :1]),
-        wind=np.array(wind, float),
+        wind=wind,
         factor=np.ones(1),
         normal=np.zeros((len(triangles), 3)),
         slope=np.zeros((len(triangles), 3)),

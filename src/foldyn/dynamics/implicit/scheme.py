@@ -145,7 +145,7 @@ class Scheme(ABC):
 
     @abstractmethod
     def works(self, h: float) -> tuple[float, float, float]:
-        """Work of loads, supports and actuators in the step, energy dissipated, and lost to air, J."""
+        """Work of loads, supports, actuators in a step, energy dissipated, and lost to air, J."""
 
     @abstractmethod
     def change(self, h: float) -> NDArray:
