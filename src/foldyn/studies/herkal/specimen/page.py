@@ -280,7 +280,10 @@ def _agreement(front: xr.Dataset) -> Table:
 # ---------------------------------------------------------------------- vibration
 def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
     responses = {name: load(folder / file) for name, file in tasks.RESPONSES.items()}
-    labels = {"published": "the paper's parameters", "fitted": "fitted parameters"}
+    labels = {
+        "published": "the paper's parameters", "air": "the same in air",
+        "fitted": "fitted parameters",
+    }  # fmt: skip
     paper = _targets()
     peaks = [paper[f"frf_{which}_peak"].value for which in ORDINALS]
     modes = load(folder / tasks.MODES)
@@ -318,8 +321,9 @@ def _response_table(responses: Mapping[str, xr.Dataset], paper: Mapping[str, Tar
         values = [_at(one.damping, k, 100.0) for one in found]
         rows.append([f"{target.what} (%)", target.value, *values])
     return Table(
-        ["", "paper", "the paper's parameters, here", "fitted parameters"], rows,
-        "Peaks of the response, and damping by the half-power points as the paper has it.",
+        ["", "paper", "the paper's parameters, here", "the same in air", "fitted parameters"], rows,
+        "Peaks of the response, and damping by the half-power points as the paper has it, in "
+        "vacuum but for one column.",
         digits=3,
     )  # fmt: skip
 

@@ -36,7 +36,8 @@ FOLDER = "specimen"
 NOTE = "synthetic data: the specimen's own are not public"
 PHOTOS, FILM, FOUND, COMPARED = "photographs.nc", "film.nc", "found.json", "front.nc"
 TRUTH = "film-truth.nc"
-RESPONSES, MODES = {"published": "frf-published.nc", "fitted": "frf-fitted.nc"}, "modes.nc"
+MODES = "modes.nc"
+RESPONSES = {"published": "frf-published.nc", "air": "frf-air.nc", "fitted": "frf-fitted.nc"}
 
 
 @dataclass(frozen=True)
@@ -242,7 +243,7 @@ def _write(one: Fit, folder: Path, note: str) -> None:
 
 def _response(part: Part, folder: Path) -> None:
     changes = read_found(folder)["changes"]
-    for name, given in (("published", {}), ("fitted", changes)):
+    for name, given in (("published", {}), ("air", vibration.IN_AIR), ("fitted", changes)):
         save(vibration.specimen("frf", changes=given).run(), folder / RESPONSES[name])
     folds = {key: value for key, value in changes.items() if not key.startswith("damping.")}
     save(vibration.specimen("modes", changes=folds).run(), folder / MODES)
