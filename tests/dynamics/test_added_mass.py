@@ -110,14 +110,29 @@ def test_new_flows_converge(monkeypatch):
 def test_reactions_carry_the_fluid():
     """The support of a plate that starts to fall about its edge bears what does not accelerate."""
     held = [fd.Fix(nodes=[0, 3], axes="xyz")]
-    case = fd.Case(plate(), held, loads=[fd.Gravity((0, 0, -9.81))], air=fd.Air(**FLUID))
+    gravity, alpha = fd.Gravity((0, 0, -9.81)), 20.0
+    case = fd.Case(plate(), held, [gravity], fd.Rayleigh(alpha), air=fd.Air(**FLUID))
     motion = fd.simulate(case, 0.01, "rk4", every=1)
     up = motion.reaction.values[:, motion.support_axis.values == "z"].sum(axis=1)
     moved = fluid_at(case, 0.0 * case.structure.nodes).on(case.structure.nodes)
     v = motion.velocity.values.reshape(len(motion.time), -1)
     p = motion.velocity.values[:, :, 2] @ case.mass.sum(axis=0) + (moved @ v.T)[2::3].sum(axis=0)
-    given = np.cumsum(np.diff(motion.time) * 0.5 * (up[1:] + up[:-1]))
-    assert_allclose(p[-1], given[-1] - case.total_mass * 9.81 * motion.time[-1], rtol=1e-3)
+    up = up - case.total_mass * 9.81 - alpha * motion.velocity.values[:, :, 2] @ case.nodal_mass
+    given = (np.diff(motion.time) * 0.5 * (up[1:] + up[:-1])).sum()
+    assert_allclose(p[-1], given, rtol=1e-3)
+
+
+@pytest.mark.parametrize("method", EXPLICIT)
+def test_alpha_damps_the_mass_of_the_sheet_alone(method):
+    """(m + m_a) v' = -alpha m v."""
+    alpha, span = 40.0, 0.05
+    case = fd.Case(plate(1e9), damping=fd.Rayleigh(alpha), air=fd.Air(**FLUID))
+    mass = case.total_mass + case.added_mass().todense()[2::3, 2::3].sum()
+    start = fd.State(velocity=np.tile([0.0, 0.0, 1.0], (5, 1)))
+    motion = fd.simulate(case, span, method, every=span, initial=start)
+    left = np.exp(-2.0 * alpha * case.total_mass / mass * span)
+    assert_allclose(motion.kinetic, 0.5 * mass * np.array([1.0, left]), rtol=2e-3)
+    assert_allclose(motion.dissipated[-1], 0.5 * mass * (1.0 - left), rtol=2e-3)
 
 
 def test_what_does_not_take_added_mass_says_so():

@@ -353,8 +353,11 @@ def move(own, mass, jump, out, line):
 # ------------------------------------------------------------------ parts of the equation of motion
 @addressed(ADDRESS, ADDRESS)
 def turn_flow(m, u, v):
-    """Add to the forces, N, what the turning of the area vectors takes."""
-    own, rows = m.added, m.s.force.shape[0]
+    """Add to the forces, N, what the turning of the area vectors takes, and the drag alpha M v.
+
+    Returns the power of the drag, W. The fluid has none.
+    """
+    own, rows, power = m.added, m.s.force.shape[0], 0.0
     moved, speed = rows_at(u, rows), rows_at(v, rows)
     w, q, turned = own.lines[0], own.lines[1], own.lines[2]
     put_areas(own, moved)
@@ -382,6 +385,14 @@ def turn_flow(m, u, v):
         for c in range(3):
             m.s.force[third, c] -= back[c]
             m.s.force[first, c] += back[c]
+    if m.system.alpha > 0.0:
+        times_mass(m.mass, speed, m.s.product)
+        for i in range(rows):
+            for c in range(3):
+                drag = m.system.alpha * m.s.product[i, c]
+                m.s.force[i, c] += drag
+                power += drag * speed[i, c]
+    return power
 
 
 @addressed(ADDRESS)
@@ -444,21 +455,19 @@ def whole_energy(own, mass, v):
     return kinetic_energy(mass, v, (0, v.shape[0])) + energy_of_fluid(own, v)
 
 
-@addressed(ADDRESS)
-def kinetic_with_fluid(m, v):
-    """Kinetic energy (J) of the sheet and of the fluid."""
-    return whole_energy(m.added, m.mass, rows_at(v, m.s.force.shape[0]))
-
-
 @addressed(ADDRESS, ADDRESS)
 def observe_fluid(m, v, a):
-    """Add to the forces, N, for reactions, what the fluid resists; returns its energy, J."""
+    """Add to the forces, N, what the fluid resists, and take the drag, for reactions.
+
+    Returns the energy of the fluid, J.
+    """
     own, rows = m.added, m.s.force.shape[0]
-    moving, speed, accelerated = m.s.moving, rows_at(v, rows), rows_at(a, rows)
+    speed = rows_at(v, rows)
+    times_mass(m.mass, speed, m.s.product)
     for i in range(rows):
         for c in range(3):
-            moving[i, c] = accelerated[i, c] + m.system.alpha * speed[i, c]
-    flux(own, own.area, moving, own.lines[0])
+            m.s.force[i, c] -= m.system.alpha * m.s.product[i, c]
+    flux(own, own.area, rows_at(a, rows), own.lines[0])
     times(own.flow, own.lines[0], own.lines[1])
     add_push(own, own.area, own.lines[1], m.s.force)
     return energy_of_fluid(own, speed)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics import parts
 from foldyn.dynamics.added_mass import (
-    kinetic_with_fluid,
     observe_fluid,
     solve_with_fluid,
     turn_flow,
@@ -69,7 +68,7 @@ class Balance(NamedTuple):
     carry: int  # supports,
     presses: bool  # obstacles and air
     follow: int  # loads that depend on the displacement
-    turn_flow: int  # what turning panels take from the fluid
+    turn_flow: int  # adds forces of fluid that turns, and drag beside added mass
     solve: int  # M^-1, unless M is diagonal,
     kinetic: int  # and the kinetic energy
     moving_power: int  # of supports
@@ -144,7 +143,7 @@ def _acceleration(m, q, w, t, out, powers):
     if m.follow != 0:
         power_in += value_at(m.follow, (m.setting, u, v))
     if m.turn_flow != 0:
-        run_at(m.turn_flow, (m.setting, u, v))
+        power_out += value_at(m.turn_flow, (m.setting, u, v))
     kinetic = 0.0
     if m.alpha > 0.0:
         if m.kinetic != 0:
@@ -370,10 +369,9 @@ def _balance(setting: Setting, whole: Context) -> Balance:
     """What accelerations need of a case; `whole` is the context of the setting."""
     terms, system, mass, share, s, added = setting
     solve = parts.solve_constrained if len(mass.ties.slave) else parts.solve
-    solve, kinetic = (
-        (solve_with_fluid, kinetic_with_fluid) if added.acts else (solve, parts.kinetic)
-    )
+    solve = solve_with_fluid if added.acts else solve
     diagonal = mass.lumped and not added.acts
+    alpha = 0.0 if added.acts else system.alpha  # or it is that of the sheet's own mass
     return Balance(
         terms=terms,
         setting=whole.address,
@@ -384,10 +382,10 @@ def _balance(setting: Setting, whole: Context) -> Balance:
         follow=parts.follow.at(whole) if system.follows else 0,
         turn_flow=turn_flow.at(whole) if added.acts else 0,
         solve=0 if diagonal else solve.at(whole),
-        kinetic=0 if diagonal or not system.alpha else kinetic.at(whole),
+        kinetic=0 if diagonal or not alpha else parts.kinetic.at(whole),
         moving_power=parts.moving_power.at(whole) if system.moves else 0,
         turning_power=parts.turning_power.at(whole) if system.turns else 0,
-        alpha=system.alpha,
+        alpha=alpha,
         diagonal=mass.diagonal,
         inverse=mass.inverse,
         loads=system.loads,
