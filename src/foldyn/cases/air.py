@@ -11,6 +11,7 @@ import numpy as np
 
 from foldyn.arguments import Check, Flag
 from foldyn.cases.decode import Part, check_keys
+from foldyn.cases.history import STEADY, Factor
 from foldyn.errors import InputError
 from foldyn.values import flag, number, show, vector, whole
 
@@ -48,6 +49,8 @@ class Air(Part):
         at rest, from 1.18 for a square to 2 for a long strip (see `coefficient`).
     resolution : int, default 4
         Boundary elements along each edge of a panel, even, from which the added mass is found.
+    history : History or callable, optional
+        Factor of the velocity over time: of gusts; constant by default.
 
     Examples
     --------
@@ -62,6 +65,7 @@ class Air(Part):
     drag: Flag = True
     drag_coefficient: Annotated[float | None, Check(number, least=0.0)] = None
     resolution: Annotated[int, Check(whole, least=2)] = 4
+    history: Factor = STEADY
 
     def agree(self) -> None:
         """Ask for an even resolution, and for something that acts."""

@@ -24,6 +24,7 @@ from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
 from foldyn.cases.state import State
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
+from foldyn.cases.waveforms import CONSTANT
 from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.mechanics.air.added_mass import AddedMass
@@ -238,6 +239,14 @@ class Case(Loaded, Damped):
         """Numbers of the planes of its contact that move, and their histories."""
         planes = enumerate(() if self.contact is None else self.contact.planes)
         return tuple((i, as_history(p.history)) for i, p in planes if p.history is not None)
+
+    @property
+    def wind_terms(self) -> tuple[tuple[NDArray[np.float64], History], ...]:
+        """Velocity (3,), m/s, of a wind that varies, and its history; none in others."""
+        if self.air is None or not self.air.blows:
+            return ()
+        history = as_history(self.air.history)
+        return () if history.code == CONSTANT else ((np.array(self.air.velocity), history),)
 
     @property
     def energy_groups(self) -> Mapping[str, str]:

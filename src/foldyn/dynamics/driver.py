@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Dashpot, Rayleigh, State
-from foldyn.cases.air import refuse_air
 from foldyn.dynamics import generalized_alpha, timing
 from foldyn.dynamics.checkpoint import SECONDS, check_keeping
 from foldyn.dynamics.gpu.checks import check_gpu, check_taken
@@ -190,7 +189,6 @@ def prepare(
     choice("method", method, (*METHODS, AUTO))
     if choice("device", device, ("cpu", "gpu")) == "gpu":
         check_gpu(method)
-    refuse_air(case, "a motion")
     integrator = method_of("rk4") if method == AUTO else suited(method, case)
     if method != AUTO:
         case = with_mass(integrator, case)

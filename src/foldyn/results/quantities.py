@@ -57,6 +57,7 @@ MOTION: Mapping[str, Quantity] = STATE | {
     "velocity": Quantity("m/s", "velocity", PLACE),
     "kinetic": Quantity("J", "kinetic energy"),
     "dissipated": Quantity("J", "energy dissipated by damping since the start"),
+    "air": Quantity("J", "energy lost to the air since the start"),
     "work": Quantity("J", "work of the loads since the start"),
     "memory": MEMORY,
 }

@@ -68,6 +68,8 @@ def lacking(packed: Packed) -> str:
         return "a law of your own"
     if not packed.mass.lumped:
         return "a constraint" if len(system.ties.slave) else "a mass matrix that is not diagonal"
+    if packed.added.acts:
+        return "added mass"
     drives = {
         "a support that moves": system.moves, "a rest angle that changes": system.turns,
         "a load that depends on the displacement": system.follows,
