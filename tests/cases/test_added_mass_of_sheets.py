@@ -103,6 +103,43 @@ def test_plates_close_to_each_other_squeeze_the_fluid_between_them():
     assert found[1] - found[0] == pytest.approx(0.1406 * (1 / 0.05 - 1 / 0.1), rel=0.06)
 
 
+def vortex_rings(pattern, n):
+    """Added mass (3, 3) of translations by constant doublets: no flow through centers of rings."""
+    s = np.linspace(0.0, 1.0, n + 1)
+    u, v = np.meshgrid(s, s, indexing="ij")
+    shape = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=-1)
+    grids = shape @ pattern.vertices[np.array(pattern.faces)][:, None]
+    sides = grids[:, :-1, :-1], grids[:, 1:, :-1], grids[:, 1:, 1:], grids[:, :-1, 1:]
+    quads = np.stack(sides, axis=3).reshape(-1, 4, 3)
+    center = quads.mean(axis=1)
+    normal = 0.5 * np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1])
+    area = np.linalg.norm(normal, axis=1)
+    normal /= area[:, None]
+    through = 0.0
+    for k in range(4):
+        one, two = center[:, None] - quads[:, k], center[:, None] - quads[:, (k + 1) % 4]
+        a, b = np.linalg.norm(one, axis=2), np.linalg.norm(two, axis=2)
+        velocity = (
+            np.cross(one, two) * ((a + b) / (a * b * (a * b + (one * two).sum(2))))[..., None]
+        )
+        through = through + np.einsum("ijk,ik->ij", velocity, normal) / (4 * np.pi)
+    found = normal.T @ (area[:, None] * np.linalg.solve(through, normal))
+    return 0.5 * (found + found.T)
+
+
+def test_a_folded_sheet_has_the_mass_of_another_method():
+    """Constant doublets and collocation, with an error that falls like the size of the rings."""
+    pattern = miura(cells=(1, 1))
+    counts = 4, 6, 9
+    other = np.array([vortex_rings(pattern, n) for n in counts]).reshape(3, 9)
+    expected = np.polyfit(1.0 / np.array(counts), other, 2)[-1].reshape(3, 3)
+    structure = fd.discretize(pattern, SHEET)
+    unit = np.tile(np.eye(3), (len(structure.nodes), 1))
+    coarse, fine = (unit.T @ (added(structure, n) @ unit) for n in (8, 12))
+    found = fine + (fine - coarse) / (1.5**2 - 1)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=5e-3 * found.max())
+
+
 # ------------------------------------------------------------------ every sheet
 @pytest.fixture(scope="module")
 def folded():
