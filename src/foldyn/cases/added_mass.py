@@ -21,7 +21,7 @@ from foldyn.mechanics.air.gaps import APART, JOINED, narrow_gap
 from foldyn.ram_limit import check_memory
 from foldyn.structures.boundary_elements import BoundaryElements, boundary_elements
 
-MOST_COUPLED = 6000  # dofs that a matrix may couple with all others
+MOST_COUPLED = 3000  # dofs that a matrix may couple with all others
 COPIES = 3  # of the flow's matrix, while it is made
 
 
@@ -87,6 +87,17 @@ def fluid_at(case: Any, displacement: NDArray) -> Fluid:
     return Fluid(structure.triangles, elements.under, elements.shares, catch, flow)
 
 
+def operator_at(case: Any, displacement: NDArray) -> tuple[AddedMass, bool] | None:
+    """Added mass of a case at a displacement (n, 3), or None without; whether it is to be a matrix.
+
+    It is not where it couples too many dofs.
+    """
+    if case.air is None or not case.air.added_mass:
+        return None
+    added = fluid_at(case, displacement).on(case.structure.nodes + displacement)
+    return added, case.air.added_mass == LOCAL or len(added.moving) <= MOST_COUPLED
+
+
 def added_mass_at(case: Any, displacement: NDArray) -> sparse.csr_array | None:
     """Added mass (3n, 3n) of a case at a displacement (n, 3), kg, or None without.
 
@@ -95,10 +106,11 @@ def added_mass_at(case: Any, displacement: NDArray) -> sparse.csr_array | None:
     InputError
         Panels nearly touch; it couples too many dofs for a matrix.
     """
-    if case.air is None or not case.air.added_mass:
+    found = operator_at(case, displacement)
+    if found is None:
         return None
-    added = fluid_at(case, displacement).on(case.structure.nodes + displacement)
-    if case.air.added_mass is True and len(added.moving) > MOST_COUPLED:
+    added, fits = found
+    if not fits:
         raise InputError(
             f": the fluid couples {len(added.moving)} dofs with each other, and matrices take "
             f"{MOST_COUPLED} at most; take fewer divisions, the scheme n4b5, or added_mass = "

@@ -32,9 +32,12 @@ from scipy import sparse
 
 from foldyn.algebra.complex_symmetric import Gram
 from foldyn.algebra.solvers import check_fill
+from foldyn.algebra.woodbury import Squared
 from foldyn.arguments import brief
 from foldyn.cases import Case, State
-from foldyn.cases.added_mass import added_mass_at
+from foldyn.cases.added_mass import operator_at
+from foldyn.cases.air import LOCAL
+from foldyn.cases.constraints import Constraints
 from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.inertia import check_mass
@@ -49,6 +52,7 @@ from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.values import number
 
+Mass = sparse.csr_array | Squared
 POWER = 4.0 / 3.0
 AT_REST = 0.9411457706782074
 """2/sqrt(pi) Gamma(POWER/2 + 1)/Gamma(POWER/2 + 3/2)."""
@@ -85,7 +89,8 @@ class Linearized:
         Forces on the free dofs per unit acceleration of the whole along x, y, z, but for those of
         fluid, kg.
     added : (nf, nf) or None
-        What of the mass is that of fluid around the sheet, kg.
+        What of the mass is that of fluid around the sheet, kg. Where it couples too many dofs for
+        a matrix, it and the mass are `Squared`.
     pushed : (nf, 3)
         Forces of that fluid per unit acceleration of the whole along x, y, z, kg.
     soft : int
@@ -112,13 +117,13 @@ class Linearized:
     displacement: NDArray
     free: NDArray
     stiffness: sparse.csc_array
-    mass: sparse.csc_array
+    mass: sparse.csc_array | Squared
     damping: sparse.csc_array
     modal: NDArray
     drag: NDArray
     ground: NDArray
     inertia: NDArray
-    added: sparse.csc_array | None
+    added: sparse.csc_array | Squared | None
     pushed: NDArray
     soft: int
     secant: float | None
@@ -238,8 +243,7 @@ def linearize(
         more = inner.damped(more, case.crease_damping * body.sheet.fold_hinges().length)
     damping = case.rayleigh.matrix(mass, _reference(case, inner.stiffened(exact), internal))
     added = _added(case, point.displacement, body, inner)
-    if added is not None:
-        mass = sparse.csr_array(mass + added)
+    mass = _moved(mass, added)
     modal = _modal_rows(case, point.displacement, stiffness, mass, internal)
     if contact is not None:  # it damps nothing
         stiffness = sparse.csr_array(stiffness + inner.behind(contact.tangent(point.dofs)))
@@ -250,13 +254,13 @@ def linearize(
         displacement=point.displacement,
         free=free,
         stiffness=_block(ties.matrix(stiffness), free),
-        mass=_block(ties.matrix(mass), free),
+        mass=_tied(mass, ties, free),
         damping=_block(ties.matrix(damping + more if more.nnz else damping), free),
         modal=ties.force(modal.T)[free].T,
         drag=ties.force(more @ whole)[free],
         ground=ties.force(_ground(point.body, point.dofs, whole))[free],
         inertia=_inertia(case, whole, inner)[free],
-        added=None if added is None else _block(ties.matrix(added), free),
+        added=None if added is None else _tied(added, ties, free),
         pushed=np.zeros((len(free), 3)) if added is None else ties.force(added @ whole)[free],
         soft=soft,
         secant=None if secant is None else float(secant),
@@ -306,15 +310,43 @@ def _ground(body: Assembly, q: NDArray, whole: NDArray) -> NDArray:
     return out
 
 
-def _added(
-    case: Case, displacement: NDArray, body: Assembly, inner: Amplitudes
-) -> sparse.csr_array | None:
-    """Mass of the fluid (m, m) at a displacement (n, 3), kg."""
-    added = added_mass_at(case, displacement)
-    if added is None:
+def _added(case: Case, displacement: NDArray, body: Assembly, inner: Amplitudes) -> Mass | None:
+    """Mass of the fluid (m, m) at a displacement (n, 3), kg: where it would be full, by rows."""
+    found = operator_at(case, displacement)
+    if found is None:
         return None
-    added.resize((body.size, body.size))
-    return inner.behind(added)
+    added, fits = found
+    if fits:
+        matrix = added.sparse
+        matrix.resize((body.size, body.size))
+        return inner.behind(matrix)
+    for name, there in (("modal damping", case.modal_damping), ("memory", case.remembering)):
+        if there:
+            raise InputError(
+                f": the fluid couples {len(added.moving)} dofs, too many for a full matrix, which "
+                f'{name} takes; leave one out, take fewer divisions, or added_mass = "{LOCAL}"',
+                "air",
+            )
+    size = body.size + len(inner.dofs)
+    rows = np.pad(added.rows, ((0, 0), (0, size - added.shape[0])))
+    return Squared(sparse.csc_array((size, size)), rows)
+
+
+def _moved(mass: sparse.csr_array, added: Mass | None) -> Mass:
+    """Mass (m, m) with that of the fluid."""
+    if added is None:
+        return mass
+    if isinstance(added, Squared):
+        return Squared(sparse.csc_array(mass), added.rows)
+    return sparse.csr_array(mass + added)
+
+
+def _tied(matrix: Mass, ties: Constraints, free: NDArray) -> sparse.csc_array | Squared:
+    """A mass (m, m) on the free dofs, as constraints leave it."""
+    if isinstance(matrix, Squared):
+        block = _block(ties.matrix(sparse.csr_array(matrix.matrix)), free)
+        return Squared(block, ties.force(matrix.rows.T)[free].T)
+    return _block(ties.matrix(matrix), free)
 
 
 def _inertia(case: Case, whole: NDArray, inner: Amplitudes) -> NDArray:
@@ -339,8 +371,7 @@ def _modal_rows(
         body, rest = case.elastic_body, np.zeros_like(state)
         inner = amplitudes(case.structure, body, body.dofs(rest), internal)
         stiffness = inner.stiffened(body.tangent(body.dofs(rest)))
-        mass, added = inner.massed(mass_of(case)), _added(case, rest, body, inner)
-        mass = mass if added is None else sparse.csr_array(mass + added)
+        mass = _moved(inner.massed(mass_of(case)), _added(case, rest, body, inner))
         modal = rows_of(damping, case, stiffness, mass, rest)
     modal.warn()
     return np.pad(modal.rows, ((0, 0), (0, stiffness.shape[0] - modal.rows.shape[1])))

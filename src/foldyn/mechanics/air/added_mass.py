@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg import LinAlgError, cho_factor
+from scipy.linalg import LinAlgError, cho_factor, cholesky
 from scipy.linalg.lapack import dpotri
 
 from foldyn.errors import ComputationError
@@ -62,6 +62,11 @@ class AddedMass:
     def moving(self) -> NDArray[np.int64]:
         """Numbers of the dofs that move fluid."""
         return np.flatnonzero(np.diff(sparse.csc_array(self.flux).indptr))
+
+    @property
+    def rows(self) -> NDArray[np.float64]:
+        """Rows G (u, 3n), kg^1/2, of which the matrix is G'G, where the flow's is full."""
+        return np.asarray(self.flux.T @ cholesky(self.flow, lower=True)).T
 
     @cached_property
     def sparse(self) -> sparse.csr_array:

@@ -9,6 +9,8 @@ from scipy.linalg import eigh
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import UnitCell, bands
+from foldyn.sweeps import MEASURES
+from foldyn.sweeps.measure import asked
 
 AIR = fd.Air(density=1.204)
 HEAVY = fd.Sheet(206e9, 0.3, 0.238, density=7850.0)
@@ -159,6 +161,34 @@ def test_modal_damping_has_its_ratios_in_air(sheet):
         np.testing.assert_allclose(ratios, [0.02, 0.03], rtol=1e-9)
 
 
+def test_large_sheets_keep_the_mass_as_rows(monkeypatch):
+    """The same modes and responses, and as many of them proven, as with a matrix."""
+    pattern = fd.patterns.miura(cells=(2, 2), a=0.1, b=0.1, panel_angle=60, dihedral=60)
+    made = fd.discretize(pattern, fd.Sheet(1.2e9, 0.2, 1e-4, density=700.0))
+    tied = [fd.Fix("xmin"), fd.Link("xmax", "xyz")]
+    held = fd.Case(made, tied, damping=fd.Rayleigh(1.0), air=fd.Air(resolution=2))
+    push, loose = fd.Force("xmax", (1e-3, 0.0, 1e-3)), held.altered(supports=())
+
+    def computed():
+        return (
+            fd.modes(held, 5), fd.modes(loose, 9),
+            fd.frf(held, push, [1.0, 9.0], method="modal", count=12),
+            fd.frf(held, fd.BaseMotion("z"), [1.0, 9.0], method="modal", count=12),
+        )  # fmt: skip
+
+    full = computed()
+    monkeypatch.setattr("foldyn.cases.added_mass.MOST_COUPLED", 1)
+    for one, other in zip(full, computed(), strict=True):
+        for name in set(one) & {"frequency", "air_share", "receptance", "transmissibility"}:
+            a, b = one[name].values, other[name].values
+            np.testing.assert_allclose(b, a, rtol=0, atol=1e-8 * np.abs(a).max())
+        assert one.attrs.get("complete") == other.attrs.get("complete")
+    with pytest.raises(InputError, match=r"method: the fluid couples too many dofs"):
+        fd.frf(held, push, [1.0])
+    with pytest.raises(InputError, match="which modal damping takes"):
+        fd.modes(held.altered(damping=fd.ModalDamping(0.02, 2)), 2)
+
+
 def test_drag_changes_nothing_at_rest(sheet):
     found = fd.modes(sheet.altered(air=fd.Air(drag=False)), 2)
     np.testing.assert_array_equal(found.frequency, fd.modes(sheet, 2).frequency)
@@ -181,3 +211,37 @@ def test_what_does_not_take_air_refuses_it(sheet):
     for call in (fd.modes, fd.trace):
         with pytest.raises(InputError, match=r"air.velocity = .*: statics would leave wind out"):
             call(windy)
+
+
+def test_a_case_file_has_air(tmp_path, sheet):
+    text = """
+[pattern]
+kind = "miura"
+cells = [1, 1]
+a = 0.1
+b = 0.1
+panel_angle = 60
+dihedral = 90
+[sheet]
+youngs_modulus = 1.2e9
+poissons_ratio = 0.2
+thickness = 1e-4
+density = 700.0
+[[supports]]
+nodes = "xmin"
+[air]
+[analysis]
+kind = "modes"
+count = 2
+"""
+    (tmp_path / "air.toml").write_text(text)
+    file = fd.read_case(tmp_path / "air.toml")
+    found = file.run()
+    np.testing.assert_allclose(found.air_share, fd.modes(sheet, 2).air_share, rtol=1e-9)
+    fd.save(found, tmp_path / "air.nc")
+    assert fd.case_of(fd.load(tmp_path / "air.nc")).air == AIR
+    share = asked("air_share[1]", MEASURES).of(found, file.case(), {})
+    assert float(share) == float(found.air_share[0])
+    (tmp_path / "air.toml").write_text(text.replace("[air]", "[air]\ndensity = -1"))
+    with pytest.raises(InputError, match=r"air.density = -1: must be greater than 0 kg/m3"):
+        fd.read_case(tmp_path / "air.toml")
