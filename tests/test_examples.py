@@ -247,7 +247,8 @@ def thick_panel(found):
 CHECKS = (
     air_deployment, air_fall, air_gust, bilayer, case_study_1, clamped, contact_tower, crane,
     deployment, design_frequencies, design_kresling, design_miura, fidelity, hardening_miura,
-    jumping_resonance, kresling_chain, miura_bands, point_mass, pressure, snap_through, sweep, thick_panel,
+    jumping_resonance, kresling_chain, miura_bands, point_mass, pressure, snap_through, sweep,
+    thick_panel,
 )  # fmt: skip
 
 
