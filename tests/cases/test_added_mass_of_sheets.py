@@ -57,6 +57,13 @@ def test_rectangles_have_the_published_mass_with_400_elements(ratio, published):
     assert limit == pytest.approx(published, rel=2e-3)
 
 
+@pytest.mark.parametrize(("ratio", "published"), [(4.0, 0.872), (10.0, 0.947)])
+def test_long_rectangles_have_the_published_mass(ratio, published):
+    """The same table; elements are as long as the plate."""
+    found = heave(plates(rectangle(1.0, ratio)), 20) / (np.pi / 4 * ratio)
+    assert found == pytest.approx(published, rel=0.006)
+
+
 def disk(n):
     """Triangles of a graded square of n x n elements drawn into a circle."""
     s = -np.cos(np.pi * np.arange(n + 1) / n)

@@ -306,7 +306,22 @@ def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
             + ".",
             lambda: plots.draw_modes(case_of(modes), modes, shown, title=note),
         ),
+        _air_table(modes, load(folder / tasks.IN_AIR), named["name"].values.tolist()),
     ]
+
+
+def _air_table(modes: xr.Dataset, in_air: xr.Dataset, names: Sequence[str]) -> Table:
+    columns = modes["frequency"].values, in_air["frequency"].values, in_air["air_share"].values
+    rows = [
+        [str(name), cell(dry), cell(wet), cell(100.0 * share)]
+        for name, dry, wet, share in zip(names, *columns, strict=True)
+    ]
+    return Table(
+        ["mode", "in vacuum (Hz)", "in air (Hz)", "share of the air (%)"], rows,
+        "Modes with the fitted folds, in vacuum and in air, and the part of the modal mass that is "
+        "air.",
+        digits=3,
+    )  # fmt: skip
 
 
 def _response_table(responses: Mapping[str, xr.Dataset], paper: Mapping[str, Target]) -> Table:

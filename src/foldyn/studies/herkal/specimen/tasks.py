@@ -36,7 +36,7 @@ FOLDER = "specimen"
 NOTE = "synthetic data: the specimen's own are not public"
 PHOTOS, FILM, FOUND, COMPARED = "photographs.nc", "film.nc", "found.json", "front.nc"
 TRUTH = "film-truth.nc"
-MODES = "modes.nc"
+MODES, IN_AIR = "modes.nc", "modes-air.nc"
 RESPONSES = {"published": "frf-published.nc", "air": "frf-air.nc", "fitted": "frf-fitted.nc"}
 
 
@@ -246,14 +246,15 @@ def _response(part: Part, folder: Path) -> None:
     for name, given in (("published", {}), ("air", vibration.IN_AIR), ("fitted", changes)):
         save(vibration.specimen("frf", changes=given).run(), folder / RESPONSES[name])
     folds = {key: value for key, value in changes.items() if not key.startswith("damping.")}
-    save(vibration.specimen("modes", changes=folds).run(), folder / MODES)
+    for name, given in ((MODES, folds), (IN_AIR, {**folds, **vibration.IN_AIR})):
+        save(vibration.specimen("modes", changes=given).run(), folder / name)
 
 
 PARTS: Mapping[str, tuple[Callable[[Part, Path], None], tuple[str, ...]]] = {
     "photographs": (_photographs, (PHOTOS,)),
     "film": (_film, (FILM, TRUTH)),
     "fit": (_fit, (FOUND, COMPARED)),
-    "response": (_response, (*RESPONSES.values(), MODES)),
+    "response": (_response, (*RESPONSES.values(), MODES, IN_AIR)),
 }
 """How each part is computed, and which files it leaves for others or for the page."""
 
