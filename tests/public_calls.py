@@ -113,7 +113,7 @@ DATA: Calls = {
     }),
     "Air": (fd.Air, {
         "density": 998.0, "velocity": (0.5, 0.0, 0.0), "added_mass": "local", "drag": True,
-        "drag_coefficient": 0.5, "resolution": 2,
+        "drag_coefficient": 0.5, "resolution": 2, "history": fd.Ramp(1.0),
     }),
     "Constant": (fd.Constant, {}),
     "Pulse": (fd.Pulse, {"duration": 0.5}),

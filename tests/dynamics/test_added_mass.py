@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 import foldyn as fd
 from foldyn.cases.added_mass import fluid_at
-from foldyn.errors import InputError
+from foldyn.errors import ComputationError, InputError
 
 SIDE = 0.1
 FLUID = {"density": 100.0, "drag": False}
@@ -146,3 +146,15 @@ def test_what_does_not_take_added_mass_says_so():
     with pytest.raises(InputError, match="resolution = 80: the flow has 6241 unknowns"):
         fd.simulate(fd.Case(plate(), air=fd.Air(**FLUID, resolution=80)), 0.01)
     assert fd.simulate(case, 1e-3, "auto", every=1e-3).attrs["method"] == "dormand_prince"
+    shell = fd.shell(fd.patterns.simple_fold(), fd.Sheet(1e7, 0.3, 0.02, density=300.0), 2)
+    with pytest.raises(InputError, match="only explicit methods take the added mass"):
+        fd.simulate(fd.Case(shell, air=fd.Air()), 0.01, "auto", every=0.01)
+
+
+def test_panels_that_close_on_each_other_end_the_motion():
+    pattern = fd.patterns.simple_fold(a=SIDE, b=SIDE, dihedral=60)
+    sheet, crease = fd.Sheet(2e7, 0.3, 2e-3, density=300.0), {"crease_stiffness": 0.5}
+    fluid = fd.Air(density=20.0, drag=False)
+    case = fd.Case(fd.discretize(pattern, sheet, crease_rest=358.0, **crease), air=fluid)
+    with pytest.raises(ComputationError, match="the flow about the sheet is lost: air: panels 0"):
+        fd.simulate(case, 0.1, "central_difference", every=0.002)

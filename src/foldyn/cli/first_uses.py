@@ -177,7 +177,11 @@ STAGES: Sequence[Uses] = (
             partial(moved, "rk4", "newmark", membrane="bars"),
         ],
         "shells": [partial(vibrating, model="shell"), partial(moved, "newmark", model="shell")],
-        "air": [partial(vibrating, air=fd.Air())],
+        "air": [
+            partial(vibrating, air=fd.Air()),
+            partial(moved, *EXPLICIT, air=fd.Air(velocity=(0, 0, 9), history=PULSE)),
+            partial(moved, *IMPLICIT, CONSERVING, air=fd.Air(added_mass=False)),
+        ],
         "several motions at once": [moved_at_once],
         "gradients": [
             partial(differentiated, "rk4", "newmark", supports=SPRINGS, damping=DAMPED),

@@ -57,7 +57,7 @@ def choose(
     dt, every and tolerance are those of `simulate`, default what implicit methods take without;
     modal is the modal damping of the motion.
     """
-    if case.air is not None and case.air.added_mass:
+    if case.air is not None and case.air.added_mass and not case.structure.massless:
         return Choice(ACCURATE, "explicit: the added mass of the air moves with the panels")
     drag = case.air is not None and case.air.drag
     conserved = not (case.damped or drag or case.remembering or any(histories(case)))

@@ -37,6 +37,7 @@ from foldyn.dynamics.turned import resists_turns, turns_told
 from foldyn.errors import (
     ComputationError,
     CrossingWarning,
+    FoldynError,
     FoldynWarning,
     InstabilityError,
     MotionInterrupted,
@@ -315,7 +316,12 @@ class Motion:
 
     def _renew_flow(self, engine: Compiled | Implicit | OnCard) -> None:
         """Find the flow of added mass anew, if the sheet has folded."""
-        if renewed_flow(self.case, self.packed, self.course) and isinstance(engine, Compiled):
+        try:
+            found = renewed_flow(self.case, self.packed, self.course)
+        except FoldynError as error:
+            why = f"at t = {self.course.tally.time:.6g} s the flow about the sheet is lost: {error}"
+            self._stop(why, ComputationError, error)
+        if found and isinstance(engine, Compiled):
             engine.accelerate()
 
     def _continuations(self) -> dict[str, tuple[float, Continuation]]:

@@ -8,6 +8,7 @@ from numba import config
 
 from foldyn.dynamics.system import Packed
 from foldyn.errors import InputError
+from foldyn.mechanics.air_drag import AirDragTerm
 from foldyn.mechanics.constant_damping import DampingMatrix
 from foldyn.mechanics.membranes import MembranesTerm
 from foldyn.mechanics.springs import SpringsTerm
@@ -77,6 +78,8 @@ def lacking(packed: Packed) -> str:
     for what, there in drives.items():
         if there:
             return what
+    if body.find(AirDragTerm) is not None:
+        return "drag of the air"
     for term in body.others:
         if not isinstance(term, TERMS):
             return f"the term {type(term).__name__.removesuffix('Term')}"
