@@ -56,7 +56,8 @@ class Air(Part):
     --------
     >>> import foldyn as fd
     >>> fd.Air(density=998.0, drag=False)
-    Air(density=998.0, velocity=(0.0, 0.0, 0.0), added_mass=True, drag=False, resolution=4)
+    Air(density=998.0, velocity=(0.0, 0.0, 0.0), added_mass=True, drag=False, resolution=4,
+        history=Constant())
     """
 
     density: Annotated[float, Check(number, above=0.0, unit="kg/m3")] = 1.204
