@@ -137,6 +137,16 @@ def test_responses_have_the_whole_mass(sheet):
             np.testing.assert_allclose(mine, x, rtol=0, atol=1e-7 * np.abs(x).max())
 
 
+@pytest.mark.matrix
+def test_a_simulated_impulse_has_the_same_response(sheet):
+    """Small motions, whose added mass is that of the state."""
+    case = sheet.altered(damping=fd.Rayleigh(alpha=3.0), air=fd.Air(drag=False, resolution=2))
+    push, frequencies = fd.Force("xmax", (0.0, 0.0, 1e-6)), np.arange(0.5, 3.0, 0.5)
+    direct = fd.frf(case, push, frequencies).receptance.values
+    found = fd.frf(case, push, frequencies, method="impulse").receptance.values
+    np.testing.assert_allclose(found, direct, rtol=0, atol=3e-3 * np.abs(direct).max())
+
+
 def test_a_base_moves_the_sheet_against_the_air(sheet):
     """Relative to the base: (K - w^2 M + i w alpha M_s) x = (w^2 M - i w alpha M_s) r."""
     case = sheet.altered(damping=fd.Rayleigh(alpha=0.5))
