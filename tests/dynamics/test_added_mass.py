@@ -32,6 +32,19 @@ def momenta(case, motion, sample):
     return np.concatenate([p.sum(axis=0), np.cross(x, p).sum(axis=0)])
 
 
+@pytest.mark.parametrize("added_mass", [True, "local"])
+def test_the_energy_of_the_fluid_is_that_of_the_added_mass(added_mass):
+    pattern = fd.patterns.miura(cells=(2, 2), a=SIDE, b=SIDE, panel_angle=60, dihedral=100)
+    structure = fd.discretize(pattern, fd.Sheet(5e6, 0.3, 1e-3, density=300.0))
+    fluid = fd.Air(density=100.0, drag=False, added_mass=added_mass, resolution=2)
+    case, random = fd.Case(structure, air=fluid), np.random.default_rng(5)
+    moved, v = 0.01 * SIDE * random.random((2, *structure.nodes.shape))
+    start = fd.State(displacement=moved, velocity=v)
+    motion = fd.simulate(case, 1e-6, dt=1e-6, initial=start)
+    whole = case.added_mass(start) @ v.ravel() + (case.mass @ v).ravel()
+    assert_allclose(motion.kinetic[0], 0.5 * v.ravel() @ whole, rtol=1e-12)
+
+
 @pytest.mark.parametrize("method", EXPLICIT)
 def test_a_body_keeps_its_momenta_and_its_energy(method):
     """Kirchhoff's equations: a plate that turns and drifts, with the moment m_a v_n v_t (Munk)."""
@@ -146,6 +159,8 @@ def test_what_does_not_take_added_mass_says_so():
     with pytest.raises(InputError, match="resolution = 80: the flow has 6241 unknowns"):
         fd.simulate(fd.Case(plate(), air=fd.Air(**FLUID, resolution=80)), 0.01)
     assert fd.simulate(case, 1e-3, "auto", every=1e-3).attrs["method"] == "dormand_prince"
+    with pytest.raises(InputError, match="air.added_mass: the exponent takes a mass that stays"):
+        fd.lyapunov_exponent(case, 1.0)
     shell = fd.shell(fd.patterns.simple_fold(), fd.Sheet(1e7, 0.3, 0.02, density=300.0), 2)
     with pytest.raises(InputError, match="only explicit methods take the added mass"):
         fd.simulate(fd.Case(shell, air=fd.Air()), 0.01, "auto", every=0.01)
