@@ -57,8 +57,8 @@ class _Context(NamedTuple):
 
 @inner_scalar
 def put_normal(sides, corners, u, out):
-    """Unit normal (3,) of a triangle at u (n, 3), to `out`; returns its area, m2."""
-    first, second, third = corners
+    """Unit normal (3,) of a triangle of three nodes at u (n, 3), to `out`; returns its area, m2."""
+    first, second, third = corners[0], corners[1], corners[2]
     ax = sides[0, 0] + u[second, 0] - u[first, 0]
     ay = sides[0, 1] + u[second, 1] - u[first, 1]
     az = sides[0, 2] + u[second, 2] - u[first, 2]
@@ -79,9 +79,7 @@ def _forces(own, u, v, t, force, powers):
     moved, speed, out = rows_at(u, own.rows), rows_at(v, own.rows), rows_at(force, own.rows)
     for e in range(air.triangles.shape[0]):
         corners, n = air.triangles[e], air.normal[e]
-        area = put_normal(
-            air.sides[e], (corners[0], corners[1], corners[2]), moved, n
-        )  # fmt: skip
+        area = put_normal(air.sides[e], corners, moved, n)
         blown = air.factor[0] * (n[0] * air.wind[0] + n[1] * air.wind[1] + n[2] * air.wind[2])
         for k in range(3):
             a, b, own_speed = corners[k], corners[(k + 1) % 3], 0.0
@@ -104,7 +102,7 @@ def _place(own, factors):
 
 
 class AirDragTerm(Term):
-    """Drag of the panels; see `Term`.
+    """Drag of the panels; see `Term`. Its memory is that of `AirDrag`.
 
     Parameters
     ----------
