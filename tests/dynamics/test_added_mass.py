@@ -6,6 +6,8 @@ from numpy.testing import assert_allclose
 
 import foldyn as fd
 from foldyn.cases.added_mass import fluid_at
+from foldyn.dynamics.gpu.checks import lacking
+from foldyn.dynamics.system import pack
 from foldyn.errors import ComputationError, InputError
 
 SIDE = 0.1
@@ -159,8 +161,14 @@ def test_what_does_not_take_added_mass_says_so():
     with pytest.raises(InputError, match="resolution = 80: the flow has 6241 unknowns"):
         fd.simulate(fd.Case(plate(), air=fd.Air(**FLUID, resolution=80)), 0.01)
     assert fd.simulate(case, 1e-3, "auto", every=1e-3).attrs["method"] == "dormand_prince"
-    with pytest.raises(InputError, match="air.added_mass: the exponent takes a mass that stays"):
+    with pytest.raises(InputError, match=r"air\.added_mass: the exponent takes a mass that stays"):
         fd.lyapunov_exponent(case, 1.0)
+    voronoi = fd.discretize(case.structure.pattern, case.structure.sheet, mass="mixed_voronoi")
+    for air, lack in (
+        (fd.Air(**FLUID), "added mass"),
+        (fd.Air(added_mass=False), "drag of the air"),
+    ):
+        assert lacking(pack(fd.Case(voronoi, air=air), 1.0)) == lack  # on a GPU
     shell = fd.shell(fd.patterns.simple_fold(), fd.Sheet(1e7, 0.3, 0.02, density=300.0), 2)
     with pytest.raises(InputError, match="only explicit methods take the added mass"):
         fd.simulate(fd.Case(shell, air=fd.Air()), 0.01, "auto", every=0.01)
