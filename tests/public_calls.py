@@ -111,6 +111,10 @@ DATA: Calls = {
         "point": (0.0, 0.5, 0.0), "normal": (0.0, 0.0, 1.0), "friction": 0.5,
         "motion": (0.0, 0.5, 1.0), "history": fd.Ramp(1.0),
     }),
+    "Air": (fd.Air, {
+        "density": 998.0, "velocity": (0.5, 0.0, 0.0), "added_mass": "local", "drag": True,
+        "drag_coefficient": 0.5, "resolution": 2, "history": fd.Ramp(1.0),
+    }),
     "Constant": (fd.Constant, {}),
     "Pulse": (fd.Pulse, {"duration": 0.5}),
     "HalfSine": (fd.HalfSine, {"duration": 0.5}),
@@ -147,6 +151,7 @@ DATA: Calls = {
         "structure": fd.discretize(pattern(), sheet()), "supports": [fd.Fix([0, 1, 2, 3])],
         "loads": [fd.Force([4, 5], (0, 0, 1e-3))], "damping": fd.Rayleigh(alpha=1.0),
         "masses": [fd.PointMass([4], 0.5)], "contact": fd.Contact(thickness=0.01),
+        "air": fd.Air(density=998.0),
     }),
     "thicken": (fd.thicken, {"pattern": pattern(), "thickness": 0.01, "offsets": 0.005}),
     "welded": (fd.welded, {

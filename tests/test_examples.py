@@ -19,6 +19,36 @@ SCRIPTS = [ROOT / "examples" / "patterns" / "make.py"]
 SCRIPTS += [ROOT / "docs" / f"{name}_figures.py" for name in FIGURES]
 
 
+def air_deployment(found):
+    """Air slows the sheet, by its mass as well, and takes the energy of its swing back."""
+    times, back = [], []
+    for motion in found["motions"].values():
+        assert motion.attrs["energy_error"] < 1e-3
+        x = found["structure"].nodes[:, 0] + motion.displacement.values[:, :, 0]
+        length = np.ptp(x, axis=1)
+        times.append(float(motion.time[np.flatnonzero(length > 0.8)[0]]))
+        back.append(length[motion.time.values > 0.2].min())
+    assert times[0] <= times[1] < times[2]
+    assert max(back[1:]) - back[0] > 0.2
+    assert min(back[1:]) > 0.7
+    assert float(found["motions"]["air"].air[-1]) > 0.05
+
+
+def air_fall(found):
+    """Sheets fall with the velocity at which drag bears their weight."""
+    for dihedral, speed in found["speeds"].items():
+        np.testing.assert_allclose(speed[-1], found["by_hand"][dihedral], rtol=3e-3)
+    np.testing.assert_allclose(found["speeds"][180][-1], found["by_hand"][180], rtol=1e-3)
+
+
+def air_gust(found):
+    """Swings decay as quadratic damping says: to a third in twenty turns."""
+    swings, by_hand = found["size"][found["turns"]], np.array(found["by_hand"])
+    assert swings[-1] < 0.4 * swings[0]
+    np.testing.assert_allclose(swings, by_hand, rtol=0.015)
+    assert found["motion"].attrs["energy_error"] < 1e-4
+
+
 def bilayer(found):
     """Arms curl up alike, near the arc of the free curvature."""
     heights = found["path"].displacement.values[:, :, 2]
@@ -215,9 +245,10 @@ def thick_panel(found):
 
 
 CHECKS = (
-    bilayer, case_study_1, clamped, contact_tower, crane, deployment, design_frequencies,
-    design_kresling, design_miura, fidelity, hardening_miura, jumping_resonance, kresling_chain,
-    miura_bands, point_mass, pressure, snap_through, sweep, thick_panel,
+    air_deployment, air_fall, air_gust, bilayer, case_study_1, clamped, contact_tower, crane,
+    deployment, design_frequencies, design_kresling, design_miura, fidelity, hardening_miura,
+    jumping_resonance, kresling_chain, miura_bands, point_mass, pressure, snap_through, sweep,
+    thick_panel,
 )  # fmt: skip
 
 

@@ -38,6 +38,7 @@ from foldyn.attractors import (
 )
 from foldyn.cases import (
     Actuate as Actuate,
+    Air as Air,
     BaseMotion as BaseMotion,
     Case as Case,
     Chirp as Chirp,

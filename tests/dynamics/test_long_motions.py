@@ -79,6 +79,7 @@ KINDS = {  # name of the case, its arguments, and what of the methods
     "steps": (["dormand_prince"], {"duration": 1.0, "every": 3}),
     "fixed": (["newmark"], {"duration": 1.0, "every": 0.02, "dt": 0.005}),
     "actuated": (["rk4", "generalized_alpha"], {"duration": 0.6, "every": 0.01}),
+    "blown": (["rk4", "dormand_prince"], {"duration": 1.2, "every": 0.02}),
     "creeping": (["dormand_prince", "generalized_alpha"], {**SECOND, "dt": 0.002}),
     "sliding": (["energy_momentum"], {"duration": 0.02, "every": 0.001}),
 }

@@ -46,6 +46,19 @@ def test_three_peaks_without_fitting(mass):
         assert Verdict(TARGETS[key], frequency).holds, (key, frequency)
 
 
+def test_air_lowers_the_frequencies_by_one_to_four_percent():
+    """To first order f^2 falls by the air's share of the modal mass (docs/specimen.md)."""
+    changes = {"analysis.count": 4}
+    vacuum, air = (
+        vibration.specimen("modes", changes={**changes, **given}).run("circumcenter")
+        for given in ({}, vibration.IN_AIR)
+    )
+    share = air.air_share.values
+    assert share == pytest.approx([0.021, 0.072, 0.024, 0.042], abs=1e-3)
+    fall = 1.0 - (air.frequency.values / vacuum.frequency.values) ** 2
+    assert fall == pytest.approx(share, rel=0.03)
+
+
 def test_damping_of_the_second_and_third_peak():
     """The paper's pair was made from 13.5 and 9 %: both are found again within a tenth or so."""
     _, second, third = vibration.response(frequencies=COARSE).damping

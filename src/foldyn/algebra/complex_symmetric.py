@@ -16,6 +16,7 @@ LOST = 1e-3  # of the solution: rounding above which it is a resonance without d
 PIVOT = 0.01  # of the largest entry in a column: what a pivot on the diagonal must have
 BESIDE = 64.0  # times rounding: by how much the factors of A are those of a matrix beside it
 REFINED, ROUNDS = 1e-12, 4  # of the solution: changes below which it is not refined further
+FULL = 0.2  # of the entries: a matrix with more is taken for a full one
 SPARSE = 40.0  # products of full matrices in the time of a solution per entry of a sparse matrix
 _EPS = float(np.finfo(np.float64).eps)
 
@@ -99,10 +100,10 @@ def _factors(matrix: sparse.csc_array, gram: Gram, weight: complex) -> Solution:
     damped by more than its rounding, and by too little to keep refinement from converging wherever
     rounding leaves anything of the solution.
     """
-    rows = gram.rows
-    if not len(rows):
+    rows, full = gram.rows, matrix.nnz > FULL * matrix.shape[0] ** 2
+    if not len(rows) and not full:
         return factorize(matrix, pivot=PIVOT)
-    if gram.fills(matrix):
+    if full or gram.fills(matrix):
         return _Full(matrix.toarray() + weight * gram.matrix)
     terms = np.abs(matrix.diagonal()) + abs(weight) * np.einsum("ri,ri->i", rows, rows)
     beside = sparse.diags_array(1j * BESIDE * _EPS * terms)

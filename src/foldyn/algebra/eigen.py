@@ -26,6 +26,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from foldyn.algebra.solvers import factorizer
 from foldyn.algebra.superlu import Factorization, SingularTangentError
+from foldyn.algebra.woodbury import Counted, Squared
 from foldyn.errors import ComputationError, InputError
 
 MOST_DENSE = 6000  # dofs of which nearly all modes may be asked for
@@ -47,7 +48,7 @@ class Pencil:
     """Stiffness and mass (n, n) of free dofs, with the solver that factorizes K - s M."""
 
     def __init__(
-        self, stiffness: sparse.csc_array, mass: sparse.csc_array, solver: str = "auto"
+        self, stiffness: sparse.csc_array, mass: sparse.csc_array | Squared, solver: str = "auto"
     ) -> None:
         self.stiffness, self.mass = stiffness, mass
         self.size = stiffness.shape[0]
@@ -69,13 +70,19 @@ class Pencil:
             moved = shift + NUDGE * attempt * (abs(shift) or self.scale * EPS)
             self.factorizations += 1
             try:
-                factors = self._factorize(sparse.csc_array(self.stiffness - moved * self.mass))
-                factors.negative()
-                return factors
+                return self._factors(moved)
             except SingularTangentError:
                 if attempt == NUDGES - 1:
                     raise
         raise AssertionError("unreachable")
+
+    def _factors(self, shift: float) -> Factorization:
+        mass = self.mass.matrix if isinstance(self.mass, Squared) else self.mass
+        factors = self._factorize(sparse.csc_array(self.stiffness - shift * mass))
+        factors.negative()
+        if shift and isinstance(self.mass, Squared):
+            return Counted(factors, self.mass.rows, -shift)
+        return factors
 
     def below(self, shift: float) -> int:
         """How many eigenvalues lie below s."""
@@ -154,7 +161,7 @@ def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> S
 def _all(pencil: Pencil, known: NDArray) -> tuple[NDArray, NDArray]:
     """All modes but the known ones, which are moved behind all others."""
     heavy, light = np.flatnonzero(pencil.heavy), np.flatnonzero(~pencil.heavy)
-    mass = pencil.mass[heavy][:, heavy].toarray()
+    mass = pencil.mass.toarray()[np.ix_(heavy, heavy)]
     stiffness = pencil.stiffness[heavy][:, heavy].toarray()
     follow = np.zeros((0, len(heavy)))
     if len(light):  # massless dofs follow statically
@@ -223,7 +230,12 @@ def _lanczos(
     operator = LinearOperator((size, size), matvec=inverse, dtype=float)
     start = inverse(mass @ start)
     try:
-        _, shapes = eigsh(pencil.stiffness, k=count, M=mass, sigma=shift, OPinv=operator, v0=start)
+        weight = mass
+        if isinstance(mass, Squared):
+            weight = LinearOperator((size, size), matvec=mass.__matmul__, dtype=float)
+        _, shapes = eigsh(
+            pencil.stiffness, k=count, M=weight, sigma=shift, OPinv=operator, v0=start
+        )
     except ArpackNoConvergence as error:
         raise ComputationError(
             f"modes: {len(error.eigenvalues)} of {count} modes converged; ask for fewer, or for "

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.linalg import lu_factor, lu_solve
 
-from foldyn.algebra.superlu import Solution
+from foldyn.algebra.superlu import Factorization, Solution
 
 
 class Updated:
@@ -38,3 +39,52 @@ class Updated:
         """Solution x."""
         x = self._factors.solve(b)
         return x - self._moved @ lu_solve(self._small, self._rows @ x, check_finite=False)
+
+
+class Squared:
+    """The sum A + G'G of a sparse matrix and a product of rows, which is not formed.
+
+    Parameters
+    ----------
+    matrix : csc_array, shape (n, n)
+        A.
+    rows : ndarray, shape (r, n)
+        G.
+    """
+
+    def __init__(self, matrix: sparse.csc_array, rows: NDArray) -> None:
+        self.matrix, self.rows, self.shape = matrix, rows, matrix.shape
+
+    def __matmul__(self, x: NDArray) -> NDArray:
+        """Product with a vector (n,) or several (n, k)."""
+        return self.matrix @ x + self.rows.T @ (self.rows @ x)
+
+    def toarray(self) -> NDArray:
+        """The sum in full."""
+        return self.matrix.toarray() + self.rows.T @ self.rows
+
+    def diagonal(self) -> NDArray:
+        """Its diagonal (n,)."""
+        return self.matrix.diagonal() + np.einsum("ri,ri->i", self.rows, self.rows)
+
+
+class Counted(Updated):
+    """The same of symmetric matrices, with the number of negative eigenvalues of the sum.
+
+    That of the block matrix [[A, G'], [G, -1/w]] can be counted from both of its blocks
+    (Haynsworth's theorem).
+    """
+
+    def __init__(self, factors: Factorization, rows: NDArray, weight: float) -> None:
+        super().__init__(factors, rows, weight)
+        values = np.linalg.eigvalsh(np.eye(len(rows)) / weight + rows @ self._moved)
+        given = len(rows) if weight > 0.0 else 0
+        self._negative = factors.negative() + int((values > 0.0).sum()) - given
+
+    def pivots(self) -> None:
+        """None: only the count is known."""
+        return
+
+    def negative(self) -> int:
+        """Count of negative eigenvalues."""
+        return self._negative

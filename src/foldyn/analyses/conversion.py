@@ -51,7 +51,7 @@ def unbounded(path: Path, document: Document, state: str) -> Document:
     loads = document.get("loads", [])
     kept_loads = [_without(each, "history") for each in loads if "creases" in each]
     kept_loads = [] if state == "rest" else kept_loads
-    left = _tables(document, "contact", "initial", "drive")
+    left = _tables(document, "contact", "air", "initial", "drive")
     left += ["[[supports]]"] if document.get("supports") else []
     left += ["[[loads]]"] if len(loads) > len(kept_loads) else []
     why = (
@@ -59,7 +59,7 @@ def unbounded(path: Path, document: Document, state: str) -> Document:
         '(a file of kind "bands" may have supports)'
     )
     _tell(path, "bands", left, why)
-    kept = _without(document, "contact", "initial", "drive", "output", "supports", "loads")
+    kept = _without(document, "contact", "air", "initial", "drive", "output", "supports", "loads")
     return {**kept, "loads": kept_loads, "analysis": {"kind": "bands"}}
 
 

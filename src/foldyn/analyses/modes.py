@@ -261,6 +261,12 @@ def _notes(modes: xarray.Dataset, case: Case) -> str:
             "Superlinear hinges have the slope that is equivalent to an oscillation by "
             f"{modes.attrs['secant']:g} degrees: the frequencies are those of that amplitude."
         )
+    if case.air is not None and "air_share" in modes:
+        share = 100.0 * modes["air_share"].values
+        notes.append(
+            f"The sheet is in a fluid of {case.air.density:.4g} kg/m3, which has {share.min():.2g} "
+            f"to {share.max():.2g} % of the modal mass."
+        )
     if "internal" in modes.attrs:
         share = modes["internal_share"].values
         notes.append(

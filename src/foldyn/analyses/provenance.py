@@ -89,6 +89,7 @@ def inputs(case_file: Any, case: Case, results: ByRule) -> list[tuple[str, str]]
         ("damping", damping_text(case)),
         ("point masses", _point_masses(case) if case.masses else ""),
         ("contact", _contact(case.contact) if case.contact else ""),
+        ("air", _said(case.air) if case.air else ""),
         ("initial state", _listed(case_file.start_keys)),
         ("analysis", f"{analysis.kind}; {_listed(analysis.arguments)}"),
     ]

@@ -168,8 +168,9 @@ def case_of_document(
                 _ = structure.mass  # a rule may refuse this pattern: say so before anything runs
         with within("", path):
             return Case(
-                structure, schema.supports, schema.loads, damping, schema.masses, schema.contact
-            )
+                structure, schema.supports, schema.loads, damping, schema.masses, schema.contact,
+                schema.air,
+            )  # fmt: skip
 
     case = make(masses[0])
     cases = {masses[0]: case}

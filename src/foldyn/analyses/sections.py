@@ -27,6 +27,7 @@ from foldyn.analyses.pattern_section import checked_pattern
 from foldyn.analyses.ranges import SAMPLINGS, varied
 from foldyn.analyses.ties import ties_of
 from foldyn.arguments import Argument, Checked, arguments
+from foldyn.cases.air import air_from
 from foldyn.cases.contact import contact_from
 from foldyn.cases.damping import (
     CreaseDamping,
@@ -335,5 +336,6 @@ class CaseSchema(Section):
     loads: list[Annotated[Any, part(load_from)]] = []
     masses: list[Annotated[Any, part(mass_from)]] = []
     contact: Annotated[Any, contact_part()] = None
+    air: Annotated[Any, part(air_from)] = None
     sweep: SweepSection | None = None
     design: DesignSection | None = None

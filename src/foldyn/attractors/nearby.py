@@ -81,7 +81,7 @@ def lyapunov_exponent(
     Raises
     ------
     InputError
-        An argument out of range, contact, or hinges that remember.
+        An argument out of range, contact, added mass of air, or hinges that remember.
     InstabilityError
         A motion grew without bound.
 
@@ -151,6 +151,10 @@ def _check(case: Case, method: str, initial: State | None) -> None:
     choice("method", method, explicit)
     if case.contact is not None:
         raise InputError(": the exponent takes smooth forces; leave contact out", "contact")
+    if case.air is not None and case.air.added_mass:
+        raise InputError(
+            ": the exponent takes a mass that stays; give added_mass = false", "air.added_mass"
+        )
     if case.remembering:
         raise InputError(
             "structure: some of its hinges remember (prony, plastic or damped creases that give "

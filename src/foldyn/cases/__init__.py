@@ -1,6 +1,7 @@
 """Cases: supports, links, loads, histories, damping, states."""
 
 from foldyn.cases import histories, loads
+from foldyn.cases.air import Air
 from foldyn.cases.case import Case
 from foldyn.cases.contact import Contact, Plane
 from foldyn.cases.damping import CreaseDamping, ModalDamping, Rayleigh, StrainDamping
@@ -16,6 +17,7 @@ from foldyn.patterns.selection import select
 
 __all__ = [
     "SUPPORTS",
+    "Air",
     "BaseMotion",
     "Case",
     "Contact",

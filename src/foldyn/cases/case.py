@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.arguments import brief
+from foldyn.cases.added_mass import elements_of, fluid_at
+from foldyn.cases.air import Air
 from foldyn.cases.case_assembly import Damped, Loaded
 from foldyn.cases.clamped_edges import supported_points
 from foldyn.cases.contact import Contact
@@ -22,13 +24,16 @@ from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
 from foldyn.cases.state import State
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
+from foldyn.cases.waveforms import CONSTANT
 from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.materials.inelastic_law import VARIABLES
+from foldyn.mechanics.air.added_mass import AddedMass
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.board_term import BoardContactTerm
 from foldyn.mechanics.contact.boards import BoardSheets
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.patterns.picture import picture
+from foldyn.structures.boundary_elements import BoundaryElements
 from foldyn.structures.discretized import read_only
 from foldyn.structures.inelastic_hinges import Remembering, remembering
 from foldyn.structures.mass import center_of_mass, inertia_tensor, row_sums
@@ -56,6 +61,8 @@ class Case(Loaded, Damped):
     contact : Contact, optional
         Panels that touch each other, and planes; without it they pass through each other. Motions
         and paths of equilibria take it.
+    air : Air, optional
+        The fluid around the sheet; vacuum by default.
 
     Attributes
     ----------
@@ -113,6 +120,7 @@ class Case(Loaded, Damped):
     damping: Damping | Sequence[Damping] = field(default_factory=Rayleigh)
     masses: Sequence[PointMass] = ()
     contact: Contact | None = None
+    air: Air | None = None
 
     def _repr_html_(self) -> str | None:
         """A picture for notebooks."""
@@ -132,6 +140,8 @@ class Case(Loaded, Damped):
         object.__setattr__(self, "damping", dampings(self.damping))
         if self.contact is not None and not isinstance(self.contact, Contact):
             raise InputError(f"contact = {show(self.contact)}: must be a Contact")
+        if self.air is not None and not isinstance(self.air, Air):
+            raise InputError(f"air = {show(self.air)}: must be an Air")
         self._check_selections()
         _ = self.base_terms, self.actuation_terms  # check the supports and the creases
         if self.constraints:
@@ -231,6 +241,14 @@ class Case(Loaded, Damped):
         return tuple((i, as_history(p.history)) for i, p in planes if p.history is not None)
 
     @property
+    def wind_terms(self) -> tuple[tuple[NDArray[np.float64], History], ...]:
+        """Velocity (3,), m/s, of a wind that varies, and its history; none in others."""
+        if self.air is None or not self.air.blows:
+            return ()
+        history = as_history(self.air.history)
+        return () if history.code == CONSTANT else ((np.array(self.air.velocity), history),)
+
+    @property
     def energy_groups(self) -> Mapping[str, str]:
         """Parts of its strain energy, and what they are."""
         return self.body.energy_groups
@@ -260,6 +278,48 @@ class Case(Loaded, Damped):
         whole = sparse.kron(self.mass, sparse.eye_array(3), format="csr")
         free = self.free_dofs
         return sparse.csr_array(self.constraints.matrix(whole)[free][:, free])
+
+    def added_mass(self, state: State | None = None) -> AddedMass:
+        """Mass of the fluid that moves with the sheet in a state, at rest unless given.
+
+        Parameters
+        ----------
+        state : State, optional
+            Of which the displacement counts.
+
+        Returns
+        -------
+        AddedMass
+            A symmetric operator on displacements (3n,), dof 3 node + axis, in kg: `added @ x`,
+            `added.diagonal()`, and for small sheets `added.todense()`.
+
+        Raises
+        ------
+        InputError
+            The case has no added mass; panels nearly touch; a state of another size.
+
+        Examples
+        --------
+        >>> import foldyn as fd
+        >>> square = fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2, 3)])
+        >>> s = fd.discretize(square, fd.Sheet(1e9, 0.3, 1e-3, 700.0))
+        >>> added = fd.Case(s, air=fd.Air(density=1.0, resolution=20)).added_mass()
+        >>> lift = [0.0, 0.0, 1.0] * len(s.nodes)
+        >>> round(float(lift @ (added @ lift)), 3)  # theory: 0.579 pi/4
+        0.453
+        """
+        shape = self.structure.nodes.shape
+        if state is not None and not isinstance(state, State):
+            raise InputError(
+                f": got {type(state).__name__}; give a State, as fd.initial_state(path)", "state"
+            )
+        given = np.zeros(shape) if state is None else state.of_nodes("displacement", shape, "state")
+        return fluid_at(self, given).on(self.structure.nodes + given)
+
+    @cached_property
+    def boundary_elements(self) -> BoundaryElements:
+        """Elements of the fluid on the sheet of a case in air."""
+        return elements_of(self)
 
     @cached_property
     def point_masses(self) -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.cases.air import air_from
 from foldyn.cases.case import Case
 from foldyn.cases.contact import Contact, contact_from
 from foldyn.cases.damping import damping_from, damping_table
@@ -149,6 +150,8 @@ class _Writer:
             sections["masses"] = [self._part(mass) for mass in case.masses]
         if case.contact is not None:
             sections["contact"] = self._contact(case.contact)
+        if case.air is not None:
+            sections["air"] = self._part(case.air)
         if not self.obstacles and not structure.as_made:
             self.obstacles.append(
                 "its structure differs from what discretize makes of its pattern, sheet and options"
@@ -315,11 +318,12 @@ def _read(sections: Mapping[str, Any]) -> Case:
     loads = [load_from(item) for item in sections["loads"]]
     masses = [mass_from(item) for item in sections.get("masses", ())]
     contact = contact_from(sections["contact"]) if "contact" in sections else None
+    air = air_from(sections["air"]) if "air" in sections else None
     structure = _structure(sections)
     with warnings.catch_warnings():  # they were issued when the case was first made
         warnings.simplefilter("ignore", FoldynWarning)
         damping = damping_from(sections["damping"])
-        return Case(structure, supports, loads, damping, masses, contact)
+        return Case(structure, supports, loads, damping, masses, contact, air)
 
 
 def _structure(sections: Mapping[str, Any]) -> Any:

@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any
 
 from foldyn.arguments import arguments
+from foldyn.cases.air import Air
 from foldyn.cases.contact import Contact, Plane
 from foldyn.cases.damping import DAMPINGS
 from foldyn.cases.histories import HISTORIES
@@ -25,7 +26,7 @@ OTHERS: Mapping[str, str] = {
 @cache
 def units() -> dict[str, str]:
     """Units by key."""
-    parts = (Sheet, ModelOptions, *SUPPORTS, *LOADS, *DAMPINGS, PointMass, Contact, Plane)
+    parts = (Sheet, ModelOptions, *SUPPORTS, *LOADS, *DAMPINGS, PointMass, Contact, Plane, Air)
     kinds = (*parts, *HISTORIES.values(), *HINGE_LAWS.values())
     found = {one.key: one.unit for kind in kinds for one in arguments(kind).values() if one.unit}
     return {**found, **OTHERS}

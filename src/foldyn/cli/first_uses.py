@@ -58,7 +58,7 @@ def sheets() -> fd.Pattern:
 
 def case(
     supports: Sequence[Any] = (), loads: Sequence[Any] = (), damping: Sequence[Any] = (),
-    contact: fd.Contact | None = None, model: str = "plate",
+    contact: fd.Contact | None = None, air: fd.Air | None = None, model: str = "plate",
     pattern: fd.Pattern | None = None, law: Callable[[], Any] | None = None, **options: Any,
 ) -> fd.Case:  # fmt: skip
     """A sheet of four panels of a model, held at one end and pushed at the other."""
@@ -71,7 +71,7 @@ def case(
         options["preset"] = model
         structure = fd.discretize(pattern, SHEET, **options)
     held = [fd.Fix("xmin"), *supports]
-    return fd.Case(structure, held, [PUSH, *loads], damping, contact=contact)
+    return fd.Case(structure, held, [PUSH, *loads], damping, contact=contact, air=air)
 
 
 def moved(
@@ -177,6 +177,11 @@ STAGES: Sequence[Uses] = (
             partial(moved, "rk4", "newmark", membrane="bars"),
         ],
         "shells": [partial(vibrating, model="shell"), partial(moved, "newmark", model="shell")],
+        "air": [
+            partial(vibrating, air=fd.Air()),
+            partial(moved, *EXPLICIT, air=fd.Air(velocity=(0, 0, 9), history=PULSE)),
+            partial(moved, *IMPLICIT, CONSERVING, air=fd.Air(added_mass=False)),
+        ],
         "several motions at once": [moved_at_once],
         "gradients": [
             partial(differentiated, "rk4", "newmark", supports=SPRINGS, damping=DAMPED),

@@ -135,6 +135,7 @@ def refuse(motion: Any) -> None:
     arrays_of_body(packed.body)  # which refuses terms
     lacks = {
         "contact, which switches on and off": system.touches,
+        "air": motion.case.air is not None,
         "rest angles that turn in time (Actuate, Temperature)": system.turns,
         "loads that depend on the displacement (Pressure, CreaseMoment)": system.follows,
         "supports that move at the start, and a mass matrix that is not diagonal": (

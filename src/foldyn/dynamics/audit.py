@@ -1,4 +1,6 @@
-"""Energy audit: kinetic + strain + dissipated - work stays what it was at the start.
+"""Energy audit: kinetic + strain + air + dissipated - work stays what it was at the start.
+
+Air is what a sheet in air has lost to it.
 
 The audit says nothing where the energies at play are no larger than rounding errors: those of the
 energies themselves, of the bars' forces at displacements of that size, and of the dihedrals, which
@@ -20,29 +22,39 @@ MARGIN = 16.0  # times the rounding errors of single operations: what they add u
 ANGLE = 16.0 * EPS  # rad: rounding of a dihedral
 BEGUN = 1e-6  # of the longest bar: a motion with smaller displacements has not become unbounded
 
+AIR = "air"
 AUDITED = ("kinetic", "dissipated", "work")
 
 
-def audited(groups: Iterable[str]) -> tuple[str, ...]:
-    """Columns of the energy table that the compiled loops fill, for groups of strain energy."""
-    return (*groups, *AUDITED)
+def audited(groups: Iterable[str], air: bool) -> tuple[str, ...]:
+    """Columns of the energy table that the compiled loops fill, for groups of strain energy.
+
+    air : whether the sheet is in air.
+    """
+    return (*groups, *((AIR,) if air else ()), *AUDITED)
 
 
 def energy_error(energy: NDArray) -> NDArray:
-    """Kinetic + strain + dissipated - work minus its first value (J), per sample."""
+    """Kinetic + strain + air + dissipated - work minus its first value (J), per sample."""
     balance = energy[:, :-1].sum(axis=1) - energy[:, -1]
     return balance - balance[0]
 
 
-def energy_scale(energy: NDArray) -> float:
-    """Largest energy at play (J): kinetic, change of strain, dissipated or work."""
-    strain = energy[:, :-3].sum(axis=1)
-    moving = np.column_stack([strain - strain[0], energy[:, -3:]])
+def energy_scale(energy: NDArray, air: bool) -> float:
+    """Largest energy at play (J): kinetic, change of strain, air, dissipated or work."""
+    others = len(AUDITED) + air
+    strain = energy[:, :-others].sum(axis=1)
+    moving = np.column_stack([strain - strain[0], energy[:, -others:]])
     return float(np.nanmax(np.abs(moving)))
 
 
 class Balance:
     """What the samples of a motion, seen piece by piece, say of its energies.
+
+    Parameters
+    ----------
+    air : bool
+        Whether the sheet is in air.
 
     Attributes
     ----------
@@ -56,7 +68,8 @@ class Balance:
 
     NUMBERS = ("error", "scale", "largest", "farthest")
 
-    def __init__(self) -> None:
+    def __init__(self, air: bool) -> None:
+        self._air = air
         self.start = np.zeros((0, 0))
         self.count = 0
         self.error = self.scale = self.largest = self.farthest = 0.0
@@ -70,7 +83,7 @@ class Balance:
         self.count += len(energy)
         seen = np.concatenate([self.start, energy])
         self.error = max(self.error, float(np.abs(energy_error(seen)).max()))
-        self.scale = max(self.scale, energy_scale(seen))
+        self.scale = max(self.scale, energy_scale(seen, self._air))
         self.largest = max(self.largest, float(np.nanmax(np.abs(energy))))
         self.farthest = max(self.farthest, float(displacement.max()), -float(displacement.min()))
 

@@ -63,9 +63,9 @@ def advance(equation, course, plan, room, stretch):
     fa, ahead = flat(a)[low:high], flat(stage[0])[low:high]
     begun = course.tally.steps
     end = min(begun + stretch, plan.steps)
-    post_totals(team, 0.0, 0.0, 0)
+    post_totals(team, 0.0, 0.0, 0.0, 0)
     for step in range(begun + 1 if begun > 0 else 0, end + 1):  # step 0, of no length, is the start
-        work_in, work_out, wrong = 0.0, 0.0, 0
+        work_in, work_out, work_air, wrong = 0.0, 0.0, 0.0, 0
         span = plan.dt if step > 0 else 0.0
         left = span
         while True:  # once, unless contact asks for shorter steps
@@ -86,12 +86,13 @@ def advance(equation, course, plan, room, stretch):
                 wrong += not abs(v[i]) < np.inf
             work_in += 0.5 * dt * (powers[0] + power_in)
             work_out += 0.5 * dt * (powers[1] + power_out)
-            powers[0], powers[1] = power_in, power_out
+            work_air += 0.5 * dt * (powers[2] + equation.powers[2])
+            powers[0], powers[1], powers[2] = power_in, power_out, equation.powers[2]
             if team.number == 0 and step > 0:
                 course.tally.evaluations += 1
             if left == 0.0 or wrong > 0:
                 break
-        post_totals(team, work_in, work_out, wrong)
+        post_totals(team, work_in, work_out, work_air, wrong)
         outcome, hinge = observe(equation, course, plan, a, step)
         if outcome != Outcome.DONE:
             return outcome, hinge

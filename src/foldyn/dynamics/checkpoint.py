@@ -371,6 +371,9 @@ def state_parts(packed: Packed, course: Course) -> dict[str, Any]:
         parts["branches"] = memory.own
     if packed.system.turns:
         parts["folds"] = [packed.body.sheet.folds, packed.body.sheet.series()[1]]
+    if packed.added.acts:
+        own = packed.added
+        parts["added_mass"] = [own.flow, own.resistance, own.guess, own.angle, own.made]
     return parts
 
 

@@ -1,4 +1,6 @@
-"""The damping of a case, except drag, as terms: dashpots, creases, strains, beta K0, modes.
+"""What damps a case, as terms: dashpots, creases, strains, beta K0, modes; drag of the air.
+
+The drag alpha M v is none of them: `dynamics.equation` has it.
 
 Dashpots with a direction of their own, and those that act in any direction from the ground, have a
 constant matrix. Dashpots along the line between their nodes and creases are `mechanics.viscous`.
@@ -6,13 +8,16 @@ constant matrix. Dashpots along the line between their nodes and creases are `me
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.cases import Case
+from foldyn.cases import Case, History
 from foldyn.dynamics.modal_damping import ModalRows
 from foldyn.errors import InputError
+from foldyn.mechanics.air_drag import AirDragTerm, air_drag
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.block_matrix import assembled, blocks_of_ends, pairs_of_ends
 from foldyn.mechanics.constant_damping import DampingMatrix, DampingRows
@@ -31,6 +36,19 @@ def damping_terms(case: Case, start: NDArray | None, modal: ModalRows) -> list[T
         terms.insert(0, DampingMatrix(_tangent(body, body.dofs(state)) * rayleigh.beta))
     modal.warn()
     return [*terms, DampingRows(modal.rows)] if len(modal.rows) else terms
+
+
+def air_terms(case: Case, histories: Sequence[History]) -> list[Term]:
+    """Drag of the air around a case, in a wind that varies as one of its histories."""
+    if case.air is None or not case.air.drag:
+        return []
+    structure, air = case.structure, case.air
+    half = 0.5 * air.density * air.coefficient(structure)
+    wind = np.array(air.velocity, float)
+    term = AirDragTerm(air_drag(structure.nodes, structure.triangles, wind), half)
+    return [
+        term.driven(histories.index(history), len(histories)) for _, history in case.wind_terms
+    ] or [term]
 
 
 def _tangent(body: Assembly, q: NDArray) -> sparse.csr_array:

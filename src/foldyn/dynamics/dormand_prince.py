@@ -94,6 +94,13 @@ def _integral(start, slopes, h, weights, count):
 
 
 @inner
+def _keep(equation, powers, stage):
+    """Keep the powers of the last acceleration as those of a stage."""
+    for k in range(3):
+        powers[k, stage] = equation.powers[k]
+
+
+@inner
 def _largest(values):
     out = 0.0
     for i in range(values.size):
@@ -142,12 +149,13 @@ def advance(equation, course, plan, room, stretch):
     tally, n = course.tally, course.u.size
     u, v = flat(course.u), flat(course.v)
     speeds, accelerations = np.empty((7, n)), np.empty((7, n))
-    powers, weights = np.empty((2, 7)), np.empty(7)
+    powers, weights = np.empty((3, 7)), np.empty(7)
     ut, vt, a = np.empty_like(course.u), np.empty_like(course.u), np.empty_like(course.u)
     fut, fvt, fa = flat(ut), flat(vt), flat(a)
     raw = flat(course.carry)  # the acceleration at the beginning of a step, without inertia
     if tally.steps == 0:
-        powers[0, 0], powers[1, 0] = acceleration(equation, course.u, course.v, plan.start, a)
+        acceleration(equation, course.u, course.v, plan.start, a)
+        _keep(equation, powers, 0)
         for i in range(n):
             raw[i] = fa[i]
         longest = _longest(equation, course.u, course.v, a, plan, tally)
@@ -159,6 +167,7 @@ def advance(equation, course, plan, room, stretch):
                 return outcome, -1
     else:
         powers[0, 0], powers[1, 0] = tally.power_in, tally.power_out
+        powers[2, 0] = tally.power_air
     for i in range(n):
         speeds[0, i] = v[i]
     last, stop = tally.steps + stretch, 0
@@ -187,7 +196,8 @@ def advance(equation, course, plan, room, stretch):
             if stops and C[stage] == 1.0:  # before what happens there
                 moment = np.nextafter(goal, -np.inf)
             advance_clock(equation, C[stage] * h)
-            powers[0, stage], powers[1, stage] = acceleration(equation, ut, vt, moment, a)
+            acceleration(equation, ut, vt, moment, a)
+            _keep(equation, powers, stage)
             for i in range(n):
                 speeds[stage, i], accelerations[stage, i] = fvt[i], fa[i]
             slow_contacts_down(equation, vt, accelerations[stage])
@@ -220,7 +230,7 @@ def advance(equation, course, plan, room, stretch):
         tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
         due = plan.start + tally.samples * plan.interval
         done, first = work_of_offsets(equation, True), tally.samples
-        begun = tally.work + done, tally.dissipated
+        begun = tally.work + done, tally.dissipated, tally.air
         near = after - ROUNDING * h if stops else after + ROUNDING * h  # after what happens there
         while plan.every == 0 and tally.samples < room and due <= near:
             _weights(min(1.0, (due - t) / h), weights)
@@ -228,6 +238,7 @@ def advance(equation, course, plan, room, stretch):
             _combine(v, accelerations, weights, h, 7, fvt)
             tally.work = _integral(begun[0], powers[0], h, weights, 7)
             tally.dissipated = _integral(begun[1], powers[1], h, weights, 7)
+            tally.air = _integral(begun[2], powers[2], h, weights, 7)
             advance_clock(equation, min(due - t, h))
             acceleration(equation, ut, vt, due, a)
             tally.evaluations += 1
@@ -238,6 +249,7 @@ def advance(equation, course, plan, room, stretch):
             due = plan.start + tally.samples * plan.interval
         tally.work = _integral(begun[0], powers[0], h, A[6], 6)
         tally.dissipated = _integral(begun[1], powers[1], h, A[6], 6)
+        tally.air = _integral(begun[2], powers[2], h, A[6], 6)
         _combine(u, speeds, A[6], h, 6, fut)
         for i in range(n):
             u[i], v[i] = fut[i], speeds[6, i]
@@ -249,7 +261,7 @@ def advance(equation, course, plan, room, stretch):
             tally.evaluations += 1
         if equation.commit != 0:
             run_at(equation.commit, (equation.setting,))
-        for k in range(2):
+        for k in range(3):
             powers[k, 0] = powers[k, 6]
         tally.time, tally.error = after, max(error, 1e-4)
         tally.farthest, tally.fastest = scale_u / plan.tolerance, scale_v / plan.tolerance
@@ -257,7 +269,8 @@ def advance(equation, course, plan, room, stretch):
         if stops:
             tally.wanted = max(tally.wanted, min(wanted, plan.dt))
             tally.work -= spent(equation, course.u)
-            powers[0, 0], powers[1, 0] = acceleration(equation, course.u, course.v, after, a)
+            acceleration(equation, course.u, course.v, after, a)
+            _keep(equation, powers, 0)
             tally.evaluations += 1
             tally.work += spent(equation, course.u)  # by offsets that have jumped, of any law
             work_of_offsets(equation, True)
@@ -276,6 +289,6 @@ def advance(equation, course, plan, room, stretch):
             outcome = sample(equation, course.u, course.v, a, after)
             if outcome != Outcome.DONE:
                 return outcome, -1
-    tally.power_in, tally.power_out = powers[0, 0], powers[1, 0]
+    tally.power_in, tally.power_out, tally.power_air = powers[0, 0], powers[1, 0], powers[2, 0]
     full = plan.every > 0 and tally.samples == room and tally.time < plan.end
     return (Outcome.FULL if full else Outcome.DONE), -1

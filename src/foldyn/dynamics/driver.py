@@ -206,7 +206,7 @@ def prepare(
         chosen = choose(
             case, u, v, float(start), duration, dt, every, tolerance, IMPLICIT_TOLERANCE, modal
         )
-        integrator = method_of(chosen.method)
+        integrator = suited(chosen.method, case)
     integrator = _with_radius(integrator, spectral_radius)
     if not integrator.implicit or not is_lumped(case.mass):
         check_mass(case.mass, case.constraints.determined)

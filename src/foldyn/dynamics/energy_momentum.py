@@ -51,7 +51,7 @@ class Step(NamedTuple):
     setting: Setting
     terms: NDArray  # (k,) contexts of all but contact,
     forces: NDArray  # (k,) their mean forces,
-    powers: NDArray  # (2,) and what these put in and take beside energy, W
+    powers: NDArray  # (3,) and what these put in, take and lose to air beside energy, W
     context: int  # of the setting
     histories: int  # evaluates them; 0 where they are constant
     old: Phase
@@ -117,6 +117,10 @@ class EnergyMomentum(Scheme):
         if self._contact is not None:
             place(self.packed.system, old.q + self.shift, old.w, t, s)
             self._contact.put(self.displacement(), s.displacement, old.factor, s.factor)
+        if self.air is not None and self.air.histories:
+            place(self.packed.system, old.q, old.w, t, s)
+            row = self.air.row
+            self.air.blow(0.5 * (old.factor[row, 0] + s.factor[row, 0]))
         return residual(self._step, h, t)
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
@@ -142,14 +146,14 @@ class EnergyMomentum(Scheme):
         assert self._contact is not None
         return self._contact.rub
 
-    def works(self, h: float) -> tuple[float, float]:
+    def works(self, h: float) -> tuple[float, float, float]:
         """See `Scheme`; exactly those of the step's forces."""
         system = self.packed.system
         done, lost = _works(self._step, h)
-        done, lost = done + h * self._terms.powers[0], lost + h * self._terms.powers[1]
+        put_in, taken, to_air = (h * self._terms.powers).tolist()
         if system.turns:
             done += _actuation(self._step, self.displacement(), self.moved())
-        return done, lost
+        return done + put_in, lost + taken, to_air
 
     def change(self, h: float) -> NDArray:
         """See `Scheme`: accelerations belong to the middle of the steps."""

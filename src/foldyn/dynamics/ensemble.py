@@ -129,7 +129,8 @@ def simulate_many(
     nodes, supported = len(case.structure.nodes), len(case.reaction_dofs)
     times = plan.start + plan.dt * plan.every * np.arange(timing.expected_samples(plan))
     timing.check_samples(len(cases) * len(times), nodes, supported)
-    shapes = (nodes, 3), (nodes, 3), (supported,), (len(audited(case.energy_groups)),), (0, 0)
+    names = audited(case.energy_groups, case.air is not None)
+    shapes = (nodes, 3), (nodes, 3), (supported,), (len(names),), (0, 0)
     out = Samples._make([times, *(np.empty((len(cases), len(times), *s)) for s in shapes), 0])
     for k, motion in enumerate(motions):
         motion.plan, motion.force = plan, force  # one step for all
@@ -173,6 +174,7 @@ def _from_start(like: Motion, initial: State | None) -> Motion:
 def _shape(case: Case) -> dict[str, Any]:
     """What the results of all cases share."""
     supported, energies = case.reaction_dofs.tolist(), [*case.energy_groups]
+    energies += ["air"] * (case.air is not None)
     return {"nodes": len(case.structure.nodes), "supported dofs": supported, "energies": energies}
 
 
@@ -246,7 +248,8 @@ def _warn(motions: Sequence[Motion], ended: Mapping[int, str], energy: NDArray) 
             f"play, the most of all: use a step below {motions[worst].plan.dt:.3g} s",
             FoldynWarning, stacklevel=3,
         )  # fmt: skip
-    names, pairs = audited(motions[0].case.energy_groups), zip(motions, energy, strict=True)
+    first, pairs = motions[0].case, zip(motions, energy, strict=True)
+    names = audited(first.energy_groups, first.air is not None)
     found = [stretch(m.case.structure, dict(zip(names, e.T, strict=True))) for m, e in pairs]
     shares = [one.share if one else 0.0 for one in found]
     if any(shares):
@@ -262,7 +265,11 @@ def _dataset(case: Case, out: Samples, outcome: list[str], facts: dict) -> xarra
     """The result."""
     known = {**MOTION, **energies_of(case)}
     values = {"displacement": out.displacement, "reaction": out.reaction, "velocity": out.velocity}
-    values |= zip(audited(case.energy_groups), np.moveaxis(out.energy, 2, 0), strict=True)
+    values |= zip(
+        audited(case.energy_groups, case.air is not None),
+        np.moveaxis(out.energy, 2, 0),
+        strict=True,
+    )
     timed = variables(known, "time", values).items()
     data = {name: (("model", *dims), *about) for name, (dims, *about) in timed}
     data["outcome"] = variable(("model",), np.array(outcome), "", "what became of the motion")

@@ -15,9 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.dynamics import parts
+from foldyn.dynamics.added_mass import (
+    observe_fluid,
+    solve_with_fluid,
+    turn_flow,
+)
 from foldyn.dynamics.explicit_contact import ContactParts, contact_parts, slow_contacts
 from foldyn.dynamics.inertia import lumped_energy
 from foldyn.dynamics.motion_state import (
+    AIR,
     DISSIPATED,
     HINGE,
     OUTCOME,
@@ -60,8 +66,9 @@ class Balance(NamedTuple):
     histories: int  # evaluates them
     turn: int  # moves rest angles,
     carry: int  # supports,
-    presses: bool  # and obstacles
+    presses: bool  # obstacles and air
     follow: int  # loads that depend on the displacement
+    turn_flow: int  # adds forces of fluid that turns, and drag beside added mass
     solve: int  # M^-1, unless M is diagonal,
     kinetic: int  # and the kinetic energy
     moving_power: int  # of supports
@@ -85,6 +92,8 @@ class Recording(NamedTuple):
     setting: Setting
     course: Course
     out: Samples
+    whole: int  # context of the setting
+    fluid: int  # adds what moves the fluid; 0 without added mass
 
 
 class Equation(NamedTuple):
@@ -101,8 +110,8 @@ class Equation(NamedTuple):
     balance: int  # contexts
     setting: int
     recording: int
-    powers: NDArray  # (2,) in and out at the last acceleration, W
-    before: NDArray  # (2,) and at the last step, for methods that keep them
+    powers: NDArray  # (3,) in, out and to the air at the last acceleration, W
+    before: NDArray  # (3,) and at the last step, for methods that keep them
     team: Team
     own: NDArray  # (2,)
     stage: NDArray  # (3, n, 3) memory of methods with several stages
@@ -133,6 +142,8 @@ def _acceleration(m, q, w, t, out, powers):
         power_in += load * speed[dof]
     if m.follow != 0:
         power_in += value_at(m.follow, (m.setting, u, v))
+    if m.turn_flow != 0:
+        power_out += value_at(m.turn_flow, (m.setting, u, v))
     kinetic = 0.0
     if m.alpha > 0.0:
         if m.kinetic != 0:
@@ -154,8 +165,8 @@ def _acceleration(m, q, w, t, out, powers):
         power_in += value_at(m.moving_power, (m.setting,))
     if m.turning_power != 0:
         power_in += value_at(m.turning_power, (m.setting,))
-    both = numbers_at(powers, 2)
-    both[0], both[1] = power_in, power_out
+    found = numbers_at(powers, 3)
+    found[0], found[1], found[2] = power_in, power_out, m.terms.powers[2]
 
 
 # ------------------------------------------------------------------ what is seen of a motion
@@ -164,10 +175,12 @@ def _sample(r, u, v, a, t):
     m, course, out, rows = r.setting, r.course, r.out, r.setting.s.force.shape[0]
     k = course.tally.samples - out.first
     out.time[k] = t
+    fluid = value_at(r.fluid, (r.whole, v, a)) if r.fluid != 0 else 0.0
     record(
         m.terms, m.system, m.mass, rows_at(u, rows), rows_at(v, rows), rows_at(a, rows),
         course.tally, m.s, out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
     )  # fmt: skip
+    out.energy[k, out.energy.shape[1] - 3] += fluid
     states_of(m.terms, out.memory[k])
     sound = 0.0
     for c in range(out.energy.shape[1]):
@@ -184,7 +197,8 @@ def acceleration(equation, q, w, t, a):
     """Acceleration q'' (n, 3) at time t, q and w the displacement and velocity without S f.
 
     q'' = - M^-1 (F_int + beta K0 v - p) - alpha w on free dofs. Returns the power of loads,
-    supports and actuators, and the power dissipated (W). The bracket stays in `Scratch.force`.
+    supports and actuators, and the power dissipated (W); the one that the air takes stays in
+    `equation.powers`, and the bracket in `Scratch.force`.
 
     A member of a team computes this for its own nodes, q and w changed there only.
     """
@@ -253,6 +267,7 @@ def observe(equation, course, plan, a, step):
     if team.number == 0:
         tally.work += total(team, WORK)
         tally.dissipated += total(team, DISSIPATED)
+        tally.air += total(team, AIR)
         tally.time = t
         tally.steps = step
         outcome = DONE
@@ -309,7 +324,7 @@ class EquationOfMotion:
         called = [kind for kind in EVERY if limited or kind != LIMIT]
         system, mass, model = packed.system, packed.mass, Model(packed.body, work, called)
         self._model, self._course, share = model, course, model.share
-        self.setting = Setting(model.terms, system, mass, share, s)
+        self.setting = Setting(model.terms, system, mass, share, s, packed.added)
         self._whole = whole = Context(self.setting)
         self.balance = balance = Context(_balance(self.setting, whole))
         self._slow = slow = slow_contacts(packed, work, s, balance.value) if slows else None
@@ -326,7 +341,7 @@ class EquationOfMotion:
             balance=balance.address,
             setting=whole.address,
             recording=0,
-            powers=np.zeros(2),
+            powers=np.zeros(3),
             before=s.powers,
             team=share.team,
             own=share.strips.own,
@@ -339,7 +354,10 @@ class EquationOfMotion:
     def sampled(self, out: Samples) -> Context:
         """The equation with samples that go to `out`."""
         if self._out is not out:  # contexts are filled by Python: once for each window of samples
-            self._recording = recording = Context(Recording(self.setting, self._course, out))
+            whole = self._whole
+            fluid = observe_fluid.at(whole) if self.setting.added.acts else 0
+            given = self.setting, self._course, out, whole.address, fluid
+            self._recording = recording = Context(Recording(*given))
             self._sampled = Context(
                 self.still.value._replace(sample=_sample.at(recording), recording=recording.address)
             )
@@ -349,8 +367,11 @@ class EquationOfMotion:
 
 def _balance(setting: Setting, whole: Context) -> Balance:
     """What accelerations need of a case; `whole` is the context of the setting."""
-    terms, system, mass, share, s = setting
+    terms, system, mass, share, s, added = setting
     solve = parts.solve_constrained if len(mass.ties.slave) else parts.solve
+    solve = solve_with_fluid if added.acts else solve
+    diagonal = mass.lumped and not added.acts
+    alpha = 0.0 if added.acts else system.alpha  # or it is that of the sheet's own mass
     return Balance(
         terms=terms,
         setting=whole.address,
@@ -359,11 +380,12 @@ def _balance(setting: Setting, whole: Context) -> Balance:
         carry=parts.carry.at(whole) if system.moves else 0,
         presses=system.presses,
         follow=parts.follow.at(whole) if system.follows else 0,
-        solve=0 if mass.lumped else solve.at(whole),
-        kinetic=0 if mass.lumped or not system.alpha else parts.kinetic.at(whole),
+        turn_flow=turn_flow.at(whole) if added.acts else 0,
+        solve=0 if diagonal else solve.at(whole),
+        kinetic=0 if diagonal or not alpha else parts.kinetic.at(whole),
         moving_power=parts.moving_power.at(whole) if system.moves else 0,
         turning_power=parts.turning_power.at(whole) if system.turns else 0,
-        alpha=system.alpha,
+        alpha=alpha,
         diagonal=mass.diagonal,
         inverse=mass.inverse,
         loads=system.loads,

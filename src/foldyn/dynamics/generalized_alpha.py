@@ -83,7 +83,8 @@ class Step(NamedTuple):
     shift: NDArray
     out: NDArray
     earlier: NDArray
-    damping: NDArray  # (k,) numbers of the terms that damp
+    damping: NDArray  # (k,) numbers of the terms that damp,
+    drag: NDArray  # and of those of the air
 
 
 class Alpha(Scheme):
@@ -100,18 +101,18 @@ class Alpha(Scheme):
         self.context = Context(
             Step(
                 equation.still.value, equation.setting, parameters, self.old, self.new, self.shift,
-                self.out, self.earlier, self.damping,
+                self.out, self.earlier, self.damping, self.drag,
             )
         )  # fmt: skip
 
     def begin(self, t: float) -> None:
         """See `Scheme`."""
         super().begin(t)
-        if len(self.damping):
+        if len(self.damping) or len(self.drag):
             for old, new in zip(self.old, self.new, strict=True):
                 new[:] = old
             _taken(self.context)
-            self.old.damped[:] = self.new.damped
+            self.old.damped[:], self.old.resisted[:] = self.new.damped, self.new.resisted
 
     def weights(self, h: float) -> Weights:
         """See `Scheme`; the mass carries what multiplies alpha M too."""
@@ -140,15 +141,17 @@ class Alpha(Scheme):
         matrix.add_following(u, self.new.factor, 1.0)
         matrix.follow(u, 0.5)  # dofs without mass have the mean velocity of the step
 
-    def works(self, h: float) -> tuple[float, float]:
+    def works(self, h: float) -> tuple[float, float, float]:
         """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""
         system = self.packed.system
         done, lost = _works(self.context, h)
-        if len(self.damping):
-            lost += _taken(self.context)
+        to_air = 0.0
+        if len(self.damping) or len(self.drag):
+            damped, to_air = _taken(self.context)
+            lost += damped
         if system.turns:
             done += _actuation(self.context, self.folds, self.work.fold_angle)
-        return done, lost
+        return done, lost, to_air
 
     def change(self, h: float) -> NDArray:
         """See `Scheme`.
@@ -285,17 +288,26 @@ def _works(step, h):
 
 @kernel
 def _taken(step):
-    """Energy that damping dissipates in a step, after `_works`: its mean force along it."""
-    terms, moved, s = step.setting.terms, step.setting.system.moved, step.setting.s
-    old, new, u, v, du, work = step.old, step.new, s.product, s.velocity, flat(s.displacement), 0.0
-    carry(moved, new.factor[:, 0], new.q, u)
-    carry(moved, new.factor[:, 1], new.w, v)
-    new.damped[:] = 0.0
-    for k in step.damping:
-        given = terms.context[k], u, v, 0.0, new.damped, terms.powers
+    """Energies that damping and the air take in a step, after `_works`."""
+    old, new, moved, s = step.old, step.new, step.setting.system.moved, step.setting.s
+    carry(moved, new.factor[:, 0], new.q, s.product)
+    carry(moved, new.factor[:, 1], new.w, s.velocity)
+    damped = _taken_by(step, step.damping, old.damped, new.damped)
+    return damped, _taken_by(step, step.drag, old.resisted, new.resisted)
+
+
+@inner
+def _taken_by(step, numbers, before, after):
+    """Energy that some terms take in a step: their mean force along it."""
+    terms, s = step.setting.terms, step.setting.s
+    one, other, du, work = flat(before), flat(after), flat(s.displacement), 0.0
+    for i in range(other.size):
+        other[i] = 0.0
+    for k in numbers:
+        given = terms.context[k], s.product, s.velocity, 0.0, after, terms.powers
         run_at(terms.kernel[k, FORCES], given)
-    for i in range(du.size):
-        work += 0.5 * (flat(old.damped)[i] + flat(new.damped)[i]) * du[i]
+    for i in range(other.size):
+        work += 0.5 * (one[i] + other[i]) * du[i]
     return work
 
 

@@ -197,7 +197,7 @@ def begin(
     remembered : that of hinges with memory, see `Memory.start`.
     continued : where dofs beside displacements begin, if it is known.
     """
-    body, system, mass, callbacks, by, _ = packed
+    body, system, mass, callbacks, by, *_ = packed
     s = scratch(system)
     still = np.zeros((system.rows, 3))
     place(system, still, still, plan.start, s)

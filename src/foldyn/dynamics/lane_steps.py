@@ -127,6 +127,7 @@ def topology(motion: Motion) -> tuple[bytes, ...]:
     packed, system = motion.packed, motion.packed.system
     drives = system.moves, system.turns, system.follows
     plain = isinstance(packed.body.sheet, BarsHingesTerm) and packed.mass.lumped
+    plain = plain and not packed.added.acts
     if not plain or packed.body.others or any(drives) or packed.model.addresses.any():
         return ()
     arrays = [getattr(packed.model, name) for name in SHARED]

@@ -57,7 +57,10 @@ def choose(
     dt, every and tolerance are those of `simulate`, default what implicit methods take without;
     modal is the modal damping of the motion.
     """
-    conserved = not (case.damped or case.remembering or any(histories(case)))
+    if case.air is not None and case.air.added_mass and not case.structure.massless:
+        return Choice(ACCURATE, "explicit: the added mass of the air moves with the panels")
+    drag = case.air is not None and case.air.drag
+    conserved = not (case.damped or drag or case.remembering or any(histories(case)))
     implicit = "energy_momentum" if conserved else "generalized_alpha"
     if case.contact is not None and not lacking(METHODS[ACCURATE], case):
         return Choice(ACCURATE, "explicit: its error resolves impacts")

@@ -19,7 +19,7 @@ from foldyn.dynamics import (
     rk4,
 )
 from foldyn.dynamics.checkpoint import restore, snapshot, state_parts
-from foldyn.dynamics.equation import EquationOfMotion
+from foldyn.dynamics.equation import EquationOfMotion, accelerate
 from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.modal_damping import ModalRows, modal_rows
 from foldyn.dynamics.motion_state import Course, Samples, StepPlan
@@ -77,13 +77,18 @@ class Compiled:
     def start_with(self, powers: NDArray) -> None:
         """Take the powers (2,) in and out, W, at the last step from elsewhere."""
         for memory in self._memories:
-            memory.powers[:] = powers if memory is self._memories[0] else 0.0
+            memory.powers[:2] = powers if memory is self._memories[0] else 0.0
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
         case = self._course, self._plan, out.end, stretch
         arguments = [(equation.sampled(out), *case) for equation in self._equations]
         return run_together(self._loop, [work.team for work in self._works], arguments)[0]
+
+    def accelerate(self) -> None:
+        """Find the acceleration anew where the motion stands, for methods that keep it."""
+        course, equation = self._course, self._equations[0].still
+        accelerate(equation, course.u, course.v, float(course.tally.time), course.carry)
 
     def checkpoint_arrays(self) -> dict[str, NDArray]:
         """All on which the next steps depend beside the case, between two stretches."""
@@ -115,12 +120,13 @@ def threads_of(packed: Packed) -> int:
     """Threads on which a motion of a case runs fastest.
 
     One where something would have to be done by each of them: functions of the user, loads that
-    depend on the displacement, constraints, and terms that threads cannot share.
+    depend on the displacement, constraints, added mass, and terms that threads cannot share.
     """
     system = packed.system
     called = bool((system.waves.code == CALLED).any())
     alone = system.follows or called
-    return 1 if alone or len(system.ties.slave) else packed.body.threads
+    alone = alone or len(system.ties.slave) > 0 or packed.added.acts
+    return 1 if alone else packed.body.threads
 
 
 class Integrator(NamedTuple):
@@ -245,6 +251,8 @@ def with_mass(method: Integrator, case: Case) -> Case:
 def lacking(method: Integrator, case: Case) -> str:
     """What a method needs and a case lacks, in words; empty where nothing."""
     structure = case.structure
+    if method.implicit and case.air is not None and case.air.added_mass:
+        return "only explicit methods take the added mass of air (leave it out: added_mass = false)"
     if structure.massless and structure.condensed is None and not method.massless:
         return f"{structure.massless} have no mass, which this method needs"
     return ""

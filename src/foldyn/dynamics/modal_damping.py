@@ -23,6 +23,7 @@ from scipy.sparse import linalg
 
 from foldyn.algebra.eigen import Pencil, Spectrum, lowest
 from foldyn.cases import Case, ModalDamping
+from foldyn.cases.added_mass import added_mass_at
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import Superlinear
 from foldyn.mechanics.assembly import Assembly
@@ -106,7 +107,7 @@ def modal_rows(case: Case, start: NDArray | None = None) -> ModalRows:
     q = body.dofs(state)
     change, soft = soft_slopes(case, body, q)
     stiffness = body.tangent(q) if change is None else sparse.csr_array(body.tangent(q) + change)
-    return rows_of(damping, case, stiffness, mass_of(case), state)._replace(soft=soft)
+    return rows_of(damping, case, stiffness, moving_mass(case, state), state)._replace(soft=soft)
 
 
 def mass_of(case: Case) -> sparse.csr_array:
@@ -114,6 +115,15 @@ def mass_of(case: Case) -> sparse.csr_array:
     mass = sparse.csr_array(sparse.kron(case.mass, sparse.eye_array(3), format="csr"))
     mass.resize((case.elastic_body.size, case.elastic_body.size))
     return mass
+
+
+def moving_mass(case: Case, displacement: NDArray) -> sparse.csr_array:
+    """The same with that of the fluid around the sheet at a displacement (n, 3)."""
+    mass, added = mass_of(case), added_mass_at(case, displacement)
+    if added is None:
+        return mass
+    added.resize(mass.shape)
+    return sparse.csr_array(mass + added)
 
 
 def rows_of(

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, Continuation
+from foldyn.dynamics.added_mass import LOOK_EVERY, begin_flow, renewed_flow
 from foldyn.dynamics.audit import Rounding, audited
 from foldyn.dynamics.checkpoint import KEY, Keeping, identity, identity_digest
 from foldyn.dynamics.diagnostics import INACCURATE, doubts, is_off
@@ -36,6 +37,7 @@ from foldyn.dynamics.turned import resists_turns, turns_told
 from foldyn.errors import (
     ComputationError,
     CrossingWarning,
+    FoldynError,
     FoldynWarning,
     InstabilityError,
     MotionInterrupted,
@@ -170,7 +172,7 @@ class Motion:
 
     def _stretch(self, result: xarray.Dataset) -> str:
         """Warning where bars hold much of the strain energy; empty otherwise."""
-        names = audited(self.case.energy_groups)
+        names = audited(self.case.energy_groups, self.case.air is not None)
         found = stretch(self.case.structure, {name: result[name].values for name in names})
         if found is None:
             return ""
@@ -237,6 +239,7 @@ class Motion:
         self.output.begin()
         report, close = reporter(progress)
         try:
+            begin_flow(self.case, self.packed, self.course, self._state[0])
             given = self.case, self.packed, self.course, self.plan, self.device
             engine = engine_of(self.course) if engine_of else self.method.engine(*given)
             continued = self._state[3] if self.case.contact is None else None
@@ -279,7 +282,10 @@ class Motion:
         while True:
             done = int(course.tally.steps)
             clock = time.perf_counter()
-            stretch = self._fits(min(length, self.recheck_after - done % self.recheck_after))
+            most = self.recheck_after - done % self.recheck_after
+            if self.packed.added.acts:
+                most = min(most, LOOK_EVERY - done % LOOK_EVERY)
+            stretch = self._fits(min(length, most))
             code, hinge = engine.advance(output.window, stretch)
             clock = time.perf_counter() - clock
             began = time.perf_counter() if began is None else began
@@ -298,6 +304,8 @@ class Motion:
             report(Progress(now - plan.start, plan.end - plan.start, step, self.audit()))
             if step == plan.steps if plan.steps else now >= plan.end:
                 return
+            if self.packed.added.acts and step > done and step % LOOK_EVERY == 0:
+                self._renew_flow(engine)
             self._checkpoint_if_due(engine)
             if plan.steps and step % self.recheck_after == 0 and step > done:
                 place(system, course.u, course.v, now, memory)
@@ -305,6 +313,16 @@ class Motion:
             growth = REPORT_EVERY / max(clock, 1e-9)
             least = 1 if self.method.implicit else CHUNK
             length = max(least, min(int(length * min(growth, 8.0)), 100_000))
+
+    def _renew_flow(self, engine: Compiled | Implicit | OnCard) -> None:
+        """Find the flow of added mass anew, if the sheet has folded."""
+        try:
+            found = renewed_flow(self.case, self.packed, self.course)
+        except FoldynError as error:
+            why = f"at t = {self.course.tally.time:.6g} s the flow about the sheet is lost: {error}"
+            self._stop(why, ComputationError, error)
+        if found and isinstance(engine, Compiled):
+            engine.accelerate()
 
     def _continuations(self) -> dict[str, tuple[float, Continuation]]:
         """What an implicit method went on from, and needs to go on if it stands at a sample.
@@ -423,7 +441,7 @@ class Motion:
         """Samples stored so far, with the case, the statistics and the panels that cross."""
         crossings = crossings or self._crossings()
         out, sampled = self.output.first(self.stored)
-        names = audited(self.case.energy_groups)
+        names = audited(self.case.energy_groups, self.case.air is not None)
         energies: dict[str, NDArray] = dict(zip(names, out.energy.T, strict=True))
         result = trajectory_dataset(
             self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
@@ -448,4 +466,7 @@ class Motion:
         if self.reason:
             facts["method_reason"] = self.reason
         facts["force_evaluations"] = int(tally.evaluations)
+        if self.packed.added.acts:
+            times, jumps = self.packed.added.made.tolist()
+            facts |= {"flows": 1 + int(times), "flow_energy": jumps}
         return facts | (engine.facts() if engine else {})

@@ -25,7 +25,7 @@ class Outcome(IntEnum):
 
 
 SHORTEST = 1e-6  # part of a fixed step: contact that asks for less is overrun
-WORK, DISSIPATED, WRONG, HINGE, OUTCOME = range(5)  # places of a member's notes to its team
+WORK, DISSIPATED, AIR, WRONG, HINGE, OUTCOME = range(6)  # places of a member's notes to its team
 
 
 class StepPlan(NamedTuple):
@@ -44,13 +44,13 @@ class StepPlan(NamedTuple):
 
 # What is counted along a motion: steps done, samples written, steps refused, force evaluations
 COUNTED = ("steps", "samples", "refused", "evaluations")
-# What is measured: work of the loads and energy dissipated (J), their powers at the last step (W);
-# the time reached, and of steps that vary the next one wanted, the last, shortest and longest (s);
-# the last one's error over the tolerance; the largest displacement (m), velocity (m/s) and kinetic
-# energy (J) so far
+# What is measured: work of the loads, energy dissipated and lost to the air (J), their powers at
+# the last step (W); the time reached, and of steps that vary the next one wanted, the last,
+# shortest and longest (s); the last one's error over the tolerance; the largest displacement (m),
+# velocity (m/s) and kinetic energy (J) so far
 MEASURED = (
-    "work", "dissipated", "power_in", "power_out", "time", "wanted", "last", "shortest", "longest",
-    "error", "farthest", "fastest", "kinetic",
+    "work", "dissipated", "air", "power_in", "power_out", "power_air", "time", "wanted", "last",
+    "shortest", "longest", "error", "farthest", "fastest", "kinetic",
 )  # fmt: skip
 TALLY = np.dtype(
     (np.record, [(n, np.int64) for n in COUNTED] + [(n, np.float64) for n in MEASURED])
@@ -134,7 +134,7 @@ def split_step(longest, left):
 
 
 @inner_scalar
-def post_totals(team, work_in, work_out, wrong):
-    """Note for the team the work, the energy dissipated (J), and how many values are not finite."""
+def post_totals(team, work_in, work_out, work_air, wrong):
+    """Note for the team the work, the energies lost (J), and how many values are not finite."""
     note = team.note[team.number]
-    note[WORK], note[DISSIPATED], note[WRONG] = work_in, work_out, wrong
+    note[WORK], note[DISSIPATED], note[AIR], note[WRONG] = work_in, work_out, work_air, wrong

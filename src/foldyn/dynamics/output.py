@@ -51,13 +51,13 @@ class Output:
         keeping: Keeping | None = None,
     ) -> None:  # fmt: skip
         self._case, self._plan, self._sampler, self._branches = case, plan, sampler, branches
-        self._keeping = keeping
-        self._names = audited(case.energy_groups)
+        self._keeping, self._air = keeping, case.air is not None
+        self._names = audited(case.energy_groups, self._air)
         at_once = 1  # samples in a step, at most
         if not plan.steps and not plan.every:
             at_once = math.floor(plan.dt / plan.interval) + 2
         self._at_once = at_once
-        self.balance = Balance()
+        self.balance = Balance(self._air)
         self.window = self._room(0)
         sampler.clear()
 
@@ -117,7 +117,7 @@ class Output:
         """Leave out all samples after the first ones."""
         if self._keeping is not None and self._keeping.begun:
             self._keeping.columns.cut(min(count, self._keeping.columns.count))
-        self.balance = Balance()
+        self.balance = Balance(self._air)
         for energy, displacement in self._energies(count):
             self.balance.add(energy, displacement)
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.actuation import offset_work, power_of_part, turn_part
+from foldyn.dynamics.added_mass import AddedMass
 from foldyn.dynamics.inertia import Inertia, kinetic_energy, moving_energy, solve_mass, solve_tied
 from foldyn.dynamics.system import Scratch, System, carry_part, power_of_moved
 from foldyn.jit.compiled import addressed
@@ -38,6 +39,7 @@ class Setting(NamedTuple):
     mass: Inertia
     share: Share
     s: Scratch
+    added: AddedMass
 
 
 @addressed(NUMBER)

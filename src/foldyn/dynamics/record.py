@@ -15,7 +15,8 @@ def record(model, system, mass, q, w, a, tally, s, displacement, velocity, react
     """Write one sample after `acceleration`.
 
     The reaction is what the supports exert: M (a + alpha v) + F_int + beta K0 v - p there. energy
-    gets the strain energies, the kinetic energy, what was dissipated and the work.
+    gets the strain energies, what the air took where there is any, the kinetic energy, what was
+    dissipated and the work.
     """
     carry(system.moved, s.factor[:, 0], q, s.displacement)
     carry(system.moved, s.factor[:, 1], w, s.velocity)
@@ -29,13 +30,15 @@ def record(model, system, mass, q, w, a, tally, s, displacement, velocity, react
     reaction[:] = 0.0
     add_reactions(system.ties.reactions, product, 1.0, reaction)
     add_reactions(system.ties.reactions, force, 1.0, reaction)
-    groups = s.energy.size
-    energy[groups] = kinetic_energy(mass, s.velocity, (0, s.velocity.shape[0]))
+    groups, last = s.energy.size, energy.size - 1
+    energy[last - 2] = kinetic_energy(mass, s.velocity, (0, s.velocity.shape[0]))
     times_mass(mass, s.velocity, s.product)
     add_reactions(system.ties.reactions, product, system.alpha, reaction)
     energies_of(model, s.displacement, s.energy)
     for k in range(groups):
         energy[k] = s.energy[k]
-    energy[groups + 1] = tally.dissipated + dissipated_by(model)
+    if last - 2 > groups:
+        energy[groups] = tally.air
+    energy[last - 1] = tally.dissipated + dissipated_by(model)
     # what brought the moving supports to their speed belongs to the work: it may come in jolts
-    energy[groups + 2] = tally.work + moving_energy(system.moved_mass, s.factor)
+    energy[last] = tally.work + moving_energy(system.moved_mass, s.factor)

@@ -43,13 +43,13 @@ def advance(equation, course, plan, room, stretch):
         ut[i], vt[i] = u[i], v[i]
     begun = course.tally.steps
     end = min(begun + stretch, plan.steps)
-    post_totals(team, 0.0, 0.0, 0)
+    post_totals(team, 0.0, 0.0, 0.0, 0)
     for step in range(begun, end + 1):
-        work_in, work_out, wrong, left = 0.0, 0.0, 0, plan.dt
+        work_in, work_out, work_air, wrong, left = 0.0, 0.0, 0.0, 0, plan.dt
         while left > 0.0:  # once, unless contact asks for shorter steps
             first = left == plan.dt
             now = plan.start + step * plan.dt + (plan.dt - left)
-            part_in, part_out, dt = 0.0, 0.0, left
+            part_in, part_out, part_air, dt = 0.0, 0.0, 0.0, left
             for stage in range(4):
                 since = 0.5 * ((stage + 1) // 2) * dt
                 t = now + since
@@ -59,6 +59,7 @@ def advance(equation, course, plan, room, stretch):
                 weight = 2.0 if 0 < stage < 3 else 1.0
                 part_in += weight * power_in
                 part_out += weight * power_out
+                part_air += weight * equation.powers[2]
                 if stage == 0:
                     if first:
                         outcome, hinge = observe(equation, course, plan, a, step)
@@ -87,8 +88,9 @@ def advance(equation, course, plan, room, stretch):
                         ut[i], vt[i] = u[i], v[i]
             work_in += dt / 6.0 * part_in
             work_out += dt / 6.0 * part_out
+            work_air += dt / 6.0 * part_air
             left = 0.0 if dt == left or wrong > 0 else left - dt
             if team.number == 0:
                 course.tally.evaluations += 4
-        post_totals(team, work_in, work_out, wrong)
+        post_totals(team, work_in, work_out, work_air, wrong)
     return Outcome.DONE, -1

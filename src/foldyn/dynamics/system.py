@@ -20,7 +20,8 @@ from foldyn.cases import Case, History
 from foldyn.cases.waveforms import CONSTANT, Callbacks, Waveforms, evaluate
 from foldyn.cases.waveforms import pack as pack_waveforms
 from foldyn.dynamics.actuation import Actuators, actuators
-from foldyn.dynamics.dampers import damping_terms
+from foldyn.dynamics.added_mass import AddedMass, added_mass
+from foldyn.dynamics.dampers import air_terms, damping_terms
 from foldyn.dynamics.hereditary import with_memory
 from foldyn.dynamics.inertia import (
     Inertia,
@@ -55,7 +56,7 @@ class System(NamedTuple):
     turns: bool  # rest angles that change
     follows: bool  # loads that depend on the displacement
     touches: bool  # contact
-    presses: bool  # obstacles that move
+    presses: bool  # obstacles that move, or a wind that varies
     rows: int  # of arrays: n, and those of the dofs beside displacements
     energies: int  # groups of strain energy
     order: NDArray  # (n,) node number of each place in memory
@@ -90,7 +91,7 @@ class Scratch(NamedTuple):
     loads: NDArray  # (2,) first and last + 1 of the loads on the thread's own nodes,
     moved: NDArray  # (2,) of the supports that move there,
     turned: NDArray  # (2,) and of what turns there
-    powers: NDArray  # (2,) in and out, at the last step, for methods that keep them, W
+    powers: NDArray  # (3,) in, out, to the air at the last step, for methods that keep them, W
     pushed: NDArray  # (n, 3) forces of loads that depend on the displacement, N; or none (0, 3)
 
 
@@ -103,6 +104,7 @@ class Packed(NamedTuple):
     callbacks: Callbacks
     numbering: Numbering
     modal: ModalRows  # in the case's own order
+    added: AddedMass
 
     @property
     def model(self) -> Any:
@@ -120,12 +122,12 @@ def pack(
     """
     histories: list[History] = []
     forces, supports = (*case.load_terms, *case.following_terms), case.imposed_terms
-    others = (*case.base_terms, *case.rest_terms, *case.obstacle_terms)
+    others = (*case.base_terms, *case.rest_terms, *case.obstacle_terms, *case.wind_terms)
     for _, history in (*forces, *supports, *others):
         if history not in histories:
             histories.append(history)
     modal = modal_rows(case, start) if modal is None else modal
-    terms = damping_terms(case, start, modal)
+    terms = [*damping_terms(case, start, modal), *air_terms(case, histories)]
     body, by = _driven(case, histories).with_terms(*terms).renumbered()
     nodal = by.matrix(case.mass)
     ties = ties_of(case.constraints, by)
@@ -147,7 +149,7 @@ def pack(
         turns=len(turned.hinge) > 0,
         follows=following.acts,
         touches=case.contact is not None,
-        presses=bool(case.obstacle_terms),
+        presses=bool(case.obstacle_terms or case.wind_terms),
         rows=by.rows,
         energies=len(body.energy_groups),
         order=by.order,
@@ -162,7 +164,8 @@ def pack(
         alpha=float(case.rayleigh.alpha),
         lightness=lightness(mass) if case.contact is not None else np.zeros(0),
     )
-    return Packed(body, system, mass, callbacks, by, modal)
+    added = added_mass(case, start, by.rank, by.rows, len(body.hinges))
+    return Packed(body, system, mass, callbacks, by, modal, added)
 
 
 def _driven(case: Case, histories: list[History]) -> Assembly:
@@ -223,7 +226,7 @@ def scratch(system: System) -> Scratch:
     never = np.full(1, np.nan)
     counts = len(system.loads.dof), len(system.moved.dof), len(system.actuators.hinge)
     loads, moved, turned = (np.array([0, count]) for count in counts)
-    stage, powers = np.zeros((3, nodes, 3)), np.zeros(2)
+    stage, powers = np.zeros((3, nodes, 3)), np.zeros(3)
     pushed = np.zeros((nodes if system.follows else 0, 3))
     return Scratch(
         force, product, line, energy, never, factor, displacement, velocity, moving, stage, loads,
@@ -236,7 +239,7 @@ def scratches(system: System, works: Sequence[Any]) -> list[Scratch]:
     whole = scratch(system)
     return [
         whole._replace(
-            powers=np.zeros(2),
+            powers=np.zeros(3),
             time=whole.time.copy(),
             factor=whole.factor.copy(),
             line=np.empty_like(whole.line),

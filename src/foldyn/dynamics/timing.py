@@ -174,6 +174,7 @@ def histories(case: Case) -> Iterator[tuple[str, History]]:
         "a load": (*case.load_terms, *case.following_terms),
         "an imposed displacement": case.imposed_terms,
         "a base motion": case.base_terms,
+        "the wind": case.wind_terms,
         "an actuation": [(turn, history) for turn, history in case.rest_terms if turn[:rest].any()],
     }
     for what, terms in driven.items():
@@ -181,14 +182,14 @@ def histories(case: Case) -> Iterator[tuple[str, History]]:
 
 
 def knots(case: Case) -> NDArray[np.float64]:
-    """Times (s) at which loads, supports or rest angles jump or turn a corner."""
+    """Times (s) at which loads, supports, the wind or rest angles jump or turn a corner."""
     return np.unique([time for _, history in histories(case) for time in history.knots() or ()])
 
 
 def jumps(case: Case) -> tuple[float, ...]:
-    """Times (s) at which loads jump, or may: those that the user names of a function."""
+    """Times (s) at which loads or wind jump, or may: those that the user names of a function."""
     times: set[float] = set()
-    for _, history in (*case.load_terms, *case.following_terms):
+    for _, history in (*case.load_terms, *case.following_terms, *case.wind_terms):
         called = history.code == CALLED
         times.update((history.knots() or ()) if called else history.jumps())
     return tuple(sorted(times))

@@ -287,6 +287,7 @@ def _check(case: Case) -> None:
         (case.terms, "supports", "have springs; leave them out"),
         (case.following_terms, "loads", "follow the sheet or come from temperature; give forces"),
         (case.contact, "contact", "leave it out: decks have no contact"),
+        (case.air, "air", "leave it out: decks have no air"),
         (case.rest_terms, "loads", "fold creases; give the folded pattern, and forces"),
     )
     for is_wrong, field, text in wrong:

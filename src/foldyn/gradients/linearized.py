@@ -90,6 +90,7 @@ def refuse(linear: Linearized, what: str) -> None:
     case = linear.case
     lacks = {
         "contact": case.contact is not None,
+        "air": case.air is not None,
         "creases that yield, creep or relax": linear.branches is not None,
         "internal amplitudes (internal)": linear.internal > 0,
         "slopes of finite amplitude (secant)": linear.secant is not None,

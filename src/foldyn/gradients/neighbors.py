@@ -158,7 +158,7 @@ def motions(
     case, state, lasting = motion.case, one.arguments.get("initial"), ("initial", "sample")
     lacks = (
         motion.method.name not in ALONG, not motion.plan.steps, motion.continues, case.contact,
-        case.remembering, motion.packed.system.turns, motion.device != "cpu",
+        case.air, case.remembering, motion.packed.system.turns, motion.device != "cpu",
     )  # fmt: skip
     if any(lacks):
         raise InputError(f"{NONE} a motion of this kind")

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
+from foldyn.cases.air import refuse_air
 from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.cell_supports import Repeated, tied_vertices
@@ -140,6 +141,7 @@ def _check(case: Case) -> None:
         raise InputError(
             ": cells do not touch each other; leave contact out of the case of a cell", "contact"
         )
+    refuse_air(case, "a sheet of cells without end")
     if case.modal_damping is not None:
         raise InputError(
             ": modes of one cell are not those of the repeated sheet; take Rayleigh, crease or "

@@ -191,6 +191,9 @@ def drive_terms(system: Linearized, drive: Drive) -> list[Term]:
     axis, damping = AXES.index(drive.axis), system.case.rayleigh
     inertia = system.inertia[:, axis]
     terms = [Term(inertia, lambda omega: omega**2 - 1j * omega * damping.alpha)]
+    pushed = system.pushed[:, axis]
+    if pushed.any():
+        terms.append(Term(pushed, lambda omega: omega**2))
     held = system.ground[:, axis]
     if held.any():
         terms.append(Term(held, lambda omega: -1.0 - 1j * omega * damping.beta))

@@ -14,9 +14,11 @@ from scipy import sparse
 
 from foldyn.algebra.complex_symmetric import solve
 from foldyn.algebra.eigen import Pencil, Spectrum, lowest
+from foldyn.algebra.woodbury import Squared
 from foldyn.arguments import Check, Checked, Flag
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
+from foldyn.errors import InputError
 from foldyn.linear.excitation import Answer, Drive, drive_terms, warn_at
 from foldyn.linear.linearized import Linearized
 from foldyn.linear.modes import rigid_space, unresisted
@@ -61,6 +63,12 @@ def direct(
 
 def dynamic_stiffness(system: Linearized, omega: float) -> sparse.csc_array:
     """K - w^2 M + i w C at an angular frequency (rad/s), with the complex stiffness of memories."""
+    if isinstance(system.mass, Squared):
+        raise InputError(
+            ": the fluid couples too many dofs for full matrices at each frequency; take "
+            'method = "modal"',
+            "method",
+        )
     undamped = system.stiffness - omega**2 * system.mass
     if system.responding is not None:
         undamped = undamped + system.responding.stiffness(1j * omega)
@@ -162,5 +170,6 @@ def _residual(pencil: Pencil, modes: Spectrum, shape: NDArray, load: NDArray) ->
         shift = float(modes.values[0] - BESIDE * beside)
     factors = pencil.factorize(shift)
     whole = factors.solve(shape)
-    whole = whole + factors.solve(shape - (pencil.stiffness - shift * pencil.mass) @ whole)
+    left = shape - pencil.stiffness @ whole + shift * (pencil.mass @ whole)
+    whole = whole + factors.solve(left)
     return whole - modes.shapes @ (load / (modes.values - shift))

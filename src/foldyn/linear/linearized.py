@@ -32,8 +32,12 @@ from scipy import sparse
 
 from foldyn.algebra.complex_symmetric import Gram
 from foldyn.algebra.solvers import check_fill
+from foldyn.algebra.woodbury import Squared
 from foldyn.arguments import brief
 from foldyn.cases import Case, State
+from foldyn.cases.added_mass import operator_at
+from foldyn.cases.air import LOCAL
+from foldyn.cases.constraints import Constraints
 from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.inertia import check_mass
@@ -48,6 +52,7 @@ from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.values import number
 
+Mass = sparse.csr_array | Squared
 POWER = 4.0 / 3.0
 AT_REST = 0.9411457706782074
 """2/sqrt(pi) Gamma(POWER/2 + 1)/Gamma(POWER/2 + 3/2)."""
@@ -81,7 +86,13 @@ class Linearized:
         Forces on the free dofs per unit displacement of the whole along x, y, z: those of springs
         to the ground and of planes that touch, N/m.
     inertia : (nf, 3)
-        Forces on the free dofs per unit acceleration of the whole along x, y, z, kg.
+        Forces on the free dofs per unit acceleration of the whole along x, y, z, but for those of
+        fluid, kg.
+    added : (nf, nf) or None
+        What of the mass is that of fluid around the sheet, kg. Where it couples too many dofs for
+        a matrix, it and the mass are `Squared`.
+    pushed : (nf, 3)
+        Forces of that fluid per unit acceleration of the whole along x, y, z, kg.
     soft : int
         Hinges of the superlinear law that stand at their rest angle, where their slope vanishes;
         they count without stiffness. 0 with `secant`.
@@ -106,12 +117,14 @@ class Linearized:
     displacement: NDArray
     free: NDArray
     stiffness: sparse.csc_array
-    mass: sparse.csc_array
+    mass: sparse.csc_array | Squared
     damping: sparse.csc_array
     modal: NDArray
     drag: NDArray
     ground: NDArray
     inertia: NDArray
+    added: sparse.csc_array | Squared | None
+    pushed: NDArray
     soft: int
     secant: float | None
     residual: float
@@ -229,6 +242,8 @@ def linearize(
     if internal:
         more = inner.damped(more, case.crease_damping * body.sheet.fold_hinges().length)
     damping = case.rayleigh.matrix(mass, _reference(case, inner.stiffened(exact), internal))
+    added = _added(case, point.displacement, body, inner)
+    mass = _moved(mass, added)
     modal = _modal_rows(case, point.displacement, stiffness, mass, internal)
     if contact is not None:  # it damps nothing
         stiffness = sparse.csr_array(stiffness + inner.behind(contact.tangent(point.dofs)))
@@ -239,12 +254,14 @@ def linearize(
         displacement=point.displacement,
         free=free,
         stiffness=_block(ties.matrix(stiffness), free),
-        mass=_block(ties.matrix(mass), free),
+        mass=_tied(mass, ties, free),
         damping=_block(ties.matrix(damping + more if more.nnz else damping), free),
         modal=ties.force(modal.T)[free].T,
         drag=ties.force(more @ whole)[free],
         ground=ties.force(_ground(point.body, point.dofs, whole))[free],
         inertia=_inertia(case, whole, inner)[free],
+        added=None if added is None else _tied(added, ties, free),
+        pushed=np.zeros((len(free), 3)) if added is None else ties.force(added @ whole)[free],
         soft=soft,
         secant=None if secant is None else float(secant),
         residual=point.relative,
@@ -293,6 +310,45 @@ def _ground(body: Assembly, q: NDArray, whole: NDArray) -> NDArray:
     return out
 
 
+def _added(case: Case, displacement: NDArray, body: Assembly, inner: Amplitudes) -> Mass | None:
+    """Mass of the fluid (m, m) at a displacement (n, 3), kg: where it would be full, by rows."""
+    found = operator_at(case, displacement)
+    if found is None:
+        return None
+    added, fits = found
+    if fits:
+        matrix = added.sparse
+        matrix.resize((body.size, body.size))
+        return inner.behind(matrix)
+    for name, there in (("modal damping", case.modal_damping), ("memory", case.remembering)):
+        if there:
+            raise InputError(
+                f": the fluid couples {len(added.moving)} dofs, too many for a full matrix, which "
+                f'{name} takes; leave one out, take fewer divisions, or added_mass = "{LOCAL}"',
+                "air",
+            )
+    size = body.size + len(inner.dofs)
+    rows = np.pad(added.rows, ((0, 0), (0, size - added.shape[0])))
+    return Squared(sparse.csc_array((size, size)), rows)
+
+
+def _moved(mass: sparse.csr_array, added: Mass | None) -> Mass:
+    """Mass (m, m) with that of the fluid."""
+    if added is None:
+        return mass
+    if isinstance(added, Squared):
+        return Squared(sparse.csc_array(mass), added.rows)
+    return sparse.csr_array(mass + added)
+
+
+def _tied(matrix: Mass, ties: Constraints, free: NDArray) -> sparse.csc_array | Squared:
+    """A mass (m, m) on the free dofs, as constraints leave it."""
+    if isinstance(matrix, Squared):
+        block = _block(ties.matrix(sparse.csr_array(matrix.matrix)), free)
+        return Squared(block, ties.force(matrix.rows.T)[free].T)
+    return _block(ties.matrix(matrix), free)
+
+
 def _inertia(case: Case, whole: NDArray, inner: Amplitudes) -> NDArray:
     """Forces (m, 3) on the unknowns per unit acceleration of the whole (m, 3)."""
     load = whole.copy()
@@ -315,7 +371,8 @@ def _modal_rows(
         body, rest = case.elastic_body, np.zeros_like(state)
         inner = amplitudes(case.structure, body, body.dofs(rest), internal)
         stiffness = inner.stiffened(body.tangent(body.dofs(rest)))
-        modal = rows_of(damping, case, stiffness, inner.massed(mass_of(case)), rest)
+        mass = _moved(inner.massed(mass_of(case)), _added(case, rest, body, inner))
+        modal = rows_of(damping, case, stiffness, mass, rest)
     modal.warn()
     return np.pad(modal.rows, ((0, 0), (0, stiffness.shape[0] - modal.rows.shape[1])))
 

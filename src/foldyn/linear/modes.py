@@ -92,8 +92,10 @@ def modes(
         (phi' M phi = 1 kg m2, the entry of largest size positive), `rigid`, `rigid_share` (of the
         shape in the space of rigid motions), `damping_ratio` (phi' C phi / (2 omega), nan where
         the frequency is 0 or nan), `participation`, `effective_mass`, and `displacement` of the
-        state; with internal amplitudes also `internal_share`, their share of the strain energy,
-        which shapes at nodes do not show. Attributes: `free_mass` (kg along x, y, z), `complete`
+        state; in air also `air_share`, the fluid's share of the modal mass, which `free_mass`,
+        `participation` and `effective_mass` include; with internal amplitudes also
+        `internal_share`, their share of the strain energy, which shapes at nodes do not show.
+        Attributes: `free_mass` (kg along x, y, z), `complete`
         (how many of the lowest modes are proven to be all there are), `soft_hinges`, `residual` of
         the state, `rounding` (a
         bound on that of the eigenvalues, as a fraction) and facts about the computation.
@@ -189,6 +191,7 @@ def _variables(
     full = linear.expanded(shapes).T
     return {
         **(_internal(linear, values, shapes) if linear.internal else {}),
+        **(_air(linear, shapes) if linear.added is not None else {}),
         "frequency": omega / (2.0 * np.pi),
         "eigenvalue": values,
         "shape": full.reshape(-1, *linear.displacement.shape),
@@ -240,6 +243,12 @@ def _internal(linear: Linearized, values: NDArray, shapes: NDArray) -> dict[str,
         "between_shape": linear.between(shapes).T.reshape(shapes.shape[1], *points.shape),
         "between_position": points,
     }
+
+
+def _air(linear: Linearized, shapes: NDArray) -> dict[str, Any]:
+    """Share of the fluid in the modal mass of shapes (nf, k)."""
+    part = np.einsum("ik,ik->k", shapes, linear.added @ shapes)
+    return {"air_share": part / np.einsum("ik,ik->k", shapes, linear.mass @ shapes)}
 
 
 def unit_translations(linear: Linearized) -> NDArray:

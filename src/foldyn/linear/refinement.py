@@ -104,5 +104,5 @@ def _meshes(divisions: int) -> tuple[int, ...]:
 def _modes(case: Case, structure: Any, count: int) -> MeshModes:
     if structure.sheet.density is None:
         structure = replace(structure, sheet=replace(structure.sheet, density=1.0))
-    bare = replace(case, structure=structure, loads=(), contact=None)
+    bare = replace(case, structure=structure, loads=(), contact=None, air=None)
     return mesh_modes(bare, count)

@@ -40,7 +40,7 @@ class _Context(NamedTuple):
     middle: NDArray  # (rows, 3)
     speed: NDArray  # (rows, 3)
     energy: NDArray  # (groups,)
-    powers: NDArray  # (3, 2) with its forces
+    powers: NDArray  # (3, 3) with its forces
 
 
 @mean_forces
@@ -56,10 +56,11 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
     mean = flat(found[0])
     for k in own.hidden:
         mean[k] = 0.5 * (flat(found[1])[k] + flat(found[2])[k])
-    power_in, power_out = own.powers[0]
-    total = numbers_at(powers, 2)
+    power_in, power_out, power_air = own.powers[0]
+    total = numbers_at(powers, 3)
     total[0] += power_in
     total[1] += power_out
+    total[2] += power_air
     if own.energies != 0:
         missed, size, square = h * (power_out - power_in), 0.0, 0.0
         for k in range(2):
@@ -88,12 +89,12 @@ class MeanForces:
     ----------
     context, kernel : ndarray, shape (k,)
         Addresses.
-    powers : ndarray, shape (2,)
-        Work per time that forces without an energy put in and take, added up, W.
+    powers : ndarray, shape (3,)
+        Work per time that forces without an energy put in, dissipate and lose to the air, W.
     """
 
     def __init__(self, body: Assembly, work: Work) -> None:
-        self.powers, self._body = np.zeros(2), body
+        self.powers, self._body = np.zeros(3), body
         pairs = zip(body.terms, body.compiled(work), strict=True)
         self._held = [
             (own.context, *self._of(term, own))
@@ -123,6 +124,6 @@ class MeanForces:
             middle=np.zeros((rows, 3)),
             speed=np.zeros((rows, 3)),
             energy=np.zeros(len(self._body.energy_groups)),
-            powers=np.zeros((states, 2)),
+            powers=np.zeros((states, 3)),
         )
         return Context(context), _mean_forces

@@ -10,8 +10,8 @@ Arrays reach a kernel by their addresses, as `rows_at` and `numbers_at` find the
 are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of the context:
 
     forces(u, v, t, force, powers)   adds its forces at u, v and the time t to `force`, N, and to
-                                     `powers` the power that it puts in and the one that it
-                                     dissipates, W; that of the sheet comes first, and writes
+                                     `powers` the powers that it puts in, dissipates and loses to
+                                     the air, W; that of the sheet comes first, and writes
     energies(u, out)                 adds its energies to their groups; the sheet's are written
     limit(u, v, a, h, beta, energy, lightness) -> h
                                      the longest step (s), at most h, in which nothing is overrun:
@@ -19,7 +19,8 @@ are (rows, 3), as in `mechanics.assembly`. The signatures, after the address of 
                                      a is the acceleration there, beta and energy are those of
                                      `contact.step_limit.Pace`; lightness (n,) is 1 / mass of the
                                      nodes, 1/kg
-    place_obstacles(factors)         puts what moves with histories where their factors (h, 3) say
+    place_obstacles(factors)         puts what moves with histories, obstacles and air, where their
+                                     factors (h, 3) say
     advance_clock(since)             it is evaluated next so long (s) after the last accepted step
     commit()                         the step is accepted that ends where it was evaluated last
     dissipated() -> J                what its laws have dissipated up to there
@@ -115,7 +116,7 @@ class Term(ABC):
     owns_hidden : bool
         Whether some of the hidden dofs are its own.
     damps : bool
-        Whether its forces resist velocities, and dissipate all their work.
+        Whether its forces resist velocities, and dissipate all their work, or give it to the air.
     undifferentiated : str
         What it is called where gradients are refused, of a term that has no `pulled`.
     """
@@ -284,7 +285,7 @@ class Terms(NamedTuple):
     context: NDArray  # (k,) addresses
     kernel: NDArray  # (k, 9) addresses, or 0
     folds: Folds
-    powers: NDArray  # (2,) memory
+    powers: NDArray  # (3,) memory
 
 
 class Share(NamedTuple):
@@ -317,7 +318,7 @@ class Model:
         self._held = terms = body.compiled(work)
         kernel = np.zeros((len(terms), len(EVERY)), np.int64)
         context = np.array([term.context.address for term in terms], np.int64)
-        self.terms = Terms(context, kernel, body.sheet.folds, np.zeros(2))
+        self.terms = Terms(context, kernel, body.sheet.folds, np.zeros(3))
         own = Whole(np.asarray(work.strips.own))
         self.share = Share(work.angle, work.fold_angle, own, work.team)
         self.call(kinds)
@@ -340,9 +341,11 @@ def parted_rows(values, n, r):
 def forces_of(terms, u, v, t, force):
     """Internal forces (rows, 3) at u, v and t; returns the powers in and out, W.
 
+    What the air takes is the last of `Terms.powers`.
+
     Keeps all dihedrals in the angle, and in the fold_angle, of the thread's `Share`.
     """
-    terms.powers[0], terms.powers[1] = 0.0, 0.0
+    terms.powers[0], terms.powers[1], terms.powers[2] = 0.0, 0.0, 0.0
     for k in range(terms.context.size):
         run_at(terms.kernel[k, FORCES], (terms.context[k], u, v, t, force, terms.powers))
     return terms.powers[0], terms.powers[1]

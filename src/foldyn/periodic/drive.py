@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from foldyn.attractors.drive import lowest_frequency
 from foldyn.cases import Case, Constant, Harmonic
+from foldyn.cases.air import refuse_air
 from foldyn.errors import InputError
 from foldyn.mechanics.constant_damping import DampingMatrix, DampingRows
 from foldyn.mechanics.term import Term
@@ -37,6 +38,7 @@ def check_smooth(case: Case, name: str) -> None:
             "motion",
             "contact",
         )
+    refuse_air(case, name)
     if case.remembering:
         raise InputError(
             f"structure: {name} takes forces that depend on where the sheet is, and some of its "

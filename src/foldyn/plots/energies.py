@@ -33,7 +33,7 @@ COLORS: Mapping[str, str] = {
 
 
 def energy_error(trajectory: xr.Dataset) -> NDArray[np.float64]:
-    """Return kinetic + strain + dissipated - work, less its value at the start.
+    """Return kinetic + strain + air + dissipated - work, less its value at the start.
 
     Parameters
     ----------
@@ -56,7 +56,8 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     trajectory : xarray.Dataset
         With ``kinetic``, the strain energies of its structure (``strain_bars``, ``strain_folds``
         and ``strain_bends``, or of a shell ``strain_membrane``, ``strain_bending`` and
-        ``strain_folds``), ``dissipated`` and ``work`` (J) over ``time`` (s).
+        ``strain_folds``), ``dissipated`` and ``work`` (J), and of one in air ``air``, over
+        ``time`` (s).
     title : str
         Title of the figure.
 
@@ -74,6 +75,9 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
         part: f"strain, {strain_name(part)}" for part in parts_of(alone("trajectory", trajectory))
     }
     others = {"dissipated": "dissipated", "work": "work of the loads"}
+    lost = "dissipated"
+    if audit.AIR in trajectory:
+        others, lost = {audit.AIR: "lost to the air"} | others, "air + dissipated"
     names = {"kinetic": "kinetic", **strain, **others}
     missing = [name for name in names if name not in trajectory]
     if missing:
@@ -88,8 +92,8 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     lower = figure.axes[1]
     lower.get_lines()[0].set(color=style.BLACK, linestyle="solid", linewidth=1.0)
     worst = float(np.nanmax(np.abs(error)))
-    largest = audit.energy_scale(_table(trajectory))
-    note = f"kinetic + strain + dissipated - work, less its start: at most {worst:.2g} J"
+    largest = audit.energy_scale(_table(trajectory), audit.AIR in trajectory)
+    note = f"kinetic + strain + {lost} - work, less its start: at most {worst:.2g} J"
     if largest > 0.0:
         note += f", {worst / largest:.2g} of the energy at play"
     lower.set_title(note, **style.FINE, loc="right", y=1.0, pad=4.0)
@@ -99,7 +103,7 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
 
 def _table(trajectory: xr.Dataset) -> NDArray[np.float64]:
     """Return the energies (J) as the audit has them, a column each."""
-    names = audit.audited(parts_of(trajectory))
+    names = audit.audited(parts_of(trajectory), audit.AIR in trajectory)
     return np.column_stack([trajectory[name].values for name in names])
 
 

@@ -119,7 +119,7 @@ def trajectory_dataset(
         own = {"method": one.method, "time": at}
         along, numbers, text = variable(("continued",), one.values, "", CONTINUATIONS[name])
         data[name] = along, numbers, text | own
-    histories = (getattr(part, "history", None) for part in (*case.supports, *case.loads))
+    histories = (getattr(part, "history", None) for part in (*case.supports, *case.loads, case.air))
     called = any(type(one) not in HISTORIES.values() for one in histories if one is not None)
     times = stage_times(statistics) if called else None
     along = {"time": ("time", time, {"units": "s", "long_name": "time"})}

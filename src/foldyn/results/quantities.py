@@ -57,6 +57,7 @@ MOTION: Mapping[str, Quantity] = STATE | {
     "velocity": Quantity("m/s", "velocity", PLACE),
     "kinetic": Quantity("J", "kinetic energy"),
     "dissipated": Quantity("J", "energy dissipated by damping since the start"),
+    "air": Quantity("J", "energy lost to the air since the start"),
     "work": Quantity("J", "work of the loads since the start"),
     "memory": MEMORY,
 }
@@ -101,6 +102,7 @@ MODES: Mapping[str, Quantity] = {
     "effective_mass": Quantity("kg", "effective mass", ("axis",)),
 }
 INTERNAL: Mapping[str, Quantity] = {
+    "air_share": Quantity("1", "share of the air in the modal mass"),
     "internal_share": Quantity("1", "share of the strain energy in internal amplitudes of panels"),
     "between_shape": Quantity("m", "mode shape between nodes", ("between", "axis")),
 }

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Actuate, Case
+from foldyn.cases.air import refuse_air, refuse_wind
 from foldyn.cases.case_assembly import SomeLoads
 from foldyn.errors import InputError
 from foldyn.mechanics.assembly import Assembly
@@ -99,6 +100,9 @@ class OrigamiProblem:
         adaptive_load: AdaptiveLoad | None = None, inertia_relief: bool = False,
         flow: str = REFUSED, memory: NDArray | str | None = None, timed: bool = False,
     ) -> None:  # fmt: skip
+        refuse_wind(case, "statics")
+        if inertia_relief:
+            refuse_air(case, "inertia relief")
         self.memories, self._plates = Memories(case, flow, timed), Plates(case)
         self.case, structure = case, case.structure
         self.structure, self._adaptive = structure, adaptive_load

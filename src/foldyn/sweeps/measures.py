@@ -85,6 +85,11 @@ def _effective_mass(result: xr.Dataset, case: Case, mode: int, axis: str) -> flo
     return float(_of_mode(result, "effective_mass", mode).sel(axis=axis))
 
 
+@_measure(MODES, doc="share of the air in the modal mass")
+def _air_share(result: xr.Dataset, case: Case, mode: int) -> float:
+    return float(_of_mode(result, "air_share", mode)) if "air_share" in result else 0.0
+
+
 def _of_mode(result: xr.Dataset, name: str, mode: int) -> xr.DataArray:
     if mode not in result["mode"].values:
         raise InputError(f"there are {result.sizes['mode']} modes; raise analysis.count")

@@ -156,7 +156,8 @@ def shares(pairs: NDArray, triangles: NDArray, panel: NDArray) -> sparse.csr_arr
 
 def energies(case: Case, result: Any) -> dict[str, NDArray]:
     """Energies of a result (samples), J, by what they are, those that it has."""
-    names = {"kinetic": "kinetic", **case.energy_groups, "dissipated": "dissipated", "work": "work"}
+    names = {"kinetic": "kinetic", **case.energy_groups, "dissipated": "dissipated"}
+    names |= {"air": "lost to the air", "work": "work"}
     return {
         text.removeprefix("strain energy of ").removeprefix("the "): np.asarray(result[name])
         for name, text in names.items()

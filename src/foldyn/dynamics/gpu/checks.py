@@ -8,6 +8,7 @@ from numba import config
 
 from foldyn.dynamics.system import Packed
 from foldyn.errors import InputError
+from foldyn.mechanics.air_drag import AirDragTerm
 from foldyn.mechanics.constant_damping import DampingMatrix
 from foldyn.mechanics.membranes import MembranesTerm
 from foldyn.mechanics.springs import SpringsTerm
@@ -68,6 +69,8 @@ def lacking(packed: Packed) -> str:
         return "a law of your own"
     if not packed.mass.lumped:
         return "a constraint" if len(system.ties.slave) else "a mass matrix that is not diagonal"
+    if packed.added.acts:
+        return "added mass"
     drives = {
         "a support that moves": system.moves, "a rest angle that changes": system.turns,
         "a load that depends on the displacement": system.follows,
@@ -75,6 +78,8 @@ def lacking(packed: Packed) -> str:
     for what, there in drives.items():
         if there:
             return what
+    if body.find(AirDragTerm) is not None:
+        return "drag of the air"
     for term in body.others:
         if not isinstance(term, TERMS):
             return f"the term {type(term).__name__.removesuffix('Term')}"

@@ -326,9 +326,10 @@ class Implicit:
 
     def _accept(self, h: float, end: float, jump: float | None) -> None:
         scheme, course = self._scheme, self._course
-        done, lost = scheme.works(h)
+        done, lost, to_air = scheme.works(h)
         course.tally.work += done
         course.tally.dissipated += lost
+        course.tally.air += to_air
         if self._touching is not None:
             given, taken = self._touching.works()
             course.tally.work += given

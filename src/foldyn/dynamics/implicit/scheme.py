@@ -20,6 +20,7 @@ from foldyn.dynamics.system import Packed, Scratch, carried, place, scratch
 from foldyn.dynamics.ties import hand_over
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.air_drag import AirDragTerm
 from foldyn.mechanics.constant_damping import DampingMatrix
 from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.term import ContactTerm
@@ -74,7 +75,8 @@ class Phase(NamedTuple):
     force: NDArray  # F_int + beta K0 v - p, N
     factor: NDArray  # (h, 3) of the histories
     pushed: NDArray  # forces of loads that depend on the displacement, N; or none (0, 3)
-    damped: NDArray  # those of damping, for methods that keep them, N; or none
+    damped: NDArray  # those of damping, for methods that keep them, N; or none,
+    resisted: NDArray  # and those of the air
 
 
 class Scheme(ABC):
@@ -111,9 +113,12 @@ class Scheme(ABC):
         self.shift = np.zeros(shape)  # new.q - old.q: their difference would lose digits
         self.earlier = np.zeros(shape)  # new.q before the last iteration
         self._gap, self._pushed = np.zeros(histories[0]), np.zeros(shape)
-        self.damping = np.flatnonzero([term.damps for term in packed.body.terms])
-        damped = np.zeros(shape if len(self.damping) else (0, 3))
-        rest = np.zeros(shape), np.zeros(histories), np.zeros_like(self.scratch.pushed), damped
+        self.air = packed.body.find(AirDragTerm)
+        air = [isinstance(term, AirDragTerm) for term in packed.body.terms]
+        damps = [term.damps for term in packed.body.terms] & ~np.array(air)
+        self.damping, self.drag = np.flatnonzero(damps), np.flatnonzero(air)
+        kept = (np.zeros(shape if len(own) else (0, 3)) for own in (self.damping, self.drag))
+        rest = np.zeros(shape), np.zeros(histories), np.zeros_like(self.scratch.pushed), *kept
         self.old = Phase(course.u, course.v, course.carry, *rest)
         self.new = Phase(*map(np.zeros_like, self.old))
         # mean velocity of the last step, and its change per time from the middle of one to another
@@ -139,8 +144,8 @@ class Scheme(ABC):
         """Fill the stiffness blocks at new.q; see `Blocks.put` for `before` and `again`."""
 
     @abstractmethod
-    def works(self, h: float) -> tuple[float, float]:
-        """Work of loads, supports and actuators in the step, and energy dissipated, J."""
+    def works(self, h: float) -> tuple[float, float, float]:
+        """Work of loads, supports, actuators in a step, energy dissipated, and lost to air, J."""
 
     @abstractmethod
     def change(self, h: float) -> NDArray:

@@ -25,6 +25,7 @@ HIGHEST = 22.0  # Hz, of the peaks that are told
 RELEASED = 2.0  # s, when the weight is taken away,
 SETTLED = 0.05  # and how long after it the first minimum is
 PAIR, ALONE = Rayleigh(14.4, 4.1e-4), Rayleigh(15.8)
+IN_AIR = {"air.density": 1.204}  # kg/m3
 ORDINALS = ("first", "second", "third")
 
 
@@ -71,7 +72,7 @@ def specimen(
 
 def response(
     published: bool = False, mass: str = "circumcenter", damping: Rayleigh = PAIR,
-    **changes: Any,
+    air: bool = False, **changes: Any,
 ) -> Response:  # fmt: skip
     """Peaks of the specimen's response to a sine of 0.001 N on each top node.
 
@@ -81,12 +82,14 @@ def response(
         Whether the folds have a moment at rest, as published.
     mass : str
     damping : Rayleigh
+    air : bool
+        Whether the air around the specimen moves with it.
     **changes
         Other arguments of `frf`.
     """
     name = "frf-published" if published else "frf"
     damping = replace(damping, state="start" if published else "rest")
-    return Response.of(specimen(name, damping).run(mass, **changes))
+    return Response.of(specimen(name, damping, IN_AIR if air else None).run(mass, **changes))
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,3 +147,4 @@ def vibration() -> list[Verdict]:
 if __name__ == "__main__":
     for verdict in vibration():
         print(verdict.line())
+    print("peaks in air (Hz):", *(f"{peak:.4g}" for peak in response(air=True).frequencies))

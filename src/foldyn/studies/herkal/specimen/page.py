@@ -280,7 +280,10 @@ def _agreement(front: xr.Dataset) -> Table:
 # ---------------------------------------------------------------------- vibration
 def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
     responses = {name: load(folder / file) for name, file in tasks.RESPONSES.items()}
-    labels = {"published": "the paper's parameters", "fitted": "fitted parameters"}
+    labels = {
+        "published": "the paper's parameters", "air": "the same in air",
+        "fitted": "fitted parameters",
+    }  # fmt: skip
     paper = _targets()
     peaks = [paper[f"frf_{which}_peak"].value for which in ORDINALS]
     modes = load(folder / tasks.MODES)
@@ -303,7 +306,22 @@ def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
             + ".",
             lambda: plots.draw_modes(case_of(modes), modes, shown, title=note),
         ),
+        _air_table(modes, load(folder / tasks.IN_AIR), named["name"].values.tolist()),
     ]
+
+
+def _air_table(modes: xr.Dataset, in_air: xr.Dataset, names: Sequence[str]) -> Table:
+    columns = modes["frequency"].values, in_air["frequency"].values, in_air["air_share"].values
+    rows = [
+        [str(name), cell(dry), cell(wet), cell(100.0 * share)]
+        for name, dry, wet, share in zip(names, *columns, strict=True)
+    ]
+    return Table(
+        ["mode", "in vacuum (Hz)", "in air (Hz)", "share of the air (%)"], rows,
+        "Modes with the fitted folds, in vacuum and in air, and the part of the modal mass that is "
+        "air.",
+        digits=3,
+    )  # fmt: skip
 
 
 def _response_table(responses: Mapping[str, xr.Dataset], paper: Mapping[str, Target]) -> Table:
@@ -318,8 +336,9 @@ def _response_table(responses: Mapping[str, xr.Dataset], paper: Mapping[str, Tar
         values = [_at(one.damping, k, 100.0) for one in found]
         rows.append([f"{target.what} (%)", target.value, *values])
     return Table(
-        ["", "paper", "the paper's parameters, here", "fitted parameters"], rows,
-        "Peaks of the response, and damping by the half-power points as the paper has it.",
+        ["", "paper", "the paper's parameters, here", "the same in air", "fitted parameters"], rows,
+        "Peaks of the response, and damping by the half-power points as the paper has it, in "
+        "vacuum but for one column.",
         digits=3,
     )  # fmt: skip
 

@@ -36,7 +36,8 @@ FOLDER = "specimen"
 NOTE = "synthetic data: the specimen's own are not public"
 PHOTOS, FILM, FOUND, COMPARED = "photographs.nc", "film.nc", "found.json", "front.nc"
 TRUTH = "film-truth.nc"
-RESPONSES, MODES = {"published": "frf-published.nc", "fitted": "frf-fitted.nc"}, "modes.nc"
+MODES, IN_AIR = "modes.nc", "modes-air.nc"
+RESPONSES = {"published": "frf-published.nc", "air": "frf-air.nc", "fitted": "frf-fitted.nc"}
 
 
 @dataclass(frozen=True)
@@ -242,17 +243,18 @@ def _write(one: Fit, folder: Path, note: str) -> None:
 
 def _response(part: Part, folder: Path) -> None:
     changes = read_found(folder)["changes"]
-    for name, given in (("published", {}), ("fitted", changes)):
+    for name, given in (("published", {}), ("air", vibration.IN_AIR), ("fitted", changes)):
         save(vibration.specimen("frf", changes=given).run(), folder / RESPONSES[name])
     folds = {key: value for key, value in changes.items() if not key.startswith("damping.")}
-    save(vibration.specimen("modes", changes=folds).run(), folder / MODES)
+    for name, given in ((MODES, folds), (IN_AIR, {**folds, **vibration.IN_AIR})):
+        save(vibration.specimen("modes", changes=given).run(), folder / name)
 
 
 PARTS: Mapping[str, tuple[Callable[[Part, Path], None], tuple[str, ...]]] = {
     "photographs": (_photographs, (PHOTOS,)),
     "film": (_film, (FILM, TRUTH)),
     "fit": (_fit, (FOUND, COMPARED)),
-    "response": (_response, (*RESPONSES.values(), MODES)),
+    "response": (_response, (*RESPONSES.values(), MODES, IN_AIR)),
 }
 """How each part is computed, and which files it leaves for others or for the page."""
 

@@ -1,0 +1,139 @@
+"""The fluid that moves with the sheet of a case, and its mass."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.cases.air import LOCAL
+from foldyn.errors import InputError
+from foldyn.mechanics.air.added_mass import (
+    AddedMass,
+    Flow,
+    caught,
+    flow_of,
+    normal_velocities,
+)
+from foldyn.mechanics.air.gaps import APART, JOINED, narrow_gap
+from foldyn.ram_limit import check_memory
+from foldyn.structures.boundary_elements import BoundaryElements, boundary_elements
+
+MOST_COUPLED = 3000  # dofs that a matrix may couple with all others
+COPIES = 3  # of the flow's matrix, while it is made
+
+
+class Fluid(NamedTuple):
+    """The fluid around a sheet in one state of it.
+
+    Attributes
+    ----------
+    triangles : ndarray of int, shape (nt, 3)
+        Nodes of the structure's triangles.
+    under, shares : ndarray, shape (e,) and (e, 3)
+        The triangle under the center of each boundary element, and the weights of its nodes.
+    catch : sparse array, shape (u, e)
+        Integrals of the flow's functions over the elements, m2.
+    flow : ndarray or sparse array, shape (u, u)
+        rho D^-1, kg/m4: with the normal velocities y of the elements the energy of the fluid is
+        (catch y)' flow (catch y) / 2.
+    """
+
+    triangles: NDArray[np.int64]
+    under: NDArray[np.int64]
+    shares: NDArray[np.float64]
+    catch: sparse.csr_array
+    flow: Flow
+
+    def on(self, x: NDArray) -> AddedMass:
+        """Added mass for the normals that the triangles have with the nodes at x (n, 3), m."""
+        normal = normal_velocities(x, self.triangles, self.under, self.shares)
+        return AddedMass(sparse.csr_array(self.catch @ normal), self.flow)
+
+
+def elements_of(case: Any) -> BoundaryElements:
+    """Boundary elements of a case in air."""
+    air, structure = case.air, case.structure
+    count = sum(len(face) for face in structure.pattern.faces) if structure.pattern else 0
+    unknowns = count * (air.resolution // 2) ** 2
+    if air.added_mass is True:
+        check_memory(
+            "air.resolution", f"the flow about {unknowns:.3g} boundary elements",
+            8.0 * COPIES * unknowns**2, f'give a lower one, or added_mass = "{LOCAL}"',
+        )  # fmt: skip
+    return boundary_elements(structure, air.resolution, air.added_mass == LOCAL)
+
+
+def fluid_at(case: Any, displacement: NDArray) -> Fluid:
+    """The fluid around the sheet of a case at a displacement (n, 3), m.
+
+    Raises
+    ------
+    InputError
+        The case has no added mass; panels nearly touch.
+    """
+    if case.air is None or not case.air.added_mass:
+        raise InputError(": the case has no added mass; give it air with added_mass", "air")
+    elements, structure = case.boundary_elements, case.structure
+    local = case.air.added_mass == LOCAL
+    points = elements.weights @ (structure.nodes + displacement)
+    if not local:
+        _check_gaps(structure.pattern, elements, points)
+    parts = elements.panel if local else None
+    flow = case.air.density * flow_of(points, elements.triangles, elements.unknown, parts)
+    catch = caught(points, elements.triangles, elements.unknown)
+    return Fluid(structure.triangles, elements.under, elements.shares, catch, flow)
+
+
+def operator_at(case: Any, displacement: NDArray) -> tuple[AddedMass, bool] | None:
+    """Added mass of a case at a displacement (n, 3), or None without; whether it is to be a matrix.
+
+    It is not where it couples too many dofs.
+    """
+    if case.air is None or not case.air.added_mass:
+        return None
+    added = fluid_at(case, displacement).on(case.structure.nodes + displacement)
+    return added, case.air.added_mass == LOCAL or len(added.moving) <= MOST_COUPLED
+
+
+def added_mass_at(case: Any, displacement: NDArray) -> sparse.csr_array | None:
+    """Added mass (3n, 3n) of a case at a displacement (n, 3), kg, or None without.
+
+    Raises
+    ------
+    InputError
+        Panels nearly touch; it couples too many dofs for a matrix.
+    """
+    found = operator_at(case, displacement)
+    if found is None:
+        return None
+    added, fits = found
+    if not fits:
+        raise InputError(
+            f": the fluid couples {len(added.moving)} dofs with each other, and matrices take "
+            f"{MOST_COUPLED} at most; take fewer divisions, the scheme n4b5, or added_mass = "
+            f'"{LOCAL}"',
+            "air",
+        )
+    return added.sparse
+
+
+def _check_gaps(pattern: Any, elements: BoundaryElements, points: NDArray) -> None:
+    """Refuse a state in which panels come too near to each other for their elements."""
+    panels = np.repeat(np.arange(len(pattern.faces)), [len(face) for face in pattern.faces])
+    corners = np.concatenate([np.array(face) for face in pattern.faces])
+    members = sparse.csr_array((np.ones(len(corners)), (panels, corners)))
+    joined = sparse.csr_array(members @ members.T)
+    gap = narrow_gap(points, elements.triangles, elements.panel, joined)
+    if gap is None:
+        return
+    one, other = sorted(elements.panel[[gap.one, gap.other]].tolist())
+    least = JOINED if joined[one, other] else APART
+    raise InputError(
+        f": panels {one} and {other} are {gap.distance:.3g} m apart, less than {least:g} of the "
+        f"size of their boundary elements, {gap.size:.3g} m, which then miss the flow between "
+        "them; open the sheet, or give a higher resolution",
+        "air",
+    )

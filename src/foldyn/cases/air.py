@@ -1,0 +1,143 @@
+"""The air, or water, around a sheet: the mass that moves with it, and its drag."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+
+from foldyn.arguments import Check, Flag
+from foldyn.cases.decode import Part, check_keys
+from foldyn.cases.history import STEADY, Factor
+from foldyn.errors import InputError
+from foldyn.values import flag, number, show, vector, whole
+
+LOCAL = "local"
+SHORTER_TO_LONGER = (0.0, 0.05, 0.1, 0.2, 1.0)
+PLATE_DRAG = (2.0, 1.5, 1.3, 1.2, 1.18)
+"""Drag coefficients of flat plates normal to the flow by the ratio of their sides: White (2011),
+Fluid Mechanics, 7th edition, table 7.3, after Hoerner (1965), Fluid-Dynamic Drag."""
+
+
+def _added_mass(name: str, value: Any) -> bool | str:
+    if isinstance(value, str) and value != LOCAL:
+        raise InputError(f" = {show(value)}: must be true, false or {show(LOCAL)}", name)
+    return value if isinstance(value, str) else flag(name, value)
+
+
+@dataclass(frozen=True)
+class Air(Part):
+    """Air, or another fluid of constant density, on both sides of the sheet.
+
+    Parameters
+    ----------
+    density : float, default 1.204
+        Of the fluid (kg/m3): dry air at 20 C and 1013 hPa by default; water has 998.
+    velocity : sequence of float, shape (3,)
+        Of the fluid far from the sheet (m/s); still air by default. Wind acts by drag alone.
+    added_mass : bool or "local", default True
+        Whether the fluid that the sheet moves adds to its mass. With "local" each panel moves the
+        fluid by itself, as if it were alone in it: for sheets whose full matrix is too large.
+    drag : bool, default True
+        Whether motions, and paths in wind, meet the pressure drag of the panels.
+    drag_coefficient : float, optional
+        C_d of the force C_d / 2 density area v|v| on a panel with the velocity v normal to it
+        relative to the fluid; by default that of a flat plate with the aspect ratio of the sheet
+        at rest, from 1.18 for a square to 2 for a long strip (see `coefficient`).
+    resolution : int, default 4
+        Boundary elements along each edge of a panel, even, from which the added mass is found.
+    history : History or callable, optional
+        Factor of the velocity over time: of gusts; constant by default.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> fd.Air(density=998.0, drag=False)
+    Air(density=998.0, velocity=(0.0, 0.0, 0.0), added_mass=True, drag=False, resolution=4,
+        history=Constant())
+    """
+
+    density: Annotated[float, Check(number, above=0.0, unit="kg/m3")] = 1.204
+    velocity: Annotated[Sequence[float], Check(vector, unit="m/s")] = (0.0, 0.0, 0.0)
+    added_mass: Annotated[bool | str, Check(_added_mass)] = True
+    drag: Flag = True
+    drag_coefficient: Annotated[float | None, Check(number, least=0.0)] = None
+    resolution: Annotated[int, Check(whole, least=2)] = 4
+    history: Factor = STEADY
+
+    def agree(self) -> None:
+        """Ask for an even resolution, and for something that acts."""
+        if self.resolution % 2:
+            raise InputError(
+                f" = {self.resolution}: must be even, so that panels of any number of corners can "
+                "be cut; take one more",
+                "resolution",
+            )
+        if not self.added_mass and not self.drag:
+            raise InputError(": without added mass and drag nothing acts; leave air out", "drag")
+
+    @property
+    def blows(self) -> bool:
+        """Whether it acts on a sheet that stands still."""
+        return self.drag and any(self.velocity)
+
+    def coefficient(self, structure: Any) -> float:
+        """Drag coefficient of the panels of a structure.
+
+        That of a flat plate, interpolated over the ratio of its shorter to its longer side. The
+        sides are those of the rectangle with the second moments of area of the sheet at rest.
+        """
+        if self.drag_coefficient is not None:
+            return self.drag_coefficient
+        return float(np.interp(_side_ratio(structure), SHORTER_TO_LONGER, PLATE_DRAG))
+
+
+def _side_ratio(structure: Any) -> float:
+    """Shorter over longer side of a rectangle with the second moments of a sheet at rest."""
+    corners = structure.nodes[structure.triangles]
+    area = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    center = np.average(corners.mean(axis=1), axis=0, weights=area)
+    away = np.concatenate([corners - center, 3.0 * (corners.mean(axis=1) - center)[:, None]], 1)
+    moments = np.einsum("t,tci,tcj->ij", area, away, away)  # of triangles, times 24
+    _, shorter, longer = np.sqrt(np.linalg.eigvalsh(moments).clip(min=0.0))
+    return float(shorter / longer)
+
+
+def air_from(table: Any, folder: Path | None = None) -> Air:
+    """Air from its table in a case file."""
+    if not isinstance(table, Mapping):
+        raise InputError(f" = {show(table)}: must be a table, written [air]")
+    check_keys(table, Air.by_key())
+    return Air.of(table, folder)
+
+
+def refuse_air(case: Any, name: str) -> None:
+    """Refuse a case in air, of which `name` knows nothing.
+
+    Raises
+    ------
+    InputError
+        The case has air.
+    """
+    if case.air is not None:
+        raise InputError(f": {name} would leave it out; take the case without air", "air")
+
+
+def refuse_wind(case: Any, name: str) -> None:
+    """Refuse a case whose air moves past the sheet, which `name` does not take.
+
+    Raises
+    ------
+    InputError
+        The case has air with a velocity and drag.
+    """
+    if case.air is not None and case.air.blows:
+        raise InputError(
+            f" = {show(case.air.velocity)}: {name} would leave wind out; take still air",
+            "air.velocity",
+        )

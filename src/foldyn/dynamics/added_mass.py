@@ -1,0 +1,473 @@
+"""Mass of the fluid that moves with a sheet, in motions: T = w'F w / 2, w = B v.
+
+B(u) takes the velocities of the nodes to the flux at the unknowns of the flow, by the area vectors
+of the panels' triangles, which follow the motion; F is the flow (`cases.added_mass`) in one state
+of folding. A sheet that turns as a whole keeps its F, so that nothing of its motion is lost; one
+that folds gets a new F when a hinge has turned by `TURN` (`renewed_flow`). With F constant
+Lagrange's equations are
+
+    (M + B'F B) a + B'F B. v + B.'F w - d(q.B v)/du = p - F_int,   q = F w,
+
+B. the change of B, and q held in the last term. The accelerations follow from
+
+    (F^-1 + B M^-1 B') z = B M^-1 r,   a = M^-1 (r - B'z),
+
+by conjugate gradients; what they start from is the inverse of that matrix where F was made.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.linalg import lapack, null_space
+
+from foldyn.cases import Case
+from foldyn.cases.added_mass import Fluid, fluid_at
+from foldyn.dynamics.inertia import Inertia, kinetic_energy, substitute, times_mass
+from foldyn.errors import InputError
+from foldyn.jit.compiled import addressed, inner, kernel
+from foldyn.jit.context import rows_at
+from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.term import ADDRESS
+
+TURN = math.radians(3.0)  # of a hinge, after which the flow is found anew
+LOOK_EVERY = 16  # steps between two looks at that
+MOST = 1500  # unknowns of the flow
+TOLERANCE = 1e-13  # of the accelerations' residual
+ITERATIONS = 200
+SCALED = 0.25, 4.0  # by how much a new flow may change the energy of deforming, least and most
+
+
+class AddedMass(NamedTuple):
+    """The flow about t triangles with u unknowns, and memory."""
+
+    triangles: NDArray  # (t, 3) nodes
+    at_rest: NDArray  # (t, 3, 3) their places at rest, m
+    sides: NDArray  # (t, 2, 3) rest vectors from the first corner to the others, m
+    start: NDArray  # (u + 1,) first of the entries of each unknown: what it catches of
+    corner: NDArray  # (k,) area vector . velocity of corners, 3 triangle + corner,
+    catch: NDArray  # (k,) times this
+    flow: NDArray  # (u, u) F, kg/m4
+    resistance: NDArray  # (u, u) its inverse
+    guess: NDArray  # (u, u) inverse of the matrix of the accelerations where F was made
+    area: NDArray  # (t, 3) memory: area vectors, m2,
+    rate: NDArray  # (t, 3) and their changes, m2/s
+    through: NDArray  # (3 t,) memory of corners
+    lines: NDArray  # (6, u) memory
+    nodal: NDArray  # (2, rows, 3) memory
+    vectors: NDArray  # (4, 3) memory of one triangle
+    angle: NDArray  # (nh,) dihedrals where F was made, rad
+    made: NDArray  # (2,) how often it was since the start, and the energies (J) left over then
+
+    @property
+    def acts(self) -> bool:
+        """Whether there is any."""
+        return len(self.flow) > 0
+
+
+def added_mass(
+    case: Case, start: NDArray | None, rank: NDArray, rows: int, hinges: int
+) -> AddedMass:
+    """Added mass of a case whose nodes stand at the places rank (n,) of `rows`.
+
+    start : displacement (n, 3) at the start; rest by default. The flow is found by `begin_flow`.
+
+    Raises
+    ------
+    InputError
+        Too many unknowns; supports that move.
+    """
+    air, nodes = case.air, case.structure.nodes
+    if air is None or not air.added_mass:
+        return _with_memory(np.zeros((0, 3)), nodes, sparse.csr_array((0, 0)), 0, 0)
+    if case.imposed_terms or case.base_terms:
+        raise InputError(
+            ": motions with supports that move do not take added mass; give added_mass = false",
+            "air",
+        )
+    unknown = int(case.boundary_elements.unknown.max(initial=-1)) + 1
+    if unknown > MOST:
+        raise InputError(
+            f".resolution = {air.resolution}: the flow has {unknown} unknowns, and motions take at "
+            f"most {MOST}; lower it, or give added_mass = false",
+            "air",
+        )
+    fluid = fluid_at(case, np.zeros_like(nodes) if start is None else start)
+    catch = _catch(fluid, nodes if start is None else nodes + start)
+    added = _with_memory(fluid.triangles, nodes, catch, rows, hinges)
+    return added._replace(triangles=np.ascontiguousarray(rank[fluid.triangles], np.int64))
+
+
+def _with_memory(
+    triangles: NDArray, nodes: NDArray, catch: sparse.csr_array, rows: int, hinges: int
+) -> AddedMass:
+    """What catches (u, 3t) of triangles (t, 3) of nodes (n, 3) at rest, with memory."""
+    unknown, count = catch.shape[0], len(triangles)
+    corners = nodes[triangles.astype(np.int64)]
+    flow, resistance, guess = np.zeros((3, unknown, unknown))
+    area, rate = np.zeros((2, count, 3))
+    return AddedMass(
+        triangles=triangles.astype(np.int64),
+        at_rest=corners,
+        sides=np.ascontiguousarray(corners[:, 1:] - corners[:, :1]),
+        start=catch.indptr.astype(np.int64),
+        corner=catch.indices.astype(np.int64),
+        catch=catch.data,
+        flow=flow,
+        resistance=resistance,
+        guess=guess,
+        area=area,
+        rate=rate,
+        through=np.zeros(3 * count),
+        lines=np.zeros((6, unknown)),
+        nodal=np.zeros((2, rows, 3)),
+        vectors=np.zeros((4, 3)),
+        angle=np.zeros(hinges),
+        made=np.zeros(2),
+    )
+
+
+def _catch(fluid: Fluid, x: NDArray) -> sparse.csr_array:
+    """What unknowns catch (u, 3t) of area vector . velocity of the triangles' corners."""
+    one, other, third = np.moveaxis(x[fluid.triangles], 1, 0)
+    area = 0.5 * np.linalg.norm(np.cross(other - one, third - one), axis=1)
+    elements = np.arange(len(fluid.under)).repeat(3)
+    columns = (3 * fluid.under[:, None] + np.arange(3)).ravel()
+    shares = (fluid.shares / area[fluid.under, None]).ravel()
+    spread = sparse.csr_array((shares, (elements, columns)), (len(fluid.under), 3 * len(area)))
+    return sparse.csr_array(fluid.catch @ spread)
+
+
+def begin_flow(case: Case, packed: Any, course: Any, start: NDArray) -> None:
+    """Find the flow where a motion starts, at `start` (n, 3)."""
+    own = packed.added
+    if own.acts:
+        _find_flow(case, own, packed.mass, start, course.u)
+        own.angle[:], own.made[:] = course.angle, 0.0
+
+
+def renewed_flow(case: Case, packed: Any, course: Any) -> bool:
+    """Find the flow anew, and tell so, where a hinge has turned by `TURN` since it was found.
+
+    The momentum of sheet and fluid stays what it is, on every free dof, and so does their energy:
+    the work of the flow's change is done along the deforming part of the velocity, which keeps the
+    momenta. What cannot be done there, the air has given or taken.
+    """
+    own, mass, v = packed.added, packed.mass, course.v
+    if np.abs(course.angle - own.angle).max(initial=0.0) <= TURN:
+        return False
+    line, jump = np.zeros(v.size), np.zeros(len(own.flow))
+    push, change = np.zeros((2, *v.shape))
+    put_areas(own, course.u)
+    before = whole_energy(own, mass, v)
+    flux(own, own.area, v, jump)
+    lost = own.flow @ jump
+    _find_flow(case, own, mass, packed.numbering.outward(course.u), course.u)
+    press(own, lost - own.flow @ jump, push)
+    solve(own, mass, push, change, line)
+    v += change
+    deforming = v - _rigid_part(packed, course)
+    missed, least = before - whole_energy(own, mass, v), whole_energy(own, mass, deforming)
+    if least > 0.0:
+        v += (math.sqrt(np.clip(1.0 + missed / least, *SCALED)) - 1.0) * deforming
+    left = before - whole_energy(own, mass, v)
+    course.tally.air += left
+    own.angle[:] = course.angle
+    own.made[:] += 1.0, abs(left)
+    return True
+
+
+def _rigid_part(packed: Any, course: Any) -> NDArray:
+    """The rigid motion (rows, 3) that supports permit and that has the momenta of sheet and fluid.
+
+    None where constraints tie dofs together.
+    """
+    own, system, v = packed.added, packed.system, course.v
+    if len(system.ties.slave):
+        return np.zeros_like(v)
+    place = np.zeros_like(v)
+    place[own.triangles] = own.at_rest
+    place += course.u
+    turns = [np.cross(axis, place) for axis in np.eye(3)]
+    shapes = np.stack([*(np.tile(axis, (len(v), 1)) for axis in np.eye(3)), *turns])
+    held = shapes.reshape(6, -1)[:, system.supported]
+    shapes = np.tensordot(null_space(held.T).T, shapes, 1)
+    pushes, speed = np.zeros((len(shapes), *v.shape)), np.zeros(len(own.flow))
+    for shape, force in zip(shapes, pushes, strict=True):
+        times_mass(packed.mass, shape, force)
+        flux(own, own.area, shape, speed)
+        press(own, own.flow @ speed, force)
+    inertia = np.tensordot(shapes, pushes, ((1, 2), (1, 2)))
+    rates = np.linalg.lstsq(inertia, np.tensordot(pushes, v, 2), rcond=None)[0]
+    return np.tensordot(rates, shapes, 1)
+
+
+def _find_flow(case: Case, own: AddedMass, mass: Inertia, outward: NDArray, u: NDArray) -> None:
+    """Find the flow at `outward` (n, 3) in the order of the case, u (rows, 3) in memory."""
+    flow: Any = fluid_at(case, outward).flow
+    own.flow[:] = flow if isinstance(flow, np.ndarray) else flow.toarray()
+    own.resistance[:] = _inverse(own.flow)
+    put_areas(own, u)
+    matrix, one, line = own.resistance.copy(), np.zeros(len(own.flow)), np.zeros(u.size)
+    for k in range(len(one)):
+        one[:] = 0.0
+        one[k] = 1.0
+        move(own, mass, one, matrix[k], line)
+    own.guess[:] = _inverse(0.5 * (matrix + matrix.T))
+
+
+def _inverse(matrix: NDArray) -> NDArray:
+    """Inverse of a symmetric positive definite matrix."""
+    factor, _ = lapack.dpotrf(matrix, lower=1)
+    inverse, _ = lapack.dpotri(factor, lower=1)
+    return np.tril(inverse) + np.tril(inverse, -1).T
+
+
+# ------------------------------------------------------------------ fluxes
+@inner
+def put_sides(own, u, t):
+    """Put the sides of a triangle at u (rows, 3) into the first two of the vectors."""
+    first, second, third = own.triangles[t, 0], own.triangles[t, 1], own.triangles[t, 2]
+    for c in range(3):
+        own.vectors[0, c] = own.sides[t, 0, c] + u[second, c] - u[first, c]
+        own.vectors[1, c] = own.sides[t, 1, c] + u[third, c] - u[first, c]
+
+
+@inner
+def add_cross(factor, a, b, out):
+    """Add factor a x b to `out`, all (3,)."""
+    out[0] += factor * (a[1] * b[2] - a[2] * b[1])
+    out[1] += factor * (a[2] * b[0] - a[0] * b[2])
+    out[2] += factor * (a[0] * b[1] - a[1] * b[0])
+
+
+@kernel
+def put_areas(own, u):
+    """Put the area vectors of triangles displaced by u (rows, 3)."""
+    for t in range(own.triangles.shape[0]):
+        put_sides(own, u, t)
+        for c in range(3):
+            own.area[t, c] = 0.0
+        add_cross(0.5, own.vectors[0], own.vectors[1], own.area[t])
+
+
+@inner
+def put_rates(own, u, v):
+    """Put the changes of the area vectors at velocities v (rows, 3)."""
+    turn, lean = own.vectors[2], own.vectors[3]
+    for t in range(own.triangles.shape[0]):
+        first, second, third = own.triangles[t, 0], own.triangles[t, 1], own.triangles[t, 2]
+        put_sides(own, u, t)
+        for c in range(3):
+            turn[c], lean[c] = v[second, c] - v[first, c], v[third, c] - v[first, c]
+            own.rate[t, c] = 0.0
+        add_cross(0.5, turn, own.vectors[1], own.rate[t])
+        add_cross(0.5, own.vectors[0], lean, own.rate[t])
+
+
+@kernel
+def flux(own, area, v, out):
+    """Flux (u,) of velocities v (rows, 3) through area vectors (t, 3), to `out`."""
+    for t in range(area.shape[0]):
+        for k in range(3):
+            node, total = own.triangles[t, k], 0.0
+            for c in range(3):
+                total += area[t, c] * v[node, c]
+            own.through[3 * t + k] = total
+    for i in range(out.size):
+        total = 0.0
+        for e in range(own.start[i], own.start[i + 1]):
+            total += own.catch[e] * own.through[own.corner[e]]
+        out[i] = total
+
+
+@inner
+def put_through(own, jump):
+    """Put what jumps (u,) press on corners, N/m2."""
+    for e in range(own.through.size):
+        own.through[e] = 0.0
+    for i in range(jump.size):
+        for e in range(own.start[i], own.start[i + 1]):
+            own.through[own.corner[e]] += own.catch[e] * jump[i]
+
+
+@inner
+def add_push(own, area, jump, force):
+    """Add the forces of jumps (u,) through area vectors (t, 3) to those (rows, 3) of the nodes."""
+    put_through(own, jump)
+    for t in range(area.shape[0]):
+        for k in range(3):
+            for c in range(3):
+                force[own.triangles[t, k], c] += own.through[3 * t + k] * area[t, c]
+
+
+@inner
+def times(matrix, x, out):
+    """A x of a symmetric matrix, to `out`, both (u,)."""
+    for i in range(x.size):
+        out[i] = 0.0
+    for j in range(x.size):  # by columns, which need no sums in order
+        row, factor = matrix[j], x[j]
+        for i in range(x.size):
+            out[i] += row[i] * factor
+
+
+@inner
+def dot(x, y):
+    """x . y."""
+    total = 0.0
+    for i in range(x.size):
+        total += x[i] * y[i]
+    return total
+
+
+@inner
+def lighten(mass, force, out, line):
+    """M^-1 force on free dofs, to `out`, both (rows, 3); `line` is memory."""
+    if mass.lumped:
+        inverse, given, found = flat(mass.inverse), flat(force), flat(out)
+        for i in range(inverse.size):
+            found[i] = inverse[i] * given[i]
+    else:
+        substitute(mass, force, out, line)
+
+
+@kernel
+def move(own, mass, jump, out, line):
+    """Add B M^-1 B' of a jump (u,) to `out` (u,); leaves M^-1 B' of it in the nodal memory."""
+    force, moved, found = own.nodal[0], own.nodal[1], own.lines[5]
+    pushed = flat(force)
+    for i in range(pushed.size):
+        pushed[i] = 0.0
+    add_push(own, own.area, jump, force)
+    lighten(mass, force, moved, line)
+    flux(own, own.area, moved, found)
+    for i in range(out.size):
+        out[i] += found[i]
+
+
+# ------------------------------------------------------------------ parts of the equation of motion
+@addressed(ADDRESS, ADDRESS)
+def turn_flow(m, u, v):
+    """Add to the forces, N, what the turning of the area vectors takes, and the drag alpha M v.
+
+    Returns the power of the drag, W. The fluid has none.
+    """
+    own, rows, power = m.added, m.s.force.shape[0], 0.0
+    moved, speed = rows_at(u, rows), rows_at(v, rows)
+    w, q, turned = own.lines[0], own.lines[1], own.lines[2]
+    put_areas(own, moved)
+    put_rates(own, moved, speed)
+    flux(own, own.rate, speed, w)
+    times(own.flow, w, turned)
+    add_push(own, own.area, turned, m.s.force)
+    flux(own, own.area, speed, w)
+    times(own.flow, w, q)
+    add_push(own, own.rate, q, m.s.force)
+    one, other, pressed, back = own.vectors[0], own.vectors[1], own.vectors[2], own.vectors[3]
+    for t in range(own.triangles.shape[0]):  # q . B v is a sum of area . pressed
+        put_sides(own, moved, t)
+        for c in range(3):
+            pressed[c], back[c] = 0.0, 0.0
+            for k in range(3):
+                pressed[c] += own.through[3 * t + k] * speed[own.triangles[t, k], c]
+        first, second, third = own.triangles[t, 0], own.triangles[t, 1], own.triangles[t, 2]
+        add_cross(0.5, other, pressed, back)
+        for c in range(3):
+            m.s.force[second, c] -= back[c]
+            m.s.force[first, c] += back[c]
+            back[c] = 0.0
+        add_cross(0.5, pressed, one, back)
+        for c in range(3):
+            m.s.force[third, c] -= back[c]
+            m.s.force[first, c] += back[c]
+    if m.system.alpha > 0.0:
+        times_mass(m.mass, speed, m.s.product)
+        for i in range(rows):
+            for c in range(3):
+                drag = m.system.alpha * m.s.product[i, c]
+                m.s.force[i, c] += drag
+                power += drag * speed[i, c]
+    return power
+
+
+@addressed(ADDRESS)
+def solve_with_fluid(m, out):
+    """Solve with the mass and the added mass."""
+    solve(m.added, m.mass, m.s.force, rows_at(out, m.s.force.shape[0]), m.s.line)
+
+
+@kernel
+def press(own, jump, force):
+    """Add the forces B' jump, N, to those (rows, 3) of the nodes."""
+    add_push(own, own.area, jump, force)
+
+
+@kernel
+def solve(own, mass, force, a, line):
+    """Accelerations a (rows, 3) by forces, m/s2, with the area vectors as put."""
+    lines = own.lines
+    z, left, along, better, moved = lines[0], lines[1], lines[2], lines[3], lines[4]
+    lighten(mass, force, a, line)
+    flux(own, own.area, a, left)
+    goal = TOLERANCE * math.sqrt(dot(left, left))
+    times(own.guess, left, z)
+    times(own.resistance, z, moved)
+    move(own, mass, z, moved, line)
+    for i in range(z.size):
+        left[i] -= moved[i]
+    ahead = 0.0
+    for step in range(ITERATIONS):
+        if not math.sqrt(dot(left, left)) > goal:
+            break
+        times(own.guess, left, better)
+        now = dot(left, better)
+        for i in range(z.size):
+            along[i] = better[i] + (now / ahead * along[i] if step > 0 else 0.0)
+        ahead = now
+        times(own.resistance, along, moved)
+        move(own, mass, along, moved, line)
+        size = now / dot(along, moved)
+        for i in range(z.size):
+            z[i] += size * along[i]
+            left[i] -= size * moved[i]
+    move(own, mass, z, moved, line)
+    found, taken = flat(a), flat(own.nodal[1])
+    for i in range(found.size):
+        found[i] -= taken[i]
+
+
+@kernel
+def energy_of_fluid(own, v):
+    """Kinetic energy (J) of the fluid at velocities v (rows, 3), with the area vectors as put."""
+    flux(own, own.area, v, own.lines[0])
+    times(own.flow, own.lines[0], own.lines[1])
+    return 0.5 * dot(own.lines[0], own.lines[1])
+
+
+@kernel
+def whole_energy(own, mass, v):
+    """The same of the sheet and of the fluid."""
+    return kinetic_energy(mass, v, (0, v.shape[0])) + energy_of_fluid(own, v)
+
+
+@addressed(ADDRESS, ADDRESS)
+def observe_fluid(m, v, a):
+    """Add to the forces, N, what the fluid resists, and take the drag, for reactions.
+
+    Returns the energy of the fluid, J.
+    """
+    own, rows = m.added, m.s.force.shape[0]
+    speed = rows_at(v, rows)
+    times_mass(m.mass, speed, m.s.product)
+    for i in range(rows):
+        for c in range(3):
+            m.s.force[i, c] -= m.system.alpha * m.s.product[i, c]
+    flux(own, own.area, rows_at(a, rows), own.lines[0])
+    times(own.flow, own.lines[0], own.lines[1])
+    add_push(own, own.area, own.lines[1], m.s.force)
+    return energy_of_fluid(own, speed)

@@ -1,0 +1,1 @@
+"""The fluid around a sheet: potential flow by doublets on boundary elements."""

@@ -1,0 +1,84 @@
+"""Gaps between boundary elements, which the flow in them must resolve."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.jit.compiled import kernel
+from foldyn.mechanics.contact.distances import apart, closest_on_triangle, dot, point
+
+APART = 0.25  # of the size of an element: least distance of panels that share no corner
+JOINED = 0.01  # of panels that do, whose grids open from it like the panels
+
+
+class Gap(NamedTuple):
+    """Where a surface comes too near to itself."""
+
+    one: int  # triangle
+    other: int
+    distance: float  # m
+    size: float  # of an element there, m
+
+
+def narrow_gap(
+    points: NDArray, triangles: NDArray, panel: NDArray, joined: sparse.csr_array
+) -> Gap | None:
+    """A gap between triangles of two panels that is below its limit, if there is one.
+
+    Parameters
+    ----------
+    points : ndarray, shape (p, 3)
+    triangles : ndarray of int, shape (t, 3)
+    panel : ndarray of int, shape (t,)
+    joined : sparse array, shape (panels, panels)
+        Nonzero for panels that share a corner.
+    """
+    from scipy.spatial import cKDTree
+
+    corners = points[triangles]
+    centers = corners.mean(axis=1)
+    radii = np.linalg.norm(corners - centers[:, None], axis=2).max(axis=1)
+    reach = (1.0 + APART) * float(radii.max())
+    pairs = cKDTree(centers).query_pairs(reach, output_type="ndarray").astype(np.int64)
+    pairs = pairs[panel[pairs[:, 0]] != panel[pairs[:, 1]]]
+    near = np.linalg.norm(centers[pairs[:, 0]] - centers[pairs[:, 1]], axis=1)
+    pairs = pairs[near <= (1.0 + APART) * radii[pairs].max(axis=1)]
+    if not len(pairs):
+        return None
+    limits = np.where(joined[panel[pairs[:, 0]], panel[pairs[:, 1]]] != 0, JOINED, APART)
+    twice = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sizes = np.sqrt(np.linalg.norm(twice, axis=1))
+    at, distance = _narrowest(points, triangles, centers, pairs, np.asarray(limits), sizes)
+    if at < 0:
+        return None
+    one, other = pairs[at]
+    return Gap(int(one), int(other), float(distance), float(sizes[pairs[at]].max()))
+
+
+@kernel
+def _narrowest(points, triangles, centers, pairs, limits, sizes):
+    """The pair of triangles without a common corner that is farthest below its limit, or -1."""
+    worst, at, distance = 1.0, -1, 0.0
+    for k in range(len(pairs)):
+        for turn in range(2):
+            i, j = pairs[k, turn], pairs[k, 1 - turn]
+            shared = False
+            for a in range(3):
+                for b in range(3):
+                    shared = shared or triangles[i, a] == triangles[j, b]
+            if shared:
+                continue
+            p = centers[i, 0], centers[i, 1], centers[i, 2]
+            a, b, c = triangles[j]
+            pa, pb, pc = point(points, a), point(points, b), point(points, c)
+            wa, wb, wc, _ = closest_on_triangle(p, pa, pb, pc)
+            r = apart(p, pa, pb, pc, wa, wb, wc)
+            gap = np.sqrt(dot(r, r))
+            over = gap / (limits[k] * max(sizes[i], sizes[j]))
+            if over < worst:
+                worst, at, distance = over, k, gap
+    return at, distance

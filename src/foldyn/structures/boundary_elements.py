@@ -1,0 +1,248 @@
+"""Boundary elements of the fluid on a sheet: panels cut into grids, each square in two triangles.
+
+A panel has a grid at each corner, between that, the middles of its two edges and the center. The
+jump of the potential ends at an open edge of the sheet like the square root of the distance to it,
+so grids are graded there, like 1 - cos(pi i / 2m), by which the error falls with the square of the
+number of elements along an edge.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.errors import InputError
+from foldyn.patterns.topology import edge_lookup, edge_of
+
+ROUNDING = 1e-9  # weights and, over squared lengths, areas that count as zero
+
+
+class BoundaryElements(NamedTuple):
+    """Triangles on a sheet, in pairs, whose corners move with its nodes.
+
+    Attributes
+    ----------
+    weights : sparse array, shape (p, n)
+        Places of their corners are these times those of the nodes.
+    triangles : ndarray of int, shape (t, 3)
+        Their corners, counter-clockwise from the front.
+    panel : ndarray of int, shape (t,)
+    unknown : ndarray of int, shape (p,)
+        Number of each corner where the flow may differ on both sides, -1 on open edges.
+    under : ndarray of int, shape (t,)
+        Triangle of the structure in which the center of each lies.
+    shares : ndarray, shape (t, 3)
+        Weights of that triangle's nodes at the center.
+    """
+
+    weights: sparse.csr_array
+    triangles: NDArray[np.int64]
+    panel: NDArray[np.int64]
+    unknown: NDArray[np.int64]
+    under: NDArray[np.int64]
+    shares: NDArray[np.float64]
+
+
+class _Corners(NamedTuple):
+    """Corners (c,) of all panels: each has the grid next to it."""
+
+    panel: NDArray
+    vertex: NDArray  # number of the point
+    ahead: NDArray  # number of the edge to the next corner, and of that from the one before
+    behind: NDArray
+    before: NDArray  # number of the corner before
+    starts: tuple[NDArray, NDArray]  # whether each of these edges is numbered from here
+    open: tuple[NDArray, NDArray]  # whether they are edges of the sheet
+    graded: tuple[NDArray, NDArray]  # whether they end across an edge of the sheet here
+    rim: NDArray  # whether the vertex is on an edge of the sheet
+    edges: int
+
+
+def boundary_elements(structure: Any, resolution: int, alone: bool = False) -> BoundaryElements:
+    """Boundary elements of a structure, or shell.
+
+    Parameters
+    ----------
+    structure : Structure
+    resolution : int
+        Along each edge of a panel, even.
+    alone : bool
+        Whether each panel is taken for itself, with open edges all around.
+
+    Raises
+    ------
+    InputError
+        A structure without a pattern or with thick panels, a panel that is not convex, a sheet
+        without an open edge.
+    """
+    pattern = structure.pattern
+    if pattern is None or pattern.boards is not None:
+        raise InputError(": added mass needs a pattern of thin panels; leave it out", "air")
+    if not len(pattern.boundary) and not alone:
+        raise InputError(
+            ": the sheet encloses a volume, from which the fluid cannot escape; open a panel, or "
+            'give added_mass = "local"',
+            "air",
+        )
+    _check_convex(pattern)
+    corners = _alone(_corners(pattern)) if alone else _corners(pattern)
+    half = resolution // 2
+    numbers, count = _numbered(corners, half, len(pattern.faces))
+    triangles = _cut(numbers)
+    panel = np.repeat(corners.panel, 2 * half * half)
+    places, owner, edge = np.zeros((count, 3)), np.zeros(count, np.int64), np.zeros(count, bool)
+    places[numbers] = _places(corners, half, structure)
+    owner[numbers] = corners.panel[:, None, None]
+    edge[corners.vertex] = corners.rim
+    for side, opened in zip((numbers[:, 1:, 0], numbers[:, 0, 1:]), corners.open, strict=True):
+        edge[side[opened]] = True
+    unknown = np.where(edge, -1, np.cumsum(~edge) - 1)
+    triangle, weight = _located(structure, places, owner)
+    entries = (
+        weight.ravel(),
+        (np.repeat(np.arange(count), 3), structure.triangles[triangle].ravel()),
+    )
+    weights = sparse.csr_array(entries, (count, len(structure.nodes)))
+    weights.eliminate_zeros()
+    under, shares = _located(structure, places[triangles].mean(axis=1), panel)
+    return BoundaryElements(weights, triangles, panel, unknown, under, shares)
+
+
+def _check_convex(pattern: Any) -> None:
+    for panel, face in enumerate(pattern.faces):
+        sides = np.diff(pattern.vertices[[*face, face[0], face[1]]], axis=0)
+        turns = np.cross(sides[:-1], sides[1:]) @ pattern.face_normals[panel]
+        if (turns < -ROUNDING * (sides**2).sum(axis=1).max()).any():
+            raise InputError(
+                f": added mass needs convex panels, and panel {panel} is not; cut it (fd.convex)",
+                "air",
+            )
+
+
+def _corners(pattern: Any) -> _Corners:
+    sizes = np.array([len(face) for face in pattern.faces])
+    panel = np.repeat(np.arange(len(sizes)), sizes)
+    vertex = np.concatenate([np.array(face) for face in pattern.faces])
+    first = np.repeat(np.cumsum(sizes) - sizes, sizes)
+    place, size = np.arange(len(panel)) - first, sizes[panel]
+    following, before = first + (place + 1) % size, first + (place - 1) % size
+    number = edge_lookup(pattern.edges)
+    pairs = zip(vertex.tolist(), vertex[following].tolist(), strict=True)
+    ahead = np.array([number[edge_of(a, b)] for a, b in pairs])
+    behind = ahead[before]
+    edge_open = np.zeros(len(pattern.edges), bool)
+    edge_open[[number[edge_of(a, b)] for a, b in pattern.boundary.tolist()]] = True
+    rim = np.zeros(len(pattern.vertices), bool)
+    rim[pattern.boundary] = True
+    single = np.bincount(vertex, minlength=len(rim)) == 1
+    opened = edge_open[ahead], edge_open[behind]
+    ends = rim[vertex]
+    return _Corners(
+        panel, vertex, ahead, behind, before,
+        starts=(vertex < vertex[following], vertex < vertex[before]),
+        open=opened,
+        graded=tuple(ends & (~one | single[vertex]) for one in opened),
+        rim=ends,
+        edges=len(pattern.edges),
+    )  # fmt: skip
+
+
+def _alone(corners: _Corners) -> _Corners:
+    """The same with vertices and edges that no two panels share."""
+    number = np.arange(len(corners.panel))
+    yes = np.ones(len(number), bool)
+    return corners._replace(
+        vertex=number, ahead=number, behind=corners.before, starts=(yes, ~yes),
+        open=(yes, yes), graded=(yes, yes), rim=yes, edges=len(number),
+    )  # fmt: skip
+
+
+def _numbered(corners: _Corners, half: int, panels: int) -> tuple[NDArray, int]:
+    """Numbers (c, half + 1, half + 1) of the points of each grid, and how many there are.
+
+    Vertices come first, then points of edges, spokes from their middles to the centers, centers,
+    and the inside of grids.
+    """
+    count, inside = len(corners.panel), np.arange(1, half)
+    middles = int(corners.vertex.max()) + 1
+    sides = middles + corners.edges
+    spokes = sides + 2 * corners.edges * len(inside)
+    centers = spokes + count * len(inside)
+    grids = centers + panels
+    out = np.empty((count, half + 1, half + 1), np.int64)
+    out[:, 0, 0], out[:, half, half] = corners.vertex, centers + corners.panel
+    out[:, half, 0], out[:, 0, half] = middles + corners.ahead, middles + corners.behind
+    ends = [
+        sides + (2 * edge + ~starts)[:, None] * len(inside) + inside - 1
+        for edge, starts in zip((corners.ahead, corners.behind), corners.starts, strict=True)
+    ]
+    out[:, inside, 0], out[:, 0, inside] = ends
+    ways = [
+        spokes + corner[:, None] * len(inside) + inside - 1
+        for corner in (np.arange(count), corners.before)
+    ]
+    out[:, half, inside], out[:, inside, half] = ways
+    own = grids + np.arange(count * len(inside) ** 2)
+    out[:, 1:half, 1:half] = own.reshape(count, len(inside), len(inside))
+    return out, grids + own.size
+
+
+def _places(corners: _Corners, half: int, structure: Any) -> NDArray:
+    """Places (c, half + 1, half + 1, 3) of the points of each grid at rest, m."""
+    steps = np.arange(half + 1) / half
+    by_kind = np.array([steps, 1.0 - np.cos(0.5 * np.pi * steps)])  # even, graded
+    bottom, left = (by_kind[graded.astype(int)] for graded in corners.graded)
+    right, top = (by_kind[opened.astype(int)] for opened in corners.open)
+    change, turn = (top - bottom)[:, :, None], (right - left)[:, None, :]
+    u = (bottom[:, :, None] + left[:, None, :] * change) / (1.0 - change * turn)
+    v = left[:, None, :] + u * turn
+    pattern, nodes = structure.pattern, structure.nodes
+    vertex = np.concatenate([np.array(face) for face in pattern.faces])
+    here, last = nodes[vertex], nodes[vertex[corners.before]]
+    following = np.empty_like(here)
+    following[corners.before] = here
+    centers = np.array([nodes[list(face)].mean(axis=0) for face in pattern.faces])
+    known = structure.centers >= 0
+    centers[known] = nodes[structure.centers[known]]
+    weights = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=-1)
+    quads = np.stack(
+        [here, 0.5 * (here + following), centers[corners.panel], 0.5 * (here + last)], axis=1
+    )
+    return np.einsum("cijk,cka->cija", weights, quads)
+
+
+def _cut(numbers: NDArray) -> NDArray:
+    """Triangles (t, 3) of the squares of grids, which are cut along alternate diagonals."""
+    half = numbers.shape[1] - 1
+    a, b = numbers[:, :-1, :-1], numbers[:, 1:, :-1]
+    c, d = numbers[:, 1:, 1:], numbers[:, :-1, 1:]
+    odd = (np.add.outer(np.arange(half), np.arange(half)) % 2 == 1)[None, :, :, None]
+    one = np.where(odd, np.stack([a, b, c], axis=-1), np.stack([a, b, d], axis=-1))
+    two = np.where(odd, np.stack([a, c, d], axis=-1), np.stack([b, c, d], axis=-1))
+    return np.stack([one, two], axis=3).reshape(-1, 3)
+
+
+def _located(structure: Any, points: NDArray, panel: NDArray) -> tuple[NDArray, NDArray]:
+    """Triangles (p,) of panels in which points at rest lie, and weights (p, 3) of their nodes."""
+    count = int(panel.max()) + 1
+    triangle, weight = np.empty(len(points), np.int64), np.empty((len(points), 3))
+    for own, mine in zip(_by(panel, count), _by(structure.triangle_panel, count), strict=True):
+        corner, one, two = np.moveaxis(structure.nodes[structure.triangles[mine]], 1, 0)
+        sides = np.stack([one - corner, two - corner], axis=2)  # (t, 3, 2)
+        away = points[own][:, None, :] - corner
+        share = np.einsum("tij,ptj->pti", np.linalg.pinv(sides), away)
+        each = np.concatenate([1.0 - share.sum(axis=2, keepdims=True), share], axis=2)
+        best = each.min(axis=2).argmax(axis=1)
+        found = each[np.arange(len(own)), best]
+        found = np.where(found > ROUNDING, found, 0.0)
+        triangle[own], weight[own] = mine[best], found / found.sum(axis=1, keepdims=True)
+    return triangle, weight
+
+
+def _by(number: NDArray, count: int) -> list[NDArray]:
+    """Where each number from 0 to count - 1 stands."""
+    counts = np.bincount(number, minlength=count)
+    return np.split(np.argsort(number, kind="stable"), np.cumsum(counts)[:-1])
