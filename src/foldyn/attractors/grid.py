@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 AT_ONCE = 256  # motions
 LOOKED_AT = 64  # starts
+DEVICE = "device", "device_reason"  # attributes
 UNDRIVEN = 0.02  # of the duration: between the states of a motion without a drive
 
 
@@ -44,7 +45,7 @@ def basins(
     method: str = "central_difference",
     dt: float | None = None,
     threads: int | None = None,
-    device: str = "cpu",
+    device: str = "auto",
     folder: str | os.PathLike[str] | None = None,
     progress: bool | Reporter | None = None,
 ) -> xarray.Dataset:
@@ -87,7 +88,7 @@ def basins(
         which they are met, or -1 where the motion does not repeat: it is chaotic or has not settled
         yet, or has failed. Along `attractor`: `periods`, of the drive after which it repeats (an
         equilibrium counts 1), `share` of the starts, and along `record` the states `displacement`
-        (m) and `velocity` (m/s).
+        (m) and `velocity` (m/s). The attribute `device` says where they were computed.
 
     Raises
     ------
@@ -128,7 +129,8 @@ def basins(
     settled = float(np.ceil(duration / period - 1e-9) * period)
     step = _step(case, starts, method, dt, period, bool(frequency))
     about = {"method": method, "dt": step, "device": device}
-    compute = partial(_ends, case, settled, period, record, {**about, "threads": threads})
+    used = dict[str, str]()
+    compute = partial(_ends, case, settled, period, record, {**about, "threads": threads}, used)
     about |= {"duration": settled, "period": period, "record": record}
     kept, found = KeptEnds(folder, case, about), list[NDArray]()
     report, close = reporter(progress)
@@ -156,7 +158,7 @@ def basins(
             FoldynWarning,
             stacklevel=2,
         )
-    about |= {"same": same, "wall_seconds": time.perf_counter() - began}
+    about |= {"same": same, "wall_seconds": time.perf_counter() - began, **used}
     about["period"] = period if frequency else None
     label = label.reshape([len(values) for values in places])
     return _dataset(
@@ -233,11 +235,15 @@ def _step(
 
 def _ends(
     case: Case, settled: float, period: float, record: int, how: Mapping[str, Any],
-    starts: Sequence[State],
+    used: dict[str, str], starts: Sequence[State],
 ) -> NDArray[np.float64]:  # fmt: skip
-    """States (m, record, 2, n, 3) of motions after they have settled, one a period."""
+    """States (m, record, 2, n, 3) of motions after they have settled, one a period.
+
+    used : gets the device on which they have settled, with the reason.
+    """
     count = len(starts)
     before = simulate_many([case] * count, settled, every=settled, initial=starts, **how)
+    used |= {name: before.attrs[name] for name in DEVICE if name in before.attrs}
     out = np.full((count, record, 2, *case.structure.nodes.shape), np.nan)
     sound = np.flatnonzero(before.outcome.values == "done")
     if not len(sound):

@@ -39,13 +39,15 @@ class OnCard:
         self._method, self._packed, self._course, self._plan = method, packed, course, plan
         self._on_cpu = on_cpu
         self._power = np.zeros(2)
-        self._launches = Launches([packed], method.name, self._places(), wide=True)
+        self._launches = self._launched()
         self._alone: Any = None
 
-    def _places(self) -> Places:
+    def _launched(self) -> Launches:
+        """The motion on the card, where it is."""
         course = self._course
         one = (course.u, course.v, course.carry, self._power, course.angle)
-        return Places(*(np.array(array)[None] for array in one))
+        places = Places(*(np.array(array)[None] for array in one))
+        return Launches([self._packed], [self._plan], self._method.name, places, wide=True)
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
@@ -55,10 +57,11 @@ class OnCard:
         keeps = self._method.name == "central_difference" and begun > 0  # the forces of its end
         while not keeps or tally.steps < end:
             first = int(tally.steps)
-            last = min(end, first + self._launches.fits(plan))
+            last = min(end, first + int(self._launches.fits()[0]))
             skips = self._method.name == "central_difference" and first > 0
             sample = int(tally.samples)
-            written, wrong = self._launches.run(plan, first + skips, last, sample)
+            span = (np.array([number]) for number in (first + skips, last, sample))
+            written, wrong = self._launches.run(*span)
             if wrong.any() or not np.isfinite(written.energy).all():
                 return self._again(out, end - first)
             self._take(written, out, sample, last - first)
@@ -95,7 +98,7 @@ class OnCard:
             self._alone = self._on_cpu()
         self._alone.start_with(self._power)
         result = self._alone.advance(out, stretch)
-        self._launches = Launches([self._packed], self._method.name, self._places(), wide=True)
+        self._launches = self._launched()
         return result
 
     def checkpoint_arrays(self) -> dict[str, NDArray]:
@@ -105,7 +108,7 @@ class OnCard:
     def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
         """See `methods.Compiled`."""
         restore(self._parts(), arrays)
-        self._launches = Launches([self._packed], self._method.name, self._places(), wide=True)
+        self._launches = self._launched()
 
     def _parts(self) -> dict[str, Any]:
         return state_parts(self._packed, self._course) | {"card_powers": self._power}
