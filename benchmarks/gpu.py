@@ -139,7 +139,7 @@ def launches_of(motions: list[Motion], wide: bool) -> Launches:
         np.stack([getattr(course, name) for course in courses])
         for name in ("u", "v", "carry", "angle")
     )
-    places = Places(u, v, carry, np.zeros((len(motions), 2)), angle)
+    places = Places(u, v, carry, np.zeros((len(motions), 4)), angle)
     plans = [motion.plan for motion in motions]
     return Launches([m.packed for m in motions], plans, motions[0].method.name, places, wide)
 

@@ -38,15 +38,16 @@ class OnCard:
     ) -> None:  # fmt: skip
         self._method, self._packed, self._course, self._plan = method, packed, course, plan
         self._on_cpu = on_cpu
-        self._power = np.zeros(2)
+        self._sums = np.zeros((1, 4))
         self._launches = self._launched()
         self._alone: Any = None
 
     def _launched(self) -> Launches:
         """The motion on the card, where it is."""
         course = self._course
-        one = (course.u, course.v, course.carry, self._power, course.angle)
-        places = Places(*(np.array(array)[None] for array in one))
+        one = (course.u, course.v, course.carry, course.angle)
+        u, v, carry, angle = (np.array(array)[None] for array in one)
+        places = Places(u, v, carry, self._sums, angle)
         return Launches([self._packed], [self._plan], self._method.name, places, wide=True)
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
@@ -78,8 +79,6 @@ class OnCard:
         out.displacement[rows], out.velocity[rows] = written.u[0], written.v[0]
         out.reaction[rows] = written.reaction[0]
         energy = written.energy[:, 0] + 0.0
-        energy[:, -2] += tally.dissipated
-        energy[:, -1] += tally.work
         out.energy[rows] = energy[:-1]
         tally.dissipated, tally.work = energy[-1, -2], energy[-1, -1]
         tally.steps += steps
@@ -87,17 +86,17 @@ class OnCard:
         tally.time = plan.start + tally.steps * plan.dt
         tally.evaluations += self._method.evaluations * steps
         places = self._launches.places()
-        for array, own in zip(
-            (course.u, course.v, course.carry, self._power, course.angle), places, strict=True
-        ):
-            array[...] = own[0]
+        course.u[...], course.v[...], course.carry[...] = places.u[0], places.v[0], places.carry[0]
+        course.angle[...], self._sums = places.angle[0], places.sums
 
     def _again(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Do a stretch on the CPU, from where the card began it."""
         if self._alone is None:
             self._alone = self._on_cpu()
-        self._alone.start_with(self._power)
+        tally = self._course.tally
+        self._alone.start_with(self._sums[:, :2].sum(axis=0))
         result = self._alone.advance(out, stretch)
+        self._sums = np.array([[*self._alone.powers, tally.work, tally.dissipated]])
         self._launches = self._launched()
         return result
 
@@ -107,11 +106,12 @@ class OnCard:
 
     def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
         """See `methods.Compiled`."""
+        self._sums = np.array(arrays["card_sums"])
         restore(self._parts(), arrays)
         self._launches = self._launched()
 
     def _parts(self) -> dict[str, Any]:
-        return state_parts(self._packed, self._course) | {"card_powers": self._power}
+        return state_parts(self._packed, self._course) | {"card_sums": self._sums}
 
     def facts(self) -> dict[str, Any]:
         """See `methods.Compiled`."""

@@ -53,7 +53,7 @@ class Nodes(NamedTuple):
 
 
 class State(NamedTuple):
-    """Where m models are; rows of the threads of all blocks, in order, in `note` and `power`."""
+    """Where m models are; rows of the threads of all blocks, in order, in `note` and `sums`."""
 
     u: Any  # (m, n, 3)
     v: Any
@@ -65,7 +65,7 @@ class State(NamedTuple):
     angle: Any  # (m, nh)
     wrong: Any  # (m,) int64
     note: Any  # (threads, columns)
-    power: Any  # (threads, 2)
+    sums: Any  # (threads, 4) powers in and out at the last step, W; work and dissipated so far, J
     barrier: Any  # (1,) int64
 
 
@@ -268,10 +268,11 @@ def kernel(method: str, wide: bool, shared: bool) -> Any:
         force = cuda.local.array(3, float64)
         first_step, last_step, every = span.first[m], span.last[m], span.every[m]
         dt, first_sample = span.dt[m], span.sample[m]
-        arrived, sample, wrong, work_in, work_out = 0, first_sample, 0, 0.0, 0.0
+        arrived, sample, wrong = 0, first_sample, 0
         for g in range(groups):
             strain[g] = 0.0
-        before_in, before_out = state.power[thread, 0], state.power[thread, 1]
+        sums = state.sums[thread]
+        before_in, before_out, work_in, work_out = sums[0], sums[1], sums[2], sums[3]
         for i in range(who, n, crowd):
             for c in range(3):
                 ut[i, c], vt[i, c] = u[i, c], v[i, c]
@@ -361,7 +362,7 @@ def kernel(method: str, wide: bool, shared: bool) -> Any:
             if runge and step < last_step:
                 work_in += dt / 6.0 * part_in
                 work_out += dt / 6.0 * part_out
-        state.power[thread, 0], state.power[thread, 1] = before_in, before_out
+        sums[0], sums[1], sums[2], sums[3] = before_in, before_out, work_in, work_out
         cuda.syncthreads()  # the notes of a last sample are added up
         note_down(state, thread, groups, strain, 0.0, work_out, work_in)
         cuda.syncthreads()

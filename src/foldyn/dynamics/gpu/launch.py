@@ -31,7 +31,7 @@ class Places(NamedTuple):
     u: NDArray  # (m, n, 3)
     v: NDArray
     carry: NDArray  # (m, n, 3) acceleration, for methods that keep it
-    power: NDArray  # (m, 2) likewise
+    sums: NDArray  # (m, 4) of `State`, or (threads, 4) as the same launches had them
     angle: NDArray  # (m, nh)
 
 
@@ -85,6 +85,7 @@ class Launches:
         self._shape, self._shared = (self._count, n), shared
         self._supported = len(cases[0].system.supported)
         self._compiled: Any = None
+        self._from = places
         self._start(places)
 
     def _histories(self) -> list[tuple[int, int]]:
@@ -138,14 +139,17 @@ class Launches:
         """Put the models there."""
         m, n = self._shape
         threads = self._blocks * self._threads
-        power = np.zeros((threads, 2))
-        power[:: threads if self._wide else self._threads] = places.power
+        sums = places.sums
+        if len(sums) != threads:
+            total = sums.reshape(m, -1, 4).sum(axis=1)
+            sums = np.zeros((threads, 4))
+            sums[:: threads if self._wide else self._threads] = total
         memory, put = cuda.device_array, card.put
         self._state = State(
             u=put(places.u), v=put(places.v), first=put(places.carry), second=memory((m, n, 3)),
             ahead_u=memory(self._ahead), ahead_v=memory(self._ahead), slot=memory(self._slot),
             angle=put(places.angle), wrong=put(np.zeros(m, np.int64)),
-            note=memory((threads, self._counts.groups + 3)), power=put(power),
+            note=memory((threads, self._counts.groups + 3)), sums=put(sums),
             barrier=put(np.zeros(1, np.int64)),
         )  # fmt: skip
 
@@ -174,9 +178,9 @@ class Launches:
     def run(self, first: NDArray, last: NDArray, sample: NDArray) -> tuple[Written, NDArray]:
         """Do the steps (m,) from first to last; samples from number `sample` (m,) on.
 
-        Returns the samples as arrays of the host, their energies (k + 1, m, columns) since the
-        start of the launch, the last row at its end; and which models (m,) went wrong. There is
-        room for as many samples of each model as one of them has.
+        Returns the samples as arrays of the host, their energies (k + 1, m, columns), the last row
+        at the end of the launch; and which models (m,) went wrong. There is room for as many
+        samples of each model as one of them has.
         """
         m, n = self._shape
         count = max(0, int((last // self._every + 1 - sample).max()))
@@ -219,14 +223,11 @@ class Launches:
             most = int(made.max_cooperative_grid_blocks(self._threads))
             items = max(self._shape[1], self._hinges)
             blocks = max(1, min(most, math.ceil(items / self._threads)))
-            places = self.places()
             self._blocks = blocks
-            self._set(places)
+            self._set(self._from)
 
     def places(self) -> Places:
         """Where the models are."""
-        state, m = self._state, self._shape[0]
-        power = state.power.copy_to_host().reshape(m, -1, 2).sum(axis=1)
-        arrays = (array.copy_to_host() for array in (state.u, state.v, state.first, state.angle))
-        u, v, carry, angle = arrays
-        return Places(u, v, carry, power, angle)
+        state = self._state
+        arrays = state.u, state.v, state.first, state.sums, state.angle
+        return Places(*(array.copy_to_host() for array in arrays))

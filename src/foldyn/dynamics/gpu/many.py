@@ -79,12 +79,12 @@ def _integrated(motions: Sequence[Motion]) -> NDArray:
         np.stack([getattr(course, name) for course in courses])
         for name in ("u", "v", "carry", "angle")
     )
-    places = Places(u, v, carry, np.zeros((len(motions), 2)), angle)
+    places = Places(u, v, carry, np.zeros((len(motions), 4)), angle)
     launches = Launches([motion.packed for motion in motions], plans, method.name, places, False)
     steps = np.array([plan.steps for plan in plans])
     between = np.array([motion.recheck_after for motion in motions])
     done, sample = np.zeros((2, len(motions)), np.int64)
-    sound, totals = np.ones(len(motions), bool), np.zeros((len(motions), 2))
+    sound = np.ones(len(motions), bool)
     while (moving := sound & ((done < steps) | (sample == 0))).any():
         checked = done - done % between + between
         last = np.minimum(np.minimum(steps, checked), done + launches.fits())
@@ -92,8 +92,6 @@ def _integrated(motions: Sequence[Motion]) -> NDArray:
         first = np.where(moving, first, last + 1)
         written, wrong = launches.run(first, last, sample)
         energy = np.moveaxis(written.energy, 0, 1) + 0.0  # (m, k + 1, columns)
-        energy[:, :, -2:] += totals[:, None]
-        totals = energy[:, -1, -2:].copy()
         sound &= ~wrong & np.isfinite(energy).all(axis=(1, 2))
         for k in np.flatnonzero(moving):
             count = int(last[k]) // plans[k].every + 1 - int(sample[k])
