@@ -83,3 +83,13 @@ def test_a_card_that_is_too_small(monkeypatch):
     monkeypatch.setattr(card, "free_memory", lambda: 1e6)
     with pytest.raises(InputError, match=r"3 models of 9 nodes needs .* GiB on the card"):
         card.check_size(1e9, "3 models of 9 nodes")
+
+
+def test_arrays_of_one_model_are_copied_at_once():
+    from foldyn.dynamics.gpu import card
+
+    array = np.arange(12.0).reshape(4, 3)[None]
+    assert array.strides[0] == 0  # whose rows Numba would copy one by one
+    flat = card.flat_strides(array)
+    assert flat.strides[0] > 0
+    np.testing.assert_array_equal(flat, array)
