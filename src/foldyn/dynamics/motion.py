@@ -49,8 +49,7 @@ from foldyn.structures.stretching import REMEDY, stretch
 if TYPE_CHECKING:
     import xarray
 
-    from foldyn.dynamics.gpu.engine import OnCard
-    from foldyn.dynamics.gpu.many import InBlocks
+    from foldyn.dynamics.gpu.engine import InBlocks, OnCard
 
 RECHECKS = 20  # of the critical step during a motion
 CHUNK = 256  # steps of the first stretch; later ones take about REPORT_EVERY seconds

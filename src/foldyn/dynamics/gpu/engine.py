@@ -1,4 +1,4 @@
-"""The engine of one motion on a GPU, in the place of `methods.Compiled`."""
+"""The engine of one motion on a GPU, in the place of `methods.Compiled`; and of one of many."""
 
 from __future__ import annotations
 
@@ -112,6 +112,16 @@ class OnCard:
 
     def _parts(self) -> dict[str, Any]:
         return state_parts(self._packed, self._course) | {"card_sums": self._sums}
+
+    def facts(self) -> dict[str, Any]:
+        """See `methods.Compiled`."""
+        return {"device": card.name()}
+
+
+class InBlocks:
+    """What a motion beside others has in the place of an engine of its own."""
+
+    threads = 1
 
     def facts(self) -> dict[str, Any]:
         """See `methods.Compiled`."""

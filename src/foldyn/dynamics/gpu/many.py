@@ -10,24 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.dynamics.gpu import card
 from foldyn.dynamics.gpu.arrays import topology
 from foldyn.dynamics.gpu.checks import METHODS, lacking
+from foldyn.dynamics.gpu.engine import InBlocks
 from foldyn.dynamics.gpu.launch import Launches, Places
 from foldyn.dynamics.motion import Motion
 from foldyn.errors import ComputationError, InputError
 
 AT_ONCE = 16384  # models: more are no quicker
-
-
-class InBlocks:
-    """What a motion beside others has in the place of an engine of its own."""
-
-    threads = 1
-
-    def facts(self) -> dict[str, Any]:
-        """See `methods.Compiled`."""
-        return {"device": card.name()}
 
 
 def integrate(motions: Sequence[Motion]) -> set[int]:
