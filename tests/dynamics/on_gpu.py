@@ -158,7 +158,6 @@ def test_a_sweep_on_a_gpu_is_that_of_the_cpu(tmp_path, monkeypatch):
     monkeypatch.setattr(choice, "FEWEST", 4)
     monkeypatch.setattr(choice, "COMPILING", 0.0)
     monkeypatch.setattr(choice, "EVALUATION", 1.0)
-    monkeypatch.setattr(choice, "processors", lambda: 1)
     mine = fd.sweep(file, vary, ["largest_displacement"], **given)
     assert alone.attrs["device"] == "cpu" != mine.attrs["device"]
     assert "s on a GPU" in mine.attrs["device_reason"]

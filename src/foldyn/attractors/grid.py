@@ -18,19 +18,20 @@ from foldyn.attractors.drive import drive_frequency
 from foldyn.attractors.kept import KeptEnds
 from foldyn.attractors.run import PER_PERIOD, divisor, step_of, told_once
 from foldyn.cases import Case, State
-from foldyn.dynamics import simulate_many
+from foldyn.dynamics import prepare, simulate_many
+from foldyn.dynamics.ensemble import device_for
+from foldyn.dynamics.gpu.choice import DEVICES
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import PLACE, variable
-from foldyn.values import number, numbers, of_kind, show, whole
+from foldyn.values import choice, number, numbers, of_kind, show, whole
 
 if TYPE_CHECKING:
     import xarray
 
 AT_ONCE = 256  # motions
 LOOKED_AT = 64  # starts
-DEVICE = "device", "device_reason"  # attributes
 UNDRIVEN = 0.02  # of the duration: between the states of a motion without a drive
 
 
@@ -128,9 +129,13 @@ def basins(
     period = 1.0 / frequency if frequency else UNDRIVEN * duration
     settled = float(np.ceil(duration / period - 1e-9) * period)
     step = _step(case, starts, method, dt, period, bool(frequency))
-    about = {"method": method, "dt": step, "device": device}
+    about = {"method": method, "dt": step, "device": choice("device", device, DEVICES)}
     used = dict[str, str]()
-    compute = partial(_ends, case, settled, period, record, {**about, "threads": threads}, used)
+    if device == "auto":
+        like = prepare(case, settled, method, step, initial=starts[0], force=True, kept=True)
+        device, used["device_reason"] = device_for([like], len(starts), threads)
+    how = {**about, "threads": threads, "device": device}
+    compute = partial(_ends, case, settled, period, record, how, used)
     about |= {"duration": settled, "period": period, "record": record}
     kept, found = KeptEnds(folder, case, about), list[NDArray]()
     report, close = reporter(progress)
@@ -239,11 +244,11 @@ def _ends(
 ) -> NDArray[np.float64]:  # fmt: skip
     """States (m, record, 2, n, 3) of motions after they have settled, one a period.
 
-    used : gets the device on which they have settled, with the reason.
+    used : gets the device on which they have settled.
     """
     count = len(starts)
     before = simulate_many([case] * count, settled, every=settled, initial=starts, **how)
-    used |= {name: before.attrs[name] for name in DEVICE if name in before.attrs}
+    used["device"] = before.attrs["device"]
     out = np.full((count, record, 2, *case.structure.nodes.shape), np.nan)
     sound = np.flatnonzero(before.outcome.values == "done")
     if not len(sound):

@@ -33,6 +33,7 @@ from foldyn.structures.stretching import MOST, REMEDY, stretch
 from foldyn.values import choice, flag, of_kind, show, whole
 
 METHOD = "central_difference"
+LANES = 2.5  # how much quicker models are in lanes
 COMMON = ("duration", "dt", "every", "start", "method")
 """Arguments that are those of all cases."""
 
@@ -104,9 +105,7 @@ def simulate_many(
     force = flag("force", force)
     choice("method", method, (METHOD, "rk4"))
     choice("device", device, DEVICES)
-    most = int(config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-    threads = most if threads is None else whole("threads", threads, least=1)
-    threads = min(threads, -(-len(cases) // WIDTH))
+    threads = _threads(threads, len(cases))
     motions: list[Motion] = []
     for k, (case, state) in enumerate(zip(cases, states, strict=True)):
         of_kind(f"cases[{k}]", case, Case)
@@ -141,7 +140,7 @@ def simulate_many(
         motion.output.window = Samples._make([out.time, *(array[k] for array in out[1:-1]), 0])
     reason = ""
     if device == "auto":
-        device, reason = choose(motions, cores=threads)
+        device, reason = device_for(motions, len(motions), threads)
     clock, spent = time.perf_counter(), time.process_time()
     ended = _integrate(motions, out, threads, device)
     facts = {
@@ -155,6 +154,21 @@ def simulate_many(
     if reason:
         facts["device_reason"] = reason
     return _dataset(case, out, [ended.get(k, "done") for k in range(len(motions))], facts)
+
+
+def device_for(
+    motions: Sequence[Motion], count: int, threads: int | None = None
+) -> tuple[str, str]:
+    """The device that "auto" stands for, and why, for `count` motions of which these are some."""
+    lanes = motions[0].method.name == METHOD
+    return choose(motions, count, LANES * _threads(threads, count) if lanes else 1.0)
+
+
+def _threads(threads: int | None, count: int) -> int:
+    """Threads for the lanes of so many models."""
+    most = int(config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+    threads = most if threads is None else whole("threads", threads, least=1)
+    return min(threads, -(-count // WIDTH))
 
 
 def _takes_starts(motion: Motion, case: Case) -> bool:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from foldyn.dynamics.gpu.checks import METHODS, lacking, no_card
 from foldyn.dynamics.motion import Motion
-from foldyn.workers import processors
 
 DEVICES = "auto", "cpu", "gpu"
 FEWEST = 10  # models
@@ -16,15 +15,12 @@ ABREAST = 200  # blocks that are as quick as one
 COMPILING = 12.0  # s
 
 
-def choose(
-    motions: Sequence[Motion], count: int | None = None, cores: int | None = None
-) -> tuple[str, str]:
+def choose(motions: Sequence[Motion], count: int, cores: float) -> tuple[str, str]:
     """The device, "cpu" or "gpu", on which motions are done sooner, and why.
 
-    count : how many there are, where `motions` stand for more.
-    cores : as many processors compute instead.
+    count : how many there are; `motions` stand for them.
+    cores : as many processors compute instead, each one motion at a time.
     """
-    count = len(motions) if count is None else count
     if count < FEWEST:
         return "cpu", f"a GPU pays from {FEWEST} models on"
     method = motions[0].method.name
@@ -34,7 +30,7 @@ def choose(
     if dofs > LARGEST:
         return "cpu", f"models of more than {LARGEST} dofs are too large for a GPU's blocks"
     each = [motion.plan.steps * motion.method.evaluations * EVALUATION * dofs for motion in motions]
-    alone = count * sum(each) / len(each) / min(cores or processors(), count)
+    alone = count * sum(each) / len(each) / min(cores, count)
     beside = COMPILING + max(each) * max(1.0, count / ABREAST)
     seconds = f"about {beside:.2g} s on a GPU, {alone:.2g} s on processors"
     if alone < beside:

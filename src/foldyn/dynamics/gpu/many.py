@@ -83,7 +83,7 @@ def _integrated(motions: Sequence[Motion]) -> NDArray:
         written, wrong = launches.run(first, last, sample)
         energy = np.moveaxis(written.energy, 0, 1) + 0.0  # (m, k + 1, columns)
         sound &= ~wrong & np.isfinite(energy).all(axis=(1, 2))
-        for k in np.flatnonzero(moving):
+        for k in np.flatnonzero(moving).tolist():
             count = int(last[k]) // plans[k].every + 1 - int(sample[k])
             rows, out = slice(int(sample[k]), int(sample[k]) + count), motions[k].output.window
             out.displacement[rows] = written.u[k, :count]
@@ -98,7 +98,7 @@ def _integrated(motions: Sequence[Motion]) -> NDArray:
         look = moving & sound & ((done == checked) | (done == steps))
         if look.any():
             u = launches.places().u if (done < steps).any() else u
-            for k in np.flatnonzero(look):
+            for k in np.flatnonzero(look).tolist():
                 sound[k] = _is_sound(motions[k], u[k])
     share, engine = (time.perf_counter() - clock) / len(motions), InBlocks()
     for motion, plan in zip(motions, plans, strict=True):
