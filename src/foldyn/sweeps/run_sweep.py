@@ -28,6 +28,9 @@ from foldyn.workers import processors
 MOST_PROCESSES = 1024
 """Processes at a time: more are a slip of the finger."""
 
+PREPARING = 0.05
+"""Seconds in which a core reads the file of a point, checks its motion and measures it."""
+
 Measures = Sequence[str | Measure | Callable[..., Any]] | Mapping[str, Callable[..., Any]]
 
 
@@ -171,7 +174,7 @@ def _device(plan: Plan, cores: int, scheduler: str | None) -> tuple[str, dict[st
             )
         device = "cpu"
     if device == "auto":
-        device, why = choose([motion], len(set(plan.points)), cores)
+        device, why = choose([motion], len(set(plan.points)), cores, PREPARING)
     name = device
     if device == "gpu":
         from foldyn.dynamics.gpu import card

@@ -15,11 +15,14 @@ ABREAST = 200  # blocks that are as quick as one
 COMPILING = 12.0  # s
 
 
-def choose(motions: Sequence[Motion], count: int, cores: float) -> tuple[str, str]:
+def choose(
+    motions: Sequence[Motion], count: int, cores: float, preparing: float = 0.0
+) -> tuple[str, str]:
     """The device, "cpu" or "gpu", on which motions are done sooner, and why.
 
     count : how many there are; `motions` stand for them.
     cores : as many processors compute instead, each one motion at a time.
+    preparing : what each takes beside its steps (s), for a GPU one after the other.
     """
     if count < FEWEST:
         return "cpu", f"a GPU pays from {FEWEST} models on"
@@ -30,8 +33,8 @@ def choose(motions: Sequence[Motion], count: int, cores: float) -> tuple[str, st
     if dofs > LARGEST:
         return "cpu", f"models of more than {LARGEST} dofs are too large for a GPU's blocks"
     each = [motion.plan.steps * motion.method.evaluations * EVALUATION * dofs for motion in motions]
-    alone = count * sum(each) / len(each) / min(cores, count)
-    beside = COMPILING + max(each) * max(1.0, count / ABREAST)
+    alone = count * (sum(each) / len(each) + preparing) / min(cores, count)
+    beside = COMPILING + max(each) * max(1.0, count / ABREAST) + count * preparing
     seconds = f"about {beside:.2g} s on a GPU, {alone:.2g} s on processors"
     if alone < beside:
         return "cpu", seconds
