@@ -88,7 +88,7 @@ class Launches:
         self._from = places
         self._start(places)
 
-    def _histories(self) -> list[tuple[int, int]]:
+    def _histories(self) -> list[tuple[int, int] | None]:
         """Distinct histories at distinct steps, as (case, row); None of constant ones.
 
         `_of_case` gets their numbers by the rows of each case.
