@@ -83,22 +83,26 @@ class Problem:
         return 4 * (per_bar * len(self.bars) + per_hinge * len(self.hinges) + per_dof * self.dofs)
 
 
-def make(cells: tuple[int, int], laws: str) -> Problem:
-    """Miura sheet with N5B8 panels, fixed along one edge, loaded at the other, shaken at start."""
+def case_of(cells: tuple[int, int], laws: str) -> fd.Case:
+    """Miura sheet with N5B8 panels, fixed along one edge, loaded at the other."""
     fold_law, bend_law = LAWS[laws]
     pattern = fd.patterns.miura(cells, panel_angle=60.0, dihedral=120.0)
     sheet = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
     structure = fd.discretize(pattern, sheet, fold_law=fold_law, bend_law=bend_law, preset="herkal")
-    x = np.asarray(structure.nodes)
     edge = np.flatnonzero(pattern.vertices[:, 0] <= 1e-9)
     far = np.flatnonzero(pattern.vertices[:, 0] >= pattern.vertices[:, 0].max() - 1e-9)
-    case = fd.Case(
+    return fd.Case(
         structure,
         supports=[fd.Fix(edge)],
         loads=[fd.Force(far, (0.0, 0.0, -LOAD))],
         damping=fd.Rayleigh(alpha=ALPHA),
     )
-    return _pack(case, x)
+
+
+def make(cells: tuple[int, int], laws: str) -> Problem:
+    """Such a sheet, shaken at the start."""
+    case = case_of(cells, laws)
+    return _pack(case, np.asarray(case.structure.nodes))
 
 
 def _pack(case: fd.Case, x: NDArray) -> Problem:

@@ -307,7 +307,7 @@ def solved(folder: Path) -> Calls:
         "sweep": (fd.sweep, {
             "case": folder / "case.toml", "vary": {"sheet.thickness": [0.01, 0.02]},
             "measures": ["frequency"], "samples": None, "method": None, "seed": None, "ties": None,
-            "processes": 1, "scheduler": None, "folder": None, "progress": None,
+            "processes": 1, "scheduler": None, "folder": None, "progress": None, "device": "cpu",
         }),
         "sensitivity": (fd.sensitivity, {
             "build": folder / "case.toml", "parameters": {"sheet.thickness": 0.01},

@@ -6,17 +6,41 @@ import importlib.util
 import os
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.dynamics.gpu import checks
+from foldyn.cli.main import main
+from foldyn.dynamics.driver import prepare
+from foldyn.dynamics.gpu import checks, choice
 from foldyn.errors import InputError
+from foldyn.mechanics.springs import SpringsTerm
 
 PATTERN = fd.patterns.miura((1, 1), panel_angle=60.0, dihedral=110.0)
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
+MOTION = """
+[pattern]
+kind = "miura"
+cells = [1, 1]
+panel_angle = 60
+dihedral = 110
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1.0
+[model]
+mass = "mixed_voronoi"
+[[supports]]
+nodes = [0, 1, 2]
+[analysis]
+kind = "dynamics"
+duration = 1e-3
+"""
 HELD = fd.Fix(np.flatnonzero(PATTERN.vertices[:, 0] <= 1e-9))
 
 
@@ -61,6 +85,78 @@ def test_what_has_no_kernel_is_named(card, what):
         fd.simulate(REFUSED[what](), 1e-3, device="gpu")
 
 
+def test_what_is_added_to_cases_is_refused_until_kernels_know_it():
+    @dataclass(frozen=True, eq=False)
+    class Aired(fd.Case):
+        air: Any = None
+
+    given = fd.discretize(PATTERN, SHEET, **LUMPED), [HELD]
+    packed = prepare(fd.Case(*given), 1e-3).packed
+    assert not checks.lacking(Aired(*given), packed)
+    assert checks.lacking(Aired(*given, air=1.2), packed) == "air of the case"
+    several = packed._replace(body=packed.body.with_terms(*[springs()] * 2))
+    assert checks.lacking(fd.Case(*given), several) == "a second set of springs"
+    other = packed._replace(body=packed.body.with_terms(Unknown(springs().springs)))
+    assert checks.lacking(fd.Case(*given), other) == "the term Unknown"
+
+
+class Unknown(SpringsTerm):
+    """A term of a kind that derives from one with kernels."""
+
+
+def springs() -> SpringsTerm:
+    return fd.Case(sheet().structure, [HELD, fd.Spring(1.0, nodes=[8])]).body.term(SpringsTerm)
+
+
+def test_the_device_is_named_in_a_case_file_and_on_the_command_line(tmp_path, monkeypatch, capsys):
+    file = tmp_path / "case.toml"
+    file.write_text(MOTION)
+    monkeypatch.setattr(checks, "no_card", lambda: "no GPU is here")
+    command = ["run", str(file), "--out", str(tmp_path / "out"), "--no-figures"]
+    assert main([*command, "--device", "gpu"]) == 2
+    assert 'case.toml: analysis.device = "gpu": no GPU is here' in capsys.readouterr().err
+    file.write_text(MOTION + 'device = "gpu"\nmethod = "newmark"\n')
+    with pytest.raises(InputError, match=r"analysis.device.*newmark has no GPU kernel"):
+        fd.read_case(file).run()
+    with pytest.raises(InputError, match="newmark has no GPU kernel"):
+        fd.sweep(file, {"sheet.density": [1.0, 2.0]}, ["largest_displacement"])
+    found = fd.sweep(
+        file, {"sheet.density": [1.0, 2.0]}, ["largest_displacement"], device="cpu", processes=1
+    )
+    assert found.attrs["device"] == "cpu"
+    file.write_text(MOTION.replace('"dynamics"\nduration = 1e-3', '"modes"'))
+    assert main([*command, "--device", "gpu"]) == 2
+    assert "--device: is of motions" in capsys.readouterr().err
+    with pytest.raises(InputError, match=r"device.*only motions"):
+        fd.sweep(file, {"sheet.density": [1.0, 2.0]}, ["frequency"], device="gpu")
+    with pytest.raises(InputError, match=r"device.*choose"):
+        fd.sweep(file, {"sheet.density": [1.0]}, ["frequency"], device="tpu")
+    monkeypatch.setattr(checks, "no_card", lambda: "")
+    file.write_text(MOTION)
+    with pytest.raises(InputError, match="leave scheduler out"):
+        fd.sweep(
+            file, {"sheet.density": [1.0]}, ["largest_displacement"], device="gpu",
+            scheduler="tcp://x:1",
+        )  # fmt: skip
+
+
+def test_few_or_short_motions_stay_on_the_cpu(monkeypatch):
+    motion = prepare(sheet(**LUMPED), 1.0, "central_difference")
+    reason = {count: choice.choose([motion], count, 2)[1] for count in (4, 1000)}
+    assert reason[4] == "a GPU pays from 10 models on"
+    assert "s on a GPU" in reason[1000]
+    monkeypatch.setattr(choice, "COMPILING", 0.0)
+    monkeypatch.setattr(choice, "no_card", lambda: "no GPU is here; buy one")
+    assert choice.choose([motion], 1000, 2) == ("cpu", "no GPU is here")
+    monkeypatch.setattr(choice, "no_card", lambda: "")
+    assert choice.choose([motion], 1000, 2)[0] == "gpu"
+    for other, why in ((REFUSED["the term "](), "the term "), (sheet(preset="n5b8e"), "plates")):
+        device, reason = choice.choose([prepare(other, 1.0, "central_difference")], 1000, 2)
+        assert device == "cpu" and why in reason
+    monkeypatch.setattr(choice, "LARGEST", 30)
+    assert choice.choose([motion], 1000, 2)[1].startswith("models of more than 30 dofs")
+
+
 def test_a_method_without_kernels_is_named():
     with pytest.raises(InputError, match="newmark has no GPU kernel; choose one of rk4"):
         fd.simulate(sheet(), 1e-3, "newmark", device="gpu")
@@ -83,3 +179,13 @@ def test_a_card_that_is_too_small(monkeypatch):
     monkeypatch.setattr(card, "free_memory", lambda: 1e6)
     with pytest.raises(InputError, match=r"3 models of 9 nodes needs .* GiB on the card"):
         card.check_size(1e9, "3 models of 9 nodes")
+
+
+def test_arrays_of_one_model_are_copied_at_once():
+    from foldyn.dynamics.gpu import card
+
+    array = np.arange(12.0).reshape(4, 3)[None]
+    assert array.strides[0] == 0  # whose rows Numba would copy one by one
+    flat = card.flat_strides(array)
+    assert flat.strides[0] > 0
+    np.testing.assert_array_equal(flat, array)

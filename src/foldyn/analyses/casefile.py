@@ -20,6 +20,7 @@ from foldyn.analyses.start import Start, start_of
 from foldyn.cases import Case, State
 from foldyn.cases.models import MODELS
 from foldyn.dynamics import Keeping
+from foldyn.dynamics.motion import Motion
 from foldyn.errors import InputError, within
 from foldyn.linear import refinement
 from foldyn.patterns import Pattern
@@ -45,6 +46,14 @@ class Kept(Protocol):
 
     def keep(self, keeping: Keeping, shown: bool) -> None:
         """Say how it is kept, and whether its result is to be shown, for which memory must do."""
+
+
+@runtime_checkable
+class Moving(Protocol):
+    """A computation of a motion, which may be integrated beside others before it is called."""
+
+    motion: Motion
+    integrated: bool
 
 
 @dataclass(frozen=True, eq=False)

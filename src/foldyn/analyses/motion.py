@@ -60,6 +60,7 @@ class MotionSection(Section):
     tolerance: Positive | None = None
     start: float = 0.0
     spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+    device: Annotated[str, one_of(("cpu", "gpu"))] = "cpu"
 
 
 class MotionOutput(ShownSection):
@@ -211,6 +212,7 @@ class _Prepared:
         self.motion = motion
         self.kept: Keeping | None = None
         self.shown = True  # whether its result is looked at as a whole
+        self.integrated = False
 
     def keep(self, keeping: Keeping, shown: bool) -> None:
         """See `Kept`."""
@@ -218,6 +220,8 @@ class _Prepared:
 
     def __call__(self, progress: bool, begun: Begun) -> xarray.Dataset:
         begun()
+        if self.integrated:
+            return self.motion.result(progress)
         found = None if self.kept is None else self.motion.finished(self.kept)
         return self.motion.run(progress, self.kept) if found is None else found
 

@@ -18,12 +18,14 @@ from foldyn.attractors.drive import drive_frequency
 from foldyn.attractors.kept import KeptEnds
 from foldyn.attractors.run import PER_PERIOD, divisor, step_of, told_once
 from foldyn.cases import Case, State
-from foldyn.dynamics import simulate_many
+from foldyn.dynamics import prepare, simulate_many
+from foldyn.dynamics.ensemble import device_for
+from foldyn.dynamics.gpu.choice import DEVICES
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import PLACE, variable
-from foldyn.values import number, numbers, of_kind, show, whole
+from foldyn.values import choice, number, numbers, of_kind, show, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -44,7 +46,7 @@ def basins(
     method: str = "central_difference",
     dt: float | None = None,
     threads: int | None = None,
-    device: str = "cpu",
+    device: str = "auto",
     folder: str | os.PathLike[str] | None = None,
     progress: bool | Reporter | None = None,
 ) -> xarray.Dataset:
@@ -87,7 +89,7 @@ def basins(
         which they are met, or -1 where the motion does not repeat: it is chaotic or has not settled
         yet, or has failed. Along `attractor`: `periods`, of the drive after which it repeats (an
         equilibrium counts 1), `share` of the starts, and along `record` the states `displacement`
-        (m) and `velocity` (m/s).
+        (m) and `velocity` (m/s). The attribute `device` says where they were computed.
 
     Raises
     ------
@@ -127,8 +129,13 @@ def basins(
     period = 1.0 / frequency if frequency else UNDRIVEN * duration
     settled = float(np.ceil(duration / period - 1e-9) * period)
     step = _step(case, starts, method, dt, period, bool(frequency))
-    about = {"method": method, "dt": step, "device": device}
-    compute = partial(_ends, case, settled, period, record, {**about, "threads": threads})
+    about = {"method": method, "dt": step, "device": choice("device", device, DEVICES)}
+    used = dict[str, str]()
+    if device == "auto":
+        like = prepare(case, settled, method, step, initial=starts[0], force=True, kept=True)
+        device, used["device_reason"] = device_for([like], len(starts), threads)
+    how = {**about, "threads": threads, "device": device}
+    compute = partial(_ends, case, settled, period, record, how, used)
     about |= {"duration": settled, "period": period, "record": record}
     kept, found = KeptEnds(folder, case, about), list[NDArray]()
     report, close = reporter(progress)
@@ -156,7 +163,7 @@ def basins(
             FoldynWarning,
             stacklevel=2,
         )
-    about |= {"same": same, "wall_seconds": time.perf_counter() - began}
+    about |= {"same": same, "wall_seconds": time.perf_counter() - began, **used}
     about["period"] = period if frequency else None
     label = label.reshape([len(values) for values in places])
     return _dataset(
@@ -233,11 +240,15 @@ def _step(
 
 def _ends(
     case: Case, settled: float, period: float, record: int, how: Mapping[str, Any],
-    starts: Sequence[State],
+    used: dict[str, str], starts: Sequence[State],
 ) -> NDArray[np.float64]:  # fmt: skip
-    """States (m, record, 2, n, 3) of motions after they have settled, one a period."""
+    """States (m, record, 2, n, 3) of motions after they have settled, one a period.
+
+    used : gets the device on which they have settled.
+    """
     count = len(starts)
     before = simulate_many([case] * count, settled, every=settled, initial=starts, **how)
+    used["device"] = before.attrs["device"]
     out = np.full((count, record, 2, *case.structure.nodes.shape), np.nan)
     sound = np.flatnonzero(before.outcome.values == "done")
     if not len(sound):

@@ -31,6 +31,8 @@ def info() -> str:
     """Text of the command."""
     from foldyn.cases.models import MODELS
     from foldyn.dynamics import METHODS, compiled
+    from foldyn.dynamics.gpu import card
+    from foldyn.dynamics.gpu.checks import no_card
     from foldyn.experiment.camera import opencv
     from foldyn.formats import FORMATS
     from foldyn.formats.dxf import ezdxf
@@ -62,6 +64,7 @@ def info() -> str:
         f"optional part for camera tracking: OpenCV, {camera}",
         f"optional part for pattern files in DXF: {drawings}",
         f"optional part for sweeps on clusters: Dask, {clusters}",
+        f"GPU of NVIDIA's: {no_card() or card.name()}",
         f"optional parts for inverse design: NLopt, {moving}; CMA-ES, {drawn}",
         *(
             f"linear solver from {solver.worthwhile:,} directions: {name}, "

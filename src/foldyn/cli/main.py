@@ -69,6 +69,9 @@ def parser() -> argparse.ArgumentParser:
         metavar="SECONDS",
         help="of a motion: computing time between checkpoints (default: 60)",
     )
+    run.add_argument(
+        "--device", choices=("cpu", "gpu"), help="of a motion: where its steps are computed"
+    )
 
     modes = commands.add_parser(
         "modes",

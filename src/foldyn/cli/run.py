@@ -62,7 +62,8 @@ def run(given: Namespace) -> Path:
         if getattr(given, "film", None):
             output = replace(case_file.output, animation=given.film)
             case_file = replace(case_file, output=output)
-        task = [case_file.computation(mass) for mass in case_file.masses]
+        changes = _device(case_file, getattr(given, "device", None))
+        task = [case_file.computation(mass, **changes) for mass in case_file.masses]
         _keep(task, folder, given)
         with case_file.placing():
             case_file.analysis.check([one.compute for one in task], given.figures is not None)
@@ -117,6 +118,15 @@ def _keep(task: list[Computation], folder: Path, given: Namespace) -> None:
         elif resume or seconds is not None:
             option = "--resume" if resume else "--checkpoint"
             raise InputError(f"{option}: only motions have checkpoints; leave it out")
+
+
+def _device(case_file: CaseFile, device: str | None) -> dict[str, str]:
+    """Argument of the device that was asked for."""
+    if device is None:
+        return {}
+    if "device" not in case_file.analysis.takes:
+        raise InputError("--device: is of motions; leave it out")
+    return {"device": device}
 
 
 def _read(path: Path, given: Namespace) -> CaseFile:

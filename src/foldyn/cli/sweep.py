@@ -84,6 +84,12 @@ def add_sweep(commands: Any) -> None:
     sweep.add_argument(
         "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers compute instead"
     )
+    sweep.add_argument(
+        "--device",
+        choices=("auto", "cpu", "gpu"),
+        help="where motions are computed (default: as the file says, else auto: on a GPU where "
+        "that pays)",
+    )
     add_results(sweep, "NAME-sweep")
     add_figures(sweep)
 
@@ -153,7 +159,8 @@ def _plan(path: Path, given: argparse.Namespace) -> Plan:
                 measures.append(own_measure(text, here) or text)
             except InputError as error:
                 raise InputError(f"--measure{error}") from None
-    return plan_of(path, vary, measures, given.samples, given.method, given.seed, ties)
+    asked = given.samples, given.method, given.seed, ties, given.device
+    return plan_of(path, vary, measures, *asked)
 
 
 def _table(texts: Sequence[str], option: str) -> dict[str, str]:

@@ -246,7 +246,7 @@ def prepare(
     span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
     packed = pack(case, span, u, modal)
     if device == "gpu":
-        check_taken(packed)
+        check_taken(case, packed)
     sampler = Sampler(case, {} if sample is None else sample, u, v, plan.start)
     state = u, v, remembered, initial.continuation if initial else None
     better = None

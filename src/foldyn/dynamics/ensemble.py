@@ -18,6 +18,7 @@ from foldyn.dynamics import timing
 from foldyn.dynamics.audit import audited
 from foldyn.dynamics.diagnostics import INACCURATE
 from foldyn.dynamics.driver import prepare
+from foldyn.dynamics.gpu.choice import DEVICES, choose
 from foldyn.dynamics.initial import check_start, check_touching
 from foldyn.dynamics.lane_steps import integrate, topology
 from foldyn.dynamics.motion import Motion
@@ -32,6 +33,7 @@ from foldyn.structures.stretching import MOST, REMEDY, stretch
 from foldyn.values import choice, flag, of_kind, show, whole
 
 METHOD = "central_difference"
+LANES = 2.5  # how much quicker models are in lanes
 COMMON = ("duration", "dt", "every", "start", "method")
 """Arguments that are those of all cases."""
 
@@ -46,7 +48,7 @@ def simulate_many(
     force: bool = False,
     threads: int | None = None,
     method: str = METHOD,
-    device: str = "cpu",
+    device: str = "auto",
 ) -> xarray.Dataset:
     """Integrate the motions of many models of one topology at once.
 
@@ -72,8 +74,9 @@ def simulate_many(
         As many as this process has processors by default.
     method : str, default "central_difference"
         An explicit method with fixed steps: this, or "rk4".
-    device : {"cpu", "gpu"}
-        Where steps are computed; a GPU takes panels' membranes, springs and dampers, too.
+    device : {"auto", "cpu", "gpu"}
+        Where steps are computed; a GPU takes panels' membranes, springs and dampers, too. "auto"
+        takes a GPU where there is one, it has kernels for all, and it should be done sooner.
 
     Returns
     -------
@@ -81,7 +84,8 @@ def simulate_many(
         The variables of a motion with the dimension `model` before `time`: `displacement` (m) and
         `velocity` (m/s) over model, time, node, axis; `reaction` (N) and the energies (J).
         `outcome` (model) is "done" or says, as `simulate` does, what ended a motion: what comes
-        after is nan. The case that it carries is the first one.
+        after is nan. The case that it carries is the first one. Attributes say where steps were
+        computed (`device`), and of "auto" why (`device_reason`).
 
     Raises
     ------
@@ -100,18 +104,18 @@ def simulate_many(
         raise InputError(f": give one State, or a list of {len(cases)}", "initial")
     force = flag("force", force)
     choice("method", method, (METHOD, "rk4"))
-    most = int(config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-    threads = most if threads is None else whole("threads", threads, least=1)
-    threads = min(threads, -(-len(cases) // WIDTH))
+    choice("device", device, DEVICES)
+    threads = _threads(threads, len(cases))
     motions: list[Motion] = []
     for k, (case, state) in enumerate(zip(cases, states, strict=True)):
         of_kind(f"cases[{k}]", case, Case)
         like = next((m for m in motions[:1] if dt is not None and _takes_starts(m, case)), None)
+        asked = "gpu" if device == "gpu" else "cpu"
         try:
             given = case, duration, method, dt, every, state
             motions.append(
                 _from_start(like, state) if like
-                else prepare(*given, force=True, start=start, kept=True, device=device)
+                else prepare(*given, force=True, start=start, kept=True, device=asked)
             )  # fmt: skip
         except InputError as error:
             place = f"cases[{k}]{'.' if error.field else ': '}"
@@ -135,6 +139,9 @@ def simulate_many(
     for k, motion in enumerate(motions):
         motion.plan, motion.force = plan, force  # one step for all
         motion.output.window = Samples._make([out.time, *(array[k] for array in out[1:-1]), 0])
+    reason = ""
+    if device == "auto":
+        device, reason = device_for(motions, len(motions), threads)
     clock, spent = time.perf_counter(), time.process_time()
     ended = _integrate(motions, out, threads, device)
     facts = {
@@ -145,13 +152,30 @@ def simulate_many(
         "threads": threads, "device": _name(device),
         "energy_error": _warn(motions, ended, out.energy),
     }  # fmt: skip
+    if reason:
+        facts["device_reason"] = reason
     return _dataset(case, out, [ended.get(k, "done") for k in range(len(motions))], facts)
+
+
+def device_for(
+    motions: Sequence[Motion], count: int, threads: int | None = None
+) -> tuple[str, str]:
+    """The device that "auto" stands for, and why, for `count` motions of which these are some."""
+    lanes = motions[0].method.name == METHOD
+    return choose(motions, count, LANES * _threads(threads, count) if lanes else 1.0)
+
+
+def _threads(threads: int | None, count: int) -> int:
+    """Threads for the lanes of so many models."""
+    most = int(config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+    threads = most if threads is None else whole("threads", threads, least=1)
+    return min(threads, -(-count // WIDTH))
 
 
 def _takes_starts(motion: Motion, case: Case) -> bool:
     """Whether what was prepared for a motion serves those of a case from any other start."""
     fresh = any(getattr(part, "state", "rest") == "start" for part in case.dampings)
-    return motion.case is case and motion.device == "cpu" and not (fresh or case.remembering)
+    return motion.case is case and not (fresh or case.remembering)
 
 
 def _from_start(like: Motion, initial: State | None) -> Motion:
@@ -227,10 +251,9 @@ def _in_lanes(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]
 
 def _on_gpu(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]:
     """Integrate all on the card; numbers of those that go wrong."""
-    from foldyn.dynamics.gpu import arrays, many
+    from foldyn.dynamics.gpu import many
 
-    alike = _alike([arrays.topology(motion.packed) for motion in motions], motions)
-    return set[int]().union(*(many.integrate(own, out) for own in alike.values()))
+    return many.integrate(motions)
 
 
 def _warn(motions: Sequence[Motion], ended: Mapping[int, str], energy: NDArray) -> float:

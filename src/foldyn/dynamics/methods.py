@@ -79,6 +79,11 @@ class Compiled:
         for memory in self._memories:
             memory.powers[:2] = powers if memory is self._memories[0] else 0.0
 
+    @property
+    def powers(self) -> NDArray:
+        """Powers (2,) in and out, W, at the last step."""
+        return np.sum([memory.powers for memory in self._memories], axis=0)
+
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
         case = self._course, self._plan, out.end, stretch

@@ -51,7 +51,7 @@ from foldyn.structures.stretching import REMEDY, stretch
 if TYPE_CHECKING:
     import xarray
 
-    from foldyn.dynamics.gpu.engine import OnCard
+    from foldyn.dynamics.gpu.engine import InBlocks, OnCard
 
 RECHECKS = 20  # of the critical step during a motion
 CHUNK = 256  # steps of the first stretch; later ones take about REPORT_EVERY seconds
@@ -79,7 +79,7 @@ class Motion:
         self._state, self.packed, self._sampler = state, packed, sampler
         self._better = better
         self._rounding = Rounding(packed.body)
-        self._engine: Compiled | Implicit | OnCard | None = None
+        self._engine: Compiled | Implicit | OnCard | InBlocks | None = None
         self._keeping: Keeping | None = None
         self.seconds = 0.0
         self._start()
@@ -229,14 +229,7 @@ class Motion:
 
         engine_of : makes what advances it, from where it starts; by default its method's engine.
         """
-        self._keeping = keeping
-        size = self.expected_samples, len(self.case.structure.nodes), len(self.case.reaction_dofs)
-        if keeping is None:
-            check_samples(*size)
-        else:
-            check_room(*size, keeping.room)
-        self._start()
-        self.output.begin()
+        self.make_room(keeping)
         report, close = reporter(progress)
         try:
             begin_flow(self.case, self.packed, self.course, self._state[0])
@@ -254,6 +247,21 @@ class Motion:
             ) from None
         finally:
             close()
+
+    def make_room(self, keeping: Keeping | None = None) -> None:
+        """Go back to the start, with room for samples."""
+        self._keeping = keeping
+        size = self.expected_samples, len(self.case.structure.nodes), len(self.case.reaction_dofs)
+        if keeping is None:
+            check_samples(*size)
+        else:
+            check_room(*size, keeping.room)
+        self._start()
+        self.output.begin()
+
+    def integrated_by(self, engine: InBlocks, seconds: float) -> None:
+        """Take over from what has integrated it beside others, in the room that it has made."""
+        self._engine, self.seconds = engine, seconds
 
     @property
     def _origin(self) -> str:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from foldyn.analyses import CaseFile
+from foldyn.analyses.casefile import Moving
 from foldyn.analyses.keys import files_of, replaced
 from foldyn.analyses.reading import case_of_document
 from foldyn.analyses.ties import Tie
@@ -76,6 +77,8 @@ class Job:
     def stamp(self, point: Point) -> list[Any]:
         """All that the evaluation of a point depends on."""
         document = self.changed(point)
+        if "device" in document.get("analysis", {}):  # which changes no more than rounding does
+            del document["analysis"]["device"]
         there = [self.path.parent / file for file in sorted(files_of(document))]
         files = {str(file): _digest(str(file)) for file in there}
         measures = [[one.name, one.text, code_of(one.measure.function)] for one in self.measures]
@@ -83,34 +86,69 @@ class Job:
 
     def __call__(self, point: Point) -> Evaluation:
         """Evaluate a point: what goes wrong is what is found there."""
-        began, values, failures, lasting = time.perf_counter(), {}, list[str](), True
+        return self.begun(point).finished()
 
-        @contextmanager
-        def noted() -> Iterator[None]:
-            """Note what goes wrong in the block; what else is found is kept."""
-            nonlocal lasting
-            try:
-                yield
-            except (InputError, ComputationError) as error:
-                failures.append(str(error).removeprefix(f"{self.path}: "))
-            except Exception as error:  # of one point; the others are computed all the same
-                failures.append(f"{type(error).__name__}: {error}")
-                lasting = False
+    def begun(self, point: Point) -> BegunPoint:
+        """A point whose computation is checked, but not begun."""
+        return BegunPoint(self, point)
 
-        with warnings.catch_warnings(record=True) as told, noted():
-            warnings.simplefilter("always")
-            if self.program != this_program():
+
+class BegunPoint:
+    """A point of a sweep from its case file to its evaluation.
+
+    Attributes
+    ----------
+    compute : callable or None
+        The computation; None where there can be none.
+    """
+
+    def __init__(self, job: Job, point: Point) -> None:
+        self._job, self.compute = job, None
+        self._seconds, self._lasting = 0.0, True
+        self._failures, self._told = list[str](), list[str]()
+        with self._timed(), self._noted():
+            if job.program != this_program():
                 raise RuntimeError("this worker has another version of Foldyn than who asks it")
-            case_file = self.case_file(point)
-            result, case, shared = case_file.computation().result(), case_file.case(), {}
-            for variable in result.variables.values():  # a measure changes nothing for the others
-                variable.values.setflags(write=False)
-            for each in self.measures:
-                with noted():
-                    values[each.name] = each.of(result.copy(deep=False), case, shared)
-        said = [str(one.message) for one in told if issubclass(one.category, FoldynWarning)]
-        failure, warned = ("; ".join(dict.fromkeys(texts)) for texts in (failures, said))
-        return Evaluation(values, failure, warned, time.perf_counter() - began, lasting)
+            self._case_file = job.case_file(point)
+            self._computation = self._case_file.computation()
+            self.compute = self._computation.compute
+
+    def finished(self) -> Evaluation:
+        """The evaluation of the point."""
+        values = {}
+        with self._timed(), self._noted():
+            if self.compute is not None:
+                if isinstance(self.compute, Moving) and self.compute.integrated:
+                    self._seconds += self.compute.motion.seconds
+                result, case, shared = self._computation.result(), self._case_file.case(), {}
+                for variable in result.variables.values():  # a measure changes it for no other
+                    variable.values.setflags(write=False)
+                for each in self._job.measures:
+                    with self._noted():
+                        values[each.name] = each.of(result.copy(deep=False), case, shared)
+        failure, warned = ("; ".join(dict.fromkeys(t)) for t in (self._failures, self._told))
+        return Evaluation(values, failure, warned, self._seconds, self._lasting)
+
+    @contextmanager
+    def _timed(self) -> Iterator[None]:
+        """Count the time of the block, and note what it warns of."""
+        began = time.perf_counter()
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            yield
+        self._told += [str(one.message) for one in told if issubclass(one.category, FoldynWarning)]
+        self._seconds += time.perf_counter() - began
+
+    @contextmanager
+    def _noted(self) -> Iterator[None]:
+        """Note what goes wrong in the block; what else is found is kept."""
+        try:
+            yield
+        except (InputError, ComputationError) as error:
+            self._failures.append(str(error).removeprefix(f"{self._job.path}: "))
+        except Exception as error:  # of one point; the others are computed all the same
+            self._failures.append(f"{type(error).__name__}: {error}")
+            self._lasting = False
 
 
 def this_program() -> str:

@@ -8,11 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from foldyn.analyses import CaseFile
+from foldyn.analyses.casefile import Compute
 from foldyn.analyses.keys import parts
+from foldyn.analyses.motion import MotionAnalysis
 from foldyn.analyses.ranges import SAMPLINGS, Varied, varied
 from foldyn.analyses.reading import case_of_document, read_document, validated
 from foldyn.analyses.sections import SweepSection
 from foldyn.analyses.ties import ties_of
+from foldyn.dynamics.gpu.choice import DEVICES
 from foldyn.errors import Faults, InputError, within
 from foldyn.input_files import path_of
 from foldyn.sweeps.job import ASIDE, Job, this_program
@@ -41,6 +44,10 @@ class Plan:
     points : list of tuple
         Values of the keys, as `varied`.
     job : Job
+    compute : callable
+        The computation of the file as it is.
+    device : str
+        Where motions are computed: "cpu", "gpu", or "auto".
     """
 
     case_file: CaseFile
@@ -50,6 +57,8 @@ class Plan:
     seed: int
     points: list[Point]
     job: Job
+    compute: Compute
+    device: str = "auto"
 
     @property
     def section(self) -> dict[str, Any]:
@@ -78,10 +87,11 @@ def plan_of(
     method: str | None,
     seed: int | None,
     ties: Mapping[str, str] | None,
+    device: str | None = None,
 ) -> Plan:
     """Check the arguments of `foldyn.sweep`; raises `InputError`."""
     path = path_of(case, "case")
-    document = read_document(path)
+    document, device = _with_device(read_document(path), device)
     case_file = case_of_document(path, document)
     table = case_file.sweep
     if measures is None and table is not None:
@@ -107,9 +117,25 @@ def plan_of(
         with faults.collected():
             one.check(case_file)
     faults.raise_all()
-    case_file.computation()  # which refuses what cannot be computed as it is
+    compute = case_file.computation().compute  # refuses what cannot be computed as it is
     number, drawn, start = how
-    return Plan(case_file, keys, drawn if sampled else GRID, number, start, points, job)
+    return Plan(
+        case_file, keys, drawn if sampled else GRID, number, start, points, job, compute, device
+    )  # fmt: skip
+
+
+def _with_device(document: dict[str, Any], device: str | None) -> tuple[dict[str, Any], str]:
+    """A case file of motions with the device that is asked for, and this."""
+    if device is not None:
+        choice("device", device, DEVICES)
+    section = document.get("analysis")
+    if not isinstance(section, dict) or section.get("kind") != MotionAnalysis.kind:
+        if device == "gpu":
+            raise InputError(' = "gpu": only motions are computed on a GPU; leave it out', "device")
+        return document, "cpu"
+    own = device or section.get("device", "auto")
+    given = {} if device is None else {"device": "gpu" if device == "gpu" else "cpu"}
+    return {**document, "analysis": section | given}, own
 
 
 def _chosen(

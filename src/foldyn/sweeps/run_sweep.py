@@ -11,19 +11,25 @@ from typing import Any
 
 import xarray as xr
 
+from foldyn.analyses.casefile import Moving
+from foldyn.dynamics.gpu.choice import choose
 from foldyn.errors import InputError
 from foldyn.sweeps.evaluations import Evaluation, Evaluations
 from foldyn.sweeps.job import Job
 from foldyn.sweeps.measure import Measure
 from foldyn.sweeps.plan import Plan, plan_of
 from foldyn.sweeps.points import Point
-from foldyn.sweeps.pool import pool_of
+from foldyn.sweeps.pool import Pool, pool_of
+from foldyn.sweeps.side_by_side import SideBySide
 from foldyn.sweeps.table import dataset
 from foldyn.values import whole
 from foldyn.workers import processors
 
 MOST_PROCESSES = 1024
 """Processes at a time: more are a slip of the finger."""
+
+PREPARING = 0.05
+"""Seconds in which a core reads the file of a point, checks its motion and measures it."""
 
 Measures = Sequence[str | Measure | Callable[..., Any]] | Mapping[str, Callable[..., Any]]
 
@@ -64,6 +70,7 @@ def sweep(
     scheduler: str | None = None,
     folder: str | os.PathLike[str] | None = None,
     progress: Callable[[Course], None] | None = None,
+    device: str | None = None,
 ) -> xr.Dataset:
     """Compute a case file at many values of its keys, and measure each result.
 
@@ -95,6 +102,9 @@ def sweep(
         Keeps every point: a sweep that was cut off goes on where it stopped.
     progress : callable, optional
         Called with a `Course` after every point.
+    device : {"auto", "cpu", "gpu"}, optional
+        Where motions are computed, by default as the file says, else "auto": side by side on a GPU
+        where there is one, it has kernels for them, and they should be done sooner.
 
     Returns
     -------
@@ -102,7 +112,8 @@ def sweep(
         A variable for each measure. Of a grid over dimensions that have the last words of the keys
         as names, of samples over ``point``; values of the keys are coordinates. `failure` says why
         a point lacks values (they are nan), `warnings` what was warned of, and `seconds` how long
-        it took.
+        it took. The attribute `device` says where motions were computed, of "auto" with the reason
+        (`device_reason`).
 
     Raises
     ------
@@ -118,7 +129,7 @@ def sweep(
     by one, with their reasons, and the others are computed all the same. A measure that cannot be
     taken of a result leaves the others of its point.
     """
-    plan = plan_of(case, vary, measures, samples, method, seed, ties)
+    plan = plan_of(case, vary, measures, samples, method, seed, ties, device)
     return swept(plan, processes, scheduler, folder, progress)
 
 
@@ -134,14 +145,42 @@ def swept(
     if processes is not None:
         whole("processes", processes, least=1, most=MOST_PROCESSES)
     count = min(processes or processors(), len(set(points)))
+    device, about = _device(plan, count, scheduler)
+    if device == "gpu":
+        count = 1
     if count > 1 and scheduler is None:
         _check_sendable(job)
     follow = _Follow(len(set(points)), progress)
-    with pool_of(job, count, scheduler) as pool:
+    chosen: Pool[Point, Evaluation] = pool_of(job, count, scheduler)
+    if device == "gpu" and isinstance(plan.compute, Moving):
+        chosen = SideBySide(job, plan.compute.motion)
+    with chosen as pool:
         evaluations = Evaluations[Point](pool, job.stamp, folder, follow)
         found = evaluations.at(points, _lost, first=True)
-    facts = {"wall_seconds": time.perf_counter() - follow.began, "processes": count}
+    facts = {"wall_seconds": time.perf_counter() - follow.began, "processes": count, **about}
     return dataset(plan, found, facts)
+
+
+def _device(plan: Plan, cores: int, scheduler: str | None) -> tuple[str, dict[str, str]]:
+    """Where points are computed, "cpu" or "gpu", and attributes that say so."""
+    if not isinstance(plan.compute, Moving):
+        return "cpu", {}
+    device, motion, why = plan.device, plan.compute.motion, ""
+    if scheduler is not None:
+        if device == "gpu":
+            raise InputError(
+                ' = "gpu": workers of a cluster compute on processors; leave scheduler out',
+                "device",
+            )
+        device = "cpu"
+    if device == "auto":
+        device, why = choose([motion], len(set(plan.points)), cores, PREPARING)
+    name = device
+    if device == "gpu":
+        from foldyn.dynamics.gpu import card
+
+        name = card.name()
+    return device, {"device": name} | ({"device_reason": why} if why else {})
 
 
 def _lost(point: Point, reason: str) -> Evaluation:

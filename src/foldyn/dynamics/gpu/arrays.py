@@ -180,7 +180,8 @@ def topology(packed: Packed) -> tuple[Any, ...]:
 
 def _one_or_all(arrays: Sequence[NDArray]) -> NDArray:
     """The arrays of all models, or of one if they are equal."""
-    alike = all(np.array_equal(array, arrays[0]) for array in arrays[1:])
+    first = arrays[0]
+    alike = all(array is first or np.array_equal(array, first) for array in arrays[1:])
     return np.ascontiguousarray(arrays[0][None] if alike else np.stack(arrays))
 
 

@@ -50,12 +50,20 @@ def size_of(values: Any) -> int:
     return sum(map(size_of, values)) if isinstance(values, tuple) else 0
 
 
+def flat_strides(array: np.ndarray) -> np.ndarray:
+    """A contiguous array whose strides say so, also along axes of one.
+
+    Those that `None` has made have a stride of 0, and Numba goes through such arrays row by row.
+    """
+    return np.ascontiguousarray(array).reshape(-1).reshape(array.shape)
+
+
 def put(values: Any) -> Any:
     """The same arrays on the card."""
     from numba import cuda
 
     if isinstance(values, np.ndarray):
-        return cuda.to_device(np.ascontiguousarray(values))
+        return cuda.to_device(flat_strides(values))
     if isinstance(values, tuple):
         made = [put(value) for value in values]
         return type(values)(*made) if hasattr(values, "_fields") else tuple(made)

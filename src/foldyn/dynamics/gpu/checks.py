@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import importlib.util
+from dataclasses import MISSING, fields
+from typing import Any
 
+import numpy as np
 from numba import config
 
+from foldyn.cases import Case
 from foldyn.dynamics.system import Packed
 from foldyn.errors import InputError
-from foldyn.mechanics.air_drag import AirDragTerm
 from foldyn.mechanics.constant_damping import DampingMatrix
 from foldyn.mechanics.membranes import MembranesTerm
 from foldyn.mechanics.springs import SpringsTerm
 from foldyn.mechanics.viscous import ViscousTerm
 from foldyn.structures.bars_hinges import BarsHingesTerm
 
+FIELDS = "structure", "supports", "loads", "damping", "masses", "contact"  # of a case, looked at
 METHODS = "rk4", "central_difference"
 OLDEST = 12, 0  # version of CUDA that a driver must know
 TERMS = MembranesTerm, SpringsTerm, DampingMatrix, ViscousTerm
@@ -29,48 +33,56 @@ def check_gpu(method: str) -> None:
             'device = "cpu"',
             "device",
         )
+    if why := no_card():
+        raise InputError(f' = "gpu": {why}', "device")
+
+
+def no_card() -> str:
+    """Why no GPU can be used here, in words, with what to do; empty where one can."""
     if config.ENABLE_CUDASIM:  # type: ignore[attr-defined]
-        return
+        return ""
     if importlib.util.find_spec("numba_cuda") is None:
-        raise InputError(
-            ' = "gpu": numba-cuda is not installed; install it with: '
-            'pip install "foldyn[gpu]" "numba-cuda[cu13]"',
-            "device",
+        return (
+            "numba-cuda is not installed; install it with: "
+            'pip install "foldyn[gpu]" "numba-cuda[cu13]"'
         )
     from numba import cuda
 
     if not cuda.is_available():
-        raise InputError(
-            ' = "gpu": no GPU of NVIDIA\'s with a driver is found here (what does nvidia-smi '
-            'say?); device = "cpu" needs none',
-            "device",
+        return (
+            "no GPU of NVIDIA's with a driver is found here (what does nvidia-smi say?); "
+            'device = "cpu" needs none'
         )
     version = tuple(cuda.driver.driver.get_version())
     if version < OLDEST:
-        raise InputError(
-            f' = "gpu": the driver of the GPU is too old: it knows CUDA {version[0]}.{version[1]}, '
-            f"and CUDA {OLDEST[0]}.{OLDEST[1]} is needed; update it",
-            "device",
+        return (
+            f"the driver of the GPU is too old: it knows CUDA {version[0]}.{version[1]}, and CUDA "
+            f"{OLDEST[0]}.{OLDEST[1]} is needed; update it"
         )
+    return ""
 
 
-def check_taken(packed: Packed, place: str = "device") -> None:
+def check_taken(case: Case, packed: Packed, place: str = "device") -> None:
     """Refuse a case with something that has no GPU kernel, and name it."""
-    if lack := lacking(packed):
+    if lack := lacking(case, packed):
         raise InputError(f' = "gpu": {lack} has no GPU kernel; use device = "cpu"', place)
 
 
-def lacking(packed: Packed) -> str:
-    """What of a case has no GPU kernel, in words; empty where nothing."""
+def lacking(case: Case, packed: Packed) -> str:
+    """What of a case has no GPU kernel, in words; empty where nothing.
+
+    Fields of a case and terms are taken only if they are known here.
+    """
+    for field in fields(case):
+        if field.name not in FIELDS and not _is_default(field, getattr(case, field.name)):
+            return f"{field.name} of the case"
     system, body = packed.system, packed.body
-    if not isinstance(body.sheet, BarsHingesTerm):
+    if type(body.sheet) is not BarsHingesTerm:
         return "a sheet whose panels bend as plates"
     if packed.model.addresses.any():
         return "a law of your own"
     if not packed.mass.lumped:
         return "a constraint" if len(system.ties.slave) else "a mass matrix that is not diagonal"
-    if packed.added.acts:
-        return "added mass"
     drives = {
         "a support that moves": system.moves, "a rest angle that changes": system.turns,
         "a load that depends on the displacement": system.follows,
@@ -78,15 +90,22 @@ def lacking(packed: Packed) -> str:
     for what, there in drives.items():
         if there:
             return what
-    if body.find(AirDragTerm) is not None:
-        return "drag of the air"
     for term in body.others:
-        if not isinstance(term, TERMS):
+        if type(term) not in TERMS:
             return f"the term {type(term).__name__.removesuffix('Term')}"
         if isinstance(term, ViscousTerm) and term.elements.hidden_turn.any():
             return "a damper at dofs without mass"
         if isinstance(term, MembranesTerm) and len(term.membranes.ends) > MOST_BARS:
             return f"a panel with more than {MOST_BARS} bars"
+    for kind, what in ((SpringsTerm, "springs"), (ViscousTerm, "dampers")):
+        if sum(isinstance(term, kind) for term in body.others) > 1:
+            return f"a second set of {what}"
     if sum(isinstance(term, MembranesTerm) for term in body.others) > MOST_KINDS:
         return f"a sheet with more than {MOST_KINDS} kinds of panels"
     return f"more than {MOST_GROUPS} energies" if len(body.energy_groups) > MOST_GROUPS else ""
+
+
+def _is_default(field: Any, value: Any) -> bool:
+    """Whether a field of a case is as if it had not been given."""
+    default = field.default if field.default_factory is MISSING else field.default_factory()
+    return value is default or (value is not None and np.array_equal(value, default))

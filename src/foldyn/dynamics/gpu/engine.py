@@ -1,4 +1,4 @@
-"""The engine of one motion on a GPU, in the place of `methods.Compiled`."""
+"""The engine of one motion on a GPU, in the place of `methods.Compiled`; and of one of many."""
 
 from __future__ import annotations
 
@@ -38,14 +38,17 @@ class OnCard:
     ) -> None:  # fmt: skip
         self._method, self._packed, self._course, self._plan = method, packed, course, plan
         self._on_cpu = on_cpu
-        self._power = np.zeros(2)
-        self._launches = Launches([packed], method.name, self._places(), wide=True)
+        self._sums = np.zeros((1, 4))
+        self._launches = self._launched()
         self._alone: Any = None
 
-    def _places(self) -> Places:
+    def _launched(self) -> Launches:
+        """The motion on the card, where it is."""
         course = self._course
-        one = (course.u, course.v, course.carry, self._power, course.angle)
-        return Places(*(np.array(array)[None] for array in one))
+        one = (course.u, course.v, course.carry, course.angle)
+        u, v, carry, angle = (np.array(array)[None] for array in one)
+        places = Places(u, v, carry, self._sums, angle)
+        return Launches([self._packed], [self._plan], self._method.name, places, wide=True)
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
@@ -55,10 +58,11 @@ class OnCard:
         keeps = self._method.name == "central_difference" and begun > 0  # the forces of its end
         while not keeps or tally.steps < end:
             first = int(tally.steps)
-            last = min(end, first + self._launches.fits(plan))
+            last = min(end, first + int(self._launches.fits()[0]))
             skips = self._method.name == "central_difference" and first > 0
             sample = int(tally.samples)
-            written, wrong = self._launches.run(plan, first + skips, last, sample)
+            span = (np.array([number]) for number in (first + skips, last, sample))
+            written, wrong = self._launches.run(*span)
             if wrong.any() or not np.isfinite(written.energy).all():
                 return self._again(out, end - first)
             self._take(written, out, sample, last - first)
@@ -75,8 +79,6 @@ class OnCard:
         out.displacement[rows], out.velocity[rows] = written.u[0], written.v[0]
         out.reaction[rows] = written.reaction[0]
         energy = written.energy[:, 0] + 0.0
-        energy[:, -2] += tally.dissipated
-        energy[:, -1] += tally.work
         out.energy[rows] = energy[:-1]
         tally.dissipated, tally.work = energy[-1, -2], energy[-1, -1]
         tally.steps += steps
@@ -84,18 +86,18 @@ class OnCard:
         tally.time = plan.start + tally.steps * plan.dt
         tally.evaluations += self._method.evaluations * steps
         places = self._launches.places()
-        for array, own in zip(
-            (course.u, course.v, course.carry, self._power, course.angle), places, strict=True
-        ):
-            array[...] = own[0]
+        course.u[...], course.v[...], course.carry[...] = places.u[0], places.v[0], places.carry[0]
+        course.angle[...], self._sums = places.angle[0], places.sums
 
     def _again(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Do a stretch on the CPU, from where the card began it."""
         if self._alone is None:
             self._alone = self._on_cpu()
-        self._alone.start_with(self._power)
+        tally = self._course.tally
+        self._alone.start_with(self._sums[:, :2].sum(axis=0))
         result = self._alone.advance(out, stretch)
-        self._launches = Launches([self._packed], self._method.name, self._places(), wide=True)
+        self._sums = np.array([[*self._alone.powers, tally.work, tally.dissipated]])
+        self._launches = self._launched()
         return result
 
     def checkpoint_arrays(self) -> dict[str, NDArray]:
@@ -104,11 +106,22 @@ class OnCard:
 
     def resume_from(self, arrays: Mapping[str, NDArray]) -> None:
         """See `methods.Compiled`."""
+        self._sums = np.array(arrays["card_sums"])
         restore(self._parts(), arrays)
-        self._launches = Launches([self._packed], self._method.name, self._places(), wide=True)
+        self._launches = self._launched()
 
     def _parts(self) -> dict[str, Any]:
-        return state_parts(self._packed, self._course) | {"card_powers": self._power}
+        return state_parts(self._packed, self._course) | {"card_sums": self._sums}
+
+    def facts(self) -> dict[str, Any]:
+        """See `methods.Compiled`."""
+        return {"device": card.name()}
+
+
+class InBlocks:
+    """What a motion beside others has in the place of an engine of its own."""
+
+    threads = 1
 
     def facts(self) -> dict[str, Any]:
         """See `methods.Compiled`."""

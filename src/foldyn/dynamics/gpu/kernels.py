@@ -53,7 +53,7 @@ class Nodes(NamedTuple):
 
 
 class State(NamedTuple):
-    """Where m models are; rows of the threads of all blocks, in order, in `note` and `power`."""
+    """Where m models are; rows of the threads of all blocks, in order, in `note` and `sums`."""
 
     u: Any  # (m, n, 3)
     v: Any
@@ -65,7 +65,7 @@ class State(NamedTuple):
     angle: Any  # (m, nh)
     wrong: Any  # (m,) int64
     note: Any  # (threads, columns)
-    power: Any  # (threads, 2)
+    sums: Any  # (threads, 4) powers in and out at the last step, W; work and dissipated so far, J
     barrier: Any  # (1,) int64
 
 
@@ -79,13 +79,13 @@ class Written(NamedTuple):
 
 
 class Span(NamedTuple):
-    """Steps of a launch."""
+    """Steps of a launch, of m models; none where the last one is before the first."""
 
-    first: int
-    last: int
-    dt: float
-    every: int
-    sample: int  # number of the next sample, and of the first one in this launch
+    first: Any  # (m,)
+    last: Any
+    dt: Any
+    every: Any
+    sample: Any  # (m,) number of the next sample, and of the first one in this launch
 
 
 @on_device
@@ -266,14 +266,18 @@ def kernel(method: str, wide: bool, shared: bool) -> Any:
         )
         strain = cuda.local.array(MOST_GROUPS, float64)
         force = cuda.local.array(3, float64)
-        arrived, sample, wrong = 0, span.sample, 0
-        work_in, work_out, dt = 0.0, 0.0, span.dt
-        before_in, before_out = state.power[thread, 0], state.power[thread, 1]
+        first_step, last_step, every = span.first[m], span.last[m], span.every[m]
+        dt, first_sample = span.dt[m], span.sample[m]
+        arrived, sample, wrong = 0, first_sample, 0
+        for g in range(groups):
+            strain[g] = 0.0
+        sums = state.sums[thread]
+        before_in, before_out, work_in, work_out = sums[0], sums[1], sums[2], sums[3]
         for i in range(who, n, crowd):
             for c in range(3):
                 ut[i, c], vt[i, c] = u[i, c], v[i, c]
-        for step in range(span.first, span.last + 1):
-            sampled = step == sample * span.every
+        for step in range(first_step, last_step + 1):
+            sampled = step == sample * every
             part_in, part_out, kinetic = 0.0, 0.0, 0.0
             for stage in range(stages):
                 h = dt
@@ -299,12 +303,12 @@ def kernel(method: str, wide: bool, shared: bool) -> Any:
                     strain,
                 )  # fmt: skip
                 wrong += jumped
-                power_in, time = 0.0, per_step * (step - span.first) + (stage + 1) // 2
+                power_in, time = 0.0, per_step * (step - first_step) + (stage + 1) // 2
                 if wide:
                     arrived = meet(state, blocks, arrived)
                 else:
                     cuda.syncthreads()
-                ends = runge and step == span.last
+                ends = runge and step == last_step
                 for i in range(who, n, crowd):
                     sum_to(nodes, slot, size, i, force)
                     for c in range(3):
@@ -319,7 +323,7 @@ def kernel(method: str, wide: bool, shared: bool) -> Any:
                             v[i, c] += 0.5 * h * a
                             wrong += not abs(v[i, c]) < math.inf
                         if looks:
-                            k, now = sample - span.sample, v[i, c]
+                            k, now = sample - first_sample, v[i, c]
                             kinetic += 0.5 * mass[i] * now * now
                             out.u[m, k, nodes.order[i], c] = u[i, c]
                             out.v[m, k, nodes.order[i], c] = now
@@ -348,17 +352,17 @@ def kernel(method: str, wide: bool, shared: bool) -> Any:
                 if looks:
                     note_down(state, thread, groups, strain, kinetic, work_out, work_in)
                     cuda.syncthreads()
-                    add_notes(state, out.energy[sample - span.sample], groups + 3)
+                    add_notes(state, out.energy[sample - first_sample], groups + 3)
                     sample += 1
                 if ends:
                     break
                 weight = 2.0 if stage == 1 or stage == 2 else 1.0
                 part_in += weight * power_in
                 part_out += weight * power_out
-            if runge and step < span.last:
+            if runge and step < last_step:
                 work_in += dt / 6.0 * part_in
                 work_out += dt / 6.0 * part_out
-        state.power[thread, 0], state.power[thread, 1] = before_in, before_out
+        sums[0], sums[1], sums[2], sums[3] = before_in, before_out, work_in, work_out
         cuda.syncthreads()  # the notes of a last sample are added up
         note_down(state, thread, groups, strain, 0.0, work_out, work_in)
         cuda.syncthreads()

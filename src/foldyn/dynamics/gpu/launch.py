@@ -19,7 +19,8 @@ from foldyn.dynamics.system import Packed
 
 BLOCK = 128  # threads of a block of a grid with one model
 FEWEST, MOST = 64, 256  # of a block with a model of its own: few, unless models are few
-WINDOW = 0.25  # of the free memory: samples of a launch
+WINDOW = 0.25  # of the free memory: samples of a launch,
+SAMPLES = 2.0**30  # bytes, and at most so many, which the processor holds too
 FACTORS = 2**28  # bytes: factors of a launch
 LOOKS = {"rk4": (0.0, 0.5, 1.0), "central_difference": (0.0,)}  # in a step, at the loads
 
@@ -30,7 +31,7 @@ class Places(NamedTuple):
     u: NDArray  # (m, n, 3)
     v: NDArray
     carry: NDArray  # (m, n, 3) acceleration, for methods that keep it
-    power: NDArray  # (m, 2) likewise
+    sums: NDArray  # (m, 4) of `State`, or (threads, 4) as the same launches had them
     angle: NDArray  # (m, nh)
 
 
@@ -40,6 +41,8 @@ class Launches:
     Parameters
     ----------
     cases : sequence of Packed
+    plans : sequence of StepPlan
+        Their steps, which may differ.
     method : str
         One of `checks.METHODS`.
     places : Places
@@ -53,8 +56,14 @@ class Launches:
         The card has no memory for them.
     """
 
-    def __init__(self, cases: Sequence[Packed], method: str, places: Places, wide: bool) -> None:
+    def __init__(
+        self, cases: Sequence[Packed], plans: Sequence[StepPlan], method: str, places: Places,
+        wide: bool,
+    ) -> None:  # fmt: skip
         host, self._cases, self._method, self._wide = CaseArrays(cases), cases, method, wide
+        self._plans = plans
+        self._dt = np.array([plan.dt for plan in plans])
+        self._every = np.array([plan.every for plan in plans])
         self._counts, self._count = host.counts, len(cases)
         n, slots = host.counts.nodes, host.counts.slots
         room = 8 * (3 * slots + 6 * n)
@@ -76,14 +85,18 @@ class Launches:
         self._shape, self._shared = (self._count, n), shared
         self._supported = len(cases[0].system.supported)
         self._compiled: Any = None
+        self._from = places
         self._start(places)
 
-    def _histories(self) -> list[tuple[Packed, int]]:
-        """Distinct histories; `_of_case` gets their numbers by the rows of each case."""
+    def _histories(self) -> list[tuple[int, int] | None]:
+        """Distinct histories at distinct steps, as (case, row); None of constant ones.
+
+        `_of_case` gets their numbers by the rows of each case.
+        """
         numbers: dict[Any, int] = {}
-        found: list[tuple[Packed, int]] = []
+        found: list[Any] = []
         self._of_case = []
-        for packed in self._cases:
+        for k, (packed, plan) in enumerate(zip(self._cases, self._plans, strict=True)):
             waves, rows = packed.system.waves, []
             for row, code in enumerate(waves.code):
                 own = slice(waves.first[row], waves.first[row + 1])
@@ -92,12 +105,15 @@ class Launches:
                     waves.parameters[row].tobytes(),
                     waves.knot[own].tobytes(),
                     waves.cubic[own].tobytes(),
+                    *(plan.start, plan.dt, plan.steps, plan.every),
                 )
                 if code == CALLED:
                     key = id(packed), row
+                elif not packed.system.varies:
+                    key = None
                 if key not in numbers:
                     numbers[key] = len(found)
-                    found.append((packed, row))
+                    found.append((k, row) if key else None)
                 rows.append(numbers[key])
             self._of_case.append(np.array(rows, np.int64))
         return found
@@ -106,7 +122,7 @@ class Launches:
         (m, n), slots = self._shape, self._counts.slots
         hinges = places.angle.shape[1]
         if SIMULATED:
-            self._threads, self._blocks = 4, 1 if self._wide else m
+            self._threads, self._blocks = 2, 1 if self._wide else m
         elif not self._wide:
             idle = cuda.get_current_device().MULTIPROCESSOR_COUNT // m
             self._threads = FEWEST if idle < 1 else MOST
@@ -123,50 +139,58 @@ class Launches:
         """Put the models there."""
         m, n = self._shape
         threads = self._blocks * self._threads
-        power = np.zeros((threads, 2))
-        power[:: threads if self._wide else self._threads] = places.power
+        sums = places.sums
+        if len(sums) != threads:
+            total = sums.reshape(m, -1, 4).sum(axis=1)
+            sums = np.zeros((threads, 4))
+            sums[:: threads if self._wide else self._threads] = total
         memory, put = cuda.device_array, card.put
         self._state = State(
             u=put(places.u), v=put(places.v), first=put(places.carry), second=memory((m, n, 3)),
             ahead_u=memory(self._ahead), ahead_v=memory(self._ahead), slot=memory(self._slot),
             angle=put(places.angle), wrong=put(np.zeros(m, np.int64)),
-            note=memory((threads, self._counts.groups + 3)), power=put(power),
+            note=memory((threads, self._counts.groups + 3)), sums=put(sums),
             barrier=put(np.zeros(1, np.int64)),
         )  # fmt: skip
 
-    def fits(self, plan: StepPlan) -> int:
-        """Steps of one launch, at most: samples and factors must have room on the card."""
+    def fits(self) -> NDArray:
+        """Steps (m,) of one launch, at most: samples and factors must have room on the card."""
         (m, n), looks = self._shape, len(LOOKS[self._method])
         sample = 8.0 * m * (6 * n + self._supported) + 8.0 * self._blocks * 11
-        samples = max(1, int(WINDOW * card.free_memory() / sample))
+        samples = max(1, int(min(SAMPLES, WINDOW * card.free_memory()) / sample))
         factors = max(1, int(FACTORS / (8 * looks * max(1, len(self._rows)))))
-        return min(samples * plan.every, factors)
+        return np.minimum(samples * self._every, factors)
 
-    def _factors(self, plan: StepPlan, first: int, last: int) -> NDArray:
+    def _factors(self, first: NDArray, last: NDArray) -> NDArray:
         """Factors of all histories (h, looks) of these steps."""
-        looks = np.array(LOOKS[self._method]) * plan.dt
-        times = (plan.start + np.arange(first, last + 1)[:, None] * plan.dt + looks).ravel()
-        out = np.ones((len(self._rows), len(times)))
-        for k, (packed, row) in enumerate(self._rows):
-            if packed.system.varies:
-                out[k] = waveform_table(packed.system.waves, row, times)[0]
+        looks = np.array(LOOKS[self._method])
+        out = np.ones((len(self._rows), len(looks) * max(1, int((last - first).max() + 1))))
+        for own, found in zip(out, self._rows, strict=True):
+            if found is None:
+                continue
+            k, row = found
+            plan, packed = self._plans[k], self._cases[k]
+            steps = np.arange(first[k], last[k] + 1)[:, None]
+            times = (plan.start + steps * plan.dt + looks * plan.dt).ravel()
+            own[: len(times)] = waveform_table(packed.system.waves, row, times)[0]
         return out
 
-    def run(self, plan: StepPlan, first: int, last: int, sample: int) -> tuple[Written, NDArray]:
-        """Do the steps from first to last; samples from number `sample` on.
+    def run(self, first: NDArray, last: NDArray, sample: NDArray) -> tuple[Written, NDArray]:
+        """Do the steps (m,) from first to last; samples from number `sample` (m,) on.
 
-        Returns the samples as arrays of the host, their energies (k + 1, m, columns) since the
-        start of the launch, the last row at its end; and which models (m,) went wrong.
+        Returns the samples as arrays of the host, their energies (k + 1, m, columns), the last row
+        at the end of the launch; and which models (m,) went wrong. There is room for as many
+        samples of each model as one of them has.
         """
         m, n = self._shape
-        count = max(0, last // plan.every + 1 - sample)
+        count = max(0, int((last // self._every + 1 - sample).max()))
         room = max(1, count)
         out = Written(
             cuda.device_array((m, room, n, 3)), cuda.device_array((m, room, n, 3)),
             cuda.device_array((m, room, max(1, self._supported))), self._energies(count),
         )  # fmt: skip
-        span = Span(first, last, plan.dt, plan.every, sample)
-        factor = cuda.to_device(self._factors(plan, first, last))
+        span = card.put(Span(first, last, self._dt, self._every, sample))
+        factor = cuda.to_device(self._factors(first, last))
         self._state.barrier.copy_to_device(np.zeros(1, np.int64))
         if not SIMULATED and self._compiled is None:
             self._fit_grid(
@@ -199,14 +223,11 @@ class Launches:
             most = int(made.max_cooperative_grid_blocks(self._threads))
             items = max(self._shape[1], self._hinges)
             blocks = max(1, min(most, math.ceil(items / self._threads)))
-            places = self.places()
             self._blocks = blocks
-            self._set(places)
+            self._set(self._from)
 
     def places(self) -> Places:
         """Where the models are."""
-        state, m = self._state, self._shape[0]
-        power = state.power.copy_to_host().reshape(m, -1, 2).sum(axis=1)
-        arrays = (array.copy_to_host() for array in (state.u, state.v, state.first, state.angle))
-        u, v, carry, angle = arrays
-        return Places(u, v, carry, power, angle)
+        state = self._state
+        arrays = state.u, state.v, state.first, state.sums, state.angle
+        return Places(*(array.copy_to_host() for array in arrays))

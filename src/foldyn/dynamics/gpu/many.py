@@ -1,64 +1,118 @@
-"""Motions of many models of one topology on the card, each in a block of threads."""
+"""Motions of many models on the card, each in a block of threads."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.dynamics.gpu.arrays import topology
+from foldyn.dynamics.gpu.checks import METHODS, lacking
+from foldyn.dynamics.gpu.engine import InBlocks
 from foldyn.dynamics.gpu.launch import Launches, Places
 from foldyn.dynamics.motion import Motion
-from foldyn.dynamics.motion_state import Samples
-from foldyn.errors import ComputationError
+from foldyn.errors import ComputationError, InputError
+
+AT_ONCE = 16384  # models: more are no quicker
 
 
-def integrate(motions: Sequence[tuple[int, Motion]], out: Samples) -> set[int]:
-    """Integrate motions of one topology and plan; numbers of those that go wrong.
+def integrate(motions: Sequence[Motion]) -> set[int]:
+    """Integrate motions, which have room for their samples; numbers of those that go wrong.
 
-    motions : with their numbers in `out`.
-    out : room for samples: times (k,), the others (m, k, ...).
+    Those with the same topology and method run at a time; their steps may differ.
     """
-    numbers, own = zip(*motions, strict=True)
-    plan, method = own[0].plan, own[0].method.name
-    courses = [motion.course for motion in own]
+    alike: dict[Any, list[int]] = {}
+    known: dict[int, Any] = {}  # of what several starts share
+    for k, motion in enumerate(motions):
+        packed = motion.packed
+        if id(packed) not in known:
+            known[id(packed)] = topology(packed)
+        alike.setdefault((motion.method.name, known[id(packed)]), []).append(k)
+    wrong = set[int]()
+    for own in alike.values():
+        for first in range(0, len(own), AT_ONCE):
+            some = own[first : first + AT_ONCE]
+            sound = _integrated([motions[k] for k in some])
+            wrong |= {k for k, well in zip(some, sound, strict=True) if not well}
+    return wrong
+
+
+def integrate_prepared(motions: Sequence[Motion]) -> set[int]:
+    """Integrate those of motions that have GPU kernels; numbers of those that went well."""
+    taken = [k for k, motion in enumerate(motions) if _is_taken(motion)]
+    wrong = integrate([motions[k] for k in taken])
+    for k in wrong:  # which the CPU shall name
+        motions[taken[k]].device = "cpu"
+    return {k for number, k in enumerate(taken) if number not in wrong}
+
+
+def _is_taken(motion: Motion) -> bool:
+    """Whether a motion has kernels, and room for its samples."""
+    if motion.method.name not in METHODS or lacking(motion.case, motion.packed):
+        return False
+    with suppress(InputError):  # which the CPU shall name
+        motion.make_room()
+        return True
+    return False
+
+
+def _integrated(motions: Sequence[Motion]) -> NDArray:
+    """Integrate motions of one topology and method; which of them (m,) went well."""
+    clock = time.perf_counter()
+    plans, method = [motion.plan for motion in motions], motions[0].method
+    courses = [motion.course for motion in motions]
     u, v, carry, angle = (
         np.stack([getattr(course, name) for course in courses])
         for name in ("u", "v", "carry", "angle")
     )
-    places = Places(u, v, carry, np.zeros((len(own), 2)), angle)
-    launches = Launches([motion.packed for motion in own], method, places, wide=False)
-    sound, done, sample = np.ones(len(own), bool), 0, 0
-    at, totals = np.array(numbers), np.zeros((len(own), 2))
-    while sound.any() and (done < plan.steps or not sample):
-        checked = done - done % own[0].recheck_after + own[0].recheck_after
-        last = min(plan.steps, checked, done + launches.fits(plan))
-        first = done + (method == "central_difference" and done > 0)
-        written, wrong = launches.run(plan, first, last, sample)
-        count = written.u.shape[1]
-        rows = slice(sample, sample + count)
-        for array, found in zip(out[1:4], written[:3], strict=True):
-            array[at, rows] = found
+    places = Places(u, v, carry, np.zeros((len(motions), 4)), angle)
+    launches = Launches([motion.packed for motion in motions], plans, method.name, places, False)
+    steps = np.array([plan.steps for plan in plans])
+    between = np.array([motion.recheck_after for motion in motions])
+    done, sample = np.zeros((2, len(motions)), np.int64)
+    sound = np.ones(len(motions), bool)
+    while (moving := sound & ((done < steps) | (sample == 0))).any():
+        checked = done - done % between + between
+        last = np.minimum(np.minimum(steps, checked), done + launches.fits())
+        first = done + ((method.name == "central_difference") & (done > 0))
+        first = np.where(moving, first, last + 1)
+        written, wrong = launches.run(first, last, sample)
         energy = np.moveaxis(written.energy, 0, 1) + 0.0  # (m, k + 1, columns)
-        energy[:, :, -2:] += totals[:, None]
-        totals = energy[:, -1, -2:].copy()
-        out.energy[at, rows] = energy[:, :-1]
         sound &= ~wrong & np.isfinite(energy).all(axis=(1, 2))
-        sample, done = sample + count, last
-        if done == checked or done == plan.steps:
-            u = launches.places().u if done < plan.steps else u
-            for k in np.flatnonzero(sound):
-                sound[k] = _is_sound(own[k], u[k], sample, done)
-    return {number for number, well in zip(numbers, sound, strict=True) if not well}
+        for k in np.flatnonzero(moving).tolist():
+            count = int(last[k]) // plans[k].every + 1 - int(sample[k])
+            rows, out = slice(int(sample[k]), int(sample[k]) + count), motions[k].output.window
+            out.displacement[rows] = written.u[k, :count]
+            out.velocity[rows] = written.v[k, :count]
+            out.reaction[rows], out.energy[rows] = written.reaction[k, :count], energy[k, :count]
+            sample[k] += count
+            tally = courses[k].tally
+            tally.steps, tally.samples = last[k], sample[k]
+            tally.time = plans[k].start + last[k] * plans[k].dt
+            tally.evaluations = method.evaluations * last[k]
+        done = np.where(moving, last, done)
+        look = moving & sound & ((done == checked) | (done == steps))
+        if look.any():
+            u = launches.places().u if (done < steps).any() else u
+            for k in np.flatnonzero(look).tolist():
+                sound[k] = _is_sound(motions[k], u[k])
+    share, engine = (time.perf_counter() - clock) / len(motions), InBlocks()
+    for motion, plan in zip(motions, plans, strict=True):
+        times = plan.start + np.arange(motion.stored) * plan.every * plan.dt
+        motion.output.window.time[: motion.stored] = times
+        motion.integrated_by(engine, share)
+    return sound
 
 
-def _is_sound(motion: Motion, u: NDArray, samples: int, step: int) -> bool:
-    """Whether a motion can go on after a step: it is audited as if it were alone."""
-    motion.course.tally.samples = samples
+def _is_sound(motion: Motion, u: NDArray) -> bool:
+    """Whether a motion can go on: it is audited as if it were alone."""
     with suppress(ComputationError):
         motion.audit()
-        if step < motion.plan.steps:
+        if motion.course.tally.steps < motion.plan.steps:
             motion.recheck(motion.packed.numbering.outward(u))
         return True
     return False

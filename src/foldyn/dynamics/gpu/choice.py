@@ -1,0 +1,47 @@
+"""Whether motions of many models are computed on a GPU where the user leaves that open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from foldyn.dynamics.gpu.checks import METHODS, lacking, no_card
+from foldyn.dynamics.motion import Motion
+
+DEVICES = "auto", "cpu", "gpu"
+FEWEST = 10  # models
+LARGEST = 3000  # dofs: of larger ones a block of threads is too slow
+EVALUATION = 35e-9  # s of a dof's forces: of a processor's core, and of a block of threads
+ABREAST = 200  # blocks that are as quick as one
+COMPILING = 12.0  # s
+
+
+def choose(
+    motions: Sequence[Motion], count: int, cores: float, preparing: float = 0.0
+) -> tuple[str, str]:
+    """The device, "cpu" or "gpu", on which motions are done sooner, and why.
+
+    count : how many there are; `motions` stand for them.
+    cores : as many processors compute instead, each one motion at a time.
+    preparing : what each takes beside its steps (s), for a GPU one after the other.
+    """
+    if count < FEWEST:
+        return "cpu", f"a GPU pays from {FEWEST} models on"
+    method = motions[0].method.name
+    if method not in METHODS:
+        return "cpu", f"{method} has no GPU kernel"
+    dofs = 3 * max(motion.packed.system.rows for motion in motions)
+    if dofs > LARGEST:
+        return "cpu", f"models of more than {LARGEST} dofs are too large for a GPU's blocks"
+    each = [motion.plan.steps * motion.method.evaluations * EVALUATION * dofs for motion in motions]
+    alone = count * (sum(each) / len(each) + preparing) / min(cores, count)
+    beside = COMPILING + max(each) * max(1.0, count / ABREAST) + count * preparing
+    seconds = f"about {beside:.2g} s on a GPU, {alone:.2g} s on processors"
+    if alone < beside:
+        return "cpu", seconds
+    known = {id(motion.packed): motion for motion in motions}
+    for motion in known.values():
+        if lack := lacking(motion.case, motion.packed):
+            return "cpu", f"{lack} has no GPU kernel"
+    if why := no_card():
+        return "cpu", why.partition(";")[0]
+    return "gpu", seconds
