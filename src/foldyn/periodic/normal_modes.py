@@ -22,7 +22,7 @@ from foldyn.periodic.equation import Equation
 from foldyn.periodic.families import Free, InResonance
 from foldyn.periodic.floquet import STEPS, is_stable, multipliers
 from foldyn.periodic.fourier import Fourier, values_of
-from foldyn.periodic.motion import balance_of, on_modes, warn_of_truncation
+from foldyn.periodic.motion import balance_of, on_modes, warn_of_crossing, warn_of_truncation
 from foldyn.periodic.orbit import FINE, Orbit
 from foldyn.periodic.start import FLOOR, balanced, equilibrium, linear_response
 from foldyn.ram_limit import check_memory
@@ -160,6 +160,7 @@ def backbone(
     values = _values(orbits, place) if not damped else _damped_values(orbits)
     values["amplitude"] = np.array([_largest(orbit, place) for orbit in orbits])
     warn_of_truncation(float(values["truncation"].max()), balance.fourier.harmonics, "harmonics")
+    warn_of_crossing(orbits)
     facts["wall_seconds"] = time.perf_counter() - began
     return points_dataset("backbone", case, values, facts)
 

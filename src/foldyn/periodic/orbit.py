@@ -8,12 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.periodic.balance import Balance
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.fourier import Fourier, values_of
+from foldyn.results.crossings import crossings_of
 
 SHOWN = 128  # samples of a period in results
 FINE = 256  # samples among which extremes are sought
+BARELY = 1e-3  # of a gap, which is left between two samples of motions that do not cross
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +69,21 @@ class Orbit:
         found[1:] *= 2.0
         return found
 
+    def crosses(self) -> bool:
+        """Whether in the motion something passes through what it should touch."""
+        case, body = self.equation.case, self.equation.body
+        if case.contact is None:
+            return False
+        phase = 2.0 * np.pi * np.arange(SHOWN + 1) / SHOWN
+        at = self.equation.at(self.multiple * phase, self.level)
+        u = at.displacements(values_of(self.amplitudes, phase))
+        if len(crossings_of(case, self.displacement(phase[:1])).crossed):
+            return True
+        terms = [body.displaced(moved).term(ContactTerm) for moved in at.planes[:-1]]
+        steps, moves = np.diff(u, axis=0), np.diff(at.planes, axis=0)
+        along = zip(terms, u[:-1], steps, moves, strict=True)
+        return any(term.clear(*part, BARELY) < 1.0 for term, *part in along)
+
     def truncation(self) -> float:
         """What twice as many harmonics would add, as a fraction of the motion, estimated.
 
@@ -75,7 +93,10 @@ class Orbit:
         fourier = Fourier(2 * kept + 1)  # even ones alone may vanish by symmetry
         balance = Balance(equation, fourier, self.multiple)
         x, at = fourier.real_of(self.amplitudes), balance.instants(self.level)
-        missing = fourier.complex_of(balance.residual(x, self.omega, at))[kept + 1 :]
+        left = balance.residual(x, self.omega, at)
+        if not np.isfinite(left).all():  # between its own samples it goes through what it touches
+            return np.inf
+        missing = fourier.complex_of(left)[kept + 1 :]
         few = equation.at(self.multiple * fourier.phase[::4], self.level)
         mean = few.tangents(fourier.values[::4] @ x).mean(axis=0)
         w, added = self.omega / self.multiple, 0.0

@@ -31,7 +31,7 @@ from foldyn.periodic.continuation import (
 from foldyn.periodic.families import ByFrequency, ByLevel
 from foldyn.periodic.floquet import STEPS, is_stable, multipliers
 from foldyn.periodic.fourier import Fourier
-from foldyn.periodic.motion import balance_of, warn_of_truncation
+from foldyn.periodic.motion import NAMED, balance_of, warn_of_crossing, warn_of_truncation
 from foldyn.periodic.orbit import measured
 from foldyn.periodic.start import balanced, coefficients
 from foldyn.results import Quantity
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
 FIRST = 0.2  # of the longest step
 AWAY = 0.05  # of the motion: how far a branch is entered
 APART = 1e-2  # from 1: multiplier of a fold that is none
-NAMED = 5  # folds that a warning lists
 MEETS = 1e-4  # of the range of the parameter: where branches meet at one point
 
 
@@ -137,7 +136,8 @@ def response_curve(
     -----
     FoldynWarning
         A branch is lost, or has too many points (those found are kept); too few harmonics: what
-        twice as many would add, or folds at which no multiplier is 1.
+        twice as many would add, or folds at which no multiplier is 1; motions that pass through
+        what they touch.
     """
     began = time.perf_counter()
     of_kind("case", case, Case)
@@ -338,6 +338,7 @@ def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
     _warn_of_folds(tracer.found)
     harmonics = tracer.found[0].family.balance.fourier.harmonics
     warn_of_truncation(float(truncation.max()), harmonics, "harmonics")
+    warn_of_crossing(orbits)
     facts = {
         "by": tracer.by,
         "harmonics": harmonics,

@@ -66,7 +66,9 @@ class Tangents:
                 kept, place = self._own[k]
                 data += np.bincount(place, term.entries(u)[kept], len(data))
             else:
-                rest = term.tangent(u) if rest is None else rest + term.tangent(u)
+                found = term.tangent(u)
+                if found.nnz:  # what touches nothing has no stiffness
+                    rest = found if rest is None else rest + found
         if self._vectors is None:
             out[:] = 0.0
             out.reshape(-1)[self._union] = data
