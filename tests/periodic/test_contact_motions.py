@@ -8,17 +8,17 @@ from duffing import NODE, oscillator
 
 import foldyn as fd
 from foldyn.attractors.drive import at_frequency, at_level, drive_frequency
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynWarning
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.orbit import Orbit
 
 F = 0.2
 
 
-def bouncing(force=F, friction=0.0, **plane):
+def bouncing(force=F, **plane):
     """The oscillator above a plane, which it meets 0.05 below rest."""
     ground = fd.Plane((0, 0, -0.2), (0, 0, 1), **plane)
-    touching = fd.Contact(0.3, friction, 3.0, panels=False, planes=[ground])
+    touching = fd.Contact(0.3, stiffness=3.0, panels=False, planes=[ground])
     return oscillator(force, F, alpha=0.6).altered(contact=touching)
 
 
@@ -106,8 +106,3 @@ def test_motions_through_the_plane_are_told():
     for swing, crosses in ((0.19, False), (0.21, True)):
         through[1] = swing
         assert Orbit(equation, through, 1.0).crosses() is crosses
-
-
-def test_friction_is_refused():
-    with pytest.raises(InputError, match="contact.friction: .* on how it got there"):
-        fd.periodic_motion(bouncing(friction=0.3))

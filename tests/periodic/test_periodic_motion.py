@@ -186,7 +186,9 @@ REFUSED = {
     "no multiple": fold([PUSH, fd.Force([1], (1e-3, 0, 0), history=fd.Harmonic(0.5))]),
     "needs supports": fd.Case(fold().structure, loads=[PUSH]),
     "constant matrix": fd.Case(fold().structure, fold().supports, [PUSH], fd.StrainDamping(1e-3)),
-    "smooth forces": fd.Case(fold().structure, fold().supports, [PUSH], contact=fd.Contact()),
+    "on how it got there": fd.Case(
+        fold().structure, fold().supports, [PUSH], contact=fd.Contact(friction=0.3)
+    ),
     "unknowns without mass": fd.Case(
         fd.shell(fd.patterns.simple_fold(**PANEL), fd.Sheet(1e6, 0.25, 0.01, 1.0), divisions=2),
         [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")], [PUSH],

@@ -164,11 +164,11 @@ def located(
         if ahead_by not in found:
             reached = ahead(family, point, ahead_by)
             if reached is None:
-                raise ArithmeticError
+                return value(other)  # look before it
             found[ahead_by] = reached
         return value(found[ahead_by])
 
-    with suppress(ArithmeticError, ValueError):
+    with suppress(ValueError):
         brentq(at, 0.0, length, xtol=LOCATED * length, rtol=1e-14, maxiter=60)
     return min(found.values(), key=lambda one: abs(value(one)))
 

@@ -47,6 +47,8 @@ class Equation:
         Displacements where all unknowns and the drive are zero, m.
     whole : Equation
         That of which this is a reduction; itself if it is none.
+    tangents : Tangents
+        Of the body on the unknowns.
     mass, damping : (k, k)
         M (kg) and C (N s/m).
     alpha : float
@@ -64,7 +66,7 @@ class Equation:
         self.basis = sparse.csr_array(sparse.csc_array(whole)[:, free])
         self.size, self.offset = len(free), np.zeros(total)
         self.whole: Equation = self
-        self._tangents = Tangents(self.body, self.basis, None if case.constraints else free)
+        self.tangents = Tangents(self.body, self.basis, None if case.constraints else free)
         nodal = mass_of(case)
         self.mass = self.projected(nodal)
         terms = damping_terms(case, None, modal_rows(case)) if driven else []
@@ -163,7 +165,7 @@ class Instants:
         equation, following = self.equation, self.equation._following
         out = np.zeros((len(x), equation.size, equation.size))
         for j, u, body in self._each(x):
-            equation._tangents.put(body, u, out[j])
+            equation.tangents.put(body, u, out[j])
             if following.acts:
                 added = following_tangent(following, u, self._factor[j])
                 out[j] += equation.projected(added)

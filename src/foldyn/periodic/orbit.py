@@ -131,6 +131,21 @@ class Orbit:
         return float(np.linalg.norm(added) / np.linalg.norm(fourier.complex_of(x)[1:]))
 
 
+def along(orbits: list[Orbit]) -> dict[str, NDArray]:
+    """What the points of a curve or a backbone have: amplitudes of all nodes, and errors."""
+    nodes = [orbit.node_amplitudes() for orbit in orbits]
+    coefficient = np.zeros((len(nodes), max(map(len, nodes)), *nodes[0].shape[1:]), complex)
+    for row, own in zip(coefficient, nodes, strict=True):
+        row[: len(own)] = own
+    found = {
+        "coefficient": coefficient,
+        "truncation": np.array([orbit.truncation() for orbit in orbits]),
+    }
+    if orbits[0].equation.whole is not orbits[0].equation:
+        found["reduction"] = np.array([orbit.reduction() for orbit in orbits])
+    return found
+
+
 def swing(values: NDArray) -> NDArray:
     """Half the distance (...) between the extremes of samples (s, ...) of a period.
 

@@ -104,7 +104,7 @@ def _projected(
         for shape, history in equation.drive.moves
     ]
     free = None if equation.case.constraints else equation.case.free_dofs
-    out._tangents = Tangents(equation.body, equation.basis, free, basis)
+    out.tangents = Tangents(equation.body, equation.basis, free, basis)
     out.basis = equation.basis @ basis
     out.offset = equation.basis @ place
     out.size = basis.shape[1]

@@ -132,19 +132,19 @@ def _grown(balance: Balance, x: NDArray, omega: float, tolerance: float, level: 
     family = ByLevel(balance, level, tolerance, omega / TURN)
     still = np.zeros(balance.shape)
     still[0] = x[0]
-    share, begin = 0.0, (still + SMALL * (x - still)).ravel()
-    first = newton(AtFrequency(balance, omega, SMALL * level), begin, tolerance)
+    begin = (still + SMALL * (x - still)).ravel()
+    first, share = newton(AtFrequency(balance, omega, SMALL * level), begin, tolerance), 0.0
     if first is not None:
-        spent, along = first.iterations, np.append(np.zeros(x.size), 1.0)
-        point = point_at(family, first.x, SMALL * level, along)
-        for step in steps(family, point, GROWING, lambda point: point.p / level - 1.0):
+        spent, ahead = first.iterations, np.append(np.zeros(x.size), 1.0)
+        top = point_at(family, first.x, SMALL * level, ahead)  # of the largest drive
+        for step in steps(family, top, GROWING, lambda point: point.p / level - 1.0):
             if not isinstance(step, Step) or step.after.p < 0.0:
                 break
-            share, spent = max(share, step.after.p / level), spent + step.after.iterations
-            if step.last:
-                found = newton(AtFrequency(balance, omega, level), step.after.z, tolerance)
-                if found is not None:
-                    return Converged(found.x, spent + found.iterations)
+            spent += step.after.iterations
+            top = max(top, step.after, key=lambda point: point.p)
+        found, share = newton(AtFrequency(balance, omega, level), top.z, tolerance), top.p / level
+        if found is not None:
+            return Converged(found.x, spent + found.iterations)
     raise ComputationError(
         f"frequency = {omega / TURN:g} Hz: no periodic motion is found; the search ends at "
         f"{share:.2g} of the drive. Remedies: another start (a motion at a frequency nearby, or a "

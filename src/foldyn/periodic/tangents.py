@@ -33,7 +33,7 @@ class Tangents:
         self, body: Assembly, basis: sparse.csr_array, free: NDArray | None,
         vectors: NDArray | None = None,
     ) -> None:  # fmt: skip
-        self._basis, self._vectors, size = basis, vectors, basis.shape[1]
+        self._basis, self._free, self._vectors, size = basis, free, vectors, basis.shape[1]
         kept: dict[int, tuple[NDArray, NDArray]] = {}  # of the sheet (-1) and of terms
         if free is not None:
             rank = np.full(body.size, -1)
@@ -50,6 +50,10 @@ class Tangents:
         ends = np.searchsorted(row, np.arange(size + 1))
         zeros = np.zeros(len(column))
         self._matrix = sparse.csr_array((zeros, column, ends), (size, size))
+
+    def of(self, body: Assembly) -> Tangents:
+        """Those of another body on the same unknowns."""
+        return Tangents(body, self._basis, self._free, self._vectors)
 
     def put(self, body: Assembly, u: NDArray, out: NDArray) -> None:
         """Put the tangent at displacements u (m,) into `out`."""
