@@ -1,5 +1,7 @@
 """The absorber of a Duffing oscillator, whose resonance breaks up at a Neimark-Sacker point."""
 
+from pathlib import Path
+
 import absorber
 import numpy as np
 import pytest
@@ -8,6 +10,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import foldyn as fd
+from foldyn.periodic.balance import AtFrequency, newton
+from foldyn.periodic.motion import balance_of
 
 TURN = 2.0 * np.pi
 
@@ -87,3 +91,19 @@ def test_motions_before_it_are_steady_and_beyond_it_quasi_periodic(curve):
     near = np.abs(np.arange(len(spectrum)) - line) <= 3
     multiples = np.abs((np.arange(len(spectrum)) / line + 0.5) % 1.0 - 0.5) * line <= 5
     assert (spectrum[~multiples] ** 2).sum() < 0.01 * (spectrum[near] ** 2).sum()  # no chaos
+
+
+def test_motions_are_those_of_pyharm():
+    """Its coefficients, of all branches, solve our equation but for the last digits."""
+    rows = np.loadtxt(Path(absorber.__file__).with_name("absorber_by_pyharm.csv"), delimiter=",")
+    harmonics = 7
+    balance = balance_of(absorber.case(), "a test", harmonics)
+    assert np.ptp(rows[:, 0]) > 0.39  # rad/s
+    amplitudes = rows[:, 1:].reshape(len(rows), 2, -1)
+    cosines, sines = np.split(amplitudes, [harmonics + 1], axis=2)
+    theirs = cosines.astype(complex)
+    theirs[:, :, 1:] -= 1j * sines
+    for omega, both in zip(rows[:, 0], theirs, strict=True):
+        x = balance.fourier.real_of(both.T)
+        found = newton(AtFrequency(balance, omega), x.ravel(), 1e-9)
+        assert np.linalg.norm(found.x - x.ravel()) < 1e-6 * np.linalg.norm(x)
