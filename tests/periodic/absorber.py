@@ -24,7 +24,7 @@ STAND = 3, 4  # what the absorber stands on, which moves with X
 @cache
 def structure():
     one = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.8, 0]])
-    pattern = fd.Pattern(np.vstack([one, one + [0, 2, 0]]), [[0, 1, 2], [3, 4, 5]])
+    pattern = fd.Pattern(np.vstack([one, one + np.array([0, 2, 0])]), [[0, 1, 2], [3, 4, 5]])
 
     def of(modulus):
         thin = fd.PanelSheet([1], thickness=0.01 * CUBIC[1] / CUBIC[0])

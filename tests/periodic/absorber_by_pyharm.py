@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 from absorber import CUBIC, DASHPOT, FORCE, MASS, STIFFNESS
-from pyHarm.Maestro import Maestro
 
 HARMONICS, SAMPLES, KEPT = 7, 256, 20
 ENDS = 0.9, 1.3  # rad/s
@@ -22,6 +21,8 @@ def chain(own, between):
 
 def computed():
     """Rows (p, 1 + 2 (2 harmonics + 1)) of converged points."""
+    from pyHarm.Maestro import Maestro
+
     inputs = {
         "system": {"type": "Base", "nh": HARMONICS, "nti": SAMPLES},
         "substructures": {
@@ -34,7 +35,9 @@ def computed():
             }
         },
         "connectors": {
-            "ground": {"type": "CubicSpring", "connect": {"chain": [0]}, "dirs": [0], "k": CUBIC[0]},
+            "ground": {
+                "type": "CubicSpring", "connect": {"chain": [0]}, "dirs": [0], "k": CUBIC[0],
+            },
             "between": {
                 "type": "CubicSpring", "connect": {"chain": [0], "INTERNAL": [1]}, "dirs": [0],
                 "k": CUBIC[1],

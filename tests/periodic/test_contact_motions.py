@@ -28,8 +28,9 @@ def height(motion):
 
 @pytest.fixture(scope="module")
 def found():
-    with pytest.warns(FoldynWarning, match="twice as many would change"):
+    with pytest.warns(FoldynWarning, match="harmonics = 5: twice as many would change"):
         few = fd.periodic_motion(bouncing(), harmonics=5)
+    with pytest.warns(FoldynWarning, match="harmonics = 9: twice as many would change"):
         more = fd.periodic_motion(bouncing(), harmonics=9, start=few)
     return few, more, fd.periodic_motion(bouncing(), harmonics=17, start=more)
 

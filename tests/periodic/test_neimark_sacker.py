@@ -56,7 +56,9 @@ def test_it_is_where_a_pair_of_the_paper_s_equation_leaves_the_circle(curve):
 
     def crossing(y):
         start = np.append(y[:4], np.eye(4).ravel())
-        end = solve_ivp(rate, (0.0, 1.0 / y[4]), start, "DOP853", args=(y[4],), rtol=1e-10, atol=1e-11)
+        end = solve_ivp(
+            rate, (0.0, 1.0 / y[4]), start, "DOP853", args=(y[4],), rtol=1e-10, atol=1e-11
+        )
         ended, monodromy = end.y[:4, -1], end.y[4:, -1].reshape(4, 4)
         return [*(ended - y[:4]), np.abs(np.linalg.eigvals(monodromy)).max() - 1.0]
 

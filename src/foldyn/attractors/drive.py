@@ -76,7 +76,6 @@ def driven_frequency(case: Case) -> float:
 
 def with_histories(case: Case, history: Callable[[Harmonic], History]) -> Case:
     """The case with other histories in place of its harmonic ones."""
-
     return _altered(case, lambda part: replace(part, history=history(part.history)))
 
 
@@ -117,9 +116,7 @@ def _altered(case: Case, change: Callable[[Any], Any]) -> Case:
     contact = case.contact
     if contact is not None:
         contact = replace(contact, planes=changed(contact.planes))
-    return case.altered(
-        loads=changed(case.loads), supports=changed(case.supports), contact=contact
-    )
+    return case.altered(loads=changed(case.loads), supports=changed(case.supports), contact=contact)
 
 
 def _driven_parts(case: Case) -> list[Any]:

@@ -24,7 +24,7 @@ from foldyn.periodic.families import Free, InResonance
 from foldyn.periodic.floquet import STEPS, is_stable, multipliers
 from foldyn.periodic.fourier import Fourier, values_of
 from foldyn.periodic.motion import balance_of, on_modes, warn_of_crossing, warn_of_truncation
-from foldyn.periodic.orbit import FINE, Orbit, along
+from foldyn.periodic.orbit import SHOWN, Orbit, along
 from foldyn.periodic.start import FLOOR, balanced, equilibrium, linear_response
 from foldyn.ram_limit import check_memory
 from foldyn.results.periodic_dataset import points_dataset
@@ -335,7 +335,7 @@ def _follow(
 
 def _largest(orbit: Orbit, place: NDArray) -> float:
     """Largest displacement of any node from the equilibrium (k,) in a motion, m."""
-    phase = TURN * np.arange(FINE) / FINE
+    phase = TURN * np.arange(SHOWN) / SHOWN
     mean = orbit.equation.at(np.zeros(1), 0.0).displacements(place[None]).reshape(1, -1, 3)
     return float(np.linalg.norm(orbit.displacement(phase) - mean, axis=2).max())
 

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.attractors.run import Stretch, measured, swing
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.periodic.balance import Balance
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.fourier import Fourier, values_of
+from foldyn.results import Quantity
 from foldyn.results.crossings import crossings_of
 
-SHOWN = 128  # samples of a period in results
-FINE = 256  # samples among which extremes are sought
+SHOWN = 128  # samples of a period in results, and of those among which extremes are sought
 BARELY = 1e-3  # of a gap, which is left between two samples of motions that do not cross
 
 
@@ -146,34 +146,11 @@ def along(orbits: list[Orbit]) -> dict[str, NDArray]:
     return found
 
 
-def swing(values: NDArray) -> NDArray:
-    """Half the distance (...) between the extremes of samples (s, ...) of a period.
-
-    A parabola through the largest sample and its neighbors finds each.
-    """
-    return 0.5 * (_peak(values) + _peak(-values))
-
-
-def _peak(values: NDArray) -> NDArray:
-    at = values.argmax(axis=0)[None]
-    before, here, after = (
-        np.take_along_axis(values, (at + shift) % len(values), 0)[0] for shift in (-1, 0, 1)
-    )
-    bend = before - 2.0 * here + after
-    with np.errstate(divide="ignore", invalid="ignore"):
-        above = np.where(bend < 0.0, -((after - before) ** 2) / (8.0 * bend), 0.0)
-    return here + above
-
-
-def measured(orbit: Orbit, measure: Any) -> float:
-    """Amplitude of a measure, a `Quantity` with a function, or of the node that swings most."""
-    phase = 2.0 * np.pi * np.arange(FINE) / FINE
+def amplitude(orbit: Orbit, measure: Quantity | None) -> float:
+    """Amplitude of a measure with a function, or of the node that swings most."""
+    phase = 2.0 * np.pi * np.arange(SHOWN + 2) / SHOWN  # and one beyond the end
     u = orbit.displacement(phase)
     if measure is None:
         return float(swing(u).max())
-    v, time = orbit.velocity(phase), phase / (2.0 * np.pi) * orbit.period
-    values = [
-        float(measure.function(one, rate, float(t)))
-        for one, rate, t in zip(u, v, time, strict=True)
-    ]
-    return float(swing(np.array(values)))
+    time = phase / (2.0 * np.pi) * orbit.period
+    return float(swing(measured(measure, Stretch(time, u, orbit.velocity(phase)))))

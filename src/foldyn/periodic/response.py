@@ -32,7 +32,7 @@ from foldyn.periodic.families import ByFrequency, ByLevel
 from foldyn.periodic.floquet import STEPS, is_stable, multipliers
 from foldyn.periodic.fourier import Fourier
 from foldyn.periodic.motion import NAMED, balance_of, warn_of_crossing, warn_of_truncation
-from foldyn.periodic.orbit import along, measured
+from foldyn.periodic.orbit import along, amplitude
 from foldyn.periodic.start import balanced, coefficients
 from foldyn.results import Quantity
 from foldyn.results.periodic_dataset import points_dataset
@@ -317,7 +317,7 @@ def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
     values = {
         "frequency": np.array([orbit.omega / (2.0 * np.pi) for orbit in orbits]),
         "level": np.array([orbit.level for orbit in orbits]),
-        "amplitude": np.array([measured(orbit, measure) for orbit in orbits]),
+        "amplitude": np.array([amplitude(orbit, measure) for orbit in orbits]),
         "stable": np.array([is_stable(found.floquet) for found in tracer.found]),
         "bifurcation": names,
         "branch": np.array([found.branch for found in tracer.found]),
