@@ -71,7 +71,7 @@ def backbone(
     amplitudes : (float, float)
         First and last amplitude: the largest displacement of any node from the equilibrium, m.
     harmonics : int
-        Of the motion's frequency.
+        Of the motion's frequency; of normal modes as many more as keep the energy constant.
     damped : bool
         The damped case under its harmonic histories in phase resonance, where a force and the
         displacement it works on are a quarter of a period apart, instead of the undamped one: what
@@ -111,7 +111,7 @@ def backbone(
     -----
     FoldynWarning
         The backbone is lost before the last amplitude (the points found are kept); too few
-        harmonics.
+        harmonics; motions that pass through what they touch.
 
     Notes
     -----
@@ -162,11 +162,11 @@ def backbone(
         "complete": complete,
     }
     orbits = [family.orbit(point.z, point.p) for point in kept]
-    if damped:
-        values = _damped_values(orbits)
-    else:
+    if isinstance(family, Free):
         orbits = [_sharpened(family, orbit) for orbit in orbits]
         values = _values(orbits, place)
+    else:
+        values = _damped_values(orbits)
     values |= along(orbits)
     values["frequency"] = np.array([orbit.omega / TURN for orbit in orbits])
     values["amplitude"] = np.array([_largest(orbit, place) for orbit in orbits])
