@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from duffing import NODE, mass, oscillator
+from duffing import NODE, K, mass, oscillator
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
@@ -80,10 +80,11 @@ def test_small_motions_are_the_linear_response_and_decay_as_the_damping_says():
     assert abs(one.floquet.values[0].imag) == pytest.approx(abs(decay.imag), abs=1e-9)
 
 
-@pytest.mark.parametrize("dashpot", [0.0, 0.3])
-def test_product_of_the_multipliers_is_that_of_liouville(dashpot):
-    one = fd.periodic_motion(oscillator(dashpot=dashpot), harmonics=9)
-    expected = -(0.1 + dashpot / mass()) / 0.25
+@pytest.mark.parametrize(("dashpot", "beta"), [(0.0, 0.0), (0.3, 0.0), (0.0, 0.02)])
+def test_product_of_the_multipliers_is_that_of_liouville(dashpot, beta):
+    case = oscillator(dashpot=dashpot).altered(damping=fd.Rayleigh(alpha=0.1, beta=beta))
+    one = fd.periodic_motion(case, harmonics=9)
+    expected = -(0.1 + (dashpot + beta * K) / mass()) / 0.25
     assert np.log(np.abs(one.floquet.values)).sum() == pytest.approx(expected, rel=1e-8)
 
 

@@ -8,6 +8,10 @@ from scipy.optimize import fsolve
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.periodic.bifurcations import Event
+from foldyn.periodic.continuation import Stride
+from foldyn.periodic.motion import balance_of
+from foldyn.periodic.response import _Tracer
 
 ALPHA, FORCE = 0.1, 0.5
 
@@ -210,6 +214,15 @@ def test_points_found_are_kept_with_a_warning():
         found = fd.response_curve(oscillator(), (0.1, 0.6), 3, most_points=5)
     assert found.attrs["complete"] == 0
     assert found.sizes["point"] == 6
+
+
+def test_a_fork_without_branch_is_warned_of():
+    # as at points that few harmonics take for a period doubling
+    tracer = _Tracer("frequencies", (0.1, 0.6), Stride(0.02, 0.1, 10), 32, 1e-9)
+    family = tracer.family(balance_of(oscillator(), "a test", 5))
+    point = tracer.first(family, None)
+    with pytest.warns(FoldynWarning, match="no branch is found at the period doubling at 0.1,"):
+        tracer._fork(family, Event("period doubling", point), 0, print)
 
 
 def test_a_curve_is_saved_and_loaded(tmp_path, curve):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from foldyn.cases import Case, State
+from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter, reporter
 from foldyn.errors import ComputationError, FoldynWarning, InputError
@@ -192,6 +193,7 @@ def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, ND
     else:
         displacement = displacement_of(state, case, "state", "a State, as fd.initial_state(path)")
     at = equation.at(np.zeros(1), 0.0)
+    check_contact(case, displacement, at.planes[0])
     place = equation.unknowns(displacement[None], at)[0]
     stiffness = _settled(equation, at, place)
     if mode > equation.size:

@@ -79,10 +79,10 @@ class Orbit:
         u = at.displacements(values_of(self.amplitudes, phase))
         if len(crossings_of(case, self.displacement(phase[:1])).crossed):
             return True
-        along = zip(u[:-1], np.diff(u, axis=0), at.planes, np.diff(at.planes, axis=0), strict=False)
+        parts = zip(u[:-1], np.diff(u, axis=0), at.planes, np.diff(at.planes, axis=0), strict=False)
         return any(
             body.displaced(moved).term(ContactTerm).clear(here, step, moves, BARELY) < 1.0
-            for here, step, moved, moves in along
+            for here, step, moved, moves in parts
         )
 
     def truncation(self) -> float:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, eigh
 
+from foldyn.cases.contact_checks import check_contact
 from foldyn.errors import ComputationError, InputError
 from foldyn.periodic.equation import Equation, Instants
 from foldyn.periodic.tangents import Tangents
@@ -43,6 +44,7 @@ def reduced(equation: Equation, modes: int, displacement: NDArray) -> Equation:
         `whole` is the one that is given.
     """
     still = equation.at(np.zeros(1), 0.0)
+    check_contact(equation.case, displacement, still.planes[0])
     place = equation.unknowns(displacement[None], still)[0]
     if modes >= equation.size:
         raise InputError(
