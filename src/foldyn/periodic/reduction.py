@@ -105,8 +105,7 @@ def _projected(
         (_carried(equation, place, np.ravel(shape), factors), history)
         for shape, history in equation.drive.moves
     ]
-    free = None if equation.case.constraints else equation.case.free_dofs
-    out.tangents = Tangents(equation.body, equation.basis, free, basis)
+    out.tangents = Tangents(equation.body, equation.basis, basis)
     out.basis = equation.basis @ basis
     out.offset = equation.basis @ place
     out.size = basis.shape[1]
