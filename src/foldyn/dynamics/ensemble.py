@@ -31,7 +31,7 @@ from foldyn.structures.stretching import MOST, REMEDY, stretch
 from foldyn.values import choice, flag, of_kind, show, whole
 
 METHOD = "central_difference"
-COMMON = ("duration", "dt", "every", "start", "method")
+COMMON = ("duration", "dt", "every", "start", "method", "device")
 """Arguments that are those of all cases."""
 
 
