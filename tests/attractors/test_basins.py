@@ -96,6 +96,17 @@ def test_chaos_is_no_attractor_that_repeats():
     assert found.basin.values.tolist() == [-1, -1] and found.sizes["attractor"] == 0
 
 
+def test_starts_that_all_end_in_one_orbit_have_its_number():
+    """Once a period they are in one place, which has no range by which to compare."""
+    case = duffing(1.0, 1.0, 0.1)
+    for places in ([0.0], [0.0, 0.3]):
+        found = fd.basins(case, lambda x: at(case, x), {"x": places}, 10.0 * TURN, dt=TURN / 64)
+        assert found.basin.values.tolist() == [0] * len(places)
+    assert np.ptp(found.displacement.values, axis=1).max() < 1e-5 * np.ptp(
+        found.displacement.values
+    )
+
+
 @pytest.mark.matrix
 def test_a_kresling_tower_falls_to_either_side_of_its_barrier():
     """Let go at rest on the path, half a millimeter before and after the saddle."""
@@ -155,6 +166,14 @@ def test_a_start_that_fails_is_named(cell):
         "initial = 3: must be a function": (3, {"x": [0.0]}),
         "grid.x: must be a list": (lambda x: at(cell, x), {"x": 1.0}),
         "grid = \\[\\]: give values by name": (lambda x: at(cell, x), []),
+        "grid: 'record' is a name in the result": (
+            lambda record: at(cell, record),
+            {"record": [1.0]},
+        ),
+        "grid: a grid of 1e.10 starts needs about": (
+            lambda x, v: at(cell, x, v),
+            {"x": np.zeros(10**5), "v": np.zeros(10**5)},
+        ),
     }.items():
         with pytest.raises(InputError, match=message), warnings.catch_warnings():
             fd.basins(cell, given[0], given[1], 10.0)

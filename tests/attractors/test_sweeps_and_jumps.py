@@ -203,6 +203,12 @@ def test_what_cannot_be_swept_is_refused(hardening):
             hardening, fd.Quantity("m"), (0.1, 0.2), 100.0
         ),
         "duration = 1 s: holds fewer": lambda: fd.swept_sine(hardening, X, (1.0, 2.0), 1.0),
+        "duration: .* samples of 3 nodes needs about": lambda: fd.swept_sine(
+            hardening, X, (0.1, 0.2), 1e12
+        ),
+        "measure: raised IndexError": lambda: fd.swept_sine(
+            hardening, fd.Quantity(function=lambda u, v, t: u[99, 2]), (0.1, 0.2), 100.0
+        ),
         "the lower one first": lambda: fd.swept_sine(hardening, X, (2.0, 1.0), 100.0),
         "amplitudes: Actuate has no size": lambda: fd.bifurcation_diagram(
             swinging, ridge, amplitudes=[1.0]

@@ -1,5 +1,7 @@
-"""Duffing's oscillator with a nonlinear absorber, of T. Detroux, L. Renson, L. Masset and G.
-Kerschen, Comput. Methods Appl. Mech. Eng. 296, 2015, 18-38, section 2:
+"""Duffing's oscillator with a nonlinear absorber (T. Detroux, G. Habib, L. Masset and G. Kerschen,
+Mech. Syst. Signal Process. 60-61, 2015, arXiv:1604.05524), with the numbers of the example of two
+degrees of freedom with cubic springs in NLvib (M. Krack and J. Gross, Harmonic Balance for
+Nonlinear Vibration Problems, 2019), which shows a Neimark-Sacker point:
 
     m1 x'' + c1 x' + k1 x + k3 x^3 + c2 (x' - y') + k2 (x - y) + k4 (x - y)^3 = F sin(2 pi f t),
     m2 y'' + c2 (y' - x') + k2 (y - x) + k4 (y - x)^3 = 0.

@@ -8,7 +8,7 @@ from duffing import NODE, oscillator
 
 import foldyn as fd
 from foldyn.attractors.drive import at_frequency, at_level, drive_frequency
-from foldyn.errors import FoldynWarning
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.orbit import Orbit
 
@@ -87,9 +87,9 @@ def test_free_motions_against_the_plane_keep_their_energy():
 
 
 def test_panels_touch():
-    pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=25)
+    pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=38)
     s = fd.discretize(pattern, fd.Sheet(1e5, 0.25, 0.1, 1.0), scheme="n4b5", bend_law="linear")
-    push = fd.Force([0, 1], (0.01, 0, 0), history=fd.Harmonic(0.4))
+    push = fd.Force([0, 1], (0.25, 0, 0), history=fd.Harmonic(0.4))
     case = fd.Case(
         s, [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")], [push], fd.Rayleigh(alpha=2.0),
         contact=fd.Contact(thickness=0.3, stiffness=3.0),
@@ -100,6 +100,12 @@ def test_panels_touch():
     start = fd.State(one.displacement.values[0], one.velocity.values[0])
     run = fd.simulate(case, 2.5, initial=start, every=0.625)
     assert run.displacement.values[-1] == pytest.approx(one.displacement.values[0], abs=1e-5)
+
+
+def test_a_start_behind_the_plane_is_refused():
+    behind = fd.State(np.array([[0, 0, 0], [0, 0, 0], [0, 0, -0.3]]))
+    with pytest.raises(InputError, match=r"contact.planes\[0\]: node 2 is 0.1 m behind it"):
+        fd.periodic_motion(bouncing(), start=behind)
 
 
 def test_motions_through_the_plane_are_told():

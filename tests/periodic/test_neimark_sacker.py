@@ -16,7 +16,7 @@ from foldyn.periodic.motion import balance_of
 TURN = 2.0 * np.pi
 
 
-def test_structure_has_the_forces_of_the_paper():
+def test_structure_has_the_forces_of_the_equation():
     case, u = absorber.case(), np.zeros((6, 3))
     for x, y in ((0.7, 0.7), (0.7, -0.2)):
         u[[X, *STAND], 2], u[Y, 2] = x, y
@@ -33,7 +33,7 @@ def curve():
 
 
 def rate(t, state, f):
-    """Of the equation of the paper, and of deviations from a motion."""
+    """Of the equation in `absorber`, and of deviations from a motion."""
     (x, y, v, w), deviation = state[:4], state[4:].reshape(4, 4)
     pull = STIFFNESS[1] * (x - y) + CUBIC[1] * (x - y) ** 3 + DASHPOT[1] * (v - w)
     push = FORCE * np.sin(TURN * f * t) - STIFFNESS[0] * x - CUBIC[0] * x**3 - DASHPOT[0] * v
@@ -48,7 +48,7 @@ def rate(t, state, f):
     return np.concatenate([own, (slope @ deviation).ravel()])
 
 
-def test_it_is_where_a_pair_of_the_paper_s_equation_leaves_the_circle(curve):
+def test_it_is_where_a_pair_of_the_equation_leaves_the_circle(curve):
     (at,) = np.flatnonzero(curve.bifurcation.values == "Neimark-Sacker")
     found = curve.isel(point=at)
     f, amplitudes = float(found.frequency), found.coefficient.values[:, [X, Y], 2]

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from duffing import NODE, mass, oscillator
+from duffing import NODE, K, mass, oscillator
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
@@ -80,10 +80,11 @@ def test_small_motions_are_the_linear_response_and_decay_as_the_damping_says():
     assert abs(one.floquet.values[0].imag) == pytest.approx(abs(decay.imag), abs=1e-9)
 
 
-@pytest.mark.parametrize("dashpot", [0.0, 0.3])
-def test_product_of_the_multipliers_is_that_of_liouville(dashpot):
-    one = fd.periodic_motion(oscillator(dashpot=dashpot), harmonics=9)
-    expected = -(0.1 + dashpot / mass()) / 0.25
+@pytest.mark.parametrize(("dashpot", "beta"), [(0.0, 0.0), (0.3, 0.0), (0.0, 0.02)])
+def test_product_of_the_multipliers_is_that_of_liouville(dashpot, beta):
+    case = oscillator(dashpot=dashpot).altered(damping=fd.Rayleigh(alpha=0.1, beta=beta))
+    one = fd.periodic_motion(case, harmonics=9)
+    expected = -(0.1 + (dashpot + beta * K) / mass()) / 0.25
     assert np.log(np.abs(one.floquet.values)).sum() == pytest.approx(expected, rel=1e-8)
 
 
@@ -182,7 +183,9 @@ def test_a_result_is_saved_and_loaded(tmp_path, strong):
 PUSH = fd.Force([0], (1e-3, 0, 0), history=fd.Harmonic(0.4))
 REFUSED = {
     "nothing drives it": fold(),
-    "takes harmonic and": fold([fd.Force([0], (1e-3, 0, 0), history=fd.Ramp(1.0))]),
+    r"loads\[0\].history: is of the kind 'ramp'": fold(
+        [fd.Force([0], (1e-3, 0, 0), history=fd.Ramp(1.0))]
+    ),
     "no multiple": fold([PUSH, fd.Force([1], (1e-3, 0, 0), history=fd.Harmonic(0.5))]),
     "needs supports": fd.Case(fold().structure, loads=[PUSH]),
     "constant matrix": fd.Case(fold().structure, fold().supports, [PUSH], fd.StrainDamping(1e-3)),
@@ -212,7 +215,8 @@ def test_what_it_cannot_follow_is_refused(message):
 def test_arguments_out_of_range_are_refused():
     for field, value in (
         ("frequency", -1.0), ("harmonics", 0), ("method", "guess"), ("start", 3), ("periods", 0),
-        ("steps", 1), ("tolerance", 2.0),
+        ("steps", 1), ("tolerance", 2.0), ("steps", 10**9), ("harmonics", 10**9),
+        ("harmonics", 10**4),  # matrices of one dof, but many of them
     ):  # fmt: skip
         with pytest.raises(InputError, match=field):
             fd.periodic_motion(oscillator(), **{field: value})

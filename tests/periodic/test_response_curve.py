@@ -8,6 +8,10 @@ from scipy.optimize import fsolve
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.periodic.bifurcations import Event
+from foldyn.periodic.continuation import Stride
+from foldyn.periodic.motion import balance_of
+from foldyn.periodic.response import _Tracer
 
 ALPHA, FORCE = 0.1, 0.5
 
@@ -212,6 +216,15 @@ def test_points_found_are_kept_with_a_warning():
     assert found.sizes["point"] == 6
 
 
+def test_a_fork_without_branch_is_warned_of():
+    # as at points that few harmonics take for a period doubling
+    tracer = _Tracer("frequencies", (0.1, 0.6), Stride(0.02, 0.1, 10), 32, 1e-9)
+    family = tracer.family(balance_of(oscillator(), "a test", 5))
+    point = tracer.first(family, None)
+    with pytest.warns(FoldynWarning, match="no branch is found at the period doubling at 0.1,"):
+        tracer._fork(family, Event("period doubling", point), 0, print)
+
+
 def test_a_curve_is_saved_and_loaded(tmp_path, curve):
     fd.save(curve, tmp_path / "curve.nc")
     again = fd.load(tmp_path / "curve.nc")
@@ -223,6 +236,7 @@ def test_arguments_out_of_range_are_refused():
     for field, value in (
         ("frequencies", (0.2, 0.2)), ("frequencies", 3), ("amplitudes", (0.1, 0.2)),
         ("harmonics", 0), ("measure", 3), ("measure", fd.Quantity("m")), ("branches", -1),
+        ("measure", fd.Quantity("m", function=lambda u, v, t: u[99, 2])), ("steps", 10**9),
         ("longest_step", 0.0), ("most_points", 1), ("steps", 2), ("tolerance", 0.0),
         ("periods", 0), ("start", "here"),
     ):  # fmt: skip

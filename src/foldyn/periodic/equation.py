@@ -66,7 +66,7 @@ class Equation:
         self.basis = sparse.csr_array(sparse.csc_array(whole)[:, free])
         self.size, self.offset = len(free), np.zeros(total)
         self.whole: Equation = self
-        self.tangents = Tangents(self.body, self.basis, None if case.constraints else free)
+        self.tangents = Tangents(self.body, self.basis)
         nodal = mass_of(case)
         self.mass = self.projected(nodal)
         terms = damping_terms(case, None, modal_rows(case)) if driven else []

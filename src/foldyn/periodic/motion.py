@@ -65,7 +65,7 @@ def periodic_motion(
         Of the motion's own frequency.
     method : {"harmonic_balance", "shooting"}
         A Fourier series whose equation holds in the mean over each harmonic, or the start from
-        which integration over a period (Gauss's method of order 6) comes back to itself.
+        which integration over a period (Radau's method of order 5) comes back to itself.
     start : State or xarray.Dataset, optional
         Where to begin: small motions about a state, or a result of `periodic_motion` or a point of
         one of `response_curve`. The equilibrium under the constant loads by default.

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from foldyn.cases import Case, State
+from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter, reporter
 from foldyn.errors import ComputationError, FoldynWarning, InputError
@@ -71,7 +72,7 @@ def backbone(
     amplitudes : (float, float)
         First and last amplitude: the largest displacement of any node from the equilibrium, m.
     harmonics : int
-        Of the motion's frequency.
+        Of the motion's frequency; of normal modes as many more as keep the energy constant.
     damped : bool
         The damped case under its harmonic histories in phase resonance, where a force and the
         displacement it works on are a quarter of a period apart, instead of the undamped one: what
@@ -111,7 +112,7 @@ def backbone(
     -----
     FoldynWarning
         The backbone is lost before the last amplitude (the points found are kept); too few
-        harmonics.
+        harmonics; motions that pass through what they touch.
 
     Notes
     -----
@@ -164,11 +165,11 @@ def backbone(
         "complete": complete,
     }
     orbits = [family.orbit(point.z, point.p) for point in kept]
-    if damped:
-        values = _damped_values(orbits)
-    else:
+    if isinstance(family, Free):
         orbits = [_sharpened(family, orbit) for orbit in orbits]
         values = _values(orbits, place)
+    else:
+        values = _damped_values(orbits)
     values |= along(orbits)
     values["frequency"] = np.array([orbit.omega / TURN for orbit in orbits])
     values["amplitude"] = np.array([_largest(orbit, place) for orbit in orbits])
@@ -194,6 +195,7 @@ def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, ND
     else:
         displacement = displacement_of(state, case, "state", "a State, as fd.initial_state(path)")
     at = equation.at(np.zeros(1), 0.0)
+    check_contact(case, displacement, at.planes[0])
     place = equation.unknowns(displacement[None], at)[0]
     stiffness = _settled(equation, at, place)
     if mode > equation.size:

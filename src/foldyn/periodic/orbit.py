@@ -79,10 +79,11 @@ class Orbit:
         u = at.displacements(values_of(self.amplitudes, phase))
         if len(crossings_of(case, self.displacement(phase[:1])).crossed):
             return True
-        terms = [body.displaced(moved).term(ContactTerm) for moved in at.planes[:-1]]
-        steps, moves = np.diff(u, axis=0), np.diff(at.planes, axis=0)
-        along = zip(terms, u[:-1], steps, moves, strict=True)
-        return any(term.clear(*part, BARELY) < 1.0 for term, *part in along)
+        parts = zip(u[:-1], np.diff(u, axis=0), at.planes, np.diff(at.planes, axis=0), strict=False)
+        return any(
+            body.displaced(moved).term(ContactTerm).clear(here, step, moves, BARELY) < 1.0
+            for here, step, moved, moves in parts
+        )
 
     def truncation(self) -> float:
         """What twice as many harmonics would add, as a fraction of the motion, estimated.

@@ -136,8 +136,8 @@ def response_curve(
     -----
     FoldynWarning
         A branch is lost, or has too many points (those found are kept); too few harmonics: what
-        twice as many would add, or folds at which no multiplier is 1; motions that pass through
-        what they touch.
+        twice as many would add, folds at which no multiplier is 1, or forks without branches;
+        motions that pass through what they touch.
     """
     began = time.perf_counter()
     of_kind("case", case, Case)
@@ -285,12 +285,22 @@ class _Tracer:
             spread[::2] = amplitudes
             ahead = np.append(np.zeros(spread.size * 2 - old.shape[1]), 1.0)
             point = Point(fourier.real_of(spread).ravel(), point.p, ahead, 0.0)
-        _, _, rows = np.linalg.svd(family.jacobian(point.z, point.p))
-        across = rows[-1] * family.size(point.z)
+        jacobian, across = family.jacobian(point.z, point.p), np.zeros(len(point.z))
+        mode = np.ones(len(across), bool)
+        if event.name == DOUBLING:  # every second harmonic is new, and none of them couples
+            mode = np.repeat(family.balance.fourier.order % 2 == 1, old.shape[1])
+        across[mode] = np.linalg.svd(jacobian[np.ix_(mode, mode)])[2][-1] * family.size(point.z)
         # a period doubling has one branch, whose two sides differ in phase alone
         for side in (1.0, -1.0) if event.name == PITCHFORK else (1.0,):
             first = branch_point(family, point.z, point.p, side * across, AWAY)
-            if first is not None and self.low <= first.p <= self.high:
+            if first is None:
+                warnings.warn(
+                    f"harmonics: no branch is found at the {event.name} at {point.p:.6g}, which a "
+                    "longer series may not have: give more harmonics",
+                    FoldynWarning,
+                    stacklevel=5,
+                )
+            elif self.low <= first.p <= self.high:
                 self.branch = max(found.branch for found in self.found) + 1
                 self.follow(family, first, depth, report, point)
 

@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, Constant
+from foldyn.cases.contact_checks import check_contact
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.linearized import equivalent_slope
 from foldyn.periodic.balance import AtFrequency, Balance, Converged, newton
@@ -68,6 +69,7 @@ def coefficients(balance: Balance, start: Any, omega: float, level: float = 1.0)
     else:
         place = displacement_of(start, equation.case, "start", PLACES)
     mean = equation.at(np.zeros(1), 0.0)
+    check_contact(equation.case, place, mean.planes[0])
     x = np.zeros(balance.shape)
     x[0] = equation.unknowns(place[None], mean)[0]
     return x + linear_response(balance, x, omega, level)
