@@ -10,6 +10,7 @@ import pytest
 from two_bars import SIZE, TURN, X, at, duffing, place
 
 import foldyn as fd
+from foldyn.attractors.diagram import repeats_after
 from foldyn.attractors.jumps import jumps_between
 from foldyn.attractors.run import extremes
 from foldyn.errors import ComputationError, FoldynWarning, InputError
@@ -168,6 +169,13 @@ def test_a_sweep_whose_motion_fails_keeps_its_points():
     np.testing.assert_array_equal(there[0], there[1])
     with pytest.raises(ComputationError):
         fd.bifurcation_diagram(case, X, amplitudes=[1024.0], **given)
+
+
+def test_a_motion_repeats_where_half_of_its_record_tells():
+    record = np.array([0.0, 1.0, 2.0, 0.0, 1.0, 2.0])[:, None]
+    assert repeats_after(record, 0.1) == 3
+    assert repeats_after(record[:5], 0.1) == 0  # of the third state there is but one
+    assert repeats_after(record + 0.2 * np.arange(6)[:, None], 0.1) == 0
 
 
 def test_extremes_lie_between_samples():
