@@ -13,6 +13,7 @@ import foldyn as fd
 from foldyn.attractors.diagram import repeats_after
 from foldyn.attractors.jumps import jumps_between
 from foldyn.attractors.run import extremes
+from foldyn.attractors.sweep import Line
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 
 ALPHA, FORCE = 0.05, 0.06
@@ -93,6 +94,12 @@ def test_a_swept_sine_jumps_past_the_folds(hardening):
     assert apart.max() > 4.0
     assert found.frequency.values[0, 0] == pytest.approx(1.0 / TURN, rel=1e-3)
     np.testing.assert_allclose(np.diff(found.frequency.values[:, [0, -1]]), 0.4 / TURN, rtol=2e-3)
+
+
+def test_a_glide_begins_as_the_harmonics_that_it_replaces():
+    line, t = Line(2.0, 2.1, 1e6), np.linspace(0.0, 1.0, 9)
+    for own in (fd.Harmonic(1.0, 30.0), fd.Harmonic(3.0, -50.0)):
+        np.testing.assert_allclose(line.chirp(1.0)(own)(t), own(2.0 * t), rtol=0, atol=1e-5)
 
 
 def test_a_sharp_resonance_without_folds_has_no_jumps():

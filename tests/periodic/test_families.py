@@ -6,6 +6,7 @@ from duffing import oscillator
 
 import foldyn as fd
 from foldyn.periodic.balance import Balance
+from foldyn.periodic.drive import Drive
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.families import ByFrequency, ByLevel, Free, InResonance
 from foldyn.periodic.fourier import Fourier
@@ -51,3 +52,18 @@ def test_derivatives_are_those_of_the_residual(name):
     assert family.jacobian(z, p) == pytest.approx(columns, rel=1e-6, abs=1e-6 * size)
     along = change(still, 1.0)
     assert family.slope(z, p) == pytest.approx(along, rel=1e-6, abs=1e-6 * np.abs(along).max())
+
+
+def test_motions_of_supports_are_differentiated_twice():
+    """A base that swings three times as fast as the force."""
+    case = oscillator()
+    fast = fd.BaseMotion("z", fd.Harmonic(0.75, phase=20.0), 0.3)
+    drive = Drive(case.altered(supports=[*case.supports, fast]))
+
+    def moved(phase):
+        return drive.sums(drive.moves, np.array([phase]), 0.8, 9)[:, 0]
+
+    for phase in (0.1, 2.0):
+        assert moved(phase)[0].max() == pytest.approx(0.24 * np.sin(3.0 * phase + np.radians(20.0)))
+        change = (moved(phase + STEP) - moved(phase - STEP)) / (2.0 * STEP)
+        assert moved(phase)[1:] == pytest.approx(change[:2], rel=1e-6)
