@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from two_bars import TURN, at, duffing, place
 
 import foldyn as fd
+from foldyn.attractors.grid import told_apart
 from foldyn.errors import FoldynWarning, InputError
 
 ALPHA = 0.25
@@ -96,6 +97,22 @@ def test_chaos_is_no_attractor_that_repeats():
     assert found.basin.values.tolist() == [-1, -1] and found.sizes["attractor"] == 0
 
 
+def test_starts_that_all_end_in_one_orbit_have_its_number():
+    """Once a period they are in one place, which has no range by which to compare."""
+    case = duffing(1.0, 1.0, 0.1, cubic=False)  # at resonance: x = -0.1 cos t
+    for places in ([0.0], [0.0, 0.3]):
+        found = fd.basins(case, lambda x: at(case, x), {"x": places}, 8.0 * TURN, dt=TURN / 256)
+        assert found.basin.values.tolist() == [0] * len(places)
+        np.testing.assert_allclose(place(case, found.displacement.values), -0.1, rtol=1e-3)
+
+
+def test_an_orbit_is_the_same_whichever_of_its_periods_is_seen_first():
+    ends = np.zeros((3, 6, 2, 1, 3))
+    ends[:, :, 0, 0, 0] = np.tile([0.0, 1.0, 3.0], 2), np.tile([3.0, 0.0, 1.0], 2), [0, 3, 1] * 2
+    label, first, periods = told_apart(ends, np.ones(2), 0.01, 3.0)
+    assert label.tolist() == [0, 0, 1] and first == [0, 2] and periods == [3, 3]
+
+
 @pytest.mark.matrix
 def test_a_kresling_tower_falls_to_either_side_of_its_barrier():
     """Let go at rest on the path, half a millimeter before and after the saddle."""
@@ -155,6 +172,14 @@ def test_a_start_that_fails_is_named(cell):
         "initial = 3: must be a function": (3, {"x": [0.0]}),
         "grid.x: must be a list": (lambda x: at(cell, x), {"x": 1.0}),
         "grid = \\[\\]: give values by name": (lambda x: at(cell, x), []),
+        "grid: 'record' is a name in the result": (
+            lambda record: at(cell, record),
+            {"record": [1.0]},
+        ),
+        "grid: a grid of 1e.10 starts needs about": (
+            lambda x, v: at(cell, x, v),
+            {"x": np.zeros(10**5), "v": np.zeros(10**5)},
+        ),
     }.items():
         with pytest.raises(InputError, match=message), warnings.catch_warnings():
             fd.basins(cell, given[0], given[1], 10.0)

@@ -85,6 +85,10 @@ def test_what_has_no_exponent_is_refused(ueda):
     flowing = fd.discretize(pattern, sheet, fold_law=fd.Prony([0.5], [1.0]))
     with pytest.raises(InputError, match="hinges remember"):
         fd.lyapunov_exponent(fd.Case(flowing, [fd.Fix([4, 5])]), 1.0)
+    with pytest.raises(InputError, match="duration = 1 s: is shorter than a period of the drive"):
+        fd.lyapunov_exponent(ueda, 1.0)
+    with pytest.raises(InputError, match=r"initial: displacement of shape \(7, 3\): the case has"):
+        fd.lyapunov_exponent(ueda, 100.0, initial=fd.State(np.zeros((7, 3))))
     overdamped = duffing(1.0, 3.0, 0.3, cubic=False)
     with pytest.raises(ComputationError, match="take a shorter interval"):
         fd.lyapunov_exponent(overdamped, 500.0, interval=100.0, dt=DT)

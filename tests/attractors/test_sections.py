@@ -87,3 +87,11 @@ def test_what_has_no_section_is_refused(periodic):
         fd.poincare_section(motion, plane=X, direction="left")
     with pytest.raises(InputError, match=r"period = 1\.0: give it or a plane"):
         fd.poincare_section(motion, 1.0, plane=X)
+    with pytest.raises(InputError, match=r"period: a section of .* states needs about"):
+        fd.poincare_section(motion, 1e-12)
+    with pytest.raises(InputError, match=r"^plane: raised IndexError: "):
+        fd.poincare_section(motion, plane=fd.Quantity(function=lambda u, v, t: u[99, 2]))
+    with pytest.raises(
+        InputError, match=r"^period: give one \(s\), or a plane: this result cannot"
+    ):
+        fd.poincare_section(motion)

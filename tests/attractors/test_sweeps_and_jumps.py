@@ -10,8 +10,10 @@ import pytest
 from two_bars import SIZE, TURN, X, at, duffing, place
 
 import foldyn as fd
+from foldyn.attractors.diagram import repeats_after
 from foldyn.attractors.jumps import jumps_between
 from foldyn.attractors.run import extremes
+from foldyn.attractors.sweep import Line
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 
 ALPHA, FORCE = 0.05, 0.06
@@ -94,6 +96,12 @@ def test_a_swept_sine_jumps_past_the_folds(hardening):
     np.testing.assert_allclose(np.diff(found.frequency.values[:, [0, -1]]), 0.4 / TURN, rtol=2e-3)
 
 
+def test_a_glide_begins_as_the_harmonics_that_it_replaces():
+    line, t = Line(2.0, 2.1, 1e6), np.linspace(0.0, 1.0, 9)
+    for own in (fd.Harmonic(1.0, 30.0), fd.Harmonic(3.0, -50.0)):
+        np.testing.assert_allclose(line.chirp(1.0)(own)(t), own(2.0 * t), rtol=0, atol=1e-5)
+
+
 def test_a_sharp_resonance_without_folds_has_no_jumps():
     case = duffing(1.0, 0.02, 0.01, cubic=False)
     omega = np.array([0.9, 0.96, 0.99, 1.0, 1.02, 1.1])
@@ -170,6 +178,13 @@ def test_a_sweep_whose_motion_fails_keeps_its_points():
         fd.bifurcation_diagram(case, X, amplitudes=[1024.0], **given)
 
 
+def test_a_motion_repeats_where_half_of_its_record_tells():
+    record = np.array([0.0, 1.0, 2.0, 0.0, 1.0, 2.0])[:, None]
+    assert repeats_after(record, 0.1) == 3
+    assert repeats_after(record[:5], 0.1) == 0  # of the third state there is but one
+    assert repeats_after(record + 0.2 * np.arange(6)[:, None], 0.1) == 0
+
+
 def test_extremes_lie_between_samples():
     t = np.linspace(0.3, 9.0, 60)
     top, bottom = extremes(2.0 * np.sin(t) + 1.0)
@@ -203,6 +218,12 @@ def test_what_cannot_be_swept_is_refused(hardening):
             hardening, fd.Quantity("m"), (0.1, 0.2), 100.0
         ),
         "duration = 1 s: holds fewer": lambda: fd.swept_sine(hardening, X, (1.0, 2.0), 1.0),
+        "duration: .* samples of 3 nodes needs about": lambda: fd.swept_sine(
+            hardening, X, (0.1, 0.2), 1e12
+        ),
+        "measure: raised IndexError": lambda: fd.swept_sine(
+            hardening, fd.Quantity(function=lambda u, v, t: u[99, 2]), (0.1, 0.2), 100.0
+        ),
         "the lower one first": lambda: fd.swept_sine(hardening, X, (2.0, 1.0), 100.0),
         "amplitudes: Actuate has no size": lambda: fd.bifurcation_diagram(
             swinging, ridge, amplitudes=[1.0]

@@ -164,11 +164,8 @@ def test_what_does_not_take_added_mass_says_so():
     with pytest.raises(InputError, match=r"air\.added_mass: the exponent takes a mass that stays"):
         fd.lyapunov_exponent(case, 1.0)
     voronoi = fd.discretize(case.structure.pattern, case.structure.sheet, mass="mixed_voronoi")
-    for air, lack in (
-        (fd.Air(**FLUID), "added mass"),
-        (fd.Air(added_mass=False), "drag of the air"),
-    ):
-        assert lacking(pack(fd.Case(voronoi, air=air), 1.0)) == lack  # on a GPU
+    blown = fd.Case(voronoi, air=fd.Air(added_mass=False))
+    assert lacking(blown, pack(blown, 1.0)) == "air of the case"  # on a GPU
     shell = fd.shell(fd.patterns.simple_fold(), fd.Sheet(1e7, 0.3, 0.02, density=300.0), 2)
     with pytest.raises(InputError, match="only explicit methods take the added mass"):
         fd.simulate(fd.Case(shell, air=fd.Air()), 0.01, "auto", every=0.01)

@@ -79,3 +79,35 @@ def test_a_motion_that_explodes_from_next_to_nothing_is_still_stopped():
     dt = 1.5 * fd.critical_step(case)
     with pytest.raises(ComputationError):
         fd.simulate(case, 2000 * dt, "rk4", dt=dt, force=True)
+
+
+def swinging():
+    """A fold that is let go, and the period of its slowest vibration (s)."""
+    s = fd.discretize(
+        fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.01, 1.0), bend_law="linear"
+    )
+    case = fd.Case(s, [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")])
+    spine = fd.backbone(case, amplitudes=(1e-3, 2e-3), harmonics=3)
+    start = fd.State(spine.coefficient.values[-1].sum(axis=0).real)
+    return case, 1.0 / float(spine.frequency[-1]), {"initial": start}
+
+
+def test_samples_at_rest_instants_are_measured_by_the_motion_between_them():
+    case, period, start = swinging()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", FoldynWarning)
+        for method in ("rk4", "generalized_alpha"):
+            found = fd.simulate(case, 2.0 * period, method, every=period, **start)
+            assert found.kinetic.values.max() < 1e-4 * float(found.strain_folds[0])
+            assert found.attrs["energy_error"] < 1e-3
+        many = fd.simulate_many([case] * 2, 2.0 * period, every=period, **start)
+        assert many.attrs["energy_error"] < 1e-3
+
+
+def test_of_many_motions_the_same_is_said_as_of_one():
+    """Displacements of 1e-13 m, which rounding hides from the hinges."""
+    case = fd.Case(fold(), SUPPORTS, damping=fd.Rayleigh(0.5))
+    u = np.zeros((len(case.structure.nodes), 3))
+    u[[2, 3], 2] = 1e-13
+    with pytest.warns(FoldynWarning, match=r"^cases\[0\] \(the worst of 1\): nothing moves far"):
+        fd.simulate_many([case], 0.3, every=0.03, initial=fd.State(u))

@@ -180,7 +180,7 @@ def test_what_does_not_fit_is_refused_by_name(given, text):
 
 def test_a_step_that_is_too_long_is_told():
     state = fd.State(moved(FIRST, 1e-4))
-    with pytest.warns(FoldynWarning, match=r"the energy balance of cases\[\d+\] is off by"):
+    with pytest.warns(FoldynWarning, match=r"cases\[\d\] \(the worst of \d\): the energy"):
         fd.simulate_many(CASES[:2], 0.02, every=10, initial=state)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from cells import SHEET, chain, kresling, miura
@@ -145,6 +147,12 @@ def test_grids_fill_the_zone_once():
 
 
 # ---------------------------------------------------------------------- what is refused
+def test_more_phases_than_memory_holds_are_refused():
+    for phases in (partial(miura().path, "G-X"), miura().grid):
+        with pytest.raises(InputError, match=r"count: a list of .* phases needs about .* GiB"):
+            phases(10**12)
+
+
 def test_wrong_vectors_name_the_nearest_vertices():
     case, own = miura().case, miura().vectors
     with pytest.raises(

@@ -74,3 +74,28 @@ def test_pairs_that_meet_on_the_real_axis_beyond_the_circle_are_no_bifurcation()
         return np.array([1.2 + point.p - 0.5, 1.2 - 0.1 * (point.p - 0.5)], complex)
 
     assert found(Curve(False), 0.1, of, lambda point: point.p - 1.0) == []
+
+
+class Circle(Curve):
+    """R(z, p) = z1^2 + p^2 - 1, z2 - z1."""
+
+    def residual(self, z, p):
+        return np.array([z[0] ** 2 + p**2 - 1.0, z[1] - z[0]])
+
+    def jacobian(self, z, p):
+        return np.array([[2.0 * z[0], 0.0], [-1.0, 1.0]])
+
+    def slope(self, z, p):
+        return np.array([2.0 * p, 0.0])
+
+
+def test_a_closed_curve_is_followed_once():
+    family = Circle(True)
+    first = point_at(family, np.array([0.8, 0.8]), 0.6, np.array([0.0, 0.0, 1.0]))
+    taken = list(steps(family, first, Stride(0.05, 0.1, 500), lambda point: point.p - 2.0))
+    assert all(isinstance(step, Step) for step in taken)
+    angles = np.unwrap([np.arctan2(step.after.p, step.after.z[0]) for step in taken])
+    turned = abs(angles[-1] - np.arctan2(0.6, 0.8))
+    assert 2.0 * np.pi - 0.2 < turned < 2.0 * np.pi
+    folds = [e for step in taken for e in events(family, step, lambda point: np.ones(2, complex))]
+    assert [event.point.p for event in folds] == pytest.approx([1.0, -1.0], abs=1e-12)

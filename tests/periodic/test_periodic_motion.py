@@ -183,7 +183,9 @@ def test_a_result_is_saved_and_loaded(tmp_path, strong):
 PUSH = fd.Force([0], (1e-3, 0, 0), history=fd.Harmonic(0.4))
 REFUSED = {
     "nothing drives it": fold(),
-    "takes harmonic and": fold([fd.Force([0], (1e-3, 0, 0), history=fd.Ramp(1.0))]),
+    r"loads\[0\].history: is of the kind 'ramp'": fold(
+        [fd.Force([0], (1e-3, 0, 0), history=fd.Ramp(1.0))]
+    ),
     "no multiple": fold([PUSH, fd.Force([1], (1e-3, 0, 0), history=fd.Harmonic(0.5))]),
     "needs supports": fd.Case(fold().structure, loads=[PUSH]),
     "constant matrix": fd.Case(fold().structure, fold().supports, [PUSH], fd.StrainDamping(1e-3)),
@@ -213,7 +215,8 @@ def test_what_it_cannot_follow_is_refused(message):
 def test_arguments_out_of_range_are_refused():
     for field, value in (
         ("frequency", -1.0), ("harmonics", 0), ("method", "guess"), ("start", 3), ("periods", 0),
-        ("steps", 1), ("tolerance", 2.0),
+        ("steps", 1), ("tolerance", 2.0), ("steps", 10**9), ("harmonics", 10**9),
+        ("harmonics", 10**4),  # matrices of one dof, but many of them
     ):  # fmt: skip
         with pytest.raises(InputError, match=field):
             fd.periodic_motion(oscillator(), **{field: value})

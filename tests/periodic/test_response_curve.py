@@ -236,6 +236,7 @@ def test_arguments_out_of_range_are_refused():
     for field, value in (
         ("frequencies", (0.2, 0.2)), ("frequencies", 3), ("amplitudes", (0.1, 0.2)),
         ("harmonics", 0), ("measure", 3), ("measure", fd.Quantity("m")), ("branches", -1),
+        ("measure", fd.Quantity("m", function=lambda u, v, t: u[99, 2])), ("steps", 10**9),
         ("longest_step", 0.0), ("most_points", 1), ("steps", 2), ("tolerance", 0.0),
         ("periods", 0), ("start", "here"),
     ):  # fmt: skip

@@ -62,3 +62,7 @@ def test_figures_of_bands_refuse_other_phases(cell):
         fd.plots.plot_iso_frequency(grid, 2)
     with pytest.raises(InputError, match="bands: got list"):
         fd.plots.plot_bands([])
+    with pytest.raises(InputError, match="title: got int, give a str"):
+        fd.plots.plot_bands(path, title=3)
+    with pytest.raises(InputError, match="gaps = 3: must be True or False"):
+        fd.plots.plot_bands(path, gaps=3)

@@ -123,6 +123,9 @@ def test_uneven_times_are_refused(trajectory):
     uneven = trajectory.isel(time=[0, 1, 2, 3, 5, 8])
     with pytest.raises(InputError, match="not evenly spaced"):
         plot_history({"run": uneven}, [6])
+    for still in (trajectory.isel(time=0), trajectory.drop_vars("displacement")):
+        with pytest.raises(InputError, match="one has no displacement along time"):
+            plot_history({"run": trajectory, "still": still}, [6])
 
 
 def test_a_motion_alone_has_no_label(trajectory):

@@ -129,7 +129,7 @@ def bifurcation_diagram(
     """
     began = time.perf_counter()
     of_kind("case", case, Case)
-    check_measure(measure)
+    check_measure(measure, len(case.structure.nodes))
     swept = _swept(case, frequencies, amplitudes)
     choice("sweep", sweep, SWEEPS)
     steady = Steady(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import os
 import time
 import warnings
@@ -23,6 +24,7 @@ from foldyn.dynamics.ensemble import device_for
 from foldyn.dynamics.gpu.choice import DEVICES
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.ram_limit import check_memory
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import PLACE, variable
 from foldyn.values import choice, number, numbers, of_kind, show, whole
@@ -32,6 +34,13 @@ if TYPE_CHECKING:
 
 AT_ONCE = 256  # motions
 LOOKED_AT = 64  # starts
+LEAST = 1e-6  # of the longest bar: the least length by which states are compared
+BYTES = 600.0  # of a start and of where it ends, for each node
+TAKEN = (
+    "attractor", "record", *PLACE, "basin", "periods", "share", "displacement", "velocity",
+    "support",
+)  # fmt: skip
+"""Names in the result."""
 UNDRIVEN = 0.02  # of the duration: between the states of a motion without a drive
 
 
@@ -121,7 +130,7 @@ def basins(
             "structure: some of its hinges remember (prony, plastic or damped creases that give "
             "way), and their state is no part of the grid; take an elastic law"
         )
-    names, places = _grid(grid)
+    names, places = _grid(grid, len(case.structure.nodes))
     starts = _starts(case, initial, names, places)
     duration = number("duration", duration, above=0.0, unit="s")
     record, same = whole("record", record, least=4), number("same", same, above=0.0, below=1.0)
@@ -150,10 +159,7 @@ def basins(
         close()
     ends = np.concatenate(found)
     weights = np.array([1.0, period / (2.0 * np.pi) if frequency else 0.0])
-    size = _range(ends[:, :, 0])
-    if not frequency:  # all may end in one equilibrium: then the starts set the scale
-        first = [start.of_nodes("displacement", ends.shape[3:]) for start in starts]
-        size = max(size, _range(np.stack(first)[:, None]))
+    size = _size(case, starts, ends, weights, same, bool(frequency))
     label, first_of, periods = told_apart(ends, weights, same, size)
     lost = int((label < 0).sum())
     if lost:
@@ -189,18 +195,24 @@ def _dataset(
     return result_dataset("basins", case, data, coordinates, facts)
 
 
-def _grid(grid: Any) -> tuple[tuple[str, ...], list[NDArray[np.float64]]]:
-    """Names of the parameters, and the values of each."""
+def _grid(grid: Any, nodes: int) -> tuple[tuple[str, ...], list[NDArray[np.float64]]]:
+    """Names of the parameters, and the values of each, for starts of some nodes."""
     if not isinstance(grid, Mapping) or not grid:
         raise InputError(f" = {show(grid)}: give values by name, {{'height': [0.0, 0.1]}}", "grid")
     places = []
     for name, given in grid.items():
         if not isinstance(name, str) or not name.isidentifier():
             raise InputError(f": {name!r} is no name of an argument", "grid")
+        if name in TAKEN:
+            raise InputError(
+                f": {name!r} is a name in the result; give the parameter another one", "grid"
+            )
         values = numbers(f"grid.{name}", given)
         if values.ndim != 1 or not values.size:
             raise InputError(": must be a list of numbers", f"grid.{name}")
         places.append(values)
+    count = math.prod(map(len, places))
+    check_memory("grid", f"a grid of {count:g} starts", count * nodes * BYTES, "take a coarser one")
     return tuple(grid), places
 
 
@@ -263,10 +275,26 @@ def _ends(
     return out
 
 
-def _range(displacement: NDArray[np.float64]) -> float:
-    """Largest range (m) of a displacement of motions (m, record, n, 3)."""
-    there = displacement[np.isfinite(displacement).all(axis=(1, 2, 3))]
-    return float(np.ptp(there, axis=(0, 1)).max()) if len(there) else 0.0
+def _size(
+    case: Case, starts: Sequence[State], ends: NDArray, weights: NDArray, same: float, driven: bool
+) -> float:
+    """Length (m) by which states are compared: the range of where motions end.
+
+    All may end in one attractor: then the starts set the scale too.
+    """
+    shape = case.structure.nodes.shape
+    first = [
+        [start.of_nodes(name, shape) for name in ("displacement", "velocity")] for start in starts
+    ]
+    every = np.concatenate([ends, np.array(first)[:, None]], axis=1) * weights[:, None, None]
+    every = every[np.isfinite(ends).all(axis=(1, 2, 3, 4))]
+    if not len(every):
+        return 0.0
+    size = float(np.ptp(every[:, :-1, 0], axis=(0, 1)).max())
+    whole = float(np.ptp(every, axis=(0, 1)).max())
+    if not driven or size < same * whole:
+        size = whole
+    return max(size, LEAST * float(case.structure.bar_length.max()))
 
 
 def told_apart(

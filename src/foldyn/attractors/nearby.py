@@ -111,6 +111,12 @@ def lyapunov_exponent(
     frequency = drive_frequency(case)
     if interval is None:
         interval = 1.0 / frequency if frequency else 0.01 * duration
+        if interval > duration:
+            raise InputError(
+                f" = {duration:g} s: is shorter than a period of the drive, {interval:g} s; give "
+                "many of them",
+                "duration",
+            )
     interval = number("interval", interval, above=0.0, most=duration, unit="s")
     silent, counted = math.ceil(settle / interval - 1e-9), math.floor(duration / interval + 1e-9)
     if dt is None:
@@ -147,6 +153,7 @@ def _check(case: Case, method: str, initial: State | None) -> None:
     of_kind("case", case, Case)
     if initial is not None:
         of_kind("initial", initial, State)
+        initial.of_nodes("displacement", case.structure.nodes.shape)
     explicit = [one.name for one in METHODS.values() if not (one.implicit or one.adaptive)]
     choice("method", method, explicit)
     if case.contact is not None:

@@ -90,27 +90,31 @@ def divisor(interval: float, dt: float) -> float:
     return interval / math.ceil(interval / dt * (1.0 - 1e-12))
 
 
-def check_measure(measure: Any) -> Quantity:
-    """Refuse what gives no number of a state."""
-    of_kind("measure", measure, Quantity)
+def check_measure(measure: Any, nodes: int, name: str = "measure") -> Quantity:
+    """Refuse what gives no number of a state of some nodes, of which that at rest is tried."""
+    of_kind(name, measure, Quantity)
     if measure.function is None or measure.dims:
         raise InputError(
-            ": must have a function of displacement, velocity and time that gives one number",
-            "measure",
+            ": must have a function of displacement, velocity and time that gives one number", name
         )
+    rest = np.zeros((1, nodes, 3))
+    measured(measure, Stretch(np.zeros(1), rest, rest.copy()), name)
     return measure
 
 
-def measured(measure: Quantity, stretch: Stretch) -> NDArray[np.float64]:
+def measured(measure: Quantity, stretch: Stretch, name: str = "measure") -> NDArray[np.float64]:
     """Values (k,) of a measure at the samples of a stretch."""
     assert measure.function is not None
-    values = [measure.function(u, v, float(t)) for t, u, v in zip(*stretch, strict=True)]
+    try:
+        values = [measure.function(u, v, float(t)) for t, u, v in zip(*stretch, strict=True)]
+    except Exception as error:
+        raise InputError(f": raised {type(error).__name__}: {error}", name) from error
     try:
         found = np.array(values, float)
     except (TypeError, ValueError):
         found = np.zeros((0, 0))
     if found.ndim != 1 or not np.isfinite(found).all():
-        raise InputError(f": gave {show(values[0])}; it must give a finite number", "measure")
+        raise InputError(f": gave {show(values[0])}; it must give a finite number", name)
     return found
 
 

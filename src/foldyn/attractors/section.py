@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from foldyn.attractors.drive import drive_frequency
 from foldyn.attractors.run import Stretch, check_measure, measured
 from foldyn.errors import InputError
+from foldyn.ram_limit import check_memory
 from foldyn.results import Quantity, case_of
 from foldyn.results.attributes import facts, own_attributes
 from foldyn.results.quantities import MOTION, variable, variables
@@ -83,16 +84,20 @@ def poincare_section(
     stretch = _stretch(motion)
     after = number("after", after, unit="s")
     choice("direction", direction, ("up", "down", "both"))
+    if plane is not None:
+        check_measure(plane, stretch.displacement.shape[1], "plane")
     if plane is None:
         period = _period(motion, period)
         shift = number("phase", phase, unit="degrees") / 360.0
         first, last = (stretch.time[[0, -1]] / period - shift).tolist()
+        size = 16.0 * stretch.displacement[0].nbytes * (last - first)
+        check_memory("period", f"a section of {last - first:.3g} states", size, "take a longer one")
         turns = np.arange(np.ceil(first - ROUNDING), np.floor(last + ROUNDING) + 1.0)
         times = np.clip((turns + shift) * period, *stretch.time[[0, -1]])
     elif period is not None:
         raise InputError(f" = {show(period)}: give it or a plane, one of the two", "period")
     else:
-        times = _passages(stretch, check_measure(plane), number("level", level), direction)
+        times = _passages(stretch, plane, number("level", level), direction)
     found = at_times(stretch, times[times >= after])
     values = {"displacement": found.displacement, "velocity": found.velocity}
     along = {"time": variable(("time",), found.time, "s", "time")}
@@ -118,7 +123,11 @@ def _period(motion: xarray.Dataset, given: float | None) -> float:
     """The period given, or that of the drive of a motion's case."""
     if given is not None:
         return number("period", given, above=0.0, unit="s")
-    if frequency := drive_frequency(case_of(motion)):
+    try:
+        case = case_of(motion)
+    except InputError as error:
+        raise InputError(f": give one (s), or a plane: {error}", "period") from None
+    if frequency := drive_frequency(case):
         return 1.0 / frequency
     raise InputError(": nothing drives the case; give a period (s), or a plane", "period")
 
@@ -143,7 +152,7 @@ def _passages(
     stretch: Stretch, plane: Quantity, level: float, direction: str
 ) -> NDArray[np.float64]:
     """Times at which a quantity passes a level, by bisection between samples."""
-    above = measured(plane, stretch) > level
+    above = measured(plane, stretch, "plane") > level
     passes = above[1:] != above[:-1]
     if direction != "both":
         passes &= above[1:] == (direction == "up")
@@ -153,6 +162,6 @@ def _passages(
         middle = 0.5 * (low + high)
         if not len(k) or not (high - low > 1e-15 * np.abs(high)).any():
             break
-        stays = (measured(plane, at_times(stretch, middle)) > level) == above[k]
+        stays = (measured(plane, at_times(stretch, middle), "plane") > level) == above[k]
         low, high = np.where(stays, middle, low), np.where(stays, high, middle)
     return 0.5 * (low + high)

@@ -18,6 +18,7 @@ from foldyn.cases import Case, Chirp, Harmonic, State
 from foldyn.dynamics.progress import Reporter, reporter
 from foldyn.errors import InputError
 from foldyn.linear.time_domain import overall
+from foldyn.ram_limit import check_memory
 from foldyn.results import Quantity
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import variable
@@ -106,7 +107,7 @@ def swept_sine(
     """
     began = time.perf_counter()
     of_kind("case", case, Case)
-    check_measure(measure)
+    check_measure(measure, len(case.structure.nodes))
     driven_frequency(case)
     ends = numbers("frequencies", frequencies)
     if ends.shape != (2,) or not 0.0 < ends[0] < ends[1]:
@@ -123,6 +124,9 @@ def swept_sine(
     settle = whole("settle", settle, least=0)
     resolution = number("resolution", resolution, above=0.0)
     run = Run(method, dt, tolerance, initial)
+    samples, nodes = PER_CYCLE * float(ends[1]) * duration, len(case.structure.nodes)
+    needed = 8.0 * samples * (6 * nodes + len(case.reaction_dofs))
+    check_memory("duration", f"{samples:.3g} samples of {nodes} nodes", needed, "sweep faster")
     ways = ["up", "down"] if sweep == "both" else [sweep]
     frequency, amplitude, jumps = [], [], list[Jump]()
     report, close = reporter(progress)

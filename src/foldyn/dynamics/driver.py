@@ -44,10 +44,8 @@ SHARPEST = 1e-9  # of the time at the start: shorter steps than that have lost t
 MANY_STEPS = 20_000_000  # beyond which the user is warned before the run
 TOLERANCE = 1e-6  # relative error of a step that is chosen by it
 IMPLICIT_TOLERANCE = 1e-5  # the same of methods of order 2: 130 steps in a vibration's period
-LARGEST_STEP = 1e-3  # of the largest step: one that is short against loads that steps resolve
 FLOOR = 1e-8  # of the longest bar: the least displacement that errors are measured by
 FINER = 4  # times shorter steps where those of central differences were too long
-SPAN = 0.05  # of a step: distance of the points between which a user's history is differentiated
 
 
 def simulate(
@@ -243,8 +241,7 @@ def prepare(
             FoldynWarning,
             stacklevel=3,
         )
-    span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
-    packed = pack(case, span, u, modal)
+    packed = pack(case, timing.apart(plan, critical), u, modal)
     if device == "gpu":
         check_taken(case, packed)
     sampler = Sampler(case, {} if sample is None else sample, u, v, plan.start)

@@ -31,8 +31,8 @@ from foldyn.dynamics.stability import (
     largest_frequency,
     stability_limit,
 )
-from foldyn.dynamics.system import Packed, place, scratch
-from foldyn.dynamics.timing import check_room, check_samples, expected_samples, steps_taken
+from foldyn.dynamics.system import Packed, pack, place, scratch
+from foldyn.dynamics.timing import apart, check_room, check_samples, expected_samples, steps_taken
 from foldyn.dynamics.turned import resists_turns, turns_told
 from foldyn.errors import (
     ComputationError,
@@ -56,6 +56,7 @@ if TYPE_CHECKING:
 RECHECKS = 20  # of the critical step during a motion
 CHUNK = 256  # steps of the first stretch; later ones take about REPORT_EVERY seconds
 REPORT_EVERY = 0.25
+BETWEEN = 0.382  # of the time between samples: no period has all its rest instants there
 EXPLODED = 1.0  # relative energy error above which the motion is stopped
 # Panels that cross are looked for at samples so far apart that it takes a small share of the time
 PER_LOOK = 500  # force evaluations of an explicit method from one to the next, at least
@@ -156,8 +157,7 @@ class Motion:
 
         Where the energies do not balance and there is a better method, it is computed anew.
         """
-        self.audit()
-        if self._better is not None and is_off(self.output.balance, self._rounding):
+        if self._better is not None and self.off():
             return self._run_anew(progress)
         self._judge()
         crossings = self._crossings()
@@ -212,9 +212,7 @@ class Motion:
         return self._other.run(progress, self._keeping)
 
     def _judge(self) -> None:
-        self.audit()
-        size, remedy = float(self.course.tally.farthest), smaller_step(self)
-        texts = [doubts(self.output.balance, self._rounding, self.plan, size, remedy)]
+        texts = [self.doubt()]
         if resists_turns(self.case, self.packed):
             seen, scale = self.output.evenly_spaced(self.stored, LOOKS), self.output.balance.scale
             texts.append(turns_told(self.case, self.packed, self._state[0], *seen, scale))
@@ -279,6 +277,7 @@ class Motion:
         """Go back to the start."""
         self.course = self.beginning
         self.output = Output(self.case, self.plan, self._sampler, self._branches, self._keeping)
+        self._looked = False
 
     def _advance(self, engine: Compiled | Implicit | OnCard, report: Reporter) -> None:
         """Advance to the end, in stretches; after each, report the progress, and audit."""
@@ -408,6 +407,8 @@ class Motion:
         """Relative energy error so far; raises where the energy has exploded."""
         balance = self.output.update_balance(self.stored)
         if balance.relative > EXPLODED and self._rounding.reveals(balance):
+            self._look_between()
+        if balance.relative > EXPLODED and self._rounding.reveals(balance):
             bad = self.output.first_off(self.stored, EXPLODED)
             at = self.output.time(bad)
             self.course.tally.samples = bad
@@ -417,6 +418,44 @@ class Motion:
                 f"off by more than the energies at play; {smaller_step(self)}"
             )
         return balance.relative
+
+    def off(self) -> bool:
+        """Whether the energies do not balance, rounding apart."""
+        if self.audit() > INACCURATE:
+            self._look_between()
+        return is_off(self.output.balance, self._rounding)
+
+    def doubt(self) -> str:
+        """Warning about the accuracy of the motion; empty if there is none."""
+        self.off()
+        size, remedy = float(self.course.tally.farthest), smaller_step(self)
+        return doubts(self.output.balance, self._rounding, self.plan, size, remedy)
+
+    def _look_between(self) -> None:
+        """See the energies at play between the first two samples: at samples it may be at rest."""
+        plan = self.plan
+        if self._looked or plan.every == 1 or not (plan.steps or plan.interval):
+            return
+        self._looked = True
+        if plan.steps:
+            count = max(1, round(BETWEEN * plan.every))
+            plan = plan._replace(end=plan.start + count * plan.dt, steps=count, every=count)
+        else:
+            length = BETWEEN * plan.interval
+            plan = plan._replace(end=plan.start + length, interval=length)
+        sampler = Sampler(self.case, {}, *self.start, plan.start)
+        # with memory of its own: this motion may go on
+        packed = pack(self.case, apart(plan, self.critical), self.start[0])
+        motion = Motion(
+            self.case, self.method, plan, self.critical, True, self._state, packed, sampler
+        )
+        motion._looked = True
+        try:
+            motion.integrate()
+        except ComputationError:  # what it tells of the whole motion has been told
+            return
+        balance = self.output.balance
+        balance.scale = max(balance.scale, motion.output.balance.scale)
 
     def recheck(self, u: NDArray) -> None:
         """Stop where the structure has stiffened so much that the step is above its limit."""

@@ -31,6 +31,13 @@ MOST_CALLS = 500  # the same for functions of the user's, which are slow
 MOST_PLACES = 100
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
 MEMORY, IMPLICIT_MEMORY = 200, 20  # steps in which a vibration moves on
+LARGEST_STEP = 1e-3  # of the largest step: one that is short against loads that steps resolve
+SPAN = 0.05  # of a step: distance of the points between which a user's history is differentiated
+
+
+def apart(plan: StepPlan, critical: float) -> float:
+    """How far apart (s) the points are between which a user's history is differentiated."""
+    return SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
 
 
 def fixed_steps(

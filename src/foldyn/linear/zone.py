@@ -10,6 +10,7 @@ import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
+from foldyn.ram_limit import check_memory
 from foldyn.values import numbers, show, whole
 
 OF_PHASES = ("ticks", "tick_labels", "grid")
@@ -32,6 +33,7 @@ def zone_path(vectors: NDArray, points: str, count: int) -> xarray.DataArray:
             "points",
         )
     count = whole("count", count, least=len(names))
+    _check_memory(count, len(vectors))
     corners = np.array([known[name] for name in names])
     lengths = np.linalg.norm(np.diff(corners, axis=0), axis=1)
     if not lengths.all():
@@ -51,6 +53,13 @@ def zone_path(vectors: NDArray, points: str, count: int) -> xarray.DataArray:
     return array(phases, distance, distance[marks], names)
 
 
+def _check_memory(count: int, dimensions: int) -> None:
+    """Refuse more phases than there is memory for; twice as much is held while they are made."""
+    check_memory(
+        "count", f"a list of {count:g} phases", 16.0 * count * (dimensions + 1), "take fewer"
+    )
+
+
 def array(
     phases: NDArray, distance: NDArray, ticks: ArrayLike, names: list[str]
 ) -> xarray.DataArray:
@@ -66,6 +75,7 @@ def array(
 def zone_grid(dimensions: int, count: int) -> xarray.DataArray:
     """See `UnitCell.grid`."""
     count = whole("count", count, least=2)
+    _check_memory(count**dimensions, dimensions)
     along = -np.pi + 2.0 * np.pi / count * np.arange(count)
     phases = np.stack(np.meshgrid(*[along] * dimensions, indexing="ij"), axis=-1)
     return xarray.DataArray(

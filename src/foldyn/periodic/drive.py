@@ -97,8 +97,9 @@ class Drive:
         for history in self._histories:
             if not isinstance(history, Constant | Harmonic):
                 raise InputError(
-                    f"history of the kind {history.kind!r}: a periodic motion takes harmonic and "
-                    "constant ones; give fd.Harmonic(frequency=...), or leave it out"
+                    f": is of the kind {history.kind!r}, and a periodic motion takes harmonic and "
+                    "constant ones; give fd.Harmonic(frequency=...), or leave it out",
+                    _place(case, history),
                 )
         found = [one.frequency for one in self._histories if isinstance(one, Harmonic)]
         self.frequency = lowest_frequency(found)
@@ -129,6 +130,17 @@ class Drive:
         for shape, (vector, _) in zip(shapes, terms, strict=True):
             shape[: vector.size] = vector.ravel()
         return self.factors(terms, phase, level) @ shapes
+
+
+def _place(case: Case, history: Any) -> str:
+    """Where in a case a history stands."""
+    planes = () if case.contact is None else case.contact.planes
+    parts = {"loads": case.loads, "supports": case.supports, "contact.planes": planes}
+    for name, own in parts.items():
+        for k, part in enumerate(own):
+            if getattr(part, "history", None) is history:
+                return f"{name}[{k}].history"
+    return "history"
 
 
 def _plane(case: Case, number: int, history: Any) -> tuple[NDArray, Any]:

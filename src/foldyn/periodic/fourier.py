@@ -30,6 +30,12 @@ class Fourier:
         self.harmonics, self.even = harmonics, even
         self.samples = max(OVER * harmonics, 4 * OVER) if samples is None else samples
 
+    def memory(self, unknowns: int) -> float:
+        """Bytes of a balance of so many unknowns: its derivative, and all of which it is made."""
+        h, s = float(self.harmonics), self.samples
+        c, s = (h + 1.0, s // 2 + 1) if self.even else (2.0 * h + 1.0, s)
+        return 24.0 * (c * unknowns) ** 2 + 8.0 * s * (c**2 + unknowns**2)
+
     @cached_property
     def order(self) -> NDArray:
         """Harmonic (c,) of each coefficient."""

@@ -127,7 +127,7 @@ def periodic_motion(
     tolerance = number("tolerance", tolerance, above=0.0, below=1.0)
     steps = whole("steps", steps, least=4)
     periods = whole("periods", periods, least=1)
-    balance = balance_of(case, "fd.periodic_motion", harmonics, periods, modes, start)
+    balance = balance_of(case, "fd.periodic_motion", harmonics, periods, modes, start, steps)
     omega = TURN * frequency_of(balance, frequency)
     if method == "shooting":
         orbit, floquet, spent = _shot(balance, start, omega, steps, tolerance)
@@ -161,7 +161,7 @@ def periodic_motion(
 
 def balance_of(
     case: Case, name: str, harmonics: int, periods: int = 1, modes: int | None = None,
-    start: Any = None,
+    start: Any = None, steps: int = STEPS,
 ) -> Balance:  # fmt: skip
     """Balance of a driven case; InputError without a drive, or where it does not fit in memory."""
     harmonics = whole("harmonics", harmonics, least=1)
@@ -172,9 +172,13 @@ def balance_of(
             "fd.Harmonic(frequency=3.0)"
         )
     equation = on_modes(equation, modes, start)
-    size = (2 * harmonics + 1) * equation.size
-    check_memory("harmonics", f"a matrix of {size} unknowns", 24.0 * size**2, "take fewer")
-    return Balance(equation, Fourier(harmonics), periods)
+    fourier, size = Fourier(harmonics), (2 * harmonics + 1) * equation.size
+    needed = fourier.memory(equation.size)
+    check_memory("harmonics", f"a matrix of {size} unknowns", needed, "take fewer")
+    instants, each = 3.0 * steps * periods, equation.size**2 + 4 * equation.body.size
+    period = f"a period of {steps * periods:.3g} steps"
+    check_memory("steps", period, 8.0 * instants * each, "take fewer")
+    return Balance(equation, fourier, periods)
 
 
 def on_modes(equation: Equation, modes: int | None, start: Any) -> Equation:

@@ -30,7 +30,7 @@ from foldyn.periodic.start import FLOOR, balanced, equilibrium, linear_response
 from foldyn.ram_limit import check_memory
 from foldyn.results.periodic_dataset import points_dataset
 from foldyn.statics.tracing import displacement_of
-from foldyn.values import flag, number, numbers, of_kind, whole
+from foldyn.values import flag, number, numbers, of_kind, show, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -134,7 +134,9 @@ def backbone(
     mode = whole("mode", mode, least=1)
     ends = numbers("amplitudes", amplitudes)
     if ends.shape != (2,) or not 0.0 < ends[0] < ends[1]:
-        raise InputError(f" = {amplitudes!r}: must be two increasing numbers above 0", "amplitudes")
+        raise InputError(
+            f" = {show(amplitudes)}: must be two increasing numbers above 0", "amplitudes"
+        )
     longest = number("longest_step", longest_step, above=0.0, most=1.0)
     stride = Stride(FIRST * longest, longest, whole("most_points", most_points, least=2))
     tolerance = number("tolerance", tolerance, above=0.0, below=1.0)
@@ -179,10 +181,10 @@ def backbone(
 
 def _undamped(case: Case, harmonics: int, modes: int | None, state: Any) -> Balance:
     equation = on_modes(Equation(case, "fd.backbone", driven=False), modes, state)
-    size = (harmonics + 1) * equation.size
-    needed = _bytes(harmonics, equation)
+    fourier, size = Fourier(harmonics, even=True), (harmonics + 1) * equation.size
+    needed = fourier.memory(equation.size)
     check_memory("harmonics", f"a matrix of {size} unknowns", needed, "take fewer")
-    return Balance(equation, Fourier(harmonics, even=True))
+    return Balance(equation, fourier)
 
 
 def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, NDArray]:
@@ -282,7 +284,7 @@ def _sharpened(family: Free, orbit: Orbit) -> Orbit:
         equation, kept = orbit.equation, len(orbit.amplitudes)
         fourier = Fourier(math.ceil(RAISE * (kept - 1)), even=True)
         try:
-            check_memory("harmonics", "a larger matrix", _bytes(fourier.harmonics, equation), "")
+            check_memory("harmonics", "a larger matrix", fourier.memory(equation.size), "")
         except InputError:
             break
         finer = Free(Balance(equation, fourier), family.span, family.tolerance, family.place)
@@ -300,11 +302,6 @@ def _sharpened(family: Free, orbit: Orbit) -> Orbit:
         if gain < WORTH:
             break
     return orbit
-
-
-def _bytes(harmonics: int, equation: Equation) -> float:
-    """Of the matrix of an even series."""
-    return 24.0 * ((harmonics + 1) * equation.size) ** 2
 
 
 def _reach(equation: Equation, motions: NDArray) -> float:

@@ -36,7 +36,7 @@ from foldyn.periodic.orbit import along, amplitude
 from foldyn.periodic.start import balanced, coefficients
 from foldyn.results import Quantity
 from foldyn.results.periodic_dataset import points_dataset
-from foldyn.values import number, numbers, of_kind, whole
+from foldyn.values import number, numbers, of_kind, show, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -142,15 +142,16 @@ def response_curve(
     began = time.perf_counter()
     of_kind("case", case, Case)
     if measure is not None:
-        check_measure(measure)
+        check_measure(measure, len(case.structure.nodes))
     by, ends = _range(frequencies, amplitudes)
     tolerance = number("tolerance", tolerance, above=0.0, below=1.0)
     longest = number("longest_step", longest_step, above=0.0, most=1.0)
     stride = Stride(FIRST * longest, longest, whole("most_points", most_points, least=2))
     branches = whole("branches", branches, least=0)
     periods = whole("periods", periods, least=1)
-    balance = balance_of(case, "fd.response_curve", harmonics, periods, modes, start)
-    tracer = _Tracer(by, ends, stride, whole("steps", steps, least=4), tolerance)
+    steps = whole("steps", steps, least=4)
+    balance = balance_of(case, "fd.response_curve", harmonics, periods, modes, start, steps)
+    tracer = _Tracer(by, ends, stride, steps, tolerance)
     report, close = reporter(progress)
     try:
         family = tracer.family(balance)
@@ -167,9 +168,8 @@ def _range(frequencies: Any, amplitudes: Any) -> tuple[str, tuple[float, float]]
         raise InputError(": give frequencies (Hz) or amplitudes, one of the two", "frequencies")
     by, given = ("frequencies", frequencies) if amplitudes is None else ("amplitudes", amplitudes)
     ends = numbers(by, given)
-    least = 0.0
-    if ends.shape != (2,) or ends[0] == ends[1] or ends.min() <= least:
-        raise InputError(f" = {given!r}: must be two different numbers above 0", by)
+    if ends.shape != (2,) or ends[0] == ends[1] or ends.min() <= 0.0:
+        raise InputError(f" = {show(given)}: must be two different numbers above 0", by)
     return by, (float(ends[0]), float(ends[1]))
 
 

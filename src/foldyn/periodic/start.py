@@ -101,6 +101,8 @@ def _of_result(balance: Balance, start: xr.Dataset, level: float) -> NDArray:
             "start",
         )
     given, longer = np.asarray(found), balance.multiple
+    if not np.isfinite(given).all():
+        raise InputError(": its coefficients must be finite", "start")
     own = int(start.get("periods", 1))
     if own != longer:  # the same motion in a longer period
         if longer % own:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from foldyn.errors import InputError
 from foldyn.linear.band_gaps import ALL, band_gaps, frequencies_of
 from foldyn.plots import style
-from foldyn.values import whole
+from foldyn.values import flag, whole
 
 GAP = "0.88"  # gray of full gaps
 
@@ -45,7 +45,7 @@ def plot_bands(bands: xr.Dataset, gaps: bool = True, title: str = "") -> Figure:
     figure = style.new_figure(6.4, 4.4, title)
     axes = figure.add_subplot()
     style.frame(axes, label, "frequency (Hz)")
-    if gaps:
+    if flag("gaps", gaps):
         found = band_gaps(bands)
         for k in np.flatnonzero(found["direction"].values == ALL):
             axes.axhspan(float(found["bottom"][k]), float(found["top"][k]), color=GAP, lw=0.0)

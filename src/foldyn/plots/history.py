@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from foldyn.errors import InputError
 from foldyn.plots.along import AXES, check_nodes_of, directions
 from foldyn.plots.chart_figures import figure_of
 from foldyn.plots.charts import Chart, Curve
@@ -62,10 +63,15 @@ def plot_history(
     Raises
     ------
     InputError
-        No trajectory or node, a node or direction that a trajectory does not have, uneven times,
-        or NaN in a displacement.
+        No trajectory or node, a result that is no motion, a node or direction that a trajectory
+        does not have, uneven times, or NaN in a displacement.
     """
     trajectories = by_label("trajectories", trajectories)
+    for one in trajectories.values():
+        if "displacement" not in one or "time" not in one["displacement"].dims:
+            raise InputError(
+                ": one has no displacement along time; give results of fd.simulate", "trajectories"
+            )
     numbers = check_nodes_of(trajectories, nodes)
     moved = {
         label: one["displacement"].transpose("time", ...).sel(node=numbers, axis=list(AXES)).values

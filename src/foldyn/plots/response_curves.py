@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.given import by_label
+from foldyn.plots.given import alone, by_label
 
 MARKERS = {"fold": "o", "pitchfork": "s", "period doubling": "D", "Neimark-Sacker": "^"}
 UNSTABLE = (0, (3, 1.6))
@@ -118,7 +118,7 @@ def plot_backbone(backbones: xr.Dataset | Mapping[str, xr.Dataset], title: str =
 
 def _kind(field: str, result: xr.Dataset, kind: str, attribute: str) -> str:
     """An attribute of a result, which must be of a kind."""
-    if result.attrs.get("foldyn_result") != kind or attribute not in result.attrs:
+    if alone(field, result).attrs.get("foldyn_result") != kind or attribute not in result.attrs:
         raise InputError(f": must be a result of foldyn.{kind}", field)
     return str(result.attrs[attribute])
 

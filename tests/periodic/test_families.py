@@ -1,0 +1,69 @@
+"""Derivatives of the families that continuation follows, against differences."""
+
+import numpy as np
+import pytest
+from duffing import oscillator
+
+import foldyn as fd
+from foldyn.periodic.balance import Balance
+from foldyn.periodic.drive import Drive
+from foldyn.periodic.equation import Equation
+from foldyn.periodic.families import ByFrequency, ByLevel, Free, InResonance
+from foldyn.periodic.fourier import Fourier
+from foldyn.periodic.motion import balance_of
+
+STEP = 1e-4
+
+
+def shaken():
+    """The oscillator on a dashpot, pushed at once and at twice its base's frequency."""
+    case = oscillator(frequency=0.5, dashpot=0.05)
+    return case.altered(supports=[*case.supports, fd.BaseMotion("z", fd.Harmonic(0.25), 0.3)])
+
+
+def families():
+    one, doubled = (balance_of(shaken(), "a test", 3, periods) for periods in (1, 2))
+    place = np.zeros(1)
+    free = Balance(Equation(shaken(), "a test", driven=False), Fourier(4, even=True))
+    return {
+        "by frequency": (ByFrequency(one, 1.0, 1e-9), 0.3),
+        "by frequency, doubled": (ByFrequency(doubled, 1.0, 1e-9), 0.3),
+        "by level": (ByLevel(one, 1.0, 1e-9, 0.25), 0.7),
+        "in resonance": (InResonance(one, 1e-9, place, 0.25), -0.2),
+        "free": (Free(free, 1.0, 1e-9, place), 0.3),
+    }
+
+
+@pytest.mark.parametrize("name", families())
+def test_derivatives_are_those_of_the_residual(name):
+    family, p = families()[name]
+    size = family.balance.shape[0] * family.balance.shape[1]
+    z = np.random.default_rng(3).uniform(0.2, 0.5, size)
+    if name == "in resonance":
+        z = np.append(z, 0.3 / family.unit)
+
+    def change(dz, dp):
+        up, down = (family.residual(z + s * dz, p + s * dp) for s in (STEP, -STEP))
+        return (up - down) / (2.0 * STEP)
+
+    still = np.zeros_like(z)
+    columns = np.array([change(row, 0.0) for row in np.eye(len(z))]).T
+    size = np.abs(columns).max()
+    assert family.jacobian(z, p) == pytest.approx(columns, rel=1e-6, abs=1e-6 * size)
+    along = change(still, 1.0)
+    assert family.slope(z, p) == pytest.approx(along, rel=1e-6, abs=1e-6 * np.abs(along).max())
+
+
+def test_motions_of_supports_are_differentiated_twice():
+    """A base that swings three times as fast as the force."""
+    case = oscillator()
+    fast = fd.BaseMotion("z", fd.Harmonic(0.75, phase=20.0), 0.3)
+    drive = Drive(case.altered(supports=[*case.supports, fast]))
+
+    def moved(phase):
+        return drive.sums(drive.moves, np.array([phase]), 0.8, 9)[:, 0]
+
+    for phase in (0.1, 2.0):
+        assert moved(phase)[0].max() == pytest.approx(0.24 * np.sin(3.0 * phase + np.radians(20.0)))
+        change = (moved(phase + STEP) - moved(phase - STEP)) / (2.0 * STEP)
+        assert moved(phase)[1:] == pytest.approx(change[:2], rel=1e-6)
