@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, State
 from foldyn.dynamics import timing
 from foldyn.dynamics.audit import audited
-from foldyn.dynamics.diagnostics import INACCURATE
 from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.initial import check_start, check_touching
 from foldyn.dynamics.lane_steps import integrate, topology
@@ -239,8 +238,9 @@ def _warn(motions: Sequence[Motion], ended: Mapping[int, str], energy: NDArray) 
             f"first of cases[{min(ended)}]: {ended[min(ended)]}", FoldynWarning, stacklevel=3,
         )  # fmt: skip
     off = [0.0 if k in ended else motion.audit() for k, motion in enumerate(motions)]
-    worst = int(np.argmax(off))
-    if off[worst] > INACCURATE:
+    told = [one if motion.unbalanced else 0.0 for one, motion in zip(off, motions, strict=True)]
+    worst = int(np.argmax(told))
+    if told[worst] > 0.0:
         warnings.warn(
             f"the energy balance of cases[{worst}] is off by {off[worst]:.1%} of the energies at "
             f"play, the most of all: use a step below {motions[worst].plan.dt:.3g} s",
@@ -255,7 +255,7 @@ def _warn(motions: Sequence[Motion], ended: Mapping[int, str], energy: NDArray) 
             f"that is largest, the most of {np.count_nonzero(shares)} motions with more than "
             f"{MOST:.0%}: {REMEDY}", StretchWarning, stacklevel=3,
         )  # fmt: skip
-    return off[worst]
+    return max(off)
 
 
 def _dataset(case: Case, out: Samples, outcome: list[str], facts: dict) -> xarray.Dataset:

@@ -155,7 +155,7 @@ class Motion:
         Where the energies do not balance and there is a better method, it is computed anew.
         """
         self.audit()
-        if self._better is not None and is_off(self.output.balance, self._rounding):
+        if self._better is not None and self.unbalanced:
             return self._run_anew(progress)
         self._judge()
         crossings = self._crossings()
@@ -377,6 +377,11 @@ class Motion:
     def _stop(self, message: str, kind: type = InstabilityError, cause: Any = None) -> NoReturn:
         """End the motion with an error, which carries what was computed until then."""
         raise kind(message, self._dataset()) from cause
+
+    @property
+    def unbalanced(self) -> bool:
+        """Whether the energies do not balance as far as they are audited, rounding apart."""
+        return is_off(self.output.balance, self._rounding)
 
     def audit(self) -> float:
         """Relative energy error so far; raises where the energy has exploded."""

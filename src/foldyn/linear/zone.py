@@ -10,6 +10,7 @@ import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
+from foldyn.ram_limit import check_memory
 from foldyn.values import numbers, show, whole
 
 OF_PHASES = ("ticks", "tick_labels", "grid")
@@ -32,6 +33,7 @@ def zone_path(vectors: NDArray, points: str, count: int) -> xarray.DataArray:
             "points",
         )
     count = whole("count", count, least=len(names))
+    _check_memory(count, len(vectors))
     corners = np.array([known[name] for name in names])
     lengths = np.linalg.norm(np.diff(corners, axis=0), axis=1)
     if not lengths.all():
@@ -66,12 +68,19 @@ def array(
 def zone_grid(dimensions: int, count: int) -> xarray.DataArray:
     """See `UnitCell.grid`."""
     count = whole("count", count, least=2)
+    _check_memory(count**dimensions, dimensions)
     along = -np.pi + 2.0 * np.pi / count * np.arange(count)
     phases = np.stack(np.meshgrid(*[along] * dimensions, indexing="ij"), axis=-1)
     return xarray.DataArray(
         phases.reshape(-1, dimensions), dims=("phase", "period"),
         attrs={"units": "rad", "grid": np.array([count] * dimensions)},
     )  # fmt: skip
+
+
+def _check_memory(phases: int, dimensions: int) -> None:
+    """Refuse more phases than fit in memory with their distances."""
+    needed = 8.0 * phases * (3 * dimensions + 2)
+    check_memory("count", f"{phases:.3g} wave vectors", needed, "take fewer")
 
 
 def special_points(vectors: NDArray) -> dict[str, NDArray]:

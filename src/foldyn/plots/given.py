@@ -18,15 +18,21 @@ P = ParamSpec("P")
 R = TypeVar("R", covariant=True)
 
 
-def by_label(field: str, results: xr.Dataset | Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
-    """Results by their labels; one that is given alone has none."""
+def by_label(
+    field: str, results: xr.Dataset | Mapping[str, xr.Dataset], along: str = ""
+) -> dict[str, xr.Dataset]:
+    """Results by their labels; one that is given alone has none. Refused without a dimension."""
     if isinstance(results, xr.Dataset):
-        return {"": results}
+        results = {"": results}
     if not isinstance(results, Mapping) or not results:
         raise InputError(
             ": give a result, or a mapping of label to result, as {'specimen': result}", field
         )
-    return {label: alone(f"{field}[{label!r}]", one) for label, one in results.items()}
+    named = {label: f"{field}[{label!r}]" if label else field for label in results}
+    for label, one in results.items():
+        if along not in ("", *alone(named[label], one).dims):
+            raise InputError(f": has no {along}: give a result along {along}", named[label])
+    return dict(results)
 
 
 def alone(field: str, result: Any) -> xr.Dataset:

@@ -65,7 +65,7 @@ def plot_history(
         No trajectory or node, a node or direction that a trajectory does not have, uneven times,
         or NaN in a displacement.
     """
-    trajectories = by_label("trajectories", trajectories)
+    trajectories = by_label("trajectories", trajectories, "time")
     numbers = check_nodes_of(trajectories, nodes)
     moved = {
         label: one["displacement"].transpose("time", ...).sel(node=numbers, axis=list(AXES)).values

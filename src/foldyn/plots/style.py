@@ -31,6 +31,7 @@ from foldyn.patterns.palette import (  # noqa: F401  figures take all colors fro
     VERMILLION,
     YELLOW,
 )
+from foldyn.values import of_kind
 
 CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, BLACK, ORANGE, SKY, GRAY)
 # Line kinds change with the color, so curves are told apart in gray print too.
@@ -178,6 +179,7 @@ def columns_that_fit(handles: Sequence, width: float, most: int) -> int:
 
 def title_above(figure: Figure, title: str) -> None:
     """Set the figure's title, if there is one."""
+    of_kind("title", title, str)
     place = {} if _constrained(figure) else {"y": 1.0 - 0.1 / figure.get_figheight(), "va": "top"}
     if title:
         figure.suptitle(title, fontsize=TITLE, color=BLACK, **place)
