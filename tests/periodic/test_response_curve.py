@@ -8,6 +8,10 @@ from scipy.optimize import fsolve
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.periodic.bifurcations import Event
+from foldyn.periodic.continuation import Stride
+from foldyn.periodic.motion import balance_of
+from foldyn.periodic.response import _Tracer
 
 ALPHA, FORCE = 0.1, 0.5
 
@@ -140,11 +144,16 @@ def test_symmetry_breaks_at_pitchforks_and_comes_back(forked):
     forks = marked(forked, "pitchfork")
     assert forks.sizes["point"] == 2
     assert np.abs(forks.floquet.values - 1.0).min(axis=1) == pytest.approx(0.0, abs=1e-6)
-    own = forked.isel(point=np.flatnonzero(forked.branch.values == 1))
-    mean = np.abs(own.coefficient.values[:, 0, NODE, 2])
-    assert mean.max() > 0.05  # no longer symmetric
-    assert mean[[0, -1]] == pytest.approx(0.0, abs=2e-3)  # as at both ends
-    assert own.stable.values[1:-1].all()
+    means = []
+    for branch in (1, 2):
+        own = forked.isel(point=np.flatnonzero(forked.branch.values == branch))
+        mean = own.coefficient.values[:, 0, NODE, 2].real
+        assert mean[[0, -1]] == pytest.approx(0.0, abs=2e-3)  # symmetric at both ends
+        assert own.stable.values[1:-1].all()
+        means.append(mean[np.abs(mean).argmax()])
+    assert means[0] == pytest.approx(-means[1], rel=0.02)  # mirror images, at other points
+    assert abs(means[0]) > 0.05
+    assert forked.branch.values.max() == 2
     on_curve = forked.isel(point=np.flatnonzero(forked.branch.values == 0))
     assert np.abs(on_curve.coefficient.values[:, 0, NODE, 2]).max() < 1e-7
     inside = (on_curve.frequency > forks.frequency.min()) & (
@@ -205,6 +214,15 @@ def test_points_found_are_kept_with_a_warning():
         found = fd.response_curve(oscillator(), (0.1, 0.6), 3, most_points=5)
     assert found.attrs["complete"] == 0
     assert found.sizes["point"] == 6
+
+
+def test_a_fork_without_branch_is_warned_of():
+    # as at points that few harmonics take for a period doubling
+    tracer = _Tracer("frequencies", (0.1, 0.6), Stride(0.02, 0.1, 10), 32, 1e-9)
+    family = tracer.family(balance_of(oscillator(), "a test", 5))
+    point = tracer.first(family, None)
+    with pytest.warns(FoldynWarning, match="no branch is found at the period doubling at 0.1,"):
+        tracer._fork(family, Event("period doubling", point), 0, print)
 
 
 def test_a_curve_is_saved_and_loaded(tmp_path, curve):

@@ -17,8 +17,8 @@ from foldyn.attractors.run import (
     Run,
     Stretch,
     check_measure,
-    extremes,
     measured,
+    swing,
     told_once,
 )
 from foldyn.cases import Case, State
@@ -226,11 +226,9 @@ class Steady(NamedTuple):
             _, run = run.advanced(case, transient, transient, every)
         stretch, run = run.advanced(case, self.record * period, every, every, transient)
         values = measured(self.measure, stretch)
-        top, bottom = extremes(values)
         path = states(stretch, period)
         repeats = repeats_after(path[:-1:PER_PERIOD], REPEATS * float(np.ptp(path, axis=0).max()))
-        amplitude = 0.5 * float(top.max() - bottom.min())
-        return Point(value, amplitude, values[:-1:PER_PERIOD], repeats, run)
+        return Point(value, float(swing(values)), values[:-1:PER_PERIOD], repeats, run)
 
 
 def states(stretch: Stretch, period: float) -> NDArray[np.float64]:

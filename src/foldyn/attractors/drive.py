@@ -18,6 +18,7 @@ from foldyn.cases import (
     History,
     Impose,
     LineLoad,
+    Plane,
     Pressure,
     Temperature,
     TotalForce,
@@ -35,8 +36,9 @@ SIZES: Mapping[type, str] = {
     Temperature: "change",
     Impose: "value",
     BaseMotion: "value",
+    Plane: "motion",
 }
-"""Fields that the effect of a load, or of a support that moves, is proportional to."""
+"""Fields that the effect of a load, or of a support or plane that moves, is proportional to."""
 
 
 def drive_frequency(case: Case) -> float:
@@ -74,15 +76,7 @@ def driven_frequency(case: Case) -> float:
 
 def with_histories(case: Case, history: Callable[[Harmonic], History]) -> Case:
     """The case with other histories in place of its harmonic ones."""
-
-    def changed(part: Any) -> Any:
-        own = getattr(part, "history", None)
-        return replace(part, history=history(own)) if isinstance(own, Harmonic) else part
-
-    return case.altered(
-        loads=[changed(part) for part in case.loads],
-        supports=[changed(part) for part in case.supports],
-    )
+    return _altered(case, lambda part: replace(part, history=history(part.history)))
 
 
 def at_frequency(case: Case, frequency: float) -> Case:
@@ -92,7 +86,7 @@ def at_frequency(case: Case, frequency: float) -> Case:
 
 
 def at_level(case: Case, level: float) -> Case:
-    """The case with its harmonic loads and moving supports times a level.
+    """The case with its harmonic loads, and moving supports and planes, times a level.
 
     Raises
     ------
@@ -101,8 +95,6 @@ def at_level(case: Case, level: float) -> Case:
     """
 
     def scaled(part: Any) -> Any:
-        if not isinstance(getattr(part, "history", None), Harmonic):
-            return part
         if type(part) not in SIZES:
             raise InputError(
                 f"amplitudes: {type(part).__name__} has no size that could be scaled; vary the "
@@ -112,13 +104,26 @@ def at_level(case: Case, level: float) -> Case:
         size = level * np.asarray(getattr(part, field), float)
         return replace(cast(Any, part), **{field: size.tolist()})
 
-    return case.altered(
-        loads=[scaled(part) for part in case.loads],
-        supports=[scaled(part) for part in case.supports],
-    )
+    return _altered(case, scaled)
+
+
+def _altered(case: Case, change: Callable[[Any], Any]) -> Case:
+    """The case with what has a harmonic history changed."""
+
+    def changed(parts: Sequence[Any]) -> list[Any]:
+        return [change(part) if _is_driven(part) else part for part in parts]
+
+    contact = case.contact
+    if contact is not None:
+        contact = replace(contact, planes=changed(contact.planes))
+    return case.altered(loads=changed(case.loads), supports=changed(case.supports), contact=contact)
 
 
 def _driven_parts(case: Case) -> list[Any]:
-    """Loads and supports with a harmonic history."""
-    parts = (*case.loads, *case.supports)
-    return [part for part in parts if isinstance(getattr(part, "history", None), Harmonic)]
+    """Loads, supports and planes with a harmonic history."""
+    planes = () if case.contact is None else case.contact.planes
+    return [part for part in (*case.loads, *case.supports, *planes) if _is_driven(part)]
+
+
+def _is_driven(part: Any) -> bool:
+    return isinstance(getattr(part, "history", None), Harmonic)

@@ -115,16 +115,22 @@ def measured(measure: Quantity, stretch: Stretch) -> NDArray[np.float64]:
 
 
 def extremes(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Largest and smallest values (k,) about each evenly spaced sample (k,).
+    """Largest and smallest values (k, ...) about each evenly spaced sample (k, ...).
 
     At a turning point the top of the parabola through three samples, else the sample itself.
     """
     top = values.copy()
     before, now, after = values[:-2], values[1:-1], values[2:]
     slope, bend = 0.5 * (after - before), before - 2.0 * now + after
-    turns = (now - before) * (after - now) < 0.0
+    turns = ((now - before) * (after - now) <= 0.0) & (bend != 0.0)
     top[1:-1][turns] -= 0.5 * slope[turns] ** 2 / bend[turns]
     return np.maximum(values, top), np.minimum(values, top)
+
+
+def swing(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Half the distance (...) between the extremes of samples (k, ...)."""
+    top, bottom = extremes(values)
+    return 0.5 * (top.max(axis=0) - bottom.min(axis=0))
 
 
 @contextmanager

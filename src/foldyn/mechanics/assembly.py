@@ -112,7 +112,7 @@ class Assembly:
         What is compiled serves both: a term puts its planes where they are before an evaluation.
         """
         body = Assembly(self.sheet, *(term.displaced(moved) for term in self.others))
-        body._evaluated, body._hinges = self._evaluated, self._hinges
+        body._evaluated, body.hinges_alone = self._evaluated, self.hinges_alone
         return body
 
     # ------------------------------------------------------------------ energies and forces
@@ -193,10 +193,12 @@ class Assembly:
 
     def hinge_forces(self, q: NDArray) -> NDArray:
         """Those of hinges (bending and folds) alone: forces at play even where all is at rest."""
-        return np.zeros(self.size) if self._hinges is None else self._hinges.internal(q)
+        alone = self.hinges_alone
+        return np.zeros(self.size) if alone is None else alone.internal(q)
 
     @cached_property
-    def _hinges(self) -> Assembly | None:
+    def hinges_alone(self) -> Assembly | None:
+        """Its hinges without the rest, if it has some."""
         alone = self.sheet.hinges_alone()
         others = [term for term in self.others if term.of_hinges]
         return None if alone is None else Assembly(alone, *others)

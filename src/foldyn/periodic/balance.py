@@ -52,6 +52,8 @@ class Balance:
         """R (c, k), N, of coefficients (c, k) under a drive of omega rad/s."""
         w, fourier = omega / self.multiple, self.fourier
         force = at.forces(fourier.values @ x) + at.driving(omega)
+        if not np.isfinite(force).all():  # it goes through what it touches
+            return np.full_like(x, np.inf)
         out = w**2 * (self._bends * x) @ self.equation.mass + fourier.fit @ force
         return out if fourier.even else out + w * (fourier.rate @ x) @ self.equation.damping.T
 
@@ -90,6 +92,8 @@ class Converged(NamedTuple):
 def newton(system, x: NDArray, tolerance: float, most: int = 25) -> Converged | None:
     """Solve `system.residual(x) = 0`, or None.
 
+    Steps that lead through something, where forces of contact are not finite, are halved.
+
     Parameters
     ----------
     system
@@ -97,12 +101,16 @@ def newton(system, x: NDArray, tolerance: float, most: int = 25) -> Converged | 
     tolerance : float
         Largest last step, as a fraction of the solution.
     """
-    x, first = x.copy(), np.inf
+    x, step, first = x.copy(), np.zeros_like(x), np.inf
     for iteration in range(most):
         residual = system.residual(x)
         norm = float(np.linalg.norm(residual))
+        if not np.isfinite(norm):
+            step *= 0.5
+            x -= step
+            continue
         first = min(first, norm)
-        if not np.isfinite(norm) or norm > 1e8 * max(first, system.rounding):
+        if norm > 1e8 * max(first, system.rounding):
             return None
         if norm == 0.0:
             return Converged(x, iteration)

@@ -155,7 +155,7 @@ class Shooting:
     def _step(self, y: NDArray, motion: NDArray, a: NDArray, at) -> tuple:
         stages, h, k = self._stages, self._stages.h, self.equation.size
         x, v, driven = y[:k], y[k:], at.driving(self.omega)
-        ahead, last = x + h * RADAU.c[:, None] * v, np.inf
+        ahead, last, step = x + h * RADAU.c[:, None] * v, np.inf, np.zeros_like(a)
         stiffness, factors = np.zeros(0), None
         for iteration in range(ITERATIONS):
             stage = ahead + h**2 * RADAU.aa @ a
@@ -165,6 +165,10 @@ class Shooting:
                 + at.forces(stage)
                 + driven
             )
+            if iteration and not np.isfinite(left).all():  # through something that it touches
+                step *= 0.5
+                a = a + step
+                continue
             stiffness = at.tangents(stage)
             factors = stages.factors(stiffness)
             step = lu_solve(factors, left.ravel()).reshape(a.shape)

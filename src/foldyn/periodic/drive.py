@@ -28,14 +28,14 @@ def check_smooth(case: Case, name: str) -> None:
     Raises
     ------
     InputError
-        Contact, laws with memory, unknowns without mass.
+        Friction, laws with memory, unknowns without mass.
     """
     case.check_movable()
-    if case.contact is not None:
+    if case.contact is not None and case.contact.rubs:
         raise InputError(
-            f": {name} takes smooth forces, and contact is none; leave it out, or simulate the "
-            "motion",
-            "contact",
+            f": {name} takes forces that depend on where the sheet is, and friction on how it got "
+            "there; give friction = 0.0, or simulate the motion",
+            "contact.friction",
         )
     if case.remembering:
         raise InputError(
@@ -79,9 +79,9 @@ class Drive:
         Lowest one of the harmonic histories (Hz); 0.0 without any.
     highest : int
         The highest one, as a multiple of it.
-    loads, moves, turns : list of (ndarray, Constant or Harmonic)
+    loads, moves, turns, planes : list of (ndarray, Constant or Harmonic)
         Forces (n, 3), N; displacements (n, 3) of supports and of what they carry, m; changes (nr,)
-        of rest angles, rad: each at factor 1.
+        of rest angles, rad; displacements (p, 3) of planes of contact, m: each at factor 1.
     """
 
     def __init__(self, case: Case) -> None:
@@ -89,7 +89,8 @@ class Drive:
         self.moves: Terms = [*case.imposed_terms, *case.base_terms]
         self.turns: Terms = list(case.rest_terms)
         self.following: Terms = list(case.following_terms)
-        every = (*self.loads, *self.moves, *self.turns, *self.following)
+        self.planes: Terms = [_plane(case, number, own) for number, own in case.obstacle_terms]
+        every = (*self.loads, *self.moves, *self.turns, *self.planes, *self.following)
         self._histories = [history for _, history in every]
         for history in self._histories:
             if not isinstance(history, Constant | Harmonic):
@@ -126,3 +127,11 @@ class Drive:
         for shape, (vector, _) in zip(shapes, terms, strict=True):
             shape[: vector.size] = vector.ravel()
         return self.factors(terms, phase, level) @ shapes
+
+
+def _plane(case: Case, number: int, history: Any) -> tuple[NDArray, Any]:
+    """Displacements (p, 3) of the planes when one of them moves, m, and its history."""
+    assert case.contact is not None
+    moved = np.zeros((len(case.contact.planes), 3))
+    moved[number] = case.contact.planes[number].motion
+    return moved, history

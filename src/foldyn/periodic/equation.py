@@ -47,6 +47,8 @@ class Equation:
         Displacements where all unknowns and the drive are zero, m.
     whole : Equation
         That of which this is a reduction; itself if it is none.
+    tangents : Tangents
+        Of the body on the unknowns.
     mass, damping : (k, k)
         M (kg) and C (N s/m).
     alpha : float
@@ -64,7 +66,7 @@ class Equation:
         self.basis = sparse.csr_array(sparse.csc_array(whole)[:, free])
         self.size, self.offset = len(free), np.zeros(total)
         self.whole: Equation = self
-        self._tangents = Tangents(self.body, self.basis, None if case.constraints else free)
+        self.tangents = Tangents(self.body, self.basis)
         nodal = mass_of(case)
         self.mass = self.projected(nodal)
         terms = damping_terms(case, None, modal_rows(case)) if driven else []
@@ -115,6 +117,10 @@ class Instants:
         U, m.
     inertia, drag : (s, k)
         s2 and s1 of the module's text.
+    planes : (s, p, 3)
+        How far planes of contact have moved, m.
+    bodies : sequence of Assembly
+        With the rest angles and planes of each instant.
     """
 
     def __init__(self, equation: Equation, phase: NDArray, level: float) -> None:
@@ -126,7 +132,13 @@ class Instants:
         self.loads = drive.sums(drive.loads, phase, level, body.size)[0] @ basis
         rest = body.sheet.rest_angles
         turned = drive.sums(drive.turns, phase, level, len(rest))[0]
-        self._bodies = [body.folded(rest + turn) for turn in turned] if drive.turns else None
+        self.bodies = [body.folded(rest + turn) if drive.turns else body for turn in turned]
+        contact = equation.case.contact
+        count = 0 if contact is None else len(contact.planes)
+        places = drive.sums(drive.planes, phase, level, 3 * count)[0]
+        self.planes = places.reshape(len(phase), count, 3)
+        if drive.planes:
+            self.bodies = [b.displaced(p) for b, p in zip(self.bodies, self.planes, strict=True)]
         factor = drive.factors(drive.following, phase, level)[0]
         self._factor = np.stack([factor, np.zeros_like(factor), np.zeros_like(factor)], axis=-1)
 
@@ -136,8 +148,7 @@ class Instants:
 
     def _each(self, x: NDArray):
         """Number, displacement and body of each instant."""
-        u, body = self.displacements(x), self.equation.body
-        return ((j, u[j], self._bodies[j] if self._bodies else body) for j in range(len(u)))
+        return zip(range(len(x)), self.displacements(x), self.bodies, strict=True)
 
     def forces(self, x: NDArray) -> NDArray:
         """f (s, k) at unknowns (s, k), N."""
@@ -146,14 +157,15 @@ class Instants:
             force[j] = body.internal(u)
             if following.acts:
                 force[j] -= following_force(following, u, self._factor[j])
-        return force @ self.equation.basis - self.loads
+        with np.errstate(invalid="ignore"):  # within what it touches
+            return force @ self.equation.basis - self.loads
 
     def tangents(self, x: NDArray) -> NDArray:
         """Derivative (s, k, k) of f, N/m."""
         equation, following = self.equation, self.equation._following
         out = np.zeros((len(x), equation.size, equation.size))
         for j, u, body in self._each(x):
-            equation._tangents.put(body, u, out[j])
+            equation.tangents.put(body, u, out[j])
             if following.acts:
                 added = following_tangent(following, u, self._factor[j])
                 out[j] += equation.projected(added)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.periodic.about_rest import AboutRest
 from foldyn.periodic.balance import Balance
 from foldyn.periodic.equation import Instants
 from foldyn.periodic.orbit import Orbit
@@ -103,9 +104,23 @@ class Free(ByFrequency):
     """Motions of an undamped sheet that nothing drives, along their frequency (Hz).
 
     An even series leaves their phase no freedom: they begin at rest, and come back to it.
+
+    Parameters
+    ----------
+    place : ndarray, shape (k,)
+        The equilibrium about which they go.
     """
 
     level = 0.0
+
+    def __init__(self, balance: Balance, span: float, tolerance: float, place: NDArray) -> None:
+        super().__init__(balance, span, tolerance)
+        self.place = place
+        self._about = AboutRest(balance.equation, balance.fourier.phase, place)
+
+    def instants(self, level: float) -> Instants:
+        """See `_OfBalance`."""
+        return self._about
 
 
 class InResonance(_OfBalance):

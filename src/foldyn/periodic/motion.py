@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 METHODS = ("harmonic_balance", "shooting")
 TRUNCATED = 1e-3  # of the motion: what twice as many harmonics would add, above which to warn
+NAMED = 5  # frequencies that a warning lists
 FEW = 3  # harmonics of the motion from which shooting starts
 ROUNDING = 1e-14  # of the motion: harmonics of what shooting finds that are none
 TURN = 2.0 * math.pi
@@ -63,7 +65,7 @@ def periodic_motion(
         Of the motion's own frequency.
     method : {"harmonic_balance", "shooting"}
         A Fourier series whose equation holds in the mean over each harmonic, or the start from
-        which integration over a period (Gauss's method of order 6) comes back to itself.
+        which integration over a period (Radau's method of order 5) comes back to itself.
     start : State or xarray.Dataset, optional
         Where to begin: small motions about a state, or a result of `periodic_motion` or a point of
         one of `response_curve`. The equilibrium under the constant loads by default.
@@ -92,7 +94,7 @@ def periodic_motion(
     Raises
     ------
     InputError
-        An argument out of range; nothing drives the case, or not harmonically; contact, laws with
+        An argument out of range; nothing drives the case, or not harmonically; friction, laws with
         memory, damping with a matrix that varies, massless unknowns, or supports that let it drift.
     ComputationError
         No motion is found.
@@ -100,7 +102,7 @@ def periodic_motion(
     Warns
     -----
     FoldynWarning
-        There are too few harmonics.
+        There are too few harmonics; the motion passes through what it touches.
 
     Notes
     -----
@@ -136,6 +138,7 @@ def periodic_motion(
         floquet = multipliers(balance.equation, orbit.amplitudes, omega, periods, steps=steps)
     truncation = orbit.truncation()
     warn_of_truncation(truncation, len(orbit.amplitudes) - 1, "harmonics")
+    warn_of_crossing([orbit])
     phase = TURN * np.arange(SHOWN) / SHOWN
     motion = {"displacement": orbit.displacement(phase), "velocity": orbit.velocity(phase)}
     facts = {
@@ -196,6 +199,18 @@ def warn_of_truncation(truncation: float, harmonics: int, field: str) -> None:
         warnings.warn(
             f"{field} = {harmonics}: twice as many would change the motion by about "
             f"{truncation:.1g} of it; give more",
+            FoldynWarning,
+            stacklevel=3,
+        )
+
+
+def warn_of_crossing(orbits: Sequence[Orbit]) -> None:
+    """Warn of motions through what touches."""
+    crossed = [f"{orbit.omega / TURN:.6g} Hz" for orbit in orbits if orbit.crosses()]
+    if crossed:
+        warnings.warn(
+            f"contact: the motion at {', '.join(crossed[:NAMED])} passes through what it touches, "
+            "so that it is none; start elsewhere, or give more harmonics",
             FoldynWarning,
             stacklevel=3,
         )

@@ -13,17 +13,19 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from foldyn.cases import Case, State
+from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter, reporter
 from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.periodic.about_rest import AboutRest
 from foldyn.periodic.balance import Balance
 from foldyn.periodic.continuation import LOST, Point, Step, Stride, corrected, point_at, steps
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.families import Free, InResonance
 from foldyn.periodic.floquet import STEPS, is_stable, multipliers
 from foldyn.periodic.fourier import Fourier, values_of
-from foldyn.periodic.motion import balance_of, on_modes, warn_of_truncation
-from foldyn.periodic.orbit import FINE, Orbit
+from foldyn.periodic.motion import balance_of, on_modes, warn_of_crossing, warn_of_truncation
+from foldyn.periodic.orbit import SHOWN, Orbit, along
 from foldyn.periodic.start import FLOOR, balanced, equilibrium, linear_response
 from foldyn.ram_limit import check_memory
 from foldyn.results.periodic_dataset import points_dataset
@@ -36,6 +38,10 @@ if TYPE_CHECKING:
 FIRST = 0.3  # of the longest step
 TURN = 2.0 * np.pi
 SAMPLES = 16  # of half a period, at which the energy is compared
+CONSTANT = 1e-10  # change of the energy along a normal mode, as a fraction, that is wanted
+RAISE, RAISES = 1.5, 3  # of the number of harmonics
+WORTH = 30.0  # by what a raise must lessen the change, for another one
+LOOSE = 1e-2  # change of the energy above which to warn
 
 
 def backbone(
@@ -66,7 +72,7 @@ def backbone(
     amplitudes : (float, float)
         First and last amplitude: the largest displacement of any node from the equilibrium, m.
     harmonics : int
-        Of the motion's frequency.
+        Of the motion's frequency; of normal modes as many more as keep the energy constant.
     damped : bool
         The damped case under its harmonic histories in phase resonance, where a force and the
         displacement it works on are a quarter of a period apart, instead of the undamped one: what
@@ -106,7 +112,7 @@ def backbone(
     -----
     FoldynWarning
         The backbone is lost before the last amplitude (the points found are kept); too few
-        harmonics.
+        harmonics; motions that pass through what they touch.
 
     Notes
     -----
@@ -157,9 +163,16 @@ def backbone(
         "complete": complete,
     }
     orbits = [family.orbit(point.z, point.p) for point in kept]
-    values = _values(orbits, place) if not damped else _damped_values(orbits)
+    if isinstance(family, Free):
+        orbits = [_sharpened(family, orbit) for orbit in orbits]
+        values = _values(orbits, place)
+    else:
+        values = _damped_values(orbits)
+    values |= along(orbits)
+    values["frequency"] = np.array([orbit.omega / TURN for orbit in orbits])
     values["amplitude"] = np.array([_largest(orbit, place) for orbit in orbits])
     warn_of_truncation(float(values["truncation"].max()), balance.fourier.harmonics, "harmonics")
+    warn_of_crossing(orbits)
     facts["wall_seconds"] = time.perf_counter() - began
     return points_dataset("backbone", case, values, facts)
 
@@ -167,7 +180,8 @@ def backbone(
 def _undamped(case: Case, harmonics: int, modes: int | None, state: Any) -> Balance:
     equation = on_modes(Equation(case, "fd.backbone", driven=False), modes, state)
     size = (harmonics + 1) * equation.size
-    check_memory("harmonics", f"a matrix of {size} unknowns", 24.0 * size**2, "take fewer")
+    needed = _bytes(harmonics, equation)
+    check_memory("harmonics", f"a matrix of {size} unknowns", needed, "take fewer")
     return Balance(equation, Fourier(harmonics, even=True))
 
 
@@ -179,6 +193,7 @@ def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, ND
     else:
         displacement = displacement_of(state, case, "state", "a State, as fd.initial_state(path)")
     at = equation.at(np.zeros(1), 0.0)
+    check_contact(case, displacement, at.planes[0])
     place = equation.unknowns(displacement[None], at)[0]
     stiffness = _settled(equation, at, place)
     if mode > equation.size:
@@ -216,17 +231,17 @@ def _free(
     balance: Balance, place: NDArray, frequency: float, motion: NDArray, tolerance: float
 ) -> tuple[Free, Point]:
     """Family of normal modes, and the one that is nearly a linear mode of a motion (k,)."""
-    family = Free(balance, frequency, tolerance)
+    family = Free(balance, frequency, tolerance, place)
     x = np.zeros(balance.shape)
     x[0], x[1] = place, motion
-    along = np.zeros(x.size + 1)
-    along[len(motion) : 2 * len(motion)] = motion
-    found = corrected(family, x.ravel(), frequency, along / np.abs(along).max(), 30)
+    row = np.zeros(x.size + 1)
+    row[len(motion) : 2 * len(motion)] = motion
+    found = corrected(family, x.ravel(), frequency, row / np.abs(row).max(), 30)
     if found is None:
         raise ComputationError(
             f"no normal mode is found at the first amplitude, near {frequency:.6g} Hz; take another"
         )
-    return family, point_at(family, *found[:2], along, found[2])
+    return family, point_at(family, *found[:2], row, found[2])
 
 
 def _resonant(
@@ -253,6 +268,43 @@ def _resonant(
             "is hardly driven, or others are near; drive it where it moves most"
         )
     return family, point_at(family, *near[:2], row, near[2])
+
+
+def _sharpened(family: Free, orbit: Orbit) -> Orbit:
+    """A normal mode with as many harmonics as its energy takes to be constant.
+
+    None are added where they gain little, as where laws bend.
+    """
+    drift = _energy(orbit, family.place)[1]
+    for _ in range(RAISES):
+        if drift <= CONSTANT:
+            break
+        equation, kept = orbit.equation, len(orbit.amplitudes)
+        fourier = Fourier(math.ceil(RAISE * (kept - 1)), even=True)
+        try:
+            check_memory("harmonics", "a larger matrix", _bytes(fourier.harmonics, equation), "")
+        except InputError:
+            break
+        finer = Free(Balance(equation, fourier), family.span, family.tolerance, family.place)
+        x = fourier.real_of(orbit.amplitudes)
+        row = np.append(x.ravel(), 0.0)  # the size stays
+        row[: equation.size] = 0.0
+        found = corrected(finer, x.ravel(), orbit.omega / TURN, row / np.abs(row).max(), 30)
+        if found is None:
+            break
+        sharper = finer.orbit(*found[:2])
+        left = _energy(sharper, family.place)[1]
+        if left >= drift:
+            break
+        orbit, drift, gain = sharper, left, drift / max(left, CONSTANT)
+        if gain < WORTH:
+            break
+    return orbit
+
+
+def _bytes(harmonics: int, equation: Equation) -> float:
+    """Of the matrix of an even series."""
+    return 24.0 * ((harmonics + 1) * equation.size) ** 2
 
 
 def _reach(equation: Equation, motions: NDArray) -> float:
@@ -285,26 +337,22 @@ def _follow(
 
 def _largest(orbit: Orbit, place: NDArray) -> float:
     """Largest displacement of any node from the equilibrium (k,) in a motion, m."""
-    phase = TURN * np.arange(FINE) / FINE
+    phase = TURN * np.arange(SHOWN) / SHOWN
     mean = orbit.equation.at(np.zeros(1), 0.0).displacements(place[None]).reshape(1, -1, 3)
     return float(np.linalg.norm(orbit.displacement(phase) - mean, axis=2).max())
 
 
 def _values(orbits: list[Orbit], place: NDArray) -> dict[str, Any]:
     energies = np.array([_energy(orbit, place) for orbit in orbits])
-    return _common(orbits) | {"energy": energies[:, 0], "energy_drift": energies[:, 1]}
-
-
-def _common(orbits: list[Orbit]) -> dict[str, Any]:
-    reduction = {}
-    if orbits[0].equation.whole is not orbits[0].equation:
-        reduction = {"reduction": np.array([orbit.reduction() for orbit in orbits])}
-    return {
-        **reduction,
-        "frequency": np.array([orbit.omega / TURN for orbit in orbits]),
-        "coefficient": np.array([orbit.node_amplitudes() for orbit in orbits]),
-        "truncation": np.array([orbit.truncation() for orbit in orbits]),
-    }
+    worst = float(energies[:, 1].max())
+    if worst > LOOSE:
+        warnings.warn(
+            f"harmonics: the energy of a motion changes by {worst:.1g} of it along the motion, and "
+            "should be constant: give more",
+            FoldynWarning,
+            stacklevel=3,
+        )
+    return {"energy": energies[:, 0], "energy_drift": energies[:, 1]}
 
 
 def _damped_values(orbits: list[Orbit]) -> dict[str, Any]:
@@ -314,7 +362,7 @@ def _damped_values(orbits: list[Orbit]) -> dict[str, Any]:
             for one in orbits
         ]
     )
-    return _common(orbits) | {
+    return {
         "level": np.array([orbit.level for orbit in orbits]),
         "floquet": floquet,
         "stable": np.array([is_stable(row) for row in floquet]),
@@ -326,6 +374,6 @@ def _energy(orbit: Orbit, place: NDArray) -> tuple[float, float]:
     phase, equation = np.pi * np.arange(SAMPLES + 1) / SAMPLES, orbit.equation
     x = values_of(orbit.amplitudes, phase)
     v = orbit.omega * values_of(orbit.amplitudes, phase, 1)
-    stored = equation.at(phase, 0.0).energies(x) - equation.at(phase[:1], 0.0).energies(place[None])
+    stored = AboutRest(equation, phase, place).energies(x)
     total = stored + 0.5 * np.einsum("ji,ik,jk->j", v, equation.mass, v)
     return float(total[0]), float(np.ptp(total) / total.mean())

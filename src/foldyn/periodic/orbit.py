@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.attractors.run import Stretch, measured, swing
+from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.periodic.balance import Balance
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.fourier import Fourier, values_of
+from foldyn.results import Quantity
+from foldyn.results.crossings import crossings_of
 
-SHOWN = 128  # samples of a period in results
-FINE = 256  # samples among which extremes are sought
+SHOWN = 128  # samples of a period in results, and of those among which extremes are sought
+BARELY = 1e-3  # of a gap, which is left between two samples of motions that do not cross
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +69,22 @@ class Orbit:
         found[1:] *= 2.0
         return found
 
+    def crosses(self) -> bool:
+        """Whether in the motion something passes through what it should touch."""
+        case, body = self.equation.case, self.equation.body
+        if case.contact is None:
+            return False
+        phase = 2.0 * np.pi * np.arange(SHOWN + 1) / SHOWN
+        at = self.equation.at(self.multiple * phase, self.level)
+        u = at.displacements(values_of(self.amplitudes, phase))
+        if len(crossings_of(case, self.displacement(phase[:1])).crossed):
+            return True
+        parts = zip(u[:-1], np.diff(u, axis=0), at.planes, np.diff(at.planes, axis=0), strict=False)
+        return any(
+            body.displaced(moved).term(ContactTerm).clear(here, step, moves, BARELY) < 1.0
+            for here, step, moved, moves in parts
+        )
+
     def truncation(self) -> float:
         """What twice as many harmonics would add, as a fraction of the motion, estimated.
 
@@ -75,7 +94,10 @@ class Orbit:
         fourier = Fourier(2 * kept + 1)  # even ones alone may vanish by symmetry
         balance = Balance(equation, fourier, self.multiple)
         x, at = fourier.real_of(self.amplitudes), balance.instants(self.level)
-        missing = fourier.complex_of(balance.residual(x, self.omega, at))[kept + 1 :]
+        left = balance.residual(x, self.omega, at)
+        if not np.isfinite(left).all():  # between its own samples it goes through what it touches
+            return np.inf
+        missing = fourier.complex_of(left)[kept + 1 :]
         few = equation.at(self.multiple * fourier.phase[::4], self.level)
         mean = few.tangents(fourier.values[::4] @ x).mean(axis=0)
         w, added = self.omega / self.multiple, 0.0
@@ -110,34 +132,26 @@ class Orbit:
         return float(np.linalg.norm(added) / np.linalg.norm(fourier.complex_of(x)[1:]))
 
 
-def swing(values: NDArray) -> NDArray:
-    """Half the distance (...) between the extremes of samples (s, ...) of a period.
-
-    A parabola through the largest sample and its neighbors finds each.
-    """
-    return 0.5 * (_peak(values) + _peak(-values))
-
-
-def _peak(values: NDArray) -> NDArray:
-    at = values.argmax(axis=0)[None]
-    before, here, after = (
-        np.take_along_axis(values, (at + shift) % len(values), 0)[0] for shift in (-1, 0, 1)
-    )
-    bend = before - 2.0 * here + after
-    with np.errstate(divide="ignore", invalid="ignore"):
-        above = np.where(bend < 0.0, -((after - before) ** 2) / (8.0 * bend), 0.0)
-    return here + above
+def along(orbits: list[Orbit]) -> dict[str, NDArray]:
+    """What the points of a curve or a backbone have: amplitudes of all nodes, and errors."""
+    nodes = [orbit.node_amplitudes() for orbit in orbits]
+    coefficient = np.zeros((len(nodes), max(map(len, nodes)), *nodes[0].shape[1:]), complex)
+    for row, own in zip(coefficient, nodes, strict=True):
+        row[: len(own)] = own
+    found = {
+        "coefficient": coefficient,
+        "truncation": np.array([orbit.truncation() for orbit in orbits]),
+    }
+    if orbits[0].equation.whole is not orbits[0].equation:
+        found["reduction"] = np.array([orbit.reduction() for orbit in orbits])
+    return found
 
 
-def measured(orbit: Orbit, measure: Any) -> float:
-    """Amplitude of a measure, a `Quantity` with a function, or of the node that swings most."""
-    phase = 2.0 * np.pi * np.arange(FINE) / FINE
+def amplitude(orbit: Orbit, measure: Quantity | None) -> float:
+    """Amplitude of a measure with a function, or of the node that swings most."""
+    phase = 2.0 * np.pi * np.arange(SHOWN + 2) / SHOWN  # and one beyond the end
     u = orbit.displacement(phase)
     if measure is None:
         return float(swing(u).max())
-    v, time = orbit.velocity(phase), phase / (2.0 * np.pi) * orbit.period
-    values = [
-        float(measure.function(one, rate, float(t)))
-        for one, rate, t in zip(u, v, time, strict=True)
-    ]
-    return float(swing(np.array(values)))
+    time = phase / (2.0 * np.pi) * orbit.period
+    return float(swing(measured(measure, Stretch(time, u, orbit.velocity(phase)))))

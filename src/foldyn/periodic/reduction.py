@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, eigh
 
+from foldyn.cases.contact_checks import check_contact
 from foldyn.errors import ComputationError, InputError
 from foldyn.periodic.equation import Equation, Instants
 from foldyn.periodic.tangents import Tangents
@@ -43,6 +44,7 @@ def reduced(equation: Equation, modes: int, displacement: NDArray) -> Equation:
         `whole` is the one that is given.
     """
     still = equation.at(np.zeros(1), 0.0)
+    check_contact(equation.case, displacement, still.planes[0])
     place = equation.unknowns(displacement[None], still)[0]
     if modes >= equation.size:
         raise InputError(
@@ -103,8 +105,7 @@ def _projected(
         (_carried(equation, place, np.ravel(shape), factors), history)
         for shape, history in equation.drive.moves
     ]
-    free = None if equation.case.constraints else equation.case.free_dofs
-    out._tangents = Tangents(equation.body, equation.basis, free, basis)
+    out.tangents = Tangents(equation.body, equation.basis, basis)
     out.basis = equation.basis @ basis
     out.offset = equation.basis @ place
     out.size = basis.shape[1]

@@ -31,8 +31,8 @@ from foldyn.periodic.continuation import (
 from foldyn.periodic.families import ByFrequency, ByLevel
 from foldyn.periodic.floquet import STEPS, is_stable, multipliers
 from foldyn.periodic.fourier import Fourier
-from foldyn.periodic.motion import balance_of, warn_of_truncation
-from foldyn.periodic.orbit import measured
+from foldyn.periodic.motion import NAMED, balance_of, warn_of_crossing, warn_of_truncation
+from foldyn.periodic.orbit import along, amplitude
 from foldyn.periodic.start import balanced, coefficients
 from foldyn.results import Quantity
 from foldyn.results.periodic_dataset import points_dataset
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
 FIRST = 0.2  # of the longest step
 AWAY = 0.05  # of the motion: how far a branch is entered
 APART = 1e-2  # from 1: multiplier of a fold that is none
-NAMED = 5  # folds that a warning lists
 MEETS = 1e-4  # of the range of the parameter: where branches meet at one point
 
 
@@ -103,8 +102,8 @@ def response_curve(
     modes : int, optional
         As for `periodic_motion`.
     branches : int
-        How many times branches are followed that fork off at a pitchfork (one of the two, which
-        are mirror images) or a period doubling: 0 none, 1 those of the curve, 2 theirs too.
+        How many times branches are followed that fork off at a pitchfork (both) or a period
+        doubling: 0 none, 1 those of the curve, 2 theirs too.
     longest_step : float
         Length of a step, of which a change of the whole motion by itself counts 1, and the range
         of the frequencies 1.
@@ -137,7 +136,8 @@ def response_curve(
     -----
     FoldynWarning
         A branch is lost, or has too many points (those found are kept); too few harmonics: what
-        twice as many would add, or folds at which no multiplier is 1.
+        twice as many would add, folds at which no multiplier is 1, or forks without branches;
+        motions that pass through what they touch.
     """
     began = time.perf_counter()
     of_kind("case", case, Case)
@@ -203,9 +203,8 @@ class _Tracer:
             omega, level = family.omega, p
         x = coefficients(balance, start, omega, level)
         z = balanced(balance, x, omega, self.tolerance, level).x
-        along = np.zeros(len(z) + 1)
-        along[-1] = np.sign(self.ends[1] - self.ends[0])
-        return point_at(family, z, p, along)
+        ahead = np.append(np.zeros(len(z)), np.sign(self.ends[1] - self.ends[0]))
+        return point_at(family, z, p, ahead)
 
     def multipliers(self, family: Any, point: Point) -> NDArray:
         """Of a point."""
@@ -276,7 +275,7 @@ class _Tracer:
         warnings.warn(f"the branch at {p:.6g} {texts[why]}", FoldynWarning, stacklevel=5)
 
     def _fork(self, family: Any, event: Event, depth: int, report: Reporter) -> None:
-        """Follow the branch that leaves a bifurcation."""
+        """Follow the branches that leave a bifurcation."""
         point, old = event.point, family.balance
         if event.name == DOUBLING:
             fourier = Fourier(2 * old.fourier.harmonics)
@@ -284,15 +283,26 @@ class _Tracer:
             amplitudes = old.fourier.complex_of(point.z.reshape(old.shape))
             spread = np.zeros((fourier.harmonics + 1, old.shape[1]), complex)
             spread[::2] = amplitudes
-            along = np.append(np.zeros(spread.size * 2 - old.shape[1]), 1.0)
-            point = Point(fourier.real_of(spread).ravel(), point.p, along, 0.0)
-        _, _, rows = np.linalg.svd(family.jacobian(point.z, point.p))
-        across = rows[-1] * family.size(point.z)
-        first = branch_point(family, point.z, point.p, across, AWAY)
-        if first is None or not self.low <= first.p <= self.high:
-            return
-        self.branch = max(found.branch for found in self.found) + 1
-        self.follow(family, first, depth, report, point)
+            ahead = np.append(np.zeros(spread.size * 2 - old.shape[1]), 1.0)
+            point = Point(fourier.real_of(spread).ravel(), point.p, ahead, 0.0)
+        jacobian, across = family.jacobian(point.z, point.p), np.zeros(len(point.z))
+        mode = np.ones(len(across), bool)
+        if event.name == DOUBLING:  # every second harmonic is new, and none of them couples
+            mode = np.repeat(family.balance.fourier.order % 2 == 1, old.shape[1])
+        across[mode] = np.linalg.svd(jacobian[np.ix_(mode, mode)])[2][-1] * family.size(point.z)
+        # a period doubling has one branch, whose two sides differ in phase alone
+        for side in (1.0, -1.0) if event.name == PITCHFORK else (1.0,):
+            first = branch_point(family, point.z, point.p, side * across, AWAY)
+            if first is None:
+                warnings.warn(
+                    f"harmonics: no branch is found at the {event.name} at {point.p:.6g}, which a "
+                    "longer series may not have: give more harmonics",
+                    FoldynWarning,
+                    stacklevel=5,
+                )
+            elif self.low <= first.p <= self.high:
+                self.branch = max(found.branch for found in self.found) + 1
+                self.follow(family, first, depth, report, point)
 
 
 def _warn_of_folds(found: list[_Found]) -> None:
@@ -313,35 +323,26 @@ def _warn_of_folds(found: list[_Found]) -> None:
 
 def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
     orbits = [found.family.orbit(found.point.z, found.point.p) for found in tracer.found]
-    nodes = [orbit.node_amplitudes() for orbit in orbits]
-    most = max(map(len, nodes))
-    coefficient = np.zeros((len(nodes), most, *nodes[0].shape[1:]), complex)
-    for row, own in zip(coefficient, nodes, strict=True):
-        row[: len(own)] = own
-    truncation = np.array([orbit.truncation() for orbit in orbits])
     names = np.array([found.bifurcation for found in tracer.found], dtype="<U15")
     values = {
         "frequency": np.array([orbit.omega / (2.0 * np.pi) for orbit in orbits]),
         "level": np.array([orbit.level for orbit in orbits]),
-        "amplitude": np.array([measured(orbit, measure) for orbit in orbits]),
+        "amplitude": np.array([amplitude(orbit, measure) for orbit in orbits]),
         "stable": np.array([is_stable(found.floquet) for found in tracer.found]),
         "bifurcation": names,
         "branch": np.array([found.branch for found in tracer.found]),
         "periods": np.array([orbit.multiple for orbit in orbits]),
         "floquet": np.array([found.floquet for found in tracer.found]),
-        "coefficient": coefficient,
-        "truncation": truncation,
+        **along(orbits),
     }
-    equation = tracer.found[0].family.balance.equation
-    if equation.whole is not equation:
-        values["reduction"] = np.array([orbit.reduction() for orbit in orbits])
     _warn_of_folds(tracer.found)
     harmonics = tracer.found[0].family.balance.fourier.harmonics
-    warn_of_truncation(float(truncation.max()), harmonics, "harmonics")
+    warn_of_truncation(float(values["truncation"].max()), harmonics, "harmonics")
+    warn_of_crossing(orbits)
     facts = {
         "by": tracer.by,
         "harmonics": harmonics,
-        "unknowns": equation.size,
+        "unknowns": orbits[0].equation.size,
         "complete": tracer.complete,
         "measure": "largest displacement" if measure is None else measure.text or "measure",
         "wall_seconds": time.perf_counter() - began,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,9 +10,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, Constant
+from foldyn.cases.contact_checks import check_contact
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.linearized import equivalent_slope
 from foldyn.periodic.balance import AtFrequency, Balance, Converged, newton
+from foldyn.periodic.continuation import Step, Stride, point_at, steps
+from foldyn.periodic.families import ByLevel
 from foldyn.periodic.fourier import values_of
 from foldyn.periodic.orbit import Orbit
 from foldyn.statics import trace
@@ -21,7 +25,9 @@ from foldyn.statics.tracing import displacement_of
 FLOOR = float(equivalent_slope(0.0, np.radians(1.0)))
 """Slope of superlinear hinges at rest in a first guess: that of a swing of one degree."""
 LITTLE = 1e-4  # of the drive, whose forces are proportional to it
-FIRST, LEAST = 0.1, 1e-3  # steps of the level of the drive
+SMALL = 0.05  # of the drive, from which a motion is followed to the whole one
+GROWING = Stride(0.05, 0.5, 200)
+TURN = 2.0 * np.pi
 PLACES = "None, a State, or a result of periodic_motion or response_curve"
 
 
@@ -33,7 +39,16 @@ def still_case(case: Case) -> Case:
         for support in case.supports
         if getattr(support, "history", None) in (None, Constant())
     ]
-    return case.altered(loads=loads, supports=supports)
+    contact = case.contact
+    if contact is not None:
+        planes = [
+            plane
+            if plane.history in (None, Constant())
+            else replace(plane, motion=None, history=None)
+            for plane in contact.planes
+        ]
+        contact = replace(contact, planes=planes)
+    return case.altered(loads=loads, supports=supports, contact=contact)
 
 
 def equilibrium(case: Case) -> NDArray:
@@ -54,6 +69,7 @@ def coefficients(balance: Balance, start: Any, omega: float, level: float = 1.0)
     else:
         place = displacement_of(start, equation.case, "start", PLACES)
     mean = equation.at(np.zeros(1), 0.0)
+    check_contact(equation.case, place, mean.planes[0])
     x = np.zeros(balance.shape)
     x[0] = equation.unknowns(place[None], mean)[0]
     return x + linear_response(balance, x, omega, level)
@@ -114,29 +130,28 @@ def balanced(
 
 
 def _grown(balance: Balance, x: NDArray, omega: float, tolerance: float, level: float) -> Converged:
-    """Increase the drive step by step, as far as it takes."""
+    """Follow the motion from a small drive to the whole one, around folds."""
+    family = ByLevel(balance, level, tolerance, omega / TURN)
     still = np.zeros(balance.shape)
     still[0] = x[0]
-    last, rate = still.ravel(), (x - still).ravel()  # at a share of the drive, per share
-    share, step, spent = 0.0, FIRST, 0
-    while share < 1.0:
-        target = min(share + step, 1.0)
-        guess = last + (target - share) * rate
-        found = newton(AtFrequency(balance, omega, target * level), guess, tolerance)
-        if found is None:
-            step *= 0.5
-            if step < LEAST:
-                raise ComputationError(
-                    f"frequency = {omega / (2.0 * np.pi):g} Hz: no periodic motion is found; the "
-                    f"search ends at {share:.2g} of the drive. Remedies: another start (a motion "
-                    "at a frequency nearby, or a State), fd.response_curve from a frequency off "
-                    "resonance, or more damping"
-                )
-            continue
-        spent += found.iterations
-        rate = (found.x - last) / (target - share)
-        last, share, step = found.x, target, 1.5 * step
-    return Converged(last, spent)
+    begin = (still + SMALL * (x - still)).ravel()
+    first, share = newton(AtFrequency(balance, omega, SMALL * level), begin, tolerance), 0.0
+    if first is not None:
+        spent, ahead = first.iterations, np.append(np.zeros(x.size), 1.0)
+        top = point_at(family, first.x, SMALL * level, ahead)  # of the largest drive
+        for step in steps(family, top, GROWING, lambda point: point.p / level - 1.0):
+            if not isinstance(step, Step) or step.after.p < 0.0:
+                break
+            spent += step.after.iterations
+            top = max(top, step.after, key=lambda point: point.p)
+        found, share = newton(AtFrequency(balance, omega, level), top.z, tolerance), top.p / level
+        if found is not None:
+            return Converged(found.x, spent + found.iterations)
+    raise ComputationError(
+        f"frequency = {omega / TURN:g} Hz: no periodic motion is found; the search ends at "
+        f"{share:.2g} of the drive. Remedies: another start (a motion at a frequency nearby, or a "
+        "State), fd.response_curve from a frequency off resonance, or more damping"
+    )
 
 
 def orbit_of(balance: Balance, x: NDArray, omega: float, level: float = 1.0) -> Orbit:

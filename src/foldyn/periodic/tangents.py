@@ -15,58 +15,62 @@ from foldyn.structures.bars_hinges import BarsHingesTerm
 class Tangents:
     """Tangents of a body on the unknowns, or on vectors of them.
 
-    Entries go straight to their places where nothing ties the dofs together; those of further terms
-    and bodies take the way of sparse matrices.
+    Entries go straight to their places; those of terms that know none, as contact, and of other
+    sheets than bars and hinges take the way of sparse matrices.
 
     Parameters
     ----------
     body : Assembly
     basis : sparse (m, k)
         Displacements of all dofs per unknown.
-    free : ndarray, shape (k,), or None
-        Dofs of the unknowns where each is one by itself.
     vectors : ndarray, shape (k, r), optional
         On which tangents are projected.
     """
 
     def __init__(
-        self, body: Assembly, basis: sparse.csr_array, free: NDArray | None,
-        vectors: NDArray | None = None,
-    ) -> None:  # fmt: skip
+        self, body: Assembly, basis: sparse.csr_array, vectors: NDArray | None = None
+    ) -> None:
         self._basis, self._vectors, size = basis, vectors, basis.shape[1]
-        kept: dict[int, tuple[NDArray, NDArray]] = {}  # of the sheet (-1) and of terms
-        if free is not None:
-            rank = np.full(body.size, -1)
-            rank[free] = np.arange(size)
-            if isinstance(body.sheet, BarsHingesTerm):
-                kept[-1] = _places(rank, *_of_blocks(body.sheet))
-            for k, term in enumerate(body.others):
-                if type(term).tangent is Term.tangent:
-                    kept[k] = _places(rank, *term.places)
-        every = [np.zeros(0, np.int64), *(place for _, place in kept.values())]
-        self._union = np.unique(np.concatenate(every))
-        self._own = {k: (at, np.searchsorted(self._union, of)) for k, (at, of) in kept.items()}
+        places: dict[int, tuple[NDArray, NDArray]] = {}  # of the sheet (-1) and of terms
+        if isinstance(body.sheet, BarsHingesTerm):
+            places[-1] = _of_blocks(body.sheet)
+        for k, term in enumerate(body.others):
+            if type(term).tangent is Term.tangent:
+                places[k] = term.places
+        spread = {k: _spread(basis, *at) for k, at in places.items()}
+        every = [np.zeros(0, np.int64), *(place for place, _, _ in spread.values())]
+        self._union = union = np.unique(np.concatenate(every))
+        self._own = {
+            k: sparse.csr_array(
+                (weight, (np.searchsorted(union, place), entry)), (len(union), len(places[k][0]))
+            )
+            for k, (place, entry, weight) in spread.items()
+        }
         row, column = np.divmod(self._union, max(size, 1))
         ends = np.searchsorted(row, np.arange(size + 1))
         zeros = np.zeros(len(column))
         self._matrix = sparse.csr_array((zeros, column, ends), (size, size))
 
+    def of(self, body: Assembly) -> Tangents:
+        """Those of another body on the same unknowns."""
+        return Tangents(body, self._basis, self._vectors)
+
     def put(self, body: Assembly, u: NDArray, out: NDArray) -> None:
         """Put the tangent at displacements u (m,) into `out`."""
         data, sheet, rest = np.zeros(len(self._union)), body.sheet, None
         if -1 in self._own and isinstance(sheet, BarsHingesTerm):
-            kept, place = self._own[-1]
             blocks = np.zeros((len(sheet.sparsity.indices), 3, 3))
             add_tangent(sheet.model, sheet.sparsity, nodal(u), -np.inf, blocks)
-            data[place] = blocks.ravel()[kept]
+            data += self._own[-1] @ blocks.ravel()
         else:
             rest = sheet.tangent(u)
         for k, term in enumerate(body.others):
             if k in self._own:
-                kept, place = self._own[k]
-                data += np.bincount(place, term.entries(u)[kept], len(data))
+                data += self._own[k] @ term.entries(u)
             else:
-                rest = term.tangent(u) if rest is None else rest + term.tangent(u)
+                found = term.tangent(u)
+                if found.nnz:  # what touches nothing has no stiffness
+                    rest = found if rest is None else rest + found
         if self._vectors is None:
             out[:] = 0.0
             out.reshape(-1)[self._union] = data
@@ -89,7 +93,19 @@ def _of_blocks(sheet: BarsHingesTerm) -> tuple[NDArray, NDArray]:
     return row.ravel(), column.ravel()
 
 
-def _places(rank: NDArray, row: NDArray, column: NDArray) -> tuple[NDArray, NDArray]:
-    """Which entries of a matrix of all dofs are kept, and their places among those kept."""
-    kept = np.flatnonzero((rank[row] >= 0) & (rank[column] >= 0))
-    return kept, rank[row[kept]] * (rank.max() + 1) + rank[column[kept]]
+def _spread(
+    basis: sparse.csr_array, row: NDArray, column: NDArray
+) -> tuple[NDArray, NDArray, NDArray]:
+    """What entries at rows and columns (e,) add to a matrix of the unknowns.
+
+    Places k row + column there, numbers of entries, and the factors of these.
+    """
+    one, other = basis[row], basis[column]
+    width = np.diff(other.indptr)
+    count = np.diff(one.indptr) * width
+    entry = np.repeat(np.arange(len(row)), count)
+    turn = np.arange(len(entry)) - np.repeat(np.cumsum(count) - count, count)
+    i = one.indptr[entry] + turn // width[entry]
+    j = other.indptr[entry] + turn % width[entry]
+    place = one.indices[i].astype(np.int64) * basis.shape[1] + other.indices[j]
+    return place, entry, one.data[i] * other.data[j]

@@ -131,7 +131,8 @@ class ContactTerm(Term):
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
         """See `Term`."""
-        self.contact(q)
+        if self.contact(q)[0] == 0.0:  # nothing touches
+            return sparse.csr_array((q.size, q.size))
         return self.tangent_at(q, self.memory)
 
     def tangent_at(self, q: NDArray, kept: Memory) -> sparse.csr_array:
