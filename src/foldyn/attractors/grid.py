@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import os
 import time
 import warnings
@@ -21,6 +22,7 @@ from foldyn.cases import Case, State
 from foldyn.dynamics import simulate_many
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.ram_limit import check_memory
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import PLACE, variable
 from foldyn.values import number, numbers, of_kind, show, whole
@@ -120,9 +122,12 @@ def basins(
             "way), and their state is no part of the grid; take an elastic law"
         )
     names, places = _grid(grid)
+    record, same = whole("record", record, least=4), number("same", same, above=0.0, below=1.0)
+    count = math.prod(len(values) for values in places)
+    needed = 8.0 * count * (record + 1) * 2 * case.structure.nodes.size
+    check_memory("grid", f"a grid of {count} starts", needed, "take fewer values")
     starts = _starts(case, initial, names, places)
     duration = number("duration", duration, above=0.0, unit="s")
-    record, same = whole("record", record, least=4), number("same", same, above=0.0, below=1.0)
     frequency = drive_frequency(case)
     period = 1.0 / frequency if frequency else UNDRIVEN * duration
     settled = float(np.ceil(duration / period - 1e-9) * period)

@@ -104,7 +104,10 @@ def check_measure(measure: Any) -> Quantity:
 def measured(measure: Quantity, stretch: Stretch) -> NDArray[np.float64]:
     """Values (k,) of a measure at the samples of a stretch."""
     assert measure.function is not None
-    values = [measure.function(u, v, float(t)) for t, u, v in zip(*stretch, strict=True)]
+    try:
+        values = [measure.function(u, v, float(t)) for t, u, v in zip(*stretch, strict=True)]
+    except Exception as error:
+        raise InputError(f": raised {type(error).__name__}: {error}", "measure") from error
     try:
         found = np.array(values, float)
     except (TypeError, ValueError):
