@@ -81,7 +81,7 @@ def test_sections_keep_the_case_and_can_be_stored(tmp_path):
 
 def test_what_has_no_section_is_refused(periodic):
     motion = periodic[2]
-    with pytest.raises(InputError, match="motion: got DataArray, give a result of fd.simulate"):
+    with pytest.raises(InputError, match="motion: got DataArray, give a result of fd"):
         fd.poincare_section(motion.time)
     with pytest.raises(InputError, match='direction = "left"'):
         fd.poincare_section(motion, plane=X, direction="left")
