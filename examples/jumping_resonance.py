@@ -9,7 +9,7 @@ curves = {}
 for force in (5e-5, 1e-4, 2e-4):  # N
     push = fd.Force([5], (force, 0, 0), history=fd.Harmonic(0.6))
     case = fd.Case(s, held, [push], fd.Rayleigh(alpha=0.08))
-    curve = fd.response_curve(case, frequencies=(0.58, 0.66), harmonics=7)
+    curve = fd.response_curve(case, (0.58, 0.66), harmonics=7, longest_step=0.2, steps=32)
     folds = curve.frequency.values[curve.bifurcation.values == "fold"]
     print(f"{1e3 * force:.2f} mN: largest swing {float(curve.amplitude.max()):.4f} m", end=", ")
     print(

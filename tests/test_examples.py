@@ -190,6 +190,21 @@ def kresling_chain(found):
     assert float(motion.dissipated[-1]) > 0.0
 
 
+def kresling_chaos(found):
+    """In one state, on to both without order, and through both in each cycle."""
+    heights, exponents = found["heights"], found["exponents"]
+    low, shut = 48.5, 29.0  # mm: the barrier, and the height of the second state
+    assert heights[4.0].min() > low
+    assert heights[7.0].min() < shut < low < heights[7.0].max()
+    assert heights[8.0].min() < shut < low < heights[8.0].max()
+    assert exponents[7.0] > 2.0  # 1/s
+    # with a complex pair of multipliers disturbances fade as exp(-alpha t / 2)
+    np.testing.assert_allclose([exponents[4.0], exponents[8.0]], -20.0, rtol=0.15)
+    once = {force: z[::32] for force, z in heights.items()}  # a period
+    assert np.ptp(once[4.0]) < 1e-3 and np.ptp(once[8.0]) < 1e-3
+    assert np.ptp(once[7.0]) > 20.0
+
+
 def miura_bands(found):
     """The full gap is there while folded and closes as the sheet unfolds; the path agrees."""
     width = np.array(found["top"]) - found["bottom"]
@@ -222,6 +237,19 @@ def pressure(found):
         np.testing.assert_allclose(np.ptp(reduced), np.ptp(shell), rtol=0.1)
 
 
+def shaken_miura(found):
+    """At first it swings in proportion, and then less, at a higher frequency."""
+    peaks = [one.isel(point=int(one.amplitude.values.argmax())) for one in found["curves"].values()]
+    swing = np.array([float(one.amplitude) for one in peaks])
+    frequency = np.array([float(one.frequency) for one in peaks])
+    np.testing.assert_allclose(swing[1] / swing[0], 3.0, rtol=5e-3)
+    assert 5.5 < swing[2] / swing[0] < 5.9
+    linear = fd.modes(fd.Case(found["s"], found["held"]), count=4).frequency.values
+    assert np.abs(frequency[0] / linear - 1.0).min() < 5e-3
+    assert frequency[2] > 1.005 * frequency[0]
+    assert all(bool(one.stable.all()) for one in found["curves"].values())
+
+
 def snap_through(found):
     """Two stable states and the barrier between them; see tests of landscapes for the numbers."""
     assert [state.stable for state in found["landscape"].states] == [True, False, True]
@@ -247,7 +275,8 @@ def thick_panel(found):
 CHECKS = (
     air_deployment, air_fall, air_gust, bilayer, case_study_1, clamped, contact_tower, crane,
     deployment, design_frequencies, design_kresling, design_miura, fidelity, hardening_miura,
-    jumping_resonance, kresling_chain, miura_bands, point_mass, pressure, snap_through, sweep,
+    jumping_resonance, kresling_chain, kresling_chaos, miura_bands, point_mass, pressure,
+    shaken_miura, snap_through, sweep,
     thick_panel,
 )  # fmt: skip
 

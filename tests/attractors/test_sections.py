@@ -7,7 +7,7 @@ import pytest
 from two_bars import SIZE, TURN, X, at, duffing, place
 
 import foldyn as fd
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 
 FALL = fd.Quantity("m/s", "speed", function=lambda u, v, t: v[1, 2])
 
@@ -81,7 +81,7 @@ def test_sections_keep_the_case_and_can_be_stored(tmp_path):
 
 def test_what_has_no_section_is_refused(periodic):
     motion = periodic[2]
-    with pytest.raises(InputError, match=r"(?s)motion = .*: give a result of fd.simulate"):
+    with pytest.raises(InputError, match="motion: got DataArray, give a result of fd"):
         fd.poincare_section(motion.time)
     with pytest.raises(InputError, match='direction = "left"'):
         fd.poincare_section(motion, plane=X, direction="left")
@@ -95,3 +95,9 @@ def test_what_has_no_section_is_refused(periodic):
         InputError, match=r"^period: give one \(s\), or a plane: this result cannot"
     ):
         fd.poincare_section(motion)
+    with pytest.warns(
+        FoldynWarning, match="at no time from after = 1e\\+09 s a whole period of 1 s"
+    ):
+        assert not fd.poincare_section(motion, 1.0, after=1e9).sizes["time"]
+    with pytest.warns(FoldynWarning, match="the plane passes 1e\\+09"):
+        assert not fd.poincare_section(motion, plane=X, level=1e9).sizes["time"]

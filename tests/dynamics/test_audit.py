@@ -72,6 +72,10 @@ def test_an_equilibrium_that_rests_is_rounding_and_not_unstable(method):
     apart = np.abs(found.displacement - found.displacement[0]).max()
     assert float(apart) < 1e-6
     assert all("below the rounding errors" in one for one in said)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", FoldynWarning)  # of many, none is unbalanced
+        many = fd.simulate_many([held, held], 0.3, method="rk4", initial=start)
+    assert float(np.abs(many.displacement - many.displacement.isel(time=0)).max()) < 1e-6
 
 
 def test_a_motion_that_explodes_from_next_to_nothing_is_still_stopped():

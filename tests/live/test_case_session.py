@@ -50,6 +50,22 @@ def test_computes_every_kind(session, kind):
     assert np.allclose(nodes[:6], fd.patterns.simple_fold(dihedral=90).vertices, atol=1e-6)
 
 
+def test_a_response_curve_plays_its_motions(tmp_path, monkeypatch):
+    head, _ = FOLD.replace('kind = "half_sine", duration', 'kind = "harmonic", frequency').split(
+        "[analysis]"
+    )
+    curve = 'kind = "response"\nfrequencies = [0.3, 0.4]\nharmonics = 1\nlongest_step = 1.0\n'
+    own = CaseSession(write(tmp_path, f"{head}[analysis]\n{curve}"))
+    assert list(own.about["offers"]) == ["response", "modes", "frf", "statics", "dynamics"]
+    answer = own.compute(wish("response"))
+    assert answer["about"]["kind"] == "periodic" and answer["about"]["driven"]
+    assert not any("in the span" in note for note in answer["notes"])
+    for kind in KINDS:
+        assert "error" not in own.compute(wish(kind)), kind
+    monkeypatch.setattr(view_requests, "MOST_FREE", 1)
+    assert "in the span of 6 modes" in own.compute(wish("response"))["notes"][0]
+
+
 def test_modes_are_those_of_the_changed_case(session, tmp_path):
     answer = session.compute(wish(dihedral=120.0))
     got = [each["frequency"] for each in answer["about"]["results"]]

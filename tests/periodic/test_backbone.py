@@ -72,6 +72,12 @@ def resonant():
     return fd.backbone(oscillator(), amplitudes=(0.01, 1.8), harmonics=9, damped=True)
 
 
+def test_resonance_without_damping_is_refused():
+    case = oscillator().altered(damping=fd.Rayleigh())
+    with pytest.raises(InputError, match="damped: nothing damps the sheet"):
+        fd.backbone(case, amplitudes=(0.01, 0.1), damped=True)
+
+
 def test_damped_backbone_follows_the_peaks_of_response_curves(resonant):
     assert resonant.frequency.values == pytest.approx(
         exact_frequency(resonant.amplitude.values), rel=1e-5

@@ -1,10 +1,12 @@
 """Motions in the span of few modes and their derivatives, against those of all dofs."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 
 
 def cell(force=0.0, supports=(), history=None):
@@ -34,7 +36,9 @@ def test_few_modes_come_near_and_say_how_near():
     whole = fd.periodic_motion(case, harmonics=5)
     errors = []
     for modes in (1, 3, 5):
-        one = fd.periodic_motion(case, harmonics=5, modes=modes)
+        told = pytest.warns(FoldynWarning, match="modes: what they leave out would change")
+        with told if modes == 1 else nullcontext():
+            one = fd.periodic_motion(case, harmonics=5, modes=modes)
         errors.append(apart(one, whole))
         assert one.attrs["reduction"] < errors[-1] < 30.0 * one.attrs["reduction"]
     assert errors[2] < errors[1] < errors[0]

@@ -30,6 +30,8 @@ def test_bands_are_lines_over_a_path(cell):
     assert full >= 1
     assert len(axes.patches) == full
     assert not fd.plots.plot_bands(b, gaps=False).axes[0].patches
+    with pytest.raises(InputError, match="title: got int, give a str"):
+        fd.plots.plot_bands(b, title=3)
 
 
 def test_polarized_bands_are_colored(cell):

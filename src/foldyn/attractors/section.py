@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from foldyn.attractors.drive import drive_frequency
 from foldyn.attractors.run import Stretch, check_measure, measured
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.ram_limit import check_memory
 from foldyn.results import Quantity, case_of
 from foldyn.results.attributes import facts, own_attributes
@@ -64,6 +65,11 @@ def poincare_section(
     InputError
         No motion; nothing that sets the period; neither a period nor a plane alone.
 
+    Warns
+    -----
+    FoldynWarning
+        The section has no states.
+
     Notes
     -----
     Between the samples a motion is the cubic with their displacements and velocities: its error is
@@ -98,7 +104,10 @@ def poincare_section(
         raise InputError(f" = {show(period)}: give it or a plane, one of the two", "period")
     else:
         times = _passages(stretch, plane, number("level", level), direction)
-    found = at_times(stretch, times[times >= after])
+    times = times[times >= after]
+    if not len(times):
+        warnings.warn(_missed(stretch, after, period, level), FoldynWarning, stacklevel=2)
+    found = at_times(stretch, times)
     values = {"displacement": found.displacement, "velocity": found.velocity}
     along = {"time": variable(("time",), found.time, "s", "time")}
     told = {"period": period if plane is None else None, "after": after}
@@ -109,11 +118,18 @@ def poincare_section(
     return own
 
 
+def _missed(stretch: Stretch, after: float, period: float | None, level: float) -> str:
+    """What a section says that has no states."""
+    wanted = f"a whole period of {period:g} s" if period else f"the plane passes {level:g}"
+    last = float(stretch.time[-1])
+    return f"the motion lasts until {last:g} s, and at no time from after = {after:g} s {wanted}"
+
+
 def _stretch(motion: xarray.Dataset) -> Stretch:
     """Samples of a motion."""
     held = getattr(motion, "data_vars", ())
     if "displacement" not in held or "velocity" not in held or "time" not in motion.dims:
-        raise InputError(f" = {show(motion)}: give a result of fd.simulate", "motion")
+        raise InputError(f": got {type(motion).__name__}, give a result of fd.simulate", "motion")
     if motion.displacement.dims != ("time", "node", "axis") or motion.sizes["time"] < 2:
         raise InputError(": give one motion of at least two samples", "motion")
     return Stretch(motion.time.values, motion.displacement.values, motion.velocity.values)

@@ -24,6 +24,7 @@ KINDS: Mapping[str, str] = {
     "statics": "Static curve",
     "dynamics": "Short motion",
     "bands": "Bands",
+    "response": "Response curve",
 }
 """What can be computed, by the kind of analysis, as the page calls it."""
 STEPS, PERIODS, FREQUENCIES, COUNT = 10, 10.0, 200, 6
@@ -33,6 +34,8 @@ SAMPLES, EVERY = 250, 4
 """Samples of a motion, and steps between them where they are ours: a hundred in a period."""
 MOST_WORK = 1e7
 """Steps times dofs of a motion with fixed steps: a second or some. Longer ones are cut."""
+MOST_FREE, MODES = 60, 6
+"""Free dofs of a response curve: some 0.1 s a point. Larger sheets move in the span of modes."""
 
 Document = dict[str, Any]
 
@@ -49,6 +52,7 @@ def offered(document: Document) -> dict[str, str]:
         "statics": bool(document.get("loads")) or (imposed and not based),
         "dynamics": bool(document.get("loads")) or imposed or based,
         "bands": False,  # of files of this kind alone: few patterns repeat
+        "response": False,  # as above: curves take seconds or more
     }
     kinds = [kind for kind in KINDS if kind == own or possible[kind]]
     return {kind: KINDS[kind] for kind in sorted(kinds, key=lambda kind: kind != own)}
@@ -64,6 +68,8 @@ def computed(path: Path, document: Document, kind: str) -> tuple[CaseFile, xr.Da
     """
     choice("compute", kind, offered(document))
     case_file = case_of_document(path, _as_kind(path, document, kind))
+    if kind == "response":
+        return case_file, _curve_of_motions(case_file)
     if kind != "dynamics":
         return case_file, case_file.run()
     asked = case_file.analysis.arguments
@@ -78,6 +84,20 @@ def computed(path: Path, document: Document, kind: str) -> tuple[CaseFile, xr.Da
         stacklevel=2,
     )
     return case_file, case_file.run(duration=duration, every=duration / SAMPLES)
+
+
+def _curve_of_motions(case_file: CaseFile) -> xr.Dataset:
+    """The response curve, of a big sheet in the span of few modes."""
+    free = len(case_file.case().free_dofs)
+    if free <= MOST_FREE or case_file.analysis.arguments.get("modes"):
+        return case_file.run()
+    warnings.warn(
+        f"the curve is computed in the span of {MODES} modes, so that it is there soon, instead of "
+        f"with {free} free dofs; foldyn run takes all of them",
+        FoldynWarning,
+        stacklevel=3,
+    )
+    return case_file.run(modes=MODES)
 
 
 def _as_kind(path: Path, document: Document, kind: str) -> Document:

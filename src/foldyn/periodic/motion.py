@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 METHODS = ("harmonic_balance", "shooting")
 TRUNCATED = 1e-3  # of the motion: what twice as many harmonics would add, above which to warn
+REDUCED = 0.05  # of the motion: what the dofs left out would add, above which to warn
 NAMED = 5  # frequencies that a warning lists
 FEW = 3  # harmonics of the motion from which shooting starts
 ROUNDING = 1e-14  # of the motion: harmonics of what shooting finds that are none
@@ -102,7 +103,7 @@ def periodic_motion(
     Warns
     -----
     FoldynWarning
-        There are too few harmonics; the motion passes through what it touches.
+        There are too few harmonics, or modes; the motion passes through what it touches.
 
     Notes
     -----
@@ -139,6 +140,8 @@ def periodic_motion(
     truncation = orbit.truncation()
     warn_of_truncation(truncation, len(orbit.amplitudes) - 1, "harmonics")
     warn_of_crossing([orbit])
+    reduction = None if modes is None else orbit.reduction()
+    warn_of_reduction(reduction)
     phase = TURN * np.arange(SHOWN) / SHOWN
     motion = {"displacement": orbit.displacement(phase), "velocity": orbit.velocity(phase)}
     facts = {
@@ -149,7 +152,7 @@ def periodic_motion(
         "iterations": spent,
         "truncation": truncation,
         "modes": modes,
-        "reduction": None if modes is None else orbit.reduction(),
+        "reduction": reduction,
         "multipliers": "variational equation integrated by Gauss's method of order 6",
         "wall_seconds": time.perf_counter() - began,
     }
@@ -203,6 +206,18 @@ def warn_of_truncation(truncation: float, harmonics: int, field: str) -> None:
         warnings.warn(
             f"{field} = {harmonics}: twice as many would change the motion by about "
             f"{truncation:.1g} of it; give more",
+            FoldynWarning,
+            stacklevel=3,
+        )
+
+
+def warn_of_reduction(reduction: Any) -> None:
+    """Warn where modes leave out much of the motions; their `reduction`, or None."""
+    most = 0.0 if reduction is None else float(np.max(reduction))
+    if most > REDUCED:
+        warnings.warn(
+            f"modes: what they leave out would change the motion by {most:.1g} of it or more; give "
+            "more",
             FoldynWarning,
             stacklevel=3,
         )

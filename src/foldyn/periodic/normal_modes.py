@@ -24,7 +24,13 @@ from foldyn.periodic.equation import Equation
 from foldyn.periodic.families import Free, InResonance
 from foldyn.periodic.floquet import STEPS, is_stable, multipliers
 from foldyn.periodic.fourier import Fourier, values_of
-from foldyn.periodic.motion import balance_of, on_modes, warn_of_crossing, warn_of_truncation
+from foldyn.periodic.motion import (
+    balance_of,
+    on_modes,
+    warn_of_crossing,
+    warn_of_reduction,
+    warn_of_truncation,
+)
 from foldyn.periodic.orbit import SHOWN, Orbit, along
 from foldyn.periodic.start import FLOOR, balanced, equilibrium, linear_response
 from foldyn.ram_limit import check_memory
@@ -112,7 +118,7 @@ def backbone(
     -----
     FoldynWarning
         The backbone is lost before the last amplitude (the points found are kept); too few
-        harmonics; motions that pass through what they touch.
+        harmonics or modes; motions that pass through what they touch.
 
     Notes
     -----
@@ -143,6 +149,12 @@ def backbone(
     damped = flag("damped", damped)
     if damped:
         balance = balance_of(case, "fd.backbone", harmonics, modes=modes, start=state)
+        if not balance.equation.damping.any():
+            raise InputError(
+                ": nothing damps the sheet, which in resonance swings without bound; give the case "
+                "damping, or leave damped out",
+                "damped",
+            )
     else:
         balance = _undamped(case, whole("harmonics", harmonics, least=1), modes, state)
     place, frequency, shape = _mode(balance.equation, state, mode)
@@ -175,6 +187,7 @@ def backbone(
     values["amplitude"] = np.array([_largest(orbit, place) for orbit in orbits])
     warn_of_truncation(float(values["truncation"].max()), balance.fourier.harmonics, "harmonics")
     warn_of_crossing(orbits)
+    warn_of_reduction(values.get("reduction"))
     facts["wall_seconds"] = time.perf_counter() - began
     return points_dataset("backbone", case, values, facts)
 

@@ -31,7 +31,13 @@ from foldyn.periodic.continuation import (
 from foldyn.periodic.families import ByFrequency, ByLevel
 from foldyn.periodic.floquet import STEPS, is_stable, multipliers
 from foldyn.periodic.fourier import Fourier
-from foldyn.periodic.motion import NAMED, balance_of, warn_of_crossing, warn_of_truncation
+from foldyn.periodic.motion import (
+    NAMED,
+    balance_of,
+    warn_of_crossing,
+    warn_of_reduction,
+    warn_of_truncation,
+)
 from foldyn.periodic.orbit import along, amplitude
 from foldyn.periodic.start import balanced, coefficients
 from foldyn.results import Quantity
@@ -137,7 +143,7 @@ def response_curve(
     FoldynWarning
         A branch is lost, or has too many points (those found are kept); too few harmonics: what
         twice as many would add, folds at which no multiplier is 1, or forks without branches;
-        motions that pass through what they touch.
+        motions that pass through what they touch; too few modes.
     """
     began = time.perf_counter()
     of_kind("case", case, Case)
@@ -339,6 +345,7 @@ def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
     harmonics = tracer.found[0].family.balance.fourier.harmonics
     warn_of_truncation(float(values["truncation"].max()), harmonics, "harmonics")
     warn_of_crossing(orbits)
+    warn_of_reduction(values.get("reduction"))
     facts = {
         "by": tracer.by,
         "harmonics": harmonics,
