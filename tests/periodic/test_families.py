@@ -16,9 +16,13 @@ STEP = 1e-4
 
 
 def shaken():
-    """The oscillator on a dashpot, pushed at once and at twice its base's frequency."""
+    """The oscillator on a dashpot, pushed at twice its base's frequency; mass ties both."""
     case = oscillator(frequency=0.5, dashpot=0.05)
-    return case.altered(supports=[*case.supports, fd.BaseMotion("z", fd.Harmonic(0.25), 0.3)])
+    own = case.structure
+    s = fd.discretize(own.pattern, own.sheet, scheme="n4b5", bar_law="linear", mass="consistent")
+    return case.altered(
+        structure=s, supports=[*case.supports, fd.BaseMotion("z", fd.Harmonic(0.25), 0.3)]
+    )
 
 
 def families():
@@ -67,3 +71,11 @@ def test_motions_of_supports_are_differentiated_twice():
         assert moved(phase)[0].max() == pytest.approx(0.24 * np.sin(3.0 * phase + np.radians(20.0)))
         change = (moved(phase + STEP) - moved(phase - STEP)) / (2.0 * STEP)
         assert moved(phase)[1:] == pytest.approx(change[:2], rel=1e-6)
+
+
+def test_resonance_of_a_swinging_base_is_that_of_the_forces_by_which_it_moves_the_mass():
+    """Bars at right angles to it have no stiffness: inertia and drag alone drive the node."""
+    case = shaken().altered(loads=[])
+    found = fd.backbone(case, amplitudes=(1e-4, 2e-4), harmonics=2, damped=True)
+    linear = found.attrs["linear_frequency"]
+    assert found.frequency.values == pytest.approx(linear, rel=1e-6)

@@ -12,6 +12,7 @@ from foldyn.periodic.orbit import Orbit
 
 TURN = 2.0 * np.pi
 PROBE = 1e-4  # of the level, or of the frequency: for derivatives that have no formula
+LITTLE = 1e-4  # level of a drive whose forces are proportional to it
 LEAST = 1e-12  # of the sheet's length: a motion is never taken as smaller
 
 
@@ -127,9 +128,9 @@ class InResonance(_OfBalance):
     """Forced motions in phase resonance, along the logarithm of the level of the drive.
 
     Their frequency is that at which the drive does no reactive work: the mean over a period of its
-    force, as it acts on the sheet in its state, times the displacement vanishes (Peeters, Kerschen
-    and Golinval, Mech. Syst. Signal Process. 25, 2011). The last unknown is the frequency over
-    `unit`, so that it counts as much as displacements of the sheet's size.
+    force, as a small one acts on the sheet in its state, times the displacement vanishes (Peeters,
+    Kerschen and Golinval, Mech. Syst. Signal Process. 25, 2011). The last unknown is the frequency
+    over `unit`, so that it counts as much as displacements of the sheet's size.
 
     Parameters
     ----------
@@ -146,16 +147,16 @@ class InResonance(_OfBalance):
         equation, fourier = balance.equation, balance.fourier
         self.unit = frequency / equation.length
         self._heavy = float(np.diag(equation.mass).max()) * (TURN * frequency) ** 2  # N/m
-        at = balance.instants()
-        still = at.forces(np.tile(place, (len(fourier.phase), 1)))
-        self._force = [fourier.fit @ part for part in (still, at.drag, at.inertia)]
+        at, there = balance.instants(LITTLE), np.tile(place, (len(fourier.phase), 1))
+        still = at.forces(there) - balance.instants(0.0).forces(there)
+        self._force = [fourier.fit @ part / LITTLE for part in (still, at.drag, at.inertia)]
 
     def frequency(self, z: NDArray) -> float:
         """Of a motion, Hz."""
         return float(z[-1]) * self.unit
 
     def _reactive(self, z: NDArray) -> tuple[float, NDArray]:
-        """Reactive work over the size of the force at level 1, m, and its derivative (c, k)."""
+        """Reactive work over the size of the force, m, and its derivative (c, k)."""
         omega = TURN * self.frequency(z)
         still, drag, inertia = self._force
         force = still + omega * drag + omega**2 * inertia
