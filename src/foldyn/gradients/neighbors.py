@@ -22,6 +22,7 @@ from xarray import Variable
 
 from foldyn.algebra.complex_symmetric import solved
 from foldyn.algebra.superlu import PIVOT, factorize
+from foldyn.algebra.woodbury import Squared
 from foldyn.cases import Case
 from foldyn.dynamics import Progress
 from foldyn.dynamics.companions import Accompanied, Companion
@@ -199,6 +200,7 @@ def modes(found: Found, others: Sequence[Asked], wanted: Sequence[int]) -> list[
     )
     seen = result["shape"].transpose("mode", "node", "axis").values
     shapes = [seen.copy() for _ in others]
+    assert not isinstance(linear.mass, Squared)  # of large sheets in air, which have no gradients
     for k in wanted:
         value = float(result["eigenvalue"].values[k])
         matrix = linear.stiffness - value * linear.mass
