@@ -171,7 +171,6 @@ def test_a_start_that_fails_is_named(cell):
         "initial: got int, give a State": (lambda x: 1, {"x": [0.0]}),
         "initial = 3: must be a function": (3, {"x": [0.0]}),
         "grid.x: must be a list": (lambda x: at(cell, x), {"x": 1.0}),
-        "grid: a grid of 100000000 starts needs": (cell, dict.fromkeys("xy", np.zeros(10**4))),
         "grid = \\[\\]: give values by name": (lambda x: at(cell, x), []),
         "grid: 'record' is a name in the result": (
             lambda record: at(cell, record),

@@ -128,13 +128,6 @@ def test_uneven_times_are_refused(trajectory):
             plot_history({"run": trajectory, "still": still}, [6])
 
 
-def test_results_without_times_are_refused(trajectory):
-    still = trajectory.isel(time=0, drop=True)
-    for given, named in ((still, "trajectories"), ({"a": still}, r"trajectories\['a'\]")):
-        with pytest.raises(InputError, match=f"^{named}: has no time"):
-            plot_history(given, [6])
-
-
 def test_a_motion_alone_has_no_label(trajectory):
     figures = [plot_history(given, [6, 7]) for given in (trajectory, {"run": trajectory})]
     for one, other in zip(*(figure.axes for figure in figures), strict=True):
