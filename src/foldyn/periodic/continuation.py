@@ -24,6 +24,7 @@ NOISE = 10.0  # times the rounding of the residual: enough where branches cross
 STRAIGHT = np.cos(np.radians(25.0))  # between tangents at both ends of a step
 SMALLEST = 1e-5  # of the longest step: the branch is lost
 LOCATED = 1e-11  # of a step: how exactly special points are found
+MISSES = 8  # points that are not found, in a search for a special one
 NEAR = 0.2  # of a step: how far beside it a point may lie that it passes
 
 
@@ -158,19 +159,19 @@ def located(
     """
     from scipy.optimize import brentq
 
-    found = {0.0: point, length: other}
+    found: dict[float, Point | None] = {0.0: point, length: other}
 
     def at(ahead_by: float) -> float:
         if ahead_by not in found:
-            reached = ahead(family, point, ahead_by)
-            if reached is None:
-                return value(other)  # look before it
-            found[ahead_by] = reached
-        return value(found[ahead_by])
+            found[ahead_by] = ahead(family, point, ahead_by)
+        reached = found[ahead_by]
+        if list(found.values()).count(None) > MISSES:
+            raise ArithmeticError
+        return value(other if reached is None else reached)  # look before what fails
 
-    with suppress(ValueError):
+    with suppress(ArithmeticError, ValueError):
         brentq(at, 0.0, length, xtol=LOCATED * length, rtol=1e-14, maxiter=60)
-    return min(found.values(), key=lambda one: abs(value(one)))
+    return min((one for one in found.values() if one), key=lambda one: abs(value(one)))
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ SAMPLES = 16  # of half a period, at which the energy is compared
 CONSTANT = 1e-10  # change of the energy along a normal mode, as a fraction, that is wanted
 RAISE, RAISES = 1.5, 3  # of the number of harmonics
 WORTH = 30.0  # by what a raise must lessen the change, for another one
-LOOSE = 1e-3  # change of the energy above which to warn
+LOOSE = 1e-2  # change of the energy above which to warn
 
 
 def backbone(

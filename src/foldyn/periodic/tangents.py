@@ -31,15 +31,21 @@ class Tangents:
         self, body: Assembly, basis: sparse.csr_array, vectors: NDArray | None = None
     ) -> None:
         self._basis, self._vectors, size = basis, vectors, basis.shape[1]
-        spread: dict[int, sparse.csr_array] = {}  # of the sheet (-1) and of terms
+        places: dict[int, tuple[NDArray, NDArray]] = {}  # of the sheet (-1) and of terms
         if isinstance(body.sheet, BarsHingesTerm):
-            spread[-1] = _spread(basis, *_of_blocks(body.sheet))
+            places[-1] = _of_blocks(body.sheet)
         for k, term in enumerate(body.others):
             if type(term).tangent is Term.tangent:
-                spread[k] = _spread(basis, *term.places)
-        filled = [np.flatnonzero(np.diff(matrix.indptr)) for matrix in spread.values()]
-        self._union = np.unique(np.concatenate([np.zeros(0, np.int64), *filled]))
-        self._own = {k: sparse.csr_array(matrix[self._union]) for k, matrix in spread.items()}
+                places[k] = term.places
+        spread = {k: _spread(basis, *at) for k, at in places.items()}
+        every = [np.zeros(0, np.int64), *(place for place, _, _ in spread.values())]
+        self._union = union = np.unique(np.concatenate(every))
+        self._own = {
+            k: sparse.csr_array(
+                (weight, (np.searchsorted(union, place), entry)), (len(union), len(places[k][0]))
+            )
+            for k, (place, entry, weight) in spread.items()
+        }
         row, column = np.divmod(self._union, max(size, 1))
         ends = np.searchsorted(row, np.arange(size + 1))
         zeros = np.zeros(len(column))
@@ -87,15 +93,19 @@ def _of_blocks(sheet: BarsHingesTerm) -> tuple[NDArray, NDArray]:
     return row.ravel(), column.ravel()
 
 
-def _spread(basis: sparse.csr_array, row: NDArray, column: NDArray) -> sparse.csr_array:
-    """Matrix (k k, e) that carries entries at rows and columns (e,) to the unknowns."""
-    one, other, size = basis[row], basis[column], basis.shape[1]
+def _spread(
+    basis: sparse.csr_array, row: NDArray, column: NDArray
+) -> tuple[NDArray, NDArray, NDArray]:
+    """What entries at rows and columns (e,) add to a matrix of the unknowns.
+
+    Places k row + column there, numbers of entries, and the factors of these.
+    """
+    one, other = basis[row], basis[column]
     width = np.diff(other.indptr)
     count = np.diff(one.indptr) * width
     entry = np.repeat(np.arange(len(row)), count)
-    place = np.arange(len(entry)) - np.repeat(np.cumsum(count) - count, count)
-    i = one.indptr[entry] + place // width[entry]
-    j = other.indptr[entry] + place % width[entry]
-    where = one.indices[i].astype(np.int64) * size + other.indices[j], entry
-    weights = one.data[i] * other.data[j]
-    return sparse.csr_array(sparse.coo_array((weights, where), (size * size, len(row))))
+    turn = np.arange(len(entry)) - np.repeat(np.cumsum(count) - count, count)
+    i = one.indptr[entry] + turn // width[entry]
+    j = other.indptr[entry] + turn % width[entry]
+    place = one.indices[i].astype(np.int64) * basis.shape[1] + other.indices[j]
+    return place, entry, one.data[i] * other.data[j]
