@@ -8,6 +8,7 @@ from duffing import NODE, K, mass, oscillator
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.periodic.start import equilibrium
 
 PANEL = {"a": 1.0, "b": 1.0, "dihedral": 60}
 
@@ -162,9 +163,26 @@ def test_start_takes_a_motion_or_a_state():
     again = fd.periodic_motion(case, start=other)
     assert difference(again, other) < 1e-9
     doubled = fd.periodic_motion(case, start=other, periods=2)
+    assert doubled.attrs["iterations"] == 1
     assert doubled.displacement.values[::2] == pytest.approx(
         np.tile(other.displacement.values[::4], (2, 1, 1))[::1], abs=1e-9
     )
+
+
+def test_what_is_constant_acts_on_the_state_about_which_it_swings():
+    moved = fd.Impose([0, 1], "x", 0.05)
+    swung = fd.Impose([4], "y", 0.05, history=fd.Harmonic(0.4))
+    push, shake = (
+        fd.Force([2, 3], (0, 0, -1e-2), history=history) for history in (None, fd.Harmonic(0.4))
+    )
+    still, swinging = ([push], [moved, fd.Fix([4], "y")]), ([push, shake], [moved, swung])
+    states = []
+    for loads, supports in (still, swinging):
+        held = [fd.Fix([5], "xyz"), fd.Fix([4], "xz"), fd.Fix([0, 1], "yz"), *supports]
+        states.append(equilibrium(fd.Case(fold().structure, held, loads)))
+    assert states[0][[0, 1], 0] == pytest.approx(0.05)
+    assert np.abs(states[0][[2, 3], 2]).min() > 1e-3
+    assert states[1] == pytest.approx(states[0], abs=1e-9)
 
 
 def test_few_harmonics_are_warned_of():

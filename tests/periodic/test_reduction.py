@@ -46,6 +46,12 @@ def test_few_modes_come_near_and_say_how_near():
     assert abs(one.floquet.values[0]) == pytest.approx(abs(whole.floquet.values[0]), rel=1e-6)
 
 
+def test_a_slow_drive_is_followed_statically_with_one_mode():
+    slow = {"frequency": 1e-3, "harmonics": 1}
+    whole, one = (fd.periodic_motion(cell(1e-6), modes=modes, **slow) for modes in (None, 1))
+    assert apart(one, whole) < 1e-5
+
+
 def test_derivatives_carry_what_modes_alone_would_lock():
     # nodes of a folding sheet follow arcs: the second harmonic is hardly in the span of the modes
     whole = fd.periodic_motion(cell(2e-4), harmonics=5).coefficient.values[2]

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from foldyn.cases import Case, Constant
+from foldyn.cases import Case, Constant, Impose
 from foldyn.cases.contact_checks import check_contact
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.linearized import equivalent_slope
@@ -32,13 +32,14 @@ PLACES = "None, a State, or a result of periodic_motion or response_curve"
 
 
 def still_case(case: Case) -> Case:
-    """The same without all that varies."""
+    """The same without all that varies; what supports swing is held in its place."""
     loads = [load for load in case.loads if load.history == Constant()]
-    supports = [
-        support
-        for support in case.supports
-        if getattr(support, "history", None) in (None, Constant())
-    ]
+    supports = []
+    for support in case.supports:
+        if getattr(support, "history", None) in (None, Constant()):
+            supports.append(support)
+        elif isinstance(support, Impose):
+            supports.append(replace(support, value=0.0, history=Constant()))
     contact = case.contact
     if contact is not None:
         planes = [
