@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from two_bars import TURN, at, duffing, place
 
 import foldyn as fd
+from foldyn.attractors.grid import told_apart
 from foldyn.errors import FoldynWarning, InputError
 
 ALPHA = 0.25
@@ -159,3 +160,13 @@ def test_a_start_that_fails_is_named(cell):
     }.items():
         with pytest.raises(InputError, match=message), warnings.catch_warnings():
             fd.basins(cell, given[0], given[1], 10.0)
+
+
+def test_orbits_met_at_another_phase_are_the_same():
+    """Of two periods, one half a cycle later; beside them one that does not repeat."""
+    ends = np.zeros((3, 4, 2, 1, 3))
+    ends[0, :, 0, 0, 0] = 1.0, 2.0, 1.0, 2.0
+    ends[1, :, 0, 0, 0] = 2.0, 1.0, 2.0, 1.0
+    ends[2, :, 0, 0, 0] = 1.0, 2.0, 1.0, 2.1
+    label, kept, periods = told_apart(ends, np.array([1.0, 0.0]), 1e-3, 1.0)
+    assert label.tolist() == [0, 0, -1] and kept == [0] and periods == [2]

@@ -185,6 +185,10 @@ def test_jumps_are_large_changes_within_the_width():
     ringing = np.where(place_ > 1.5, 3.0 + np.exp(-(place_ - 1.5) / 0.01), 1.0)
     (jump,) = jumps_between("up", place_, ringing, 0.01)
     assert jump.place <= 1.5 <= jump.after and jump.amplitudes[0] == 1.0
+    two = np.where(place_ > 1.5, 2.0, 1.0) + np.where(place_ > 1.53, 2.0, 0.0)  # 2 widths apart
+    (jump,) = jumps_between("up", place_, two, 0.01)  # the larger of both
+    assert jump.place <= 1.53 <= jump.after
+    assert len(jumps_between("up", place_, two, 0.005)) == 2
 
 
 def test_what_cannot_be_swept_is_refused(hardening):

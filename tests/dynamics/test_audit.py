@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.dynamics.audit import Rounding
+from foldyn.dynamics.audit import Balance, Rounding
+from foldyn.dynamics.diagnostics import INACCURATE, doubts, is_off
 from foldyn.errors import ComputationError, FoldynWarning
 
 SUPPORTS = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
@@ -83,3 +84,19 @@ def test_a_motion_that_explodes_from_next_to_nothing_is_still_stopped():
     dt = 1.5 * fd.critical_step(case)
     with pytest.raises(ComputationError):
         fd.simulate(case, 2000 * dt, "rk4", dt=dt, force=True)
+
+
+def test_samples_at_instants_of_rest_do_not_accuse_the_step():
+    """All are at the start of a swing, but for the error of the steps: 1e-5 of the energy."""
+    rounding, still = rounding_of(1.0), np.full((3, 6, 3), 0.01)
+    columns = np.zeros((3, 5))
+    columns[:, 0] = 1.0, 1.0 - 5e-6, 1.0 - 1e-5  # J: strain; then bends, kinetic, ...
+    said = []
+    for kinetic in (1e-9, 0.5):  # seen at the last
+        balance, seen = Balance(), columns.copy()
+        seen[2, 2] = kinetic
+        balance.add(seen, still)
+        assert balance.relative > INACCURATE
+        said.append(doubts(balance, rounding, None, 0.0, "REMEDY"))
+        assert is_off(balance, rounding) == rounding.reveals(balance) == (kinetic > 0.1)
+    assert said[0].endswith("sample more often") and said[1].endswith(": REMEDY")

@@ -18,6 +18,7 @@ from foldyn.mechanics.assembly import Assembly
 EPS = float(np.finfo(float).eps)
 MARGIN = 16.0  # times the rounding errors of single operations: what they add up to
 ANGLE = 16.0 * EPS  # rad: rounding of a dihedral
+HIDDEN = 1e-3  # of the energies held: what samples at instants of rest show of those at play
 BEGUN = 1e-6  # of the longest bar: a motion with smaller displacements has not become unbounded
 
 AUDITED = ("kinetic", "dissipated", "work")
@@ -79,6 +80,11 @@ class Balance:
         """Largest energy error over the energies at play; 0 where nothing is at play."""
         return self.error / self.scale if self.scale > 0.0 else 0.0
 
+    @property
+    def hides(self) -> bool:
+        """Whether hardly any energy is seen to move: all samples may be at instants of rest."""
+        return self.scale < HIDDEN * self.largest
+
     def off(self, energy: NDArray, limit: float) -> NDArray:
         """Which of some samples have an error above a limit times the energies at play."""
         seen = np.concatenate([self.start, energy])
@@ -109,7 +115,8 @@ class Rounding:
         far off: implicit methods measure their errors against no less than `BEGUN`.
         """
         far = balance.farthest > BEGUN * self.length
-        return far and balance.scale > self.energy(balance.largest, balance.farthest)
+        hidden = self.energy(balance.largest, balance.farthest)
+        return far and balance.scale > hidden and not balance.hides
 
     def least_motion(self, accuracy: float) -> float:
         """Displacement (m) below which dihedrals are less accurate than that; 0 without hinges."""

@@ -11,7 +11,7 @@ INACCURATE = 1e-2  # relative energy error above which the user is warned
 def is_off(balance: Balance, rounding: Rounding) -> bool:
     """Whether the energies of a motion do not balance, rounding apart."""
     hidden = rounding.energy(balance.largest, balance.farthest)
-    return balance.relative > INACCURATE and balance.scale > hidden
+    return balance.relative > INACCURATE and balance.scale > hidden and not balance.hides
 
 
 def doubts(balance: Balance, rounding: Rounding, plan: StepPlan, size: float, remedy: str) -> str:
@@ -50,5 +50,10 @@ def doubts(balance: Balance, rounding: Rounding, plan: StepPlan, size: float, re
         return (
             f"{off}, {balance.scale:.2g} J: they are below the rounding errors of forces and "
             f"displacements of this size ({hidden:.2g} J), which may be all that moves"
+        )
+    if balance.hides:
+        return (
+            f"{off} that the samples show, {balance.scale:.2g} J of {balance.largest:.2g} J held: "
+            "they may all be at instants of rest, and say nothing then; sample more often"
         )
     return f"{off}: {remedy}"
