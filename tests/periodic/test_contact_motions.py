@@ -71,8 +71,12 @@ def test_a_plane_that_swings_drives():
     assert run.displacement.values[:, NODE, 2] == pytest.approx(
         height(one)[[0, 32, 64, 96, 0]], abs=1e-4 * np.ptp(height(one))
     )
-    other = fd.periodic_motion(at_frequency(swinging, 0.1), harmonics=12)
-    assert other.attrs["frequency"] == 0.1
+    assert drive_frequency(at_frequency(swinging, 0.1)) == 0.1
+    z = fd.Quantity("m", "height", function=lambda u, v, t: u[NODE, 2])
+    steady = fd.bifurcation_diagram(swinging, z, [F, 1.1 * F], sweep="up", settle=15, record=4)
+    other = fd.periodic_motion(swinging, 1.1 * F, harmonics=12)
+    swings = [0.5 * np.ptp(height(motion)) for motion in (one, other)]
+    assert steady.amplitude.values[0] == pytest.approx(swings, rel=1e-3)
 
 
 def test_free_motions_against_the_plane_keep_their_energy():
