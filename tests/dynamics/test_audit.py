@@ -89,6 +89,7 @@ def test_a_motion_that_explodes_from_next_to_nothing_is_still_stopped():
 def test_samples_at_instants_of_rest_do_not_accuse_the_step():
     """All are at the start of a swing, but for the error of the steps: 1e-5 of the energy."""
     rounding, still = rounding_of(1.0), np.full((3, 6, 3), 0.01)
+    plan = fd.dynamics.prepare(fd.Case(fold(), SUPPORTS), 0.1).plan
     columns = np.zeros((3, 5))
     columns[:, 0] = 1.0, 1.0 - 5e-6, 1.0 - 1e-5  # J: strain; then bends, kinetic, ...
     said = []
@@ -97,6 +98,6 @@ def test_samples_at_instants_of_rest_do_not_accuse_the_step():
         seen[2, 2] = kinetic
         balance.add(seen, still)
         assert balance.relative > INACCURATE
-        said.append(doubts(balance, rounding, None, 0.0, "REMEDY"))
+        said.append(doubts(balance, rounding, plan, 0.0, "REMEDY"))
         assert is_off(balance, rounding) == rounding.reveals(balance) == (kinetic > 0.1)
     assert said[0].endswith("sample more often") and said[1].endswith(": REMEDY")

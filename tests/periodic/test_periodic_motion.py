@@ -217,3 +217,19 @@ def test_arguments_out_of_range_are_refused():
     ):  # fmt: skip
         with pytest.raises(InputError, match=field):
             fd.periodic_motion(oscillator(), **{field: value})
+
+
+def test_bases_move_and_drag_by_all_their_harmonics():
+    s = fd.discretize(fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.01, 1.0))
+    swings = [fd.BaseMotion("x", fd.Harmonic(f), size) for f, size in ((0.5, 1e-4), (1.0, 2e-4))]
+    held = [fd.Fix([4, 5]), fd.Fix([0, 1], "yz"), *swings]
+    case = fd.Case(s, held, damping=fd.Rayleigh(alpha=0.5))
+    one = fd.periodic_motion(case, harmonics=5)
+    turn = 2.0 * np.pi * one.time.values
+    wanted = np.pi * 1e-4 * np.cos(0.5 * turn) + 2.0 * np.pi * 2e-4 * np.cos(turn)
+    assert one.velocity.sel(node=4, axis="x").values == pytest.approx(wanted, abs=1e-12)
+    other = fd.periodic_motion(case, method="shooting")  # of the same equation
+    start = fd.State(one.displacement.values[0], one.velocity.values[0])
+    later = fd.simulate(case, 2.0, "rk4", every=2.0, initial=start).displacement.values[-1]
+    assert later == pytest.approx(one.displacement.values[0], abs=1e-7)
+    assert other.displacement.values[0] == pytest.approx(one.displacement.values[0], abs=1e-7)
