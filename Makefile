@@ -18,6 +18,8 @@ OLDEST_TESTS := tests/jit tests/materials tests/results \
   $(addprefix tests/mechanics/test_,assembly.py dihedral.py invariance.py) \
   $(addprefix tests/analyses/test_,casefile.py casefile_messages.py limits.py)
 WORKERS ?= -n auto --maxprocesses 4 --dist worksteal
+# each worker keeps one processor busy: with more threads for linear algebra they wait for each other
+export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo warm-up test test-all test-oldest lint format docs wheel-check clean setup
 .DEFAULT_GOAL := help

@@ -16,8 +16,6 @@ import foldyn as fd
 from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.gpu import choice
 from foldyn.dynamics.gpu.checks import METHODS, lacking
-from foldyn.dynamics.gpu.launch import Launches
-from foldyn.dynamics.gpu.many import integrate_prepared
 from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
 
 STEPS, END = {"dt": 1e-5, "every": 2}, 4e-5
@@ -126,14 +124,16 @@ def test_samples_do_not_depend_on_the_pieces(monkeypatch, method):
     each = case(1)
     given = {"initial": shaken(each), "device": "gpu", **STEPS}
     whole = fd.simulate(each, END, method, **given)
-    monkeypatch.setattr(Launches, "fits", lambda *_: np.array([3]))
+    monkeypatch.setattr("foldyn.dynamics.gpu.launch.Launches.fits", lambda *_: np.array([3]))
     agree(fd.simulate(each, END, method, **given), whole, 0.0)
     agree(fd.simulate_many([each], END, method=method, **given).isel(model=0), whole, 1e-12)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_motions_side_by_side_have_steps_of_their_own(monkeypatch, method):
-    monkeypatch.setattr(Launches, "fits", lambda self: 2 * self._every)
+    from foldyn.dynamics.gpu.many import integrate_prepared  # no import where there is no GPU
+
+    monkeypatch.setattr("foldyn.dynamics.gpu.launch.Launches.fits", lambda self: 2 * self._every)
     motions, alone = [], []
     for k, (dt, every) in enumerate(((1e-5, 2), (2.5e-5, 1), (5e-6, 3))):
         given = method, dt, every, shaken(case(k), k)

@@ -87,13 +87,13 @@ def test_what_has_no_kernel_is_named(card, what):
 
 def test_what_is_added_to_cases_is_refused_until_kernels_know_it():
     @dataclass(frozen=True, eq=False)
-    class Aired(fd.Case):
-        air: Any = None
+    class Charged(fd.Case):
+        charge: Any = None
 
     given = fd.discretize(PATTERN, SHEET, **LUMPED), [HELD]
     packed = prepare(fd.Case(*given), 1e-3).packed
-    assert not checks.lacking(Aired(*given), packed)
-    assert checks.lacking(Aired(*given, air=1.2), packed) == "air of the case"
+    assert not checks.lacking(Charged(*given), packed)
+    assert checks.lacking(Charged(*given, charge=1.2), packed) == "charge of the case"
     several = packed._replace(body=packed.body.with_terms(*[springs()] * 2))
     assert checks.lacking(fd.Case(*given), several) == "a second set of springs"
     other = packed._replace(body=packed.body.with_terms(Unknown(springs().springs)))

@@ -251,9 +251,6 @@ def test_zones_refuse_unknown_points():
         miura().path("G")
     with pytest.raises(InputError, match="count"):
         miura().path("G-X-M", 2)
-    for make in (lambda: miura().path("G-X", 10**14), lambda: miura().grid(10**7)):
-        with pytest.raises(InputError, match=r"count: 1e\+14 wave vectors .*take fewer"):
-            make()
 
 
 @pytest.mark.filterwarnings("error:.*no equilibrium")

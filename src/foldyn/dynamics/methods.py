@@ -81,7 +81,7 @@ class Compiled:
 
     @property
     def powers(self) -> NDArray:
-        """Powers (2,) in and out, W, at the last step."""
+        """Powers (3,) in, out and to the air, W, at the last step."""
         return np.sum([memory.powers for memory in self._memories], axis=0)
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:

@@ -96,7 +96,7 @@ class OnCard:
         tally = self._course.tally
         self._alone.start_with(self._sums[:, :2].sum(axis=0))
         result = self._alone.advance(out, stretch)
-        self._sums = np.array([[*self._alone.powers, tally.work, tally.dissipated]])
+        self._sums = np.array([[*self._alone.powers[:2], tally.work, tally.dissipated]])
         self._launches = self._launched()
         return result
 
