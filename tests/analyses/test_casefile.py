@@ -38,7 +38,7 @@ def test_the_example_of_the_design(read, example, tmp_path) -> None:
     assert history == Pulse(1.0)
     assert found.analysis.kind == "dynamics"
     given = {"method": "rk4", "duration": 20.0, "dt": None, "every": 0.01, "force": False}
-    given |= {"tolerance": None, "start": 0.0, "spectral_radius": None}
+    given |= {"tolerance": None, "start": 0.0, "spectral_radius": None, "device": "cpu"}
     assert found.analysis.arguments == given
     np.testing.assert_array_equal(found.output.nodes, [6, 7])
 

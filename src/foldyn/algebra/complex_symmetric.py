@@ -111,15 +111,13 @@ def _factors(matrix: sparse.csc_array, gram: Gram, weight: complex) -> Solution:
 
 
 class _Full:
-    """Factors of a full matrix (Bunch and Kaufman, Math. Comput. 31, 1977)."""
+    """Factors of a full matrix: LU, as the oldest SciPy solves with no symmetric ones."""
 
     def __init__(self, matrix: NDArray) -> None:
-        space = 64 * len(matrix)  # for LAPACK's blocks
-        found = lapack.zsytrf(matrix.T, lower=True, lwork=space, overwrite_a=True)
-        self._factors, self._pivots, failed = found
+        self._factors, self._pivots, failed = lapack.zgetrf(matrix.T, overwrite_a=True)
         if failed:
             raise SingularTangentError("the matrix is singular")
 
     def solve(self, b: NDArray) -> NDArray:
         """Solution x of A x = b."""
-        return lapack.zsytrs(self._factors, self._pivots, b, lower=True)[0]
+        return lapack.zgetrs(self._factors, self._pivots, b)[0]
