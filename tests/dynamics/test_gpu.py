@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from on_gpu import CASE_FILE
 
 import foldyn as fd
 from foldyn.cli.main import main
@@ -22,25 +23,14 @@ from foldyn.mechanics.springs import SpringsTerm
 
 PATTERN = fd.patterns.miura((1, 1), panel_angle=60.0, dihedral=110.0)
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
-MOTION = """
-[pattern]
-kind = "miura"
-cells = [1, 1]
-panel_angle = 60
-dihedral = 110
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
-[model]
-mass = "mixed_voronoi"
-[[supports]]
-nodes = [0, 1, 2]
+MOTION = (
+    CASE_FILE.partition("[[loads]]")[0]
+    + """
 [analysis]
 kind = "dynamics"
 duration = 1e-3
 """
+)
 HELD = fd.Fix(np.flatnonzero(PATTERN.vertices[:, 0] <= 1e-9))
 
 

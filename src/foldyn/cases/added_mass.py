@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +27,8 @@ MOST_COUPLED = 3000  # dofs that a matrix may couple with all others
 COPIES = 3  # of the flow's matrix, while it is made
 
 
-class Fluid(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Fluid:
     """The fluid around a sheet in one state of it.
 
     Attributes
@@ -36,16 +39,23 @@ class Fluid(NamedTuple):
         The triangle under the center of each boundary element, and the weights of its nodes.
     catch : sparse array, shape (u, e)
         Integrals of the flow's functions over the elements, m2.
-    flow : ndarray or sparse array, shape (u, u)
-        rho D^-1, kg/m4: with the normal velocities y of the elements the energy of the fluid is
-        (catch y)' flow (catch y) / 2.
     """
 
     triangles: NDArray[np.int64]
     under: NDArray[np.int64]
     shares: NDArray[np.float64]
     catch: sparse.csr_array
-    flow: Flow
+    _density: float
+    _surface: tuple[NDArray, ...]  # what `flow_of` takes
+
+    @cached_property
+    def flow(self) -> Flow:
+        """The matrix rho D^-1 (u, u), kg/m4.
+
+        With the normal velocities y of the elements the energy of the fluid is
+        (catch y)' flow (catch y) / 2.
+        """
+        return self._density * flow_of(*self._surface)
 
     def on(self, x: NDArray) -> AddedMass:
         """Added mass for the normals that the triangles have with the nodes at x (n, 3), m."""
@@ -81,10 +91,9 @@ def fluid_at(case: Any, displacement: NDArray) -> Fluid:
     points = elements.weights @ (structure.nodes + displacement)
     if not local:
         _check_gaps(structure.pattern, elements, points)
-    parts = elements.panel if local else None
-    flow = case.air.density * flow_of(points, elements.triangles, elements.unknown, parts)
-    catch = caught(points, elements.triangles, elements.unknown)
-    return Fluid(structure.triangles, elements.under, elements.shares, catch, flow)
+    surface = points, elements.triangles, elements.unknown
+    given = structure.triangles, elements.under, elements.shares, caught(*surface)
+    return Fluid(*given, case.air.density, (*surface, elements.panel) if local else surface)
 
 
 def operator_at(case: Any, displacement: NDArray) -> tuple[AddedMass, bool] | None:

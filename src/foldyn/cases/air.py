@@ -13,6 +13,7 @@ from foldyn.arguments import Check, Flag
 from foldyn.cases.decode import Part, check_keys
 from foldyn.cases.history import STEADY, Factor
 from foldyn.errors import InputError
+from foldyn.structures.mesh import double_areas
 from foldyn.values import flag, number, show, vector, whole
 
 LOCAL = "local"
@@ -42,7 +43,7 @@ class Air(Part):
         Whether the fluid that the sheet moves adds to its mass. With "local" each panel moves the
         fluid by itself, as if it were alone in it: for sheets whose full matrix is too large.
     drag : bool, default True
-        Whether motions, and paths in wind, meet the pressure drag of the panels.
+        Whether motions meet the pressure drag of the panels.
     drag_coefficient : float, optional
         C_d of the force C_d / 2 density area v|v| on a panel with the velocity v normal to it
         relative to the fluid; by default that of a flat plate with the aspect ratio of the sheet
@@ -98,9 +99,7 @@ class Air(Part):
 def _side_ratio(structure: Any) -> float:
     """Shorter over longer side of a rectangle with the second moments of a sheet at rest."""
     corners = structure.nodes[structure.triangles]
-    area = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
+    area = np.linalg.norm(double_areas(structure.nodes, structure.triangles), axis=1)
     center = np.average(corners.mean(axis=1), axis=0, weights=area)
     away = np.concatenate([corners - center, 3.0 * (corners.mean(axis=1) - center)[:, None]], 1)
     moments = np.einsum("t,tci,tcj->ij", area, away, away)  # of triangles, times 24

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg import lapack, null_space
+from scipy.linalg import null_space
 
 from foldyn.cases import Case
 from foldyn.cases.added_mass import Fluid, fluid_at
@@ -32,7 +32,10 @@ from foldyn.errors import InputError
 from foldyn.jit.compiled import addressed, inner, kernel
 from foldyn.jit.context import rows_at
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.air.added_mass import inverse
 from foldyn.mechanics.term import ADDRESS
+from foldyn.statics.rigid import rigid_motions
+from foldyn.structures.mesh import double_areas
 
 TURN = math.radians(3.0)  # of a hinge, after which the flow is found anew
 LOOK_EVERY = 16  # steps between two looks at that
@@ -133,8 +136,7 @@ def _with_memory(
 
 def _catch(fluid: Fluid, x: NDArray) -> sparse.csr_array:
     """What unknowns catch (u, 3t) of area vector . velocity of the triangles' corners."""
-    one, other, third = np.moveaxis(x[fluid.triangles], 1, 0)
-    area = 0.5 * np.linalg.norm(np.cross(other - one, third - one), axis=1)
+    area = 0.5 * np.linalg.norm(double_areas(x, fluid.triangles), axis=1)
     elements = np.arange(len(fluid.under)).repeat(3)
     columns = (3 * fluid.under[:, None] + np.arange(3)).ravel()
     shares = (fluid.shares / area[fluid.under, None]).ravel()
@@ -192,10 +194,9 @@ def _rigid_part(packed: Any, course: Any) -> NDArray:
     place = np.zeros_like(v)
     place[own.triangles] = own.at_rest
     place += course.u
-    turns = [np.cross(axis, place) for axis in np.eye(3)]
-    shapes = np.stack([*(np.tile(axis, (len(v), 1)) for axis in np.eye(3)), *turns])
-    held = shapes.reshape(6, -1)[:, system.supported]
-    shapes = np.tensordot(null_space(held.T).T, shapes, 1)
+    motions = rigid_motions(place)
+    free = motions @ null_space(motions[system.supported])
+    shapes = free.T.reshape(-1, *v.shape)
     pushes, speed = np.zeros((len(shapes), *v.shape)), np.zeros(len(own.flow))
     for shape, force in zip(shapes, pushes, strict=True):
         times_mass(packed.mass, shape, force)
@@ -210,21 +211,14 @@ def _find_flow(case: Case, own: AddedMass, mass: Inertia, outward: NDArray, u: N
     """Find the flow at `outward` (n, 3) in the order of the case, u (rows, 3) in memory."""
     flow: Any = fluid_at(case, outward).flow
     own.flow[:] = flow if isinstance(flow, np.ndarray) else flow.toarray()
-    own.resistance[:] = _inverse(own.flow)
+    own.resistance[:] = inverse(own.flow.copy())
     put_areas(own, u)
     matrix, one, line = own.resistance.copy(), np.zeros(len(own.flow)), np.zeros(u.size)
     for k in range(len(one)):
         one[:] = 0.0
         one[k] = 1.0
         move(own, mass, one, matrix[k], line)
-    own.guess[:] = _inverse(0.5 * (matrix + matrix.T))
-
-
-def _inverse(matrix: NDArray) -> NDArray:
-    """Inverse of a symmetric positive definite matrix."""
-    factor, _ = lapack.dpotrf(matrix, lower=1)
-    inverse, _ = lapack.dpotri(factor, lower=1)
-    return np.tril(inverse) + np.tril(inverse, -1).T
+    own.guess[:] = inverse(0.5 * (matrix + matrix.T))
 
 
 # ------------------------------------------------------------------ fluxes

@@ -15,11 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.dynamics import parts
-from foldyn.dynamics.added_mass import (
-    observe_fluid,
-    solve_with_fluid,
-    turn_flow,
-)
+from foldyn.dynamics.added_mass import observe_fluid, solve_with_fluid, turn_flow
 from foldyn.dynamics.explicit_contact import ContactParts, contact_parts, slow_contacts
 from foldyn.dynamics.inertia import lumped_energy
 from foldyn.dynamics.motion_state import (

@@ -403,11 +403,6 @@ class Motion:
         """End the motion with an error, which carries what was computed until then."""
         raise kind(message, self._dataset()) from cause
 
-    @property
-    def unbalanced(self) -> bool:
-        """Whether the energies do not balance as far as they are audited, rounding apart."""
-        return is_off(self.output.balance, self._rounding)
-
     def audit(self) -> float:
         """Relative energy error so far; raises where the energy has exploded."""
         balance = self.output.update_balance(self.stored)

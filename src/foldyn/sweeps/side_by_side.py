@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from itertools import islice
-from typing import Self
 
 from foldyn.analyses.casefile import Moving
 from foldyn.dynamics.motion import Motion
 from foldyn.sweeps.evaluations import Evaluation
 from foldyn.sweeps.job import Job
 from foldyn.sweeps.points import Point
+from foldyn.sweeps.pool import Here
 
 AT_ONCE = 512
 """Motions, at most: a GPU is at full speed."""
@@ -18,7 +18,7 @@ ROOM = 2.0**31
 """Bytes of their samples."""
 
 
-class SideBySide:
+class SideBySide(Here[Point, Evaluation]):
     """A pool whose points are motions.
 
     Parameters
@@ -31,6 +31,7 @@ class SideBySide:
     """
 
     def __init__(self, job: Job, like: Motion) -> None:
+        super().__init__(job)
         self.job = job
         size = 48.0 * like.expected_samples * like.packed.system.rows  # bytes
         self.count = int(max(1, min(AT_ONCE, ROOM / size)))
@@ -51,12 +52,3 @@ class SideBySide:
             while begun:  # which gives its samples' memory back
                 point, one = begun.pop(0)
                 keep(point, one.finished())
-
-    def stop(self) -> None:
-        """Nothing runs beside this."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass

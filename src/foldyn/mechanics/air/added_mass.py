@@ -101,21 +101,21 @@ def flow_of(
         Parts of the surface coincide.
     """
     if parts is None:
-        return _inverse(inductance(points, triangles, unknown))
+        return inverse(inductance(points, triangles, unknown))
     blocks, places = [], []
     order = np.argsort(parts, kind="stable")
     for own in np.split(order, np.cumsum(np.bincount(parts))[:-1]):
         here, local = np.unique(triangles[own], return_inverse=True)
         free = unknown[here] >= 0
         number = np.where(free, np.cumsum(free) - 1, -1)
-        blocks.append(_inverse(inductance(points[here], local.reshape(-1, 3), number)))
+        blocks.append(inverse(inductance(points[here], local.reshape(-1, 3), number)))
         places.append(unknown[here][free])
     place = np.concatenate(places)
     turned = sparse.csr_array((np.ones(len(place)), (place, np.arange(len(place)))))
     return sparse.csr_array(turned @ sparse.block_diag(blocks, format="csr") @ turned.T)
 
 
-def _inverse(matrix: NDArray) -> NDArray[np.float64]:
+def inverse(matrix: NDArray) -> NDArray[np.float64]:
     """Inverse of a positive definite matrix, in its place."""
     try:
         factor, _ = cho_factor(matrix, lower=True, overwrite_a=True)
@@ -124,10 +124,10 @@ def _inverse(matrix: NDArray) -> NDArray[np.float64]:
             "added mass: panels lie on each other, and no flow between them is defined; open the "
             "sheet"
         ) from None
-    inverse, _ = dpotri(factor, lower=True, overwrite_c=True)
-    upper = np.triu_indices(len(inverse), 1)
-    inverse[upper] = inverse.T[upper]
-    return inverse
+    found, _ = dpotri(factor, lower=True, overwrite_c=True)
+    upper = np.triu_indices(len(found), 1)
+    found[upper] = found.T[upper]
+    return found
 
 
 def caught(points: NDArray, triangles: NDArray, unknown: NDArray) -> sparse.csr_array:
