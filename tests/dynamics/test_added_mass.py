@@ -47,6 +47,23 @@ def test_the_energy_of_the_fluid_is_that_of_the_added_mass(added_mass):
     assert_allclose(motion.kinetic[0], 0.5 * v.ravel() @ whole, rtol=1e-12)
 
 
+def test_a_sheet_that_folds_moves_alike_wherever_it_stands():
+    """Rounding must not choose the triangle under an element on the line between two."""
+    turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    pattern, moves = folded().pattern, []
+    for turned, shift in ((np.eye(3), 0.0), (turn, np.array([1.0, 2.0, 3.0]))):
+        placed = fd.Pattern(pattern.vertices @ turned.T + shift, pattern.faces)
+        sheet = fd.discretize(placed, fd.Sheet(5e6, 0.3, 1e-3, density=300.0))
+        push = fd.Force([6, 8], turned @ (0.01, 0.02, 0.05))
+        held = fd.Fix(nodes=[0, 1, 2])
+        case = fd.Case(sheet, [held], [push], air=fd.Air(**FLUID, resolution=2))
+        motion = fd.simulate(case, 0.05, "rk4", every=0.05)
+        moves.append(motion.displacement.values[-1] @ turned)
+    assert motion.attrs["flows"] > 1
+    assert_allclose(moves[1], moves[0], atol=1e-10 * SIDE)
+
+
 @pytest.mark.parametrize("method", EXPLICIT)
 def test_a_body_keeps_its_momenta_and_its_energy(method):
     """Kirchhoff's equations: a plate that turns and drifts, with the moment m_a v_n v_t (Munk)."""

@@ -235,7 +235,8 @@ def _located(structure: Any, points: NDArray, panel: NDArray) -> tuple[NDArray, 
         away = points[own][:, None, :] - corner
         share = np.einsum("tij,ptj->pti", np.linalg.pinv(sides), away)
         each = np.concatenate([1.0 - share.sum(axis=2, keepdims=True), share], axis=2)
-        best = each.min(axis=2).argmax(axis=1)
+        least = each.min(axis=2)  # of triangles that share a point, the first
+        best = (least > least.max(axis=1, keepdims=True) - ROUNDING).argmax(axis=1)
         found = each[np.arange(len(own)), best]
         found = np.where(found > ROUNDING, found, 0.0)
         triangle[own], weight[own] = mine[best], found / found.sum(axis=1, keepdims=True)

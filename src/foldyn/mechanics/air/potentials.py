@@ -16,7 +16,7 @@ import numpy as np
 from foldyn.jit.compiled import inner, shared
 from foldyn.mechanics.contact.distances import cross, dot, minus
 
-NEAR = 2.0  # times the sum of both radii: centers nearer than that take the closed form
+NEAR = 2.0 + 1e-9  # times the sum of both radii: nearer centers, 2 in grids, take the closed form
 A1, B1, W1 = 0.797426985353087, 0.101286507323456, 0.125939180544827
 A2, B2, W2 = 0.059715871789770, 0.470142064105115, 0.132394152788506
 SEVEN = np.array([
