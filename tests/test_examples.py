@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from foldyn.periodic.orbit import amplitudes_of
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
@@ -177,6 +178,9 @@ def jumping_resonance(found):
     spine = found["spine"]
     peak = curves[-1].isel(point=int(curves[-1].amplitude.values.argmax()))
     assert abs(float(peak.frequency / spine.frequency[0]) - 1.0) > 0.03
+    size = amplitudes_of(spine.coefficient.values)
+    there = np.interp(float(peak.amplitude), size, spine.frequency.values)
+    assert float(peak.frequency) == pytest.approx(there, rel=2e-4)
     assert float(spine.frequency[-1]) > float(spine.frequency[0])
 
 

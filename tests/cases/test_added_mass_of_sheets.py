@@ -178,6 +178,19 @@ def test_it_turns_shifts_scales_and_renumbers_with_the_sheet(folded):
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
+def test_rounding_does_not_choose_how_regular_grids_are_integrated():
+    """Pairs of elements stand at the distance at which another rule takes over."""
+    pattern = fd.patterns.miura(cells=(2, 1), a=0.03, b=0.03, panel_angle=60, dihedral=100)
+    found = [
+        fd.Case(
+            fd.discretize(fd.Pattern(pattern.vertices + shift, pattern.faces), SHEET),
+            air=fd.Air(resolution=2),
+        ).added_mass().todense()
+        for shift in (0.0, [1.0, 2.0, 3.0])
+    ]  # fmt: skip
+    np.testing.assert_allclose(*found, rtol=0, atol=1e-11 * np.abs(found[0]).max())
+
+
 def test_a_state_moves_the_elements_as_a_pattern_that_is_folded_so(folded):
     """Panels bend in no rigid folding, so both have the same elements."""
     flatter = fd.patterns.miura(cells=(2, 1), a=1.0, b=1.3, panel_angle=70, dihedral=130)

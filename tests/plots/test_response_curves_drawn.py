@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 from foldyn.errors import InputError
+from foldyn.periodic.response import LARGEST
 from foldyn.plots import plot_backbone, plot_response_curve
 from foldyn.plots.response_curves import UNSTABLE
 
@@ -26,7 +27,14 @@ def curve(**attributes):
 
 
 def spine(**data):
-    points = {"amplitude": ("point", [0.1, 1.0, 2.0]), **data}
+    """A node that moves along a diagonal, about 5."""
+    size = np.array([0.1, 1.0, 2.0])
+    swung = np.multiply.outer(size, [[[5.0, 5.0, 5.0]], [[0.6, 0.8, 0.0]]]).astype(complex)
+    points = {
+        "amplitude": ("point", size),
+        "coefficient": (("point", "harmonic", "node", "axis"), swung),
+        **data,
+    }
     along = {"frequency": ("point", [1.0, 1.5, 2.0])}
     return xr.Dataset(points, along, {"foldyn_result": "backbone", "mode": 1})
 
@@ -44,10 +52,20 @@ def test_unstable_motions_are_dashed_from_fold_to_fold():
 
 
 def test_backbone_does_not_change_the_range():
-    alone = plot_response_curve({"one": curve(), "other": curve()}).axes[0]
-    both = plot_response_curve({"one": curve(), "other": curve()}, spine()).axes[0]
+    curves = dict.fromkeys(["one", "other"], curve(measure=LARGEST))
+    alone = plot_response_curve(curves).axes[0]
+    both = plot_response_curve(curves, spine()).axes[0]
     assert both.get_xlim() == alone.get_xlim()
     assert len(both.lines) == len(alone.lines) + 1
+
+
+def test_backbone_is_drawn_by_what_curves_show():
+    """Displacements along one axis, where its own amplitude is that in space."""
+    axes = plot_response_curve(curve(measure=LARGEST), spine()).axes[0]
+    (line,) = (one for one in axes.lines if one.get_label() == "backbone")
+    np.testing.assert_allclose(line.get_ydata(), [0.08, 0.8, 1.6], rtol=1e-12)
+    with pytest.raises(InputError, match="backbone: the curves show the displacement, a backbone"):
+        plot_response_curve(curve(), spine())
 
 
 def test_curves_along_the_drive_show_its_factor():

@@ -149,9 +149,19 @@ def along(orbits: list[Orbit]) -> dict[str, NDArray]:
 
 def amplitude(orbit: Orbit, measure: Quantity | None) -> float:
     """Amplitude of a measure with a function, or of the node that swings most."""
-    phase = 2.0 * np.pi * np.arange(SHOWN + 2) / SHOWN  # and one beyond the end
+    phase = _phases()
     u = orbit.displacement(phase)
     if measure is None:
         return float(swing(u).max())
     time = phase / (2.0 * np.pi) * orbit.period
     return float(swing(measured(measure, Stretch(time, u, orbit.velocity(phase)))))
+
+
+def amplitudes_of(coefficient: NDArray) -> NDArray[np.float64]:
+    """The same (p,) of the nodes of motions with some coefficients (p, h + 1, n, 3), m."""
+    return np.array([swing(values_of(one, _phases())).max() for one in coefficient])
+
+
+def _phases() -> NDArray[np.float64]:
+    """Of a period, and one beyond its end."""
+    return 2.0 * np.pi * np.arange(SHOWN + 2) / SHOWN

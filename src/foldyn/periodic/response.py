@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 FIRST = 0.2  # of the longest step
 AWAY = 0.05  # of the motion: how far a branch is entered
 APART = 1e-2  # from 1: multiplier of a fold that is none
+LARGEST = "largest displacement"  # of any node along an axis: what is shown without a measure
 MEETS = 1e-4  # of the range of the parameter: where branches meet at one point
 
 
@@ -351,7 +352,7 @@ def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
         "harmonics": harmonics,
         "unknowns": orbits[0].equation.size,
         "complete": tracer.complete,
-        "measure": "largest displacement" if measure is None else measure.text or "measure",
+        "measure": LARGEST if measure is None else measure.text or "measure",
         "wall_seconds": time.perf_counter() - began,
     }
     units = "m" if measure is None else measure.units

@@ -32,7 +32,8 @@ def plot_response_curve(
     curves : xarray.Dataset, or mapping of str to xarray.Dataset
         A result of `foldyn.response_curve`, or several by their labels.
     backbone : xarray.Dataset, optional
-        A result of `foldyn.backbone` to be drawn behind them.
+        A result of `foldyn.backbone` to be drawn behind them, by the amplitude of curves without a
+        measure: half the distance between the extremes of the largest displacement along an axis.
     title : str
         Title of the figure.
 
@@ -44,7 +45,7 @@ def plot_response_curve(
     Raises
     ------
     InputError
-        Something else than response curves of one kind.
+        Something else than response curves of one kind; a backbone beside curves of a measure.
     """
     labeled = by_label("curves", curves)
     kinds = {_kind("curves", one, "response_curve", "by") for one in labeled.values()}
@@ -67,9 +68,10 @@ def plot_response_curve(
         keys.append(style.key(name, **_mark(style.GRAY, name)))
     if backbone is not None and along == "frequency":
         _kind("backbone", backbone, "backbone", "mode")
+        size = _size_along(backbone, labeled)
         look = {"color": style.GRAY, "linewidth": 1.0, "label": "backbone", "zorder": 1.0}
         limits = axes.get_xlim(), axes.get_ylim()
-        keys += axes.plot(backbone["frequency"].values, backbone["amplitude"].values, **look)
+        keys += axes.plot(backbone["frequency"].values, size, **look)
         axes.set(xlim=limits[0], ylim=limits[1])
     style.exponents(axes)
     return style.finish(figure, keys, 4, width=SIZE[0])
@@ -114,6 +116,22 @@ def plot_backbone(backbones: xr.Dataset | Mapping[str, xr.Dataset], title: str =
             for k, (label, one) in enumerate(labeled.items())
         ]
     return style.finish(figure, keys if any(labeled) else [], 4, width=figure.get_figwidth())
+
+
+def _size_along(backbone: xr.Dataset, curves: Mapping[str, xr.Dataset]) -> NDArray:
+    """Amplitudes of the motions of a backbone, as those of curves without a measure."""
+    from foldyn.periodic.orbit import amplitudes_of
+    from foldyn.periodic.response import LARGEST
+
+    for curve in curves.values():
+        if curve.attrs["measure"] != LARGEST:
+            raise InputError(
+                f": the curves show the {curve.attrs['measure']}, a backbone the {LARGEST}; leave "
+                "it out",
+                "backbone",
+            )
+    dims = "point", "harmonic", "node", "axis"
+    return amplitudes_of(backbone["coefficient"].transpose(*dims).values)
 
 
 def _kind(field: str, result: xr.Dataset, kind: str, attribute: str) -> str:

@@ -89,7 +89,10 @@ def points_dataset(
     units : str
         Of the amplitude.
     """
-    known = {**POINTS, "amplitude": POINTS["amplitude"]._replace(units=units)}
+    size = POINTS["amplitude"]._replace(units=units)
+    if kind == "backbone":
+        size = size._replace(text="largest displacement of any node from the equilibrium")
+    known = {**POINTS, "amplitude": size}
     data = variables(known, "point", {k: v for k, v in values.items() if k != "frequency"})
     text = "frequency of the motion" if kind == "backbone" else POINTS["frequency"].text
     frequency = np.asarray(values["frequency"], float)
