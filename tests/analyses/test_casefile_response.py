@@ -7,6 +7,7 @@ import foldyn as fd
 from foldyn.analyses import read_case
 from foldyn.cli.main import main
 from foldyn.errors import InputError
+from foldyn.periodic import response_curve
 
 SHEET = """
 [pattern]
@@ -96,6 +97,35 @@ def test_what_a_file_gets_wrong_is_named(tmp_path, changed, message):
     analysis = f'\n[analysis]\nkind = "response"\n{changed}\n'
     with pytest.raises(InputError, match=message):
         read_case(written(tmp_path, analysis))
+
+
+def test_an_interrupted_curve_is_kept(tmp_path, monkeypatch, capsys):
+    whole = response_curve
+
+    def interrupted(case, *, progress, **given):
+        def stop(state):
+            if state.steps > 1:
+                raise KeyboardInterrupt
+
+        return whole(case, progress=stop, **given)
+
+    monkeypatch.setattr("foldyn.analyses.response.response_curve", interrupted)
+    path, folder = written(tmp_path, CURVE), tmp_path / "out"
+    assert main(["run", str(path), "--out", str(folder), "--no-figures"]) == 130
+    told = capsys.readouterr().err
+    assert "interrupted after 2 points" in told and "result.nc" in told
+    kept = fd.load(folder / "result.nc")
+    assert kept.attrs["complete"] == 0 and kept.sizes["point"] == 2
+    assert kept.attrs["stopped_because"] == "interrupted after 2 points"
+
+
+def test_a_drive_is_asked_for_as_files_have_it(tmp_path):
+    path = written(tmp_path, CURVE)
+    text = path.read_text("utf-8")
+    line = 'history = { kind = "harmonic", frequency = 0.5 }\n'
+    path.write_text(text.replace(line, ""), "utf-8")
+    with pytest.raises(InputError, match='kind = "harmonic", frequency = '):
+        read_case(path).run()
 
 
 def test_other_histories_are_refused(tmp_path):

@@ -14,7 +14,7 @@ from foldyn.attractors.diagram import repeats_after
 from foldyn.attractors.jumps import jumps_between
 from foldyn.attractors.run import extremes
 from foldyn.attractors.sweep import Line
-from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
 
 ALPHA, FORCE = 0.05, 0.06
 DT = TURN / 100
@@ -161,6 +161,37 @@ def test_a_kresling_tower_doubles_its_period():
         script["shaken"](), rise, amplitudes=forces, sweep="up", settle=120, record=16
     )
     assert found.periods.values.tolist() == [[1, 1, 2, 2, 2, 4]]
+
+
+@pytest.mark.parametrize(("most", "points"), [(3, [3, 0]), (5, [4, 1])])
+def test_points_found_are_kept_when_it_is_interrupted(most, points):
+    def stop(state):
+        if state.steps >= most:
+            raise KeyboardInterrupt
+
+    case, given = duffing(1.0, 0.3, 0.1), {"settle": 2, "record": 4, "dt": TURN / 100}
+    given |= {"frequencies": np.array([0.6, 0.7, 0.8, 0.9]) / TURN}
+    with pytest.raises(MotionInterrupted, match=f"interrupted after {most} points") as stopped:
+        fd.bifurcation_diagram(case, X, progress=stop, **given)
+    kept, whole = stopped.value.partial, fd.bifurcation_diagram(case, X, **given)
+    assert kept.attrs["complete"] == 0
+    for way, (up_to, order) in enumerate(zip(points, (1, -1), strict=True)):
+        if up_to:
+            own, all_of_it = kept.amplitude[way, ::order], whole.amplitude[way, ::order]
+            np.testing.assert_array_equal(own[:up_to], all_of_it[:up_to])
+            assert np.isnan(own[up_to:]).all()
+    assert kept.sizes["sweep"] == np.count_nonzero(points)
+
+
+def test_an_interrupt_before_the_first_point_keeps_nothing():
+    def stop(u, v, t):
+        if t > 0.0:  # not yet where the measure is checked
+            raise KeyboardInterrupt
+        return 0.0
+
+    measure = fd.Quantity("m", function=stop)
+    with pytest.raises(MotionInterrupted, match="before the first point"):
+        fd.bifurcation_diagram(duffing(1.0, 0.3, 0.1), measure, [0.1], settle=2, record=4)
 
 
 @pytest.mark.filterwarnings("ignore:the energy balance")

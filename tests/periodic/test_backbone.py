@@ -6,7 +6,7 @@ from duffing import NODE, K, cubic, mass, oscillator
 from scipy.special import ellipk
 
 import foldyn as fd
-from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
 
 
 def exact_frequency(amplitude):
@@ -106,6 +106,18 @@ def test_what_does_not_swing_is_refused_and_what_is_lost_is_warned_of():
         found = fd.backbone(oscillator(), amplitudes=(1e-3, 1.0), most_points=4)
     assert found.attrs["complete"] == 0
     assert found.sizes["point"] == 5
+
+
+def test_points_found_are_kept_when_it_is_interrupted():
+    def stop(state):
+        if state.steps > 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(MotionInterrupted, match="interrupted after 5 points") as stopped:
+        fd.backbone(oscillator(), amplitudes=(1e-3, 1.0), progress=stop)
+    kept, whole = stopped.value.partial, fd.backbone(oscillator(), amplitudes=(1e-3, 1.0))
+    assert kept.attrs["complete"] == 0
+    np.testing.assert_array_equal(kept.amplitude, whole.amplitude[:5])
 
 
 def test_arguments_out_of_range_are_refused():

@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import foldyn as fd
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynWarning, InputError, MotionInterrupted
 from foldyn.periodic.bifurcations import Event
 from foldyn.periodic.continuation import Stride
 from foldyn.periodic.motion import balance_of
@@ -214,6 +214,25 @@ def test_points_found_are_kept_with_a_warning():
         found = fd.response_curve(oscillator(), (0.1, 0.6), 3, most_points=5)
     assert found.attrs["complete"] == 0
     assert found.sizes["point"] == 6
+
+
+def test_what_nothing_damps_is_told_where_its_curve_does_not_end():
+    undamped = oscillator(alpha=0.0)
+    with pytest.warns(FoldynWarning, match="point") as told:
+        fd.response_curve(undamped, (0.1, 0.6), 3, most_points=5)
+    assert "give more most_points. Nothing damps the sheet" in str(told[0].message)
+
+
+def test_points_found_are_kept_when_it_is_interrupted():
+    def stop(state):
+        if state.steps > 12:
+            raise KeyboardInterrupt
+
+    with pytest.raises(MotionInterrupted, match="interrupted after 13 points") as stopped:
+        fd.response_curve(oscillator(), (0.1, 0.6), 3, progress=stop)
+    kept, whole = stopped.value.partial, fd.response_curve(oscillator(), (0.1, 0.6), 3)
+    assert kept.attrs["complete"] == 0
+    np.testing.assert_array_equal(kept.amplitude, whole.amplitude[:13])
 
 
 def test_a_fork_without_branch_is_warned_of():

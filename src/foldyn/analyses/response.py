@@ -92,7 +92,7 @@ class ResponseAnalysis(Analysis):
 
             layout = "{desc}: {percentage:3.0f} %|{bar}| [{elapsed}<{remaining}]"
             shown = bar(progress, total=1.0, desc="response curve", bar_format=layout)
-            with bar_closed(shown) as reached:
+            with bar_closed(shown, keeps=True) as reached:
                 return response_curve(case, progress=tell, **given)
 
         return compute

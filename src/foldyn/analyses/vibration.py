@@ -91,17 +91,21 @@ def about(case_file: CaseFile, mass: str) -> dict[str, Any]:
 
 
 @contextmanager
-def bar_closed(bar: Any) -> Iterator[Any]:
+def bar_closed(bar: Any, keeps: bool = False) -> Iterator[Any]:
     """Close a bar at the end.
 
     The partial result of a search for equilibrium, or of a simulated motion, is not a result of
     this kind and is not kept.
+
+    keeps : whether what an interrupt leaves is of this kind.
     """
     try:
         yield bar
     except ComputationError as error:
         raise ComputationError(str(error)) from None
     except MotionInterrupted as stop:
+        if keeps:
+            raise
         raise KeyboardInterrupt(str(stop)) from None
     finally:
         bar.close()

@@ -23,7 +23,7 @@ from foldyn.attractors.run import (
 )
 from foldyn.cases import Case, State
 from foldyn.dynamics.progress import Progress, Reporter, reporter
-from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
 from foldyn.results import Quantity
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import variable
@@ -103,6 +103,8 @@ def bifurcation_diagram(
         An argument out of range, or nothing that drives the case.
     ComputationError
         The first motion fails.
+    MotionInterrupted
+        From the keyboard (Ctrl-C); its `partial` has the points until then.
 
     Warns
     -----
@@ -142,18 +144,20 @@ def bifurcation_diagram(
     values = swept.values
     points: list[list[Point]] = []
     jumps: list[Jump] = []
+    interrupted = False
     report, close = reporter(progress)
     try:
         with told_once():
             for way in ways:
-                found: list[Point] = []
                 here = values if way == "up" else values[::-1]
                 if points:  # from where the sweep up has ended
                     here = here[len(values) - len(points[0]) :]
+                found: list[Point] = []
+                points.append(found)
                 try:
                     for value in here.tolist():
                         found.append(steady.point(run, value))
-                        run, done = found[-1].run, len(found) + len(points) * len(values)
+                        run, done = found[-1].run, len(found) + (len(points) - 1) * len(values)
                         report(Progress(float(done), float(len(ways) * len(values)), done, 0.0))
                 except ComputationError as error:
                     if not found:
@@ -165,15 +169,22 @@ def bifurcation_diagram(
                         stacklevel=2,
                     )
                 jumps += bracketed(steady, way, found, resolution)
-                points.append(found)
+    except KeyboardInterrupt:
+        interrupted = True
     finally:
         close()
+    points = [found for found in points if found]
+    if not points:
+        raise MotionInterrupted("interrupted before the first point")
     facts = {
         "method": method, "settle": settle, "record": record, "resolution": resolution,
-        "complete": all(len(found) == len(values) for found in points),
+        "complete": not interrupted and all(len(found) == len(values) for found in points),
         "wall_seconds": time.perf_counter() - began,
     }  # fmt: skip
-    return _dataset(case, measure, swept, ways, points, jumps, facts)
+    diagram = _dataset(case, measure, swept, ways[: len(points)], points, jumps, facts)
+    if interrupted:
+        raise MotionInterrupted(f"interrupted after {sum(map(len, points))} points", diagram)
+    return diagram
 
 
 class Swept(NamedTuple):

@@ -26,6 +26,9 @@ from foldyn.cases import (
 from foldyn.errors import InputError
 
 WHOLE = 1e-9  # relative distance of a ratio of frequencies from a whole number
+HARMONIC = (
+    'fd.Harmonic(frequency=...) (in a case file, history = { kind = "harmonic", frequency = ... })'
+)
 SIZES: Mapping[type, str] = {
     Force: "vector",
     TotalForce: "total",
@@ -69,9 +72,7 @@ def driven_frequency(case: Case) -> float:
     """The same, refused where nothing drives the case."""
     if frequency := drive_frequency(case):
         return frequency
-    raise InputError(
-        "case: nothing drives it; give a load or a support the history fd.Harmonic(frequency=...)"
-    )
+    raise InputError(f"case: nothing drives it; give a load or a support the history {HARMONIC}")
 
 
 def with_histories(case: Case, history: Callable[[Harmonic], History]) -> Case:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.attractors.drive import lowest_frequency
+from foldyn.attractors.drive import HARMONIC, lowest_frequency
 from foldyn.cases import Case, Constant, Harmonic
 from foldyn.cases.air import refuse_air
 from foldyn.errors import InputError
@@ -98,7 +98,7 @@ class Drive:
             if not isinstance(history, Constant | Harmonic):
                 raise InputError(
                     f": is of the kind {history.kind!r}, and a periodic motion takes harmonic and "
-                    "constant ones; give fd.Harmonic(frequency=...), or leave it out",
+                    f"constant ones; give {HARMONIC}, or leave it out",
                     _place(case, history),
                 )
         found = [one.frequency for one in self._histories if isinstance(one, Harmonic)]

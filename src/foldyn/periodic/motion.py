@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.attractors.drive import HARMONIC
 from foldyn.cases import Case, State
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.periodic.balance import Balance, newton
@@ -171,8 +172,8 @@ def balance_of(
     equation = Equation(case, name)
     if not equation.drive.varies:
         raise InputError(
-            f"case: nothing drives it: {name} takes loads or supports that have a history such as "
-            "fd.Harmonic(frequency=3.0)"
+            f"case: nothing drives it: {name} follows the period of a load or support; give one "
+            f"the history {HARMONIC}"
         )
     equation = on_modes(equation, modes, start)
     fourier, size = Fourier(harmonics), (2 * harmonics + 1) * equation.size

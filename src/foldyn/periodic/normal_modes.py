@@ -16,7 +16,7 @@ from foldyn.cases import Case, State
 from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter, reporter
-from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
 from foldyn.periodic.about_rest import AboutRest
 from foldyn.periodic.balance import Balance
 from foldyn.periodic.continuation import LOST, Point, Step, Stride, corrected, point_at, steps
@@ -113,6 +113,8 @@ def backbone(
         As of `periodic_motion`.
     ComputationError
         The equilibrium is unstable, or the first motion is not found.
+    MotionInterrupted
+        From the keyboard (Ctrl-C); its `partial` has the points until then.
 
     Warns
     -----
@@ -164,9 +166,12 @@ def backbone(
     def reached(point: Point) -> float:
         return _largest(family.orbit(point.z, point.p), place)
 
+    kept, complete, interrupted = [first], False, False
     report, close = reporter(progress)
     try:
-        kept, complete = _follow(family, first, stride, reached, ends, report)
+        complete = _follow(family, kept, stride, reached, ends, report)
+    except KeyboardInterrupt:
+        interrupted = True
     finally:
         close()
     facts = {
@@ -189,7 +194,10 @@ def backbone(
     warn_of_crossing(orbits)
     warn_of_reduction(values.get("reduction"))
     facts["wall_seconds"] = time.perf_counter() - began
-    return points_dataset("backbone", case, values, facts)
+    found = points_dataset("backbone", case, values, facts)
+    if interrupted:
+        raise MotionInterrupted(f"interrupted after {len(kept)} points", found)
+    return found
 
 
 def _undamped(case: Case, harmonics: int, modes: int | None, state: Any) -> Balance:
@@ -324,12 +332,12 @@ def _reach(equation: Equation, motions: NDArray) -> float:
 
 
 def _follow(
-    family: Any, first: Point, stride: Stride, reached: Callable[[Point], float], ends: NDArray,
-    report: Reporter,
-) -> tuple[list[Point], bool]:  # fmt: skip
-    """Points from the first to the last amplitude, and whether it is reached."""
-    kept, whole_way = [first], math.log(ends[1] / ends[0])
-    for step in steps(family, first, stride, lambda point: reached(point) / ends[1] - 1.0):
+    family: Any, kept: list[Point], stride: Stride, reached: Callable[[Point], float],
+    ends: NDArray, report: Reporter,
+) -> bool:  # fmt: skip
+    """Add points from the first to the last amplitude; whether it is reached."""
+    whole_way = math.log(ends[1] / ends[0])
+    for step in steps(family, kept[0], stride, lambda point: reached(point) / ends[1] - 1.0):
         if not isinstance(step, Step):
             remedy = "a smaller longest_step, or more harmonics" if step == LOST else "most_points"
             warnings.warn(
@@ -338,11 +346,11 @@ def _follow(
                 FoldynWarning,
                 stacklevel=3,
             )
-            return kept, False
+            return False
         kept.append(step.after)
         done = math.log(reached(step.after) / ends[0]) / whole_way
         report(Progress(min(max(done, 0.0), 1.0), 1.0, len(kept), 0.0))
-    return kept, True
+    return True
 
 
 def _largest(orbit: Orbit, place: NDArray) -> float:

@@ -15,7 +15,7 @@ from foldyn.attractors.run import check_measure
 from foldyn.cases import Case, State
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter, reporter
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynWarning, InputError, MotionInterrupted
 from foldyn.periodic.balance import Balance
 from foldyn.periodic.bifurcations import DOUBLING, FOLD, PITCHFORK, Event, events
 from foldyn.periodic.continuation import (
@@ -138,6 +138,8 @@ def response_curve(
         As of `periodic_motion`.
     ComputationError
         No motion is found at the first end.
+    MotionInterrupted
+        From the keyboard (Ctrl-C); its `partial` has the points until then.
 
     Warns
     -----
@@ -164,6 +166,10 @@ def response_curve(
         family = tracer.family(balance)
         first = tracer.first(family, start)
         tracer.follow(family, first, branches, report)
+    except KeyboardInterrupt:
+        tracer.complete = False
+        partial = _dataset(case, tracer, measure, began) if tracer.found else None
+        raise MotionInterrupted(f"interrupted after {len(tracer.found)} points", partial) from None
     finally:
         close()
     return _dataset(case, tracer, measure, began)
@@ -227,7 +233,7 @@ class _Tracer:
 
         origin : the bifurcation, of this family, from which it comes.
         """
-        branch, kept, forks = self.branch, [], []
+        branch, forks = self.branch, []
         known: dict[int, tuple[Point, NDArray]] = {}
 
         def of(point: Point) -> NDArray:
@@ -236,7 +242,7 @@ class _Tracer:
             return known[id(point)][1]
 
         def keep(point: Point, name: str = "") -> None:
-            kept.append(_Found(family, point, branch, name, of(point)))
+            self.found.append(_Found(family, point, branch, name, of(point)))
 
         def outside(point: Point) -> float:
             return max(self.low - point.p, point.p - self.high)
@@ -245,7 +251,7 @@ class _Tracer:
             keep(point)
         for step in steps(family, first, self.stride, outside):
             if not isinstance(step, Step):
-                self._warn(step, kept[-1].point.p)
+                self._warn(step)
                 break
             back = None
             for event in events(family, step, of):
@@ -259,8 +265,7 @@ class _Tracer:
             keep(step.after)
             known = {id(step.after): known[id(step.after)]}
             done = min(max(abs(step.after.p - self.ends[0]) / self.span, 0.0), 1.0)
-            report(Progress(done, 1.0, len(self.found) + len(kept), 0.0))
-        self.found += kept
+            report(Progress(done, 1.0, len(self.found), 0.0))
         self.forks += forks
         for event in forks if depth else ():
             if event not in self.met:
@@ -272,14 +277,22 @@ class _Tracer:
         same = (one for one in self.forks if abs(one.point.p - event.point.p) <= near)
         return next(same, None) if branch and event.name == PITCHFORK else None
 
-    def _warn(self, why: str, p: float) -> None:
-        self.complete = False
+    def _warn(self, why: str) -> None:
+        self.complete, last = False, self.found[-1]
         texts = {
             LOST: "is lost: no further motion is found; the points before are kept. Remedies: a "
             "smaller longest_step, or more harmonics",
             LONG: f"has more than {self.stride.most} points, which are kept; give more most_points",
         }
-        warnings.warn(f"the branch at {p:.6g} {texts[why]}", FoldynWarning, stacklevel=5)
+        cause = ""
+        if not last.family.balance.equation.damping.any():
+            cause = (
+                ". Nothing damps the sheet, which in resonance swings without bound: give the case "
+                "damping, or stay on one side of the resonance"
+            )
+        warnings.warn(
+            f"the branch at {last.point.p:.6g} {texts[why]}{cause}", FoldynWarning, stacklevel=5
+        )
 
     def _fork(self, family: Any, event: Event, depth: int, report: Reporter) -> None:
         """Follow the branches that leave a bifurcation."""
