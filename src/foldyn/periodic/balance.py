@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.algebra.banded import one_thread
 from foldyn.periodic.equation import Equation, Instants
 from foldyn.periodic.fourier import Fourier
 
@@ -115,7 +116,8 @@ def newton(system, x: NDArray, tolerance: float, most: int = 25) -> Converged | 
         if norm == 0.0:
             return Converged(x, iteration)
         try:
-            step = np.linalg.solve(system.jacobian(x), -residual)
+            with one_thread(len(x)):
+                step = np.linalg.solve(system.jacobian(x), -residual)
         except np.linalg.LinAlgError:
             return None
         if not np.isfinite(step).all():
