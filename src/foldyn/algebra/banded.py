@@ -95,7 +95,8 @@ def one_thread(rows: int = 0) -> AbstractContextManager:
     """Keep LAPACK on one thread: more make the factorization of a band, or of few rows, slower.
 
     Measured with two threads, SciPy's OpenBLAS: bands 5 times at 333 dofs, 1.4 at 6000; full
-    matrices twice at 400 to 900 rows. They also wait for each other where other programs run. Threads of other libraries (PARDISO's) stay.
+    matrices twice at 400 to 900 rows. They also wait for each other where other programs run.
+    Threads of other libraries (PARDISO's) stay.
 
     rows : of a full matrix, of which more than FEW keep their threads.
     """

@@ -12,6 +12,8 @@ base frequency is that of the drive over `multiple`, so that longer periods than
 
 from __future__ import annotations
 
+import math
+from contextlib import AbstractContextManager
 from functools import cached_property
 from typing import NamedTuple
 
@@ -38,6 +40,11 @@ class Balance:
         self.equation, self.fourier, self.multiple = equation, fourier, multiple
         self.shape = len(fourier.order), equation.size
         self._bends = fourier.curvature[:, None]
+
+    @property
+    def threads(self) -> AbstractContextManager:
+        """Those of LAPACK for matrices of all unknowns: one where they are few."""
+        return one_thread(math.prod(self.shape))
 
     @cached_property
     def _pairs(self) -> NDArray:
@@ -116,8 +123,7 @@ def newton(system, x: NDArray, tolerance: float, most: int = 25) -> Converged | 
         if norm == 0.0:
             return Converged(x, iteration)
         try:
-            with one_thread(len(x)):
-                step = np.linalg.solve(system.jacobian(x), -residual)
+            step = np.linalg.solve(system.jacobian(x), -residual)
         except np.linalg.LinAlgError:
             return None
         if not np.isfinite(step).all():

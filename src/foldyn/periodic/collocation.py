@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
-from foldyn.algebra.banded import one_thread
 from foldyn.periodic.equation import Equation
 
 STAGES = 3
@@ -101,10 +100,9 @@ def monodromy(equation: Equation, stiffness: NDArray, w: float, drag: float) -> 
     stages = Stages(w**2 * mass, w * (damping - drag * mass), 2.0 * np.pi / steps, GAUSS)
     shift = half * damping - half**2 * mass
     motion = np.eye(2 * k)
-    with one_thread(STAGES * k):
-        for tangent in stiffness:
-            left = tangent - shift
-            motion = stages.tangent_step(stages.factors(left), left, motion)
+    for tangent in stiffness:
+        left = tangent - shift
+        motion = stages.tangent_step(stages.factors(left), left, motion)
     return np.exp(-half * 2.0 * np.pi / w) * motion
 
 

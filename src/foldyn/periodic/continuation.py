@@ -17,8 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
-from foldyn.algebra.banded import one_thread
-
 ITERATIONS = 8  # of Newton's method in a step
 EASY = 4  # iterations up to which the next step is longer
 GROWTH, CUT = 1.5, 0.5
@@ -98,8 +96,7 @@ def _bordered(family: Family, z: NDArray, p: float, row: NDArray):
     matrix[:n, :n] = family.jacobian(z, p)
     matrix[:n, n] = family.slope(z, p)
     matrix[n] = row
-    with one_thread(n):
-        return lu_factor(matrix, overwrite_a=True, check_finite=False)
+    return lu_factor(matrix, overwrite_a=True, check_finite=False)
 
 
 def _side(factors) -> float:

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.periodic.collocation import monodromy, stage_phases
+from foldyn.algebra.banded import one_thread
+from foldyn.periodic.collocation import STAGES, monodromy, stage_phases
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.fourier import values_of
 
@@ -42,7 +43,8 @@ def multipliers(
     at = equation.at(multiple * phase.ravel(), level)
     tangents = at.tangents(values_of(amplitudes, phase.ravel()))
     stiffness = tangents.reshape(*phase.shape, equation.size, equation.size)
-    found = np.linalg.eigvals(monodromy(equation, stiffness, omega / multiple, equation.alpha))
+    with one_thread(STAGES * equation.size):
+        found = np.linalg.eigvals(monodromy(equation, stiffness, omega / multiple, equation.alpha))
     return found[np.argsort(-np.abs(found), kind="stable")]
 
 

@@ -131,13 +131,14 @@ def periodic_motion(
     periods = whole("periods", periods, least=1)
     balance = balance_of(case, "fd.periodic_motion", harmonics, periods, modes, start, steps)
     omega = TURN * frequency_of(balance, frequency)
-    if method == "shooting":
-        orbit, floquet, spent = _shot(balance, start, omega, steps, tolerance)
-    else:
-        x = coefficients(balance, start, omega)
-        found = balanced(balance, x, omega, tolerance)
-        orbit, spent = orbit_of(balance, found.x, omega), found.iterations
-        floquet = multipliers(balance.equation, orbit.amplitudes, omega, periods, steps=steps)
+    with balance.threads:
+        if method == "shooting":
+            orbit, floquet, spent = _shot(balance, start, omega, steps, tolerance)
+        else:
+            x = coefficients(balance, start, omega)
+            found = balanced(balance, x, omega, tolerance)
+            orbit, spent = orbit_of(balance, found.x, omega), found.iterations
+            floquet = multipliers(balance.equation, orbit.amplitudes, omega, periods, steps=steps)
     truncation = orbit.truncation()
     warn_of_truncation(truncation, len(orbit.amplitudes) - 1, "harmonics")
     warn_of_crossing([orbit])

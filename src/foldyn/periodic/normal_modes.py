@@ -159,37 +159,38 @@ def backbone(
             )
     else:
         balance = _undamped(case, whole("harmonics", harmonics, least=1), modes, state)
-    place, frequency, shape = _mode(balance.equation, state, mode)
-    begin = _resonant if damped else _free
-    family, first = begin(balance, place, frequency, shape * ends[0], tolerance)
+    with balance.threads:
+        place, frequency, shape = _mode(balance.equation, state, mode)
+        begin = _resonant if damped else _free
+        family, first = begin(balance, place, frequency, shape * ends[0], tolerance)
 
-    def reached(point: Point) -> float:
-        return _largest(family.orbit(point.z, point.p), place)
+        def reached(point: Point) -> float:
+            return _largest(family.orbit(point.z, point.p), place)
 
-    kept, complete, interrupted = [first], False, False
-    report, close = reporter(progress)
-    try:
-        complete = _follow(family, kept, stride, reached, ends, report)
-    except KeyboardInterrupt:
-        interrupted = True
-    finally:
-        close()
-    facts = {
-        "mode": mode,
-        "harmonics": balance.fourier.harmonics,
-        "damped": damped,
-        "linear_frequency": frequency,
-        "complete": complete,
-    }
-    orbits = [family.orbit(point.z, point.p) for point in kept]
-    if isinstance(family, Free):
-        orbits = [_sharpened(family, orbit) for orbit in orbits]
-        values = _values(orbits, place)
-    else:
-        values = _damped_values(orbits)
-    values |= along(orbits)
-    values["frequency"] = np.array([orbit.omega / TURN for orbit in orbits])
-    values["amplitude"] = np.array([_largest(orbit, place) for orbit in orbits])
+        kept, complete, interrupted = [first], False, False
+        report, close = reporter(progress)
+        try:
+            complete = _follow(family, kept, stride, reached, ends, report)
+        except KeyboardInterrupt:
+            interrupted = True
+        finally:
+            close()
+        facts = {
+            "mode": mode,
+            "harmonics": balance.fourier.harmonics,
+            "damped": damped,
+            "linear_frequency": frequency,
+            "complete": complete,
+        }
+        orbits = [family.orbit(point.z, point.p) for point in kept]
+        if isinstance(family, Free):
+            orbits = [_sharpened(family, orbit) for orbit in orbits]
+            values = _values(orbits, place)
+        else:
+            values = _damped_values(orbits)
+        values |= along(orbits)
+        values["frequency"] = np.array([orbit.omega / TURN for orbit in orbits])
+        values["amplitude"] = np.array([_largest(orbit, place) for orbit in orbits])
     warn_of_truncation(float(values["truncation"].max()), balance.fourier.harmonics, "harmonics")
     warn_of_crossing(orbits)
     warn_of_reduction(values.get("reduction"))

@@ -163,9 +163,10 @@ def response_curve(
     tracer = _Tracer(by, ends, stride, steps, tolerance)
     report, close = reporter(progress)
     try:
-        family = tracer.family(balance)
-        first = tracer.first(family, start)
-        tracer.follow(family, first, branches, report)
+        with balance.threads:
+            family = tracer.family(balance)
+            first = tracer.first(family, start)
+            tracer.follow(family, first, branches, report)
     except KeyboardInterrupt:
         tracer.complete = False
         partial = _dataset(case, tracer, measure, began) if tracer.found else None
