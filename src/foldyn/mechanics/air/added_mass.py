@@ -11,6 +11,7 @@ from scipy import sparse
 from scipy.linalg import LinAlgError, cho_factor, cholesky
 from scipy.linalg.lapack import dpotri
 
+from foldyn.algebra.banded import one_thread
 from foldyn.errors import ComputationError
 from foldyn.mechanics.air.doublets import inductance, normals_of
 
@@ -117,14 +118,15 @@ def flow_of(
 
 def inverse(matrix: NDArray) -> NDArray[np.float64]:
     """Inverse of a positive definite matrix, in its place."""
-    try:
-        factor, _ = cho_factor(matrix, lower=True, overwrite_a=True)
-    except LinAlgError:
-        raise ComputationError(
-            "added mass: panels lie on each other, and no flow between them is defined; open the "
-            "sheet"
-        ) from None
-    found, _ = dpotri(factor, lower=True, overwrite_c=True)
+    with one_thread(len(matrix)):
+        try:
+            factor, _ = cho_factor(matrix, lower=True, overwrite_a=True)
+        except LinAlgError:
+            raise ComputationError(
+                "added mass: panels lie on each other, and no flow between them is defined; open "
+                "the sheet"
+            ) from None
+        found, _ = dpotri(factor, lower=True, overwrite_c=True)
     upper = np.triu_indices(len(found), 1)
     found[upper] = found.T[upper]
     return found
