@@ -19,7 +19,7 @@ from threadpoolctl import threadpool_limits
 
 import foldyn as fd
 from foldyn.linear.linearized_cell import linearize_cell
-from foldyn.workers import processors
+from foldyn.threads import processors
 
 COUNT, PHASES, ROUNDS = 10, 200, 7
 

@@ -17,7 +17,6 @@ from concurrent.futures import (
     FIRST_COMPLETED,
     Future,
     ProcessPoolExecutor,
-    ThreadPoolExecutor,
     wait,
 )
 from concurrent.futures.process import BrokenProcessPool
@@ -26,8 +25,6 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from threading import Thread
 from typing import Any, Generic, Self, TypeVar
-
-from threadpoolctl import threadpool_limits
 
 from foldyn import ram_limit
 from foldyn.errors import ComputationError
@@ -40,22 +37,6 @@ AHEAD = 2
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 """Variables by which a process beside others is told to run on one thread."""
 GONE = "the process that computed it was ended from outside, perhaps for lack of memory"
-
-
-def processors() -> int:
-    """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def in_threads(do: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """What is computed for each item, by threads on all processors.
-
-    It pays where that is linear algebra, which runs without Python's lock, on one thread each.
-    """
-    with threadpool_limits(1), ThreadPoolExecutor(processors()) as pool:
-        return list(pool.map(do, items))
 
 
 class Workers(Generic[Item, Result]):

@@ -6,18 +6,12 @@ the band is factorized faster than the sparse matrix, the more so the smaller it
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
-from functools import cache
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
-from threadpoolctl import ThreadpoolController
 
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.jit.compiled import summing
-
-FEW = 2000  # rows of a full matrix up to which threads lose
 
 
 class Cholesky:
@@ -89,20 +83,3 @@ def substitute(columns, b):
         b[j] /= columns[j, width]
         for i in range(others.size):
             others[i] -= column[i] * b[j]
-
-
-def one_thread(rows: int = 0) -> AbstractContextManager:
-    """Keep LAPACK on one thread: more make the factorization of a band, or of few rows, slower.
-
-    Measured with two threads, SciPy's OpenBLAS: bands 5 times at 333 dofs, 1.4 at 6000; full
-    matrices twice at 400 to 900 rows. They also wait for each other where other programs run.
-    Threads of other libraries (PARDISO's) stay.
-
-    rows : of a full matrix, of which more than FEW keep their threads.
-    """
-    return nullcontext() if rows > FEW else _openblas().limit(limits=1)
-
-
-@cache
-def _openblas() -> ThreadpoolController:
-    return ThreadpoolController().select(internal_api="openblas")

@@ -32,14 +32,13 @@ def add_view(commands: Any) -> None:
 
 def run_view(given: Namespace) -> None:
     """Serve the page until Ctrl-C."""
-    from threadpoolctl import threadpool_limits
-
     from foldyn.live.files import served
     from foldyn.studies import find_case
+    from foldyn.threads import one_thread
 
     say = speech(given.quiet)
     server, title = served([find_case(name) for name in given.files], given.port)
-    with server, threadpool_limits(1, user_api="blas"):  # small matrices
+    with server, one_thread():  # small matrices
         try:
             print(server.address, flush=True)
             say(f"{title}: the page is at this address until Ctrl-C")

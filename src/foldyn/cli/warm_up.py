@@ -24,7 +24,8 @@ def add_warm_up(commands: Any) -> None:
 def run_warm_up(given: Namespace) -> None:
     """Run the command."""
     from foldyn.cli.first_uses import STAGES, use
-    from foldyn.workers import Workers, processors
+    from foldyn.threads import processors
+    from foldyn.workers import Workers
 
     began, total, count = time.perf_counter(), 0, processors()
     with (

@@ -34,7 +34,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from foldyn.algebra.banded import one_thread
 from foldyn.dynamics.adjoint import Adjoint
 from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.implicit.matrix import StepMatrix
@@ -44,6 +43,7 @@ from foldyn.dynamics.motion_state import samples
 from foldyn.dynamics.ties import hand_over
 from foldyn.dynamics.timing import jumps
 from foldyn.errors import ComputationError, InputError
+from foldyn.threads import one_thread
 
 METHODS = ("newmark", "generalized_alpha")
 ROOM = 16e6  # bytes of the states of a segment

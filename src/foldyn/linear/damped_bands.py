@@ -20,8 +20,8 @@ from foldyn.linear.unit_cell import UnitCell
 from foldyn.linear.wave_solver import check_count
 from foldyn.linear.zone import checked_phases, of_phases
 from foldyn.results.dataset import result_dataset
+from foldyn.threads import in_threads
 from foldyn.values import of_kind, whole
-from foldyn.workers import in_threads
 
 if TYPE_CHECKING:
     import xarray

@@ -25,8 +25,8 @@ from foldyn.linear.bloch import Bloch
 from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.results.dataset import result_dataset
+from foldyn.threads import in_threads
 from foldyn.values import number, numbers, whole
-from foldyn.workers import in_threads
 
 if TYPE_CHECKING:
     import xarray

@@ -18,7 +18,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.bloch import Bloch, null_space
 from foldyn.linear.group_velocity import Waves
-from foldyn.workers import in_threads
+from foldyn.threads import in_threads
 
 DENSE = 500  # dofs up to which a problem is solved with full matrices
 GUARD = 3  # waves beyond those asked for, that none is missed where several coincide

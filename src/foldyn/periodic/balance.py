@@ -20,9 +20,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.algebra.banded import one_thread
 from foldyn.periodic.equation import Equation, Instants
 from foldyn.periodic.fourier import Fourier
+from foldyn.threads import one_thread
 
 
 class Balance:

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.algebra.banded import one_thread
 from foldyn.periodic.collocation import STAGES, monodromy, stage_phases
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.fourier import values_of
+from foldyn.threads import one_thread
 
 STEPS = 64  # in a period of the drive
 NEUTRAL = 1e-6  # above 1: what is rounding in an undamped motion

@@ -22,8 +22,8 @@ from foldyn.sweeps.points import Point
 from foldyn.sweeps.pool import Pool, pool_of
 from foldyn.sweeps.side_by_side import SideBySide
 from foldyn.sweeps.table import dataset
+from foldyn.threads import processors
 from foldyn.values import whole
-from foldyn.workers import processors
 
 MOST_PROCESSES = 1024
 """Processes at a time: more are a slip of the finger."""

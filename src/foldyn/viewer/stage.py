@@ -5,13 +5,11 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from threadpoolctl import ThreadpoolController
 
 from foldyn import __version__
 from foldyn.cases import Case
@@ -21,6 +19,7 @@ from foldyn.patterns import Pattern
 from foldyn.plots.along import displacements, stretches, way
 from foldyn.results.contents import pattern_of
 from foldyn.structures import Sheet, discretize
+from foldyn.threads import one_thread
 from foldyn.viewer.arrays import Arrays
 from foldyn.viewer.backdrop import Backdrop
 from foldyn.viewer.fields import Field, energies, fields, folding_fields
@@ -88,7 +87,7 @@ def stage(
     node = None if kind in ("modes", "bands") or not nodes else nodes[0]
     about = {"title": title, "kind": kind, "version": __version__, "node": node}
     keys: dict[int, str] = {}
-    with _threads().limit(limits=1, user_api="blas"):  # small matrices
+    with one_thread():  # small matrices
         for name, result in results.items():
             case = folding_case(result) if kind == "folding" else cases[name]
             key = keys.setdefault(id(case.structure.pattern), f"s{len(keys)}")
@@ -100,12 +99,6 @@ def stage(
     if backdrop:
         about["backdrop"] = backdrop.about()
     return Stage(about, arrays)
-
-
-@cache
-def _threads() -> ThreadpoolController:
-    """Those of BLAS, whose libraries are found once."""
-    return ThreadpoolController()
 
 
 def rest_stage(shown: Pattern | Case, title: str) -> Stage:

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.algebra.banded import one_thread
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.actuation import note_offsets
 from foldyn.dynamics.checkpoint import restore, snapshot, state_parts
@@ -27,6 +26,7 @@ from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.motion_state import Course, Outcome, Samples, StepPlan
 from foldyn.dynamics.system import Packed
 from foldyn.mechanics.inelastic_branches import HingeMemory
+from foldyn.threads import one_thread
 
 LEAST_STEP = 2.0**-20  # of the step wanted: where Newton's method fails with less, it fails
 LEAST_TIME = 1e-13  # step relative to the end of the motion

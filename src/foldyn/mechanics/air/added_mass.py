@@ -11,9 +11,9 @@ from scipy import sparse
 from scipy.linalg import LinAlgError, cho_factor, cholesky
 from scipy.linalg.lapack import dpotri
 
-from foldyn.algebra.banded import one_thread
 from foldyn.errors import ComputationError
 from foldyn.mechanics.air.doublets import inductance, normals_of
+from foldyn.threads import one_thread
 
 COLUMNS = 256  # of a matrix that are found at once
 

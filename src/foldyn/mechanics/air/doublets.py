@@ -23,7 +23,7 @@ from scipy import sparse
 
 from foldyn.jit.compiled import shared
 from foldyn.mechanics.air.potentials import CLOSE, inverse_distances
-from foldyn.workers import in_threads
+from foldyn.threads import in_threads
 
 BLOCK = 64e6  # bytes of the integrals that are held at once
 ROWS = 16  # of them that a thread takes at once
