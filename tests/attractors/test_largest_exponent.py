@@ -7,12 +7,24 @@ import pytest
 from two_bars import TURN, at, duffing
 
 import foldyn as fd
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError, InputError, MotionInterrupted
 
 DT = TURN / 100
 SPROTT = 0.1034
 """Of Ueda's oscillator x'' + 0.05 x' + x^3 = 7.5 cos t (exponents 0.1034, 0, -0.1534):
 J. C. Sprott, Chaos and Time-Series Analysis, Oxford 2003, appendix A."""
+
+
+def interrupted_after(time, case):
+    """What is kept of 8 periods after 2 more, interrupted at a time (s)."""
+
+    def stop(state):
+        if state.time > time - 1e-6:
+            raise KeyboardInterrupt
+
+    with pytest.raises(MotionInterrupted) as stopped:
+        fd.lyapunov_exponent(case, 8 * TURN, settle=2 * TURN, dt=DT, progress=stop)
+    return stopped.value
 
 
 @pytest.fixture(scope="module")
@@ -92,3 +104,14 @@ def test_what_has_no_exponent_is_refused(ueda):
     overdamped = duffing(1.0, 3.0, 0.3, cubic=False)
     with pytest.raises(ComputationError, match="take a shorter interval"):
         fd.lyapunov_exponent(overdamped, 500.0, interval=100.0, dt=DT)
+
+
+def test_what_was_counted_is_kept_when_it_is_interrupted(ueda):
+    whole = fd.lyapunov_exponent(ueda, 8 * TURN, settle=2 * TURN, dt=DT)
+    stop = interrupted_after(6 * TURN, ueda)
+    kept = stop.partial
+    assert str(stop) == f"interrupted after {float(kept.time[-1] - kept.attrs['settle']):.6g} s"
+    np.testing.assert_array_equal(kept.estimate, whole.estimate[: kept.sizes["time"]])
+    assert kept.sizes["time"] == 3 and kept.exponent == whole.estimate[2]
+    early = interrupted_after(TURN, ueda)
+    assert early.partial is None and "before anything was counted" in str(early)

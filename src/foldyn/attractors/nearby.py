@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from foldyn.dynamics import METHODS, Motion, prepare
 from foldyn.dynamics.failures import failure
 from foldyn.dynamics.motion_state import Outcome
 from foldyn.dynamics.progress import Progress, Reporter, reporter
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError, InputError, MotionInterrupted
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import variable
 from foldyn.values import choice, number, of_kind
@@ -84,6 +85,8 @@ def lyapunov_exponent(
         An argument out of range, contact, added mass of air, or hinges that remember.
     InstabilityError
         A motion grew without bound.
+    MotionInterrupted
+        From the keyboard (Ctrl-C); its `partial` has the estimate until then.
 
     Notes
     -----
@@ -123,13 +126,19 @@ def lyapunov_exponent(
         longest = 1.0 / (PER_PERIOD * frequency) if frequency else interval
         dt = step_of(case, method, initial, longest)
     dt = divisor(interval, dt)
-    report, close = reporter(progress)
-    try:
-        with told_once():
-            pair = Pair(case, (silent + counted) * interval, interval, initial, method, dt)
-            growth = pair.growth(silent + counted, report)[silent:]
-    finally:
-        close()
+    grown, interrupted = list[float](), False
+    with told_once():
+        pair = Pair(case, (silent + counted) * interval, interval, initial, method, dt)
+        report, close = reporter(progress)
+        try:
+            grown.extend(pair.growth(silent + counted, report))
+        except KeyboardInterrupt:
+            interrupted, counted = True, len(grown) - silent
+        finally:
+            close()
+    if counted < 1:
+        raise MotionInterrupted("interrupted before anything was counted")
+    growth = np.array(grown[silent:])
     elapsed = interval * (1.0 + np.arange(counted))
     estimate = np.cumsum(growth) / elapsed
     blocks = np.array([block.mean() for block in np.array_split(growth, min(BLOCKS, counted))])
@@ -146,7 +155,10 @@ def lyapunov_exponent(
         "method": method, "dt": pair.dt, "interval": interval, "settle": silent * interval,
         "apart": APART, "wall_seconds": time.perf_counter() - began,
     }  # fmt: skip
-    return result_dataset("lyapunov_exponent", case, data, along, facts)
+    found = result_dataset("lyapunov_exponent", case, data, along, facts)
+    if interrupted:
+        raise MotionInterrupted(f"interrupted after {elapsed[-1]:.6g} s", found)
+    return found
 
 
 def _check(case: Case, method: str, initial: State | None) -> None:
@@ -196,8 +208,8 @@ class Pair:
         aside = case.constraints.displacement(x).reshape(shape)
         self._aside = self._motions[0].packed.numbering.inward(aside)
 
-    def growth(self, intervals: int, report: Reporter) -> NDArray[np.float64]:
-        """Growth (intervals,) of the logarithm of the distance in each interval."""
+    def growth(self, intervals: int, report: Reporter) -> Iterator[float]:
+        """Growth of the logarithm of the distance in one interval after the other."""
         first, second = self._motions
         engines = []
         for motion in self._motions:
@@ -208,7 +220,7 @@ class Pair:
         size = max(self._size(first), SMALL * float(first.case.structure.bar_length.max()))
         difference = self._aside, np.zeros_like(self._aside), np.zeros_like(self._aside)
         away = self._distance(*difference[:2])
-        out, steps = np.empty(intervals), first.plan.every
+        steps = first.plan.every
         for k in range(intervals):
             wanted = APART * size
             for array, base, part in zip(_arrays(second), _arrays(first), difference, strict=True):
@@ -217,10 +229,10 @@ class Pair:
                 self._advance(motion, engine, steps)
             difference = [b - a for a, b in zip(_arrays(first), _arrays(second), strict=True)]
             away = self._distance(*difference[:2])
-            out[k] = math.log(max(away, 1e-300) / wanted)
-            if not abs(out[k]) < MOST:
+            grown = math.log(max(away, 1e-300) / wanted)
+            if not abs(grown) < MOST:
                 raise ComputationError(
-                    f"the distance changes by a factor of {math.exp(out[k]):.2g} in an interval of "
+                    f"the distance changes by a factor of {math.exp(grown):.2g} in an interval of "
                     f"{self._interval:.3g} s, too much to be measured; take a shorter interval"
                 )
             size = max(size, self._size(first))
@@ -228,8 +240,8 @@ class Pair:
             report(Progress(now, first.plan.end, int(first.course.tally.steps), 0.0))
             if (k + 1) % 64 == 0:
                 self._look(first)
+            yield grown
         self._look(first)
-        return out
 
     def _advance(self, motion: Motion, engine: Any, steps: int) -> None:
         code, hinge = engine.advance(motion.output.window, steps)
