@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache
-from typing import TypeVar
+from threading import Lock
+from typing import Any, TypeVar, cast
 
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
@@ -33,6 +34,28 @@ def in_threads(do: Callable[[Item], Result], items: Iterable[Item]) -> list[Resu
         return list(pool.map(do, items))
 
 
+class _Limit:
+    """Threads of LAPACK in this process, limited while anything is inside."""
+
+    def __init__(self) -> None:
+        self._lock, self._inside, self._limited = Lock(), 0, cast("Any", None)
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if not self._inside:
+                self._limited = _openblas().limit(limits=1)
+            self._inside += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if not self._inside:
+                self._limited.restore_original_limits()
+
+
+_ONE = _Limit()
+
+
 def one_thread(rows: int = 0) -> AbstractContextManager:
     """Keep LAPACK on one thread: more make the factorization of a band, or of few rows, slower.
 
@@ -42,7 +65,7 @@ def one_thread(rows: int = 0) -> AbstractContextManager:
 
     rows : of a full matrix, of which more than FEW keep their threads.
     """
-    return nullcontext() if rows > FEW else _openblas().limit(limits=1)
+    return nullcontext() if rows > FEW else _ONE
 
 
 @cache
