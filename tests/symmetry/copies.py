@@ -235,7 +235,7 @@ FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     **dict.fromkeys(("panels", "rigid"), Copy.panels_of),
     "creases": Copy.creases,
     **dict.fromkeys(("vector", "total", "force_per_length", "acceleration"), Copy.vector),
-    **dict.fromkeys(("normal", "motion"), Copy.vector),
+    **dict.fromkeys(("normal", "motion", "velocity"), Copy.vector),
     "point": Copy.point,
     "direction": Copy.direction,
     **dict.fromkeys(("pressure", "moment", "curvature", "fold_angle"), Copy.to_front),
@@ -254,6 +254,7 @@ FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     **dict.fromkeys(("stiffness", "rest_length", "coefficient", "alpha", "beta"), Copy.same),
     **dict.fromkeys(("ratios", "times", "onset", "yield_moment", "isotropic"), Copy.same),
     **dict.fromkeys(("kinematic", "barrier_moment", "rate", "friction"), Copy.same),
+    **dict.fromkeys(("added_mass", "drag", "drag_coefficient", "resolution"), Copy.same),
     "Contact.panels": Copy.same,
 }  # fmt: skip
 
@@ -267,10 +268,10 @@ def remade(structure: Any, pattern: fd.Pattern, sheet: fd.Sheet, options: dict) 
 def copied(case: fd.Case, symmetry: Symmetry) -> tuple[fd.Case, Copy]:
     """The case under a symmetry, and what else this does."""
     copy = Copy(case, symmetry)
-    contact = case.contact and copy.part(case.contact)
+    contact, air = (part and copy.part(part) for part in (case.contact, case.air))
     return fd.Case(
         copy.structure, copy.supports(case.supports), copy.parts(case.loads),
-        copy.parts(case.dampings), copy.parts(case.masses), contact,
+        copy.parts(case.dampings), copy.parts(case.masses), contact, air,
     ), copy  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, NamedTuple
 
@@ -30,10 +31,11 @@ SHELL = "shell"
 MODELS = (*PRESETS, SHELL)
 STATIC = "trace"
 ANALYSES = (*METHODS, STATIC)
-EXTRAS = ("springs", "memory", "contact", "all")  # the last: the others together
+EXTRAS = ("springs", "memory", "contact", "air", "all")  # the last: the others together
 TRIES = 12  # of a part, until the library takes it
 SMALL = 0.02  # of the pattern's size: displacements
-ALWAYS = {"BaseMotion.value"}  # drawn: the default, a meter, is as large as the sheet
+ALWAYS = {"BaseMotion.value", "Air.density", "Air.resolution"}
+"""Drawn: a meter by default is as large as the sheet, air is light, and its flow takes long."""
 LEAST = 1e-6  # of that size: the largest displacement, or there is nothing to compare
 STEPS = 40  # of implicit methods; as many samples, so that contact is seen when it sets in
 
@@ -154,6 +156,13 @@ FIELDS: Mapping[str, Callable[[Scene, dict], Any]] = {
     **dict.fromkeys(("yield_moment", "barrier_moment"), lambda s, _: s.positive(s.moment / s.size)),
     **dict.fromkeys(("isotropic", "kinematic"), lambda s, _: s.positive(s.moment / s.size)),
     "rate": lambda s, _: s.positive(0.1 / s.time),
+    # of air
+    "density": lambda s, _: s.positive(20.0),
+    "velocity": lambda s, _: s.vector(0.05 * s.size / s.time),
+    "added_mass": lambda s, _: [True, False, "local"][s.rng.integers(3)],
+    "drag": lambda s, _: bool(s.rng.random() < 0.8),
+    "drag_coefficient": lambda s, _: s.positive(1.0),
+    "resolution": lambda s, _: 2,
 }  # fmt: skip
 
 
@@ -357,6 +366,8 @@ def _draw(rng, chosen: Combination) -> Draw:
     if extra in ("contact", "all"):
         case = case.altered(contact=contact_of(scene))
     taken(case)
+    if extra in ("air", "all"):
+        case = _with_air(case, scene, taken)
     supports = [kind for kind in SUPPORTS if kind is not fd.Spring]
     lists = {"supports": (supports, 2), "loads": (LOADS, 4), "damping": (DAMPINGS, 2)}
     for name, (kinds, most) in {**lists, "masses": ([fd.PointMass], 1)}.items():
@@ -392,6 +403,16 @@ def _with_one_more(case: fd.Case, name: str, kinds: Any, scene: Scene, taken: An
         except InputError:
             continue
     return case
+
+
+def _with_air(case: fd.Case, scene: Scene, taken: Any) -> fd.Case:
+    """The case in a fluid that its analysis takes."""
+    for _ in range(TRIES):
+        surrounded = case.altered(air=drawn(scene, [fd.Air]))
+        with suppress(InputError):
+            taken(surrounded)
+            return surrounded
+    raise InputError("no air is taken")
 
 
 def contact_of(scene: Scene) -> fd.Contact:

@@ -35,10 +35,11 @@ class Fluid:
     ----------
     triangles : ndarray of int, shape (nt, 3)
         Nodes of the structure's triangles.
-    under, shares : ndarray, shape (e,) and (e, 3)
-        The triangle under the center of each boundary element, and the weights of its nodes.
-    catch : sparse array, shape (u, e)
-        Integrals of the flow's functions over the elements, m2.
+    under, shares : ndarray, shape (k,) and (k, 3)
+        The triangles under the centers of boundary elements, and the weights of their nodes; two
+        share an element on the line between them.
+    catch : sparse array, shape (u, k)
+        Integrals of the flow's functions over these elements, m2.
     """
 
     triangles: NDArray[np.int64]
@@ -52,7 +53,7 @@ class Fluid:
     def flow(self) -> Flow:
         """The matrix rho D^-1 (u, u), kg/m4.
 
-        With the normal velocities y of the elements the energy of the fluid is
+        With the normal velocities y there the energy of the fluid is
         (catch y)' flow (catch y) / 2.
         """
         return self._density * flow_of(*self._surface)
@@ -92,7 +93,8 @@ def fluid_at(case: Any, displacement: NDArray) -> Fluid:
     if not local:
         _check_gaps(structure.pattern, elements, points)
     surface = points, elements.triangles, elements.unknown
-    given = structure.triangles, elements.under, elements.shares, caught(*surface)
+    catch = sparse.csr_array(sparse.csc_array(caught(*surface))[:, elements.element])
+    given = structure.triangles, elements.under, elements.shares, catch
     return Fluid(*given, case.air.density, (*surface, elements.panel) if local else surface)
 
 

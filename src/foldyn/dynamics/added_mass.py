@@ -23,7 +23,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg import null_space
 
 from foldyn.cases import Case
 from foldyn.cases.added_mass import Fluid, fluid_at
@@ -34,7 +33,7 @@ from foldyn.jit.context import rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.air.added_mass import inverse
 from foldyn.mechanics.term import ADDRESS
-from foldyn.statics.rigid import rigid_motions
+from foldyn.statics.rigid import free_rigid_motions
 from foldyn.structures.mesh import double_areas
 
 TURN = math.radians(3.0)  # of a hinge, after which the flow is found anew
@@ -49,7 +48,6 @@ class AddedMass(NamedTuple):
     """The flow about t triangles with u unknowns, and memory."""
 
     triangles: NDArray  # (t, 3) nodes
-    at_rest: NDArray  # (t, 3, 3) their places at rest, m
     sides: NDArray  # (t, 2, 3) rest vectors from the first corner to the others, m
     start: NDArray  # (u + 1,) first of the entries of each unknown: what it catches of
     corner: NDArray  # (k,) area vector . velocity of corners, 3 triangle + corner,
@@ -115,7 +113,6 @@ def _with_memory(
     area, rate = np.zeros((2, count, 3))
     return AddedMass(
         triangles=triangles.astype(np.int64),
-        at_rest=corners,
         sides=np.ascontiguousarray(corners[:, 1:] - corners[:, :1]),
         start=catch.indptr.astype(np.int64),
         corner=catch.indices.astype(np.int64),
@@ -172,7 +169,7 @@ def renewed_flow(case: Case, packed: Any, course: Any) -> bool:
     press(own, lost - own.flow @ jump, push)
     solve(own, mass, push, change, line)
     v += change
-    deforming = v - _rigid_part(packed, course)
+    deforming = v - _rigid_part(case, packed, course)
     missed, least = before - whole_energy(own, mass, v), whole_energy(own, mass, deforming)
     if least > 0.0:
         v += (math.sqrt(np.clip(1.0 + missed / least, *SCALED)) - 1.0) * deforming
@@ -183,20 +180,12 @@ def renewed_flow(case: Case, packed: Any, course: Any) -> bool:
     return True
 
 
-def _rigid_part(packed: Any, course: Any) -> NDArray:
-    """The rigid motion (rows, 3) that supports permit and that has the momenta of sheet and fluid.
-
-    None where constraints tie dofs together.
-    """
-    own, system, v = packed.added, packed.system, course.v
-    if len(system.ties.slave):
-        return np.zeros_like(v)
-    place = np.zeros_like(v)
-    place[own.triangles] = own.at_rest
-    place += course.u
-    motions = rigid_motions(place)
-    free = motions @ null_space(motions[system.supported])
-    shapes = free.T.reshape(-1, *v.shape)
+def _rigid_part(case: Case, packed: Any, course: Any) -> NDArray:
+    """The rigid motion (rows, 3) that supports permit, with the momenta of sheet and fluid."""
+    own, by, v = packed.added, packed.numbering, course.v
+    place = case.structure.nodes + by.outward(course.u)
+    free = free_rigid_motions(place, case.constraints).T
+    shapes = np.array([by.inward(shape.reshape(-1, 3)) for shape in free]).reshape(-1, *v.shape)
     pushes, speed = np.zeros((len(shapes), *v.shape)), np.zeros(len(own.flow))
     for shape, force in zip(shapes, pushes, strict=True):
         times_mass(packed.mass, shape, force)

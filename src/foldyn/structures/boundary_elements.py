@@ -32,16 +32,20 @@ class BoundaryElements(NamedTuple):
     panel : ndarray of int, shape (t,)
     unknown : ndarray of int, shape (p,)
         Number of each corner where the flow may differ on both sides, -1 on open edges.
-    under : ndarray of int, shape (t,)
-        Triangle of the structure in which the center of each lies.
-    shares : ndarray, shape (t, 3)
-        Weights of that triangle's nodes at the center.
+    element : ndarray of int, shape (k,)
+        Number of an element, once for each triangle of the structure on which its center lies: on
+        the line between two there are two, so that no numbering chooses one.
+    under : ndarray of int, shape (k,)
+        That triangle.
+    shares : ndarray, shape (k, 3)
+        Weights of its nodes at the center; those of an element add up to 1.
     """
 
     weights: sparse.csr_array
     triangles: NDArray[np.int64]
     panel: NDArray[np.int64]
     unknown: NDArray[np.int64]
+    element: NDArray[np.int64]
     under: NDArray[np.int64]
     shares: NDArray[np.float64]
 
@@ -100,15 +104,12 @@ def boundary_elements(structure: Any, resolution: int, alone: bool = False) -> B
     for side, opened in zip((numbers[:, 1:, 0], numbers[:, 0, 1:]), corners.open, strict=True):
         edge[side[opened]] = True
     unknown = np.where(edge, -1, np.cumsum(~edge) - 1)
-    triangle, weight = _located(structure, places, owner)
-    entries = (
-        weight.ravel(),
-        (np.repeat(np.arange(count), 3), structure.triangles[triangle].ravel()),
-    )
+    point, triangle, weight = _located(structure, places, owner)
+    entries = weight.ravel(), (point.repeat(3), structure.triangles[triangle].ravel())
     weights = sparse.csr_array(entries, (count, len(structure.nodes)))
     weights.eliminate_zeros()
-    under, shares = _located(structure, places[triangles].mean(axis=1), panel)
-    return BoundaryElements(weights, triangles, panel, unknown, under, shares)
+    on = _located(structure, places[triangles].mean(axis=1), panel)
+    return BoundaryElements(weights, triangles, panel, unknown, *on)
 
 
 def _check_convex(pattern: Any) -> None:
@@ -225,22 +226,25 @@ def _cut(numbers: NDArray) -> NDArray:
     return np.stack([one, two], axis=3).reshape(-1, 3)
 
 
-def _located(structure: Any, points: NDArray, panel: NDArray) -> tuple[NDArray, NDArray]:
-    """Triangles (p,) of panels in which points at rest lie, and weights (p, 3) of their nodes."""
-    count = int(panel.max()) + 1
-    triangle, weight = np.empty(len(points), np.int64), np.empty((len(points), 3))
+def _located(structure: Any, points: NDArray, panel: NDArray) -> list[NDArray]:
+    """Points (k,) at rest, triangles (k,) of their panels on which they lie, and weights (k, 3).
+
+    Triangles that share a point have equal parts of the weights.
+    """
+    count, found = int(panel.max()) + 1, []
     for own, mine in zip(_by(panel, count), _by(structure.triangle_panel, count), strict=True):
         corner, one, two = np.moveaxis(structure.nodes[structure.triangles[mine]], 1, 0)
         sides = np.stack([one - corner, two - corner], axis=2)  # (t, 3, 2)
         away = points[own][:, None, :] - corner
         share = np.einsum("tij,ptj->pti", np.linalg.pinv(sides), away)
         each = np.concatenate([1.0 - share.sum(axis=2, keepdims=True), share], axis=2)
-        least = each.min(axis=2)  # of triangles that share a point, the first
-        best = (least > least.max(axis=1, keepdims=True) - ROUNDING).argmax(axis=1)
-        found = each[np.arange(len(own)), best]
-        found = np.where(found > ROUNDING, found, 0.0)
-        triangle[own], weight[own] = mine[best], found / found.sum(axis=1, keepdims=True)
-    return triangle, weight
+        least = each.min(axis=2)
+        here, under = np.nonzero(least > least.max(axis=1, keepdims=True) - ROUNDING)
+        weight = each[here, under]
+        weight = np.where(weight > ROUNDING, weight, 0.0)
+        whole = weight.sum(axis=1) * np.bincount(here)[here]
+        found.append((own[here], mine[under], weight / whole[:, None]))
+    return [np.concatenate(parts) for parts in zip(*found, strict=True)]
 
 
 def _by(number: NDArray, count: int) -> list[NDArray]:
