@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from threading import Lock
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
@@ -38,7 +38,8 @@ class _Limit:
     """Threads of LAPACK in this process, limited while anything is inside."""
 
     def __init__(self) -> None:
-        self._lock, self._inside, self._limited = Lock(), 0, cast("Any", None)
+        self._lock, self._inside = Lock(), 0
+        self._limited: Any = None
 
     def __enter__(self) -> None:
         with self._lock:
