@@ -27,7 +27,7 @@ from foldyn.sweeps.measures import (
     sampled,
     time_of,
 )
-from foldyn.viewer.fields import bar_strain
+from foldyn.viewer.states import bar_strain
 
 Seeds = dict[str, NDArray]
 """Derivatives of a number by variables of a result, of their shapes, by name."""

@@ -118,13 +118,14 @@ class Assembly:
     # ------------------------------------------------------------------ energies and forces
     def dofs(
         self, displacement: NDArray, push: NDArray | None = None, memory: Term | None = None,
-        held: tuple[NDArray, sparse.csr_array] | None = None,
+        held: tuple[NDArray, sparse.csr_array] | None = None, kept: list[Any] | None = None,
     ) -> NDArray:  # fmt: skip
         """Vector (m,) of displacements (n, 3), the hidden dofs in balance, by Newton's method.
 
         push : forces (m,), N, of which those on the hidden dofs count; none by default.
         memory : what resists beside the sheet.
         held : where the hidden dofs begin (r,), and rows (k, r) along which they stay there.
+        kept : holds the last factors from one state to the next, while steps with them shrink fast.
 
         Raises
         ------
@@ -137,20 +138,28 @@ class Assembly:
             return q
         first, held_forces = self.size - len(self.hidden), np.zeros(rows.shape[0])
         body = self._of_hidden if memory is None else self._of_hidden.with_terms(memory)
+        solve, last = kept[0] if kept else None, np.inf
         for _ in range(ITERATIONS):
             couple = body.internal(q)[first:]
             if push is not None:
                 couple -= push[self.hidden]
             if not couple.any():
                 return q
-            stiffness = body.tangent(q, LEAST_SLOPE)[first:][:, first:]
-            if rows.shape[0]:
-                stiffness = sparse.block_array([[stiffness, rows.T], [rows, None]])
-            step = splu(sparse.csc_array(stiffness)).solve(-np.append(couple, held_forces))
-            step = step[: len(couple)]
+            if solve is None:
+                stiffness = body.tangent(q, LEAST_SLOPE)[first:][:, first:]
+                if rows.shape[0]:
+                    stiffness = sparse.block_array([[stiffness, rows.T], [rows, None]])
+                solve = splu(sparse.csc_array(stiffness)).solve
+            step = solve(-np.append(couple, held_forces))[: len(couple)]
             q[first:] += step
-            if self.sheet.per_hidden * np.abs(step).max(initial=0.0) <= BALANCED:
+            largest = self.sheet.per_hidden * float(np.abs(step).max(initial=0.0))
+            if largest <= BALANCED:
+                if kept is not None:
+                    kept[:] = [solve]
                 return q
+            if kept is None or largest > 0.1 * last:
+                solve = None
+            last = largest
         raise ComputationError("the rotations of the panels do not balance at this displacement")
 
     @cached_property

@@ -194,6 +194,10 @@ class SheetTerm(Term):
     def turn(self, q: NDArray, other: NDArray) -> float:
         """Largest turn (rad) of a part between two states; inf if parts collide."""
 
+    def plate_energies(self, q: NDArray) -> NDArray:
+        """Energy (p,), J, of each panel as a plate, or of each triangle of a shell."""
+        return np.zeros(0)
+
     @abstractmethod
     def scale(self) -> NDArray:
         """Forces (m,), N, at the dofs under a strain of one, whose rounding errors stay."""

@@ -182,6 +182,19 @@ class ShellTerm(SheetTerm):
         sides = float((apart * np.sqrt(self.model.per_length2)).max(initial=0.0))
         return largest_turn(sides, self.angles(q), self.angles(other))
 
+    def plate_energies(self, q: NDArray) -> NDArray:
+        """See `SheetTerm`: of stretching and bending."""
+        model, work, (u, x) = self.model, shell_work(self.model), self._split(q)
+        fold(model, u, x, work)
+        ride(model, u, work)
+        apart = u[np.roll(model.triangles, -1, axis=1)] - u[model.triangles]
+        longer = np.einsum("tkc,tkc->tk", apart, 2.0 * model.side + apart)
+        strain = 0.5 * longer * model.per_length2
+        turn = np.append(work.turn, 0.0)[model.hinge] * model.weight  # without one: number -1
+        turn += model.sign * model.per_reach * np.append(x, 0.0)[model.rotation]
+        stretching = np.einsum("tk,tkm,tm->t", strain, model.membrane, strain)
+        return 0.5 * (stretching + np.einsum("tk,tkm,tm->t", turn, model.bending, turn))
+
     def scale(self) -> NDArray:
         """Stiffness of the triangles' sides in the plane times their lengths, summed at nodes.
 

@@ -178,6 +178,20 @@ class BarsPlatesTerm(SheetTerm):
         bars = self._bars.turn(q[: self._nodal], other[: self._nodal])
         return largest_turn(bars, self.angles(q), self.angles(other))
 
+    def plate_energies(self, q: NDArray) -> NDArray:
+        """See `SheetTerm`."""
+        model, work, (displacement, rotation) = self.model, plates_work(self.model), self._split(q)
+        turn_hinges(model, displacement, work)
+        from_rest = work.angle.copy()
+        from_rest[len(model.fold_rest) :] -= model.bend_rest
+        turned = np.append(from_rest, (self.per_hidden * rotation)[::-1])  # number -1 comes last
+        angle, size = turned[model.angle], np.diff(model.start)
+        plate = np.repeat(np.arange(len(size)), size**2)
+        row, column = np.divmod(np.arange(len(plate)) - model.entry[plate], size[plate])
+        first = model.start[plate]
+        energy = 0.5 * model.stiffness * angle[first + row] * angle[first + column]
+        return np.bincount(plate, energy, len(size))
+
     def scale(self) -> NDArray:
         """EA of the bars, summed at the nodes; for rotations the largest stiffness of a plate."""
         turning = self.model.per_reach * np.abs(self.model.stiffness).max(initial=0.0)

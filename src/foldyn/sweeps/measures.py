@@ -28,7 +28,7 @@ from foldyn.signals import (
 from foldyn.statics import Landscape, landscape
 from foldyn.statics.load_at import load_at
 from foldyn.sweeps.measure import BAND, MODE, Measure
-from foldyn.viewer.fields import bar_strain
+from foldyn.viewer.states import bar_strain
 
 F = TypeVar("F", bound=Callable[..., Any])
 MOTION, PATH, MODES, FRF, FIDELITY = "dynamics", "statics", "modes", "frf", "fidelity"

@@ -1,0 +1,170 @@
+"""How creases turn and which energies panels have, at all samples of a motion or path."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.cases import Case
+from foldyn.cases.case_assembly import SomeLoads
+from foldyn.materials.prony import CreaseDampers
+from foldyn.materials.series import in_series
+from foldyn.mechanics import angles
+from foldyn.mechanics.following import following_force, joined
+from foldyn.structures import Structure, membranes
+from foldyn.structures.mesh import double_areas
+
+
+class States(NamedTuple):
+    """Creases (samples, nf) of k hinges, some of them several in a row, and panels.
+
+    turn : from rest, without what the panels beside a crease turn, rad.
+    moment : of the whole crease, N m.
+    pairs, energy : ends (k, 2) of the hinges and their energies (samples, k), J.
+    plates : energy of each panel as a plate, or of each triangle of a shell (samples, p), J.
+    rest : rest angles as loads turn them (samples, nr), rad.
+    """
+
+    turn: NDArray
+    moment: NDArray
+    pairs: NDArray
+    energy: NDArray
+    plates: NDArray
+    rest: NDArray
+
+
+def memory_acts(case: Case, result: Any) -> bool:
+    """Whether creases had memory: dampers in series with panels have one where time passes."""
+    passes = "time" in result.sizes or "elapsed" in result
+    return any(passes or not isinstance(part.law, CreaseDampers) for part in case.remembering)
+
+
+def creases_known(case: Case, result: Any) -> bool:
+    """Whether displacements tell how creases turn.
+
+    They do not where panels give way beside creases that have memory or, in motions, dampers.
+    """
+    sheet = case.body.sheet
+    give = len(sheet.hidden) > 0 or bool(sheet.fold_hinges().softness.any())
+    damped = "time" in result.sizes and bool(case.crease_damping.any())
+    return not (give and (damped or memory_acts(case, result)))
+
+
+def states(case: Case, result: Any, displacement: NDArray) -> States:
+    """States at displacements (samples, n, 3), m, with unknowns without mass in balance."""
+    body, structure, kind = case.body, case.structure, case.structure.hinge_kinds[0]
+    loads, rest, factors = _loads(case, result, len(displacement))
+    changes, hinges = rest - body.sheet.rest_angles, body.sheet.fold_hinges()
+    angle = hinge_angles(structure, hinges.nodes, displacement)
+    plates = np.zeros((len(displacement), 0))
+    if len(body.hidden):
+        pushes = joined((part, k) for k, load in enumerate(loads) for part in load)
+        hidden, none = np.zeros(len(body.hidden)), sparse.csr_array((0, len(body.hidden)))
+        found, kept = [], []
+        for k, u in enumerate(displacement):
+            here = body.folded(rest[k]) if changes[k].any() else body
+            push = following_force(pushes, np.append(u, hidden), factors[:, k : k + 1])
+            q = here.dofs(u, push, held=(hidden, none), kept=kept)
+            hidden = q[body.hidden]
+            there = np.minimum(hinges.hidden, body.size)
+            angle[k] -= (np.append(q, 0.0)[there] * hinges.hidden_turn).sum(axis=1)
+            found.append(here.sheet.plate_energies(q))
+        plates = np.array(found)
+    if count := body.sheet.offsets:
+        angle += changes[:, -count:] + body.sheet.rest_angles[-count:]
+    share, at_rest = kind.share[hinges.fold], hinges.rest + changes[:, hinges.fold]
+    energy, moment = hinges.stiffness * np.array(in_series(kind.law, angle, at_rest, share))
+    turn = (angle - hinges.softness * moment - hinges.rest) * hinges.share
+    places = (np.arange(len(hinges.fold)), hinges.fold)
+    shape = len(hinges.fold), len(structure.folds)
+    of_crease = sparse.csr_array((np.ones(len(hinges.fold)), places), shape)
+    pairs = hinges.nodes[:, :2]
+    return States(turn @ of_crease, moment @ of_crease, pairs, energy, plates, rest)
+
+
+def _loads(case: Case, result: Any, samples: int) -> tuple[list[list[Any]], NDArray, NDArray]:
+    """Following forces of each load, rest angles (samples, nr), and factors (loads, samples)."""
+    rest = np.tile(case.body.sheet.rest_angles, (samples, 1))
+    constant = set(np.atleast_1d(result.attrs.get("constant", [])).astype(int).tolist())
+    following, factors = [], np.ones((len(case.loads), samples))
+    for k, load in enumerate(case.loads):
+        if "time" in result.sizes:
+            factors[k] = load.history(result["time"].values)
+        elif k not in constant:
+            factors[k] = result["load_factor"].values
+        alone = SomeLoads(case, [k])
+        for change, _ in alone.rest_terms:
+            rest += np.outer(factors[k], change)
+        following.append([part for part, _ in alone.following_terms])
+    return following, rest, factors
+
+
+def hinge_angles(structure: Any, hinges: NDArray, displacement: NDArray) -> NDArray:
+    """Dihedrals (samples, k) of hinges (k, 4), rad."""
+    rows = hinges.astype(np.uint32)
+    return np.array([angles(structure.nodes + u, rows) for u in displacement]).reshape(
+        len(displacement), len(rows)
+    )
+
+
+def bar_strain(structure: Any, displacement: NDArray) -> NDArray:
+    """Elongation of bars over their length (samples, nb)."""
+    i, j = structure.bars.T
+    apart = structure.nodes[j] - structure.nodes[i] + displacement[:, j] - displacement[:, i]
+    return np.linalg.norm(apart, axis=2) / structure.bar_length - 1.0
+
+
+def energy_density(structure: Any, displacement: NDArray, found: States) -> NDArray:
+    """Strain energy over the area of each panel (samples, m), J/m2.
+
+    That of a bar or hinge goes in equal parts to the triangles beside it; springs, and clamped
+    edges of models without plates, are left out.
+
+    displacement : (samples, n, 3), m
+    """
+    panel, pairs, parts = structure.triangle_panel, [found.pairs], [found.energy]
+    triangle = 0.5 * np.linalg.norm(double_areas(structure.nodes, structure.triangles), axis=1)
+    area = np.bincount(panel, triangle)
+    panels = np.zeros((len(displacement), len(area)))
+    if isinstance(structure, Structure):
+        panels += membranes.energies(
+            structure.membranes, structure.edge_gives, structure.nodes, displacement, len(area)
+        )
+        if not structure.membranes:
+            stiffness = structure.sheet.youngs_modulus * structure.bar_area * structure.bar_length
+            stretch = 1.0 + bar_strain(structure, displacement)
+            pairs.append(structure.bars)
+            parts.append(stiffness * structure.bar_law.energy(stretch))
+        if found.plates.shape[1]:
+            panels += found.plates
+        else:
+            bends, first = structure.hinge_kinds[1], len(structure.folds)
+            angle = hinge_angles(structure, structure.bends, displacement)
+            rest = found.rest[:, first : first + len(structure.bends)]
+            pairs.append(structure.bends[:, :2])
+            parts.append(bends.stiffness * bends.energy(angle, rest))
+    else:
+        of_panel = sparse.csr_array((np.ones(len(panel)), (np.arange(len(panel)), panel)))
+        panels += found.plates @ of_panel
+    beside = shares(np.vstack(pairs), structure.triangles, panel)
+    return (np.hstack(parts) @ beside + panels) / area
+
+
+def shares(pairs: NDArray, triangles: NDArray, panel: NDArray) -> sparse.csr_array:
+    """Parts (k, m) of what lies along pairs of nodes (k, 2) that belong to each panel."""
+    if not len(pairs):
+        return sparse.csr_array((0, int(panel.max(initial=-1)) + 1))
+    sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    count = int(triangles.max(initial=0)) + 1
+    of_side, of_pair = (np.sort(rows, axis=1) @ [count, 1] for rows in (sides, pairs))
+    key, place = np.unique(of_pair, return_inverse=True)
+    at = np.minimum(np.searchsorted(key, of_side), len(key) - 1)
+    found = key[at] == of_side
+    shape = (len(key), int(panel.max(initial=0)) + 1)
+    ones = np.ones(int(found.sum()))
+    beside = sparse.csr_array((ones, (at[found], np.repeat(panel, 3)[found])), shape=shape)
+    total = np.maximum(beside.sum(axis=1), 1.0)
+    return (sparse.diags_array(1.0 / total) @ beside).tocsr()[place]
