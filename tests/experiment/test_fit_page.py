@@ -77,6 +77,8 @@ def test_the_page_shows_the_model_and_charts(fitted, tmp_path) -> None:
     page = write_fit(fitted, tmp_path).read_text("utf-8")
     assert not list(tmp_path.glob("*.png"))
     assert page.count("data-foldyn=") == 2
+    shown = re.findall(r'<script type="application/json" id="[^"]*about">(.*?)</script>', page)
+    assert [json.loads(text)["node"] for text in shown] == [0, 0]  # pressed, and swung
     plots = [json.loads(unescape(text)) for text in re.findall(r'data-plot="(.*?)"', page)]
     assert [plot["title"] for plot in plots] == [
         "", "load factor 0.5", "load factor 1", "node 0", "node 2", "node 0", "node 2",

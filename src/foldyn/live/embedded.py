@@ -16,6 +16,7 @@ from foldyn.analyses import CaseFile
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
+from foldyn.plots.readings import moved_supports
 from foldyn.report.page import report_html, write_report
 from foldyn.results import case_of, check_result
 from foldyn.statics import Folding
@@ -161,5 +162,6 @@ def results_stage(results: Mapping[str, xr.Dataset], title: str) -> Stage:
     if next(iter(results.values())).attrs["foldyn_result"] == "folding":
         return stage(results, {}, title, [])
     cases = {name: case_of(result) for name, result in results.items()}
-    loaded = next(iter(cases.values())).loaded_nodes.tolist()
-    return stage(results, cases, title, loaded or [0])
+    first = next(iter(cases.values()))
+    moved = moved_supports(first)
+    return stage(results, cases, title, first.loaded_nodes.tolist() or (moved[0] if moved else [0]))

@@ -77,7 +77,8 @@ td.number::after { content: attr(data-lacks); visibility: hidden; }
 .plot .keys button[aria-pressed="false"] { text-decoration: line-through; }
 .plot .keys button[aria-pressed="false"] svg { opacity: 0.25; }
 .plot .keys svg { flex: none; }
-.foldyn { width: min(84rem, 100vw - 2rem); margin-left: max(50% - 42rem, 50% - 50vw + 1rem); }
+body:has(.foldyn) { max-width: 86rem; }
+body:has(.foldyn) :is(figure, .plots) { max-width: 60rem; }
 @media (max-width: 40rem) {
   body { padding: 1rem 0.8rem 3rem; }
   h1 { font-size: 1.5rem; }
@@ -85,7 +86,6 @@ td.number::after { content: attr(data-lacks); visibility: hidden; }
   th, td { padding: 0.3rem 0.5rem; }
   .wide { overflow-x: auto; }
   .wide img { max-width: none; width: 44rem; }
-  .foldyn { width: auto; margin-left: 0; }
 }
 @media print { h2 { break-after: avoid; } figure, tr { break-inside: avoid; } }
 """

@@ -17,6 +17,7 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import character, mac
 from foldyn.patterns import Pattern
 from foldyn.plots.along import displacements, stretches, way
+from foldyn.plots.readings import moved_supports, total_reaction
 from foldyn.results.contents import pattern_of
 from foldyn.structures import Sheet, discretize
 from foldyn.threads import one_thread
@@ -156,8 +157,11 @@ def _path(
         stable[start + 1 : stop] &= good
         stable[[start, stop]] &= good
     about = _changing(arrays, key, case, result, u, way(result))
-    load = arrays.exact(f"{key}.load", result["load_factor"].values, "f4")
-    return [own | about | {"load": load, "stable": stable.tolist()}]
+    about["load"] = arrays.exact(f"{key}.load", result["load_factor"].values, "f4")
+    if (moved := moved_supports(case)) is not None:  # the load factor is their displacement
+        force = total_reaction(result, *moved)
+        about |= {"way": moved[1], "force": arrays.exact(f"{key}.force", force, "f4")}
+    return [own | about | {"stable": stable.tolist()}]
 
 
 def _folding(

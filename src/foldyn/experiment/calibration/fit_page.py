@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -21,7 +21,7 @@ from foldyn.experiment.calibration.measured import (
     ForceDisplacement,
     dense_curve,
 )
-from foldyn.experiment.calibration.measurement import Measurement
+from foldyn.experiment.calibration.measurement import AtNodes, Measurement
 from foldyn.experiment.calibration.modal import ModalParameters, ModeShapes
 from foldyn.experiment.calibration.mode_tables import modes_table, shapes_table
 from foldyn.experiment.calibration.responses import FrequencyResponse
@@ -63,7 +63,7 @@ def write_fit(
     folder = Path(folder)
     album, runs = Album(folder, figures), _runs(fit)
     title = title or f"Fit of {fit.problem.path.stem}"
-    sections: list[Section | Stage] = [*_stages(runs, title)]
+    sections: list[Section | Stage] = [*_stages(fit, runs, title)]
     sections += [Heading("Parameters"), _parameters(fit), Text(_quality(fit))]
     if len(fit.estimates) > 1:
         caption = (
@@ -104,14 +104,23 @@ def _runs(fit: Fit) -> list[_Run]:
     return runs
 
 
-def _stages(runs: Sequence[_Run], title: str) -> Iterator[Stage]:
+def _stages(fit: Fit, runs: Sequence[_Run], title: str) -> Iterator[Stage]:
     """The fitted model, its paths in step and its motions in step."""
     for kind in dict.fromkeys(run.case_file.analysis.kind for run in runs):
         own = {run.name: run for run in runs if run.case_file.analysis.kind == kind}
-        nodes = next(iter(own.values())).case_file.output.nodes.tolist()
+        nodes = _nodes(fit, own.values())
         results = {name: run.result for name, run in own.items()}
         cases = {name: run.case_file.case() for name, run in own.items()}
         yield stage(results, cases, title, nodes)
+
+
+def _nodes(fit: Fit, runs: Iterable[_Run]) -> list[int]:
+    """Measured nodes of the first run that has some, otherwise those of the case file's output."""
+    for run in runs:
+        for one in (fit.problem.measurements[i] for i in run.members):
+            if isinstance(one, AtNodes):
+                return one.where(run.case_file.case()).tolist()
+    return next(iter(runs)).case_file.output.nodes.tolist()
 
 
 def _provenance(fit: Fit, runs: Sequence[_Run], call: Call) -> list[Section]:

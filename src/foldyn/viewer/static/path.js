@@ -1,4 +1,5 @@
-// Paths of equilibria: the load factor over a displacement, with its stability.
+// Paths of equilibria: the load factor over a displacement, with its stability; where supports move,
+// their force takes its place.
 import { Analysis, SHOWING } from "./analysis.js";
 import { at, between } from "./curves.js";
 import { number } from "./numbers.js";
@@ -34,13 +35,15 @@ export class Path extends Analysis {
     const { page } = this;
     const { curves: values, label } = this.histories();
     const curves = page.shown.map((result, k) =>
-      ({ ...page.curve(result, values[k], [...result.load]), stable: result.stable }));
+      ({ ...page.curve(result, values[k], [...driven(result)]), stable: result.stable }));
+    const { way } = page.shown[0];
+    const ylabel = way ? `force of the supports along ${way} (N)` : this.factor;
     this.chart(host, {
-      label: `${this.factor} against ${this.place}${this.dashed}`, xlabel: label, ylabel: this.factor,
+      label: `${ylabel} against ${this.place}${this.dashed}`, xlabel: label, ylabel,
       curves, free: true, seek: (k) => page.seek(page.shown[0].moments[k]),
       follow: () => {
         const points = page.shown.map((result, k) =>
-          [at(result, values[k], page.moment), at(result, result.load, page.moment)]);
+          [at(result, values[k], page.moment), at(result, driven(result), page.moment)]);
         return [points[0][0], points];
       },
     });
@@ -54,4 +57,8 @@ export class Path extends Analysis {
       },
     });
   }
+}
+
+function driven(result) {
+  return result.force ?? result.load;
 }

@@ -40,6 +40,7 @@ export class Result {
       displacement: await store.changing(about.displacement),
       moments: about.moments ? Float64Array.from(await store.get(about.moments)) : null,
       load: about.load ? await store.get(about.load) : null,
+      force: about.force ? await store.get(about.force) : null,
       fields: Object.fromEntries(fields),
       energies: Object.fromEntries(energies),
     });
