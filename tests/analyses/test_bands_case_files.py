@@ -7,13 +7,18 @@ from itertools import product
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import foldyn as fd
 from case_texts import MIURA_TEXT
+from foldyn import plots
+from foldyn.analyses.bands import BandsAnalysis
 from foldyn.analyses.reading import case_of_document, read_as
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.band_gaps import legs
 from foldyn.live.view_requests import computed, offered
+from foldyn.report.album import Album
+from foldyn.report.sections import Picture
 
 BANDS_TEXT = f"""{MIURA_TEXT}[analysis]
 kind = "bands"
@@ -55,6 +60,19 @@ def test_states_have_the_bands_of_their_cells(found):
         np.testing.assert_array_equal(here["zone_wave_vector"], zone["wave_vector"])
         np.testing.assert_array_equal(here["position"], cell.case.structure.nodes)
         np.testing.assert_allclose(here["vectors"], cell.vectors)
+
+
+def test_figures_show_each_state(tmp_path, found, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(plots, "plot_bands", lambda bands: drawn.append(bands) or Figure())
+    album = Album(tmp_path, "png")
+    rule = next(iter(case_file(tmp_path).masses))
+    shown = [*BandsAnalysis.sections(case_file(tmp_path), {rule: found}, album)]
+    captions = [one.caption for one in shown if isinstance(one, Picture)]
+    assert [bands["state"].item() for bands in drawn] == [60, 100]
+    for k, name in enumerate(("bands.png", "bands-2.png")):
+        assert (tmp_path / name).exists()
+        assert f"dihedral {(60, 100)[k]} degrees" in captions[-2 + k]
 
 
 def test_gaps_are_those_of_the_whole_zone_and_of_legs(found):

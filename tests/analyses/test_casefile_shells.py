@@ -96,6 +96,16 @@ def test_integrators_of_shells_are_those_of_the_registry(filed):
         assert read_case(path).analysis.arguments["method"] == method
 
 
+def test_a_shell_of_rigid_panels_moves_by_explicit_methods_too(filed):
+    """It has no rotations; where some panels bend, the solver refuses by name."""
+    few = 'model.divisions = 2; analysis.duration = 0.05; analysis.method = "rk4"'
+    whole = read_case(filed(f'{SHELL}; {MOTION}; {few}; model.rigid = "all"'))
+    assert whole.run().attrs["method"] == "rk4"
+    some = read_case(filed(f"{SHELL}; {MOTION}; {few}; model.rigid = [0]"))
+    with pytest.raises(InputError, match=r"analysis\.method = 'rk4': the rotations of a shell"):
+        some.run()
+
+
 def test_integrators_of_simulated_responses(filed):
     named = read_case(filed(f'{SHELL}; {IMPULSE}; analysis.integrator = "newmark"'))
     assert named.analysis.arguments["integrator"] == "newmark"

@@ -98,7 +98,7 @@ class BandsAnalysis(Analysis):
     schema = BandsSchema
     needs_density = "bands need"
     takes = ("path", "points", "count", "zone", "attenuation", "stretch", "turn", "secant")
-    files = ("bands",)
+    files = ("bands", "bands-*")
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
         """See `Analysis`."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,14 +24,15 @@ def bands_sections(case_file: Any, results: ByRule, album: Album) -> Iterator[Se
     result = results[first]
     yield from album.structure(case_file.case(first), "A cell with its nodes and supports.")
     yield Heading("The bands")
-    shown = result.isel(state=0) if "state" in result.dims else result
-    of = f", {state_text(result, 0)}" if "state" in result.dims else ""
-    yield from album.figure(
-        "bands",
-        f"Frequencies of Bloch waves along the path of the Brillouin zone{of}, mass rule {first}. "
-        "Full gaps are gray; the color is the share of motion along z.",
-        lambda: plots.plot_bands(shown),
-    )
+    for k in range(result.sizes.get("state", 1)):
+        shown = result.isel(state=k) if "state" in result.dims else result
+        of = f", {state_text(result, k)}" if "state" in result.dims else ""
+        yield from album.figure(
+            "bands" if k == 0 else f"bands-{k + 1}",
+            f"Frequencies of Bloch waves along the path of the Brillouin zone{of}, mass rule "
+            f"{first}. Full gaps are gray; the color is the share of motion along z.",
+            partial(plots.plot_bands, shown),
+        )
     yield Heading("The numbers")
     yield _gaps(results)
     yield by_mass_rule(

@@ -143,7 +143,7 @@ class FrfSchema(VibrationSchema):
     @model_validator(mode="after")
     def _moves_the_model(self) -> Self:
         if self.model.kind == SHELL:
-            check_massless("integrator", getattr(self.analysis, "integrator", None))
+            check_massless(self, "integrator")
         return self
 
     @model_validator(mode="after")

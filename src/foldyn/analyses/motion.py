@@ -83,13 +83,14 @@ class MotionSchema(CaseSchema):
         if self.model.kind == SHELL:
             if "method" not in self.analysis.model_fields_set:
                 self.analysis.method = AUTO
-            check_massless("method", self.analysis.method, (AUTO, *MASSLESS_METHODS))
+            check_massless(self, "method", (AUTO, *MASSLESS_METHODS))
         return self
 
 
-def check_massless(key: str, method: str | None, fit: Sequence[str] = MASSLESS_METHODS) -> None:
-    """Refuse an integrator that a shell cannot have."""
-    if method is not None and method not in fit:
+def check_massless(schema: Any, key: str, fit: Sequence[str] = MASSLESS_METHODS) -> None:
+    """Refuse an integrator that a shell cannot have, unless its panels may all be rigid."""
+    method = getattr(schema.analysis, key, None)
+    if schema.model.rigid is None and method is not None and method not in fit:
         raise InputError(
             f" = {show(method)}: needs mass everywhere, and the rotations of a shell have none; "
             f"choose one of {', '.join(fit)}, or leave it out",
