@@ -299,3 +299,14 @@ def test_welds_stay_flat_where_they_can():
     assert folding.pattern.welds.tolist() == [[2, 3], [6, 7]]
     np.testing.assert_allclose(np.degrees(folding.pattern.dihedrals), 90.0)
     np.testing.assert_allclose(np.degrees(folding.pattern.weld_dihedrals), 180.0)
+
+
+@pytest.mark.parametrize("angles", [35.0, {"all": 35.0}], ids=["one size", "all"])
+def test_unassigned_creases_are_free_beside_one_size_for_all_others(angles):
+    # four creases of a symmetric vertex: the unassigned one follows from the three that are driven
+    pattern = vertex([120, 60, 60, 120], "VVMU")
+    folding = fd.fold(pattern, angles, steps=4)
+    assert np.isnan(folding.targets).tolist() == [False, False, False, True]
+    assert folding.kind == "rigid" and folding.angles[3] > math.radians(10)
+    own = fd.Pattern(pattern.vertices, pattern.faces, pattern.assignments, fold_angles={"all": 0.6})
+    np.testing.assert_array_equal(own.fold_angles, [0.6, 0.6, -0.6, np.nan])

@@ -135,6 +135,7 @@ def _lines(drawing: Drawing, unit: float, notes: Notes) -> Lines:
             "to 180",
             notes.line(k),
         )
+    angles[(letters == "U") & (angles == 0.0)] = np.nan  # 0 of all but mountains and valleys: none
     against = np.where(letters == "M", angles > 0, (letters == "V") & (angles < 0))
     along = np.where(letters == "M", angles < 0, (letters == "V") & (angles > 0))
     if against.any() and not along.any():

@@ -58,7 +58,7 @@ def fold_angles(given: Any, creases: NDArray[np.int64], named: Named) -> NDArray
     if isinstance(given, Mapping):
         row = edge_lookup(creases)
         for word in (key for key in given if isinstance(key, str)):
-            rows = crease_rows(f"fold_angles.{word}", word, named, is_key=True)
+            rows = folded_rows(f"fold_angles.{word}", word, named)
             angles[rows] = _own_way(word, _angle(given[word]), np.array(named.assignments)[rows])
         for key, angle in given.items():
             if isinstance(key, str):
@@ -184,6 +184,13 @@ def crease_rows(field: str, word: str, pattern: Any, is_key: bool = False) -> ND
             field,
         )
     return rows
+
+
+def folded_rows(field: str, word: str, pattern: Any) -> NDArray[np.int64]:
+    """Rows as of `crease_rows`, `word` a key; "all" leaves unassigned creases free, if it can."""
+    rows = crease_rows(field, word, pattern, is_key=True)
+    known = rows[[pattern.assignments[k] in "MV" for k in rows.tolist()]]
+    return known if word == "all" and len(known) else rows
 
 
 def crease_values(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from foldyn.cases.folding import check_fold_angles, check_fraction
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
-from foldyn.patterns.crease_data import crease_rows, vertex_pair
+from foldyn.patterns.crease_data import folded_rows, vertex_pair
 from foldyn.patterns.topology import edge_lookup
 from foldyn.statics.folding.energy import SIGNS
 from foldyn.values import show
@@ -82,7 +82,7 @@ def _given(pattern: Pattern, angles: Any) -> NDArray[np.float64]:
         targets, row = np.full(count, np.nan), edge_lookup(pattern.creases)
         words = [key for key in angles if isinstance(key, str)]
         for word in words:  # pairs after words, which they refine
-            rows = crease_rows(f"angles.{word}", word, pattern, is_key=True)
+            rows = folded_rows(f"angles.{word}", word, pattern)
             targets[rows] = _sized(pattern, rows, angles[word], f"angles.{word}")
         for key in (key for key in angles if not isinstance(key, str)):
             pair = vertex_pair("angles", key)
@@ -105,7 +105,7 @@ def _given(pattern: Pattern, angles: Any) -> NDArray[np.float64]:
 
 def _sized_all(pattern: Pattern, angle: Any) -> NDArray[np.float64]:
     targets = np.full(len(pattern.creases), np.nan)
-    rows = crease_rows("angles", "all", pattern, is_key=True)
+    rows = folded_rows("angles", "all", pattern)
     targets[rows] = _sized(pattern, rows, angle, "angles")
     return targets
 
