@@ -18,11 +18,13 @@ from foldyn.formats.notes import Notes, count
 from foldyn.formats.panels import Panels
 from foldyn.patterns import Pattern
 from foldyn.patterns.flat_foldability import flat_foldability
-from foldyn.patterns.topology import Edge, Faces, edge_lookup
+from foldyn.patterns.geometry import CLOSED, LAYERS
+from foldyn.patterns.topology import Edge, Faces, edge_lookup, edge_of
 from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.values import LONGEST, SHORTEST, number
 
 _FARTHEST = 1e8  # from the origin, over the size: coordinates keep eight digits within the drawing
+_SHUT = 179.0  # degrees: fold angles of closed creases
 _TURNED = 1e-3  # rad from pi: what counts as folded
 
 
@@ -158,6 +160,7 @@ def _pattern(panels: Panels, drawing: Drawing, notes: Notes) -> Pattern:
     creases = {(a, b): k for k, (a, b) in enumerate(bare.creases.tolist())}
     given = np.array([panels.letters.get(edge, "") for edge in creases], dtype="<U1")
     faces = _turned(bare, given, notes)
+    given = _with_sides(bare, given, faces, panels, drawing, notes)
     letters: dict[Edge, str] = dict(zip(creases, given.tolist(), strict=True))
     letters = {edge: letter for edge, letter in letters.items() if letter}
     folds, trusted = 0, drawing.faces is None or bool(bare.vertices[:, 2].any())
@@ -195,6 +198,43 @@ def _turned(bare: Pattern, letters: NDArray[np.str_], notes: Notes) -> Faces:
         return bare.faces
     notes.repairs.append("turned all panels over: seen from their front, every letter was wrong")
     return tuple((face[0], *face[:0:-1]) for face in bare.faces)
+
+
+def _with_sides(
+    bare: Pattern, given: NDArray[np.str_], faces: Faces, panels: Panels, drawing: Drawing,
+    notes: Notes,
+) -> NDArray[np.str_]:  # fmt: skip
+    """Letters of creases, of closed ones by their fold angle or by the order of their layers.
+
+    Panels that lie upon each other face each other at a valley, and look away at a mountain.
+    """
+    orders = drawing.custom.get(FACE_ORDERS, ())
+    if len(faces) != len(drawing.faces or ()):
+        orders = ()
+    over = {edge_of(f, g): -s if faces[g][1] != panels.faces[g][1] else s for f, g, s in orders}
+    letters, unknown, against = given.copy(), [], []
+    turn = np.abs(bare.dihedrals - np.pi)
+    for k in np.flatnonzero(turn > np.pi - CLOSED).tolist():
+        edge, pair = edge_of(*bare.creases[k].tolist()), edge_of(*bare.crease_faces[k].tolist())
+        angle = panels.angles.get(edge, np.nan)
+        order = over.get(pair, 0)
+        side = order or (np.sign(angle) if abs(angle) > _SHUT else 0)
+        told = "V" if side > 0 else "M"
+        if given[k] in ("M", "V"):
+            against += [edge] if order and told != given[k] else []
+        elif side and (not given[k] or told == "M"):  # others are closed to the front
+            letters[k] = told
+        elif not side and turn[k] > np.pi - LAYERS:
+            letters[k] = given[k] or "V"
+            unknown.append(edge)
+    for edges, what, text in (
+        (unknown, "without letter or order of layers", "taken as folded to the front, as valleys"),
+        (against, "whose letter contradicts the order of layers", "the letters are kept"),
+    ):
+        if edges:
+            which = count(len(edges), "closed crease")
+            notes.doubts.append(f"{which} {what}, as {edges[0]}: {text}")
+    return letters
 
 
 def _with_fronts(pattern: Pattern, faces: Faces, drawing: Drawing, notes: Notes) -> Pattern:

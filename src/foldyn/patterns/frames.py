@@ -40,6 +40,5 @@ def fold_angles(pattern: Pattern, vertices: NDArray | None = None) -> NDArray[np
     if vertices is None:
         return flat - pattern.dihedrals
     normals = face_geometry(vertices, pattern.faces).face_normals
-    dihedrals, closed = crease_dihedrals(vertices, normals, pattern.creases, pattern.crease_faces)
-    mountains = np.array(pattern.assignments) == "M"
-    return flat - np.where(closed & mountains, 2.0 * np.pi, dihedrals)
+    graph = pattern.creases, pattern.crease_faces, np.array(pattern.assignments, dtype="<U1")
+    return flat - crease_dihedrals(vertices, normals, *graph)[0]

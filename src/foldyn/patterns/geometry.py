@@ -25,6 +25,7 @@ _DEGENERATE = 1e-10
 SAME_PLACE = 1e-9  # of the pattern's size
 ASKEW = np.array([0.5377, 0.8339, 0.1244])  # shorter than 1
 LAYERS = 1e-6  # rad: panels that leave their edges at less than that lie upon each other
+CLOSED = 1e-3  # rad from closed: a crease's letter, not rounding, says to which side it has turned
 
 
 class FaceGeometry(NamedTuple):
@@ -132,7 +133,7 @@ def _crosses_itself(corners: NDArray, normals: NDArray, diameter: NDArray) -> ND
 
 
 def crease_dihedrals(
-    vertices: NDArray, normals: NDArray, creases: NDArray, crease_faces: NDArray
+    vertices: NDArray, normals: NDArray, creases: NDArray, crease_faces: NDArray, letters: NDArray
 ) -> tuple[NDArray, NDArray]:
     """Dihedral of each crease, by `atan2` of the two normals about the crease.
 
@@ -144,14 +145,16 @@ def crease_dihedrals(
         Unit normals of the faces towards the front.
     creases, crease_faces : ndarray of int, shape (nc, 2)
         As in `Topology`.
+    letters : ndarray of str, shape (nc,)
+        Of which "M" and "V" decide the side of closed creases.
 
     Returns
     -------
     dihedral : ndarray, shape (nc,)
-        Radians in [0, 2 pi]: pi when flat, below on a valley, above on a mountain.
+        Radians in [0, 2 pi]: pi when flat, below on a valley, above on a mountain. Where the panels
+        coincide to rounding, so that the geometry cannot tell 0 from 2 pi, 0 unless a mountain.
     closed : ndarray of bool, shape (nc,)
-        True where the panels coincide to rounding, so that the geometry cannot tell 0
-        (reported) from 2 pi.
+        True where the panels coincide within 1e-3 rad.
     """
     axis = vertices[creases[:, 1]] - vertices[creases[:, 0]]
     axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
@@ -161,8 +164,11 @@ def crease_dihedrals(
     back = back - np.einsum("ij,ij->i", back, axis)[:, None] * axis
     sine = np.einsum("ij,ij->i", np.cross(front, back), axis)
     cosine = np.einsum("ij,ij->i", front, back)
-    closed = (np.abs(sine) < 1e-12 * np.abs(cosine)) & (cosine < 0)
-    dihedral = np.where(closed, 0.0, np.pi + np.arctan2(sine, cosine))
+    closed = (np.abs(sine) < CLOSED * np.abs(cosine)) & (cosine < 0)
+    shut = closed & (np.abs(sine) < 1e-12 * np.abs(cosine))
+    dihedral = np.where(shut, 0.0, np.pi + np.arctan2(sine, cosine))
+    dihedral[closed & (letters == "M") & (dihedral < np.pi)] = 2.0 * np.pi
+    dihedral[closed & (letters == "V") & (dihedral > np.pi)] = 0.0
     return dihedral, closed
 
 

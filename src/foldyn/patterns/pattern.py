@@ -92,8 +92,8 @@ class Pattern(Transforms):
         The same as `creases`, `crease_faces` and `dihedrals` of welds.
     dihedrals : ndarray, shape (nc,)
         Angle between the two panels across each crease (rad, 0 to 2 pi) seen from the front:
-        pi when flat, below pi on a valley, above on a mountain. Where panels coincide the
-        letter decides between 0 and 2 pi (0 without one).
+        pi when flat, below pi on a valley, above on a mountain. Where panels coincide within
+        1e-3 rad the letter decides the side, 0 or 2 pi; to rounding it is 0 without one.
     flat_dihedrals : ndarray, shape (nc,)
         Dihedral (rad) at which the two panels lie flat: pi, but of thick panels, whose boards lie
         askew to the planes through their hinge lines.
@@ -177,13 +177,15 @@ class Pattern(Transforms):
         topology = build_topology(checked_faces(faces, len(points)), len(points), welds)
         geometry = face_geometry(points, topology.faces)
         normals = geometry.face_normals
-        graph = topology.creases, topology.crease_faces
-        dihedrals, closed = crease_dihedrals(points, normals, *graph)
         named = crease_data.families(families, topology.creases)
         by_pair = crease_data.letters_by_pair(assignments, named, topology.creases)
         given, open_edges = _given_letters(by_pair, topology)
-        dihedrals[closed & (given == "M")] = 2 * np.pi
-        bent, shut = crease_dihedrals(points, normals, topology.welds, topology.weld_faces)
+        graph = topology.creases, topology.crease_faces, given
+        dihedrals, _ = crease_dihedrals(points, normals, *graph)
+        flat_there = np.full(len(topology.welds), "F")
+        bent, shut = crease_dihedrals(
+            points, normals, topology.welds, topology.weld_faces, flat_there
+        )
         if shut.any():
             raise InputError(
                 f": the panels at {tuple(topology.welds[shut][0].tolist())} lie upon each other; "
@@ -193,8 +195,7 @@ class Pattern(Transforms):
         apart, flat = dihedrals, np.full(len(dihedrals), np.pi)
         if boards is not None:
             boards.check(topology.faces)
-            apart, closed = crease_dihedrals(points, boards.normals, *graph)
-            apart[closed & (given == "M")] = 2 * np.pi
+            apart, _ = crease_dihedrals(points, boards.normals, *graph)
             flat = np.pi + dihedrals - apart
         _warn_of_contradictions(given, topology.creases, apart)
         _warn_of_seams(seams(points, topology.faces, normals, topology.boundary), open_edges)

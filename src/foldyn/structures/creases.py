@@ -74,6 +74,7 @@ def fold_rest(
         return rest
     drawn = hinge_angles(x, folds)
     shut = (drawn < 1e-9) | (drawn > 2.0 * np.pi - 1e-9) | np.isnan(drawn)
+    shut |= np.abs(drawn - pattern.dihedrals[crease]) > np.pi  # closed by its letter
     wrong = np.flatnonzero(shut & ~given_there)
     if len(wrong):
         number = crease[wrong[0]]

@@ -100,8 +100,8 @@ class FoldEnergy:
         self._shape = len(bars) + len(hinges), x.size
         turns, _ = self._turns(x, np.zeros(len(hinges)))
         # the letter, not the geometry, says which way a closed crease has turned
-        closed = np.abs(np.abs(turns[self.bends :]) - math.pi) < 1e-9
-        turns[self.bends :][closed] = math.pi * self.signs[closed]
+        apart = math.pi - pattern.dihedrals - turns[self.bends :]
+        turns[self.bends :] += 2.0 * math.pi * np.round(apart / (2.0 * math.pi))
         self.rest = turns.copy()
         self.start = Shape(x, turns, np.zeros(len(bars)), 0.0)
 
