@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.errors import InputError
+from foldyn.errors import ComputationError, InputError
 from foldyn.statics.folding.layer_constraints import layer_constraints
 from foldyn.statics.folding.layer_order import flat_state, layer_order
 from foldyn.statics.folding.starts import composed
@@ -170,3 +170,45 @@ def test_three_panels_are_not_ordered_in_a_cycle():
     constraints = layer_constraints(folded, flat_state(folded, angles, CLOSED))
     assert constraints.pairs.tolist() == [[0, 1], [0, 2], [1, 2]]
     assert constraints.triples.tolist() == [[0, 2, 1]]
+
+
+def side_by_side(one, other):
+    """Two separate patterns as one, and how many panels the first has."""
+    shift = len(one.vertices)
+    faces = [*one.faces, *(tuple(v + shift for v in face) for face in other.faces)]
+    letters = [*one.assignments, *other.assignments]
+    return fd.Pattern(np.vstack([one.vertices, other.vertices]), faces, letters), len(one.faces)
+
+
+@pytest.mark.parametrize("turn", [0.0, 50.0, 90.0])
+def test_separate_sheets_have_layers_of_their_own(turn):
+    # each lies flat, in planes that the angle `turn` parts: their layers are those of each alone
+    alone = [flat(strip([1.0, 0.9, 0.8], "MV")), flat(strip([0.7, 0.6, 0.5, 0.6], "VVM"))]
+    (one, first), (other, second) = alone
+    other = other.rotated(turn, (1, 0.3, 0.2)).moved((5, 1, 0.4))
+    both, panels = side_by_side(one, other)
+    angles = np.concatenate([first, second])
+    rows = layer_order(both, flat_state(both, angles, CLOSED)).tolist()
+    for sheet, own, shift in ((one, first, 0), (other, second, panels)):
+        told = layer_order(sheet, flat_state(sheet, own, CLOSED))
+        assert len(told)
+        assert [[f + shift, g + shift, s] for f, g, s in told.tolist()] == [
+            row for row in rows if (row[0] >= panels) == (shift > 0)
+        ]
+
+
+def test_separate_sheets_fold_to_the_layers_of_each():
+    both, _ = side_by_side(strip([0.6, 0.5], "V"), strip([0.4, 0.5, 0.3], "MM").moved((3, 0, 0)))
+    folding = fd.fold(both, 180.0, steps=4)
+    assert folding.layers is not None
+    pairs = {tuple(row) for row in folding.layers[:, :2].tolist()}
+    assert pairs >= {(0, 1), (2, 3), (3, 4)} and not pairs & {(0, 2), (1, 2), (0, 3), (1, 3)}
+    assert f"({len(pairs)} pairs that overlap)" in folding.report()
+
+
+def test_no_order_is_told_of_layers_that_are_not_flat():
+    folded, angles = flat(strip([1.0, 1.0, 1.0], "MV"))
+    bent = folded.vertices + [[0, 0, 0.4 * (k == 3)] for k in range(len(folded.vertices))]
+    folded = folded.changed(vertices=bent)
+    with pytest.raises(ComputationError, match="panels 0 and 1 lie upon each other"):
+        layer_order(folded, flat_state(folded, angles, CLOSED))

@@ -7,10 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
 
 from foldyn.errors import ComputationError, InputError
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import edge_lookup, edge_of
+from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.statics.folding.layer_constraints import FlatState, layer_constraints
 from foldyn.statics.folding.layers import CrossingError, ordered
@@ -28,17 +30,43 @@ def flat_state(pattern: Pattern, angles: NDArray, closed: float) -> FlatState | 
     size = np.abs(angles)
     if ((size > math.pi - closed) & (size < closed)).any() or not (size >= closed).any():
         return None
-    middle = pattern.vertices - pattern.vertices.mean(axis=0)
-    _, _, axes = np.linalg.svd(middle, full_matrices=False)
-    thickness = float(np.ptp(middle @ axes[2]))
-    points = middle @ axes[:2].T
+    points, near = _flattened(pattern)
     areas = []
     for face in pattern.faces:
         a, b = points[list(face)].T
         areas.append(float(a @ np.roll(b, -1) - b @ np.roll(a, -1)))
     signs = np.where(size >= closed, np.sign(angles), 0.0).astype(np.int64)
-    near = max(EXACT * pattern.size, 2.0 * thickness)
     return FlatState(points, np.array(areas) > 0.0, signs, near)
+
+
+def _flattened(pattern: Pattern) -> tuple[NDArray, float]:
+    """Vertices (n, 2), m, in the plane in which a sheet lies, and the distance that counts as none.
+
+    Separate sheets that do not lie in one plane have planes of their own, put side by side.
+    """
+    edges = np.array([pair for face in pattern.faces for pair in around(face)])
+    size = len(pattern.vertices)
+    graph = sparse.coo_array((np.ones(len(edges)), edges.T), shape=(size, size))
+    part = csgraph.connected_components(graph, directed=False)[1]
+    used = np.unique(edges)
+    sheets = [used[part[used] == k] for k in np.unique(part[used])]
+    planes = [_in_plane(pattern.vertices[rows]) for rows in sheets]
+    near = max(EXACT * pattern.size, 2.0 * max(thickness for _, thickness in planes))
+    together, thickness = _in_plane(pattern.vertices[used])
+    if thickness <= near:
+        sheets, planes, near = [used], [(together, thickness)], max(near, 2.0 * thickness)
+    points, start = np.zeros((size, 2)), 0.0
+    for rows, (flat, _) in zip(sheets, planes, strict=True):
+        points[rows] = flat - flat.min(axis=0) + [start, 0.0]
+        start = points[rows, 0].max() + pattern.size
+    return points, near
+
+
+def _in_plane(x: NDArray) -> tuple[NDArray, float]:
+    """Points x (k, 3) in their plane (k, 2), and how thick they are across it."""
+    middle = x - x.mean(axis=0)
+    axes = np.linalg.svd(middle, full_matrices=False)[2]
+    return middle @ axes[:2].T, float(np.ptp(middle @ axes[2]))
 
 
 def with_layers(pattern: Pattern, angles: NDArray, closed: float, given: Orders) -> Pattern:
@@ -73,6 +101,12 @@ def layer_order(pattern: Pattern, state: FlatState, given: Orders = ()) -> NDArr
     constraints = layer_constraints(pattern, state)
     pairs = constraints.pairs
     row = edge_lookup(pairs)
+    for f, g in pattern.crease_faces[state.signs != 0].tolist():
+        if edge_of(f, g) not in row:
+            raise ComputationError(
+                f"no order of the layers was looked for: panels {f} and {g} lie upon each other, "
+                f"but what counts as flat is as large as they are ({state.near:.3g} m)"
+            )
     for f, g, side in given:
         if side and edge_of(f, g) in row:
             above = side if state.up[g] else -side
