@@ -57,6 +57,23 @@ def test_actuators_do_the_work():
     assert fd.checks.observed_order(1.0 / counts, errors) == pytest.approx(2.0, abs=0.25)
 
 
+@pytest.mark.parametrize("constant", [(), (0,)])
+def test_work_counts_from_rest(constant):
+    """Wherever a path begins, its work is what has been stored since rest."""
+    s = flat_miura((1, 1), 150.0, bend_law="linear")
+    supports = [fd.Fix([0], "xyz"), fd.Fix([2], "xz"), fd.Fix([6], "z")]
+    loads = [fd.Force([8], (0, 0, 2e-4)), fd.Force([8], (1e-4, 0, 0))]
+    case = fd.Case(s, supports, loads)
+    for factors in ([0.0, 0.3, 0.6], [0.3, 0.6], [0.6]):
+        path = trace(case, load_factors=factors, constant=constant)
+        stored = path.strain_bars + path.strain_folds + path.strain_bends
+        assert float(stored[-1]) > 1e-10
+        np.testing.assert_allclose(path.work, stored, rtol=0.05, atol=1e-15)  # trapezoids
+        assert float(path.work[0]) == pytest.approx(float(stored[0]), rel=1e-9)
+    again = trace(case, load_factors=[0.6, 0.7], initial=fd.initial_state(path))
+    assert float(again.work[0]) == 0.0  # since the state from which it was started
+
+
 def test_actuation_with_a_force():
     """The factor moves the rest angles and the force together."""
     s = flat_miura((1, 1), 150.0)

@@ -59,6 +59,16 @@ def test_a_yielding_path_follows_the_law(hardening):
     np.testing.assert_allclose(work, stored, rtol=0, atol=2e-3 * work.max())  # trapezoids
 
 
+def test_a_path_that_begins_after_yielding_knows_what_was_lost():
+    """Work and dissipation count from rest, also where the first point has yielded already."""
+    law = fd.Plastic(LIMIT, isotropic=HARD, law="linear")
+    whole, late = cycled(law, [0.0, 0.8, 1.0]), cycled(law, [0.8, 1.0])
+    assert float(late.dissipated[0]) > 0.0
+    np.testing.assert_allclose(late.dissipated, whole.dissipated[1:], rtol=1e-9)
+    begun = float(late.strain_folds[0] + late.dissipated[0])
+    assert float(late.work[0]) == pytest.approx(begun, rel=1e-9)
+
+
 @pytest.mark.parametrize("method", ["mgdcm", "arc_length"])
 def test_methods_with_a_free_factor_follow_the_law(method):
     """The moment at each point is that of the formula, and so is the end."""

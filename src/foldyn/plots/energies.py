@@ -148,7 +148,8 @@ def plot_path_energies(
         *((strain_name(part), COLORS.get(part, style.GRAY)) for part in energies), strict=True
     )
     handles = upper.stackplot(x, *energies.values(), labels=names, colors=colors, alpha=0.75)
-    work = float(sum(layer[0] for layer in energies.values())) + path["work"].values
+    work = path["work"].values
+    work = float(sum(layer[0] for layer in energies.values())) + work - work[0]
     (line,) = upper.plot(
         x, work, color=style.BLACK, linewidth=1.2, linestyle=style.DASHES[1],
         label="at the start + work done",

@@ -66,17 +66,18 @@ CONTINUATIONS: Mapping[str, str] = {
     "continued_from": "with what the method went on from another motion at the first sample",
 }
 """What motions of implicit methods have besides, along the dimension continued."""
+SINCE = "since rest, or since the state from which a path was started"
 PATH: Mapping[str, Quantity] = {
     **STATE,
     **CONTACT,
     "plane_friction": Quantity("N", "friction of each plane on the sheet", ("plane", "axis")),
-    "work": Quantity("J", "work of loads, supports and actuators since the first point"),
+    "work": Quantity("J", f"work of loads, supports and actuators {SINCE}"),
     "negative_eigenvalues": Quantity(text="negative eigenvalues of the tangent (unstable if any)"),
     "point": Quantity(text="kind of the point"),
     "iterations": Quantity(text="Newton iterations"),
     "residual": Quantity(text="residual as a fraction of the forces at play"),
     "memory": MEMORY,
-    "dissipated": Quantity("J", "energy dissipated by creases and friction since the first point"),
+    "dissipated": Quantity("J", f"energy dissipated by creases and friction {SINCE}"),
     "elapsed": Quantity("s", "time since the first point"),
 }
 FOLDING: Mapping[str, Quantity] = {

@@ -264,6 +264,8 @@ class OrigamiProblem:
 
     def begin(self, factor: float) -> None:
         """Begin at a factor, with friction at rest."""
+        at_rest = self.memories.body.energies(self.dofs(self.start()))
+        self.energy_at_rest = float(at_rest.sum())
         self._evaluate(self.start(factor), factor)
         self.memories.tie()
 

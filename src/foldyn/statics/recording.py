@@ -203,6 +203,7 @@ def _dataset(
         warnings.warn(message, FoldynWarning, stacklevel=5)
     recorded = [_recorded(problem, point) for point in points]
     residuals, energies, reactions, touches = zip(*recorded, strict=True)
+    begun = _begun(problem, points[0], energies[0]) if from_rest else 0.0
     displacement = np.array([problem.displacement(p.u) for p in points])
     crossings = crossings_of(problem.case, displacement)
     if len(crossings.first):
@@ -219,14 +220,14 @@ def _dataset(
         np.reshape(reactions, (len(points), -1)),
         {
             **dict(zip(problem.groups, np.transpose(energies), strict=True)),
-            "work": _work(problem, points, residuals),
+            "work": _work(problem, points, residuals) + begun,
         },
         {
             "negative_eigenvalues": [p.negative for p in points],
             "point": [p.kind for p in points],
             "iterations": [p.iterations for p in points],
             "residual": [p.residual for p in points],
-            **_memory(problem, points),
+            **_memory(problem, points, from_rest),
             **{name: [touch[name] for touch in touches] for name in touches[0]},
         },
         {
@@ -272,14 +273,20 @@ def _recorded(
     )
 
 
-def _memory(problem: OrigamiProblem, points: Sequence[Point]) -> dict[str, Any]:
+def _begun(problem: OrigamiProblem, first: Point, energies: NDArray) -> float:
+    """Work (J) that has led from rest to the first point: what is stored there, or dissipated."""
+    stored = float(energies.sum()) - problem.energy_at_rest
+    return stored + problem.memories.lost(first.memory)
+
+
+def _memory(problem: OrigamiProblem, points: Sequence[Point], from_rest: bool) -> dict[str, Any]:
     """States of the branches of laws with memory, and what they and friction dissipate, J."""
     own, out = problem.memories, {}
     if problem.case.remembering:
         out["memory"] = [own.branches(point.memory) for point in points]
     if problem.case.remembering or own.rubs:
         lost = np.array([own.lost(point.memory) for point in points])
-        out["dissipated"] = lost - lost[0]
+        out["dissipated"] = lost if from_rest else lost - lost[0]
     if own.timed:
         times = np.array([point.memory.time for point in points])
         out["elapsed"] = times - times[0]
