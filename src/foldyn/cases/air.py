@@ -38,7 +38,7 @@ class Air(Part):
     density : float, default 1.204
         Of the fluid (kg/m3): dry air at 20 C and 1013 hPa by default; water has 998.
     velocity : sequence of float, shape (3,)
-        Of the fluid far from the sheet (m/s); still air by default. Wind acts by drag alone.
+        Of the fluid far from the sheet (m/s); still air by default.
     added_mass : bool or "local", default True
         Whether the fluid that the sheet moves adds to its mass. With "local" each panel moves the
         fluid by itself, as if it were alone in it: for sheets whose full matrix is too large.
@@ -51,7 +51,8 @@ class Air(Part):
     resolution : int, default 4
         Boundary elements along each edge of a panel, even, from which the added mass is found.
     history : History or callable, optional
-        Factor of the velocity over time: of gusts; constant by default.
+        Factor of the velocity over time: of gusts; constant by default. With added mass it may
+        not jump, as fluid pushes when it accelerates.
 
     Examples
     --------
@@ -83,7 +84,7 @@ class Air(Part):
     @property
     def blows(self) -> bool:
         """Whether it acts on a sheet that stands still."""
-        return self.drag and any(self.velocity)
+        return any(self.velocity)
 
     def coefficient(self, structure: Any) -> float:
         """Drag coefficient of the panels of a structure.
@@ -133,7 +134,7 @@ def refuse_wind(case: Any, name: str) -> None:
     Raises
     ------
     InputError
-        The case has air with a velocity and drag.
+        The case has air with a velocity.
     """
     if case.air is not None and case.air.blows:
         raise InputError(

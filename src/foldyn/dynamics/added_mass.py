@@ -1,30 +1,35 @@
-"""Mass of the fluid that moves with a sheet, in motions: T = w'F w / 2, w = B v.
+"""Mass of the fluid that moves with a sheet, in motions: T = w'F w / 2, w = B (v - U).
 
-B(u) takes the velocities of the nodes to the flux at the unknowns of the flow, by the area vectors
+U(t) is the velocity of the wind, the same everywhere: the flow is what the sheet does to it. B(u)
+takes velocities of the nodes to the flux at the unknowns of the flow, by the area vectors
 of the panels' triangles, which follow the motion; F is the flow (`cases.added_mass`) in one state
 of folding. A sheet that turns as a whole keeps its F, so that nothing of its motion is lost; one
 that folds gets a new F when a hinge has turned by `TURN` (`renewed_flow`). With F constant
 Lagrange's equations are
 
-    (M + B'F B) a + B'F B. v + B.'F w - d(q.B v)/du = p - F_int,   q = F w,
+    (M + B'F B) a + B'F (B. (v - U) - B U.) + B.'F w - d(q.B (v - U))/du = p - F_int,   q = F w,
 
-B. the change of B, and q held in the last term. The accelerations follow from
+B. and U. the changes of B and U, and q held in the last term. The accelerations follow from
 
     (F^-1 + B M^-1 B') z = B M^-1 r,   a = M^-1 (r - B'z),
 
 by conjugate gradients; what they start from is the inverse of that matrix where F was made.
+
+The forces f of the fluid take f.U from the wind. Their sum is -P., P = sum of B'q its momentum: the
+air has got U.P and, as time goes on, -P.U. (the power).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.cases import Case
+from foldyn.cases import Case, History
 from foldyn.cases.added_mass import Fluid, fluid_at
 from foldyn.dynamics.inertia import Inertia, kinetic_energy, substitute, times_mass
 from foldyn.errors import InputError
@@ -63,6 +68,10 @@ class AddedMass(NamedTuple):
     vectors: NDArray  # (4, 3) memory of one triangle
     angle: NDArray  # (nh,) dihedrals where F was made, rad
     made: NDArray  # (2,) how often it was since the start, and the energies (J) left over then
+    wind: NDArray  # (3,) velocity of the air at factor 1, m/s
+    gust: int  # row of the wind's history, -1 where it is steady
+    blown: NDArray  # (2, 3) memory: the air's velocity, m/s, and acceleration, m/s2
+    carried: NDArray  # (1,) memory: U.P at the last sample, J
 
     @property
     def acts(self) -> bool:
@@ -71,11 +80,13 @@ class AddedMass(NamedTuple):
 
 
 def added_mass(
-    case: Case, start: NDArray | None, rank: NDArray, rows: int, hinges: int
-) -> AddedMass:
+    case: Case, start: NDArray | None, rank: NDArray, rows: int, hinges: int,
+    histories: Sequence[History],
+) -> AddedMass:  # fmt: skip
     """Added mass of a case whose nodes stand at the places rank (n,) of `rows`.
 
     start : displacement (n, 3) at the start; rest by default. The flow is found by `begin_flow`.
+    histories : those of the case, the wind's among them.
 
     Raises
     ------
@@ -100,7 +111,11 @@ def added_mass(
     fluid = fluid_at(case, np.zeros_like(nodes) if start is None else start)
     catch = _catch(fluid, nodes if start is None else nodes + start)
     added = _with_memory(fluid.triangles, nodes, catch, rows, hinges)
-    return added._replace(triangles=np.ascontiguousarray(rank[fluid.triangles], np.int64))
+    added.wind[:] = added.blown[0] = air.velocity
+    return added._replace(
+        triangles=np.ascontiguousarray(rank[fluid.triangles], np.int64),
+        gust=next((histories.index(history) for _, history in case.wind_terms), -1),
+    )
 
 
 def _with_memory(
@@ -128,6 +143,10 @@ def _with_memory(
         vectors=np.zeros((4, 3)),
         angle=np.zeros(hinges),
         made=np.zeros(2),
+        wind=np.zeros(3),
+        gust=-1,
+        blown=np.zeros((2, 3)),
+        carried=np.zeros(1),
     )
 
 
@@ -147,14 +166,18 @@ def begin_flow(case: Case, packed: Any, course: Any, start: NDArray) -> None:
     if own.acts:
         _find_flow(case, own, packed.mass, start, course.u)
         own.angle[:], own.made[:] = course.angle, 0.0
+        _blow(case, own, course)
+        energy_of_flow(own, course.v)
+        course.tally.air = -own.carried[0]
 
 
 def renewed_flow(case: Case, packed: Any, course: Any) -> bool:
     """Find the flow anew, and tell so, where a hinge has turned by `TURN` since it was found.
 
-    The momentum of sheet and fluid stays what it is, on every free dof, and so does their energy:
-    the work of the flow's change is done along the deforming part of the velocity, which keeps the
-    momenta. What cannot be done there, the air has given or taken.
+    The momentum of sheet and fluid stays what it is, on every free dof, and so does their energy
+    beyond that of a wind without the sheet: the work of the flow's change is done along the
+    deforming part of the velocity, which keeps the momenta. What cannot be done there, the air has
+    given or taken.
     """
     own, mass, v = packed.added, packed.mass, course.v
     if np.abs(course.angle - own.angle).max(initial=0.0) <= TURN:
@@ -162,22 +185,34 @@ def renewed_flow(case: Case, packed: Any, course: Any) -> bool:
     line, jump = np.zeros(v.size), np.zeros(len(own.flow))
     push, change = np.zeros((2, *v.shape))
     put_areas(own, course.u)
-    before = whole_energy(own, mass, v)
-    flux(own, own.area, v, jump)
+    _blow(case, own, course)
+    before = _conserved(own, mass, v)
+    flux(own, own.area, v - own.blown[0], jump)
     lost = own.flow @ jump
     _find_flow(case, own, mass, packed.numbering.outward(course.u), course.u)
     press(own, lost - own.flow @ jump, push)
     solve(own, mass, push, change, line)
     v += change
     deforming = v - _rigid_part(case, packed, course)
-    missed, least = before - whole_energy(own, mass, v), whole_energy(own, mass, deforming)
+    missed, least = before - _conserved(own, mass, v), whole_energy(own, mass, deforming)
     if least > 0.0:
         v += (math.sqrt(np.clip(1.0 + missed / least, *SCALED)) - 1.0) * deforming
-    left = before - whole_energy(own, mass, v)
+    left = before - _conserved(own, mass, v)
     course.tally.air += left
     own.angle[:] = course.angle
     own.made[:] += 1.0, abs(left)
     return True
+
+
+def _blow(case: Case, own: AddedMass, course: Any) -> None:
+    """Put the velocity of the air at the time of a motion."""
+    for _, history in case.wind_terms:
+        own.blown[0] = history(float(course.tally.time)) * own.wind
+
+
+def _conserved(own: AddedMass, mass: Inertia, v: NDArray) -> float:
+    """Energy (J) that a steady wind keeps: of sheet and flow, and U.P."""
+    return whole_energy(own, mass, v) - energy_of_fluid(own, np.zeros_like(v) + own.blown[0])
 
 
 def _rigid_part(case: Case, packed: Any, course: Any) -> NDArray:
@@ -338,26 +373,39 @@ def move(own, mass, jump, out, line):
 def turn_flow(m, u, v):
     """Add to the forces, N, what the turning of the area vectors takes, and the drag alpha M v.
 
-    Returns the power of the drag, W. The fluid has none.
+    Also what an air takes that accelerates. Returns the power of the drag, W. The fluid has none
+    but what it takes from the wind.
     """
     own, rows, power = m.added, m.s.force.shape[0], 0.0
-    moved, speed = rows_at(u, rows), rows_at(v, rows)
-    w, q, turned = own.lines[0], own.lines[1], own.lines[2]
+    moved, speed, past, pushed = rows_at(u, rows), rows_at(v, rows), own.nodal[0], own.nodal[1]
+    w, q, turned, driven = own.lines[0], own.lines[1], own.lines[2], own.lines[3]
+    if own.gust >= 0:
+        for c in range(3):
+            own.blown[0, c] = m.s.factor[own.gust, 0] * own.wind[c]
+            own.blown[1, c] = m.s.factor[own.gust, 1] * own.wind[c]
+    put_relative(own, speed)
     put_areas(own, moved)
     put_rates(own, moved, speed)
-    flux(own, own.rate, speed, w)
+    flux(own, own.rate, past, w)
+    if own.gust >= 0:
+        put_uniform(own.blown[1], pushed)
+        flux(own, own.area, pushed, driven)
+        for i in range(w.size):
+            w[i] -= driven[i]
     times(own.flow, w, turned)
     add_push(own, own.area, turned, m.s.force)
-    flux(own, own.area, speed, w)
+    flux(own, own.area, past, w)
     times(own.flow, w, q)
+    if own.gust >= 0:
+        m.terms.powers[2] -= dot(q, driven)
     add_push(own, own.rate, q, m.s.force)
     one, other, pressed, back = own.vectors[0], own.vectors[1], own.vectors[2], own.vectors[3]
-    for t in range(own.triangles.shape[0]):  # q . B v is a sum of area . pressed
+    for t in range(own.triangles.shape[0]):  # q . B (v - U) is a sum of area . pressed
         put_sides(own, moved, t)
         for c in range(3):
             pressed[c], back[c] = 0.0, 0.0
             for k in range(3):
-                pressed[c] += own.through[3 * t + k] * speed[own.triangles[t, k], c]
+                pressed[c] += own.through[3 * t + k] * past[own.triangles[t, k], c]
         first, second, third = own.triangles[t, 0], own.triangles[t, 1], own.triangles[t, 2]
         add_cross(0.5, other, pressed, back)
         for c in range(3):
@@ -426,10 +474,37 @@ def solve(own, mass, force, a, line):
 
 @kernel
 def energy_of_fluid(own, v):
-    """Kinetic energy (J) of the fluid at velocities v (rows, 3), with the area vectors as put."""
+    """Kinetic energy (J) of fluid at rest for velocities v (rows, 3), with the areas as put."""
     flux(own, own.area, v, own.lines[0])
     times(own.flow, own.lines[0], own.lines[1])
     return 0.5 * dot(own.lines[0], own.lines[1])
+
+
+@inner
+def put_uniform(velocity, out):
+    """Put one velocity (3,) of all nodes."""
+    for i in range(out.shape[0]):
+        for c in range(3):
+            out[i, c] = velocity[c]
+
+
+@inner
+def put_relative(own, v):
+    """Put velocities (rows, 3) relative to the air into the first nodal memory."""
+    for i in range(v.shape[0]):
+        for c in range(3):
+            own.nodal[0, i, c] = v[i, c] - own.blown[0, c]
+
+
+@kernel
+def energy_of_flow(own, v):
+    """Kinetic energy (J) of the flow for velocities v (rows, 3) of the sheet; keeps U.P."""
+    put_relative(own, v)
+    energy = energy_of_fluid(own, own.nodal[0])
+    put_uniform(own.blown[0], own.nodal[0])
+    flux(own, own.area, own.nodal[0], own.lines[0])
+    own.carried[0] = dot(own.lines[0], own.lines[1])
+    return energy
 
 
 @kernel
@@ -442,7 +517,7 @@ def whole_energy(own, mass, v):
 def observe_fluid(m, v, a):
     """Add to the forces, N, what the fluid resists, and take the drag, for reactions.
 
-    Returns the energy of the fluid, J.
+    Returns the energy of the flow, J.
     """
     own, rows = m.added, m.s.force.shape[0]
     speed = rows_at(v, rows)
@@ -453,4 +528,4 @@ def observe_fluid(m, v, a):
     flux(own, own.area, rows_at(a, rows), own.lines[0])
     times(own.flow, own.lines[0], own.lines[1])
     add_push(own, own.area, own.lines[1], m.s.force)
-    return energy_of_fluid(own, speed)
+    return energy_of_flow(own, speed)

@@ -176,7 +176,9 @@ def _sample(r, u, v, a, t):
         m.terms, m.system, m.mass, rows_at(u, rows), rows_at(v, rows), rows_at(a, rows),
         course.tally, m.s, out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
     )  # fmt: skip
-    out.energy[k, out.energy.shape[1] - 3] += fluid
+    if r.fluid != 0:
+        out.energy[k, out.energy.shape[1] - 4] += m.added.carried[0]
+        out.energy[k, out.energy.shape[1] - 3] += fluid
     states_of(m.terms, out.memory[k])
     sound = 0.0
     for c in range(out.energy.shape[1]):

@@ -152,14 +152,16 @@ def _check_tied_velocity(case: Case, velocity: NDArray) -> None:
 
 
 def check_steady(case: Case, start: float, end: float) -> None:
-    """Refuse a support or a fold that would have to jump."""
+    """Refuse a support or a fold that would have to jump, and a wind that moves fluid."""
     for what, history in histories(case):
         times = [time for time in history.jumps() if start < time < end]
-        if times and what != "a load":
-            section = "loads" if what == "an actuation" else "supports"
+        drags = what == "the wind" and not (case.air and case.air.added_mass)
+        if times and what != "a load" and not drags:
+            section = {"an actuation": "loads", "the wind": "air"}.get(what, "supports")
+            instead = ", or added_mass = false" if section == "air" else ""
             raise InputError(
                 f"{section}: {what} with the history {history.kind} jumps at t = {times[0]:g} s, "
-                "but nothing can move in no time: use a ramp, a half sine or a table"
+                f"but nothing can move in no time: use a ramp, a half sine or a table{instead}"
             )
 
 

@@ -164,7 +164,7 @@ def pack(
         alpha=float(case.rayleigh.alpha),
         lightness=lightness(mass) if case.contact is not None else np.zeros(0),
     )
-    added = added_mass(case, start, by.rank, by.rows, len(body.hinges))
+    added = added_mass(case, start, by.rank, by.rows, len(body.hinges), histories)
     return Packed(body, system, mass, callbacks, by, modal, added)
 
 

@@ -36,7 +36,7 @@ from foldyn.algebra.woodbury import Squared
 from foldyn.arguments import brief
 from foldyn.cases import Case, State
 from foldyn.cases.added_mass import operator_at
-from foldyn.cases.air import LOCAL
+from foldyn.cases.air import LOCAL, refuse_wind
 from foldyn.cases.constraints import Constraints
 from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics.dampers import damping_matrix
@@ -211,6 +211,7 @@ def linearize(
             "0, here and in the planes",
             "contact",
         )
+    refuse_wind(case, "small vibrations")
     amplitude = None
     if secant is not None:
         amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
