@@ -126,6 +126,71 @@ def test_modes_about_an_equilibrium_feel_its_change():
     assert not np.allclose(unloaded[name], changed[name], rtol=1e-2)
 
 
+@pytest.mark.parametrize(
+    ("preset", "law", "force"),
+    [
+        ("herkal", "superlinear", 0.02),
+        ("herkal", "superlinear", 2e-3),  # some bends so near rest that they count as soft
+        ("plate", fd.PlateSuperlinear(onset=0.02), 0.02),
+    ],
+)
+def test_bends_near_a_kink_of_their_law(preset, law, force):
+    """The slope of a superlinear bend changes fast near rest, where a load has turned it a little.
+
+    With all stiffness times a factor and the load as well, the state stays: frequencies have half
+    of the factor's exponent.
+    """
+
+    def loaded(modulus: float, stiffness: float, force: float) -> fd.Case:
+        pattern = fd.patterns.miura(panel_angle=62.0, b=1.1, dihedral=95.0)
+        made = fd.discretize(pattern, fd.Sheet(modulus, 0.25, 0.02, 800.0), preset=preset,
+                             bend_law=law, crease_stiffness=stiffness)  # fmt: skip
+        held = [fd.Fix(list(pattern.faces[0]))]
+        return fd.Case(made, held, [fd.Force([8], (0.0, 0.3 * force, force))])
+
+    about = {**MODES, "state": "equilibrium"}
+    values = {"modulus": 1e6, "stiffness": 0.03, "force": force}
+    design = Design(loaded, values, ["frequency[2]", "frequency[3]"], about)
+    found, own = design.gradient(), design.numbers({})
+    assert design.difference({"stiffness": 0.03}) == pytest.approx(
+        0.03 * found["stiffness"], rel=1e-4
+    )
+    whole = sum(values[name] * found[name] for name in values)
+    assert whole == pytest.approx(0.5 * own, rel=1e-5)
+
+
+# ------------------------------------------------------------------ dofs without mass
+@pytest.mark.filterwarnings("ignore:the rest state is no equilibrium")
+@pytest.mark.parametrize("model", ["n5b8e", "shell"])
+@pytest.mark.parametrize("analysis", ["modes", "frf"])
+def test_what_has_no_mass_stays_in_balance(model, analysis):
+    """Creases that are not at their rest angle bend the panels, more or less with the design."""
+    pattern = fd.patterns.miura(panel_angle=62.0, b=1.1, dihedral=95.0)
+    rest = np.degrees(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.02)).fold_rest)
+
+    def build(thickness: float, stiffness: float) -> fd.Case:
+        sheet = fd.Sheet(1e6, 0.25, thickness, 800.0)
+        options = {
+            "crease_stiffness": stiffness,
+            "crease_rest": rest + 12.0 * np.array([1.0, 0.8, -1.0, 0.5]),
+        }
+        shell = model == "shell"
+        made = (
+            fd.shell(pattern, sheet, divisions=2, **options)
+            if shell
+            else fd.discretize(pattern, sheet, preset=model, **options)
+        )
+        return fd.Case(made, [fd.Fix([0, 1, 4, 3])], damping=fd.Rayleigh(0.2, 1e-2))
+
+    measures, given = ["frequency[1]", "damping_ratio[2]"], {"kind": "modes", "count": 3}
+    if analysis == "frf":
+        push = [fd.Force([8], (0.0, 0.0, 1.0))]
+        measures, given = ["response[8,z,1]"], {"kind": "frf", "drive": push, "frequencies": [1.0]}
+    values = {"thickness": 0.02, "stiffness": 0.15}
+    errors = Design(build, values, measures, given).errors()
+    assert max(errors.values()) < 1e-6, errors
+
+
 # ------------------------------------------------------------------ several modes at once
 def square(one: float = 0.02, other: float = 0.02, thickness: float = 0.02) -> fd.Case:
     """A flat sheet of 2 x 2 squares held in its middle, whose bending modes come in pairs."""
@@ -185,6 +250,27 @@ def test_each_has_derivatives_in_one_direction(rates):
     h = 1e-6
     one_sided = (-3.0 * at(0.0) + 4.0 * at(h) - at(2.0 * h)) / (2.0 * h)
     assert found == pytest.approx(one_sided, rel=1e-4, abs=1e-8)
+
+
+@pytest.mark.filterwarnings("ignore:the rest state is no equilibrium")
+def test_so_they_have_where_dofs_without_mass_move_along():
+    """Of a pyramid on guides, whose creases are not at their rest angle."""
+    corners = [(1.0, 1.0, 0.0), (-1.0, 1.0, 0.0), (-1.0, -1.0, 0.0), (1.0, -1.0, 0.0)]
+    pattern = fd.Pattern([*corners, (0.0, 0.0, 0.6)], [(k, (k + 1) % 4, 4) for k in range(4)])
+
+    def build(thickness: float) -> fd.Case:
+        made = fd.discretize(pattern, fd.Sheet(1e6, 0.25, thickness, 900.0), preset="n5b8e",
+                             crease_stiffness=0.1, crease_rest=200.0)  # fmt: skip
+        return fd.Case(made, [fd.Fix([4]), fd.Fix([0, 1, 2, 3], "xy")])
+
+    def both(h: float) -> np.ndarray:
+        return fd.modes(build(0.02 + h), 4)["frequency"].values[1:3]
+
+    names, rates, four = ["frequency[2]", "frequency[3]"], {"thickness": 1.0}, {**MODES, "count": 4}
+    found = fd.sensitivity(build, {"thickness": 0.02}, names, four, along=rates)["derivative"]
+    h = 1e-5
+    assert np.ptp(both(0.0)) < 1e-9
+    assert found.values == pytest.approx((both(h) - both(-h)) / (2.0 * h), rel=1e-5)
 
 
 # ------------------------------------------------------------------ what has none

@@ -40,16 +40,21 @@ BEYOND = 6  # modes that are sought beyond those asked for: the rigid ones
 
 
 def soft_slopes(case: Case, body: Assembly, q: NDArray) -> tuple[sparse.csr_array | None, int]:
-    """What to add to the tangent (m, m) so that hinges at rest have no slope, and how many do so.
+    """What to add to the tangent (m, m) so that hinges at rest have no slope, and their number."""
+    at_rest, slope = soft_at_rest(case, body, q)
+    change = np.where(at_rest, -slope, 0.0)
+    return (body.sheet.soft_tangent(q, change) if change.any() else None), int(at_rest.sum())
 
-    Superlinear ones, whose slope at their rest angle is the root of rounding errors. Hinges that
-    constraints keep from turning are left alone.
+
+def soft_at_rest(case: Case, body: Assembly, q: NDArray) -> tuple[NDArray[np.bool_], NDArray]:
+    """Whether superlinear hinges (h,) stand at their rest angle, and their slopes / k (h,).
+
+    There the slope is the root of rounding errors. Hinges that constraints keep from turning are
+    left alone.
     """
     hinges = body.sheet.soft_hinges(q)
     slope = Superlinear().slope(hinges.offset, np.zeros(len(hinges.offset)))
-    at_rest = (slope < SOFT) & (hinges.stiffness > 0.0) & _turns(case, hinges.gradient)
-    change = np.where(at_rest, -slope, 0.0)
-    return (body.sheet.soft_tangent(q, change) if change.any() else None), int(at_rest.sum())
+    return (slope < SOFT) & (hinges.stiffness > 0.0) & _turns(case, hinges.gradient), slope
 
 
 def _turns(case: Case, gradient: sparse.csr_array) -> NDArray[np.bool_]:

@@ -17,9 +17,12 @@ from foldyn.mechanics.pullback import Pullback
 SINGULAR = 1e-13  # of the stiffness at play: a motion that meets no more is a critical point's
 
 
-def free_block(case: Case, q: NDArray) -> tuple[NDArray, sparse.csc_array]:
-    """Free dofs (nf,), and the tangent (nf, nf) there."""
-    free = np.concatenate([case.free_dofs, case.body.hidden])
+def free_block(
+    case: Case, q: NDArray, free: NDArray | None = None
+) -> tuple[NDArray, sparse.csc_array]:
+    """Free dofs (nf,), all by default, and the tangent (nf, nf) there."""
+    if free is None:
+        free = np.concatenate([case.free_dofs, case.body.hidden])
     tangent = sparse.csr_array(case.constraints.matrix(case.body.tangent(q)))
     return free, sparse.csc_array(tangent[free][:, free])
 
@@ -28,15 +31,22 @@ class Balance:
     """An equilibrium (m,) of a case, and its motions under forces.
 
     The factors of its tangent serve for all numbers of which derivatives are taken.
+
+    Parameters
+    ----------
+    case : Case
+    q : ndarray, shape (m,)
+    free : ndarray of int, shape (nf,), optional
+        Dofs that are in balance there, all free ones by default; the others stand.
     """
 
-    def __init__(self, case: Case, q: NDArray) -> None:
-        self.case, self.q = case, q
+    def __init__(self, case: Case, q: NDArray, free: NDArray | None = None) -> None:
+        self.case, self.q, self._free = case, q, free
 
     @cached_property
     def _factors(self) -> tuple[NDArray, float, Any]:
         """Free dofs, the stiffness at play (N/m), and factors; None where it is singular."""
-        free, block = free_block(self.case, self.q)
+        free, block = free_block(self.case, self.q, self._free)
         try:
             return free, float(np.abs(block).max()), splu(block)
         except RuntimeError:  # exactly singular

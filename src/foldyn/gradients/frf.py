@@ -6,8 +6,8 @@ solution of Z z = s,
 
     dJ = Re(z' (df - dZ x)):
 
-products of `gradients.linearized`, of real and imaginary parts. About an equilibrium K also changes
-with the state.
+products of `gradients.linearized`, of real and imaginary parts. K and K0 also change with what is
+in balance, as those of modes do.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ class FrfGradient:
         _check_damping(case)
         self.case, self.result = case, frf(case, **given)
         state = given.get("state")
-        self._equilibrium = state == "equilibrium"
-        if self._equilibrium:
+        equilibrium = state == "equilibrium"
+        if equilibrium:
             state = State(self.result["displacement"].transpose("node", "axis").values)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)  # all was said by `frf`
@@ -74,7 +74,7 @@ class FrfGradient:
                 "there are no gradients of transmissibilities where springs stand on the ground "
                 "beside the base; hold their ends by nodes that are fixed"
             )
-        self._products = Products(self._linear)
+        self._products = Products(self._linear, equilibrium)
 
     def numbers(self, case: Case) -> Arrays:
         """Numbers of a case by which gradients are taken."""
@@ -91,17 +91,21 @@ class FrfGradient:
                 f"there are no derivatives through {', '.join(unknown)} of this frequency "
                 f"response, but through {known}"
             )
-        total, state = self._products.nothing(), np.zeros(len(self._products.q))
+        total = self._products.nothing()
+        state, reference = np.zeros((2, len(self._products.q)))
         by_response = np.asarray(seeds[known], np.complex128)
         for k in np.flatnonzero(by_response.any(axis=(1, 2))):
             frequency = float(self.result["frequency"].values[k])
-            state += self._add(frequency, by_response[k].ravel(), total)
-        if self._equilibrium:
-            self._products.add_equilibrium(state, total)
+            self._add(frequency, by_response[k].ravel(), total, state, reference)
+        self._products.add_state(state, total)
+        self._reference.add_state(reference, total)
         return total
 
-    def _add(self, frequency: float, by: Complex, total: dict[str, NDArray]) -> NDArray:
-        """Add what a number has at a frequency (Hz); returns its derivatives by the state (m,).
+    def _add(
+        self, frequency: float, by: Complex, total: dict[str, NDArray], state: NDArray,
+        reference: NDArray,
+    ) -> None:  # fmt: skip
+        """Add what a number has at a frequency (Hz), by numbers and by the states (m,) of K and K0.
 
         by : its derivatives (3n,) by the response.
         """
@@ -117,10 +121,8 @@ class FrfGradient:
                 "Rayleigh(alpha=...), or take other frequencies"
             )
         damped, mass = 1j * omega * rayleigh.beta * z, (1j * omega * rayleigh.alpha - omega**2) * z
-        state = self._add_products(self._products, -z, x, total)
-        own = self._add_products(self._reference, -damped, x, total)
-        if self._reference is self._products:
-            state += own
+        state += self._add_products(self._products, -z, x, total)
+        reference += self._add_products(self._reference, -damped, x, total)
         self._add_inertia(-mass, x, total)
         total["alpha"] -= (1j * omega * z @ (linear.mass @ x)).real
         total["beta"] -= (1j * omega * z @ (self._stiffness @ x)).real
@@ -130,7 +132,6 @@ class FrfGradient:
             pushed = (omega**2 - 1j * omega * rayleigh.alpha) * z
             self._products.add_mass(pushed.real, moved, 1.0, total)
             total["alpha"] -= (1j * omega * z @ linear.inertia[:, self._axis]).real
-        return state
 
     def _add_products(
         self, products: Products, z: Complex, x: Complex, total: dict[str, NDArray]
@@ -149,7 +150,7 @@ class FrfGradient:
         """Products with K0, to which damping is proportional: at rest, or in the state."""
         if self.case.rayleigh.state != "rest" or not self._linear.displacement.any():
             return self._products
-        return Products(self._linear, np.zeros_like(self._linear.displacement))
+        return Products(self._linear, False, np.zeros_like(self._linear.displacement))
 
     @cached_property
     def _stiffness(self) -> sparse.csr_array:

@@ -1,28 +1,34 @@
 """Products z' K x and z' M x with the matrices of small motions, differentiated.
 
 Of K, the derivative of forces, what is needed is the pullback of the forces with the weights z,
-differentiated along x: by differences over turns so small that their error is 1e-12.
+differentiated along x: by differences over turns so small that their error is 1e-12. Where hinges
+stand near a kink of their law, as superlinear ones near rest, the steps are a hundredth of the way
+there; bars and panels, whose rounding such steps would show, keep the larger ones.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.dynamics.modal_damping import soft_at_rest
 from foldyn.gradients.equilibrium import Balance
 from foldyn.gradients.numbers import nothing
 from foldyn.linear.linearized import Linearized
-from foldyn.materials import Superlinear
+from foldyn.materials import HingeLaw
+from foldyn.materials.series import in_series
+from foldyn.mechanics import angles
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.pullback import Pullback, refuse_lacking
-from foldyn.structures.bars_hinges import BarsHingesTerm
+from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges, SheetTerm
+from foldyn.mechanics.term import nodal
 
 TURN = 1e-3  # rad: of the largest turn in a difference along a motion
 SMALL = 1e-6  # of the longest bar: a motion by which turns are measured
-AT_REST = 1e-9  # rad: superlinear hinges that stand nearer to their rest angle have no slope
+NEAR, NEAREST = 1e-2, 4e-7  # of the way to a kink, and rad: superlinear hinges nearer are soft
 
 
 class Products:
@@ -31,17 +37,26 @@ class Products:
     Parameters
     ----------
     linear : Linearized
+    equilibrium : bool
+        Whether its state is an equilibrium under the loads, and moves with the design. Elsewhere
+        only dofs without mass do: they are in balance where the nodes stand.
     displacement : (n, 3), optional
         Where K is the tangent, m; by default in the state of `linear`.
     """
 
-    def __init__(self, linear: Linearized, displacement: NDArray | None = None) -> None:
+    def __init__(
+        self, linear: Linearized, equilibrium: bool, displacement: NDArray | None = None
+    ) -> None:
         self._linear, self._case = linear, linear.case
-        body = linear.case.body
+        body, self._factor = linear.case.body, float(equilibrium)
         self.q = body.dofs(linear.displacement if displacement is None else displacement)
-        self._balance = Balance(linear.case, self.q)
-        self._soft = _soft(body.sheet, self.q)
-        self._pullback = Pullback(_without(body, self._soft))
+        moving = None if equilibrium else body.hidden
+        self._balance = Balance(linear.case, self.q, moving)
+        self._moves = equilibrium or len(body.hidden) > 0
+        at_rest = soft_at_rest(linear.case, body, self.q)[0]
+        self._sheet = body.sheet.weakened(at_rest) if at_rest.any() else body.sheet
+        self._soft = at_rest.any() and self._sheet.folds.stiffness != body.sheet.folds.stiffness
+        self._pullback = Pullback(body.on(self._sheet) if at_rest.any() else body)
         self._mass = sparse.csr_array(linear.case.mass)
         self._mass.sort_indices()
         self._rows = np.repeat(np.arange(self._mass.shape[0]), np.diff(self._mass.indptr))
@@ -58,18 +73,38 @@ class Products:
         state = np.zeros(len(self.q))
         if by == 0.0 or not motion.any():
             return state
-        body = self._case.body
-        scale = SMALL * body.sheet.longest() / np.abs(motion).max()
-        step = TURN * scale / body.turn(self.q, self.q + scale * motion)
+        small = SMALL * self._sheet.longest() / np.abs(motion).max()
+        step = TURN * small / self._case.body.turn(self.q, self.q + small * motion)
+        near = NEAR * _way_to_kinks(self._sheet, self.q, small * motion) * small
+        parts = [(self._pullback, step, by)]
+        if near < step:
+            parts += [(self._hinges, step, -by), (self._hinges, near, by)]
+        for pullback, length, factor in parts:
+            state += self._difference(pullback, weight, motion, length, factor, total)
+        return state
+
+    def _difference(
+        self, pullback: Pullback, weight: NDArray, motion: NDArray, step: float, by: float,
+        total: dict[str, NDArray],
+    ) -> NDArray:  # fmt: skip
+        """Add how a pullback changes along a motion, of the fourth order; returns that by q."""
+        state = np.zeros(len(self.q))
         for place, share in ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0)):
             factor = by * share / (12.0 * step)
-            self._pullback.clear()
-            state += factor * self._pullback.at(self.q + place * step * motion, weight)
-            if self._soft.any():
-                self._pullback.gradient["0.hinge_stiffness"][self._soft] = 0.0
-            for name, out in self._pullback.gradient.items():
+            pullback.clear()
+            state += factor * pullback.at(self.q + place * step * motion, weight)
+            if np.any(self._soft):
+                pullback.gradient["0.hinge_stiffness"][self._soft] = 0.0
+            for name, out in pullback.gradient.items():
                 total[name] += factor * out
         return state
+
+    @cached_property
+    def _hinges(self) -> Pullback:
+        """The forces of the sheet's hinges alone."""
+        alone = self._sheet.hinges_alone()
+        assert alone is not None
+        return Pullback(Assembly(alone))
 
     def add_mass(self, z: NDArray, x: NDArray, by: float, total: dict[str, NDArray]) -> None:
         """Add the gradient of by z' M x, for z (nf,) and x (nf,) or of all nodes (n, 3)."""
@@ -80,9 +115,10 @@ class Products:
         product = np.einsum("ea,ea->e", one[self._rows], other[self._mass.indices])
         total["mass"] += by * product
 
-    def add_equilibrium(self, state: NDArray, total: dict[str, NDArray]) -> None:
-        """Add what a gradient (m,) by the state has if that is an equilibrium under the loads."""
-        self._balance.add_seen(state, self._pullback, total)
+    def add_state(self, state: NDArray, total: dict[str, NDArray]) -> None:
+        """Add what a gradient (m,) by the state has as that moves with the design."""
+        if self._moves:
+            self._balance.add_seen(state, self._pullback, total, self._factor)
 
 
 def refuse(linear: Linearized, what: str) -> None:
@@ -104,16 +140,29 @@ def refuse(linear: Linearized, what: str) -> None:
     refuse_lacking(what, lacks)
 
 
-def _soft(sheet: Any, q: NDArray) -> NDArray:
-    """Mask (nh,) of superlinear hinges at their rest angle, which have no slope in modes."""
-    if not isinstance(sheet, BarsHingesTerm):
-        return np.zeros(0, bool)
-    model = sheet.model
-    code = np.repeat(model.hinge_runs[:, 2], model.hinge_runs[:, 1] - model.hinge_runs[:, 0])
-    return (code == Superlinear.code) & (np.abs(sheet.angles(q) - model.hinge_rest) < AT_REST)
+def _way_to_kinks(sheet: SheetTerm, q: NDArray, motion: NDArray) -> float:
+    """Least factor of a small motion (m,) by which a hinge gets to a kink or pole of its law."""
+    way = np.inf
+    folds = sheet.fold_hinges()
+    for hinges, number in ((folds, 0), (sheet.bend_hinges(), len(np.unique(folds.fold)))):
+        if not len(hinges.row):
+            continue
+        law, parameters = sheet.rest_law(number), sheet.folds.parameters[hinges.row]
+        here, there = (_creased(sheet, hinges, law, at) for at in (q, q + motion))
+        reach = np.maximum(law.reach(here, hinges.rest, parameters), NEAREST)
+        with np.errstate(divide="ignore"):
+            way = min(way, float((reach / np.abs(there - here)).min()))
+    return way
 
 
-def _without(body: Assembly, soft: NDArray) -> Assembly:
-    """The body without the stiffness of these hinges."""
-    sheet: Any = body.sheet
-    return body.on(sheet.weakened(soft)) if soft.any() else body
+def _creased(sheet: SheetTerm, hinges: FoldHinges, law: HingeLaw, q: NDArray) -> NDArray:
+    """Angles (k,) that the laws of hinges see, rad."""
+    points = (hinges.corners + nodal(q)[hinges.nodes]).reshape(-1, 3)
+    turned = angles(points, np.arange(len(points), dtype=np.uint32).reshape(-1, 4))
+    there = np.where(hinges.hidden == NO_DOF, 0, hinges.hidden)
+    turned -= (q[there] * hinges.hidden_turn).sum(axis=1)
+    share, offset = (each[hinges.row] for each in sheet.series())
+    turned += offset[:, 0]
+    if (share < 1.0).any():  # see `materials.series`
+        turned -= (1.0 - share) * in_series(law, turned, hinges.rest, share)[1]
+    return turned

@@ -9,8 +9,8 @@ of (K - lambda M) z + c M phi = s, phi' M z = 0,
 
     s' d phi = -z' (dK - lambda dM) phi - c/2 phi' dM phi.
 
-About an equilibrium K also changes with the state: K mu = the derivative of the number by the
-state gives -mu' dR, R the residual of the equilibrium.
+K also changes with what is in balance, all of an equilibrium, and about rest what has no mass:
+K mu = the derivative of the number by these dofs gives -mu' dR, R their residual.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class ModesGradient:
         self.case, self.result, self._linear = case, found.result, found.linear
         self._values, self._shapes = found.spectrum.values, oriented(found.spectrum.shapes)
         self._equilibrium = arguments.get("state") == "equilibrium"
-        self._products = Products(found.linear)
+        self._products = Products(found.linear, arguments.get("state") == "equilibrium")
         self._parted = False
 
     def numbers(self, case: Case) -> Arrays:
@@ -80,7 +80,8 @@ class ModesGradient:
             for i in range(count):
                 for j in range(i + 1):
                     total = self._products.nothing()
-                    self._add(part[:, i], part[:, j], 1.0, self._values[first], total)
+                    state = self._add(part[:, i], part[:, j], 1.0, self._values[first], total)
+                    self._products.add_state(state, total)
                     split[i, j] = split[j, i] = rate(total)
             other._shapes[:, first:last] = part @ np.linalg.eigh(split)[1]
         return other
@@ -96,7 +97,7 @@ class ModesGradient:
                 f"{', '.join(KNOWN)}"
             )
         total, state = self._products.nothing(), np.zeros(len(self._products.q))
-        by_value, by_shape = self._seeds(seeds, total)
+        by_value, by_shape = self._seeds(seeds, total, state)
         self._check_alone(by_value, by_shape)
         for k in np.flatnonzero((by_value != 0.0) | by_shape.any(axis=0)).tolist():
             value, shape = self._values[k], self._shapes[:, k]
@@ -106,15 +107,14 @@ class ModesGradient:
                 z, c = self._nelson(k, by_shape[:, k])
                 state += self._add(z, shape, -1.0, -value, total)
                 self._products.add_mass(shape, shape, -0.5 * c, total)
-        if self._equilibrium:
-            self._products.add_equilibrium(state, total)
+        self._products.add_state(state, total)
         return total
 
     # ------------------------------------------------------------------ parts
     def _seeds(
-        self, seeds: Mapping[str, NDArray], total: dict[str, NDArray]
+        self, seeds: Mapping[str, NDArray], total: dict[str, NDArray], state: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Derivatives by eigenvalues (k,) and shapes (nf, k); others go to `total`."""
+        """Derivatives by eigenvalues (k,) and shapes (nf, k); others go to `total` and `state`."""
         linear, values, shapes = self._linear, self._values, self._shapes
         zeros = np.zeros(len(values))
         with np.errstate(invalid="ignore"):
@@ -144,7 +144,7 @@ class ModesGradient:
             by_value[k] -= by_ratio[k] * self.result["damping_ratio"].values[k] / (2.0 * values[k])
             total["alpha"] += by * float(shape @ (linear.mass @ shape))
             total["beta"] += by * float(shape @ stiff)
-            self._add(shape, shape, by * rayleigh.beta, -by * rayleigh.alpha, total)
+            state += self._add(shape, shape, by * rayleigh.beta, -by * rayleigh.alpha, total)
         return by_value, by_shape
 
     def _add(

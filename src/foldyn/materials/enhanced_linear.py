@@ -160,3 +160,8 @@ class EnhancedLinear(HingeLaw):
         if self.code == STRESS_FREE:
             _relieve_each(writable(rest), table)
         return table
+
+    def reach(self, theta: NDArray, rest: NDArray, parameters: NDArray) -> NDArray:
+        """See `HingeLaw`: the angles between which it is linear, and where the panels meet."""
+        kinks = (0.0, *self.linear_between, TWO_PI)
+        return np.min([np.abs(theta - kink) for kink in kinks], axis=0)

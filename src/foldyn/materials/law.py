@@ -96,6 +96,10 @@ class HingeLaw(Law):
         """Parameters of the compiled form, shape (n, 4), for hinges with rest angles (n,)."""
         return np.zeros((len(rest), PARAMETERS))
 
+    def reach(self, theta: NDArray, rest: NDArray, parameters: NDArray) -> NDArray:
+        """How far (rad) a kink or pole is from each dihedral (n,); smooth laws have none."""
+        return np.full(len(theta), np.inf)
+
     def energy(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
         """Energy / k (rad^2) at dihedral `theta` with rest dihedral `rest` (rad)."""
         return self._table(theta, rest)[0]

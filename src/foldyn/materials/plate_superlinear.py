@@ -111,6 +111,10 @@ class PlateSuperlinear(HingeLaw):
         onset = SQUARE if self.onset is None else math.radians(self.onset)
         return onset_parameters(np.full(len(rest), onset))
 
+    def reach(self, theta: NDArray, rest: NDArray, parameters: NDArray) -> NDArray:
+        """See `HingeLaw`: branch points in the complex plane, at the onset beside rest."""
+        return np.sqrt((theta - rest) ** 2 + 1.0 / parameters[:, 0])
+
 
 def plate_onset(plate: ArrayLike, superlinear: ArrayLike) -> NDArray:
     """Turns (rad) at which k d of a plate and k' d^(4/3) are equal, of stiffnesses k and k'."""

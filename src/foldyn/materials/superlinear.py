@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from foldyn.jit.compiled import scalar
 from foldyn.jit.eights import choose, per_cube_root
@@ -59,3 +60,7 @@ class Superlinear(HingeLaw):
 
     code = CODE
     name: str = "superlinear"
+
+    def reach(self, theta: NDArray, rest: NDArray, parameters: NDArray) -> NDArray:
+        """See `HingeLaw`: the rest angle."""
+        return np.abs(theta - rest)

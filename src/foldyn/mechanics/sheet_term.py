@@ -214,6 +214,10 @@ class SheetTerm(Term):
         """Tangent (m, m) of these hinges alone, without moment and with given slopes / k (h,)."""
         return sparse.csr_array((self.size, self.size))
 
+    def weakened(self, hinges: NDArray) -> Self:
+        """The sheet without the stiffness of some of these hinges, a mask (h,)."""
+        return self
+
     def own_strains(self) -> Strains | None:
         """Its bars and hinges; None where panels bend as plates."""
         return None

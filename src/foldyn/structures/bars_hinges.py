@@ -181,8 +181,9 @@ class BarsHingesTerm(SheetTerm):
         return self._with(alone._replace(hinge_stiffness=stiffness)).tangent(q)
 
     def weakened(self, hinges: NDArray) -> BarsHingesTerm:
-        """The sheet without the stiffness of some of its hinges, a mask (nh,)."""
-        stiffness = np.where(hinges, 0.0, self.model.hinge_stiffness)
+        """See `SheetTerm`."""
+        stiffness = self.model.hinge_stiffness.copy()
+        stiffness[self._soft[hinges]] = 0.0
         return self._with(self.model._replace(hinge_stiffness=stiffness))
 
     @property
