@@ -29,7 +29,7 @@ from foldyn.cases import Case, Rayleigh
 from foldyn.errors import InputError
 from foldyn.gradients.linearized import Products, refuse
 from foldyn.gradients.numbers import Gradient, numbers_of
-from foldyn.linear.modes import spectrum_of, unit_translations
+from foldyn.linear.modes import nodes_translated, spectrum_of, unit_translations
 from foldyn.mechanics.pullback import Arrays
 from foldyn.statics.stability import oriented
 
@@ -130,10 +130,11 @@ class ModesGradient:
         by_factor = np.array(seeds.get("participation", np.zeros((len(values), 3))), float)
         if "effective_mass" in seeds:
             by_factor += 2.0 * self.result["participation"].values * seeds["effective_mass"]
-        along = unit_translations(linear)
-        by_shape += linear.mass @ (along @ by_factor.T)
+        # the nearest motions r to unit translations have phi' M r = phi' M (unit translations)
+        by_shape += linear.mass @ (unit_translations(linear) @ by_factor.T)
+        moved = nodes_translated(self.case).T.reshape(3, -1, 3)
         for k, a in np.argwhere(by_factor != 0.0):
-            self._products.add_mass(shapes[:, k], along[:, a], float(by_factor[k, a]), total)
+            self._products.add_mass(shapes[:, k], moved[a], float(by_factor[k, a]), total)
         by_ratio = np.asarray(seeds.get("damping_ratio", zeros), float)
         self._check_vibrates(by_ratio)
         for k in np.flatnonzero(by_ratio):

@@ -259,9 +259,8 @@ def unit_translations(linear: Linearized) -> NDArray:
     on_nodes = linear.free < linear.displacement.size
     if not linear.case.constraints:
         return (on_nodes[:, None] & (linear.free[:, None] % 3 == np.arange(3))).astype(float)
-    moves = ~linear.case.fixed.ravel()
-    unit = moves[:, None] & (np.arange(len(moves))[:, None] % 3 == np.arange(3))
-    weighted = sparse.kron(linear.case.mass, sparse.eye_array(3), format="csr") @ unit.astype(float)
+    weighted = sparse.kron(linear.case.mass, sparse.eye_array(3), format="csr")
+    weighted = weighted @ nodes_translated(linear.case)
     pushed = np.stack([linear.projected(each) for each in weighted.T], axis=1)
     out = np.zeros(pushed.shape)
     mass = linear.case.constraints.matrix(mass_of(linear.case))
@@ -269,6 +268,13 @@ def unit_translations(linear: Linearized) -> NDArray:
     own = sparse.csc_array(mass[nodal][:, nodal])
     out[on_nodes] = factorize(own).solve(pushed[on_nodes])
     return out
+
+
+def nodes_translated(case: Case) -> NDArray:
+    """Unit translations (3n, 3) of all that is not fixed, whatever constraints allow."""
+    moves = ~case.fixed.ravel()
+    unit = moves[:, None] & (np.arange(len(moves))[:, None] % 3 == np.arange(3))
+    return unit.astype(float)
 
 
 def _rounding(pencil: Pencil, spectrum: Spectrum) -> float:
