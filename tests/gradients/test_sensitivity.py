@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from differences import Design
 
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.gradients.numbers import numbers_of
 from foldyn.gradients.parameters import Columns, Parameters, Slope
+from foldyn.mechanics.pullback import Arrays
 
 MODES = {"kind": "modes", "count": 3}
 CASE = """
@@ -132,6 +134,69 @@ def test_thicknesses_of_panels_share_edges_and_are_changed_one_by_one():
     assert each["gradient_thickness"].values.sum() == pytest.approx(
         total["gradient_thickness"].values[0], rel=1e-9
     )
+
+
+def test_entries_that_are_mixed_are_changed_one_by_one():
+    """As a filter mixes them, however much smaller than others the mixed stiffness is."""
+
+    def build(values: Any) -> fd.Case:
+        stiffness = 0.03 * np.asarray(values)
+        stiffness[2] = 0.015 * (values[1] + values[3])  # whose own entry has no influence
+        stiffness[0] *= 1e5
+        return cell(stiffness=stiffness)
+
+    values = np.array([1.0, 1.2, 1.1, 1.0])
+    design = Design(build, {"values": values}, ["frequency[2]"], MODES)
+    found = design.gradient()["values"][0]
+    assert found[2] == 0.0
+    for k in (1, 3):
+        alone = {"values": np.eye(4)[k]}
+        assert found[k] == pytest.approx(design.difference(alone)[0], rel=1e-5)
+
+
+@pytest.mark.parametrize("count", [2, 3, 7, 40])
+def test_entries_are_told_apart_exactly(count):
+    """A number of one entry from one that has a little of another, or the difference of two."""
+
+    def slope(case_of: Any) -> Any:
+        design = Parameters(case_of, {"values": np.logspace(-3.0, 1.0, count)}, {})
+        return design.slopes(lambda numbers: Arrays({"own": numbers}, {}))["values"]
+
+    apart = slope(lambda values: values[::-1] ** 3)
+    assert isinstance(apart, Slope)
+    assert apart.entry["own"].tolist() == list(range(count))[::-1]
+    seed = np.linspace(1.0, 2.0, count)
+    expected = 3.0 * np.logspace(-3.0, 1.0, count) ** 2 * seed[::-1]
+    assert apart.pulled({"own": seed}) == pytest.approx(expected, rel=1e-9)
+    for other in (1e-6, -1.0):
+        mixed = slope(lambda values, by=other: np.append(values, values[0] + by * values[-1]))
+        assert isinstance(mixed, Columns)
+        last = mixed.pulled({"own": np.append(np.zeros(count), 1.0)})
+        assert last[[0, -1]] == pytest.approx([1.0, other], rel=1e-6)
+
+
+def test_stiffnesses_of_several_decades():
+    values = {"stiffness": np.array([2e-5, 0.02, 5.0, 3e-3])}
+    found = fd.sensitivity(cell, values, "frequency[1]", MODES)["gradient_stiffness"].values[0]
+
+    def own(k: int) -> float:
+        """From a case in which that crease alone is a parameter."""
+
+        def build(one: float) -> fd.Case:
+            return cell(stiffness=np.where(np.arange(4) == k, one, values["stiffness"]))
+
+        one = fd.sensitivity(build, {"one": values["stiffness"][k]}, "frequency[1]", MODES)
+        return float(one["gradient_one"].values[0])
+
+    assert found == pytest.approx([own(k) for k in range(4)], rel=1e-8)
+
+
+@pytest.mark.parametrize("size", [0.0, -0.01, 1e-12])
+def test_sizes_that_differences_cannot_take_are_refused(size):
+    with pytest.raises(InputError, match=r"sizes\.thickness = .*above 0, and at least 2e-08"):
+        fd.sensitivity(cell, {"thickness": 0.02}, "mass", MODES, sizes={"thickness": size})
+    with pytest.raises(InputError, match=r"sizes\.force = .*give a size above 0: differences"):
+        fd.sensitivity(cell, {"force": 0.0}, "mass", MODES, sizes={"force": -abs(size)})
 
 
 def test_a_parameter_of_zero_needs_a_size():

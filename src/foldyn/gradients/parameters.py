@@ -3,16 +3,18 @@
 Nothing is solved to build a case, so that central differences of its numbers are cheap; they are of
 the fourth order, with steps of a thousandth, and right to about 1e-11.
 
-An array of n parameters costs as much as one number where each number of the case depends on one
-entry, as stiffnesses do on those of their creases. All entries are changed at once, once in equal
-parts and once in parts that tell them apart; how the numbers then change says what belongs to
-which. A third change, at random, checks it. Where it fails, as for thicknesses of panels that share
-an edge, entries are changed one by one.
+All entries of an array are changed at once where each number of the case depends on one of them, as
+stiffnesses do on those of their creases. Which one is found exactly: some of the entries are
+changed at a time, in groups, and each entry is in a set of groups of its own, all of one size. A
+number that depends on one entry changes with as many groups, a number that depends on several with
+more, and then entries are changed one by one, as thicknesses of panels that share an edge are.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
+from itertools import combinations, islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +26,8 @@ from foldyn.mechanics.pullback import Arrays
 from foldyn.values import numbers, show
 
 STEP = 1e-3  # of the size of a parameter
-MATCHES = 1e-4  # relative: how well the entries are told apart, and the check holds
+LEAST = 1e-6  # of a value: smaller changes are hidden by its rounding
+GOLDEN = 0.6180339887498949  # multiples of it, less whole numbers, differ from each other
 SILENT = 1e-11, 1e-12  # of a number, and of the largest of its array: rounding of a change
 Values = Mapping[str, Any]
 Build = Callable[..., Any]
@@ -67,9 +70,17 @@ class Parameters:
 
     def __init__(self, build: Build, values: Values, steps: Values) -> None:
         self.build, self.values, self.steps = build, checked(values), steps
-        for name in steps:
+        for name, size in steps.items():
             if name not in self.values:
                 raise InputError(f".{name}: there is no such parameter", "sizes")
+            least = LEAST * np.abs(self.values[name])
+            if not (np.less_equal(least, size) & np.greater(size, 0.0)).all():
+                needed = f", and at least {least.max():.3g}" if least.any() else ""
+                raise InputError(
+                    f".{name} = {show(size)}: give a size above 0{needed}: differences take a "
+                    "thousandth of it, and rounding would hide how the case changes",
+                    "sizes",
+                )
 
     def case(self, changes: Values | None = None) -> Any:
         """The case, with some values changed."""
@@ -92,7 +103,7 @@ class Parameters:
                 f'sizes={{"{name}": 1.0}}',
                 name,
             )
-        return np.where(own > 1e-3 * common, own, common)
+        return np.where(own > LEAST * common, own, common)
 
     def moved(self, name: str, direction: NDArray, by: float) -> Any:
         """The case with a parameter moved by so much of a direction."""
@@ -118,13 +129,6 @@ class Parameters:
             check_layout(name, here, found)
             return found.numbers
 
-        def roughly(direction: NDArray) -> dict[str, NDArray]:
-            ahead, behind = at(direction, STEP), at(direction, -STEP)
-            return {
-                key: _seen((ahead[key] - behind[key]) / (2.0 * STEP), here.numbers[key])
-                for key in here.numbers
-            }
-
         def change(direction: NDArray) -> dict[str, NDArray]:
             near = at(direction, STEP), at(direction, -STEP)
             far = at(direction, 2.0 * STEP), at(direction, -2.0 * STEP)
@@ -133,18 +137,39 @@ class Parameters:
                 for key in here.numbers
             }
 
+        entry = {key: np.zeros(np.shape(each), np.int64) for key, each in here.numbers.items()}
+        if value.size > 1 and (entry := self._told_apart(at, size, here.numbers)) is None:
+            return self._one_by_one(change, size)
         by = change(size)
-        if value.ndim == 0:
-            entry = {key: np.where(each != 0.0, 0, -1) for key, each in by.items()}
-            return Slope({key: each / size for key, each in by.items()}, entry, 1)
-        for changed in (roughly, change):  # the first is cheaper, and most often enough
-            marks = 1.0 + np.arange(value.size) / value.size
-            chance = np.random.default_rng(0).uniform(0.5, 1.5, value.size)
-            entry = _told_apart(by, changed(size * marks), changed(size * chance), chance)
-            if entry is not None:
-                own = {key: _over(each, size, entry[key]) for key, each in by.items()}
-                return Slope(own, entry, value.size)
-        return self._one_by_one(change, size)
+        entry = {key: np.where(each != 0.0, entry[key], -1) for key, each in by.items()}
+        return Slope(
+            {key: each / np.ravel(size)[entry[key]] for key, each in by.items()}, entry, value.size
+        )
+
+    def _told_apart(
+        self, at: Callable[[NDArray, float], Mapping[str, NDArray]], size: NDArray,
+        here: Mapping[str, NDArray],
+    ) -> dict[str, NDArray] | None:  # fmt: skip
+        """Entry on which each number depends, -1 for none; None where one depends on several."""
+        count = len(size)
+        groups = next(m for m in range(2, 64) if math.comb(m, m // 2) >= count)
+        sets = list(islice(combinations(range(groups), groups // 2), count))
+        sought = np.array([0, *(sum(1 << group for group in own) for own in sets)])
+        order = np.argsort(sought)
+        irregular = size * (0.5 + np.arange(1, count + 1) * GOLDEN % 1.0)  # none cancel each other
+        found = {key: np.zeros(np.shape(each), np.int64) for key, each in here.items()}
+        for group in range(groups):
+            moved = at(irregular * [group in own for own in sets], STEP)
+            for key, each in moved.items():
+                changed = _seen((each - here[key]) / STEP, here[key]) != 0.0
+                found[key] += changed.astype(np.int64) << group
+        entry = {}
+        for key, each in found.items():
+            place = order[np.minimum(np.searchsorted(sought, each, sorter=order), count)]
+            if (sought[place] != each).any():
+                return None
+            entry[key] = place - 1
+        return entry
 
     def _one_by_one(
         self, change: Callable[[NDArray], dict[str, NDArray]], size: NDArray
@@ -155,39 +180,6 @@ class Parameters:
             alone[k] = size[k]
             columns.append({key: each / size[k] for key, each in change(alone).items()})
         return Columns(columns)
-
-
-def _told_apart(
-    by: Mapping[str, NDArray], marked: Mapping[str, NDArray], tried: Mapping[str, NDArray],
-    chance: NDArray,
-) -> dict[str, NDArray] | None:  # fmt: skip
-    """Entry to which each number belongs; None where one belongs to several.
-
-    by, marked, tried : rates of the numbers where all entries change alike, by marks that tell them
-        apart, and by chance.
-    """
-    count, entry = len(chance), {}
-    for key, each in by.items():
-        moves = each != 0.0
-        part = np.divide(marked[key], each, out=np.ones_like(each), where=moves) - 1.0
-        number = np.where(moves, np.rint(part * count), -1).astype(np.int64)
-        apart = np.abs(part * count - number)[moves].max(initial=0.0)
-        inside = (number < count).all() and (number[moves] >= 0).all()
-        expected = np.where(moves, each * chance[np.clip(number, 0, count - 1)], 0.0)
-        scale = np.abs(tried[key]).max(initial=0.0)
-        if (
-            apart > 0.1
-            or not inside
-            or np.abs(tried[key] - expected).max(initial=0.0) > (MATCHES * scale)
-        ):
-            return None
-        entry[key] = number
-    return entry
-
-
-def _over(rate: NDArray, size: NDArray, entry: NDArray) -> NDArray:
-    """Rates over the sizes of their entries; 0 of those that have none."""
-    return np.divide(rate, size[entry], out=np.zeros_like(rate), where=entry >= 0)
 
 
 def _difference(
