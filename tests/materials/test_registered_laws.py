@@ -10,7 +10,16 @@ import pytest
 import foldyn as fd
 from custom_laws import CUBIC
 from foldyn.errors import InputError
-from foldyn.materials import BAR_LAWS, HINGE_LAWS, BarLaw, HingeLaw, MemoryLaw, bar_law, hinge_law
+from foldyn.materials import (
+    BAR_LAWS,
+    HINGE_LAWS,
+    BarLaw,
+    HingeLaw,
+    MemoryLaw,
+    bar_law,
+    hinge_law,
+    switch,
+)
 from foldyn.materials.switch import move_rest
 
 STEP = 1e-5
@@ -52,6 +61,57 @@ def test_functions_of_a_hinge_law_are_derivatives(name):
     close(law.moment(THETA, REST), difference(lambda theta: law.energy(theta, REST), THETA))
     close(law.slope(THETA, REST), difference(lambda theta: law.moment(theta, REST), THETA))
     close(law.rest_slope(THETA, REST), difference(lambda rest: law.energy(THETA, rest), REST))
+
+
+@pytest.mark.parametrize("name", HINGES)
+def test_the_moment_of_a_hinge_law_is_differentiated_by_all_numbers(name):
+    """Gradients take this: by the rest angle, and by the first three parameters."""
+    law, flat = HINGES[name], (THETA.ravel(), REST.ravel())
+    parameters, address = law.parameters(flat[1]), np.array(law.addresses or (0, 0, 0), np.int64)
+
+    def moment(rest, column=0, by=0.0):
+        moved = parameters.copy()
+        moved[:, column] += by
+        return law.compiled(law.code, flat[0], rest, moved, address)[1]
+
+    found = law.moment_by(*flat)
+    close(found[0], difference(moment, flat[1]))
+    for column in range(3):
+        size = np.maximum(np.abs(parameters[:, column]), 1e-3)
+        change = difference(lambda by, c=column, s=size: moment(flat[1], c, by * s), 0.0)
+        close(found[1 + column], change / size)
+
+
+@pytest.mark.parametrize("name", HINGES)
+def test_a_hinge_law_has_no_kink_within_its_reach(name):
+    """Its slope is smooth there: differences of a few thousandths of the way are exact."""
+    law = HINGES[name]
+    theta, rest = THETA.ravel(), REST.ravel()
+    way = 3e-3 * np.minimum(law.reach(theta, rest, law.parameters(rest)), 1.0)
+    at = [law.slope(theta + k * way, rest) for k in (-2, -1, 1, 2)]
+    assert (law.slope(theta, rest) * 6.0) == pytest.approx(
+        4.0 * (at[1] + at[2]) - (at[0] + at[3]), rel=1e-6, abs=1e-9
+    )
+
+
+def test_every_function_of_the_switch_is_asked_for():
+    table = {name for name in vars(switch) if name.startswith(("bar_", "hinge_"))}
+    assert table - {"bar_table", "hinge_table"} == {*BarLaw.functions, *HingeLaw.functions}
+
+
+@pytest.mark.parametrize("row", range(5))
+def test_a_missing_branch_is_named_when_a_structure_is_built(row, monkeypatch):
+    known = HingeLaw.compiled
+
+    def compiled(*given):
+        table = known(*given)
+        table[row] = np.nan
+        return table
+
+    monkeypatch.setattr(HingeLaw, "compiled", staticmethod(compiled))
+    pattern, sheet = fd.patterns.simple_fold(), fd.Sheet(1e6, 0.25, 0.01)
+    with pytest.raises(InputError, match=rf"branch in {HingeLaw.functions[row]} of materials"):
+        fd.discretize(pattern, sheet, fold_law="linear")
 
 
 @pytest.mark.parametrize("name", HINGES)

@@ -29,6 +29,8 @@ class Law(Checked, ABC):
     name: str
     code: int = CALLED
     rest_state: tuple[float, ...]
+    functions: ClassVar[tuple[str, ...]]
+    """Functions of `switch.py` that make the rows of its table."""
     compiled: ClassVar[Callable[..., NDArray]]
     """All functions of a law by its code; the switch, which knows the laws, gives it to them."""
 
@@ -44,12 +46,14 @@ class Law(Checked, ABC):
 
     def check(self, field: str) -> None:
         """Refuse a built-in law that the compiled switch lacks: it gives nan for such a law."""
-        own = type(self).addresses is not Law.addresses  # asking for them would compile them
-        if not own and np.isnan(self._table(*self.rest_state)).any():
+        if type(self).addresses is not Law.addresses:  # asking for them would compile them
+            return
+        unknown = np.isnan(self._table(*self.rest_state))
+        if lacks := [name for name, here in zip(self.functions, unknown, strict=False) if here]:
             raise InputError(
                 f": {self.name!r}, code {self.code}, is not a law that the kernels know; give a "
-                "CustomBarLaw or CustomHingeLaw (a new built-in law needs its line in every "
-                "function of materials/switch.py)",
+                "CustomBarLaw or CustomHingeLaw (a new built-in law needs its branch in "
+                f"{', '.join(lacks)} of materials/switch.py)",
                 field,
             )
 
@@ -62,6 +66,7 @@ class BarLaw(Law):
     """Axial law of a bar in terms of the stretch lambda = l / L, per unit Young's modulus."""
 
     rest_state = (1.0,)
+    functions = "bar_energy", "bar_stress", "bar_slope"
 
     def energy(self, stretch: ArrayLike) -> NDArray:
         """Energy density W / E_y at each stretch."""
@@ -85,6 +90,7 @@ class HingeLaw(Law):
     """Moment law of a hinge in terms of its dihedral (rad), per unit stiffness."""
 
     rest_state = (math.pi, math.pi)
+    functions = "hinge_energy", "hinge_moment", "hinge_slope", "hinge_rest_slope", "hinge_moment_by"
     linear_between: tuple[float, float] | None = None
     """Dihedrals (rad) between which the moment is k (theta - rest), if the law is linear at all."""
     follows_rest: bool = True
@@ -116,6 +122,10 @@ class HingeLaw(Law):
         """Derivative of energy / k (rad) with respect to the rest dihedral."""
         return self._table(theta, rest)[3]
 
+    def moment_by(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
+        """Derivatives (4, ...) of the moment / k by the rest dihedral and `parameters` a, b, c."""
+        return self._table(theta, rest)[4:]
+
     def _table(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
         theta, rest = np.broadcast_arrays(np.asarray(theta, float), np.asarray(rest, float))
         address = np.array(self.addresses or (0, 0, 0), np.int64)
@@ -124,4 +134,4 @@ class HingeLaw(Law):
         flat = self.compiled(
             self.code, np.ascontiguousarray(theta.ravel()), flat_rest, parameters, address
         )
-        return flat.reshape((4, *theta.shape))
+        return flat.reshape((len(flat), *theta.shape))

@@ -156,12 +156,14 @@ def bar_table(code, e, address):
 
 @kernel
 def hinge_table(code, theta, rest, p, address):
-    """Energy, moment, slope and rest slope rows (4, n) of one law at theta (n,)."""
-    out = np.empty((4, theta.size))
+    """Rows (8, n) of one law at theta (n,): those of `HingeLaw.functions`, by a, b and c last."""
+    out = np.empty((8, theta.size))
     for i in range(theta.size):
         t, r = theta[i], rest[i]
         out[0, i] = hinge_energy(code, t, r, p[i, 0], p[i, 1], p[i, 2], p[i, 3], address[0])
         out[1, i] = hinge_moment(code, t, r, p[i, 0], p[i, 1], p[i, 2], p[i, 3], address[1])
         out[2, i] = hinge_slope(code, t, r, p[i, 0], p[i, 1], address[2])
         out[3, i] = hinge_rest_slope(code, t, r, p[i, 0], p[i, 1], address[0])
+        by = hinge_moment_by(code, t, r, p[i, 0], p[i, 1], address[1])
+        out[4, i], out[5, i], out[6, i], out[7, i] = by
     return out
