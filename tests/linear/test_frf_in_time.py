@@ -194,15 +194,15 @@ def test_folds_turned_part_of_the_way():
 
 
 def test_damping_of_the_state():
-    """K0 in the state about which it moves; steps of a sine start elsewhere and are refused."""
+    """K0 in the state about which it moves, also where steps of a sine start elsewhere."""
     loaded = miura_case([fd.Force([7], (0.004, 0, 0))])
     case = loaded.altered(damping=fd.Rayleigh(2.0, 1e-3, state="start"))
     direct = struck(case)
     at_rest = loaded.altered(damping=fd.Rayleigh(2.0, 1e-3))
     other = frf(at_rest, LIFT, STATES, state="equilibrium")
     assert largest_error(other.receptance, direct.receptance.values) > 0.02
-    with pytest.raises(InputError, match='use state = "rest"'):
-        frf(case, LIFT, STATES, state="equilibrium", method="stepped_sine")
+    steps = frf(case, LIFT, STATES, state="equilibrium", method="stepped_sine")
+    assert largest_error(steps.receptance, direct.receptance.values) < 3e-3
 
 
 def test_imposed_nodes_stay_where_the_state_puts_them():

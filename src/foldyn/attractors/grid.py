@@ -19,7 +19,7 @@ from foldyn.attractors.drive import drive_frequency
 from foldyn.attractors.kept import KeptEnds
 from foldyn.attractors.run import PER_PERIOD, divisor, step_of, told_once
 from foldyn.cases import Case, State
-from foldyn.dynamics import prepare, simulate_many
+from foldyn.dynamics import initial_state, prepare, simulate_many
 from foldyn.dynamics.ensemble import device_for
 from foldyn.dynamics.gpu.choice import DEVICES
 from foldyn.dynamics.progress import Progress, Reporter, reporter
@@ -265,7 +265,7 @@ def _ends(
     sound = np.flatnonzero(before.outcome.values == "done")
     if not len(sound):
         return out
-    later = [State(before.displacement.values[k, -1], before.velocity.values[k, -1]) for k in sound]
+    later = [initial_state(before.isel(model=k)) for k in sound]
     span = (record - 1) * period
     after = simulate_many(
         [case] * len(sound), span, every=period, initial=later, start=settled, **how

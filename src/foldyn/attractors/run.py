@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, State
-from foldyn.dynamics import METHODS, critical_step, prepare
+from foldyn.dynamics import METHODS, prepare
+from foldyn.dynamics.methods import suited, with_mass
+from foldyn.dynamics.modal_damping import modal_rows
 from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.timing import DEFAULT_FRACTION
 from foldyn.errors import InputError
@@ -68,20 +70,22 @@ class Run:
             dt = step_of(case, self.method, self.state, longest)
         if dt is not None:
             dt = divisor(every, dt)
-        found = prepare(
+        motion = prepare(
             case, duration, self.method, dt, every, self.state, tolerance=self.tolerance,
             start=start,
-        ).samples(report)  # fmt: skip
-        memory = found.memory[-1].copy() if found.memory.size else None
-        end = State(found.displacement[-1].copy(), found.velocity[-1].copy(), memory)
+        )  # fmt: skip
+        found = motion.samples(report)
         stretch = Stretch(found.time, found.displacement, found.velocity)
-        return stretch, replace(self, state=end)
+        return stretch, replace(self, state=motion.end)
 
 
 def step_of(case: Case, method: str, state: State | None, longest: float) -> float:
     """Step (s) of a method with fixed steps: half the critical one about a state, or `longest`."""
-    at = None if state is None else state.displacement
-    return min(DEFAULT_FRACTION * critical_step(case, method, at), longest)
+    shape, chosen = case.structure.nodes.shape, suited(method, case)
+    case, at = with_mass(chosen, case), state or State()
+    modal = modal_rows(case, at.origin_of(shape).displacement)
+    critical = chosen.critical_step(case, at.of_nodes("displacement", shape), modal)
+    return min(DEFAULT_FRACTION * critical, longest)
 
 
 def divisor(interval: float, dt: float) -> float:

@@ -11,7 +11,7 @@ from foldyn.cases.history import Function, as_history
 from foldyn.cases.loads import *  # noqa: F403
 from foldyn.cases.masses import PointMass
 from foldyn.cases.selection import resolve_nodes
-from foldyn.cases.state import Continuation, State
+from foldyn.cases.state import Continuation, Origin, State
 from foldyn.cases.supports import SUPPORTS, BaseMotion, Fix, Impose, Link, Spring
 from foldyn.patterns.selection import select
 
@@ -29,6 +29,7 @@ __all__ = [
     "Impose",
     "Link",
     "ModalDamping",
+    "Origin",
     "Plane",
     "PointMass",
     "Rayleigh",

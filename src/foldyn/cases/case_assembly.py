@@ -324,6 +324,8 @@ class Damped(Supported):
         Those among the supports, with their places for messages.
     damped : bool
         Whether anything dissipates energy.
+    damped_at_start : bool
+        Whether any damping is that about the state in which a motion begins.
     """
 
     damping: Damping | Sequence[Damping]
@@ -375,6 +377,11 @@ class Damped(Supported):
     def dashpots(self) -> tuple[tuple[str, Dashpot], ...]:
         """See the class."""
         return tuple(self._supports(Dashpot))
+
+    @property
+    def damped_at_start(self) -> bool:
+        """See the class."""
+        return any(getattr(part, "state", "rest") == "start" for part in self.dampings)
 
     @property
     def damped(self) -> bool:

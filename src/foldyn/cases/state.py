@@ -30,6 +30,27 @@ class Continuation:
     values: NDArray
 
 
+@brief
+@dataclass(frozen=True, eq=False)
+class Origin:
+    """Where the motion began that goes on from a state.
+
+    Parameters
+    ----------
+    displacement : ndarray, shape (n, 3)
+        There, m: that about which damping has its `state = "start"`.
+    flow : ndarray, shape (n, 3), optional
+        Displacement (m) at which the flow of added mass was found last; where it goes on unless
+        known.
+    looked : int
+        Steps since it was looked at whether that flow still holds.
+    """
+
+    displacement: NDArray
+    flow: NDArray | None = None
+    looked: int = 0
+
+
 def _vectors(name: str, value: Any) -> NDArray:
     """Return a vector of every node."""
     array = numbers(name, value)
@@ -43,9 +64,9 @@ def _memory(name: str, value: Any) -> NDArray | str:
     return choice(name, value, ("fresh",)) if isinstance(value, str) else numbers(name, value)
 
 
-def _continuation(name: str, value: Any) -> Continuation:
-    """Return what is one."""
-    if isinstance(value, Continuation):
+def _known(name: str, value: Any, kind: type) -> Any:
+    """Return what is of a kind."""
+    if isinstance(value, kind):
         return value
     raise InputError(f": got {type(value).__name__}; it comes from fd.initial_state(result)", name)
 
@@ -68,12 +89,17 @@ class State(Checked):
         With which a motion goes on exactly from the end of another one; `initial_state` takes it
         from the result. It serves the same method where the state and the forces are those of the
         end; otherwise the motion starts as without it.
+    origin : Origin, optional
+        Where the motion began that goes on here: damping with ``state = "start"`` and added mass
+        stay what they were. `initial_state` takes it from the result; without it the motion begins
+        in the state itself.
     """
 
     displacement: Annotated[ArrayLike | None, Check(_vectors, unit="m")] = None
     velocity: Annotated[ArrayLike | None, Check(_vectors, unit="m/s")] = None
     memory: Annotated[ArrayLike | str | None, Check(_memory)] = None
-    continuation: Annotated[Continuation | None, Check(_continuation)] = None
+    continuation: Annotated[Continuation | None, Check(_known, kind=Continuation)] = None
+    origin: Annotated[Origin | None, Check(_known, kind=Origin)] = None
 
     def of_nodes(self, name: str, shape: tuple[int, ...], field: str = "initial") -> NDArray:
         """Its displacement or velocity of the nodes of a case (n, 3), zero where it has none."""
@@ -82,6 +108,16 @@ class State(Checked):
         if array.shape != shape:
             raise InputError(f": {name} of shape {array.shape}: the case has {shape}", field)
         return array
+
+    def origin_of(self, shape: tuple[int, ...], field: str = "initial") -> Origin:
+        """Where the motion of nodes (n, 3) began that goes on from here."""
+        if self.origin is None:
+            return Origin(self.of_nodes("displacement", shape, field))
+        if self.origin.displacement.shape != shape:
+            raise InputError(
+                f": origin of shape {self.origin.displacement.shape}: the case has {shape}", field
+            )
+        return self.origin
 
     def agree(self) -> None:
         """Refuse displacements and velocities of different numbers of nodes."""

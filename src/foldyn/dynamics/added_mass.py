@@ -85,7 +85,8 @@ def added_mass(
 ) -> AddedMass:  # fmt: skip
     """Added mass of a case whose nodes stand at the places rank (n,) of `rows`.
 
-    start : displacement (n, 3) at the start; rest by default. The flow is found by `begin_flow`.
+    start : displacement (n, 3) where the motion began; rest by default. `begin_flow` finds the
+        flow.
     histories : those of the case, the wind's among them.
 
     Raises
@@ -160,12 +161,13 @@ def _catch(fluid: Fluid, x: NDArray) -> sparse.csr_array:
     return sparse.csr_array(fluid.catch @ spread)
 
 
-def begin_flow(case: Case, packed: Any, course: Any, start: NDArray) -> None:
-    """Find the flow where a motion starts, at `start` (n, 3)."""
-    own = packed.added
+def begin_flow(case: Case, packed: Any, course: Any, place: NDArray) -> None:
+    """Find the flow with which a motion starts, at `place` (n, 3)."""
+    own, inward = packed.added, packed.numbering.inward(place)
     if own.acts:
-        _find_flow(case, own, packed.mass, start, course.u)
-        own.angle[:], own.made[:] = course.angle, 0.0
+        _find_flow(case, own, packed.mass, place, inward)
+        own.angle[:], own.made[:] = packed.body.angles(inward), 0.0
+        put_areas(own, course.u)
         _blow(case, own, course)
         energy_of_flow(own, course.v)
         course.tally.air = -own.carried[0]

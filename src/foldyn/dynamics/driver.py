@@ -150,8 +150,9 @@ def simulate(
     -----
     Histories are evaluated at every stage time t_n + c dt with t_n = start + n dt. The damping
     matrices alpha M + beta K0 and of modes are constant: K0 the tangent, and the modes those, at
-    rest or, with the damping's state = "start", at the initial displacement. Dashpots between nodes
-    and damped creases follow the motion.
+    rest or, with the damping's state = "start", where the motion began: at the initial displacement
+    or, if `initial` is a sample of a motion, where that one began. Dashpots between nodes and
+    damped creases follow the motion.
     """
     keeping = None if store is None else check_keeping(store, checkpoint, resume)
     if store is None and flag("resume", resume):
@@ -197,7 +198,8 @@ def prepare(
     u, v = check_start(case, initial)
     check_touching(case, u, float(start), float(start) + duration)
     remembered = case.memory_in(initial)
-    modal = modal_rows(case, u)
+    origin = (initial or State()).origin_of(u.shape)
+    modal = modal_rows(case, origin.displacement)
     chosen = Choice(integrator.name, "")
     if method == AUTO:
         timing.counted_in_seconds(duration, every)
@@ -211,7 +213,7 @@ def prepare(
     critical = integrator.critical_step(case, u, modal)
     plan = _plan(case, integrator, duration, dt, every, critical, force, tolerance, float(start))
     _warn_of_damping(case, integrator, u, critical)
-    warn_of_unstable_damping(case, u)
+    warn_of_unstable_damping(case, origin.displacement)
     if plan.dt < SHARPEST * abs(plan.start):
         raise InputError(
             f" = {plan.start:g} s: steps of {plan.dt:.3g} s are lost in its rounding; start "
@@ -241,7 +243,7 @@ def prepare(
             FoldynWarning,
             stacklevel=3,
         )
-    packed = pack(case, timing.apart(plan, critical), u, modal)
+    packed = pack(case, timing.apart(plan, critical), origin.displacement, modal)
     if device == "gpu":
         check_taken(case, packed)
     sampler = Sampler(case, {} if sample is None else sample, u, v, plan.start)
@@ -255,8 +257,8 @@ def prepare(
             None, sample, kept,
         )  # fmt: skip
     return Motion(
-        case, integrator, plan, critical, force, state, packed, sampler, chosen.reason, better,
-        device,
+        case, integrator, plan, critical, force, state, origin, packed, sampler, chosen.reason,
+        better, device,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ import xarray
 from numba import config
 from numpy.typing import NDArray
 
-from foldyn.cases import Case, State
+from foldyn.cases import Case, Origin, State
 from foldyn.dynamics import timing
 from foldyn.dynamics.audit import audited
 from foldyn.dynamics.driver import prepare
@@ -26,7 +26,7 @@ from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.stability import damper_rate, frequency_bound, is_stable
 from foldyn.errors import ComputationError, FoldynWarning, InputError, StretchWarning
 from foldyn.mechanics.lanes import WIDTH
-from foldyn.results.dataset import result_dataset
+from foldyn.results.dataset import origin_variables, result_dataset
 from foldyn.results.quantities import MOTION, energies_of, variable, variables
 from foldyn.structures.stretching import MOST, REMEDY, stretch
 from foldyn.values import choice, flag, of_kind, show, whole
@@ -153,7 +153,17 @@ def simulate_many(
     }  # fmt: skip
     if reason:
         facts["device_reason"] = reason
-    return _dataset(case, out, [ended.get(k, "done") for k in range(len(motions))], facts)
+    outcome = [ended.get(k, "done") for k in range(len(motions))]
+    return _dataset(case, out, outcome, _origins(motions, float(out.time[-1])), facts)
+
+
+def _origins(motions: Sequence[Motion], last: float) -> dict[str, Any]:
+    """Where motions began, over the models, if anything depends on it; the last sample's time."""
+    found = [origin_variables(one.reached, last) for one in motions if one.reached]
+    return {
+        name: (("model", *dims), np.stack([own[name][1] for own in found]), about)
+        for name, (dims, _, about) in (found[0] if len(found) == len(motions) else {}).items()
+    }
 
 
 def device_for(
@@ -173,8 +183,8 @@ def _threads(threads: int | None, count: int) -> int:
 
 def _takes_starts(motion: Motion, case: Case) -> bool:
     """Whether what was prepared for a motion serves those of a case from any other start."""
-    fresh = any(getattr(part, "state", "rest") == "start" for part in case.dampings)
-    return motion.case is case and not (fresh or case.remembering)
+    own = case.damped_at_start or motion.packed.added.acts or bool(case.remembering)
+    return motion.case is case and not own
 
 
 def _from_start(like: Motion, initial: State | None) -> Motion:
@@ -190,7 +200,7 @@ def _from_start(like: Motion, initial: State | None) -> Motion:
     sampler = Sampler(case, {}, *u_v, like.plan.start)
     state = *u_v, None, None
     return Motion(
-        case, like.method, like.plan, critical, like.force, state, like.packed, sampler
+        case, like.method, like.plan, critical, like.force, state, Origin(u), like.packed, sampler
     )  # fmt: skip
 
 
@@ -282,7 +292,9 @@ def _warn(motions: Sequence[Motion], ended: Mapping[int, str], energy: NDArray) 
     return max(off.values(), default=0.0)
 
 
-def _dataset(case: Case, out: Samples, outcome: list[str], facts: dict) -> xarray.Dataset:
+def _dataset(
+    case: Case, out: Samples, outcome: list[str], origins: dict, facts: dict
+) -> xarray.Dataset:
     """The result."""
     known = {**MOTION, **energies_of(case)}
     values = {"displacement": out.displacement, "reaction": out.reaction, "velocity": out.velocity}
@@ -292,7 +304,7 @@ def _dataset(case: Case, out: Samples, outcome: list[str], facts: dict) -> xarra
         strict=True,
     )
     timed = variables(known, "time", values).items()
-    data = {name: (("model", *dims), *about) for name, (dims, *about) in timed}
+    data = origins | {name: (("model", *dims), *about) for name, (dims, *about) in timed}
     data["outcome"] = variable(("model",), np.array(outcome), "", "what became of the motion")
     along = {"time": variable(("time",), out.time, "s", "time")}
     along["model"] = variable(("model",), np.arange(len(outcome)), "", "model")

@@ -12,7 +12,7 @@ from scipy import sparse
 
 from foldyn.algebra.solvers import factorized
 from foldyn.algebra.superlu import SingularTangentError
-from foldyn.cases import Case, Continuation, State
+from foldyn.cases import Case, Continuation, Origin, State
 from foldyn.cases.constraints import AGREES
 from foldyn.cases.contact_checks import check_contact, check_driven
 from foldyn.cases.ties import check_tied
@@ -25,7 +25,7 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.following import following_force
 from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.results.contents import check_variable
-from foldyn.results.quantities import CONTINUATIONS
+from foldyn.results.quantities import CONTINUATIONS, ORIGIN, PLACE
 from foldyn.values import whole
 
 AXES = "xyz"
@@ -40,7 +40,8 @@ def initial_state(result: Any, at: int = -1) -> State:
     Parameters
     ----------
     result : xarray.Dataset
-        A trajectory or a path.
+        A trajectory or a path. Damping with ``state = "start"`` and added mass stay those of the
+        trajectory: `State` of its displacement and velocity alone begins anew.
     at : int, default -1
         Number of the sample; negative ones count from the end.
     """
@@ -56,7 +57,7 @@ def initial_state(result: Any, at: int = -1) -> State:
     if not -count <= at < count:
         raise InputError(f" = {at}: the result has samples 0 to {count - 1}", "at")
     sample = result.isel({dimension: at})
-    state = {
+    state: dict[str, Any] = {
         name: check_variable(sample, name, ("node", "axis"), place="initial_state: ").to_numpy()
         for name in ("displacement", "velocity")
         if name == "displacement" or name in sample
@@ -65,7 +66,24 @@ def initial_state(result: Any, at: int = -1) -> State:
         state["memory"] = check_variable(
             sample, "memory", ("branch", "variable"), place="initial_state: "
         ).to_numpy()
-    return State(**state, continuation=_continuation(sample) if "time" in sample else None)
+    if "time" not in sample:
+        return State(**state)
+    return State(**state, continuation=_continuation(sample), origin=_origin(sample))
+
+
+def _origin(sample: Any) -> Origin | None:
+    """Where the motion began of a sample, if its result says so."""
+    if "origin" not in sample:
+        return None
+    places = {
+        name: check_variable(sample, name, PLACE, place="initial_state: ")
+        for name in ORIGIN
+        if name in sample
+    }
+    origin, flow = places["origin"].to_numpy(), places.get("flow")
+    if flow is None or flow.attrs.get("time") != float(sample["time"]):
+        return Origin(origin)
+    return Origin(origin, flow.to_numpy(), int(flow.attrs["looked"]))
 
 
 def _continuation(sample: Any) -> Continuation | None:
@@ -166,7 +184,7 @@ def check_steady(case: Case, start: float, end: float) -> None:
 
 
 def warn_of_unstable_damping(case: Case, u: NDArray) -> None:
-    """Warn where damping follows the stiffness at the start u (n, 3), and this is not positive."""
+    """Warn where damping follows the stiffness at a start u (n, 3), and this is not positive."""
     if case.rayleigh.beta == 0.0 or case.rayleigh.state != "start":
         return
     free = np.asarray(case.free_dofs)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases import Case, Continuation
+from foldyn.cases import Case, Continuation, Origin, State
 from foldyn.dynamics.added_mass import LOOK_EVERY, begin_flow, renewed_flow
 from foldyn.dynamics.audit import Rounding, audited
 from foldyn.dynamics.checkpoint import KEY, Keeping, identity, identity_digest
@@ -70,14 +70,14 @@ class Motion:
 
     def __init__(
         self, case: Case, method: Integrator, plan: StepPlan, critical: float, force: bool,
-        state: tuple[NDArray, NDArray, NDArray | str | None, Continuation | None], packed: Packed,
-        sampler: Sampler, reason: str = "", better: Callable[[], Motion] | None = None,
-        device: str = "cpu",
+        state: tuple[NDArray, NDArray, NDArray | str | None, Continuation | None], origin: Origin,
+        packed: Packed, sampler: Sampler, reason: str = "",
+        better: Callable[[], Motion] | None = None, device: str = "cpu",
     ) -> None:  # fmt: skip
         self.device = device
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force, self.reason = critical, force, reason
-        self._state, self.packed, self._sampler = state, packed, sampler
+        self._state, self.origin, self.packed, self._sampler = state, origin, packed, sampler
         self._better = better
         self._rounding = Rounding(packed.body)
         self._engine: Compiled | Implicit | OnCard | InBlocks | None = None
@@ -215,7 +215,8 @@ class Motion:
         texts = [self.doubt()]
         if resists_turns(self.case, self.packed):
             seen, scale = self.output.evenly_spaced(self.stored, LOOKS), self.output.balance.scale
-            texts.append(turns_told(self.case, self.packed, self._state[0], *seen, scale))
+            place = self.origin.displacement
+            texts.append(turns_told(self.case, self.packed, place, *seen, scale))
         for text in filter(None, texts):
             warnings.warn(text, FoldynWarning, stacklevel=5)
 
@@ -230,7 +231,7 @@ class Motion:
         self.make_room(keeping)
         report, close = reporter(progress)
         try:
-            begin_flow(self.case, self.packed, self.course, self._state[0])
+            begin_flow(self.case, self.packed, self.course, self._flow)
             given = self.case, self.packed, self.course, self.plan, self.device
             engine = engine_of(self.course) if engine_of else self.method.engine(*given)
             continued = self._state[3] if self.case.contact is None else None
@@ -276,6 +277,7 @@ class Motion:
     def _start(self) -> None:
         """Go back to the start."""
         self.course = self.beginning
+        self._flow = self._state[0] if self.origin.flow is None else self.origin.flow
         self.output = Output(self.case, self.plan, self._sampler, self._branches, self._keeping)
         self._looked = False
 
@@ -291,7 +293,7 @@ class Motion:
             clock = time.perf_counter()
             most = self.recheck_after - done % self.recheck_after
             if self.packed.added.acts:
-                most = min(most, LOOK_EVERY - done % LOOK_EVERY)
+                most = min(most, LOOK_EVERY - self._looked_at(done))
             stretch = self._fits(min(length, most))
             code, hinge = engine.advance(output.window, stretch)
             clock = time.perf_counter() - clock
@@ -311,7 +313,8 @@ class Motion:
             report(Progress(now - plan.start, plan.end - plan.start, step, self.audit()))
             if step == plan.steps if plan.steps else now >= plan.end:
                 return
-            if self.packed.added.acts and step > done and step % LOOK_EVERY == 0:
+            new = step > done or step == 0
+            if self.packed.added.acts and new and self._looked_at(step) == 0:
                 self._renew_flow(engine)
             self._checkpoint_if_due(engine)
             if plan.steps and step % self.recheck_after == 0 and step > done:
@@ -321,6 +324,10 @@ class Motion:
             least = 1 if self.method.implicit else CHUNK
             length = max(least, min(int(length * min(growth, 8.0)), 100_000))
 
+    def _looked_at(self, step: int) -> int:
+        """Steps, at one of them, since it was looked at whether the flow of added mass holds."""
+        return (self.origin.looked + step) % LOOK_EVERY
+
     def _renew_flow(self, engine: Compiled | Implicit | OnCard) -> None:
         """Find the flow of added mass anew, if the sheet has folded."""
         try:
@@ -328,8 +335,29 @@ class Motion:
         except FoldynError as error:
             why = f"at t = {self.course.tally.time:.6g} s the flow about the sheet is lost: {error}"
             self._stop(why, ComputationError, error)
-        if found and isinstance(engine, Compiled):
+        if not found:
+            return
+        self._flow = self.packed.numbering.outward(self.course.u)
+        if isinstance(engine, Compiled):
             engine.accelerate()
+
+    @property
+    def end(self) -> State:
+        """The state at its last sample, with all that it takes to go on from there."""
+        last = self.output.written(self.stored)
+        memory = last.memory[-1].copy() if last.memory.size else None
+        u, v = last.displacement[-1].copy(), last.velocity[-1].copy()
+        continuation = self._continuations().get("continuation", (0.0, None))[1]
+        return State(u, v, memory, continuation, self.reached)
+
+    @property
+    def reached(self) -> Origin | None:
+        """Where the motion began, with the flow at its end; None where nothing depends on it."""
+        acts, steps = self.packed.added.acts, int(self.course.tally.steps)
+        if not (acts or self.case.damped_at_start):
+            return None
+        flow = self._flow if acts else None
+        return Origin(self.origin.displacement, flow, self._looked_at(steps))
 
     def _continuations(self) -> dict[str, tuple[float, Continuation]]:
         """What an implicit method went on from, and needs to go on if it stands at a sample.
@@ -350,7 +378,8 @@ class Motion:
 
     def _identity(self) -> dict[str, Any]:
         *state, continued = self._state
-        state.append(continued.values if continued else None)
+        state += [continued.values if continued else None]
+        state += [self.origin.displacement, self.origin.flow]
         return identity(self.case, self.method, self.plan, state, self._sampler.rows)
 
     def finished(self, keeping: Keeping) -> xarray.Dataset | None:
@@ -374,7 +403,8 @@ class Motion:
             return
         self.output.flush(self.stored)
         arrays = {f"engine.{name}": array for name, array in engine.checkpoint_arrays().items()}
-        arrays |= self.output.checkpoint_arrays() | {"seconds": np.array(self.seconds)}
+        arrays |= self.output.checkpoint_arrays()
+        arrays |= {"seconds": np.array(self.seconds), "flow": self._flow}
         self._keeping.checkpoint(arrays, float(self.course.tally.time))
 
     def _resumed(self, engine: Compiled | Implicit | OnCard) -> float:
@@ -390,6 +420,7 @@ class Motion:
         own = "engine."
         engine.resume_from({name[len(own) :]: kept[name] for name in kept if name.startswith(own)})
         self.output.resume_from(kept, self.stored)
+        self._flow = kept["flow"]
         return float(kept["seconds"])
 
     def _sample(self) -> None:
@@ -445,10 +476,11 @@ class Motion:
             plan = plan._replace(end=plan.start + length, interval=length)
         sampler = Sampler(self.case, {}, *self.start, plan.start)
         # with memory of its own: this motion may go on
-        packed = pack(self.case, apart(plan, self.critical), self.start[0])
+        packed = pack(self.case, apart(plan, self.critical), self.origin.displacement)
         motion = Motion(
-            self.case, self.method, plan, self.critical, True, self._state, packed, sampler
-        )
+            self.case, self.method, plan, self.critical, True, self._state, self.origin, packed,
+            sampler,
+        )  # fmt: skip
         motion._looked = True
         try:
             motion.integrate()
@@ -493,7 +525,7 @@ class Motion:
         result = trajectory_dataset(
             self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
             self._statistics(), sampled, out.memory if self._branches else None,
-            self._continuations(),
+            self._continuations(), self.reached and (float(self.course.tally.time), self.reached),
         )  # fmt: skip
         if self._keeping is not None:
             result.attrs[KEY] = identity_digest(self._identity())

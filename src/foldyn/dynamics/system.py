@@ -117,7 +117,7 @@ def pack(
 ) -> Packed:
     """Arrays of a case; `span` (s) is short against the variations of the loads.
 
-    start : displacement (n, 3) at the start, where damping may take its stiffness; rest by default.
+    start : displacement (n, 3) where the motion began, about which damping may be; rest by default.
     modal : the modal damping of a motion from there, if it is known.
     """
     histories: list[History] = []

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from foldyn.arguments import Check
 from foldyn.cases import Harmonic, State
 from foldyn.dynamics.progress import Reporter
-from foldyn.errors import InputError
 from foldyn.linear.excitation import Answer, warn_at
 from foldyn.linear.time_domain import Integration, Rig, overall
 from foldyn.signals import stepped_sine as response_per_drive
@@ -57,11 +56,6 @@ def stepped_sine(rig: Rig, frequency: NDArray, options: SteppedSine, report: Rep
     FoldynWarning
         Motions have not settled.
     """
-    if "start" in {getattr(part, "state", "rest") for part in rig.case.dampings}:
-        raise InputError(
-            'damping: with state = "start" each motion would take K0 or modes where the one before '
-            'has ended; use state = "rest", or method = "impulse" or "burst_random"'
-        )
     response = np.empty((len(frequency), *rig.state.shape), complex)
     unsteady, spent = np.empty(len(frequency)), np.zeros(len(frequency))
     order = np.arange(len(frequency))

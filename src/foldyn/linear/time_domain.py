@@ -118,15 +118,12 @@ class Rig:
         dt, tolerance = self.integration.dt, self.integration.tolerance
         if dt is not None:
             dt = every / math.ceil(every / dt * (1.0 - 1e-12))
-        time, displacement, velocity, _, _, memory, _ = prepare(
+        motion = prepare(
             self.driven(history), duration, self.integrator, dt, every,
             initial or State(self.state), tolerance=tolerance, start=start,
-        ).samples(progress)  # fmt: skip
-        return (
-            time,
-            displacement - self.state,
-            State(displacement[-1], velocity[-1], memory[-1] if memory.size else None),
-        )
+        )  # fmt: skip
+        found = motion.samples(progress)
+        return found.time, found.displacement - self.state, motion.end
 
 
 def _moves_along(load: Load, case: Case) -> bool:

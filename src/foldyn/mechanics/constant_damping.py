@@ -158,6 +158,10 @@ class DampingRows(Term):
         out = np.zeros_like(self.rows)
         return Pulled(Context(_RowsBackward(self.rows, out)), _rows_pullback, {"rows": out})
 
+    def damping(self, q: NDArray) -> sparse.csr_array:
+        """See `Term`; full, for few dofs."""
+        return sparse.csr_array(self.rows.T @ self.rows)
+
     def placed(self, order: NDArray, before: Assembly) -> DampingRows:
         """See `Term`."""
         rows = np.zeros((len(self.rows), 3 * before.rows))

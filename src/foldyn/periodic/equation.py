@@ -36,6 +36,8 @@ class Equation:
         Who asks, for messages.
     driven : bool
         False leaves out all that varies, and the damping.
+    origin : ndarray, shape (n, 3), optional
+        Displacement (m) about which damping has its ``state = "start"``; rest by default.
 
     Attributes
     ----------
@@ -55,11 +57,13 @@ class Equation:
         The part alpha M of the damping, 1/s.
     """
 
-    def __init__(self, case: Case, name: str, driven: bool = True) -> None:
+    def __init__(
+        self, case: Case, name: str, driven: bool = True, origin: NDArray | None = None
+    ) -> None:
         check_smooth(case, name)
         check_held(case, name)
         check_mass(case.mass, case.constraints.determined)
-        self.case, self.body, self.drive = case, case.body, Drive(case)
+        self.case, self.body, self.drive, self.origin = case, case.body, Drive(case), origin
         self.level = 1.0 if driven else 0.0
         free, total = case.free_dofs, self.body.size
         whole = case.constraints.extended(total) if case.constraints else sparse.eye_array(total)
@@ -69,7 +73,7 @@ class Equation:
         self.tangents = Tangents(self.body, self.basis)
         nodal = mass_of(case)
         self.mass = self.projected(nodal)
-        terms = damping_terms(case, None, modal_rows(case)) if driven else []
+        terms = damping_terms(case, origin, modal_rows(case, origin)) if driven else []
         check_damping(terms, name)
         self.alpha = case.rayleigh.alpha if driven else 0.0
         drag = nodal * self.alpha

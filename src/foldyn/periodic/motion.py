@@ -21,7 +21,7 @@ from foldyn.periodic.floquet import STEPS, is_stable, multipliers
 from foldyn.periodic.fourier import Fourier, values_of
 from foldyn.periodic.orbit import SHOWN, Orbit
 from foldyn.periodic.reduction import reduced
-from foldyn.periodic.start import balanced, coefficients, equilibrium, orbit_of
+from foldyn.periodic.start import balanced, coefficients, equilibrium, orbit_of, origin_of
 from foldyn.ram_limit import check_memory
 from foldyn.results.periodic_dataset import periodic_dataset
 from foldyn.values import choice, number, of_kind, whole
@@ -70,7 +70,8 @@ def periodic_motion(
         which integration over a period (Radau's method of order 5) comes back to itself.
     start : State or xarray.Dataset, optional
         Where to begin: small motions about a state, or a result of `periodic_motion` or a point of
-        one of `response_curve`. The equilibrium under the constant loads by default.
+        one of `response_curve`. The equilibrium under the constant loads by default. Damping with
+        ``state = "start"`` is about this state, and goes on from a result as it was.
     periods : int
         Periods of the drive in one of the motion: 2 after a period doubling.
     modes : int, optional
@@ -160,7 +161,7 @@ def periodic_motion(
     }
     return periodic_dataset(
         case, phase / TURN * orbit.period, motion, orbit.node_amplitudes(), floquet,
-        is_stable(floquet), periods, facts,
+        is_stable(floquet), periods, facts, balance.equation.origin,
     )  # fmt: skip
 
 
@@ -170,7 +171,7 @@ def balance_of(
 ) -> Balance:  # fmt: skip
     """Balance of a driven case; InputError without a drive, or where it does not fit in memory."""
     harmonics = whole("harmonics", harmonics, least=1)
-    equation = Equation(case, name)
+    equation = Equation(case, name, origin=origin_of(case, start))
     if not equation.drive.varies:
         raise InputError(
             f"case: nothing drives it: {name} follows the period of a load or support; give one "

@@ -195,7 +195,7 @@ def backbone(
     warn_of_crossing(orbits)
     warn_of_reduction(values.get("reduction"))
     facts["wall_seconds"] = time.perf_counter() - began
-    found = points_dataset("backbone", case, values, facts)
+    found = points_dataset("backbone", case, values, facts, origin=balance.equation.origin)
     if interrupted:
         raise MotionInterrupted(f"interrupted after {len(kept)} points", found)
     return found

@@ -370,4 +370,5 @@ def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
         "wall_seconds": time.perf_counter() - began,
     }
     units = "m" if measure is None else measure.units
-    return points_dataset("response_curve", case, values, facts, units)
+    origin = orbits[0].equation.origin
+    return points_dataset("response_curve", case, values, facts, units, origin)

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from foldyn.cases import Case, Constant, Impose
+from foldyn.cases import Case, Constant, Impose, State
 from foldyn.cases.contact_checks import check_contact
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.linearized import equivalent_slope
@@ -18,6 +18,8 @@ from foldyn.periodic.continuation import Step, Stride, point_at, steps
 from foldyn.periodic.families import ByLevel
 from foldyn.periodic.fourier import values_of
 from foldyn.periodic.orbit import Orbit
+from foldyn.results.contents import check_variable
+from foldyn.results.quantities import PLACE
 from foldyn.statics import trace
 from foldyn.statics.equilibrium import drives
 from foldyn.statics.tracing import displacement_of
@@ -58,6 +60,20 @@ def equilibrium(case: Case) -> NDArray:
     if not drives(still, ()):
         return np.zeros_like(case.structure.nodes)
     return trace(still, "newton", [0.0, 1.0])["displacement"].values[-1]
+
+
+def origin_of(case: Case, start: Any) -> NDArray | None:
+    """Displacement (n, 3) about which damping has its start; None where none has.
+
+    That of the state or the result with which the search begins, or the equilibrium.
+    """
+    if not case.damped_at_start:
+        return None
+    if isinstance(start, State):
+        return start.origin_of(case.structure.nodes.shape, "start").displacement
+    if isinstance(start, xr.Dataset) and "origin" in start:
+        return check_variable(start, "origin", PLACE, place="start: ").to_numpy()
+    return equilibrium(case)
 
 
 def coefficients(balance: Balance, start: Any, omega: float, level: float = 1.0) -> NDArray:

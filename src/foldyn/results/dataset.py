@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,7 +11,7 @@ import tomli_w
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.cases import HISTORIES, Case, Continuation
+from foldyn.cases import HISTORIES, Case, Continuation, Origin
 from foldyn.cases.document import Document, pattern_document, to_document
 from foldyn.patterns import Pattern
 from foldyn.results.attributes import facts, own_attributes
@@ -25,6 +26,7 @@ from foldyn.results.quantities import (
     INTERNAL,
     MODES,
     MOTION,
+    ORIGIN,
     PATH,
     PLACE,
     RESPONSES,
@@ -54,7 +56,7 @@ DOCUMENT: Mapping[str, tuple[str, ...]] = {
 """Variables of the case, which every result has, with their dimensions; other tables have one of
 their own."""
 TAKEN = frozenset(
-    {*MOTION, *CROSSINGS, *DOCUMENT, "time", "node", "axis", *CONTINUATIONS}
+    {*MOTION, *CROSSINGS, *DOCUMENT, "time", "node", "axis", *CONTINUATIONS, *ORIGIN}
     | {"support", "support_node", "support_axis"}
 )
 """Names that every motion has."""
@@ -72,6 +74,7 @@ def trajectory_dataset(
     sampled: Mapping[str, tuple[Quantity, ArrayLike]] | None = None,
     memory: ArrayLike | None = None,
     continuations: Mapping[str, tuple[float, Continuation]] | None = None,
+    origin: tuple[float, Origin] | None = None,
 ) -> xr.Dataset:
     """Dataset of a motion, which carries its own case.
 
@@ -97,6 +100,8 @@ def trajectory_dataset(
     continuations : mapping of str to (float, Continuation), optional
         Time (s) of the last sample and what the method needs to go on from there, `continuation`;
         the same of the first sample and what it had there, `continued_from`.
+    origin : (float, Origin), optional
+        Time (s) of the last sample, and where the motion began, if anything depends on it.
 
     Returns
     -------
@@ -119,11 +124,25 @@ def trajectory_dataset(
         own = {"method": one.method, "time": at}
         along, numbers, text = variable(("continued",), one.values, "", CONTINUATIONS[name])
         data[name] = along, numbers, text | own
+    data |= {} if origin is None else origin_variables(origin[1], origin[0])
     histories = (getattr(part, "history", None) for part in (*case.supports, *case.loads, case.air))
     called = any(type(one) not in HISTORIES.values() for one in histories if one is not None)
     times = stage_times(statistics) if called else None
     along = {"time": ("time", time, {"units": "s", "long_name": "time"})}
     return result_dataset("trajectory", case, data, along, statistics, times)
+
+
+def origin_variables(origin: Origin, time: float = math.nan) -> dict[str, Any]:
+    """Variables that say where a motion began that goes on at a time (s)."""
+    places = {"origin": origin.displacement, "flow": origin.flow}
+    data: dict[str, Any] = {
+        name: variable(own.dims, places[name], own.units, own.text)
+        for name, own in ORIGIN.items()
+        if places[name] is not None
+    }
+    if "flow" in data:
+        data["flow"][2].update(time=time, looked=origin.looked)
+    return data
 
 
 def path_dataset(

@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.cases import Case
-from foldyn.results.dataset import result_dataset
+from foldyn.cases import Case, Origin
+from foldyn.results.dataset import origin_variables, result_dataset
 from foldyn.results.quantities import PLACE, Quantity, variable, variables
 
 HARMONICS = ("harmonic", *PLACE)
@@ -39,6 +39,7 @@ POINTS: Mapping[str, Quantity] = {
 def periodic_dataset(
     case: Case, time: ArrayLike, motion: Mapping[str, ArrayLike], coefficient: NDArray,
     floquet: ArrayLike, stable: bool, periods: int, statistics: Mapping[str, Any],
+    origin: NDArray | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Dataset of one periodic motion, which carries its case.
 
@@ -57,8 +58,11 @@ def periodic_dataset(
         Periods of the drive in one of the motion.
     statistics : mapping
         Facts about the computation, each stored as an attribute.
+    origin : ndarray, shape (n, 3), optional
+        Displacement (m) about which damping has its start.
     """
     data = variables(MOTION, "time", motion)
+    data |= {} if origin is None else origin_variables(Origin(origin))
     own = POINTS["coefficient"]
     data["coefficient"] = variable(own.dims, coefficient, own.units, own.text)
     single = {"stable": bool(stable), "periods": int(periods)}
@@ -74,7 +78,7 @@ def periodic_dataset(
 
 def points_dataset(
     kind: str, case: Case, values: Mapping[str, ArrayLike], statistics: Mapping[str, Any],
-    units: str = "m",
+    units: str = "m", origin: NDArray | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Dataset of the points of a response curve or a backbone, which carries its case.
 
@@ -88,12 +92,15 @@ def points_dataset(
         Facts about the computation, each stored as an attribute.
     units : str
         Of the amplitude.
+    origin : ndarray, shape (n, 3), optional
+        As of `periodic_dataset`.
     """
     size = POINTS["amplitude"]._replace(units=units)
     if kind == "backbone":
         size = size._replace(text="largest displacement of any node from the equilibrium")
     known = {**POINTS, "amplitude": size}
     data = variables(known, "point", {k: v for k, v in values.items() if k != "frequency"})
+    data |= {} if origin is None else origin_variables(Origin(origin))
     text = "frequency of the motion" if kind == "backbone" else POINTS["frequency"].text
     frequency = np.asarray(values["frequency"], float)
     along: dict[str, Any] = {

@@ -66,6 +66,11 @@ CONTINUATIONS: Mapping[str, str] = {
     "continued_from": "with what the method went on from another motion at the first sample",
 }
 """What motions of implicit methods have besides, along the dimension continued."""
+ORIGIN: Mapping[str, Quantity] = {
+    "origin": Quantity("m", "displacement about which damping has its start", PLACE),
+    "flow": Quantity("m", "displacement at which the flow was found last", PLACE),
+}
+"""What motions have besides whose damping or added mass depends on where they began."""
 SINCE = "since rest, or since the state from which a path was started"
 PATH: Mapping[str, Quantity] = {
     **STATE,
