@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -9,8 +11,11 @@ from trusses import VonMises, apex, marked, snapped
 
 import foldyn as fd
 from foldyn.algebra.superlu import SuperLU
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.plots.path import describe_point
 from foldyn.statics import Settings, stability, switch_branch, trace
+from foldyn.sweeps import MEASURES
+from foldyn.sweeps.measure import asked
 
 pytestmark = pytest.mark.filterwarnings("ignore:the path loses stability")
 
@@ -48,10 +53,66 @@ def test_stability_counts(path):
     assert np.abs(apex(path, "x")).max() < 1e-10  # the path stays symmetric
 
 
+def lose_equilibria(monkeypatch, is_lost):
+    """Let no equilibrium be found on the way of a step where `is_lost` (height of the apex)."""
+    plain = stability.Section.at
+
+    def at(self, share, low, high):
+        mark = plain(self, share, low, high)
+        height = STEEP.h + float(mark.station.point.u[8]) if mark else np.inf
+        return None if is_lost(height) else mark
+
+    monkeypatch.setattr(stability.Section, "at", at)
+
+
+def test_a_bifurcation_among_lost_equilibria_has_an_interval(monkeypatch):
+    """None found within 1 mm of it: it is marked all the same, and the load factors enclose it."""
+    lose_equilibria(monkeypatch, lambda z: abs(z - Z0) < 1e-3)
+    path = marked(down())
+    assert path.point.values.tolist() == ["bifurcation", "limit", "limit", "bifurcation"]
+    low, high = path.interval.values.T
+    assert (low <= CRITICAL)[0] and (high >= CRITICAL)[0]
+    per_height = STEEP.load(STEEP.h - Z0 - 1e-3) - STEEP.load(STEEP.h - Z0 + 1e-3)
+    assert abs(per_height) * 0.9 < high[0] - low[0] < 20 * abs(per_height)
+    np.testing.assert_array_equal(low[1:], high[1:])  # those that are located
+    case, value = STEEP.case(free="xz"), {}
+    for name in ("bifurcation_load", "bifurcation_interval", "limit_load", "limit_interval"):
+        told = pytest.warns(FoldynWarning, match="lies between the load factors")
+        with told if name == "bifurcation_load" else nullcontext():
+            value[name] = asked(name, MEASURES).of(path, case, {})
+    np.testing.assert_array_equal(value["bifurcation_interval"], [low[0], high[0]])
+    assert value["bifurcation_load"] == pytest.approx(0.5 * (low[0] + high[0]))
+    np.testing.assert_allclose(value["limit_interval"], STEEP.limit, rtol=1e-9)
+    assert "between" in path.attrs["stability_changes"]
+    assert "bifurcation between" in describe_point(path, 0)
+
+
+@pytest.mark.parametrize("all_lost", [False, True])
+def test_a_limit_point_among_lost_equilibria_has_an_interval(monkeypatch, all_lost):
+    """It lies above the load factors on both sides, below where their tangents meet."""
+    near = STEEP.h - STEEP.limit_at[0]
+    lose_equilibria(monkeypatch, lambda z: all_lost or abs(z - near) < 0.05)
+    path = marked(down())
+    first = path.point.values.tolist().index("limit")
+    low, high = path.interval.values[first]
+    assert low < STEEP.limit < high
+    assert high - low < 0.3 * STEEP.limit
+    located = marked(down())
+    assert path.point.values.tolist() == located.point.values.tolist()
+
+
+def test_measures_refuse_paths_that_have_not_looked():
+    case = STEEP.case(free="xz")
+    path = trace(case, load_factors=[0.5 * CRITICAL, 1.02 * CRITICAL])
+    assert path.negative_eigenvalues.values.tolist() == [0, 1]
+    with pytest.raises(InputError, match=r"stability changes between.*arc_length"):
+        asked("bifurcation_load", MEASURES).of(path, case, {})
+
+
 def test_by_bisection_alone(monkeypatch):
     """Solvers that do not tell their pivots (PARDISO) locate by the count."""
-    found, plain, pivots = [], stability._bisected, SuperLU.pivots
-    monkeypatch.setattr(stability, "_bisected", lambda *a: found.append(1) or plain(*a))
+    found, plain, pivots = [], stability._bracketed, SuperLU.pivots
+    monkeypatch.setattr(stability, "_bracketed", lambda *a: found.append(1) or plain(*a))
     monkeypatch.setattr(SuperLU, "negative", lambda self: int((pivots(self) < 0).sum()))
     monkeypatch.setattr(SuperLU, "pivots", lambda self: None)
     np.testing.assert_allclose(marked(down()).load_factor, FACTORS, rtol=1e-9)
@@ -132,3 +193,18 @@ def test_double_bifurcation():
 def test_refuses_what_is_no_bifurcation(path, options, message):
     with pytest.raises(InputError, match=message):
         switch_branch(path, **{"case": STEEP.case(free="xz"), **options})
+
+
+@pytest.mark.matrix
+def test_a_tube_buckles_at_one_load_whatever_the_steps():
+    """Its equilibria are hard to find beside the bifurcation: the tangent is nearly singular."""
+    pattern = fd.patterns.kresling(sides=8, radius=0.04, height=0.022, twist=-22.5, storeys=4)
+    sheet = fd.Sheet(3e9, 0.3, 2.03e-4, 1300.0, length_scale_ratio=3)
+    supports = [fd.Fix("zmin"), fd.Fix("zmax", "xy"), fd.Impose("zmax", "z", -0.006)]
+    case = fd.Case(fd.discretize(pattern, sheet, preset="n5b8e"), supports)
+    ways = [[0.0, 0.45, 0.497], [0.0, 0.48, 0.51]]
+    first = [marked(trace(case, "displacement", load_factors=way)) for way in ways]
+    assert all(found.point.values[0] == "bifurcation" for found in first)
+    loads = [float(found.load_factor[0]) for found in first]
+    np.testing.assert_allclose(loads, 0.4946, rtol=3e-4)  # by the lowest eigenvalue of modes
+    assert np.ptp(loads) < 1e-5

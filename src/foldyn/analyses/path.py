@@ -35,6 +35,7 @@ from foldyn.cases.directions import DIRECTIONS
 from foldyn.cases.loads import load_from
 from foldyn.cases.supports import support_from
 from foldyn.errors import InputError
+from foldyn.plots.along import critical_word, is_loose
 from foldyn.statics import METHODS, Point, Settings, trace
 from foldyn.statics.newton import settings_of
 from foldyn.statics.reached import Reached, reached_from
@@ -179,7 +180,9 @@ class PathAnalysis(Analysis):
         """Points, what is special about them, effort."""
         a, kinds = result.attrs, result["point"].values
         limits, crossings = int((kinds == "limit").sum()), int((kinds == "bifurcation").sum())
-        special = f" ({counted(limits, 'limit point')}, {counted(crossings, 'bifurcation')})"
+        loose = [critical_word(result, int(k)) for k in np.flatnonzero(is_loose(result))]
+        more = f"; not located: {', '.join(loose)}" if loose else ""
+        special = f" ({counted(limits, 'limit point')}, {counted(crossings, 'bifurcation')}{more})"
         unstable = f", {a['unstable_points']} of them unstable," if a["unstable_points"] > 0 else ""
         return (
             f"  {a['method']}: {counted(result.sizes['step'], 'point')}"

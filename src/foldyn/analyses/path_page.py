@@ -11,7 +11,7 @@ from foldyn import plots
 from foldyn.analyses.casefile import CaseFile
 from foldyn.cases import Case
 from foldyn.errors import ComputationError, InputError
-from foldyn.plots.along import CRITICAL, along, evenly, main_direction
+from foldyn.plots.along import along, critical_word, evenly, main_direction
 from foldyn.plots.charts import Chart, Curve
 from foldyn.report.album import (
     Album,
@@ -187,7 +187,7 @@ def _points(
             *(cell(column[k]) for column in columns.values()),
             int(path["iterations"][k]),
             judged[k],
-            CRITICAL.get(str(path["point"].values[k]), ""),
+            critical_word(path, k),
         ]
         for k in rows
     ]

@@ -24,6 +24,7 @@ from foldyn.sweeps.measures import (
     curve_of,
     frequency_of,
     highest,
+    intervals,
     sampled,
     time_of,
 )
@@ -252,6 +253,12 @@ def _limit_load(result: xr.Dataset, case: Case) -> Seeds:
     at = np.flatnonzero(result["point"].values == "limit")
     if not len(at):
         raise InputError("the path has no limit point; trace it by arc_length, and farther")
+    low, high = intervals(result, "limit")[0]
+    if high > low:
+        raise InputError(
+            f"the limit point is only known to lie between the load factors {low:.6g} and "
+            f"{high:.6g}; trace the path with smaller steps"
+        )
     return {"load_factor": _one(result.sizes["step"], int(at[0]))}
 
 

@@ -72,6 +72,22 @@ def check_path(path: xr.Dataset, name: str) -> None:
         raise InputError(f"{name}: its displacement contains NaN or infinity")
 
 
+def critical_word(path: xr.Dataset, number: int) -> str:
+    """What a point is if it is critical, with the load factors between which that lies."""
+    word = CRITICAL.get(str(path["point"].values[number]), "")
+    if is_loose(path)[number]:
+        low, high = path["interval"].transpose("step", "end").values[number]
+        word += f" between {low:.4g} and {high:.4g}"
+    return word
+
+
+def is_loose(path: xr.Dataset) -> NDArray[np.bool_]:
+    """Which points of a path stand for critical ones that could not be located."""
+    if "interval" not in path:
+        return np.zeros(path.sizes["step"], bool)
+    return np.ptp(path["interval"].transpose("step", "end").values, axis=1) > 0.0
+
+
 def displacements(result: xr.Dataset, dimension: str = "step") -> NDArray[np.float64]:
     """Displacements (m) of all nodes at each point or time, shape (m, n, 3)."""
     return result["displacement"].transpose(dimension, "node", "axis").values

@@ -18,6 +18,7 @@ from foldyn.plots.along import (
     along,
     asked,
     check_path,
+    critical_word,
     displacements,
     stretches,
 )
@@ -237,8 +238,7 @@ def draw_shapes(
 def describe_point(path: xr.Dataset, number: int) -> str:
     """Text for a point: its number, load factor, and what is special about it."""
     point = path.isel(step=number)
-    kind = str(point["point"].values)
-    remark = CRITICAL.get(kind, "")
+    remark = critical_word(path, number)
     if not remark and int(point["negative_eigenvalues"]) > 0:
         remark = "unstable"
     text = f"point {number}: load factor {float(point['load_factor']):.4g}"

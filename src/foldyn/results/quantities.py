@@ -79,6 +79,7 @@ PATH: Mapping[str, Quantity] = {
     "work": Quantity("J", f"work of loads, supports and actuators {SINCE}"),
     "negative_eigenvalues": Quantity(text="negative eigenvalues of the tangent (unstable if any)"),
     "point": Quantity(text="kind of the point"),
+    "interval": Quantity(text="load factors between which the critical point lies", dims=("end",)),
     "iterations": Quantity(text="Newton iterations"),
     "residual": Quantity(text="residual as a fraction of the forces at play"),
     "memory": MEMORY,

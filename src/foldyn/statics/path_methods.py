@@ -156,7 +156,6 @@ def _with_critical(solver: Solver, start: Station, way: Walk) -> Walk:
     before = start
     for station in way:
         yield from critical_points(solver, before, station)
-        yield station
         before = station
 
 

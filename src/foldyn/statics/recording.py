@@ -49,6 +49,12 @@ CLOSED = 179.0  # degrees from flat beyond which a fold counts as closed
 MOST_LISTED = 20  # changes that the attribute lists
 
 
+def place_of(point: Point) -> str:
+    """Where a critical point lies, in words."""
+    low, high = (f"{factor:.4g}" for factor in point.interval or (point.factor, point.factor))
+    return f"the load factor {low}" if low == high else f"a load factor between {low} and {high}"
+
+
 class Change(NamedTuple):
     """Neighboring points whose counts differ; without a first one, where the path begins."""
 
@@ -58,8 +64,8 @@ class Change(NamedTuple):
     @property
     def critical(self) -> Point | None:
         """The located critical point among them."""
-        both = (self.before, self.after)
-        return next((point for point in both if point and point.kind != "regular"), None)
+        both = sorted(filter(None, (self.before, self.after)), key=lambda point: point.negative)
+        return next((point for point in both if point.kind != "regular"), None)
 
     @property
     def loses(self) -> bool:
@@ -74,8 +80,7 @@ class Change(NamedTuple):
         start = self.before
         if at is not None:
             what = "limit point" if at.kind == "limit" else at.kind
-            where = f"the load factor {at.factor:.4g} ({what})"
-            return f"{start.negative} up to {where}, then {end.negative}"
+            return f"{start.negative} up to {place_of(at)} ({what}), then {end.negative}"
         return (
             f"{start.negative} at the load factor {start.factor:.4g}, {end.negative} at "
             f"{end.factor:.4g}"
@@ -227,6 +232,7 @@ def _dataset(
             "point": [p.kind for p in points],
             "iterations": [p.iterations for p in points],
             "residual": [p.residual for p in points],
+            **_intervals(points),
             **_memory(problem, points, from_rest),
             **{name: [touch[name] for touch in touches] for name in touches[0]},
         },
@@ -271,6 +277,13 @@ def _recorded(
         problem.reactions(*at),
         problem.touch(point.u),
     )
+
+
+def _intervals(points: Sequence[Point]) -> dict[str, list[tuple[float, float]]]:
+    """Load factors between which critical points lie, if some could not be located."""
+    if all(point.interval is None for point in points):
+        return {}
+    return {"interval": [point.interval or (point.factor, point.factor) for point in points]}
 
 
 def _begun(problem: OrigamiProblem, first: Point, energies: NDArray) -> float:

@@ -4,7 +4,8 @@ Where the count of negative eigenvalues of the tangent changes along a step, an 
 passed through zero. The step is halved until one crossing remains, and the crossing is then found
 as the zero of the tangent's determinant, each point an equilibrium in the plane across the step.
 
-A crossing that cannot be located is left out: the counts on both sides still show it.
+Where equilibria are not found all the way to a crossing, it is known by the interval of load
+factors between the nearest ones on both sides; the point that stands for it is one of these.
 
 At a limit point the load factor turns: the response to the factor points along the step on one
 side and against it on the other. At a bifurcation it does not, and another path crosses.
@@ -26,6 +27,7 @@ from foldyn.statics.stepping import Station, arrive, elapse, kept, recall
 
 APART = 1e-6  # share of a step within which crossings count as one multiple point
 SHARP = 1e-13  # share of a step to which a crossing is located
+LOOKS = 0.5, 0.25, 0.75  # where an equilibrium is sought between two others
 
 
 class Mark(NamedTuple):
@@ -105,27 +107,35 @@ class Section:
         value(root)
         return marks[root]
 
+    def slope(self, mark: Mark) -> float:
+        """Derivative of the load factor by the share there."""
+        return self.whole / float(self.chord @ mark.station.response)
+
     def climbs(self, mark: Mark) -> bool:
         """Whether the load factor grows along the step there."""
         return float(self.chord @ mark.station.response) > 0.0
 
 
 def critical_points(solver: Solver, start: Station, end: Station) -> list[Station]:
-    """Stations at the limit and bifurcation points of a step, in their order.
+    """Stations at the limit and bifurcation points of a step, in their order, and its end.
 
-    Each of them is on the way of the step: from what the structure remembered at its start.
+    The end itself stands for a crossing if no equilibrium is found between it and the start. Each
+    of the others is on the way of the step: from what the structure remembered at its start.
     """
     counts = start.point.negative, end.point.negative
     if counts[0] == counts[1] or min(counts) < 0:
-        return []
+        return [end]
     section, found = Section(solver, start, end), []
     recall(solver.problem, start)
     for station in _crossings(section, *section.ends):
+        if station.point.u is end.point.u:
+            end = station
+            break
         elapse(solver.problem, section.share(station) * section.seconds)
         found.append(kept(solver.problem, station))
         recall(solver.problem, start)
     recall(solver.problem, end)
-    return found
+    return [*found, end]
 
 
 def _crossings(section: Section, low: Mark, high: Mark) -> list[Station]:
@@ -133,28 +143,50 @@ def _crossings(section: Section, low: Mark, high: Mark) -> list[Station]:
     if change == 0:
         return []
     if change > 1 and high.share - low.share > APART:
-        middle = section.at(0.5 * (low.share + high.share), low, high)
-        if middle is not None and middle.negative >= 0:
+        middle = _between(section, low, high)
+        if middle is not None:
             return _crossings(section, low, middle) + _crossings(section, middle, high)
-    critical = _crossing(section, low, high)
-    return [] if critical is None else [critical]
+    return [_crossing(section, low, high)]
 
 
-def _crossing(section: Section, low: Mark, high: Mark) -> Station | None:
-    """The critical point between two marks, as near as rounding allows; None if it is lost."""
+def _crossing(section: Section, low: Mark, high: Mark) -> Station:
+    """The critical point between two marks, as near as equilibria are found to it."""
     kind = "bifurcation" if section.climbs(low) == section.climbs(high) else "limit"
     count = min(low.negative, high.negative)
     single = abs(high.negative - low.negative) == 1
     if single and low.station.stiffness.symmetric.pivots() is not None:
-        critical = _zero_of_determinant(section, low, high)
-    else:
-        critical = _bisected(section, low, high)
-    if critical is None:
-        return None
-    return critical._replace(point=replace(critical.point, negative=count, kind=kind))
+        try:
+            critical = _zero_of_determinant(section, low, high)
+        except LostError:
+            pass
+        else:
+            return critical._replace(point=replace(critical.point, negative=count, kind=kind))
+    low, high = _bracketed(section, low, high)
+    located = high.share - low.share <= APART
+    interval = None if located else _interval(section, low, high, kind == "limit")
+    if not located and (low.share, high.share) == (0.0, 1.0):
+        end = high.station
+        return end._replace(point=replace(end.point, kind=kind, interval=interval))
+    station = low.station if low.share > 0.0 and high.share == 1.0 else high.station
+    point = replace(station.point, negative=count, kind=kind, interval=interval)
+    return station._replace(point=point)
 
 
-def _zero_of_determinant(section: Section, low: Mark, high: Mark) -> Station | None:
+def _interval(section: Section, low: Mark, high: Mark, limit: bool) -> tuple[float, float]:
+    """Load factors between which the critical point between two marks lies.
+
+    A limit point lies beyond both, by no more than where the tangents there meet.
+    """
+    one, other = low.station.point.factor, high.station.point.factor
+    if limit:
+        rises, falls = section.slope(low), section.slope(high)
+        ahead = (other - one - falls * (high.share - low.share)) / (rises - falls)
+        farther = max(one, other) if rises > 0.0 else min(one, other)
+        one, other = farther, one + rises * ahead
+    return min(one, other), max(one, other)
+
+
+def _zero_of_determinant(section: Section, low: Mark, high: Mark) -> Station:
     scale = _log_determinant(low)
 
     def determinant(mark: Mark) -> float:
@@ -163,10 +195,7 @@ def _zero_of_determinant(section: Section, low: Mark, high: Mark) -> Station | N
         sign = 1.0 if (mark.negative - low.negative) % 2 == 0 else -1.0
         return sign * float(np.exp(min(_log_determinant(mark) - scale, 600.0)))
 
-    try:
-        return section.zero(determinant, SHARP, (low, high), nearest=True).station
-    except LostError:
-        return _bisected(section, low, high)
+    return section.zero(determinant, SHARP, (low, high), nearest=True).station
 
 
 def _log_determinant(mark: Mark) -> float:
@@ -175,13 +204,24 @@ def _log_determinant(mark: Mark) -> float:
         return float(np.log(np.abs(pivots)).sum()) if pivots is not None else np.nan
 
 
-def _bisected(section: Section, low: Mark, high: Mark) -> Station | None:
+def _bracketed(section: Section, low: Mark, high: Mark) -> tuple[Mark, Mark]:
+    """The nearest marks found on both sides of a crossing."""
     while high.share - low.share > SHARP:
-        middle = section.at(0.5 * (low.share + high.share), low, high)
-        if middle is None or middle.negative < 0 or middle.share in (low.share, high.share):
+        middle = _between(section, low, high)
+        if middle is None:
             break
         low, high = (middle, high) if middle.negative == low.negative else (low, middle)
-    return high.station if high.share - low.share <= APART else None
+    return low, high
+
+
+def _between(section: Section, low: Mark, high: Mark) -> Mark | None:
+    """A mark between two others whose negative eigenvalues are counted; None if none is found."""
+    for weight in LOOKS:
+        share = low.share + weight * (high.share - low.share)
+        mark = section.at(share, low, high) if low.share < share < high.share else None
+        if mark is not None and mark.negative >= 0:
+            return mark
+    return None
 
 
 def critical_modes(solver: Solver, station: Station, count: int = 1) -> tuple[NDArray, NDArray]:

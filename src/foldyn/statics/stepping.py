@@ -59,6 +59,8 @@ class Point:
         Negative eigenvalues of the tangent on the free dofs; -1 if they were not counted.
     kind : str
         "regular", "limit" or "bifurcation".
+    interval : tuple of (float, float), optional
+        Load factors between which a critical point lies that could not be located.
     memory
         Of a problem whose parts yield, what its `recall` takes.
     """
@@ -69,6 +71,7 @@ class Point:
     residual: float
     negative: int = -1
     kind: str = "regular"
+    interval: tuple[float, float] | None = None
     memory: Any = None
 
 

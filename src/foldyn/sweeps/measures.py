@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from inspect import signature
 from typing import Any, TypeVar
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.cases.directions import AXES
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.band_gaps import ALL, frequencies_of, legs
 from foldyn.linear.frf import quantity_of
 from foldyn.linear.peaks_of import kind_of, resonances
@@ -35,6 +36,8 @@ MOTION, PATH, MODES, FRF, FIDELITY = "dynamics", "statics", "modes", "frf", "fid
 BANDS = "bands"
 PROMINENT = 0.05
 """Least prominence of a peak of a spectrum, as a part of its maximum."""
+NEAR = 1e-5
+"""Width of an interval of load factors, as a part of these, that needs no mention."""
 CURVES, MOVED = (FRF, MOTION), (MOTION, PATH)
 MEASURES: dict[str, Measure] = {}
 """By name."""
@@ -302,19 +305,53 @@ def _largest_load(result: xr.Dataset, case: Case) -> float:
     return float(result["load_factor"].values.max())
 
 
-def _loads_at(result: xr.Dataset, kind: str) -> NDArray:
-    return result["load_factor"].values[result["point"].values == kind]
+def intervals(result: xr.Dataset, kind: str) -> NDArray:
+    """Load factors (k, 2) between which critical points lie, alike where they are located."""
+    counts, factor = result["negative_eigenvalues"].values, result["load_factor"].values
+    changes = np.flatnonzero((np.diff(counts) != 0) & (np.minimum(counts[1:], counts[:-1]) >= 0))
+    if len(changes) and (result.attrs["method"] == "newton" or not result.attrs["locate"]):
+        low, high = factor[changes[0] : changes[0] + 2]
+        raise InputError(
+            f"the stability changes between the load factors {low:.6g} and {high:.6g}, where the "
+            'path has not looked for the point: trace it by "displacement" or "arc_length", and '
+            "with locate = True"
+        )
+    ends = np.column_stack([factor, factor])
+    if "interval" in result:
+        ends = result["interval"].transpose("step", "end").values
+    return ends[result["point"].values == kind]
+
+
+def _first(result: xr.Dataset, kind: str) -> NDArray:
+    return np.concatenate([intervals(result, kind), np.full((1, 2), np.nan)])[0]
+
+
+def _load_of(result: xr.Dataset, kind: str) -> float:
+    low, high = _first(result, kind)
+    if high - low > NEAR * abs(high):
+        warnings.warn(
+            f"the first {kind} point lies between the load factors {low:.6g} and {high:.6g}, and "
+            "no equilibrium was found nearer to it: the middle stands for it; smaller steps may "
+            "find one",
+            FoldynWarning,
+            stacklevel=4,
+        )
+    return float(0.5 * (low + high))
 
 
 @_measure(PATH, doc="load factor of a limit point", dims=("limit",))
 def _limit_loads(result: xr.Dataset, case: Case) -> NDArray:
-    return _loads_at(result, "limit")
+    return intervals(result, "limit").mean(axis=1)
 
 
 @_measure(PATH, doc="load factor of the first limit point")
 def _limit_load(result: xr.Dataset, case: Case) -> float:
-    found = _loads_at(result, "limit")
-    return float(found[0]) if found.size else np.nan
+    return _load_of(result, "limit")
+
+
+@_measure(PATH, doc="load factors between which the first limit point lies", dims=("end",))
+def _limit_interval(result: xr.Dataset, case: Case) -> NDArray:
+    return _first(result, "limit")
 
 
 @_measure(PATH, doc="load factor where a node has moved so far (m)")
@@ -326,8 +363,12 @@ def _load_at(
 
 @_measure(PATH, doc="load factor of the first bifurcation")
 def _bifurcation_load(result: xr.Dataset, case: Case) -> float:
-    found = _loads_at(result, "bifurcation")
-    return float(found[0]) if found.size else np.nan
+    return _load_of(result, "bifurcation")
+
+
+@_measure(PATH, doc="load factors between which the first bifurcation lies", dims=("end",))
+def _bifurcation_interval(result: xr.Dataset, case: Case) -> NDArray:
+    return _first(result, "bifurcation")
 
 
 @_measure(PATH, units="N/m", doc="stiffness over the first step", through=landscape)
