@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from sheets import compression, specimen, total_force
-from trusses import VonMises
+from trusses import APEX, VonMises, apex
 
 import foldyn as fd
-from foldyn.errors import ComputationError, MotionInterrupted
+from foldyn.errors import ComputationError, FoldynWarning, MotionInterrupted
 from foldyn.results import path_dataset
 from foldyn.statics import Settings, switch_branch, trace
 
@@ -106,6 +106,47 @@ def test_until_ends_the_path():
     assert path.sizes["step"] == 5
     assert float(path.displacement[-1, 0, 0]) == pytest.approx(0.4 * 0.056)
     assert path.attrs["status"] == "complete"
+
+
+WAYS = [
+    ("newton", {"load_factors": [0.0, 1.0, 2.0]}),
+    ("displacement", {"steps": 3}),
+    ("mgdcm", {"steps": 4}),
+    ("arc_length", {"steps": 4}),
+]
+
+
+@pytest.mark.parametrize(("method", "given"), WAYS)
+def test_a_path_says_when_until_is_not_reached(method, given):
+    truss = VonMises()
+    case = truss.case(free="xz", load=-0.2 * truss.limit)
+    if method == "displacement":
+        held = fd.Impose([APEX], "z", -0.02 * truss.h)
+        case = fd.Case(truss.structure(), [*case.supports, held])
+    until = {"node": APEX, "axis": "z", "displacement": -0.9 * truss.h}
+    with pytest.warns(FoldynWarning, match=r"has not reached `until`: take more steps"):
+        path = trace(case, method, until=until, **given)
+    assert path.attrs["status"] == "until not reached"
+    assert abs(float(apex(path)[-1])) < 0.9 * truss.h
+
+
+@pytest.mark.parametrize("method", ["newton", "mgdcm", "arc_length"])
+def test_a_path_stops_where_it_leaves_any_sensible_range(method):
+    """A truss that is pulled and pulled: no bar becomes twice as long."""
+    truss = VonMises(h=0.3)
+    way = {"load_factors": np.linspace(0.0, 10.0, 41)} if method == "newton" else {"steps": 200}
+    with pytest.raises(
+        ComputationError, match=r"any sensible range.*times as far.*units"
+    ) as caught:
+        trace(truss.case(load=3.0 * truss.EA), method, **way)
+    partial = caught.value.partial
+    rise = truss.h + apex(partial)
+    longest = np.hypot(truss.b, rise) / truss.L
+    assert partial.attrs["status"] == "stopped"
+    assert 1.2 < longest[-1] <= 2.0
+    np.testing.assert_allclose(
+        partial.load_factor, -truss.load(-apex(partial)) / (3.0 * truss.EA), rtol=1e-8
+    )
 
 
 def test_statistics_cannot_hide_what_every_result_has():

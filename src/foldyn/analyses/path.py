@@ -184,10 +184,11 @@ class PathAnalysis(Analysis):
         more = f"; not located: {', '.join(loose)}" if loose else ""
         special = f" ({counted(limits, 'limit point')}, {counted(crossings, 'bifurcation')}{more})"
         unstable = f", {a['unstable_points']} of them unstable," if a["unstable_points"] > 0 else ""
+        missed = f" ({a['status']})" if a["status"] != "complete" else ""
         return (
             f"  {a['method']}: {counted(result.sizes['step'], 'point')}"
             f"{special if limits or crossings else ''}{unstable} to the load factor "
-            f"{float(result['load_factor'][-1]):.4g}, {a['newton_iterations']} iterations, "
+            f"{float(result['load_factor'][-1]):.4g}{missed}, {a['newton_iterations']} iterations, "
             f"{a['wall_seconds']:.1f} s"
         )
 

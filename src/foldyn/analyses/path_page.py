@@ -199,6 +199,7 @@ def _run(case_file: CaseFile, path: xarray.Dataset) -> Table:
     kinds = path["point"].values
     cells = {
         "method": path.attrs["method"],
+        "status": path.attrs["status"],
         "points": path.sizes["step"],
         "limit points": int((kinds == "limit").sum()),
         "bifurcations": int((kinds == "bifurcation").sum()),

@@ -25,7 +25,7 @@ from foldyn.statics.reached import until_of
 from foldyn.statics.recording import record
 from foldyn.statics.stability import critical_modes
 from foldyn.statics.stepping import PathStoppedError, Point, Station, Walk, arrive
-from foldyn.statics.tracing import check_steps, on_nodes
+from foldyn.statics.tracing import check_steps
 from foldyn.values import choice, function, of_kind, whole
 
 if TYPE_CHECKING:
@@ -112,9 +112,9 @@ def switch_branch(
         first = _onto_branch(solver, crossing, mode, _multiplicity(path, at), direction)
         yield first
         away = first.point.u - crossing.point.u
-        yield from along(solver, first, plan, on_nodes(until, problem), away)
+        yield from along(solver, first, plan, away)
 
-    return record(stations(), progress, solver, problem, facts)
+    return record(stations(), progress, solver, problem, facts, until)
 
 
 def _bifurcation(path: xarray.Dataset, at: int | None) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice, pairwise
 from typing import Any, NamedTuple
 
@@ -19,8 +19,6 @@ from foldyn.values import choice, number, numbers, show
 STEPS_DRIVEN = 10
 STEPS_FREE = 100
 FIRST_STEP = 0.05  # of the load, or of the way to the last load factor
-
-Until = Callable[[NDArray, float], bool]  # of all dofs (m,) and the load factor
 
 
 class PathMethod(NamedTuple):
@@ -132,10 +130,7 @@ def _durations(given: Any, steps: int) -> list[float]:
     return np.broadcast_to(array, steps).tolist()
 
 
-def along(
-    solver: Solver, start: Station, plan: PathPlan, until: Until | None,
-    direction: NDArray | None = None,
-) -> Walk:  # fmt: skip
+def along(solver: Solver, start: Station, plan: PathPlan, direction: NDArray | None = None) -> Walk:
     """Stations of a path after its first one; `direction` as of `continuation.follow`."""
     method = plan.method
     if method.rule is None:
@@ -146,10 +141,7 @@ def along(
         way = _up_to(solver, start, way, plan.end, plan.steps)
     if method.between and solver.settings.stability and solver.settings.locate:
         way = _with_critical(solver, start, way)
-    for station in way:
-        yield station
-        if until is not None and until(station.point.u, station.point.factor):
-            return
+    return way
 
 
 def _with_critical(solver: Solver, start: Station, way: Walk) -> Walk:

@@ -39,12 +39,13 @@ from foldyn.statics.stepping import (
     Walk,
 )
 from foldyn.structures.locking import kept_apart, locks
-from foldyn.structures.mesh import hinge_angles
+from foldyn.structures.mesh import hinge_angles, lengths
 from foldyn.structures.stretching import REMEDY, stretch
 
 if TYPE_CHECKING:
     import xarray
 
+MOST_STRETCH = 2.0  # of a bar: no sheet can be followed beyond
 CLOSED = 179.0  # degrees from flat beyond which a fold counts as closed
 MOST_LISTED = 20  # changes that the attribute lists
 
@@ -141,11 +142,13 @@ def stability_warning(
 
 def record(
     stations: Walk, progress: Callable[[Point], None] | None, solver: Solver,
-    problem: OrigamiProblem, facts: dict[str, Any], adaptive: bool = False,
+    problem: OrigamiProblem, facts: dict[str, Any],
+    until: Callable[[NDArray, float], bool] | None = None, adaptive: bool = False,
 ) -> xarray.Dataset:  # fmt: skip
     """Follow a path to its end and make its dataset; raises where it cannot go on, with what is.
 
     facts : what was asked for, stored as attributes.
+    until : says of displacements (n, 3) and load factor whether the path ends there.
     adaptive : whether an adaptive load acts.
     """
     began = time.perf_counter()
@@ -158,9 +161,13 @@ def record(
 
     try:
         for station in stations:
+            _check_stretch(problem, station.point)
             points.append(station.point)
             if progress is not None:
                 progress(station.point)
+            if len(points) > 1 and _ends(until, problem, station.point):
+                until = None
+                break
     except PathStoppedError as stop:
         remedy = _closed(problem, points) or _true(stop.remedy, problem)
         partial = dataset("stopped", stopped_because=stop.reason, remedy=remedy)
@@ -168,9 +175,39 @@ def record(
     except KeyboardInterrupt:
         partial = dataset("stopped", stopped_because="interrupted")
         raise MotionInterrupted(f"interrupted after {len(points)} points", partial) from None
-    path = dataset("complete")
+    if until is not None:
+        warnings.warn(
+            f"the path ends at the load factor {points[-1].factor:.4g}, after {len(points)} "
+            "points, and has not reached `until`: take more steps, or load factors that lead "
+            "farther",
+            FoldynWarning,
+            stacklevel=3,
+        )
+    path = dataset("complete" if until is None else "until not reached")
     assert path is not None, "every path has a first point"
     return path
+
+
+def _ends(
+    until: Callable[[NDArray, float], bool] | None, problem: OrigamiProblem, point: Point
+) -> bool:
+    return until is not None and bool(until(problem.displacement(point.u).copy(), point.factor))
+
+
+def _check_stretch(problem: OrigamiProblem, point: Point) -> None:
+    """Stop where the path has left any sensible range: where a bar is twice as long as at rest."""
+    structure = problem.structure
+    longer = lengths(structure.nodes + problem.displacement(point.u), structure.bars)
+    longer /= structure.bar_length
+    if not (longer > MOST_STRETCH).any():
+        return
+    bar = int(longer.argmax())
+    one, other = structure.bars[bar]
+    raise PathStoppedError(
+        f"the path has left any sensible range: at the load factor {point.factor:.6g} the nodes "
+        f"{one} and {other} are {longer[bar]:.3g} times as far apart as at rest",
+        "end it before (until, load_factors or steps), or check the units of loads and modulus",
+    )
 
 
 def _true(remedy: str, problem: OrigamiProblem) -> str:

@@ -19,7 +19,7 @@ from foldyn.statics.equilibrium import AdaptiveLoad, OrigamiProblem, drives, is_
 from foldyn.statics.mechanism import refuse_mechanisms
 from foldyn.statics.newton import Settings, Solver, settings_of
 from foldyn.statics.path_memory import FOLLOWED, flowing
-from foldyn.statics.path_methods import METHODS, PathPlan, Until, along, plan_path
+from foldyn.statics.path_methods import METHODS, PathPlan, along, plan_path
 from foldyn.statics.reached import until_of
 from foldyn.statics.recording import record
 from foldyn.statics.stepping import Point, Walk, kept, settle, walk
@@ -101,8 +101,9 @@ def trace(
         `reaction` (N) at supported dofs; energies (J) `strain_bars`, `strain_folds`,
         `strain_bends` and `work`; `negative_eigenvalues`, `point` ("regular", "limit",
         "bifurcation"), `iterations`, `residual`; with a duration `elapsed` (s). Attributes hold
-        `status` ("complete" or "stopped", then with `stopped_because` and `remedy`),
-        `unstable_points` (how many) and `stability_changes` (in words), and facts about the run.
+        `status` ("complete", "until not reached", or "stopped" with `stopped_because` and
+        `remedy`), `unstable_points` (how many) and `stability_changes` (in words), and facts about
+        the run.
 
     Raises
     ------
@@ -115,7 +116,7 @@ def trace(
     -----
     FoldynWarning
         The count of negative eigenvalues changes along the path, but for limit points that
-        "mgdcm" and "arc_length" have located.
+        "mgdcm" and "arc_length" have located; or the path ends before `until` is reached.
     CrossingWarning
         Panels pass through each other at a point.
 
@@ -172,24 +173,15 @@ def trace(
         if first.point.factor != plan.begin:
             *_, first = walk(solver, first, [plan.begin], False)
         yield first
-        yield from along(solver, first, plan, on_nodes(until, problem))
+        yield from along(solver, first, plan)
 
-    return record(stations(), progress, solver, problem, facts, adaptive_load is not None)
+    return record(stations(), progress, solver, problem, facts, until, adaptive_load is not None)
 
 
 def _flowed(case: Case, initial: State | None, timed: bool) -> NDArray | str | None:
     """State in which branches begin that the path moves on, of that of all (b, 2)."""
     state = case.memory_in(initial)
     return state[flowing(case, timed)] if isinstance(state, np.ndarray) else state
-
-
-def on_nodes(
-    until: Callable[[NDArray, float], bool] | None, problem: OrigamiProblem
-) -> Until | None:
-    """A user's function of displacements (n, 3) as one of flat dofs."""
-    if until is None:
-        return None
-    return lambda u, factor: bool(until(problem.displacement(u).copy(), factor))
 
 
 def check_steps(steps: Any, dofs: int) -> None:
