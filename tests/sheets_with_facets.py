@@ -59,14 +59,16 @@ def crossed_miura(dihedral=90):
     """A Miura sheet, and the same with each panel cut by a diagonal, the one or the other."""
     whole = fd.patterns.miura(cells=(2, 1), a=0.05, b=0.04, panel_angle=60, dihedral=dihedral)
     letters = dict(zip(map(tuple, whole.creases.tolist()), whole.assignments, strict=True))
-    cut = []
+    cut, facets = [], {}
     for k, (a, b, c, d) in enumerate(whole.faces):
         cut += [(a, b, c), (a, c, d)] if k % 2 else [(a, b, d), (b, c, d)]
+        facets[(a, c) if k % 2 else (b, d)] = "F"
     angles = dict.fromkeys(letters, 0.5)
     families = {"straight": [pair for pair, letter in letters.items() if letter == "M"]}
     made = fd.Pattern(
-        whole.vertices, cut, letters, "cut", fold_angles=angles, families=families, custom={"a": 1}
-    )
+        whole.vertices, cut, letters | facets, "cut", fold_angles=angles, families=families,
+        custom={"a": 1},
+    )  # fmt: skip
     return whole, made
 
 

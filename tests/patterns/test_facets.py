@@ -251,3 +251,21 @@ def test_case_files_say_so(tmp_path):
         warnings.simplefilter("error", FoldynWarning)
         with pytest.raises(InputError, match=r'leave out facets = "line"'):
             fd.read_case(path).case()
+
+
+def ridge(letters=None):
+    """A gable roof whose two slopes are cut by diagonals."""
+    points = [(x, y, 1.0 - abs(x)) for x in (-1, 0, 1) for y in (0, 2)]
+    faces = [(0, 2, 3), (0, 3, 1), (2, 4, 5), (2, 5, 3)]
+    return fd.Pattern(points, faces, letters)
+
+
+@pytest.mark.parametrize("letters", [None, {(2, 3): "M"}], ids=["none", "some"])
+def test_lines_without_letters_that_are_welded_beside_others_are_told(letters):
+    roof = ridge(letters)
+    assert roof.unlettered.tolist() == [True, letters is None, True]
+    with pytest.warns(FoldynWarning, match=r"facets: 2 of 3 creases, as \(0, 3\), lie flat and"):
+        assert len(fd.welded(roof.moved((1, 2, 3))).creases) == 1  # a moved one has none either
+    for clear in (ridge("FMF"), roof.changed(assignments="FMF")):
+        assert fd.welded(clear).faces == ((0, 2, 3, 1), (2, 4, 5, 3))
+    fd.welded(roof, [(0, 3), (2, 5)])

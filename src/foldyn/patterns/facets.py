@@ -8,13 +8,14 @@ welds, lines across which the sheet runs on.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.patterns.crease_data import crease_rows
 from foldyn.patterns.pattern import Pattern, pattern_of
 from foldyn.patterns.topology import Edge, around, edge_lookup, vertex_pair
@@ -48,6 +49,11 @@ def welded(
     Returns
     -------
     Pattern
+
+    Warns
+    -----
+    FoldynWarning
+        No facets are named, and some creases are welded that lie flat but have no letter.
 
     Raises
     ------
@@ -102,7 +108,19 @@ def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
     """Rows of the creases that are facets."""
     letters = np.array(pattern.assignments, dtype="<U1")
     if facets is None:
-        return np.flatnonzero(letters == "F")
+        rows = np.flatnonzero(letters == "F")
+        guessed = rows[pattern.unlettered[rows]]
+        if 0 < guessed.size < len(letters):  # of a sheet that is flat all over, all are facets
+            which = (
+                f"{guessed.size} of {len(letters)} creases, as {_pair(pattern.creases[guessed[0]])}"
+            )
+            warnings.warn(
+                f"facets: {which}, lie flat and have no letter, and are welded; assign letters to "
+                "those that fold, or name the facets",
+                FoldynWarning,
+                stacklevel=3,
+            )
+        return rows
     if isinstance(facets, str):
         facets = pattern.creases[crease_rows("facets", facets, pattern)]
     row, rows = edge_lookup(pattern.creases), set()

@@ -76,6 +76,8 @@ class Pattern(Transforms):
     ----------
     assignments : tuple of str
         The letter of each crease.
+    unlettered : ndarray of bool, shape (nc,)
+        Creases that were given no letter and have that of their dihedral.
     fold_angles : ndarray, shape (nc,)
         Angle to fold each crease to (rad, pi less the dihedral), NaN where none is given.
     families, rim_families : mapping
@@ -133,6 +135,7 @@ class Pattern(Transforms):
     welds: NDArray[np.int64]
     periods: tuple[NDArray[np.int64], ...]
     rim_families: Mapping[str, NDArray[np.int64]]
+    unlettered: NDArray[np.bool_] = field(init=False)
     flipped: tuple[bool, ...] = field(init=False)
     edges: NDArray[np.int64] = field(init=False)
     creases: NDArray[np.int64] = field(init=False)
@@ -206,6 +209,7 @@ class Pattern(Transforms):
             **geometry._asdict(),
             "vertices": points,
             "assignments": letters,
+            "unlettered": given == "",
             "name": name,
             "boards": boards,
             "fold_angles": crease_data.fold_angles(fold_angles, topology.creases, words),

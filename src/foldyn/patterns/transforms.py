@@ -32,6 +32,7 @@ class Transforms:
         vertices: NDArray[np.float64]
         faces: tuple[tuple[int, ...], ...]
         assignments: tuple[str, ...]
+        unlettered: NDArray[np.bool_]
         name: str
         boards: Boards | None
         fold_angles: NDArray[np.float64]
@@ -233,7 +234,10 @@ class Transforms:
             own["periods"] = ()  # which are said of the vertices by number
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
-            return type(self)(**{**own, **values})
+            changed = type(self)(**{**own, **values})
+        if "assignments" not in values:
+            object.__setattr__(changed, "unlettered", self.unlettered)
+        return changed
 
     def _rim(self) -> dict[str, NDArray[np.int64]]:
         """Boundary edges (m, 2) of each family."""
