@@ -7,7 +7,8 @@ import pytest
 
 import foldyn as fd
 from foldyn.errors import InputError
-from foldyn.formats import diagnose, read_pattern
+from foldyn.formats import diagnose, read_pattern, svg
+from foldyn.formats.building import built
 from foldyn.patterns.frames import fold_angles
 
 # a square vertex with creases to its corners and, below, two lists of letters and angles
@@ -128,3 +129,111 @@ def test_a_crease_on_the_wrong_side_of_closed_cannot_be_simulated(file):
         else:
             with pytest.raises(InputError, match="folded flat upon itself"):
                 fd.discretize(pattern, sheet)
+
+
+# ------------------------------------------------------------------------------ SVG
+
+PAGE = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 60 40" width="60mm" height="40mm">'
+
+
+def drawn(inner):
+    """Letter and ends of each line of an SVG file, in mm, y down."""
+    drawing = svg.read(f"{PAGE}{inner}</svg>")
+    ends = (drawing.vertices * [1, -1])[drawing.edges].round(6).tolist()
+    return [(letter, *map(tuple, pair)) for letter, pair in zip(drawing.letters, ends, strict=True)]
+
+
+@pytest.mark.parametrize(
+    ("transform", "start", "end"),
+    [  # of a line from (2, 1) to (4, 1)
+        ("translate(3px, 2px)", (5, 3), (7, 3)),
+        ("translate(3px)", (5, 1), (7, 1)),
+        ("translateY(1cm)", (2, 1 + 96 / 2.54), (4, 1 + 96 / 2.54)),
+        ("scale(50%)", (1, 0.5), (2, 0.5)),
+        ("scaleX(3)", (6, 1), (12, 1)),
+        ("rotate(90deg)", (-1, 2), (-1, 4)),
+        ("rotate(0.25turn)", (-1, 2), (-1, 4)),
+        ("rotate(100grad) translateX(1px)", (-1, 3), (-1, 5)),
+        ("skewX(45deg)", (3, 1), (5, 1)),
+        ("skew(0.7853981634rad, 0deg)", (3, 1), (5, 1)),
+        ("matrix(0, 1, -1, 0, 5, 0)", (4, 2), (4, 4)),
+        ("none", (2, 1), (4, 1)),
+    ],
+)
+def test_css_transforms_place_lines_as_browsers_do(transform, start, end):
+    line = '<line x1="2" y1="1" x2="4" y2="1" stroke="red"'
+    wanted = [("M", tuple(np.round(start, 6)), tuple(np.round(end, 6)))]
+    assert drawn(f'{line} style="transform: {transform}"/>') == wanted
+    assert drawn(f"<style>.a {{transform: {transform}}}</style>{line} class='a'/>") == wanted
+    # CSS goes before the attribute of the element, not before that of a group
+    assert drawn(f'{line} transform="scale(9)" style="transform:{transform}"/>') == wanted
+    (moved,) = drawn(f'<g transform="translate(1,0)">{line} style="transform:{transform}"/></g>')
+    np.testing.assert_allclose(np.subtract(moved[1:], wanted[0][1:]), [[1, 0]] * 2, atol=1e-6)
+
+
+def test_transforms_about_an_origin():
+    for origin in ("2px 1px", "2 1"):
+        style = f"transform: rotate(90deg) scale(2); transform-origin: {origin}"
+        line = f'<line x1="2" y1="1" x2="4" y2="1" stroke="red" style="{style}"/>'
+        assert drawn(line) == [("M", (2, 1), (2, 5))]
+    corner = "transform: scale(2); transform-origin: left top"
+    assert drawn(f'<line x2="4" stroke="red" style="{corner}"/>') == [("M", (0, 0), (8, 0))]
+
+
+@pytest.mark.parametrize(
+    ("style", "message"),
+    [
+        ("transform: rotate(45deg); transform-origin: 50% 50%", "line 1.transform-origin: is not"),
+        ("transform: rotate(45deg); transform-origin: center", "line 1.transform-origin = "),
+        ("transform: scale(2); transform-box: fill-box", "line 1.transform-origin: is not read"),
+        ("transform: translate(10%, 0)", 'line 1.transform = "translate.10%, 0.": is no transform'),
+        ("transform: rotate3d(1, 0, 0, 60deg)", "line 1.transform = .* is no transform"),
+        ("transform: rotate(3px)", "line 1.transform = .* is no transform"),
+        ("translate: 3px 4px", 'line 1.translate = "3px 4px": is not read from CSS'),
+        ("rotate: 30deg", 'line 1.rotate = "30deg": is not read from CSS'),
+    ],
+)
+def test_css_that_moves_lines_in_other_ways_is_refused(style, message):
+    with pytest.raises(InputError, match=message):
+        drawn(f'<line x2="4" stroke="red" style="{style}"/>')
+
+
+def test_css_that_shapes_lines_is_refused():
+    with pytest.raises(InputError, match=r'circle 1\.r = "9px": is not read from CSS; write it'):
+        drawn('<style>circle {r: 9px}</style><circle r="4" stroke="red"/>')
+    assert drawn('<g style="width: 100%"/><line x2="4" stroke="blue"/>') == [("V", (0, 0), (4, 0))]
+
+
+@pytest.mark.parametrize("letter", "BMVFUC")
+@pytest.mark.parametrize("look", ["", 'stroke="none"', 'stroke="#0000ff"', 'stroke="white"'])
+def test_data_assignment_goes_before_colors(letter, look):
+    line = f'<line x2="7" {look} data-assignment="{{}}"/>'
+    wanted = [(letter, (0, 0), (7, 0))]
+    assert drawn(line.format(letter)) == drawn(line.format(letter.lower())) == wanted
+    inside = f'<g data-assignment="{letter}"><line x2="7" {look}/></g>'
+    assert drawn(inside) == wanted
+    assert drawn(f'<g data-assignment="F">{line.format(letter)}</g>') == wanted
+
+
+def test_data_fold_angles_go_before_opacity():
+    text = f"""{PAGE}<rect width="60" height="40" data-assignment="B"/>
+      <line x1="20" x2="20" y2="40" data-assignment="V" data-foldAngle="35"/>
+      <line x1="40" x2="40" y2="40" data-assignment="M" data-foldAngle="-70" opacity="0.5"/>
+      </svg>"""
+    found = built(svg.read(text))
+    assert found.pattern.assignments == ("V", "M") and not found.diagnosis.assumptions
+    np.testing.assert_allclose(np.degrees(found.pattern.fold_angles), [35, -70])
+
+
+@pytest.mark.parametrize(
+    ("attribute", "message"),
+    [
+        ('data-assignment="mountain"', "line 1.data-assignment = "),
+        ('data-assignment="M" data-foldAngle="x"', "line 1.data-foldangle = .x.: give degrees"),
+        ('data-assignment="M" data-foldAngle="200"', "line 1: a fold angle of 200 degrees"),
+        ('data-assigned="M"', "lines: there are none to be seen; .* or attributes data-assignment"),
+    ],
+)
+def test_strange_data_attributes_are_refused(attribute, message):
+    with pytest.raises(InputError, match=message):
+        built(svg.read(f'{PAGE}<line x2="7" {attribute}/></svg>'))

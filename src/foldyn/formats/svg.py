@@ -1,8 +1,9 @@
 """SVG crease patterns: lines whose colors say what they are, as Origami Simulator draws them.
 
 Red is a mountain, blue a valley, black the outline, yellow a flat crease, green a cut, magenta a
-hinge without a letter; the opacity of a mountain or valley is its fold angle over 180 degrees. y
-points down in an SVG and up in a pattern, which shows the sheet as it is drawn, from its front.
+hinge without a letter; the opacity of a mountain or valley is its fold angle over 180 degrees. The
+attributes data-assignment and data-foldAngle (letters and degrees) go before these. y points down
+in an SVG and up in a pattern, which shows the sheet as it is drawn, from its front.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ from foldyn.formats.svg_shapes import (
     curves,
     length,
     numbers,
-    placing,
+    placed_by,
 )
-from foldyn.formats.svg_styles import Rules, Style, rules_of, styled
+from foldyn.formats.svg_styles import Rules, Style, declared, rules_of, styled
 from foldyn.formats.xml_text import DEEPEST, from_xml, local
 from foldyn.values import LONGEST
 
@@ -140,12 +141,13 @@ def _walk(element: Element, outer: Placing, inherited: Style, lines: _Lines, dep
     if name in _NOT_DRAWN:
         return
     place = f'{name} "{identity}"' if identity else f"{name} {lines.counts[name]}"
-    style = styled(element, lines.rules, inherited, place)
+    given = declared(element, lines.rules, place)
+    style = styled(given, inherited, place)
     if style is None:
         return
     here = outer
-    if "transform" in element.attrib:
-        here = after(outer, placing(element.get("transform"), place))
+    if "transform" in given:
+        here = after(outer, placed_by(given, place))
     if name in SHAPES:
         if style.shown:
             found = curves(element, lines.view, place)
@@ -183,7 +185,8 @@ def _drawing(
     if not lines.curves:
         raise InputError(
             ": there are none to be seen; give crease lines a stroke (red mountains, blue valleys, "
-            "a black outline)",
+            "a black outline), or "
+            "attributes data-assignment",
             "lines",
         )
     for box, (*_, place) in zip(boxes, lines.curves, strict=True):
@@ -191,21 +194,28 @@ def _drawing(
             raise InputError(f": coordinates must be finite, and at most {LONGEST:g}", place)
     chords = Chords(boxes)
     opacities: list[float] = []
+    stated: list[float] = []
     taken: Counter[tuple[RGB, RGB | None]] = Counter()
     for (curve, here, style, place), box in zip(lines.curves, boxes, strict=True):
-        color = style.color or (0, 0, 0)
-        to = nearest(color)
-        taken[color, to] += 1
-        if to is None:
-            continue
+        letter = style.letter
+        if not letter:
+            color = style.color or (0, 0, 0)
+            to = nearest(color)
+            taken[color, to] += 1
+            if to is None:
+                continue
+            letter = COLORS[to][0]
         if curve.straight or not chords.tolerance:
             along = box[[0, -1]]
         else:
             growth = float(np.linalg.svd(here[:, :2], compute_uv=False)[0])
             along = placed(curve.points(chords.tolerance / (growth or 1.0)), here)
-        number = chords.add(along, COLORS[to][0], place)
-        opacities += [style.opacity * style.own if style.stated else np.nan] * number
+        number = chords.add(along, letter, place)
+        faint = style.stated and np.isnan(style.angle)
+        opacities += [style.opacity * style.own if faint else np.nan] * number
+        stated += [style.angle] * number
     angles, said = _fold_angles(np.array(chords.letters), np.array(opacities))
+    angles = np.where(np.isnan(stated), angles, stated)
     return chords.drawing(
         sum(not curve.straight for curve, *_ in lines.curves),
         angles,

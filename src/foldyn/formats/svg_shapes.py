@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -26,7 +27,10 @@ _UNITS = {"": 1.0, "px": 1.0, "in": 96.0, "cm": 96 / 2.54, "mm": 96 / 25.4, "q":
 _DIGITS = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LENGTH = re.compile(rf"({_DIGITS})\s*([A-Za-z%]*)", re.ASCII)
 _NUMBER = re.compile(_DIGITS, re.ASCII)
-_FUNCTION = re.compile(r"\s*(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^()]*)\)[\s,]*")
+_FUNCTION = re.compile(
+    r"\s*(matrix|translate[XY]?|scale[XY]?|rotate|skew[XY]?)\s*\(([^()]*)\)[\s,]*"
+)
+_ANGLES = {"": 1.0, "deg": 1.0, "grad": 0.9, "rad": math.degrees(1.0), "turn": 360.0}
 _LONGEST = 2000  # letters of a transform
 SHAPES = ("line", "polyline", "polygon", "rect", "circle", "ellipse", "path")
 Placing = NDArray[np.float64]
@@ -74,26 +78,63 @@ def _is_plain(text: str) -> bool:
     return text.isascii() and "_" not in text
 
 
-def placing(text: str | None, place: str) -> Placing:
-    """Affine map of a `transform`."""
+def placing(text: str, place: str) -> Placing:
+    """Affine map of a `transform`, as an attribute or in CSS."""
     from svgelements import Matrix
 
-    text = (text or "").strip()
-    if not text or text == "none":
+    text, plain, end = text.strip(), [], 0
+    if text in ("", "none"):
         return np.eye(3)[:2]
-    end = 0
-    while end < len(text) <= _LONGEST and (match := _FUNCTION.match(text, end)):
-        end = match.end()
     try:
+        while end < len(text) <= _LONGEST and (match := _FUNCTION.match(text, end)):
+            plain.append(_without_units(match[1], match[2]))
+            end = match.end()
         if end < len(text) or not _is_plain(text):
             raise ValueError
-        m = Matrix(text)
+        m = Matrix(" ".join(plain))
         found = np.array([[m.a, m.c, m.e], [m.b, m.d, m.f]], dtype=np.float64)
-    except (ValueError, TypeError, IndexError, OverflowError, AttributeError):
+    except (ValueError, TypeError, KeyError, IndexError, OverflowError, AttributeError):
         raise InputError(f" = {show(text)}: is no transform", f"{place}.transform") from None
     if not np.isfinite(found).all():
         raise InputError(f" = {show(text)}: must be finite", f"{place}.transform")
     return found
+
+
+def _without_units(name: str, arguments: str) -> str:
+    """A function of a transform in degrees and pixels, with the names that attributes have."""
+    if _LENGTH.sub("", arguments).strip(" \t\r\n,"):
+        raise ValueError(arguments)
+    kind, axis, values = name.rstrip("XY"), name[-1], []
+    for k, (digits, unit) in enumerate(_LENGTH.findall(arguments)):
+        if (kind == "rotate" and k == 0) or kind == "skew":
+            factor = _ANGLES[unit.lower()]
+        elif kind == "scale":
+            factor = {"": 1.0, "%": 0.01}[unit]
+        else:
+            factor = 1.0 if kind == "matrix" and not unit else _UNITS[unit.lower()]
+        values.append(float(digits) * factor)
+    if name == "skew":
+        x, y = (math.tan(math.radians(value)) for value in (*values, 0.0)[:2])
+        return f"matrix(1 {y!r} {x!r} 1 0 0)"
+    if kind in ("translate", "scale") and axis in "XY":
+        (value,), other = values, float(kind == "scale")
+        values, name = [value, other] if axis == "X" else [other, value], kind
+    return f"{name}({' '.join(map(repr, values))})"
+
+
+def placed_by(given: Mapping[str, str], place: str) -> Placing:
+    """Affine map of the `transform` of an element, about its `transform-origin`."""
+    here = placing(given["transform"], place)
+    words = ["0" if w in ("left", "top") else w for w in given.get("transform-origin", "").split()]
+    if given.get("transform-box", "view-box") != "view-box" or "%" in "".join(words):
+        raise InputError(
+            ": is not read where it is said by the box of the element; give the origin as lengths, "
+            "as 5px 5px, or apply the transform to the coordinates",
+            f"{place}.transform-origin",
+        )
+    x, y = (length(word, 0.0, f"{place}.transform-origin") for word in [*words, "0", "0"][:2])
+    back = np.array([[1.0, 0.0, -x], [0.0, 1.0, -y]])
+    return after(after(np.array([[1.0, 0.0, x], [0.0, 1.0, y]]), here), back)
 
 
 def after(outer: Placing, inner: Placing) -> Placing:

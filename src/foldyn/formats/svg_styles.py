@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -9,13 +10,22 @@ from typing import TYPE_CHECKING
 
 from foldyn.errors import InputError
 from foldyn.formats.line_colors import RGB
+from foldyn.formats.svg_shapes import SHAPES
 from foldyn.formats.xml_text import local
-from foldyn.values import parsed, show
+from foldyn.values import choice, parsed, show
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
-PROPERTIES = ("stroke", "stroke-opacity", "opacity", "display", "visibility", "color")
+PROPERTIES = (
+    "stroke", "stroke-opacity", "opacity", "display", "visibility", "color", "transform",
+    "transform-origin", "transform-box",
+)  # fmt: skip
+_MOVING = ("translate", "rotate", "scale")
+_SHAPING = ("d", "x", "y", "width", "height", "cx", "cy", "r", "rx", "ry")
+"""What CSS may say of elements, but is read from attributes alone."""
+ASSIGNMENT, ANGLE = "data-assignment", "data-foldangle"
+"""Attributes by which programs for FOLD files say what a line is."""
 _SELECTOR = re.compile(r"(\*|[A-Za-z][\w-]*)?((?:[.#][\w-]+)*)")
 _HEX = re.compile(r"#(?:[0-9a-f]{3,4}|[0-9a-f]{6}|[0-9a-f]{8})")
 _LONGEST = 200  # letters of a value
@@ -45,11 +55,14 @@ class Style:
     visible: bool = True
     current: RGB = (0, 0, 0)
     own: float = 1.0  # stroke-opacity, which is inherited; opacity of groups multiplies
+    letter: str = ""  # of the line, where an attribute says it
+    angle: float = math.nan  # degrees, to which an attribute says that it folds
 
     @property
     def shown(self) -> bool:
         """Whether there are lines to see."""
-        return self.visible and self.color is not None and self.opacity * self.own > 0.0
+        drawn = self.color is not None or bool(self.letter)
+        return self.visible and drawn and self.opacity * self.own > 0.0
 
 
 Rules = list[tuple[tuple[int, int], str, str, frozenset[str], dict[str, str]]]
@@ -61,7 +74,7 @@ def declarations(text: str) -> dict[str, str]:
     found = {}
     for declaration in text.split(";"):
         name, _, value = declaration.partition(":")
-        if name.strip().lower() in PROPERTIES:
+        if name.strip().lower() in (*PROPERTIES, *_MOVING, *_SHAPING):
             found[name.strip().lower()] = value.partition("!")[0].strip()
     return found
 
@@ -100,18 +113,27 @@ def _without_comments(text: str) -> str:
     return "".join((*kept, text[place:]))
 
 
-def styled(element: Element, rules: Rules, inherited: Style, place: str) -> Style | None:
-    """Style of an element in one of another style; None where nothing in it is displayed.
+def styled(given: Mapping[str, str], inherited: Style, place: str) -> Style | None:
+    """Style of an element, from what is `declared`, in one of another style.
+
+    None where nothing in it is displayed.
 
     Raises
     ------
     InputError
         A value that is none; the message names the place.
     """
-    given = _given(element, rules)
     if given.get("display") == "none":
         return None
     style = inherited
+    if ASSIGNMENT in given:
+        letter = choice(f"{place}.{ASSIGNMENT}", given[ASSIGNMENT].upper(), "BMVFUCJ")
+        style = replace(style, letter=letter)
+    if ANGLE in given:
+        try:
+            style = replace(style, angle=parsed(given[ANGLE]))
+        except ValueError:
+            raise InputError(f" = {show(given[ANGLE])}: give degrees", f"{place}.{ANGLE}") from None
     if "visibility" in given and given["visibility"] != "inherit":
         style = replace(style, visible=given["visibility"] == "visible")
     if given.get("color", "inherit") not in ("inherit", "currentColor"):
@@ -130,8 +152,16 @@ def styled(element: Element, rules: Rules, inherited: Style, place: str) -> Styl
     return style
 
 
-def _given(element: Element, rules: Rules) -> Mapping[str, str]:
+def declared(element: Element, rules: Rules, place: str) -> Mapping[str, str]:
+    """What attributes, rules and the style of an element say of its looks and place.
+
+    Raises
+    ------
+    InputError
+        CSS moves or shapes it by a property that is read as an attribute alone.
+    """
     given = {name: element.get(name, "").strip() for name in PROPERTIES if element.get(name)}
+    css: dict[str, str] = {}
     if rules:
         tag, name = local(element), element.get("id", "")
         classes = set(element.get("class", "").split())
@@ -141,8 +171,17 @@ def _given(element: Element, rules: Rules) -> Mapping[str, str]:
                 and (not rule_id or rule_id == name)
                 and rule_classes <= classes
             ):
-                given |= found
-    return given | declarations(element.get("style", ""))
+                css |= found
+    css |= declarations(element.get("style", ""))
+    shaped = _SHAPING if local(element) in (*SHAPES, "use") else ()
+    for name in (*_MOVING, *shaped):
+        if css.get(name, "none") not in ("none", "auto"):
+            raise InputError(
+                f" = {show(css[name])}: is not read from CSS; write it as an attribute",
+                f"{place}.{name}",
+            )
+    said = {key.lower(): value.strip() for key, value in element.attrib.items()}
+    return given | css | {name: said[name] for name in (ASSIGNMENT, ANGLE) if said.get(name)}
 
 
 def _rgba(value: str, style: Style, place: str) -> tuple[RGB | None, float]:
