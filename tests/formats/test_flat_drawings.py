@@ -225,7 +225,8 @@ def test_a_window_falls_out(letter):
     )
     p = found.pattern
     assert p.face_areas.sum() == pytest.approx(1 - 0.25)
-    assert "left out 1 region that cuts bound on all sides, of 2.5e+05 mm2" in repairs(found)
+    told = repairs(found) if letter == "C" else doubts(found)  # B only may mean cuts
+    assert "left out 1 region that cuts bound on all sides, of 2.5e+05 mm2" in told
     assert p.assignments.count("M") == 2
 
 

@@ -237,3 +237,44 @@ def test_data_fold_angles_go_before_opacity():
 def test_strange_data_attributes_are_refused(attribute, message):
     with pytest.raises(InputError, match=message):
         built(svg.read(f'{PAGE}<line x2="7" {attribute}/></svg>'))
+
+
+# ------------------------------------------------------------------------------ black lines inside
+
+SHEET = '<rect width="60" height="40" fill="none" stroke="black"/>'
+
+
+@pytest.mark.parametrize(
+    ("black", "leaves"),
+    [
+        ("M20 0V40", 1600),  # one crease drawn in black: a third would be lost
+        ("M20 0V40M40 0V40", 800),
+        ("M0 10H60M0 20H60M0 30H60", 600),
+        ("M0 0L60 40M60 0L0 40", 600),
+        ("M20 0V40M0 25H60", 1000),
+        ("M10 10H50V30H10ZM30 30V40M30 0V10", 800),  # a window, and the frame cut in two
+    ],
+)
+def test_black_lines_that_would_cut_pieces_off_are_refused(black, leaves):
+    edge = '<line x1="60" y2="1" x2="60" stroke="red"/>'  # with it not all lines are black
+    text = f'{PAGE}{SHEET}{edge}<path d="{black}" fill="none" stroke="black"/></svg>'
+    with pytest.raises(InputError, match=f"would leave {leaves} of its 2400 mm2: draw creases"):
+        built(svg.read(text))
+    magenta = text.replace('"none" stroke="black"/></svg>', '"none" stroke="magenta"/></svg>')
+    found = built(svg.read(magenta))
+    assert found.pattern.face_areas.sum() == pytest.approx(2400e-6)
+    assert set(found.pattern.assignments) <= {"U", "F"}
+
+
+def test_black_slits_and_windows_stay_cuts_but_are_doubted():
+    fold = '<path d="M30 0V10M30 30V40" stroke="red"/>'
+    window = '<rect x="20" y="10" width="20" height="20" fill="none" stroke="black"/>'
+    found = built(svg.read(f"{PAGE}{SHEET}{fold}{window}</svg>"))
+    assert found.pattern.face_areas.sum() == pytest.approx(2000e-6)
+    first, second = found.diagnosis.doubts
+    assert "6 lines of the outline inside the sheet taken as cuts" in first
+    assert "left out 1 region that cuts bound on all sides, of 400 mm2" in second
+    slit = '<path d="M10 0V40M50 0V40" stroke="blue"/><path d="M10 20H50" stroke="black"/>'
+    found = built(svg.read(f"{PAGE}{SHEET}{slit}</svg>"))
+    assert found.pattern.face_areas.sum() == pytest.approx(2400e-6)
+    assert "1 line of the outline inside the sheet taken as cuts" in found.diagnosis.doubts[0]

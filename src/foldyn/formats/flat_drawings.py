@@ -11,7 +11,7 @@ from foldyn.formats.lines import Lines, single, without_points
 from foldyn.formats.notes import Notes, count
 from foldyn.formats.panels import Panels, compact, with_inner_borders
 from foldyn.formats.planar import check_crowding, joined, on_lines, split, tolerance_of
-from foldyn.formats.regions import enclosed, sheet
+from foldyn.formats.regions import areas, enclosed, sheet
 
 _SAME = 1e-9  # of the size: ends that are farther apart are told of
 _PLANE = 1e-9  # of the size
@@ -55,17 +55,20 @@ def flat_panels(lines: Lines, notes: Notes) -> Panels:
             f"divided {count(divided, 'panel')} with others or openings inside into triangles, by "
             "flat creases"
         )
+    drawn = panels
     panels, cuts, folds = with_inner_borders(panels)
     if cuts:
-        notes.repairs.append(f"{count(cuts, 'line')} of the outline inside the sheet taken as cuts")
+        notes.doubts.append(f"{count(cuts, 'line')} of the outline inside the sheet taken as cuts")
     if folds:
         notes.doubts.append(
             f"all lines are of the outline's kind: the {folds} inside the sheet are taken as "
             "creases without a letter"
         )
     panels, openings, others = sheet(panels)
+    meant = _uncut(drawn, panels, openings, cuts) if cuts else len(openings)
     if len(openings):
-        notes.repairs.append(
+        told = notes.repairs if meant == len(openings) else notes.doubts
+        told.append(
             f"left out {count(len(openings), 'region')} that cuts bound on all sides, of "
             f"{1e6 * openings.sum():.4g} mm2 in all"
         )
@@ -77,6 +80,26 @@ def flat_panels(lines: Lines, notes: Notes) -> Panels:
     if len(others) > 3:
         notes.doubts.append(f"left out {len(others) - 3} more such sheets")
     return compact(panels)
+
+
+def _uncut(drawn: Panels, kept: Panels, openings: NDArray, cuts: int) -> int:
+    """Openings that there are without lines of the outline that are taken for cuts.
+
+    Raises
+    ------
+    InputError
+        These lines cut pieces off the sheet.
+    """
+    whole, meant, _ = sheet(drawn)
+    before, after = areas(whole).sum(), areas(kept).sum()
+    if before - after - (openings.sum() - meant.sum()) > _SAME * before:
+        raise InputError(
+            f": {cuts} of the outline's kind (black, B) are inside the sheet; as cuts they would "
+            f"leave {1e6 * after:.4g} of its {1e6 * before:.4g} mm2: draw creases as such (those "
+            "without a letter magenta, U), and what cuts pieces off as cuts (green, C)",
+            "lines",
+        )
+    return len(meant)
 
 
 def _in_plane(lines: Lines, notes: Notes) -> Lines:
