@@ -22,10 +22,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from foldyn.mechanics.dihedral import dihedrals_and_gradients
 from foldyn.patterns import Pattern
+from foldyn.statics.folding.curvature import Curvature, Parts
 from foldyn.structures.mesh import lengths, n4b5
 
 SIGNS = {"M": -1.0, "V": 1.0, "F": 0.0, "U": 0.0}
@@ -58,11 +58,11 @@ class Shape(NamedTuple):
 
 
 class Evaluated(NamedTuple):
-    """A shape with the gradient of its energy (m,) and its Gauss-Newton matrix (m, m)."""
+    """A shape with its energy, and what its gradient and its matrix are made of."""
 
     shape: Shape
-    gradient: NDArray
-    matrix: sparse.csc_array
+    bars: Parts
+    hinges: Parts
 
 
 class FoldEnergy:
@@ -93,11 +93,7 @@ class FoldEnergy:
         x = (pattern.vertices - self.center) / self.size
         self._bars, self._hinges = bars, np.ascontiguousarray(hinges, np.uint32)
         self._length, self._axis = lengths(x, bars), lengths(x, hinges[:, :2])
-        columns = [_dofs(bars), _dofs(hinges)]
-        rows = [np.repeat(np.arange(len(bars)), 6)]
-        rows.append(len(bars) + np.repeat(np.arange(len(hinges)), 12))
-        self._places = np.concatenate(rows), np.concatenate([c.ravel() for c in columns])
-        self._shape = len(bars) + len(hinges), x.size
+        self.curvature = Curvature(bars, hinges, len(x))
         turns, _ = self._turns(x, np.zeros(len(hinges)))
         # the letter, not the geometry, says which way a closed crease has turned
         apart = math.pi - pattern.dihedrals - turns[self.bends :]
@@ -144,15 +140,34 @@ class FoldEnergy:
         twice = self._length @ strains**2 + self._axis @ (pull * offset)
         twice += stiffness.sides * (self._axis[self.bends :] @ beyond**2)
         pull[self.bends :] += stiffness.sides * self.signs * beyond
-        jacobian = sparse.csr_array(
-            (np.concatenate([np.hstack([-along, along]).ravel(), gradients.ravel()]), self._places),
-            self._shape,
+        return Evaluated(
+            Shape(x, turns, strains, 0.5 * float(twice)),
+            Parts(np.hstack([-along, along]), self._length, self._length * strains),
+            Parts(gradients, self._axis * slope, self._axis * pull),
         )
-        gradient = jacobian.T @ np.concatenate([self._length * strains, self._axis * pull])
-        scale = np.sqrt(np.concatenate([self._length, self._axis * slope]))
-        scaled = sparse.csr_array(jacobian.multiply(scale[:, None]))
-        matrix = sparse.csc_array(scaled.T @ scaled)
-        return Evaluated(Shape(x, turns, strains, 0.5 * float(twice)), gradient, matrix)
+
+    def gradient(self, at: Evaluated) -> NDArray:
+        """Gradient (m,) of the energy."""
+        out = np.zeros(at.shape.x.size)
+        for nodes, own in ((self._bars, at.bars), (self._hinges, at.hinges)):
+            forces = own.gradients * own.pulls[:, None]
+            out += np.bincount(_dofs(nodes).ravel(), forces.ravel(), out.size)
+        return out
+
+    def expected(self, at: Evaluated, step: NDArray) -> tuple[NDArray, NDArray]:
+        """What bars (nb,) and hinges (nh,) pull with after a step (n, 3), to first order."""
+        bars, hinges = (
+            own.pulls
+            + own.slopes * np.einsum("kd,kd->k", own.gradients, step[nodes].reshape(len(nodes), -1))
+            for nodes, own in ((self._bars, at.bars), (self._hinges, at.hinges))
+        )
+        return bars, hinges
+
+    def matrix(self, at: Evaluated, pulls: tuple[NDArray, NDArray] | None = None) -> NDArray:
+        """Entries of the matrix where bars and hinges pull so, or of its Gauss-Newton part."""
+        pulls = pulls or (0.0 * at.bars.pulls, 0.0 * at.hinges.pulls)
+        parts = (own._replace(pulls=pull) for own, pull in zip(at[1:], pulls, strict=True))
+        return self.curvature.matrix(at.shape.x, *parts)
 
     def _stretch(self, x: NDArray) -> tuple[NDArray, NDArray]:
         """Strains (nb,) of bars and their gradients (nb, 3) with respect to the second end."""

@@ -52,7 +52,9 @@ def folded_pattern(pattern: Pattern, energy: FoldEnergy, shape: Shape, x: NDArra
     """
     bent = np.abs(shape.turns - energy.rest)[: len(energy.diagonals)] > PLANE
     cut = np.setdiff1d(energy.diagonal_panel[bent], _with_slivers(energy, x))
-    faces = [face for number, face in enumerate(pattern.faces) if number not in set(cut.tolist())]
+    whole = np.ones(len(pattern.faces), bool)
+    whole[cut] = False
+    faces = [face for face, kept in zip(pattern.faces, whole, strict=True) if kept]
     pieces = energy.triangles[np.isin(energy.triangle_panel, cut)]
     inside = np.sort(energy.diagonals[np.isin(energy.diagonal_panel, cut)], axis=1)
     welds = np.concatenate([pattern.welds, inside])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from foldyn.patterns import Pattern
 from foldyn.statics.folding.energy import Aim, FoldEnergy, Shape, Stiffness
-from foldyn.statics.folding.minimum import minimum
+from foldyn.statics.folding.minimum import lowest, minimum, settled
 from foldyn.statics.folding.starts import FIRST_TURN, ajar, composed, opened
 
 PLATES = Stiffness(bends=0.3, creases=1e-3, sides=0.1)  # panels that hardly bend
@@ -20,7 +20,8 @@ THIN = Stiffness(bends=1e-3, creases=1e-3, sides=1.0)
 CLOSING = 10.0  # stiffness of sides, so that closed creases stay within 180
 AJAR = math.radians(179.8)  # most turn of creases that are to open from the folded state
 FREE_MARGIN = math.radians(1.0)  # of mountains and valleys without an angle to reach
-WEAKER = (1e-3, 1e-6, 1e-9)  # springs of the creases, while what they held is let go
+WEAKER = 1e-3  # springs of the creases, before what they held is let go
+LESS = 0.3  # of the strain must be left with these
 HELD = 0.2  # of what creases have turned: change by which a state counts as kept
 TURNED = 1e-3  # rad, least turn that counts as one
 ISOMETRIC = 1e-9  # strain
@@ -99,14 +100,20 @@ def _followed(
 
     Where springs cannot be let go at a step, that is not tried again before the last one.
     """
-    shapes, shares, lets_go = [first], [0.0], True
+    shapes, shares, before, plane = [first], [0.0], shape, True
+    lets_go = True
     for k in range(1, steps + 1):
         aimed = angles[0] + (angles[1] - angles[0]) * (k / steps)
         last = k == steps
         aim = _aim(energy, aimed, most)
-        shape = minimum(energy, shape, aim, stiffness, settled=1e-10 if last else 1e-4)
-        kept = relaxed(energy, stiffness, shape, aim, angles[0]) if lets_go or last else None
+        ahead = 2.0 * shape.x - before.x
+        before, shape = shape, lowest(energy, shape, ahead, aim, stiffness)
+        shape = minimum(energy, shape, aim, stiffness, least=1e-10 if last else 1e-4)
+        kept = None
+        if lets_go or last:
+            kept = relaxed(energy, stiffness, shape, aim, angles[0], plane or last)
         lets_go = kept is not None
+        plane = kept is not None and energy.bent(kept.turns).max(initial=0.0) <= PLANE
         if last and kept is None:
             kept = eased(energy, stiffness, shape, aim, angles[0])
         shapes.append(shape if kept is None else kept)
@@ -116,34 +123,32 @@ def _followed(
 
 
 def relaxed(
-    energy: FoldEnergy, stiffness: Stiffness, shape: Shape, aim: Aim, first: NDArray
+    energy: FoldEnergy, stiffness: Stiffness, shape: Shape, aim: Aim, first: NDArray, plane: bool
 ) -> Shape | None:
     """The shape without the springs of its creases, if it stays near.
 
     How near is measured by how far the creases have turned since the `first` state.
 
-    First panels stay as stiff as they are, so that they end plane if the pattern can be folded
-    rigidly; failing that they bend as they like, as thin paper does.
+    First, if they may end `plane`, panels stay as stiff as they are, as in a pattern that can be
+    folded rigidly; failing that they bend as they like, as thin paper does.
     """
     wrong = len(wrong_ways(energy, shape.turns, aim.angles))
     turned = np.abs(energy.creases(shape.turns) - first).sum() + TURNED
     aim = aim._replace(least=np.zeros_like(energy.signs))
-    for thin in (False, True):
-        kept = shape
-        for weaker in WEAKER:
-            weak = stiffness._replace(
-                bends=stiffness.bends * (weaker if thin else 1.0),
-                creases=stiffness.creases * weaker,
-            )
-            settled = 1e-10 if weaker == WEAKER[-1] else 1e-6
-            before = largest_strain(kept)
-            kept = minimum(energy, kept, aim, weak, settled=settled)
-            moved = np.abs(energy.creases(kept.turns - shape.turns)).sum()
-            if moved > HELD * turned or largest_strain(kept) > max(ISOMETRIC, 0.3 * before):
-                break  # elsewhere, or strained by more than the springs
-        else:
-            if len(wrong_ways(energy, kept.turns, aim.angles)) <= wrong:
-                return kept
+    free = aim._replace(angles=np.full_like(aim.angles, np.nan))
+    for thin in (False, True) if plane else (True,):
+        bends = stiffness.bends * np.array([WEAKER, 0.0] if thin else [1.0, 1.0])
+        weak = stiffness._replace(bends=bends[0], creases=stiffness.creases * WEAKER)
+        kept: Shape | None = minimum(energy, shape, aim, weak)
+        if largest_strain(kept) > max(ISOMETRIC, LESS * largest_strain(shape)):
+            continue  # strained by more than the springs
+        kept = settled(energy, kept, free, weak._replace(bends=bends[1], creases=0.0), 1e-10)
+        if kept is None or largest_strain(kept) > ISOMETRIC:
+            continue
+        if np.abs(energy.creases(kept.turns - shape.turns)).sum() > HELD * turned:
+            continue  # elsewhere
+        if len(wrong_ways(energy, kept.turns, aim.angles)) <= wrong:
+            return kept
     return None
 
 
