@@ -17,8 +17,9 @@ PANELS = np.array([0, 0, 1, 1])
 def of_squares(other) -> float:
     points = np.vstack([SQUARE, other])
     found = clearance(points, TRIANGLES, PANELS)
-    vector = found.weights @ points[found.nodes]
-    assert np.linalg.norm(vector) == pytest.approx(found.distance, abs=1e-15)
+    vectors = np.einsum("kn,kna->ka", found.weights, points[found.nodes])
+    assert len(vectors)
+    assert np.linalg.norm(vectors, axis=1) == pytest.approx(found.distance, rel=1e-8)
     return found.distance
 
 
@@ -37,6 +38,17 @@ UPRIGHT = SQUARE[:, [0, 2, 1]]
 )
 def test_two_squares(other, shift, distance):
     assert of_squares(other + np.array(shift)) == pytest.approx(distance, rel=1e-12)
+
+
+def test_all_points_that_are_closest_are_told():
+    """Of a tilted square the two corners of its lower side; turned a little one of them alone."""
+    tilted = SQUARE * [0.6, 0.6, 0.0] + [0.2, 0.2, 0.3] + SQUARE[:, [2, 2, 1]]
+    assert of_squares(tilted) == pytest.approx(0.3)
+    found = clearance(np.vstack([SQUARE, tilted]), TRIANGLES, PANELS)
+    assert {4, 5} <= set(found.nodes[np.abs(found.weights) == 1.0].tolist())
+    tilted[1, 2] += 1e-3
+    found = clearance(np.vstack([SQUARE, tilted]), TRIANGLES, PANELS)
+    assert {*found.nodes[found.weights == 1.0].tolist()} == {4}
 
 
 def test_panels_that_cross_have_none():

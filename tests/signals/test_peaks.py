@@ -8,6 +8,7 @@ from known_poles import SPECIMEN, Mode, receptance
 
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.signals import find_peaks, half_power, spectrum
+from foldyn.signals.peaks import magnitude_curve
 
 F0 = 9.3
 ORDERS = {"receptance": 0, "mobility": 1, "accelerance": 2}
@@ -31,6 +32,39 @@ def test_the_peak_of_a_mode_is_exact_between_samples(quantity, z):
     if quantity == "receptance":  # 1 / (2 z sqrt(1 - z^2)) times the static value
         static = receptance(np.zeros(1), Mode(F0, z))[0].real
         assert peaks.height[0] / static == pytest.approx(1 / (2 * z * np.sqrt(1 - z**2)))
+
+
+@pytest.mark.parametrize("spacing", [0.2, 1e-2, 1e-4, 1e-5])
+@pytest.mark.parametrize("quantity", ORDERS)
+def test_a_peak_follows_its_mode_however_close_the_samples(quantity, spacing):
+    """Its slopes by the samples, with how these change as the mode's numbers do."""
+    z, h = 0.03, 1e-4
+    dip = np.sqrt(1 - 2 * z**2)
+    at = {"receptance": F0 * dip, "mobility": F0, "accelerance": F0 / dip}[quantity]
+    f = at + spacing * (np.arange(5) - 1.7)
+    one = magnitude_curve(f, curve(f, quantity, Mode(F0, z)), quantity)
+    slopes, size = one.peak_slopes(2), one.size[1:4]
+
+    def rate(ahead, behind):
+        return (curve(f, quantity, ahead) - curve(f, quantity, behind))[1:4] / (2.0 * h)
+
+    by_frequency = rate(Mode(F0 * (1 + h), z), Mode(F0 * (1 - h), z))
+    assert slopes.frequency @ by_frequency == pytest.approx(at, rel=1e-4)
+    by_damping = rate(Mode(F0, z * (1 + h)), Mode(F0, z * (1 - h)))
+    height = one.peak(2)[1]
+    root = {"receptance": 1 - 2 * z**2, "mobility": 1 - z**2, "accelerance": 1 - 2 * z**2}
+    falls = root[quantity] / (1 - z**2)  # of 1 / (2 z sqrt(1 - z^2)), or of 1 / (2 z)
+    assert slopes.height @ by_damping == pytest.approx(-falls * height, rel=1e-4)
+    assert slopes.height @ size == pytest.approx(height, rel=1e-9)  # twice as high
+    rounding = 1e-9 * np.abs(slopes.frequency) @ size
+    assert slopes.frequency @ size == pytest.approx(0.0, abs=rounding)
+
+
+def test_a_kink_is_not_shaped_like_a_mode():
+    size = np.array([0.1, 0.999, 1.0, 0.01, 0.01])
+    one = magnitude_curve(np.arange(1.0, 6.0), size, "receptance")
+    assert one.peak_slopes(2) is None
+    assert one.peak(2) == (3.0, 1.0)
 
 
 def test_several_peaks_their_prominence_and_their_number():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +14,6 @@ from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.gradients.numbers import Gradient
 from foldyn.linear.frf import quantity_of
-from foldyn.mechanics.contact.clearance import Clearance
 from foldyn.signals.peaks import magnitude_curve
 from foldyn.statics import Equilibrium, Landscape
 from foldyn.sweeps.measure import Asked, asked
@@ -23,7 +22,6 @@ from foldyn.sweeps.measures import (
     closest_panels,
     curve_of,
     frequency_of,
-    highest,
     intervals,
     sampled,
     time_of,
@@ -34,19 +32,36 @@ Seeds = dict[str, NDArray]
 """Derivatives of a number by variables of a result, of their shapes, by name."""
 
 
+TIE = 1e-9
+"""Relative difference below which two numbers are one, but for rounding."""
+
+
 class Derivative(NamedTuple):
     """The derivative of a measure.
 
     seeds : of a result and a case, with the measure's arguments.
     frozen : of a measure that also takes numbers of the case itself: of the result, or what
         measures come through, and the case, the measure as a function of another case, where the
-        result stays as it is.
+        result stays as it is. Differences are taken of it: it must be smooth.
     numbers : of the same the derivatives of such a measure by numbers of the case.
+    places : of the same, for an extreme: all places where it is reached, of which `seeds` and
+        `frozen` take one as `at`. It has a derivative where all of them have the same.
+    cut : whether it depends on the lengths to which bars are cut, beside the result.
     """
 
     seeds: Callable[..., Seeds]
     frozen: Callable[..., Callable[[Case], float]] | None = None
     numbers: Callable[..., Gradient] | None = None
+    places: Callable[..., Sequence[Any]] | None = None
+    cut: bool = False
+
+
+def _largest(numbers: NDArray) -> list[tuple[int, ...]]:
+    """Where the largest of some numbers stand: that of all first, then those that tie with it."""
+    top = numbers.max()
+    tied = np.argwhere(numbers >= top - TIE * abs(top))
+    order = np.argsort(-numbers[tuple(tied.T)], kind="stable")
+    return [tuple(place) for place in tied[order].tolist()]
 
 
 def _of_mode(variable: str) -> Derivative:
@@ -103,19 +118,18 @@ def _velocity(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
     return {"velocity": seeds["displacement"]}
 
 
-def _extreme(which: Callable[[NDArray], Any]) -> Callable[..., Seeds]:
-    def seeds(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
-        motion = _moved(result, node, axis)
-        k = int(which(motion))
-        rivals = np.flatnonzero(motion == motion[k])
-        if len(rivals) > 1 and motion.any():
-            raise InputError(
-                f"is reached at {len(rivals)} samples at once, which part as the design changes: "
-                "it has no derivative; take displacement_at of one of them, or mean_square"
-            )
-        return _samples(result, node, axis, _one(len(motion), k))
+def _extreme(sign: float) -> Derivative:
+    """The highest displacement of a node (sign 1), or the lowest one (-1)."""
 
-    return seeds
+    def places(result: xr.Dataset, case: Case, node: int, axis: str) -> list[tuple[int, ...]]:
+        return _largest(sign * _moved(result, node, axis))
+
+    def seeds(
+        result: xr.Dataset, case: Case, at: tuple[int], node: int, axis: str
+    ) -> Seeds:  # fmt: skip
+        return _samples(result, node, axis, _one(result.sizes["time"], *at))
+
+    return Derivative(seeds, places=places)
 
 
 def _trapezoid(result: xr.Dataset) -> NDArray:
@@ -137,85 +151,112 @@ def _mean_square(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
     return _samples(result, node, axis, 2.0 * weights * motion / weights.sum())
 
 
-def _largest_displacement(result: xr.Dataset, case: Case, node: int | None = None) -> Seeds:
-    moved = _all_moved(result)
-    size = np.linalg.norm(moved, axis=-1)
+def _moved_farthest(
+    result: xr.Dataset, case: Case, node: int | None = None
+) -> list[tuple[int, ...]]:
+    size = np.linalg.norm(_all_moved(result), axis=-1)
     if node is not None:
         size = np.where(np.arange(size.shape[1]) == node, size, -1.0)
-    k, i = np.unravel_index(size.argmax(), size.shape)
-    out = np.zeros_like(moved)
-    if not size[k, i] > 0.0:
+    if not size.max() > 0.0:
         raise InputError("is 0, where a size has no derivative")
-    out[k, i] = moved[k, i] / size[k, i]
+    return _largest(size)
+
+
+def _largest_displacement(
+    result: xr.Dataset, case: Case, at: tuple[int, int], node: int | None = None
+) -> Seeds:
+    moved = _all_moved(result)
+    out = np.zeros_like(moved)
+    out[at] = moved[at] / np.linalg.norm(moved[at])
     return {"displacement": out}
 
 
-class _Strained(NamedTuple):
-    """The bar that is strained most: its number, its ends, how they move, and the sample."""
+def _strained_most(result: xr.Dataset, case: Case) -> list[tuple[int, ...]]:
+    """Samples and bars with the largest strain."""
+    return _largest(np.abs(bar_strain(case.structure, _all_moved(result))))
 
-    bar: int
+
+class _Bar(NamedTuple):
+    """A bar that is stretched (sign 1) or shortened (-1), whose ends move apart by so much (m)."""
+
     ends: NDArray  # (2,)
-    apart: NDArray  # (3,) displacement of the second less that of the first, m
-    sample: int
-    moved: NDArray  # (samples, n, 3)
+    apart: NDArray  # (3,)
+    sign: float
 
     def strain(self, case: Case) -> tuple[NDArray, float]:
-        """Its vector, m, and its strain in a case."""
+        """Its vector at rest, m, and the size of its strain; small ones keep all their digits."""
         a, b = case.structure.nodes[self.ends]
-        vector = b - a + self.apart
-        return vector, float(np.linalg.norm(vector) / case.structure.bar_length[self.bar] - 1.0)
+        rest = b - a
+        excess = float((2.0 * rest + self.apart) @ self.apart / (rest @ rest))
+        return rest, self.sign * excess / (1.0 + np.sqrt(1.0 + excess))
 
 
-def _strained(result: xr.Dataset, case: Case) -> _Strained:
-    moved = _all_moved(result)
-    size = np.stack([np.abs(bar_strain(case.structure, u[None])[0]) for u in moved])
-    k, e = (int(i) for i in np.unravel_index(size.argmax(), size.shape))
-    ends = case.structure.bars[e]
-    return _Strained(e, ends, moved[k, ends[1]] - moved[k, ends[0]], k, moved)
+def _bar(result: xr.Dataset, case: Case, at: tuple[int, int]) -> _Bar:
+    sample, bar = at
+    ends, moved = case.structure.bars[bar], _all_moved(result)[sample]
+    one = _Bar(ends, moved[ends[1]] - moved[ends[0]], 1.0)
+    return one._replace(sign=float(np.sign(one.strain(case)[1])))
 
 
-def _strain(result: xr.Dataset, case: Case) -> Seeds:
-    found = _strained(result, case)
-    vector, strain = found.strain(case)
-    length = np.linalg.norm(vector) * case.structure.bar_length[found.bar]
-    out = np.zeros_like(found.moved)
-    out[found.sample, found.ends[1]] = np.sign(strain) * vector / length
-    out[found.sample, found.ends[0]] = -out[found.sample, found.ends[1]]
+def _strain(result: xr.Dataset, case: Case, at: tuple[int, int]) -> Seeds:
+    one = _bar(result, case, at)
+    rest, _ = one.strain(case)
+    present = rest + one.apart
+    out = np.zeros_like(_all_moved(result))
+    size = np.linalg.norm(present) * np.linalg.norm(rest)
+    out[at[0], one.ends[1]] = one.sign * present / size
+    out[at[0], one.ends[0]] = -out[at[0], one.ends[1]]
     return {"displacement": out}
 
 
-def _strain_of(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
-    found = _strained(result, case)
-    return lambda other: abs(found.strain(other)[1])
+def _strain_of(result: xr.Dataset, case: Case, at: tuple[int, int]) -> Callable[[Case], float]:
+    one = _bar(result, case, at)
+    return lambda other: one.strain(other)[1]
 
 
-def _clearance(result: xr.Dataset, case: Case) -> Seeds:
-    sample, found = _apart(result, case)
-    if "displacement" not in result or "mode" in result.dims:
-        return {}
-    moved = _all_moved(result)
-    vector = found.weights @ (case.structure.nodes + moved[sample])[found.nodes]
-    out = np.zeros_like(moved)
-    out[sample, found.nodes] = np.outer(found.weights, vector / found.distance)
-    return {"displacement": out}
+class _Apart(NamedTuple):
+    """Two points of panels that are closest, in a sample; see `Clearance`."""
+
+    sample: int
+    nodes: NDArray  # (4,)
+    weights: NDArray  # (4,)
+    moved: NDArray  # (n, 3) of all nodes, m
+
+    def vector(self, case: Case) -> NDArray:
+        """From one to the other (3,), m."""
+        return self.weights @ (case.structure.nodes + self.moved)[self.nodes]
+
+    def along(self, case: Case) -> NDArray:
+        """The same, of the length 1."""
+        vector = self.vector(case)
+        return vector / np.linalg.norm(vector)
 
 
-def _apart(result: xr.Dataset, case: Case) -> tuple[int, Clearance]:
-    sample, found = closest_panels(result, case)
-    if not found.distance > 0.0:
+def _closest(result: xr.Dataset, case: Case) -> list[_Apart]:
+    """All pairs of points of panels that are closest."""
+    found = closest_panels(result, case)
+    distance = np.array([one.distance for one in found])
+    if not distance.min() > 0.0:
         raise InputError("is 0, where panels touch or cross, and a distance has no derivative")
-    return sample, found
+    moved = np.zeros((1, 1, 3)) if "mode" in result.dims else _all_moved(result)
+    return [
+        _Apart(k, *pair, moved[k])
+        for (k,) in _largest(-distance)
+        for pair in zip(found[k].nodes, found[k].weights, strict=True)
+    ]
 
 
-def _clearance_of(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
-    sample, found = _apart(result, case)
-    moved = _all_moved(result)[sample] if "mode" not in result.dims else 0.0
+def _clearance(result: xr.Dataset, case: Case, at: _Apart) -> Seeds:
+    if "mode" in result.dims:
+        return {}
+    out = np.zeros_like(_all_moved(result))
+    out[at.sample, at.nodes] = np.outer(at.weights, at.along(case))
+    return {"displacement": out}
 
-    def distance(other: Case) -> float:
-        places = (other.structure.nodes + moved)[found.nodes]
-        return float(np.linalg.norm(found.weights @ places))
 
-    return distance
+def _clearance_of(result: xr.Dataset, case: Case, at: _Apart) -> Callable[[Case], float]:
+    along = at.along(case)
+    return lambda other: float(along @ at.vector(other))  # the size turns round where they touch
 
 
 def _reaction(result: xr.Dataset, case: Case, axis: str) -> Seeds:
@@ -224,21 +265,30 @@ def _reaction(result: xr.Dataset, case: Case, axis: str) -> Seeds:
     return {"reaction": out}
 
 
-def _strain_energy(result: xr.Dataset, case: Case) -> Seeds:
-    u, k = _strained_most(result, case)
-    out = np.zeros((len(u), *u[0].shape))
-    out[k] = _forces(case, u[k])
+def _strain_energies(result: xr.Dataset, case: Case) -> NDArray:
+    """Of all samples, J."""
+    return sum(result[name].values for name in case.energy_groups)  # type: ignore
+
+
+def _tensest(result: xr.Dataset, case: Case) -> list[tuple[int, ...]]:
+    return _largest(_strain_energies(result, case))
+
+
+def _strain_energy(result: xr.Dataset, case: Case, at: tuple[int]) -> Seeds:
+    u, energy = _all_moved(result), _strain_energies(result, case)[at]
+    if abs(_energy(case, u[at]) - energy) > TIE * energy:
+        raise InputError(
+            "has no derivative where turns of edges lag behind the nodes, as damping makes them; "
+            'leave out beta, or take a structure without such turns, as preset = "plate"'
+        )
+    out = np.zeros(u.shape)
+    out[at] = _forces(case, u[at])
     return {"displacement": out}
 
 
-def _strained_most(result: xr.Dataset, case: Case) -> tuple[NDArray, int]:
-    energy = sum(result[name].values for name in case.energy_groups)
-    return _all_moved(result), int(np.argmax(energy))
-
-
-def _strain_energy_of(result: xr.Dataset, case: Case) -> Callable[[Case], float]:
-    u, k = _strained_most(result, case)
-    return lambda other: _energy(other, u[k])
+def _strain_energy_of(result: xr.Dataset, case: Case, at: tuple[int]) -> Callable[[Case], float]:
+    u = _all_moved(result)[at]
+    return lambda other: _energy(other, u)
 
 
 def _forces(case: Case, u: NDArray) -> NDArray:
@@ -266,17 +316,26 @@ def _load_at(result: xr.Dataset, case: Case, node: int, axis: str, displacement:
     return {"load_at": {(3 * node + AXES.index(axis), displacement): 1.0}}
 
 
-def _between_states(pair: Callable[[Landscape], tuple[Equilibrium, Equilibrium]]) -> Derivative:
-    """Energy of a state above that of another, both without force: it has no other derivative."""
+def _climb(start: int, end: int) -> Derivative:
+    """Energy from one stable state to the top on the way to another: it has no other derivative."""
 
-    def frozen(found: Landscape, case: Case) -> Callable[[Case], float]:
-        high, low = (state.displacement for state in pair(found))
+    def places(found: Landscape, case: Case) -> list[tuple[Equilibrium, Equilibrium]]:
+        stable = found.stable
+        if len(stable) < 2:
+            raise InputError("there are no two stable states, and so no barrier between them")
+        first, last = sorted(found.states.index(stable[k]) for k in (start, end))
+        between = found.states[first : last + 1]
+        tops = _largest(np.array([state.energy for state in between]))
+        return [(between[k], stable[start]) for (k,) in tops]
+
+    def frozen(found: Landscape, case: Case, at: Any) -> Callable[[Case], float]:
+        high, low = (state.displacement for state in at)
         return lambda other: _energy(other, high) - _energy(other, low)
 
-    def numbers(landscape: Landscape, case: Case) -> Gradient:
+    def numbers(landscape: Landscape, case: Case, at: Any) -> Gradient:
         if not case.imposed_terms:
             return {}
-        high, low = pair(landscape)
+        high, low = at
         motion = sum((vector for vector, _ in case.imposed_terms), np.zeros_like(high.displacement))
         size = np.abs(motion).max()
         found = {}
@@ -287,16 +346,7 @@ def _between_states(pair: Callable[[Landscape], tuple[Equilibrium, Equilibrium]]
             )
         return found
 
-    return Derivative(_nothing, frozen, numbers)
-
-
-def _climb(found: Landscape, start: int, end: int) -> tuple[Equilibrium, Equilibrium]:
-    stable = found.stable
-    if len(stable) < 2:
-        raise InputError("there are no two stable states, and so no barrier between them")
-    places = sorted(found.states.index(stable[k]) for k in (start, end))
-    between = found.states[places[0] : places[1] + 1]
-    return max(between, key=lambda state: state.energy), stable[start]
+    return Derivative(_nothing, frozen, numbers, places, cut=True)
 
 
 # ------------------------------------------------------------------ frequency responses
@@ -319,35 +369,32 @@ def _sizes(result: xr.Dataset, node: int, axes: list[int], weights: Mapping[int,
     return {name: out}
 
 
-def _peak(which: int) -> Callable[..., Seeds]:
-    """Of the frequency (0) or the height (1) of the highest peak, from the samples around it."""
+def _peak(what: str) -> Derivative:
+    """Of the "frequency" or the "height" of the highest peak, from the samples around it."""
 
-    def seeds(result: xr.Dataset, case: Case, node: int, axis: str | None = None) -> Seeds:
+    def places(
+        result: xr.Dataset, case: Case, node: int, axis: str | None = None
+    ) -> list[tuple[int, ...]]:
         if "frequency" not in result.dims:
             raise InputError("of a spectrum of a motion has no derivative; take that of an frf")
+        return _largest(curve_of(result, node, axis)[2].height)
+
+    def seeds(
+        result: xr.Dataset, case: Case, at: tuple[int], node: int, axis: str | None = None
+    ) -> Seeds:  # fmt: skip
         f, size, peaks, kind = curve_of(result, node, axis)
-        best = highest(peaks)
-        if best is None:
-            raise InputError("there is no peak among these frequencies; take others")
-        at = int(peaks.index[best])
-        if (peaks.frequency[best], peaks.height[best]) == (f[at], size[at]):
-            raise InputError("the peak has not the shape of a mode; take closer frequencies")
-        near, weights = np.arange(at - 1, at + 2), {}
-        for k in near:
-            change = 1e-3 * size[k] * (np.arange(len(size)) == k)
-            there = [
-                magnitude_curve(f, size + share * change, kind).peak(at)[which]
-                for share in (1.0, -1.0, 2.0, -2.0)
-            ]
-            slope = (8.0 * (there[0] - there[1]) - (there[2] - there[3])) / (12e-3 * size[k])
-            weights[int(np.searchsorted(result["frequency"].values, f[k]))] = slope
+        near = int(peaks.index[at]) + np.arange(-1, 2)
+        slopes = magnitude_curve(f, size, kind).peak_slopes(int(near[1]))
+        if slopes is None:
+            raise InputError("the peak has not the shape of a mode; take other frequencies")
+        rows = np.searchsorted(result["frequency"].values, f[near]).tolist()
         axes = list(range(len(AXES))) if axis is None else [AXES.index(axis)]
-        return _sizes(result, node, axes, weights)
+        return _sizes(result, node, axes, dict(zip(rows, getattr(slopes, what), strict=True)))
 
-    return seeds
+    return Derivative(seeds, places=places)
 
 
-def _nothing(result: xr.Dataset, case: Case) -> Seeds:
+def _nothing(result: xr.Dataset, case: Case, **_: Any) -> Seeds:
     return {}
 
 
@@ -359,22 +406,22 @@ DERIVATIVES: Mapping[str, Derivative] = {
     "displacement": Derivative(_displacement),
     "displacement_at": Derivative(_displacement_at),
     "velocity": Derivative(_velocity),
-    "maximum": Derivative(_extreme(np.argmax)),
-    "minimum": Derivative(_extreme(np.argmin)),
+    "maximum": _extreme(1.0),
+    "minimum": _extreme(-1.0),
     "integral": Derivative(_integral),
     "mean_square": Derivative(_mean_square),
-    "largest_displacement": Derivative(_largest_displacement),
-    "strain": Derivative(_strain, frozen=_strain_of),
-    "strain_energy": Derivative(_strain_energy, frozen=_strain_energy_of),
-    "clearance": Derivative(_clearance, frozen=_clearance_of),
+    "largest_displacement": Derivative(_largest_displacement, places=_moved_farthest),
+    "strain": Derivative(_strain, _strain_of, places=_strained_most, cut=True),
+    "strain_energy": Derivative(_strain_energy, _strain_energy_of, places=_tensest, cut=True),
+    "clearance": Derivative(_clearance, _clearance_of, places=_closest),
     "reaction": Derivative(_reaction),
     "limit_load": Derivative(_limit_load),
     "load_at": Derivative(_load_at),
     "response": Derivative(_response),
-    "peak_frequency": Derivative(_peak(0)),
-    "peak_height": Derivative(_peak(1)),
-    "barrier": _between_states(lambda found: _climb(found, 0, 1)),
-    "barrier_back": _between_states(lambda found: _climb(found, 1, 0)),
+    "peak_frequency": _peak("frequency"),
+    "peak_height": _peak("height"),
+    "barrier": _climb(0, 1),
+    "barrier_back": _climb(1, 0),
 }
 """By the name of the measure."""
 

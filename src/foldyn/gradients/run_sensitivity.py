@@ -73,6 +73,7 @@ ARRAYS = (
     "node_mass",
 )  # fmt: skip
 """Arrays of a structure that can be parameters as they are."""
+SAME, ROUNDING = 1e-6, 1e-9  # of derivatives, and of a number: derivatives that are one
 Source = Callable[..., Case] | Case | str | os.PathLike[str]
 Own = tuple[Callable[..., float], Callable[..., Seeds]]
 
@@ -154,12 +155,12 @@ def sensitivity(
     case = design.case()
     found = source.analyse(case)
     slopes = design.slopes(found.numbers)
-    if isinstance(build, Case) and LENGTH in slopes:
+    if cut := isinstance(build, Case) and LENGTH in slopes:
         slopes[LENGTH] = _by_lengths(slopes[LENGTH], found.numbers(case).numbers)
     direction = None if along is None else _direction(along, design)
     if direction is not None and isinstance(found, ModesGradient):
         found = found.along(lambda gradient: _rate(slopes, direction, gradient))
-    parts = _Parts(found, case, design, slopes, {})
+    parts = _Parts(found, case, design, slopes, cut, {})
     values, gradients = zip(*(parts.of(one) for one in wanted), strict=True)
     data: dict[str, Any] = {"value": ("measure", np.array(values))}
     if direction is None:
@@ -395,6 +396,20 @@ def _add(seeds: dict[Any, Any], variable: Any, seed: Any, share: float) -> None:
         seeds[variable] = seeds.get(variable, 0.0) + share * np.asarray(seed)
 
 
+class _Changes(NamedTuple):
+    """Derivatives of a number by variables of a result, parameters, and numbers of the case."""
+
+    seeds: Seeds
+    explicit: dict[str, NDArray]
+    numbers: dict[str, NDArray]
+
+    def add(self, other: _Changes, share: float) -> None:
+        """Add a share of those of another number."""
+        for own, more in zip(self, other, strict=True):
+            for key, each in more.items():
+                _add(own, key, each, share)
+
+
 class _Parts(NamedTuple):
     """All that values and gradients of measures are made of."""
 
@@ -402,39 +417,89 @@ class _Parts(NamedTuple):
     case: Case
     design: Parameters
     slopes: dict[str, Any]
+    cut: bool  # whether lengths to which bars are cut are among the parameters
     shared: dict[Any, Any]  # what measures have come through
 
     def of(self, one: Wanted) -> tuple[float, dict[str, NDArray]]:
         """Value of a number, and its derivatives by all entries of each parameter."""
-        result, values = self.found.result, {}
+        values = {}
         for name, (measure, _) in one.measures.items():
-            value = measure.of(result, self.case, self.shared)
+            value = measure.of(self.found.result, self.case, self.shared)
             if value.ndim:
                 raise InputError(f"{measure.text}: is an array; ask for one of its numbers")
             values[name] = float(value)
         value, parts = one.expression.value_and_slopes(values)
-        seeds: Seeds = {}
-        explicit = {name: np.zeros(each.size) for name, each in self.design.values.items()}
+        total = _Changes({}, {}, {})
         for name, (measure, derivative) in one.measures.items():
             with said_of(measure.text):
-                own = derivative.seeds(result, self.case, **measure.arguments)
-            for variable, seed in own.items():
-                _add(seeds, variable, seed, parts[name])
-            if derivative.frozen:
-                subject = self.shared.get(measure.measure.through, result)
-                frozen = derivative.frozen(subject, self.case, **measure.arguments)
-                for key, slope in self._explicit(frozen).items():
-                    explicit[key] += parts[name] * slope
+                own = self._of_measure(measure, derivative, values[name] if parts[name] else np.inf)
+            total.add(own, parts[name])
         with said_of(one.text):
-            gradient = dict(self.found.backward(seeds)) if seeds else self._nothing
-        for name, (measure, derivative) in one.measures.items():
+            return value, self._by_parameters(total)
+
+    def _of_measure(self, measure: Asked, derivative: Derivative, value: float) -> _Changes:
+        """Derivatives of a measure, the same wherever an extreme is reached."""
+        if derivative.cut and self.cut:
+            raise InputError(
+                f"has no derivative by {LENGTH}, the lengths to which bars are cut; leave it out "
+                "of the parameters, or take another measure, as displacement"
+            )
+        places: list[dict[str, Any]] = [{}]
+        if derivative.places:
+            found = derivative.places(self._subject(measure), self.case, **measure.arguments)
+            places = [{"at": place} for place in found]
+        one = self._at(measure, derivative, places[:1], np.ones(1))
+        if len(places) > 1:
+            shares = np.random.default_rng(0).dirichlet(np.ones(len(places) - 1))
+            other = self._at(measure, derivative, places[1:], shares)
+            pair = [self._by_parameters(each) for each in (one, other)]
+            left, right = (
+                np.concatenate([by * self.design.size(name).ravel() for name, by in each.items()])
+                for each in pair
+            )
+            size = max(np.abs(left).max(), np.abs(right).max())
+            if np.abs(left - right).max() > SAME * size + ROUNDING * abs(value):
+                raise InputError(
+                    f"is reached at {len(places)} places at once, which part as the design "
+                    "changes: it has no derivative; take a measure of one of them, or mean_square"
+                )
+        return one
+
+    def _subject(self, measure: Asked) -> Any:
+        """The result, or what a measure has come through."""
+        return self.shared.get(measure.measure.through, self.found.result)
+
+    def _at(
+        self, measure: Asked, derivative: Derivative, places: Sequence[dict[str, Any]],
+        shares: NDArray,
+    ) -> _Changes:  # fmt: skip
+        """Derivatives of shares of a measure at some places."""
+        total, frozen = _Changes({}, {}, {}), []
+        for place, share in zip(places, shares.tolist(), strict=True):
+            given = {**place, **measure.arguments}
+            seeds, numbers = derivative.seeds(self.found.result, self.case, **given), {}
             if derivative.numbers:
-                subject = self.shared.get(measure.measure.through, result)
-                own = derivative.numbers(subject, self.case, **measure.arguments)
-                for key, by in own.items():
-                    _add(gradient, key, by, parts[name])
-        return value, {
-            name: slope.pulled(gradient) + explicit[name] for name, slope in self.slopes.items()
+                numbers = derivative.numbers(self._subject(measure), self.case, **given)
+            total.add(_Changes(seeds, {}, dict(numbers)), share)
+            if derivative.frozen:
+                own = derivative.frozen(self._subject(measure), self.case, **given)
+                frozen.append((share, own))
+        if frozen:
+            total.explicit.update(
+                self._explicit(lambda case: sum(share * own(case) for share, own in frozen))
+            )
+        return total
+
+    def _by_parameters(self, changes: _Changes) -> dict[str, NDArray]:
+        """Derivatives by all entries of each parameter."""
+        gradient = self._nothing
+        if changes.seeds:
+            gradient = dict(self.found.backward(changes.seeds))
+        for key, by in changes.numbers.items():
+            _add(gradient, key, by, 1.0)
+        return {
+            name: slope.pulled(gradient) + changes.explicit.get(name, 0.0)
+            for name, slope in self.slopes.items()
         }
 
     @property

@@ -129,7 +129,17 @@ class Curve(NamedTuple):
 
     def peak(self, index: int) -> tuple[float, float]:
         """Frequency and height of the peak at a sample, from it and its two neighbors."""
-        f, size, order = self
+        v = self._top(index)
+        if v is None:
+            return float(self.f[index]), float(self.size[index])
+        a, b, c, center = self.stiffness_parabola(index)
+        value = (a * v + b) * v + c
+        height = self.size[index] * np.sqrt((1.0 + v) ** self.order / value)
+        return float(center * np.sqrt(1.0 + v)), float(height)
+
+    def _top(self, index: int) -> float | None:
+        """Where the peak is, in v; None for one that is not shaped like a mode's."""
+        f, order = self.f, self.order
         a, b, c, center = self.stiffness_parabola(index)
         # stationary p(v) / (1 + v)^order, p = a v^2 + b v + c and 1 + v the squared frequency
         if order == 0:
@@ -141,10 +151,34 @@ class Curve(NamedTuple):
             v = (2.0 * c - b) / (2.0 * a - b)
         low, high = (f[[index - 1, index + 1]] / center) ** 2 - 1.0
         value = (a * v + b) * v + c
-        if not (low < v < high and value > 0.0):  # not shaped like a mode: a zero, a kink, a spike
-            return float(f[index]), float(size[index])
-        peak = center * np.sqrt(1.0 + v)
-        return float(peak), float(size[index] * np.sqrt((1.0 + v) ** order / value))
+        return v if low < v < high and value > 0.0 else None  # or it is a zero, a kink, a spike
+
+    def peak_slopes(self, index: int) -> PeakSlopes | None:
+        """Derivatives of the peak at a sample by it and its two neighbors.
+
+        None for a peak that is not shaped like a mode's. With p the parabola through the squared
+        stiffnesses p_i of the three, sum p_i L_i(v), the peak's v is where
+        g = (1 + v) p' - order p = 0; the height, stationary there, feels the change of p alone.
+        """
+        v = self._top(index)
+        if v is None:
+            return None
+        near = slice(index - 1, index + 2)
+        a, b, c, center = self.stiffness_parabola(index)
+        at = (self.f[near] / center) ** 2 - 1.0
+        own = (self.size[index] / self.size[near]) ** 2 * (1.0 + at) ** self.order
+        shape = np.stack([np.roll(at, -k) for k in range(3)])  # of each: its place, the others'
+        one, other = v - shape[:, 1], v - shape[:, 2]
+        scale = (shape[:, 0] - shape[:, 1]) * (shape[:, 0] - shape[:, 2])
+        part, slope = one * other / scale, (one + other) / scale  # L_i and L_i'
+        by_size = -2.0 * own / self.size[near]
+        value, steep = (a * v + b) * v + c, 2.0 * a * v + b
+        bent = 2.0 * a * (1.0 + v) + (1.0 - self.order) * steep  # g'
+        moved = ((1.0 + v) * slope - self.order * part) / bent  # -dv by p_i
+        frequency, height = self.peak(index)
+        return PeakSlopes(
+            -0.5 * frequency / (1.0 + v) * moved * by_size, -0.5 * height / value * part * by_size
+        )
 
     def stiffness_parabola(self, index: int) -> tuple[float, float, float, float]:
         """Parabola a v^2 + b v + c through the squared dynamic stiffness at three samples.
@@ -164,6 +198,13 @@ class Curve(NamedTuple):
             a = (right - left) / (v[2] - v[0])
             b = left - a * v[0]
         return float(a), float(b), 1.0, float(center)
+
+
+class PeakSlopes(NamedTuple):
+    """Derivatives (3,) of a peak's frequency (Hz) and height by the magnitudes around it."""
+
+    frequency: NDArray[np.float64]
+    height: NDArray[np.float64]
 
 
 def magnitude_curve(frequency: ArrayLike, magnitude: ArrayLike, quantity: str) -> Curve:

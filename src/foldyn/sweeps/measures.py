@@ -280,17 +280,15 @@ def _strain(result: xr.Dataset, case: Case) -> float:
 
 @_measure(MODES, *MOVED, units="m", doc="least distance of panels that share no vertex")
 def _clearance(result: xr.Dataset, case: Case) -> float:
-    return closest_panels(result, case)[1].distance
+    return min(one.distance for one in closest_panels(result, case))
 
 
-def closest_panels(result: xr.Dataset, case: Case) -> tuple[int, Clearance]:
-    """The sample (0: of modes, whose panels are at rest) in which panels are closest, and where."""
+def closest_panels(result: xr.Dataset, case: Case) -> list[Clearance]:
+    """How close panels are in each sample (one of modes, whose panels are at rest), and where."""
     made, shapes = case.structure, np.zeros((1, 1, 3))
     if "time" in result.dims or "step" in result.dims:
         shapes = sampled(result, "displacement").transpose(..., "node", "axis").values
-    found = [clearance(made.nodes + u, made.triangles, made.triangle_panel) for u in shapes]
-    k = int(np.argmin([one.distance for one in found]))
-    return k, found[k]
+    return [clearance(made.nodes + u, made.triangles, made.triangle_panel) for u in shapes]
 
 
 # --------------------------------------------------------------------------- paths

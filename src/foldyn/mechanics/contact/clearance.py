@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.mechanics.contact.distances import (
     apart,
     between,
@@ -20,6 +20,8 @@ from foldyn.mechanics.contact.distances import (
 from foldyn.mechanics.crossings import crossing_panels
 
 NEIGHBORS = 32  # of a triangle's center, among which a first bound is looked for
+TIE = 2e-9  # of the square of the least distance: pairs of points that differ by less are as close
+MOST = 64  # of such pairs that are told
 
 
 class Clearance(NamedTuple):
@@ -29,8 +31,9 @@ class Clearance(NamedTuple):
     ----------
     distance : float
         m; 0 where panels cross, inf where every two panels share a vertex.
-    nodes, weights : ndarray, shape (4,)
-        The vector between both points is the sum of the weights times the nodes' places.
+    nodes, weights : ndarray, shape (k, 4)
+        The vector between both points is the sum of the weights times the nodes' places: of each
+        pair that is as close as this.
     """
 
     distance: float
@@ -54,12 +57,13 @@ def clearance(points: NDArray, triangles: NDArray, panels: NDArray) -> Clearance
     rows, owners = np.asarray(triangles, np.int64), np.asarray(panels, np.int64)
     members = sparse.csr_array((np.ones(rows.size), (np.repeat(owners, 3), rows.ravel())))
     meet = (members @ members.T).tocsr()
-    nodes, weights = np.zeros(4, np.int64), np.zeros(4)
+    nodes, weights = np.zeros((MOST, 4), np.int64), np.zeros((MOST, 4))
     pairs = _near(x[rows], owners, meet)
     crossing = crossing_panels(x, rows, owners)
     if len(crossing) and (_entries(meet, *crossing.T) == 0.0).any():
-        return Clearance(0.0, nodes, weights)
-    return Clearance(float(_closest(x, rows, pairs, nodes, weights)), nodes, weights)
+        return Clearance(0.0, nodes[:0], weights[:0])
+    best, count = _closest(x, rows, pairs, nodes, weights)
+    return Clearance(float(best), nodes[:count], weights[:count])
 
 
 def _near(corners: NDArray, panels: NDArray, meet: sparse.csr_array) -> NDArray[np.int64]:
@@ -84,8 +88,11 @@ def _entries(matrix: sparse.csr_array, rows: NDArray, columns: NDArray) -> NDArr
 
 @kernel
 def _closest(x, triangles, pairs, nodes, weights):
-    """Least distance of some pairs of triangles; where it is goes into the last two arguments."""
-    best = np.inf
+    """Least distance of some pairs of triangles, and how often it is reached.
+
+    Where that is goes into the last two arguments, in no order.
+    """
+    best, count = np.inf, 0
     for k in range(len(pairs)):
         for turn in range(2):
             i, j = pairs[k, turn], pairs[k, 1 - turn]
@@ -96,10 +103,15 @@ def _closest(x, triangles, pairs, nodes, weights):
                 p = point(x, v)
                 wa, wb, wc, _ = closest_on_triangle(p, pa, pb, pc)
                 r = apart(p, pa, pb, pc, wa, wb, wc)
-                if dot(r, r) < best:
-                    best = dot(r, r)
-                    nodes[0], nodes[1], nodes[2], nodes[3] = v, a, b, c
-                    weights[0], weights[1], weights[2], weights[3] = 1.0, -wa, -wb, -wc
+                square = dot(r, r)
+                count = _counted(square, best, count)
+                best = min(best, square)
+                if square <= (1.0 + TIE) * best and count < MOST:
+                    nodes[count, 0], nodes[count, 1] = v, a
+                    nodes[count, 2], nodes[count, 3] = b, c
+                    weights[count, 0], weights[count, 1] = 1.0, -wa
+                    weights[count, 2], weights[count, 3] = -wb, -wc
+                    count += 1
         for one in range(3):
             a, b = triangles[pairs[k, 0], one], triangles[pairs[k, 0], (one + 1) % 3]
             pa, pb = point(x, a), point(x, b)
@@ -108,8 +120,19 @@ def _closest(x, triangles, pairs, nodes, weights):
                 pc, pd = point(x, c), point(x, d)
                 s, t, _ = closest_of_segments(pa, pb, pc, pd)
                 r = between(pa, pb, pc, pd, s, t)
-                if dot(r, r) < best:
-                    best = dot(r, r)
-                    nodes[0], nodes[1], nodes[2], nodes[3] = a, b, c, d
-                    weights[0], weights[1], weights[2], weights[3] = 1.0 - s, s, t - 1.0, -t
-    return np.sqrt(best)
+                square = dot(r, r)
+                count = _counted(square, best, count)
+                best = min(best, square)
+                if square <= (1.0 + TIE) * best and count < MOST:
+                    nodes[count, 0], nodes[count, 1] = a, b
+                    nodes[count, 2], nodes[count, 3] = c, d
+                    weights[count, 0], weights[count, 1] = 1.0 - s, s
+                    weights[count, 2], weights[count, 3] = t - 1.0, -t
+                    count += 1
+    return np.sqrt(best), count
+
+
+@inner_scalar
+def _counted(square, best, count):
+    """How many pairs of points stay the closest ones beside another: none if that is closer."""
+    return 0 if square < (1.0 - TIE) * best else count
