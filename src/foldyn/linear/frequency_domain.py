@@ -6,7 +6,7 @@ The static response of the modes left out completes those superposed.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from scipy import sparse
 
 from foldyn.algebra.complex_symmetric import solve
 from foldyn.algebra.eigen import Pencil, Spectrum, lowest
+from foldyn.algebra.superlu import factorize
 from foldyn.algebra.woodbury import Squared
 from foldyn.arguments import Check, Checked, Flag
 from foldyn.dynamics import Progress
@@ -22,9 +23,12 @@ from foldyn.errors import InputError
 from foldyn.linear.excitation import Answer, Drive, drive_terms, warn_at
 from foldyn.linear.linearized import Linearized
 from foldyn.linear.modes import rigid_space, unresisted
+from foldyn.ram_limit import check_memory
 from foldyn.values import whole
 
 DIAGONAL = 1e-12  # of the modal damping: couplings of modes that are rounding
+FOLLOWS = 1e-8  # of the terms of a damping force on a dof without mass: below it is none
+COPIES = 3  # of the matrix of the amplitudes
 BESIDE = 0.01  # of the lowest eigenvalue above 0: how far below 0 a free body is held up
 RESONANCE = (
     "there is no response at {} (nan): a resonance without damping, or 0 Hz of a body that is free "
@@ -98,7 +102,8 @@ def modal(
     """Superpose modes: x = Phi q + r with (Lambda - w^2 + i w Phi' C Phi) q = Phi' f.
 
     The matrix of the modal damping is taken whole: modes that damping couples (dashpots and
-    creases, beta K0 about a state where the tangent is not K0) stay coupled.
+    creases, beta K0 about a state where the tangent is not K0) stay coupled, and so do dofs without
+    mass that damping or memory parts from the modes, in which they follow statically.
     r = (K - s M)^-1 f - Phi (Lambda - s)^-1 Phi' f is the response of all other modes at the
     squared frequency s: 0, or slightly below for a body that is free to move (mode acceleration:
     Craig and Kurdila, Fundamentals of Structural Dynamics, 2nd ed. 2006, chapter 11).
@@ -113,41 +118,83 @@ def modal(
     pencil = Pencil(system.stiffness, system.mass)
     count = pencil.finite if options.count is None else int(options.count)
     modes = lowest(pencil, count, unresisted(system, rigid_space(system)))
-    damping = modes.shapes.T @ (system.damping @ modes.shapes)
+    basis = _with_massless(system, pencil, modes)
+    damping = basis.shapes.T @ (system.damping @ basis.shapes)
     if len(system.modal):
-        own = system.modal @ modes.shapes
+        own = system.modal @ basis.shapes
         damping = damping + own.T @ own
     parts = []
     for term in drive_terms(system, drive):
-        load, left = modes.shapes.T @ term.shape, np.zeros(pencil.size)
+        load, left = basis.shapes.T @ term.shape, np.zeros(pencil.size)
         if options.static_correction and count < pencil.finite:
-            left = _residual(pencil, modes, term.shape, load)
+            left = _residual(pencil, basis, term.shape, load)
         parts.append((load, left, term.factor))
-    noise, memory = pencil.noise(modes.shapes), None
+    memory = None
     response = np.zeros((len(frequency), pencil.size), np.complex128)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
         if system.responding is not None:
-            memory = system.responding.between(modes.shapes, 1j * omega)
+            memory = system.responding.between(basis.shapes, 1j * omega)
         for load, left, factor in parts:
-            q = _amplitudes(modes.values, noise, damping, omega, load, memory)
-            response[k] += (modes.shapes @ q + left) * factor(omega)
+            q = _amplitudes(basis, damping, omega, load, memory)
+            response[k] += (basis.shapes @ q + left) * factor(omega)
         report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
     warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
     facts = {"modes": count, "static_correction": options.static_correction}
     return Answer(response, {}, facts)
 
 
-def _amplitudes(
-    values: NDArray, noise: NDArray, damping: NDArray, omega: float, load: NDArray,
-    memory: NDArray | None,
-) -> NDArray:  # fmt: skip
-    """Modal amplitudes at an angular frequency (rad/s); `noise` is the rounding of the values.
+class _Basis(NamedTuple):
+    """Motions, r of them, that neither stiffness nor mass couples: modes, and those without mass.
 
-    memory : complex stiffness of laws with memory between the modes there.
+    values : (r,) stiffness; inertia : (r,) 1 or 0; noise : (r,) rounding of the values.
     """
-    own = damping.diagonal()
-    detuned = values - omega**2
+
+    shapes: NDArray  # (nf, r)
+    values: NDArray
+    inertia: NDArray
+    noise: NDArray
+
+
+def _with_massless(system: Linearized, pencil: Pencil, modes: Spectrum) -> _Basis:
+    """Modes with the motions of dofs without mass by which damping or memory parts from them.
+
+    In modes dofs without mass follow the others statically. What resists their rates moves them
+    beside that, while those among them that nothing else resists follow.
+    """
+    shapes, light = modes.shapes, ~pencil.heavy
+    pull, most = np.abs(system.damping @ shapes), abs(system.damping) @ np.abs(shapes)
+    moved = (pull > FOLLOWS * most).any(axis=1)
+    if system.responding is not None:
+        moved[system.responding.gradient.indices] = True
+    own, others = np.flatnonzero(light & moved), np.flatnonzero(light & ~moved)
+    size = f"{len(own)} unknowns without mass beside {len(modes.values)} modes"
+    needed = 16.0 * COPIES * (len(own) + len(modes.values)) ** 2 + 16.0 * len(own) * pencil.size
+    check_memory("method", size, needed, 'take method = "direct"')
+    aside, stiffness = np.zeros((pencil.size, len(own))), pencil.stiffness
+    aside[own, np.arange(len(own))] = 1.0
+    if len(own) and len(others):
+        across = stiffness[others][:, own].toarray()
+        within = factorize(sparse.csc_array(stiffness[others][:, others]))
+        aside[others] = -np.stack([within.solve(column) for column in across.T], axis=1)
+    values, turned = np.linalg.eigh(aside.T @ (stiffness @ aside))
+    return _Basis(
+        np.hstack([shapes, aside @ turned]),
+        np.append(modes.values, values),
+        np.append(np.ones(len(modes.values)), np.zeros(len(own))),
+        np.append(pencil.noise(shapes), np.zeros(len(own))),
+    )
+
+
+def _amplitudes(
+    basis: _Basis, damping: NDArray, omega: float, load: NDArray, memory: NDArray | None
+) -> NDArray:
+    """Amplitudes (r,) of the basis at an angular frequency (rad/s).
+
+    memory : complex stiffness of laws with memory between its motions there.
+    """
+    own, noise = damping.diagonal(), basis.noise
+    detuned = basis.values - omega**2 * basis.inertia
     scale = np.sqrt(np.abs(np.outer(own, own)))
     if memory is not None or (np.abs(damping - np.diag(own)) > DIAGONAL * scale.max()).any():
         try:
@@ -161,15 +208,16 @@ def _amplitudes(
     return np.where(resonant, np.nan, amplitudes)
 
 
-def _residual(pencil: Pencil, modes: Spectrum, shape: NDArray, load: NDArray) -> NDArray:
+def _residual(pencil: Pencil, basis: _Basis, shape: NDArray, load: NDArray) -> NDArray:
     """Static response (nf,) of the modes left out."""
-    positive = modes.values[modes.values > 0.0]
+    modal = basis.values[basis.inertia > 0.0]
+    positive = modal[modal > 0.0]
     shift = 0.0
-    if modes.values[0] <= 0.0:
+    if modal[0] <= 0.0:
         beside = positive[0] if positive.size else pencil.scale
-        shift = float(modes.values[0] - BESIDE * beside)
+        shift = float(modal[0] - BESIDE * beside)
     factors = pencil.factorize(shift)
     whole = factors.solve(shape)
     left = shape - pencil.stiffness @ whole + shift * (pencil.mass @ whole)
     whole = whole + factors.solve(left)
-    return whole - modes.shapes @ (load / (modes.values - shift))
+    return whole - basis.shapes @ (load / (basis.values - shift * basis.inertia))

@@ -1,0 +1,128 @@
+"""Each kind of damping in each model: analyses agree on it, or refuse it by name."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.errors import InputError
+from pairwise import in_pairs
+
+PATTERN = fd.patterns.simple_fold(a=0.9, b=1.1, dihedral=100)
+SHEET = fd.Sheet(1e9, 0.3, 0.02, 300.0)
+HELD, PRELOAD = fd.Fix([2, 3, 4, 5]), fd.Force([0, 1], (0, 0, 20.0))
+TINY = fd.Force([0, 1], (0, 0, 1e-4))
+OMEGA = 6.0  # rad/s, about that of the first mode
+RATIO = 0.05
+KICK = 2e-3  # of the mode: small, and large beside what implicit steps leave of the preload
+BETA = 2.0 * RATIO / OMEGA
+
+Kind = tuple[Any, tuple[Any, ...], Any]  # damping, further supports, law of the crease
+KINDS: dict[str, Kind] = {
+    "drag": (fd.Rayleigh(2.0 * RATIO * OMEGA), (), "linear"),
+    "stiffness at rest": (fd.Rayleigh(beta=BETA / 4e4), (), "linear"),  # of panels that have turned
+    "stiffness at the start": (fd.Rayleigh(beta=BETA, state="start"), (), "linear"),
+    "modes at rest": (fd.ModalDamping([RATIO, 0.02]), (), "linear"),
+    "modes at the start": (fd.ModalDamping(RATIO, state="start"), (), "linear"),
+    "creases": (fd.CreaseDamping(2.0), (), "linear"),
+    "strain rates": (fd.StrainDamping(BETA), (), "linear"),
+    "dashpot to the ground": ((), (fd.Dashpot(0.6, nodes=[0, 1], direction="z"),), "linear"),
+    "dashpot along a line": ((), (fd.Dashpot(5.0, between=[(0, 4), (1, 5)]),), "linear"),
+    "relaxing creases": ((), (), fd.Prony([0.1, 0.1], [0.05, 0.5])),
+    "relaxing damped creases": (fd.CreaseDamping(1.0), (), fd.Prony([0.1], [0.5])),
+}
+MODELS = ("plate", "n5b8e", "herkal", "merlin2", "shell")
+EXPLICIT = ("rk4", "central_difference", "dormand_prince")
+IMPLICIT = ("newmark", "generalized_alpha", "energy_momentum")
+STIFF = ("stiffness at the start", "strain rates")  # a thousand times the explicit steps
+TIMED = [
+    row
+    for row in in_pairs(KINDS, MODELS, EXPLICIT + IMPLICIT)
+    if not row.marks and not (row.values[0] in STIFF and row.values[2] in EXPLICIT)
+]
+
+
+@cache
+def made(kind: str, model: Any) -> fd.Case:
+    damping, supports, law = KINDS[kind]
+    options: dict[str, Any] = {"crease_stiffness": 60.0, "fold_law": law}
+    if model == "shell":
+        s = fd.shell(PATTERN, SHEET, divisions=2, **options)
+    else:
+        soft = {"bend_law": "linear"} if model in ("herkal", "merlin2") else {}
+        s = fd.discretize(PATTERN, SHEET, preset=model, **soft, **options)
+    return fd.Case(s, [HELD, *supports], [PRELOAD], damping)
+
+
+def case_of(kind: str, model: str) -> fd.Case | None:
+    """The case; None of what the model refuses by name."""
+    if kind == "strain rates" and model in ("n5b8e", "shell"):
+        with pytest.raises(InputError, match="StrainDamping"):
+            made(kind, model)
+        return None
+    return made(kind, model)
+
+
+@pytest.mark.filterwarnings("ignore:damping. .* resist")
+@pytest.mark.parametrize(("kind", "model"), in_pairs(KINDS, MODELS))
+def test_frequency_responses_modes_and_periodic_motions(kind, model):
+    case = case_of(kind, model)
+    if case is None:
+        return
+    modes = fd.modes(case, 1, state="equilibrium")
+    f, ratio = float(modes.frequency[0]), float(modes.damping_ratio[0])
+    state = fd.State(modes.displacement.values)
+    assert 0.02 < ratio < 0.2
+    direct, modal, harmonic = (
+        fd.frf(case, TINY, [0.6 * f, f, 3.0 * f], state, method).receptance.values
+        for method in ("direct", "modal", "harmonic")
+    )
+    for at in range(3):
+        size = np.abs(direct[at]).max()
+        assert np.abs(modal[at] - direct[at]).max() < 1e-7 * size
+        assert np.abs(harmonic[at] - direct[at]).max() < 1e-5 * size
+    shape = modes["shape"].values[0]
+    static = float(shape[[0, 1], 2].sum()) / 2.0 / (2.0 * np.pi * f) ** 2  # a load of 1 N
+    node = int(np.abs(shape[:, 2]).argmax())
+    assert abs(direct[1, node, 2] / (static * shape[node, 2])) == pytest.approx(
+        0.5 / ratio, rel=0.03
+    )
+    driven = case.altered(loads=[PRELOAD, fd.Force([0, 1], TINY.vector, fd.Harmonic(f))])
+    refused = model in ("n5b8e", "shell") or kind not in CONSTANT
+    if refused:
+        with pytest.raises(InputError, match=r"damping|structure|remember"):
+            fd.periodic_motion(driven, harmonics=2)
+        return
+    one = fd.periodic_motion(driven, harmonics=2, start=state)
+    expected = -1j * direct[1] * 2e-4
+    assert np.abs(one.coefficient.values[1] - expected).max() < 1e-3 * np.abs(expected).max()
+
+
+CONSTANT = (
+    "drag", "stiffness at rest", "stiffness at the start", "modes at rest", "modes at the start",
+    "dashpot to the ground",
+)  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore:damping. .* resist", "ignore:.* critical step")
+@pytest.mark.parametrize(("kind", "model", "method"), TIMED)
+def test_simulated_motions_decay_as_the_frequency_response_says(kind, model, method):
+    """A kick that only the first mode gets: what the second period leaves of the speed."""
+    case = case_of(kind, model)
+    if case is None:
+        return
+    modes = fd.modes(case, 1, state="equilibrium")
+    f, ratio = float(modes.frequency[0]), float(modes.damping_ratio[0])
+    shape, period = modes["shape"].values[0], 1.0 / (f * np.sqrt(1.0 - ratio**2))
+    start = fd.State(modes.displacement.values, KICK * shape)
+    if method in EXPLICIT and model == "shell":
+        with pytest.raises(InputError, match="have no mass"):
+            fd.simulate(case, period, method, initial=start)
+        return
+    dt = period / 200.0 if method in IMPLICIT else None
+    run = fd.simulate(case, 2.0 * period, method, dt, every=period, initial=start)
+    mass = case.nodal_mass[:, None]
+    first, last = ((shape * mass * run.velocity.values[k]).sum() for k in (1, 2))
+    assert -np.log(last / first) / (2.0 * np.pi) == pytest.approx(ratio, rel=0.05)
