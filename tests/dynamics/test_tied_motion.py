@@ -138,3 +138,13 @@ def test_a_node_without_mass_may_ride() -> None:
     implicit = fd.simulate(case, 0.2, "newmark", dt=1e-4, every=0.1)
     np.testing.assert_allclose(implicit.displacement, motion.displacement, atol=3e-7)
     assert motion.energy_error < 1e-4
+
+
+def test_a_rigid_shell_drifts_in_any_direction() -> None:
+    """Rounded velocities of what panels tie together do not contradict them."""
+    pattern = fd.patterns.miura(b=1.2, panel_angle=64, dihedral=110)
+    shell = fd.shell(pattern, SHEET, divisions=2, rigid="all")
+    drift = np.array([0.3, -0.7, 0.2])
+    start = fd.State(velocity=np.tile(drift, (len(shell.nodes), 1)))
+    motion = fd.simulate(fd.Case(shell), 0.1, "newmark", dt=0.05, every=1, initial=start)
+    np.testing.assert_allclose(motion.displacement[-1] - 0.1 * drift, 0.0, atol=1e-11)

@@ -226,7 +226,9 @@ def begin(
     carried, imposed = by.outward(s.displacement), case.imposed
     prescribed = np.where(case.fixed, v, 0.0)
     if ties := case.constraints:
-        prescribed = ties.moved(prescribed, ties.values(v), "initial")
+        values = ties.values(v)
+        values[np.abs(values) <= AGREES * np.abs(v).max()] = 0.0  # or rounding would contradict
+        prescribed = ties.moved(prescribed, values, "initial")
     q, w = u - carried, v - by.outward(carry_supports(mass, by.inward(prescribed)))
     apart = np.where(imposed, np.abs(q), 0.0)
     apart.ravel()[case.imposed_slaves] = np.abs(ties.coordinates(q.ravel()))[case.imposed_slaves]
