@@ -10,7 +10,7 @@ from trusses import APEX, VonMises, snapped
 
 import foldyn as fd
 from foldyn.errors import InputError
-from foldyn.statics import landscape, trace
+from foldyn.statics import energy_landscape, landscape, trace
 
 TRUSS = VonMises()
 
@@ -57,6 +57,25 @@ def test_kresling_by_force_and_by_displacement(kresling):
         np.testing.assert_allclose(a.displacement, b.displacement, atol=1e-8)
     np.testing.assert_allclose(one.negative_stiffness, other.negative_stiffness, rtol=1e-7)
     assert [state.stable for state in one.states] == [True, False, True]
+
+
+@pytest.mark.filterwarnings("ignore:the path loses stability")
+def test_bifurcations_say_nothing_of_the_slope(monkeypatch):
+    """The tangent is singular there, so that the response may point anywhere."""
+    plain = energy_landscape.station_of
+
+    def station_of(*given):
+        station = plain(*given)
+        singular = station.point.kind == "bifurcation"
+        return station._replace(response=-station.response) if singular else station
+
+    monkeypatch.setattr(energy_landscape, "station_of", station_of)
+    steep = VonMises(h=2.0)
+    case = steep.case(free="xz")
+    path = snapped(case, first_step=100.0, steps=60)
+    assert (path.point == "bifurcation").sum() == 2
+    found = landscape(path, case)
+    np.testing.assert_allclose(found.negative_stiffness, [steep.limit_at], rtol=1e-8)
 
 
 def test_barrier_is_the_work_of_the_force(kresling):

@@ -12,7 +12,7 @@ from swept_cases import FRF, MODES, PATH, compiled_here, fails_sometimes
 import foldyn as fd
 from foldyn.analyses.keys import replaced
 from foldyn.analyses.reading import case_of_document, read_document
-from foldyn.errors import InputError
+from foldyn.errors import ComputationError, InputError
 from foldyn.sweeps import Measure, evaluations, job
 from foldyn.sweeps.evaluations import Evaluation
 
@@ -318,3 +318,48 @@ def test_a_mechanism_is_told_at_its_points(case):
     case.write_text(PATH.replace("[[supports]]\nnodes = [4, 5]\n", ""))
     found = of(case, ["largest_load"], ONE)
     assert "can move freely" in str(found["failure"].values[0])
+
+
+TOWER = """[pattern]
+kind = "kresling"
+sides = 5
+radius = 1.0
+height = 0.6
+twist = 20
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.3
+thickness = 0.01
+[model]
+fold_law = "linear"
+[[supports]]
+nodes = "zmin"
+[[loads]]
+nodes = "zmax"
+force = [0, 0, -1]
+[analysis]
+kind = "statics"
+method = "arc_length"
+first_step = 5
+steps = 80
+"""
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_what_a_path_had_before_it_stopped_is_measured(tmp_path):
+    """The load at which a tower snaps is found, though its creases close later on."""
+    path = tmp_path / "tower.toml"
+    path.write_text(TOWER)
+    names = ["limit_load", "largest_load", "stiffness", "displacement[5,z]"]
+    vary = {"sheet.thickness": [0.01]}
+    found = fd.sweep(path, vary, names, processes=1).isel(thickness=0)
+    with pytest.raises(ComputationError, match="closed") as caught:
+        fd.read_case(path).run()
+    partial = caught.value.partial
+    assert float(found["limit_load"]) == float(partial.load_factor[partial.point == "limit"][0])
+    assert float(found["largest_load"]) == float(partial.load_factor.max())
+    assert float(found["stiffness"]) > 0.0
+    assert np.isnan(found["displacement_5_z"])
+    told = str(found["failure"].values)
+    assert "what there is of the path is measured" in told
+    assert "displacement[5,z]: is of whole paths" in told

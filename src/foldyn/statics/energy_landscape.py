@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -155,20 +156,20 @@ def landscape(
     none = NO_FORCE * float(np.abs(force).max())
     force[np.abs(force) <= none] = 0.0
     states, edges = [], []
-    falls = [walker.rigidity(s) < 0.0 for s in stations]
     for k, station in enumerate(stations):
         if force[k] == 0.0:
             states.append(walker.state(station, energy[0]))
-        if k + 1 == len(stations):
-            break
-        after = stations[k + 1]
-        if force[k] * force[k + 1] < 0.0:
-            states.append(walker.state(walker.root(walker.force, station, after), energy[0]))
-        if falls[k] != falls[k + 1]:
-            edges.append(walker.stroke(walker.root(walker.compliance, station, after)))
-    if falls[0]:
+        if k + 1 < len(stations) and force[k] * force[k + 1] < 0.0:
+            found = walker.root(walker.force, station, stations[k + 1])
+            states.append(walker.state(found, energy[0]))
+    sloping = [s for s in stations if s.point.kind != "bifurcation"]  # singular: no slope is sure
+    falls = [walker.rigidity(s) < 0.0 for s in sloping]
+    for (before, fell), (after, fall) in pairwise(zip(sloping, falls, strict=True)):
+        if fell != fall:
+            edges.append(walker.stroke(walker.root(walker.compliance, before, after)))
+    if falls[:1] == [True]:
         edges.insert(0, float(stroke[0]))
-    if falls[-1]:
+    if len(edges) % 2:
         edges.append(float(stroke[-1]))
     ranges = tuple(zip(edges[::2], edges[1::2], strict=True))
     return Landscape(stroke, force, energy - energy[0], tuple(states), ranges)

@@ -216,7 +216,7 @@ def _bracketed(section: Section, low: Mark, high: Mark) -> tuple[Mark, Mark]:
 
 def _between(section: Section, low: Mark, high: Mark) -> Mark | None:
     """A mark between two others whose negative eigenvalues are counted; None if none is found."""
-    for weight in LOOKS:
+    for weight in LOOKS if high.share - low.share > APART else LOOKS[:1]:
         share = low.share + weight * (high.share - low.share)
         mark = section.at(share, low, high) if low.share < share < high.share else None
         if mark is not None and mark.negative >= 0:

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from foldyn.analyses import CaseFile
 from foldyn.analyses.casefile import Moving
@@ -23,6 +23,9 @@ from foldyn.program import program
 from foldyn.sweeps.evaluations import Evaluation
 from foldyn.sweeps.measure import Asked, Loaded
 from foldyn.sweeps.points import Point
+
+if TYPE_CHECKING:
+    import xarray
 
 COMPUTING = ("analyses", "results", "sweeps")
 """Folders that measures depend on, besides the solvers."""
@@ -120,7 +123,7 @@ class BegunPoint:
             if self.compute is not None:
                 if isinstance(self.compute, Moving) and self.compute.integrated:
                     self._seconds += self.compute.motion.seconds
-                result, case, shared = self._computation.result(), self._case_file.case(), {}
+                result, case, shared = self._result(), self._case_file.case(), {}
                 for variable in result.variables.values():  # a measure changes it for no other
                     variable.values.setflags(write=False)
                 for each in self._job.measures:
@@ -128,6 +131,19 @@ class BegunPoint:
                         values[each.name] = each.of(result.copy(deep=False), case, shared)
         failure, warned = ("; ".join(dict.fromkeys(t)) for t in (self._failures, self._told))
         return Evaluation(values, failure, warned, self._seconds, self._lasting)
+
+    def _result(self) -> xarray.Dataset:
+        """The result; of a path that stops, what there is of it, which is noted."""
+        try:
+            return self._computation.result()
+        except ComputationError as error:
+            if error.partial is None or error.partial.attrs["foldyn_result"] != "path":
+                raise
+            self._failures.append(f"{self._said(error)} (what there is of the path is measured)")
+            return error.partial
+
+    def _said(self, error: Exception) -> str:
+        return str(error).removeprefix(f"{self._job.path}: ")
 
     @contextmanager
     def _timed(self) -> Iterator[None]:
@@ -145,7 +161,7 @@ class BegunPoint:
         try:
             yield
         except (InputError, ComputationError) as error:
-            self._failures.append(str(error).removeprefix(f"{self._job.path}: "))
+            self._failures.append(self._said(error))
         except Exception as error:  # of one point; the others are computed all the same
             self._failures.append(f"{type(error).__name__}: {error}")
             self._lasting = False

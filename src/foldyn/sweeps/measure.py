@@ -56,6 +56,8 @@ class Measure:
     through : callable, optional
         ``through(result, case)`` comes first, once for all measures that share it; what it gives
         takes the place of the result.
+    whole : bool
+        Whether a path that stopped on the way has none: it is of the end, or an extreme.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Measure:
     takes: tuple[str, ...] = ()
     needs: int = 0
     through: Callable[[xr.Dataset, Case], Any] | None = None
+    whole: bool = False
 
     @property
     def asked(self) -> str:
@@ -109,6 +112,8 @@ class Asked:
         FoldynError
             It cannot be taken of this result.
         """
+        if self.measure.whole and result.attrs.get("status") == "stopped":
+            raise InputError(f"{self.text}: is of whole paths, and this one stopped on the way")
         try:
             through, subject = self.measure.through, result
             if through is not None:

@@ -191,7 +191,7 @@ def _decay(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
 
 
 # ------------------------------------------------------------------- motions and paths
-@_measure(*MOVED, units="m", doc="displacement at the end")
+@_measure(*MOVED, units="m", doc="displacement at the end", whole=True)
 def _displacement(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
     return float(sampled(result, "displacement")[-1].sel(node=node, axis=axis))
 
@@ -240,7 +240,7 @@ def _mean_square(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
     return float(square.integrate("time")) / float(times[-1] - times[0])
 
 
-@_measure(*MOVED, units="m", doc="largest displacement")
+@_measure(*MOVED, units="m", doc="largest displacement", whole=True)
 def _largest_displacement(result: xr.Dataset, case: Case, node: int | None = None) -> float:
     moved = sampled(result, "displacement")
     moved = moved if node is None else moved.sel(node=[node])
@@ -253,12 +253,12 @@ def sampled(result: xr.Dataset, name: str) -> xr.DataArray:
     return result[name].transpose(along, ...)
 
 
-@_measure(*MOVED, units="J", doc="largest strain energy")
+@_measure(*MOVED, units="J", doc="largest strain energy", whole=True)
 def _strain_energy(result: xr.Dataset, case: Case) -> float:
     return float(sum(result[name].values for name in case.energy_groups).max())  # type: ignore
 
 
-@_measure(*MOVED, units="J", doc="energy dissipated")
+@_measure(*MOVED, units="J", doc="energy dissipated", whole=True)
 def _dissipated(result: xr.Dataset, case: Case) -> float:
     if "dissipated" not in result:
         return 0.0  # a path without creases that yield
@@ -270,7 +270,7 @@ def _energy_error(result: xr.Dataset, case: Case) -> float:
     return float(result.attrs["energy_error"])
 
 
-@_measure(*MOVED, doc="largest strain of a bar")
+@_measure(*MOVED, doc="largest strain of a bar", whole=True)
 def _strain(result: xr.Dataset, case: Case) -> float:
     if case.structure.bar_law is None:
         raise InputError("is of bars, and a shell has none")
@@ -278,7 +278,7 @@ def _strain(result: xr.Dataset, case: Case) -> float:
     return float(np.abs(bar_strain(case.structure, moved)).max())
 
 
-@_measure(MODES, *MOVED, units="m", doc="least distance of panels that share no vertex")
+@_measure(MODES, *MOVED, units="m", doc="least distance of panels that share no vertex", whole=True)
 def _clearance(result: xr.Dataset, case: Case) -> float:
     return min(one.distance for one in closest_panels(result, case))
 
@@ -292,7 +292,7 @@ def closest_panels(result: xr.Dataset, case: Case) -> list[Clearance]:
 
 
 # --------------------------------------------------------------------------- paths
-@_measure(PATH, units="N", doc="sum of the reactions at the end")
+@_measure(PATH, units="N", doc="sum of the reactions at the end", whole=True)
 def _reaction(result: xr.Dataset, case: Case, axis: str) -> float:
     chosen = (result["support_axis"] == axis).values
     return float(sampled(result, "reaction").values[-1, chosen].sum())
@@ -374,7 +374,7 @@ def _stiffness(found: Landscape, case: Case) -> float:
     return _secant(found, slice(0, 2))
 
 
-@_measure(PATH, units="N/m", doc="stiffness over the last step", through=landscape)
+@_measure(PATH, units="N/m", doc="stiffness over the last step", through=landscape, whole=True)
 def _final_stiffness(found: Landscape, case: Case) -> float:
     return _secant(found, slice(-2, None))
 
