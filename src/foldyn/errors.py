@@ -183,7 +183,11 @@ class CrossingWarning(FoldynWarning):
 
 
 class StretchWarning(FoldynWarning):
-    """Bars hold much of the strain energy: they are too stiff in the plane of the panels."""
+    """Panels that stretch hold much of the strain energy, which the model gets only roughly."""
+
+
+class ModelRangeWarning(FoldynWarning):
+    """Bars and hinges are asked for what is beyond their range: the shell gives it."""
 
 
 class UnitsWarning(FoldynWarning):

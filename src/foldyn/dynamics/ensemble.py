@@ -28,7 +28,7 @@ from foldyn.errors import ComputationError, FoldynWarning, InputError, StretchWa
 from foldyn.mechanics.lanes import WIDTH
 from foldyn.results.dataset import origin_variables, result_dataset
 from foldyn.results.quantities import MOTION, energies_of, variable, variables
-from foldyn.structures.stretching import MOST, REMEDY, stretch
+from foldyn.structures.stretching import most, remedy, stretch
 from foldyn.values import choice, flag, of_kind, show, whole
 
 METHOD = "central_difference"
@@ -285,9 +285,10 @@ def _warn(motions: Sequence[Motion], ended: Mapping[int, str], energy: NDArray) 
     shares = [one.share if one else 0.0 for one in found]
     if any(shares):
         warnings.warn(
-            f"bars hold {max(shares):.0%} of the strain energy of cases[{np.argmax(shares)}] where "
-            f"that is largest, the most of {np.count_nonzero(shares)} motions with more than "
-            f"{MOST:.0%}: {REMEDY}", StretchWarning, stacklevel=3,
+            f"panels that stretch hold {max(shares):.0%} of the strain energy of "
+            f"cases[{np.argmax(shares)}] where that is largest, the most of "
+            f"{np.count_nonzero(shares)} motions with more than {most(first.structure):.0%}, "
+            f"{remedy(first.structure)}", StretchWarning, stacklevel=3,
         )  # fmt: skip
     return max(off.values(), default=0.0)
 

@@ -46,7 +46,7 @@ from foldyn.errors import (
 from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.results import trajectory_dataset
 from foldyn.results.crossings import Crossings, crossings_of
-from foldyn.structures.stretching import REMEDY, stretch
+from foldyn.structures.stretching import remedy, stretch
 
 if TYPE_CHECKING:
     import xarray
@@ -178,8 +178,8 @@ class Motion:
             return ""
         at = float(result["time"][found.at])
         return (
-            f"bars hold {found.share:.0%} of the strain energy where that is largest, at t = "
-            f"{at:.6g} s: {REMEDY}"
+            f"panels that stretch hold {found.share:.0%} of the strain energy where that is "
+            f"largest, at t = {at:.6g} s, {remedy(self.case.structure)}"
         )
 
     @cached_property

@@ -13,6 +13,7 @@ from foldyn.cases import State
 from foldyn.errors import FoldynWarning
 from foldyn.linear.group_velocity import Waves, slopes_of
 from foldyn.linear.linearized_cell import linearize_cell
+from foldyn.linear.model_range import warn_beyond
 from foldyn.linear.tracking import tracked
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.linear.wave_solver import WaveSolver
@@ -126,6 +127,7 @@ def bands(
         )
     with np.errstate(invalid="ignore"):
         frequency = np.sqrt(values) / TURN
+    warn_beyond(cell.case.structure, np.nan_to_num(frequency).max(axis=0), "band")
     data: dict[str, Any] = {
         "frequency": (("phase", "band"), frequency, {"units": "Hz"}),
         "eigenvalue": (("phase", "band"), values, {"units": "rad2/s2"}),

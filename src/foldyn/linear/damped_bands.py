@@ -16,6 +16,7 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from foldyn.cases import State
 from foldyn.linear.bloch import Bloch, null_space
 from foldyn.linear.linearized_cell import linearize_cell
+from foldyn.linear.model_range import warn_beyond
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.linear.wave_solver import check_count
 from foldyn.linear.zone import checked_phases, of_phases
@@ -76,6 +77,7 @@ def damped_bands(
     linear = linearize_cell(cell, state, secant, load_factor)
     rates = np.array(in_threads(lambda phase: damped_rates(linear.bloch, phase, count), given))
     size = np.abs(rates)
+    warn_beyond(cell.case.structure, size.max(axis=0) / TURN, "band")
     ratio = np.divide(-rates.real, size, out=np.full(size.shape, np.nan), where=size > 0.0)
     along, attributes = of_phases(phases, given)
     along["band"] = ("band", 1 + np.arange(count))

@@ -23,6 +23,7 @@ from foldyn.cases import State
 from foldyn.errors import InputError
 from foldyn.linear.bloch import Bloch
 from foldyn.linear.linearized_cell import linearize_cell
+from foldyn.linear.model_range import warn_beyond
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.results.dataset import result_dataset
 from foldyn.threads import in_threads
@@ -99,6 +100,7 @@ def attenuation(
     wanted = np.atleast_1d(numbers("frequencies", frequencies))
     if wanted.ndim != 1 or not len(wanted) or (wanted <= 0.0).any():
         raise InputError(": give numbers above 0 (Hz)", "frequencies")
+    warn_beyond(cell.case.structure, wanted)
     count, phase = whole("count", count, least=1), number("phase", phase)
     along = cell.period("along", along)
     if phase and cell.dimensions == 1:

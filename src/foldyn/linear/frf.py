@@ -19,6 +19,7 @@ from foldyn.linear.excitation import NAMED, Answer, absolute, drive_of
 from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
 from foldyn.linear.linearized import Linearized, linearize
+from foldyn.linear.model_range import warn_beyond
 from foldyn.linear.stepped_sine import SteppedSine, stepped_sine
 from foldyn.linear.time_domain import Rig
 from foldyn.linear.transients import BurstRandom, Impulse, burst_random, impulse
@@ -26,7 +27,7 @@ from foldyn.ram_limit import check_memory
 from foldyn.results import frf_dataset
 from foldyn.results.quantities import RESPONSES, variable
 from foldyn.signals import convert_response
-from foldyn.structures.stretching import MOST, REMEDY, resists_stretch, stretching
+from foldyn.structures.stretching import most, remedy, stretching
 from foldyn.values import choice, number, numbers, of_kind, suggest, whole
 
 if TYPE_CHECKING:
@@ -200,6 +201,7 @@ def frf(
             own = {"integrator": rig.integrator, "dt": chosen.dt}
     finally:
         close()
+    warn_beyond(case.structure, frequency, internal=None if way.by_amplitude else internal)
     facts = {
         "method": method,
         **driven.facts(),
@@ -231,19 +233,20 @@ def _warn_of_instability(system: Linearized) -> None:
 def _warn_of_stretch(system: Linearized, frequency: NDArray, response: NDArray) -> None:
     """Warn where bars hold much of the strain energy of the response (m, nf) at a peak of it."""
     structure, motion = system.case.structure, np.nan_to_num(response).T
-    if not resists_stretch(structure):
+    limit = most(structure)
+    if not np.isfinite(limit):
         return
     strain = np.einsum("im,im->m", motion.conj(), system.stiffness @ motion).real
     beside = np.concatenate([[0.0], strain, [0.0]])
     peaks = np.flatnonzero((strain > beside[:-2]) & (strain >= beside[2:]))
-    bars = stretching(structure, system.displacement, system.expanded(motion[:, peaks]))
-    told = bars > MOST * strain[peaks]
+    bars = stretching(structure, system.displacement, system.whole(motion[:, peaks]))
+    told = bars > limit * strain[peaks]
     if told.any():
         share = (bars[told] / strain[peaks[told]]).clip(max=1.0)
         listed = ", ".join(f"{f:.4g}" for f in frequency[peaks[told]][:NAMED])
         warnings.warn(
-            f"bars hold more than {MOST:.0%} of the strain energy of the response at {listed} Hz "
-            f"({share.max():.0%} at most), where peaks may lie far too high: {REMEDY}",
+            f"panels that stretch hold more than {limit:.0%} of the strain energy of the response "
+            f"at {listed} Hz ({share.max():.0%} at most), {remedy(structure)}",
             StretchWarning,
             stacklevel=3,
         )

@@ -24,11 +24,12 @@ from foldyn.dynamics.modal_damping import mass_of
 from foldyn.errors import FoldynWarning, StretchWarning
 from foldyn.linear.hereditary import Branches, damped_mode
 from foldyn.linear.linearized import Linearized, linearize
+from foldyn.linear.model_range import warn_beyond
 from foldyn.ram_limit import check_memory
 from foldyn.results import modes_dataset
 from foldyn.statics.rigid import free_rigid_motions, rigid_motions
 from foldyn.statics.stability import oriented
-from foldyn.structures.stretching import MOST, REMEDY, resists_stretch, stretching
+from foldyn.structures.stretching import most, remedy, stretching
 from foldyn.values import of_kind, whole
 
 if TYPE_CHECKING:
@@ -112,6 +113,10 @@ def modes(
     FoldynWarning
         The state is no equilibrium, or an unstable one; loads do not act at rest; hinges have no
         slope; a mode was missed.
+    StretchWarning
+        Panels that stretch hold much of the strain energy of a mode.
+    ModelRangeWarning
+        Modes lie above the range of the model.
     """
     found = spectrum_of(
         case, count, state, secant, load_factor=load_factor, internal=internal, verify=verify,
@@ -153,6 +158,8 @@ def spectrum_of(
     spectrum = lowest(pencil, count, unresisted(linear, space), verify)
     _warn(spectrum)
     _warn_of_stretch(linear, spectrum)
+    frequency = np.sqrt(spectrum.values.clip(min=0.0)) / TURN
+    warn_beyond(case.structure, frequency, "mode", linear.internal)
     statistics = {
         "count": count,
         "state": state if isinstance(state, str) else "rest" if state is None else "given",
@@ -304,19 +311,19 @@ def _warn(spectrum: Spectrum) -> None:
 
 def _warn_of_stretch(linear: Linearized, spectrum: Spectrum) -> None:
     structure = linear.case.structure
-    if not resists_stretch(structure):
+    limit = most(structure)
+    if not np.isfinite(limit):
         return
-    bars = stretching(structure, linear.displacement, linear.expanded(spectrum.shapes))
+    bars = stretching(structure, linear.displacement, linear.whole(spectrum.shapes))
     share = np.divide(bars, spectrum.values, out=np.zeros_like(bars), where=spectrum.values > 0.0)
-    told = np.flatnonzero(share > MOST)
+    told = np.flatnonzero(share > limit)
     if len(told):
         worst = told[share[told].argmax()]
         numbers = ", ".join(str(k + 1) for k in told)
         warnings.warn(
-            f"bars hold more than {MOST:.0%} of the strain energy of mode{'s' * (len(told) > 1)} "
-            f"{numbers} (mode {worst + 1}: {min(share[worst], 1.0):.0%}), and the "
-            f"{'frequencies' if len(told) > 1 else 'frequency'} may come out far too high: "
-            f"{REMEDY}",
+            f"panels that stretch hold more than {limit:.0%} of the strain energy of "
+            f"mode{'s' * (len(told) > 1)} {numbers} (mode {worst + 1}: "
+            f"{min(share[worst], 1.0):.0%}), {remedy(structure)}",
             StretchWarning,
             stacklevel=3,
         )

@@ -40,7 +40,7 @@ from foldyn.statics.stepping import (
 )
 from foldyn.structures.locking import kept_apart, locks
 from foldyn.structures.mesh import hinge_angles, lengths
-from foldyn.structures.stretching import REMEDY, stretch
+from foldyn.structures.stretching import remedy, stretch
 
 if TYPE_CHECKING:
     import xarray
@@ -297,8 +297,9 @@ def _stretch_warning(
     if found is None:
         return ""
     return (
-        f"bars hold {found.share:.0%} of the strain energy where that is largest, at point "
-        f"{found.at} (load factor {points[found.at].factor:.6g}): {REMEDY}"
+        f"panels that stretch hold {found.share:.0%} of the strain energy where that is largest, "
+        f"at point {found.at} (load factor {points[found.at].factor:.6g}), "
+        f"{remedy(problem.structure)}"
     )
 
 

@@ -16,6 +16,7 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned, pattern_of
 from foldyn.ram_limit import check_memory
 from foldyn.structures import calibration as calibrate
+from foldyn.structures.beyond_range import doubt_range
 from foldyn.structures.clamps import boundary_edges, clamp_rows, clamp_stiffness
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
@@ -119,6 +120,8 @@ def discretize(
     UnitsWarning
         The sheet's numbers are probably not in SI units: as thick as a fifth of an edge, or with
         a wave speed that no material has.
+    ModelRangeWarning
+        The model gets such a pattern only roughly.
 
     Examples
     --------
@@ -158,6 +161,7 @@ def discretize(
     area = np.concatenate([inner_area, [edge_area[a, b] for a, b in pattern.lines.tolist()]])
 
     folds = fold_stiffness(options.crease_stiffness, pattern, sheet)
+    doubt_range(pattern, sheet, options, folds)
     welds, onset = weld_stiffness(pattern, sheet), np.zeros(0)
     bends = np.concatenate([calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), welds])
     plates, softness = None, np.zeros(len(folds))
