@@ -143,6 +143,25 @@ def test_a_search_that_stands_still_ends():
         search._last = moving
 
 
+@pytest.mark.parametrize("text", ["(a**2 - 1)**2 + b**2", "3 + 0 * (a + b)"])
+def test_a_start_that_no_parameter_improves_is_no_optimum_found(method, text):
+    """A saddle, and what depends on nothing: derivatives are 0 there."""
+    if not METHODS[method].gradient:
+        pytest.skip("draws its designs")
+    start = {"a": 0.0, "b": 0.0}
+    with pytest.warns(FoldynWarning, match=r"no parameter changes .* at the best design"):
+        found = best({"a": (-2.0, 2.0), "b": (-2.0, 2.0)}, text, start=start, method=method)
+    assert found.parameters == start
+    assert not found.ends[0].converged
+    assert "stays at its start, where no parameter changes" in found.ends[0].message
+
+
+def test_a_start_that_is_the_optimum_is_said_to_be_the_start():
+    found = best(SQUARE, "a + b", start={"a": -2.0, "b": -1.0})
+    assert found.ends[0].converged
+    assert "stays at its start, no design that was tried is better" in found.ends[0].message
+
+
 def test_without_a_feasible_design_the_nearest_is_returned_with_a_warning():
     with pytest.warns(FoldynWarning, match=r"none of \d+ designs is feasible.*a \+ b == 5 by 1"):
         found = best(SQUARE, "a", ["a + b == 5", "a <= 100"])

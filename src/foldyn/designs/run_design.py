@@ -23,6 +23,8 @@ from foldyn.sweeps.evaluations import Evaluation, Evaluations
 from foldyn.sweeps.pool import Here
 from foldyn.values import MOST, choice, number, whole
 
+FLAT = 1e-12
+"""Change of the objective over its size, across the bounds, that counts as none."""
 MOST_DRAWN = 20
 """Designs that are drawn for a start until one can be computed."""
 
@@ -234,9 +236,22 @@ def _end(start: int, search: Search, message: str, converged: bool) -> End:
     if not sound:
         return End(start, np.nan, np.nan, False, len(own), message, False)
     best = min(sound, key=search.key)
+    if best is sound[0]:
+        why = "no design that was tried is better"
+        if _insensitive(search, best):
+            why, converged = f"where no parameter changes {search.problem.objective.text}", False
+        message = f"{message}; the design stays at its start, {why}"
     return End(
         start, float(best.numbers[0]), best.violation, best.feasible, len(own), message, converged
     )
+
+
+def _insensitive(search: Search, row: Row) -> bool:
+    """Whether the derivatives of the objective are all 0, so that no method knows where to go."""
+    if row.slopes is None or search.sizes is None:
+        return False
+    change = np.abs(row.slopes[0] * (search.space.upper - search.space.lower)).max()
+    return bool(change <= FLAT * search.sizes[0])
 
 
 def _found(
@@ -256,6 +271,13 @@ def _found(
         warnings.warn(
             f"none of {len(search.rows)} designs is feasible; the nearest one violates {violated}. "
             "Widen the bounds, relax constraints, or take more starts",
+            FoldynWarning,
+            stacklevel=4,
+        )
+    elif _insensitive(search, best) and not ends[best.start].converged:
+        warnings.warn(
+            f"no parameter changes {problem.objective.text} at the best design: it need not be an "
+            "optimum; start elsewhere, or take another objective",
             FoldynWarning,
             stacklevel=4,
         )
