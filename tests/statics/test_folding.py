@@ -215,6 +215,19 @@ def test_a_state_that_rotations_close_is_opened():
         fd.fold(vertex([80, 90, 90, 100], "VVVM"), fraction=0.9, start="folded")
 
 
+@pytest.mark.filterwarnings("ignore:panels pass through")
+def test_a_state_that_stays_closed_is_not_taken_where_less_was_asked():
+    # two valleys beside the smallest sector: the folded state closes, but no rigid path opens it
+    pattern = vertex([84, 57, 96, 123], "VVVM")
+    with pytest.warns(FoldynWarning, match="do not turn their way"):
+        folding = fd.fold(pattern, fraction=0.6, steps=4)
+    assert folding.started_from == "pattern" and folding.wrong
+    assert np.degrees(np.abs(folding.angles)).max() < 150.0
+    with pytest.warns(FoldynWarning, match=r"4 creases stay closed that were to open: creases 0 "):
+        folding = fd.fold(pattern, fraction=0.6, steps=4, start="folded")
+    assert np.degrees(np.abs(folding.angles)).min() > 175.0
+
+
 def test_panels_that_pass_through_each_other_are_named():
     # two flaps of a strip of three panels, each wider than the middle one, folded by 170 degrees
     x = [0.0, 1.0, 1.6, 2.6]

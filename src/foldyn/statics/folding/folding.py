@@ -30,6 +30,7 @@ from foldyn.statics.folding.ways import (
     from_folded,
     from_pattern,
     largest_strain,
+    unopened,
     wrong_ways,
 )
 from foldyn.values import choice, function, whole
@@ -218,7 +219,8 @@ def fold(
     start : {"auto", "pattern", "folded"}
         Where the path begins. "folded" takes the state that rotations of the panels by the full
         angles give, where they close, and opens it to the angles wanted. "auto" folds the pattern
-        as it is, and where creases turn the wrong way tries the folded state as well.
+        as it is, and where creases turn the wrong way tries the folded state as well: that is
+        taken if all creases open from there.
     panels : {"whole", "subdivided"}
         "subdivided" cuts panels from their middles to their corners and to the middles of their
         edges, so that they can bend as paper does where whole ones, cut once, stretch. The path and
@@ -239,7 +241,8 @@ def fold(
     Warns
     -----
     FoldynWarning
-        Mountains or valleys that have not turned their own way.
+        Mountains or valleys that have not turned their own way; creases that have stayed closed
+        where the path begins at the folded state.
     CrossingWarning
         Panels that pass through each other in a state of the path.
 
@@ -292,7 +295,7 @@ def _best_way(
 ) -> Way:  # fmt: skip
     """The way with the fewest creases that turn the wrong way, without strain, near the targets.
 
-    From the folded state only if that comes nearer to the targets.
+    From the folded state only if all creases open there, and come nearer to the targets.
     """
 
     def cost(way: Way) -> tuple[bool, int, bool, float]:
@@ -310,7 +313,9 @@ def _best_way(
             return best
     way = from_folded(energy, bending.opening, pattern, full_angles(pattern), targets, steps, tell)
     if best is not None:
-        if way is None or _off(energy, way, targets) >= _off(energy, best, targets):
+        if way is None or len(_unopened(energy, way, targets)):
+            return best
+        if _off(energy, way, targets) >= _off(energy, best, targets):
             return best
         return min(best, way, key=cost)
     if way is None:
@@ -326,6 +331,11 @@ def _off(energy: FoldEnergy, way: Way, targets: NDArray) -> float:
     """Mean difference (rad) of the creases from their targets; 0 where there are none."""
     off = np.abs(energy.creases(way.shapes[-1].turns) - targets)
     return float(np.nansum(off) / max(1, np.isfinite(off).sum()))
+
+
+def _unopened(energy: FoldEnergy, way: Way, targets: NDArray) -> NDArray[np.int64]:
+    first, last = (energy.creases(way.shapes[k].turns) for k in (0, -1))
+    return unopened(first, last, targets)
 
 
 def _bend(energy: FoldEnergy, way: Way) -> float:
@@ -380,15 +390,21 @@ def _crossed(pattern: Pattern, energy: FoldEnergy, x: NDArray, turns: NDArray) -
 
 def _warn(folding: Folding) -> None:
     if folding.wrong:
-        pairs = folding.path["crease_vertices"].values[list(folding.wrong)].tolist()
-        shown = _listed([f"{k} ({a}, {b})" for k, (a, b) in zip(folding.wrong, pairs, strict=True)])
-        warnings.warn(
-            f"{len(folding.wrong)} mountains or valleys do not turn their way: creases {shown}",
-            FoldynWarning, stacklevel=3,
-        )  # fmt: skip
+        said = f"{len(folding.wrong)} mountains or valleys do not turn their way: creases"
+        warnings.warn(f"{said} {_named(folding, folding.wrong)}", FoldynWarning, stacklevel=3)
+    first = folding.path["fold_angle"].values[0]
+    shut = unopened(first, folding.angles, folding.targets).tolist()
+    if folding.started_from == "folded" and shut:
+        said = f"{len(shut)} creases stay closed that were to open: creases"
+        warnings.warn(f"{said} {_named(folding, shut)}", FoldynWarning, stacklevel=3)
     if folding.first_crossings:
         text = f"panels pass through each other {folding._where_crossed}"
         warnings.warn(text, CrossingWarning, stacklevel=3)
+
+
+def _named(folding: Folding, creases: Sequence[int]) -> str:
+    pairs = folding.path["crease_vertices"].values[list(creases)].tolist()
+    return _listed([f"{k} ({a}, {b})" for k, (a, b) in zip(creases, pairs, strict=True)])
 
 
 def _listed(items: Sequence[str]) -> str:

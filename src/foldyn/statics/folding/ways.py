@@ -19,6 +19,7 @@ PAPER = Stiffness(bends=0.03, creases=5e-3, sides=0.1)  # and some that do, driv
 THIN = Stiffness(bends=1e-3, creases=1e-3, sides=1.0)
 CLOSING = 10.0  # stiffness of sides, so that closed creases stay within 180
 AJAR = math.radians(179.8)  # most turn of creases that are to open from the folded state
+OPENED = 0.1  # part of what was asked: a crease that has opened by less stays closed
 FREE_MARGIN = math.radians(1.0)  # of mountains and valleys without an angle to reach
 WEAKER = 1e-3  # springs of the creases, before what they held is let go
 LESS = 0.3  # of the strain must be left with these
@@ -55,6 +56,12 @@ def wrong_ways(energy: FoldEnergy, turns: NDArray, targets: NDArray) -> NDArray[
     flat = np.abs(np.nan_to_num(targets, nan=1.0)) <= TURNED
     late = energy.signs * energy.creases(turns) <= TURNED
     return np.flatnonzero((energy.signs != 0.0) & late & ~flat)
+
+
+def unopened(first: NDArray, turns: NDArray, targets: NDArray) -> NDArray[np.int64]:
+    """Creases that were to open from their first turns (nc,) and have hardly done so."""
+    asked = np.abs(first) - np.abs(targets)  # nan where a crease is free
+    return np.flatnonzero((asked > TURNED) & (np.abs(first) - np.abs(turns) < OPENED * asked))
 
 
 def from_pattern(
