@@ -10,8 +10,9 @@ import foldyn as fd
 from case_texts import HELD_MIURA_TEXT
 from foldyn.checks import gradient_error, observed_order, tangent_error
 from foldyn.errors import InputError
-from foldyn.structures.condensed_panel import _condensed, panel_stiffness
+from foldyn.structures.condensed_panel import panel_stiffness
 from foldyn.structures.panel_plate import outline
+from foldyn.structures.plate_boundary import condensed
 
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=1.0)
 G = SHEET.bending_modulus
@@ -85,7 +86,8 @@ def test_meshes_converge():
     square = np.c_[np.asarray(PANELS["square"], float), np.zeros(4)]
     shape = outline(square, square.mean(axis=0), [True] * 4, [True] * 4)
     pieces = np.array([4, 8, 16])
-    found = [np.linalg.eigvalsh(_condensed(shape, 0.3, n))[3] for n in (*pieces, 32)]
+    stiffness = condensed(shape, 0.3, (*pieces.tolist(), 32))
+    found = [np.linalg.eigvalsh(each)[3] for each in stiffness]
     error = np.abs(np.array(found[:3]) - (4.0 * found[3] - found[2]) / 3.0)
     assert 1.5 < observed_order(1.0 / pieces, error) < 2.1
     best, used = ((4.0 * found[k] - found[k - 1]) / 3.0 for k in (3, 2))

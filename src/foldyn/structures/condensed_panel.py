@@ -21,8 +21,9 @@ from scipy.linalg import null_space
 
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.structures.panel_plate import Outline, PanelPlate, facets_of, mass_of
+from foldyn.structures.plate_boundary import condensed
 
-COARSE, FINE = 8, 16  # pieces of each edge in the two meshes
+COARSE, FINE = 8, 16  # pieces of each edge in the two meshes: powers of 2
 
 
 @lru_cache(maxsize=4096)
@@ -33,7 +34,7 @@ def panel_stiffness(panel: Outline, poissons_ratio: float) -> NDArray:
     creased edges, then the bows, in their order. A turn is the increase of a dihedral, seen from
     the front, and a bow positive towards it.
     """
-    coarse, fine = (_condensed(panel, poissons_ratio, n) for n in (COARSE, FINE))
+    coarse, fine = condensed(panel, poissons_ratio, (COARSE, FINE))
     stiffness = extrapolated(coarse, fine, FINE / COARSE)
     held = heights_and_slopes(panel)
     stiffness = held.T @ stiffness @ held
@@ -115,12 +116,6 @@ def _spoke_turns(points: NDArray, corners: int) -> NDArray:
     return turns
 
 
-def _condensed(panel: Outline, poissons_ratio: float, n: int) -> NDArray:
-    """Stiffness of the heights of corners and center, mean outward slopes of creases, and bows."""
-    plate = PanelPlate(panel, poissons_ratio, n)
-    return plate.solved([*plate.heights, *plate.slopes, *plate.bows])[1]
-
-
 def _paraboloid(panel: Outline) -> NDArray:
     """The same of the heights r^2 / 2."""
     corners = np.array(panel.corners)
@@ -133,7 +128,10 @@ def _paraboloid(panel: Outline) -> NDArray:
 
 
 def _curled(panel: Outline, poissons_ratio: float, n: int) -> tuple[NDArray, NDArray]:
-    """`_condensed`, and the forces that lack to hold the paraboloid: where edges stay straight."""
+    """Stiffness of heights, slopes and bows, and the forces that lack to hold the paraboloid.
+
+    They lack where edges stay straight.
+    """
     plate = PanelPlate(panel, poissons_ratio, n)
     held = [*plate.heights, *plate.slopes, *plate.bows]
     shapes, stiffness = plate.solved(held)

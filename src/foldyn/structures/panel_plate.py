@@ -92,28 +92,12 @@ class PanelPlate:
         self._ends = ends
         number = {pair: len(self.points) + k for k, pair in enumerate(map(tuple, ends.tolist()))}
         self.heights = [{node: 1.0} for node in at.tolist()]
-        self.slopes, self.bows, self.lines = [], [], []
-        self._turning = []  # the slopes of edges that are not clamped
-        for k, nodes in enumerate(edge.tolist() for edge in edges):
-            if panel.creased[k]:
-                mean = {
-                    number[min(a, b), max(a, b)]: (1.0 if a < b else -1.0) / n
-                    for a, b in pairwise(nodes)
-                }
-                self.slopes.append(mean)
-                self._turning += [] if panel.clamped[k] else [mean]
-                *others, (last, share) = mean.items()
-                for side, part in others if panel.clamped[k] else ():
-                    self.lines.append({side: n * part, last: -n * share})
-            if panel.bowed[k]:
-                share = 1.0 / (n * float(np.linalg.norm(x[k] - x[(k + 1) % len(x)])))
-                ends = 0.5 * (1 - n) * share  # the line between them takes them off
-                inner = {node: share for node in nodes[1:-1]}
-                self.bows.append({nodes[0]: ends, nodes[-1]: ends, **inner})
-            if panel.straight[k]:
-                for step in range(1, n):
-                    part = step / n
-                    self.lines.append({nodes[step]: 1.0, nodes[0]: part - 1.0, nodes[-1]: -part})
+        sides = []
+        for nodes in (edge.tolist() for edge in edges):
+            pairs = [(min(pair), max(pair)) for pair in pairwise(nodes)]
+            sign = np.where(np.diff(nodes) > 0, 1.0, -1.0)
+            sides.append((np.array([number[pair] for pair in pairs]), sign))
+        self.slopes, self.bows, self.lines, self._turning = edge_functions(panel, edges, sides)
 
     def uneven(self, count: int) -> list[dict[int, float]]:
         """Parts P_1 to P_count (Legendre) of the slopes along each creased edge not clamped.
@@ -139,7 +123,7 @@ class PanelPlate:
         others = np.setdiff1d(np.arange(size), first)
         inner = sparse.csc_array(self.stiffness[others][:, others])
         factor = splu(inner, "MMD_AT_PLUS_A", 0.0, options={"SymmetricMode": True})
-        rows = _rows([*held[count:], *self.lines], size)
+        rows = rows_of([*held[count:], *self.lines], size)
         both = self.stiffness[others][:, first].toarray()
         given, multipliers = rows[:, first].toarray(), rows[:, others]
         loose = factor.solve(np.column_stack([both, multipliers.T.toarray()]))
@@ -174,7 +158,47 @@ class PanelPlate:
         return sparse.csr_array(sparse.coo_array(entries, shape=self.stiffness.shape))
 
 
-def _rows(functions: list[dict[int, float]], size: int) -> sparse.csr_array:
+class EdgeFunctions(NamedTuple):
+    """Linear functions of the unknowns of a plate at the edges of its panel; see `PanelPlate`."""
+
+    slopes: list[dict[int, float]]
+    bows: list[dict[int, float]]
+    lines: list[dict[int, float]]
+    turning: list[dict[int, float]]  # the slopes of edges that are not clamped
+
+
+def edge_functions(
+    panel: Outline, edges: Sequence[NDArray], sides: Sequence[tuple[NDArray, NDArray]]
+) -> EdgeFunctions:
+    """Functions of the unknowns along edges.
+
+    edges, sides : of each edge the numbers of the heights of its points (n + 1,), and those of the
+        slopes across its sides with their signs (n,), 1 where they are outward.
+    """
+    found, x = EdgeFunctions([], [], [], []), np.array(panel.corners)
+    for k, (nodes, (across, sign)) in enumerate(zip(edges, sides, strict=True)):
+        nodes, n = nodes.tolist(), len(sign)
+        if panel.creased[k]:
+            mean = dict(zip(across.tolist(), (sign / n).tolist(), strict=True))
+            found.slopes.append(mean)
+            if not panel.clamped[k]:
+                found.turning.append(mean)
+            *others, (last, share) = mean.items()
+            for side, part in others if panel.clamped[k] else ():
+                found.lines.append({side: n * part, last: -n * share})
+        if panel.bowed[k]:
+            share = 1.0 / (n * float(np.linalg.norm(x[k] - x[(k + 1) % len(x)])))
+            ends = 0.5 * (1 - n) * share  # the line between them takes them off
+            inner = {node: share for node in nodes[1:-1]}
+            found.bows.append({nodes[0]: ends, nodes[-1]: ends, **inner})
+        if panel.straight[k]:
+            for step in range(1, n):
+                part = step / n
+                found.lines.append({nodes[step]: 1.0, nodes[0]: part - 1.0, nodes[-1]: -part})
+    return found
+
+
+def rows_of(functions: list[dict[int, float]], size: int) -> sparse.csr_array:
     """Rows (k, size) of linear functions, given by their coefficients."""
     row = np.repeat(np.arange(len(functions)), [len(entries) for entries in functions])
     column = [place for entries in functions for place in entries]
@@ -238,22 +262,29 @@ def _sides(triangles: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     return side.reshape(-1, 3), sign, ends
 
 
-def _plate(
-    points: NDArray, triangles: NDArray, side: NDArray, sign: NDArray, poissons_ratio: float
-) -> sparse.csr_array:
-    """Stiffness of heights of the points and slopes across the sides, for G = 1."""
-    corners = points[triangles]
-    flat = np.concatenate([corners, np.zeros((*triangles.shape, 1))], axis=2)
+def plate_blocks(corners: NDArray, sign: NDArray, poissons_ratio: float) -> NDArray:
+    """Stiffness (nt, 6, 6) of heights of the corners (nt, 3, 2) of triangles, and of slopes.
+
+    sign : (nt, 3), 1 where slopes are outward.
+    """
+    flat = np.concatenate([corners, np.zeros((len(corners), 3, 1))], axis=2)
     bending = triangle_stiffness(flat, poissons_ratio, 1.0, 1.0)[1]
     along = np.roll(corners, -1, axis=1) - corners
     outward = np.stack([along[:, :, 1], -along[:, :, 0]], axis=2)
     outward /= np.linalg.norm(along, axis=2)[:, :, None]
     inverse = np.linalg.inv(corners[:, 1:] - corners[:, :1])
     gradient = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)
-    turns = np.zeros((len(triangles), 3, 6))  # of the sheet at each side, beta
+    turns = np.zeros((len(corners), 3, 6))  # of the sheet at each side, beta
     turns[:, :, :3] = -outward @ gradient
     turns[:, np.arange(3), 3 + np.arange(3)] = sign
-    block = np.einsum("tka,tkl,tlb->tab", turns, bending, turns)
+    return turns.transpose(0, 2, 1) @ bending @ turns
+
+
+def _plate(
+    points: NDArray, triangles: NDArray, side: NDArray, sign: NDArray, poissons_ratio: float
+) -> sparse.csr_array:
+    """Stiffness of heights of the points and slopes across the sides, for G = 1."""
+    block = plate_blocks(points[triangles], sign, poissons_ratio)
     dofs = np.concatenate([triangles, len(points) + side], axis=1)
     rows, columns = np.repeat(dofs, 6, axis=1).ravel(), np.tile(dofs, (1, 6)).ravel()
     size = len(points) + int(side.max()) + 1
