@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import re
 import secrets
@@ -9,6 +11,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from foldyn.errors import InputError
 
@@ -46,6 +49,22 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     What UTF-8 has no letter for, bytes of a file's name for one, becomes an escape, "\udcff".
     """
     write_bytes(path, text.encode("utf-8", "backslashreplace"))
+
+
+def plain(value: Any) -> Any:
+    """Value as JSON can hold it: arrays become lists, and what is not finite null."""
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if hasattr(value, "tolist"):  # of NumPy
+        return plain(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def write_json(path: str | os.PathLike[str], value: Any) -> None:
+    """Write a value as a file of JSON; see `plain`."""
+    write_text(path, json.dumps(plain(value), indent=2, allow_nan=False) + "\n")
 
 
 @contextmanager

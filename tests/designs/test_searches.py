@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from formulas import Formulas, best, plan
@@ -205,8 +207,14 @@ def test_a_design_is_saved(tmp_path):
     lines = (tmp_path / "history.csv").read_text().splitlines()
     assert len(lines) == 1 + found.evaluations
     assert "parameter_b[1]" in lines[0] and "a >= 0.5" in lines[0]
-    with pytest.raises(InputError, match=r"written as \.nc or \.csv"):
+    found.save(tmp_path / "design.json")
+    kept = json.loads((tmp_path / "design.json").read_text())
+    assert kept["parameters"]["b"] == found.parameters["b"].tolist()
+    assert kept["ends"][0]["converged"] is found.ends[0].converged
+    with pytest.raises(InputError, match=r"written as \.json, \.nc or \.csv"):
         found.save(tmp_path / "design.txt")
+    with pytest.raises(InputError, match=r"the folder .* does not exist"):
+        found.save(tmp_path / "none" / "design.json")
     with pytest.raises(InputError, match="did you mean 'parameters'"):
         found["parameter"]
     assert "feasible=True" in repr(found) and "<table>" in found._repr_html_()

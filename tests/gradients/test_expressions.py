@@ -83,6 +83,8 @@ def test_what_is_no_expression_is_refused_with_its_place(text, why):
         ("abs(mass)", 0.0, "take its square instead"),
         ("min(mass, 2 - mass)", 1.0, r"its arguments are equal \(1\).*write it smoothly"),
         ("max(mass, 1, 2 * mass - 1)", 1.0, "by a constraint"),
+        ("max(mass, 2 - mass)", 1.0 + 1e-12, "its arguments are equal"),
+        ("abs(mass - 2)", 2.0 - 1e-12, "is 0, .*take its square instead"),
     ],
 )
 def test_where_there_is_no_value_or_derivative_the_message_says_so(text, at, why):

@@ -21,7 +21,7 @@ from foldyn.designs.space import Space
 from foldyn.errors import InputError
 from foldyn.results import netcdf
 from foldyn.values import show, suggest
-from foldyn.writing import write_text
+from foldyn.writing import plain, write_json, write_text
 
 PARAMETER, GRADIENT = "parameter_", "gradient_"
 """What stands before the names of parameters in datasets."""
@@ -101,16 +101,27 @@ class Design:
             raise InputError(f"{show(name)}: {hint}a design has {', '.join(known)}")
         return getattr(self, name)
 
+    def summary(self) -> dict[str, Any]:
+        """All numbers but the history, as JSON has them (nan is null)."""
+        own = {name: value for name, value in vars(self).items() if name not in ("ends", "history")}
+        return plain(
+            {"foldyn_version": foldyn.__version__, **own, "ends": [vars(one) for one in self.ends]}
+        )
+
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the history, with the best design, as a dataset (``*.nc``) or a table (``*.csv``).
+        """Write the best design (``*.json``), or the history with it (``*.nc``, ``*.csv``).
 
         Raises
         ------
         InputError
-            The name has another ending.
+            The name has another ending, or its folder does not exist.
         """
         path = Path(path)
-        if path.suffix == ".nc":
+        if not path.parent.is_dir():
+            raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
+        if path.suffix == ".json":
+            write_json(path, self.summary())
+        elif path.suffix == ".nc":
             netcdf.write(self.history, path)
         elif path.suffix == ".csv":
             columns = dict(_columns(self.history))
@@ -120,7 +131,9 @@ class Design:
             table.writerows(zip(*columns.values(), strict=True))
             write_text(path, text.getvalue())
         else:
-            raise InputError(f"{path}: a design is written as .nc or .csv; choose one of them")
+            raise InputError(
+                f"{path}: a design is written as .json, .nc or .csv; choose one of them"
+            )
 
 
 def _columns(history: xr.Dataset) -> Iterator[tuple[str, list[Any]]]:

@@ -21,8 +21,8 @@ from foldyn.values import show, suggest
 
 EXAMPLE = 'write for example "-frequency[2] / frequency[1]"'
 SENSES = {ast.Eq: "==", ast.LtE: "<=", ast.GtE: ">="}
-TIE = 1e-12
-"""Relative difference below which two numbers tie."""
+TIE = 1e-9
+"""Relative difference below which two numbers are one, but for rounding."""
 SMOOTH = (
     "has no derivative there; write it smoothly, as (a**8 + b**8)**(1/8), or bound both: let one "
     "of them be the objective and keep the other beside it by a constraint"
@@ -181,7 +181,7 @@ def _worked(node: ast.expr, known: Mapping[str, _Number], width: int) -> _Number
         name = ast.unparse(node.func)
         if name in _SEVERAL:
             return _chosen(_SEVERAL[name], arguments, ast.unparse(node))
-        return _of_one(name, arguments[0], ast.unparse(node))
+        return _of_one(name, arguments[0], ast.unparse(node), _rounding(node.args[0], known))
     if isinstance(node, ast.Constant):
         return _Number(float(node.value), np.zeros(width))  # type: ignore[arg-type]
     return known[_measure(node)]
@@ -215,15 +215,22 @@ def _chosen(
     tied = [one for one in arguments if abs(one.value - value) <= TIE * abs(value)]
     if any(not np.allclose(one.slope, tied[0].slope, TIE, 0.0) for one in tied):
         raise InputError(f"{text}: its arguments are equal ({value:.6g}), so that it {SMOOTH}")
-    return tied[0]
+    return _Number(value, tied[0].slope)
 
 
-def _of_one(name: str, one: _Number, text: str) -> _Number:
+def _rounding(node: ast.expr, known: Mapping[str, _Number]) -> float:
+    """Up to what a part of an expression is 0, but for rounding: by the parts of a difference."""
+    if not (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub)):
+        return 0.0
+    return TIE * max(abs(_worked(one, known, 0).value) for one in (node.left, node.right))
+
+
+def _of_one(name: str, one: _Number, text: str, rounding: float) -> _Number:
     function, derivative = _FUNCTIONS[name]
     value = float(function(one.value))
     if not one.slope.any():
         return _Number(value, one.slope)
-    if name == "abs" and one.value == 0.0:
+    if name == "abs" and abs(one.value) <= rounding:
         raise InputError(f"{text}: is 0, where it has no derivative; take its square instead")
     return _Number(value, float(derivative(np.float64(one.value))) * one.slope)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
+from foldyn.gradients.expressions import TIE
 from foldyn.gradients.numbers import Gradient
 from foldyn.linear.frf import quantity_of
 from foldyn.signals.peaks import magnitude_curve
@@ -30,10 +31,6 @@ from foldyn.viewer.states import bar_strain
 
 Seeds = dict[str, NDArray]
 """Derivatives of a number by variables of a result, of their shapes, by name."""
-
-
-TIE = 1e-9
-"""Relative difference below which two numbers are one, but for rounding."""
 
 
 class Derivative(NamedTuple):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,7 +21,7 @@ from foldyn.experiment.calibration.fit_problem import Problem
 from foldyn.experiment.calibration.measurement import Measurement, spread
 from foldyn.experiment.calibration.uncertainty import Estimate
 from foldyn.results import netcdf
-from foldyn.writing import write_text
+from foldyn.writing import plain, write_json, write_text
 
 RARE = 0.01
 """Probability of a misfit by noise alone below which something else must have part in it."""
@@ -198,17 +197,17 @@ class Fit:
         return {
             "foldyn_version": foldyn.__version__,
             "case": self.problem.path.name,
-            "parameters": [_plain(vars(one) | {"note": one.note}) for one in self.estimates],
+            "parameters": [plain(vars(one) | {"note": one.note}) for one in self.estimates],
             "ties": {tie.key: tie.expression for tie in self.problem.space.ties},
             "confidence": self.confidence,
-            "correlation": _plain(self.correlation.tolist()),
+            "correlation": plain(self.correlation.tolist()),
             "singular_values": self.singular_values.tolist(),
             "directions": self.directions.tolist(),
             "degrees_of_freedom": self.freedom,
-            "misfit": _plain(self.misfit),
+            "misfit": plain(self.misfit),
             "quality": self.quality,
-            "measurements": [_plain(vars(one)) for one in self.scores],
-            "starts": [_plain(vars(one)) for one in self.descents],
+            "measurements": [plain(vars(one)) for one in self.scores],
+            "starts": [plain(vars(one)) for one in self.descents],
             "evaluations": self.evaluations,
             "seconds": self.seconds,
             "quotients": list(self.quotients),
@@ -250,8 +249,7 @@ class Fit:
         if not path.parent.is_dir():
             raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
         if path.suffix == ".json":
-            text = json.dumps(self.summary(), indent=2, allow_nan=False)
-            write_text(path, text + "\n")
+            write_json(path, self.summary())
         elif path.suffix == ".nc":
             netcdf.write(self.dataset(), path)
         else:
@@ -267,14 +265,3 @@ def score(one: Measurement, predicted: NDArray) -> Score:
     return Score(
         one.name, one.held_out, len(observed), rms, one.unit, rms / spread(observed), sigmas
     )
-
-
-def _plain(value: Any) -> Any:
-    """Value as JSON can hold it: what is not finite becomes null."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    return None if isinstance(value, float) and not np.isfinite(value) else value
