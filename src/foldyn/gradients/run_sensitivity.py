@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from inspect import signature
 from pathlib import Path
@@ -22,7 +21,8 @@ from foldyn.cases import Case
 from foldyn.dynamics import simulate
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import InputError, within
-from foldyn.gradients.expressions import Expression, parse
+from foldyn.gradients.chain import Chain, Wanted
+from foldyn.gradients.expressions import parse
 from foldyn.gradients.frf import FrfGradient
 from foldyn.gradients.measures import Derivative, Seeds, derivative_of, one_number
 from foldyn.gradients.modes import ModesGradient
@@ -32,29 +32,14 @@ from foldyn.gradients.parameters import Parameters, Slope, Values, checked
 from foldyn.gradients.path import PathGradient
 from foldyn.input_files import path_of
 from foldyn.linear import frf, modes
-from foldyn.mechanics.pullback import Arrays
 from foldyn.statics import trace
 from foldyn.structures import Structure
 from foldyn.sweeps.job import ASIDE
-from foldyn.sweeps.measure import Asked, of_callable
+from foldyn.sweeps.measure import of_callable
 from foldyn.values import choice, listed, of_kind, show
 
 if TYPE_CHECKING:
-    from typing import Protocol
-
-    class Differentiated(Protocol):
-        """A result, and gradients of numbers that are functions of it."""
-
-        result: xr.Dataset
-
-        def numbers(self, case: Case) -> Arrays:
-            """Numbers of a case by which gradients are taken."""
-            ...
-
-        def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:
-            """Gradient of a number, by its derivatives by variables of the result."""
-            ...
-
+    from foldyn.gradients.chain import Differentiated
 
 KINDS: Mapping[str, Callable[[Case, Mapping[str, Any]], Differentiated]] = {
     "modes": ModesGradient,
@@ -73,7 +58,6 @@ ARRAYS = (
     "node_mass",
 )  # fmt: skip
 """Arrays of a structure that can be parameters as they are."""
-SAME, ROUNDING = 1e-6, 1e-9  # of derivatives, and of a number: derivatives that are one
 Source = Callable[..., Case] | Case | str | os.PathLike[str]
 Own = tuple[Callable[..., float], Callable[..., Seeds]]
 
@@ -160,8 +144,8 @@ def sensitivity(
     direction = None if along is None else _direction(along, design)
     if direction is not None and isinstance(found, ModesGradient):
         found = found.along(lambda gradient: _rate(slopes, direction, gradient))
-    parts = _Parts(found, case, design, slopes, cut, {})
-    values, gradients = zip(*(parts.of(one) for one in wanted), strict=True)
+    chain = Chain(found, case, design, slopes, cut, {})
+    values, gradients = zip(*(chain.of(one) for one in wanted), strict=True)
     data: dict[str, Any] = {"value": ("measure", np.array(values))}
     if direction is None:
         for name, value in design.values.items():
@@ -341,14 +325,6 @@ def _of_file(
 
 
 # ------------------------------------------------------------------ measures
-class Wanted(NamedTuple):
-    """A number to be differentiated: an expression of measures with their derivatives."""
-
-    text: str
-    expression: Expression
-    measures: dict[str, tuple[Asked, Derivative]]
-
-
 def _wanted(measures: Any, kind: str) -> list[Wanted]:
     if isinstance(measures, Mapping):
         return [_own(name, pair) for name, pair in measures.items()]
@@ -384,143 +360,6 @@ def _own(name: str, pair: Any) -> Wanted:
 def _own_of(function: Callable[..., float]) -> Callable[..., Callable[[Case], float]]:
     """A user's function where the result stays as it is."""
     return lambda result, case: lambda other: float(function(result, other))
-
-
-def _add(seeds: dict[Any, Any], variable: Any, seed: Any, share: float) -> None:
-    """Add a share of derivatives by a variable of a result to others."""
-    if isinstance(seed, Mapping):  # by what a variable takes: see `path.PathGradient`
-        own = seeds.setdefault(variable, {})
-        for key, each in seed.items():
-            _add(own, key, each, share)
-    else:
-        seeds[variable] = seeds.get(variable, 0.0) + share * np.asarray(seed)
-
-
-class _Changes(NamedTuple):
-    """Derivatives of a number by variables of a result, parameters, and numbers of the case."""
-
-    seeds: Seeds
-    explicit: dict[str, NDArray]
-    numbers: dict[str, NDArray]
-
-    def add(self, other: _Changes, share: float) -> None:
-        """Add a share of those of another number."""
-        for own, more in zip(self, other, strict=True):
-            for key, each in more.items():
-                _add(own, key, each, share)
-
-
-class _Parts(NamedTuple):
-    """All that values and gradients of measures are made of."""
-
-    found: Differentiated
-    case: Case
-    design: Parameters
-    slopes: dict[str, Any]
-    cut: bool  # whether lengths to which bars are cut are among the parameters
-    shared: dict[Any, Any]  # what measures have come through
-
-    def of(self, one: Wanted) -> tuple[float, dict[str, NDArray]]:
-        """Value of a number, and its derivatives by all entries of each parameter."""
-        values = {}
-        for name, (measure, _) in one.measures.items():
-            value = measure.of(self.found.result, self.case, self.shared)
-            if value.ndim:
-                raise InputError(f"{measure.text}: is an array; ask for one of its numbers")
-            values[name] = float(value)
-        value, parts = one.expression.value_and_slopes(values)
-        total = _Changes({}, {}, {})
-        for name, (measure, derivative) in one.measures.items():
-            with said_of(measure.text):
-                own = self._of_measure(measure, derivative, values[name] if parts[name] else np.inf)
-            total.add(own, parts[name])
-        with said_of(one.text):
-            return value, self._by_parameters(total)
-
-    def _of_measure(self, measure: Asked, derivative: Derivative, value: float) -> _Changes:
-        """Derivatives of a measure, the same wherever an extreme is reached."""
-        if derivative.cut and self.cut:
-            raise InputError(
-                f"has no derivative by {LENGTH}, the lengths to which bars are cut; leave it out "
-                "of the parameters, or take another measure, as displacement"
-            )
-        places: list[dict[str, Any]] = [{}]
-        if derivative.places:
-            found = derivative.places(self._subject(measure), self.case, **measure.arguments)
-            places = [{"at": place} for place in found]
-        one = self._at(measure, derivative, places[:1], np.ones(1))
-        if len(places) > 1:
-            shares = np.random.default_rng(0).dirichlet(np.ones(len(places) - 1))
-            other = self._at(measure, derivative, places[1:], shares)
-            pair = [self._by_parameters(each) for each in (one, other)]
-            left, right = (
-                np.concatenate([by * self.design.size(name).ravel() for name, by in each.items()])
-                for each in pair
-            )
-            size = max(np.abs(left).max(), np.abs(right).max())
-            if np.abs(left - right).max() > SAME * size + ROUNDING * abs(value):
-                raise InputError(
-                    f"is reached at {len(places)} places at once, which part as the design "
-                    "changes: it has no derivative; take a measure of one of them, or mean_square"
-                )
-        return one
-
-    def _subject(self, measure: Asked) -> Any:
-        """The result, or what a measure has come through."""
-        return self.shared.get(measure.measure.through, self.found.result)
-
-    def _at(
-        self, measure: Asked, derivative: Derivative, places: Sequence[dict[str, Any]],
-        shares: NDArray,
-    ) -> _Changes:  # fmt: skip
-        """Derivatives of shares of a measure at some places."""
-        total, frozen = _Changes({}, {}, {}), []
-        for place, share in zip(places, shares.tolist(), strict=True):
-            given = {**place, **measure.arguments}
-            seeds, numbers = derivative.seeds(self.found.result, self.case, **given), {}
-            if derivative.numbers:
-                numbers = derivative.numbers(self._subject(measure), self.case, **given)
-            total.add(_Changes(seeds, {}, dict(numbers)), share)
-            if derivative.frozen:
-                own = derivative.frozen(self._subject(measure), self.case, **given)
-                frozen.append((share, own))
-        if frozen:
-            total.explicit.update(
-                self._explicit(lambda case: sum(share * own(case) for share, own in frozen))
-            )
-        return total
-
-    def _by_parameters(self, changes: _Changes) -> dict[str, NDArray]:
-        """Derivatives by all entries of each parameter."""
-        gradient = self._nothing
-        if changes.seeds:
-            gradient = dict(self.found.backward(changes.seeds))
-        for key, by in changes.numbers.items():
-            _add(gradient, key, by, 1.0)
-        return {
-            name: slope.pulled(gradient) + changes.explicit.get(name, 0.0)
-            for name, slope in self.slopes.items()
-        }
-
-    @property
-    def _nothing(self) -> dict[str, NDArray]:
-        """Gradient of nothing."""
-        numbers = self.found.numbers(self.case).numbers
-        return {name: np.zeros_like(array) for name, array in numbers.items()}
-
-    def _explicit(self, frozen: Callable[[Case], float]) -> dict[str, NDArray]:
-        """Derivatives of a measure where the result stays as it is."""
-        slopes = self.design.slopes(lambda case: Arrays({"value": np.array([frozen(case)])}, {}))
-        return {name: slope.pulled({"value": np.ones(1)}) for name, slope in slopes.items()}
-
-
-@contextmanager
-def said_of(text: str) -> Iterator[None]:
-    """Say of which measure bad input is."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{text}: {error}") from None
 
 
 # ------------------------------------------------------------------ directions

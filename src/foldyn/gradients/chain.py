@@ -1,0 +1,180 @@
+"""From measures to parameters: derivatives of a number by the result, the case and the design."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.errors import InputError
+from foldyn.gradients.expressions import Expression
+from foldyn.gradients.measures import Derivative, Seeds
+from foldyn.gradients.numbers import Gradient
+from foldyn.gradients.parameters import Parameters
+from foldyn.mechanics.pullback import Arrays
+from foldyn.sweeps.measure import Asked
+
+SAME, ROUNDING = 1e-6, 1e-9  # of derivatives, and of a number: derivatives that are one
+
+
+class Differentiated(Protocol):
+    """A result, and gradients of numbers that are functions of it."""
+
+    result: xr.Dataset
+
+    def numbers(self, case: Case) -> Arrays:
+        """Numbers of a case by which gradients are taken."""
+        ...
+
+    def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:
+        """Gradient of a number, by its derivatives by variables of the result."""
+        ...
+
+
+class Wanted(NamedTuple):
+    """A number to be differentiated: an expression of measures with their derivatives."""
+
+    text: str
+    expression: Expression
+    measures: dict[str, tuple[Asked, Derivative]]
+
+
+def _add(seeds: dict[Any, Any], variable: Any, seed: Any, share: float) -> None:
+    """Add a share of derivatives by a variable of a result to others."""
+    if isinstance(seed, Mapping):  # by what a variable takes: see `path.PathGradient`
+        own = seeds.setdefault(variable, {})
+        for key, each in seed.items():
+            _add(own, key, each, share)
+    else:
+        seeds[variable] = seeds.get(variable, 0.0) + share * np.asarray(seed)
+
+
+class _Changes(NamedTuple):
+    """Derivatives of a number by variables of a result, parameters, and numbers of the case."""
+
+    seeds: Seeds
+    explicit: dict[str, NDArray]
+    numbers: dict[str, NDArray]
+
+    def add(self, other: _Changes, share: float) -> None:
+        """Add a share of those of another number."""
+        for own, more in zip(self, other, strict=True):
+            for key, each in more.items():
+                _add(own, key, each, share)
+
+
+class Chain(NamedTuple):
+    """All that values and gradients of measures are made of."""
+
+    found: Differentiated
+    case: Case
+    design: Parameters
+    slopes: dict[str, Any]
+    cut: bool  # whether lengths to which bars are cut are among the parameters
+    shared: dict[Any, Any]  # what measures have come through
+
+    def of(self, one: Wanted) -> tuple[float, dict[str, NDArray]]:
+        """Value of a number, and its derivatives by all entries of each parameter."""
+        values = {}
+        for name, (measure, _) in one.measures.items():
+            value = measure.of(self.found.result, self.case, self.shared)
+            if value.ndim:
+                raise InputError(f"{measure.text}: is an array; ask for one of its numbers")
+            values[name] = float(value)
+        value, parts = one.expression.value_and_slopes(values)
+        total = _Changes({}, {}, {})
+        for name, (measure, derivative) in one.measures.items():
+            with said_of(measure.text):
+                if parts[name]:  # what counts for nothing needs no derivative
+                    total.add(self._of_measure(measure, derivative, values[name]), parts[name])
+        with said_of(one.text):
+            return value, self._by_parameters(total)
+
+    def _of_measure(self, measure: Asked, derivative: Derivative, value: float) -> _Changes:
+        """Derivatives of a measure, the same wherever an extreme is reached."""
+        if derivative.cut and self.cut:
+            raise InputError(
+                "has no derivative by bar_length, the lengths to which bars are cut; leave it out "
+                "of the parameters, or take another measure, as displacement"
+            )
+        places: list[dict[str, Any]] = [{}]
+        if derivative.places:
+            found = derivative.places(self._subject(measure), self.case, **measure.arguments)
+            places = [{"at": place} for place in found]
+        one = self._at(measure, derivative, places[:1], np.ones(1))
+        if len(places) > 1:
+            shares = np.random.default_rng(0).dirichlet(np.ones(len(places) - 1))
+            other = self._at(measure, derivative, places[1:], shares)
+            pair = [self._by_parameters(each) for each in (one, other)]
+            left, right = (
+                np.concatenate([by * self.design.size(name).ravel() for name, by in each.items()])
+                for each in pair
+            )
+            size = max(np.abs(left).max(), np.abs(right).max())
+            if np.abs(left - right).max() > SAME * size + ROUNDING * abs(value):
+                raise InputError(
+                    f"is reached at {len(places)} places at once, which part as the design "
+                    "changes: it has no derivative; take a measure of one of them, or mean_square"
+                )
+        return one
+
+    def _subject(self, measure: Asked) -> Any:
+        """The result, or what a measure has come through."""
+        return self.shared.get(measure.measure.through, self.found.result)
+
+    def _at(
+        self, measure: Asked, derivative: Derivative, places: Sequence[dict[str, Any]],
+        shares: NDArray,
+    ) -> _Changes:  # fmt: skip
+        """Derivatives of shares of a measure at some places."""
+        total, frozen = _Changes({}, {}, {}), []
+        for place, share in zip(places, shares.tolist(), strict=True):
+            given = {**place, **measure.arguments}
+            seeds, numbers = derivative.seeds(self.found.result, self.case, **given), {}
+            if derivative.numbers:
+                numbers = derivative.numbers(self._subject(measure), self.case, **given)
+            total.add(_Changes(seeds, {}, dict(numbers)), share)
+            if derivative.frozen:
+                own = derivative.frozen(self._subject(measure), self.case, **given)
+                frozen.append((share, own))
+        if frozen:
+            total.explicit.update(
+                self._explicit(lambda case: sum(share * own(case) for share, own in frozen))
+            )
+        return total
+
+    def _by_parameters(self, changes: _Changes) -> dict[str, NDArray]:
+        """Derivatives by all entries of each parameter."""
+        seeds = changes.seeds
+        gradient = dict(self.found.backward(seeds)) if seeds else self._nothing
+        for key, by in changes.numbers.items():
+            _add(gradient, key, by, 1.0)
+        return {
+            name: slope.pulled(gradient) + changes.explicit.get(name, 0.0)
+            for name, slope in self.slopes.items()
+        }
+
+    @property
+    def _nothing(self) -> dict[str, NDArray]:
+        """Gradient of nothing."""
+        numbers = self.found.numbers(self.case).numbers
+        return {name: np.zeros_like(array) for name, array in numbers.items()}
+
+    def _explicit(self, frozen: Callable[[Case], float]) -> dict[str, NDArray]:
+        """Derivatives of a measure where the result stays as it is."""
+        slopes = self.design.slopes(lambda case: Arrays({"value": np.array([frozen(case)])}, {}))
+        return {name: slope.pulled({"value": np.ones(1)}) for name, slope in slopes.items()}
+
+
+@contextmanager
+def said_of(text: str) -> Iterator[None]:
+    """Say of which measure bad input is."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{text}: {error}") from None
