@@ -7,7 +7,9 @@ import pytest
 
 import foldyn as fd
 from foldyn.errors import InputError
+from foldyn.linear.excitation import drive_of
 from foldyn.linear.linearized import linearize
+from foldyn.linear.time_domain import Integration, Rig
 from foldyn.mechanics.contact.term import ContactTerm
 
 PAPER = fd.Sheet(1.2e9, 0.2, 0.3e-3, 690.0)
@@ -76,3 +78,13 @@ def test_a_base_that_moves_leaves_the_floor_behind():
 def test_friction_is_refused():
     with pytest.raises(InputError, match=r"contact.friction: what rubs sticks or slides"):
         fd.modes(tent(panels=True, friction=0.2), 3)
+
+
+def test_planes_that_swing_stand_still_in_motions_about_a_state():
+    """Histories play no part: a floor stays where it is in the state."""
+    floor = fd.Plane((0, 0, -1.0), (0, 0, 1), motion=(0, 0, 2e-4), history=fd.Harmonic(5.0, 90.0))
+    case = tent(planes=[floor]).altered(loads=[], supports=[fd.Fix([0, 1, 2, 3])])
+    drive = fd.Force([4], (0, 0, 1e-6))
+    rig = Rig(case, fd.State(), 0.5, drive_of(case, drive, 1.0), Integration())
+    (_, history), *_ = rig.driven(fd.Harmonic(1.0)).obstacle_terms
+    assert history(np.array([0.0, 0.3, 7.0])).tolist() == [0.5, 0.5, 0.5]

@@ -64,7 +64,8 @@ def bifurcation_diagram(
     Parameters
     ----------
     case : Case
-        With `Harmonic` histories of loads or supports; they set the period.
+        With `Harmonic` histories of loads, supports, planes or wind; they set the period. Others
+        must be constant.
     measure : Quantity
         With the `function` of displacement (n, 3), m, velocity (n, 3), m/s, and time, s, that the
         diagram shows: a number.
@@ -200,7 +201,7 @@ class Swept(NamedTuple):
 def _swept(case: Case, frequencies: ArrayLike | None, amplitudes: ArrayLike | None) -> Swept:
     if (frequencies is None) == (amplitudes is None):
         raise InputError(": give frequencies (Hz) or amplitudes, one of the two", "frequencies")
-    own = driven_frequency(case)
+    own = driven_frequency(case, "fd.bifurcation_diagram")
     by, given = ("frequencies", frequencies) if amplitudes is None else ("amplitudes", amplitudes)
     values = numbers(by, given)
     if values.ndim != 1 or not values.size or values.min() <= 0.0 or (np.diff(values) <= 0.0).any():

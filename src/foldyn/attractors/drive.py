@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
 
 from foldyn.cases import (
+    Air,
     BaseMotion,
     Case,
+    Constant,
     CreaseMoment,
     Force,
     Gravity,
@@ -22,6 +24,7 @@ from foldyn.cases import (
     Pressure,
     Temperature,
     TotalForce,
+    as_history,
 )
 from foldyn.errors import InputError
 
@@ -40,8 +43,9 @@ SIZES: Mapping[type, str] = {
     Impose: "value",
     BaseMotion: "value",
     Plane: "motion",
+    Air: "velocity",
 }
-"""Fields that the effect of a load, or of a support or plane that moves, is proportional to."""
+"""Fields that say how much a load acts, a support or plane moves, or the air blows."""
 
 
 def drive_frequency(case: Case) -> float:
@@ -68,11 +72,24 @@ def lowest_frequency(frequencies: Sequence[float]) -> float:
     return lowest
 
 
-def driven_frequency(case: Case) -> float:
-    """The same, refused where nothing drives the case."""
+def driven_frequency(case: Case, name: str) -> float:
+    """The same, refused where nothing, or something not harmonic, drives the case for `name`."""
+    check_harmonic(case, name)
     if frequency := drive_frequency(case):
         return frequency
     raise InputError(f"case: nothing drives it; give a load or a support the history {HARMONIC}")
+
+
+def check_harmonic(case: Case, name: str) -> None:
+    """Refuse histories that are neither harmonic nor constant."""
+    for place, part in _parts(case):
+        history = as_history(getattr(part, "history", None))
+        if not isinstance(history, Constant | Harmonic):
+            raise InputError(
+                f": is of the kind {history.kind!r}, and {name} takes harmonic and constant ones; "
+                f"give {HARMONIC}, or leave it out",
+                f"{place}.history",
+            )
 
 
 def with_histories(case: Case, history: Callable[[Harmonic], History]) -> Case:
@@ -87,7 +104,7 @@ def at_frequency(case: Case, frequency: float) -> Case:
 
 
 def at_level(case: Case, level: float) -> Case:
-    """The case with its harmonic loads, and moving supports and planes, times a level.
+    """The case with its harmonic loads and gusts, and moving supports and planes, times a level.
 
     Raises
     ------
@@ -117,14 +134,26 @@ def _altered(case: Case, change: Callable[[Any], Any]) -> Case:
     contact = case.contact
     if contact is not None:
         contact = replace(contact, planes=changed(contact.planes))
-    return case.altered(loads=changed(case.loads), supports=changed(case.supports), contact=contact)
+    air = case.air if case.air is None else changed([case.air])[0]
+    return case.altered(
+        loads=changed(case.loads), supports=changed(case.supports), contact=contact, air=air
+    )
 
 
 def _driven_parts(case: Case) -> list[Any]:
-    """Loads, supports and planes with a harmonic history."""
+    """Loads, supports, planes and winds with a harmonic history."""
+    return [part for _, part in _parts(case) if _is_driven(part)]
+
+
+def _parts(case: Case) -> Iterator[tuple[str, Any]]:
+    """What may have a history that counts, with its place for messages."""
     planes = () if case.contact is None else case.contact.planes
-    return [part for part in (*case.loads, *case.supports, *planes) if _is_driven(part)]
+    listed = {"loads": case.loads, "supports": case.supports, "contact.planes": planes}
+    for name, parts in listed.items():
+        yield from ((f"{name}[{k}]", part) for k, part in enumerate(parts))
+    if case.air is not None and case.air.blows:
+        yield "air", case.air
 
 
 def _is_driven(part: Any) -> bool:
-    return isinstance(getattr(part, "history", None), Harmonic)
+    return isinstance(getattr(part, "history", None), Harmonic)  # of still air, it changes nothing

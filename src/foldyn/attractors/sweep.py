@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.attractors.diagram import FREQUENCY, SWEEPS
-from foldyn.attractors.drive import at_frequency, driven_frequency, with_histories
+from foldyn.attractors.drive import at_frequency, drive_frequency, driven_frequency, with_histories
 from foldyn.attractors.jumps import Jump, jump_variables, jumps_between
 from foldyn.attractors.run import Run, Stretch, check_measure, extremes, measured, told_once
 from foldyn.cases import Case, Chirp, Harmonic, State
@@ -53,7 +53,7 @@ def swept_sine(
     Parameters
     ----------
     case : Case
-        With `Harmonic` histories of loads or supports.
+        As of `bifurcation_diagram`.
     measure : Quantity
         As of `bifurcation_diagram`.
     frequencies : (float, float)
@@ -108,7 +108,7 @@ def swept_sine(
     began = time.perf_counter()
     of_kind("case", case, Case)
     check_measure(measure, len(case.structure.nodes))
-    driven_frequency(case)
+    driven_frequency(case, "fd.swept_sine")
     ends = numbers("frequencies", frequencies)
     if ends.shape != (2,) or not 0.0 < ends[0] < ends[1]:
         raise InputError(
@@ -206,7 +206,7 @@ def _glide(
     if settle:
         wait = settle / line.start
         _, run = run.advanced(at_frequency(case, line.start), wait, wait, longest)
-    swept = with_histories(case, line.chirp(driven_frequency(case)))
+    swept = with_histories(case, line.chirp(drive_frequency(case)))
     length = float(line.cycles[-1])
     every = length / math.ceil(length / longest)
     return run.advanced(swept, length, every, longest, report=report)

@@ -67,11 +67,18 @@ class Rig:
         integration: Integration,
     ) -> None:  # fmt: skip
         point = operating_point(case, state, load_factor)
-        self.case, self.state = case, point.displacement
+        self.state = point.displacement
         self.drive, self.integration = drive, integration
         massless = case.structure.massless
         self.integrator = integration.integrator or ("generalized_alpha" if massless else "rk4")
         history = Table([0.0, 1.0], [point.factor, point.factor])
+        self.case = case
+        if case.contact is not None:  # planes stand where they do in the state
+            planes = [
+                plane if plane.history is None else replace(plane, history=history)
+                for plane in case.contact.planes
+            ]
+            self.case = case.altered(contact=replace(case.contact, planes=planes))
         kept = [load for load in case.loads if _moves_along(load, case)]
         holding = point.body.internal(point.dofs)
         holding -= point.problem.following_force(point.dofs, point.factor)

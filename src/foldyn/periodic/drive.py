@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.attractors.drive import HARMONIC, lowest_frequency
+from foldyn.attractors.drive import check_harmonic, lowest_frequency
 from foldyn.cases import Case, Constant, Harmonic
 from foldyn.cases.air import refuse_air
 from foldyn.errors import InputError
@@ -93,15 +93,8 @@ class Drive:
         self.following: Terms = list(case.following_terms)
         self.planes: Terms = [_plane(case, number, own) for number, own in case.obstacle_terms]
         every = (*self.loads, *self.moves, *self.turns, *self.planes, *self.following)
-        self._histories = [history for _, history in every]
-        for history in self._histories:
-            if not isinstance(history, Constant | Harmonic):
-                raise InputError(
-                    f": is of the kind {history.kind!r}, and a periodic motion takes harmonic and "
-                    f"constant ones; give {HARMONIC}, or leave it out",
-                    _place(case, history),
-                )
-        found = [one.frequency for one in self._histories if isinstance(one, Harmonic)]
+        check_harmonic(case, "a periodic motion")
+        found = [one.frequency for _, one in every if isinstance(one, Harmonic)]
         self.frequency = lowest_frequency(found)
         self.highest = round(max(found) / self.frequency) if found else 0
 
@@ -130,17 +123,6 @@ class Drive:
         for shape, (vector, _) in zip(shapes, terms, strict=True):
             shape[: vector.size] = vector.ravel()
         return self.factors(terms, phase, level) @ shapes
-
-
-def _place(case: Case, history: Any) -> str:
-    """Where in a case a history stands."""
-    planes = () if case.contact is None else case.contact.planes
-    parts = {"loads": case.loads, "supports": case.supports, "contact.planes": planes}
-    for name, own in parts.items():
-        for k, part in enumerate(own):
-            if getattr(part, "history", None) is history:
-                return f"{name}[{k}].history"
-    return "history"
 
 
 def _plane(case: Case, number: int, history: Any) -> tuple[NDArray, Any]:
