@@ -271,3 +271,17 @@ def test_what_cannot_be_swept_is_refused(hardening):
     }.items():
         with pytest.raises(InputError, match=message):
             call()
+
+
+@pytest.mark.parametrize(
+    ("cubic", "alpha", "force", "ends"),
+    [(False, 0.03, 0.01, (0.85, 1.15)), (True, 0.1, 0.04, (0.95, 1.2))],
+)
+def test_a_swept_sine_has_no_jumps_where_curves_are_but_steep(cubic, alpha, force, ends):
+    """The flank of a sharp resonance, and a curve that leans over and has not yet a fold."""
+    case = duffing(1.0, alpha, force, cubic=cubic)
+    found = fd.swept_sine(case, X, np.array(ends) / TURN, 450 * TURN, dt=DT)
+    assert found.sizes["jump"] == 0
+    step = max(1, int(0.01 / abs(np.diff(found.frequency[0])[0]) / TURN))
+    change = found.amplitude.values[:, step:] / found.amplitude.values[:, :-step]
+    assert np.abs(np.log(change)).max() > 0.2  # within a hundredth of the frequency

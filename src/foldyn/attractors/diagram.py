@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     import xarray
 
 SWEEPS = ("up", "down", "both")
+RESOLUTION = 1e-3  # relative width to which jumps are bracketed
 SAME = 1e-9  # relative difference of values that are one
 REPEATS = 1e-3  # of the size of a motion: states as near as that are one
 FREQUENCY = Quantity("Hz", "frequency of the drive")
@@ -48,7 +49,7 @@ def bifurcation_diagram(
     sweep: str = "both",
     settle: int = 200,
     record: int = 32,
-    resolution: float = 1e-3,
+    resolution: float = RESOLUTION,
     initial: State | None = None,
     method: str = "rk4",
     dt: float | None = None,
@@ -230,12 +231,16 @@ class Steady(NamedTuple):
     settle: int
     record: int
 
-    def point(self, run: Run, value: float) -> Point:
-        """The motion at a value of what is swept, from where another one stands."""
+    def point(self, run: Run, value: float, begun: float = 0.0) -> Point:
+        """The motion at a value of what is swept, from where another one stands.
+
+        begun : what has passed of its first period (s).
+        """
         case, period = self.case_at(value), 1.0 / self.frequency_at(value)
         every, transient = period / PER_PERIOD, self.settle * period
         if self.settle:
-            _, run = run.advanced(case, transient, transient, every)
+            left = transient - begun
+            _, run = run.advanced(case, left, left, every, begun)
         stretch, run = run.advanced(case, self.record * period, every, every, transient)
         values = measured(self.measure, stretch)
         path = states(stretch, period)

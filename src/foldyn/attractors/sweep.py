@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.attractors.diagram import FREQUENCY, SWEEPS
+from foldyn.attractors.diagram import FREQUENCY, RESOLUTION, SWEEPS, Steady, bracketed
 from foldyn.attractors.drive import at_frequency, drive_frequency, driven_frequency, with_histories
-from foldyn.attractors.jumps import Jump, jump_variables, jumps_between
+from foldyn.attractors.jumps import Jump, is_jump, jump_variables, jumps_between
 from foldyn.attractors.run import Run, Stretch, check_measure, extremes, measured, told_once
-from foldyn.cases import Case, Chirp, Harmonic, State
+from foldyn.cases import Case, Chirp, Harmonic, Origin, State
 from foldyn.dynamics.progress import Reporter, reporter
-from foldyn.errors import InputError
+from foldyn.errors import ComputationError, InputError
 from foldyn.linear.time_domain import overall
 from foldyn.ram_limit import check_memory
 from foldyn.results import Quantity
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 PER_CYCLE = 48  # samples in a cycle of the highest frequency
 FEWEST = 10  # cycles in a sweep
+HELD, FEWEST_RECORDED = 50, 4  # cycles at a frequency that is held: to settle, and looked at
 
 
 def swept_sine(
@@ -64,10 +66,13 @@ def swept_sine(
     sweep : {"up", "down", "both"}
         Which way; "both" goes up first, and down from there.
     settle : int
-        Cycles at the first frequency before each sweep.
+        Cycles at the first frequency before each sweep, and (50 at least) at each that tells a jump
+        from a steep curve.
     resolution : float
         Relative width in frequency within which a change of the amplitude by over 20 % of the
-        larger one is a jump. A sweep that is so slow that a vibration decays within it shows jumps.
+        larger one may be a jump: it is if motions at steps between the frequencies, from before
+        it, jump too, as in `bifurcation_diagram`. A sweep that is so slow that a vibration decays
+        within it shows jumps.
     initial : State, optional
         Where the motion starts; rest by default.
     method, dt, tolerance :
@@ -139,7 +144,9 @@ def swept_sine(
                 stretch, run = _glide(case, line, settle, run, 1.0 / (PER_CYCLE * ends[1]), tell)
                 own = _amplitudes(stretch.time, measured(measure, stretch), line.cycles)
                 rates = 1.0 / np.diff(line.cycles)
-                jumps += jumps_between(way, rates, own, resolution)
+                glide = Glide(case, measure, line, settle, stretch, rates, own, run)
+                found = jumps_between(way, rates, own, resolution)
+                jumps += [jump for jump in found if glide.folds(jump, resolution)]
                 order = slice(None, None, 1 if way == "up" else -1)
                 frequency.append(rates[order])
                 amplitude.append(own[order])
@@ -194,6 +201,53 @@ class Line(NamedTuple):
             return Chirp(ratio * self.start, ratio * end, length, own.phase)
 
         return made
+
+
+class Glide(NamedTuple):
+    """A sweep, and the amplitude of each of its cycles."""
+
+    case: Case
+    measure: Quantity
+    line: Line
+    settle: int
+    stretch: Stretch
+    rates: NDArray[np.float64]  # (k,) Hz
+    amplitude: NDArray[np.float64]  # (k,)
+    run: Run
+
+    def folds(self, jump: Jump, width: float) -> bool:
+        """Whether motions at steps of the frequency jump there, too, or the curve is but steep.
+
+        The sweep runs past a fold: steps begin before, where the amplitude stays if it is held.
+        """
+        steady = Steady(
+            lambda f: at_frequency(self.case, f), lambda f: f, self.measure,
+            max(self.settle, HELD), FEWEST_RECORDED,
+        )  # fmt: skip
+        last = first = int(np.argmin(np.abs(self.rates - jump.place)))
+        back = 0.0
+        try:
+            while True:
+                before = steady.point(*self._at(first))
+                if first == 0 or not is_jump(before.amplitude, self.amplitude[first]):
+                    break
+                back = 2.0 * back + width * jump.place
+                apart = np.abs(self.rates[:last] - jump.place) >= back
+                first = int(np.flatnonzero(apart)[-1]) if apart.any() else 0
+            after = steady.point(before.run, jump.after)
+            return bool(bracketed(steady, jump.sweep, [before, after], RESOLUTION))
+        except ComputationError:  # it does not stay where it is
+            return True
+
+    def _at(self, cycle: int) -> tuple[Run, float, float]:
+        """The motion in a cycle, the cycle's frequency (Hz), and what has passed of it (s)."""
+        k = int(np.searchsorted(self.stretch.time, self.line.cycles[cycle]))
+        t, frequency, state = self.stretch.time[k], float(self.rates[cycle]), self.run.state
+        turns = (self.line.start + 0.5 * self.line.slope * t) * t
+        place, speed = self.stretch.displacement[k], self.stretch.velocity[k]
+        origin = None if state is None else state.origin
+        here = State(place, speed, origin=origin and Origin(origin.displacement))
+        return replace(self.run, state=here), frequency, float(turns % 1.0) / frequency
 
 
 def _glide(
