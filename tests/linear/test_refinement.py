@@ -152,3 +152,30 @@ def test_doubt_is_about_what_finer_meshes_show(frequencies):
         off = np.abs(finest / limits(own, meshes, observed=True) - 1.0)
         assert SETTLED <= doubt(own, meshes) < 0.03
         assert off <= doubt(own, meshes) + SETTLED  # order 1.2 of the second overshoots by 0.07 %
+
+
+@pytest.mark.parametrize(
+    ("radius", "divisions"),
+    [(None, (4, 8)), pytest.param(2e-3, (8, 12), marks=pytest.mark.matrix)],
+)
+def test_a_panel_that_touches_a_clamp_has_no_limit(radius, divisions):
+    """Even meshes settle too slowly, and with a radius they agree on what depends on it."""
+    cell = fd.patterns.miura(cells=(1, 1), a=0.08, b=0.1, panel_angle=65, dihedral=100)
+    sheet = fd.Sheet(3e9, 0.3, 1e-3, density=900.0)
+
+    def told(edges):
+        ends = sorted({node for edge in edges for node in edge})
+        structure = fd.discretize(cell, sheet, preset="n5b8e", clamped=edges)
+        case = fd.Case(structure, [fd.Fix(ends, along=True)])
+        return fd.fidelity(case, 1, divisions, [], vertex_radius=radius)
+
+    touching, whole = told([(1, 2)]), told([(0, 1), (1, 2)])
+    assert touching.result.attrs["touched_clamp"] == 1
+    assert np.isnan(touching.result.mesh_error).all()
+    assert "touches a clamped edge at vertex 1 alone" in touching.advice
+    assert "touched_clamp" not in whole.result.attrs
+    assert np.isfinite(whole.result.mesh_error).all()
+    shell = fd.shell(cell, sheet, 4, clamped=[(1, 2)])
+    judged = refinement(fd.Case(shell, [fd.Fix([1, 2], along=True)]))
+    said = Dataset(attrs=judged.facts())
+    assert np.isnan(judged.error) and "no mesh converges" in mesh_error(said)

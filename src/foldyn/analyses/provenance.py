@@ -14,6 +14,7 @@ from foldyn.arguments import arguments
 from foldyn.cases import Contact, History
 from foldyn.cases.units import units
 from foldyn.linear.advice import percent
+from foldyn.linear.reference import NO_LIMIT
 from foldyn.materials.law import Law
 from foldyn.plots.load_curves import history_name
 from foldyn.report.album import ByRule
@@ -157,6 +158,8 @@ def mesh_error(result: xarray.Dataset) -> str:
     first, second, third = (int(n) for n in told["mesh_divisions"])
     meshes = f"{first}, {second} and {third} pieces of every edge"
     error = 100.0 * float(told["mesh_error"])
+    if "touched_clamp" in told:
+        return f"no mesh converges: {NO_LIMIT.format(told['touched_clamp'])}"
     if np.isnan(told["mesh_changes"]).any():
         return (
             f"this mesh cannot be judged: with {first} piece{'s' * (first > 1)} of every edge some "

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import xarray
 
+from foldyn.linear.reference import NO_LIMIT
+
 OWN = "own"
 """Name of the case's own model."""
 GOOD, LARGEST = 0.02, 0.10  # errors: of a model that is left as it is, and of one that can be used
@@ -141,6 +143,12 @@ def reach(result: xarray.Dataset, model: str, below: int) -> Reach:
 
 def _mesh(result: xarray.Dataset, below: int) -> Iterator[str]:
     """How far the shell itself may be off."""
+    if "touched_clamp" in result.attrs:
+        yield (
+            f"No mesh of the shell converges: {NO_LIMIT.format(result.attrs['touched_clamp'])}. "
+            "Clamp an edge of that panel, not its corner alone."
+        )
+        return
     error = np.abs(result["mesh_error"].values[: below or None])
     unsettled = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(error)))
     if unsettled:

@@ -21,7 +21,13 @@ from foldyn.linear.compared import OWN, Fidelity
 from foldyn.linear.matched import SPARE, matched
 from foldyn.linear.modes import modes
 from foldyn.linear.operating_point import BALANCED
-from foldyn.linear.reference import Reference, is_graded, modes_at_rest, reference_modes
+from foldyn.linear.reference import (
+    Reference,
+    is_graded,
+    modes_at_rest,
+    reference_modes,
+    touched_clamp,
+)
 from foldyn.linear.shell_of import check_reduced, graded_meshes, meshes, shell_of, with_structure
 from foldyn.linear.small_loads import forces_alone, rest_forces, small_loads
 from foldyn.materials import Superlinear
@@ -196,6 +202,7 @@ class Comparison:
             "plate_frequency": limit,
             "divisions": divisions[1:],
             "vertex_radius": self.shells[-1].structure.options.vertex_radius,
+            "touched_clamp": touched_clamp(self.shells[-1].structure),
             "triangles": len(true.case.structure.triangles),
             "rigid": int((true.found["eigenvalue"] <= 0.0).sum()),
             "secant": self.secant,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from foldyn.algebra.extrapolation import convergence
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.linear.reference import MeshModes, mesh_modes, same_modes
+from foldyn.linear.reference import MeshModes, mesh_modes, same_modes, touched_clamp
 
 MODES = 3
 FINE = 16  # pieces: beyond, the judgement is dear
@@ -25,6 +25,7 @@ class Refinement(NamedTuple):
     frequencies: NDArray[np.float64]  # (3, k) Hz
     order: NDArray[np.float64]  # (k,) that the meshes show; nan: they have not converged
     extrapolated: NDArray[np.float64]  # (k,) Hz; nan likewise
+    touched: int | None  # vertex at which there is no limit; see `touched_clamp`
 
     @property
     def frequency(self) -> NDArray[np.float64]:
@@ -58,6 +59,7 @@ class Refinement(NamedTuple):
             "mesh_order": self.order,
             "mesh_changes": self.changes,
             "extrapolated": self.extrapolated,
+            **({} if self.touched is None else {"touched_clamp": self.touched}),
         }
 
 
@@ -92,7 +94,10 @@ def refinement(case: Case, count: int = MODES) -> Refinement | None:
     if not frequencies.size:
         return None
     order, limit = convergence(frequencies, meshes)
-    return Refinement(divisions, meshes, frequencies, order, limit)
+    touched = touched_clamp(structure)
+    if touched is not None:
+        order[:] = limit[:] = np.nan
+    return Refinement(divisions, meshes, frequencies, order, limit, touched)
 
 
 def _meshes(divisions: int) -> tuple[int, ...]:
