@@ -75,6 +75,51 @@ def test_a_free_strip_expands_without_stress() -> None:
         assert np.abs(path.reaction).max() < 1e-8
 
 
+def stored(result, structure) -> np.ndarray:
+    return np.sum([result[group].values for group in structure.energy_groups], axis=0)
+
+
+def test_free_panels_store_nothing() -> None:
+    """Whatever causes the strain: two loads on the same panels act as one."""
+    cause = [fd.Temperature(12.0, 2e-4, 3e-4), fd.Temperature(4.0, 1e-4, -2e-4)]
+    for structure in models(strip(3)):
+        path = fd.trace(fd.Case(structure, HELD, cause), load_factors=[0.0, 0.4, 1.0])
+        whole = structure.body.energies(structure.body.dofs(path.displacement.values[-1])).sum()
+        assert whole > 1e-4
+        assert np.abs(stored(path, structure)).max() < 1e-9 * whole
+        assert np.abs(path.work).max() < 1e-8 * whole
+
+
+def test_panels_that_may_not_expand_store_what_they_may_not() -> None:
+    """E A L (alpha T)^2 / 2 between rigid ends, and the work along the path is just that."""
+    strain, length = 3e-7, COUNT * WIDTH
+    ends = [0, 1, 2 * COUNT, 2 * COUNT + 1]
+    supports = [fd.Fix(ends, "x"), fd.Fix([0, 2 * COUNT], "yz"), fd.Fix([1], "z")]
+    expected = 0.5 * SHEET.youngs_modulus * SHEET.thickness * WIDTH * length * strain**2
+    straight = [(0, 1), (2 * COUNT, 2 * COUNT + 1)]
+    for structure in islice(models(strip(), straight=straight), 2):
+        path = traced(structure, fd.Temperature(0.03, expansion=1e-5), supports)
+        assert float(path.strain_bars[-1]) == pytest.approx(expected, rel=1e-3)
+        assert float(path.work[-1]) == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
+def test_warm_panels_among_cold_ones_balance() -> None:
+    """Work is stored energy: by one panel that expands, one that curls, and a force."""
+    pattern = fd.patterns.miura(cells=(1, 1), a=0.05, b=0.04, panel_angle=70, dihedral=110)
+    loads = [
+        fd.Temperature(2.0, expansion=1e-3, panels=[0]),
+        fd.Temperature(-1.0, expansion=5e-4, curvature=0.3, panels=[0, 1]),
+        fd.Force([8], (0.0, 0.0, 1e-4)),
+    ]
+    for structure in models(pattern):
+        case = fd.Case(structure, [fd.Fix("xmin")], loads)
+        path = fd.trace(case, steps=12)
+        energy = stored(path, structure)
+        assert energy[-1] > 1e-6 and energy.min() >= -1e-15
+        np.testing.assert_allclose(path.work, energy, rtol=0.03, atol=0.01 * energy[-1])
+
+
 def test_a_free_strip_curls_to_an_arc() -> None:
     """w = kappa (x^2 + y^2) / 2, and nothing strains; the second model's error is of order 2."""
     load = fd.Temperature(10.0, curvature=1e-4)
@@ -182,6 +227,26 @@ def test_motion_by_heat_ends_where_statics_ends_and_audits(model: int, method: s
     end = fd.trace(case, "newton", load_factors=[0.0, 1.0]).displacement.values[-1]
     np.testing.assert_allclose(motion.displacement[-1], end, atol=1e-3 * np.abs(end).max())
     assert abs(motion.attrs["energy_error"]) < 1e-4
+    whole = structure.body.energies(structure.body.dofs(end)).sum()
+    assert np.abs(stored(motion, structure)).max() < 1e-3 * whole  # but for the waves of it
+    given = motion.work - motion.dissipated - motion.kinetic - stored(motion, structure)
+    assert np.abs(given).max() < 1e-4 * whole
+    assert float(motion.work[0]) == 0.0
+
+
+def test_a_motion_in_the_heat_does_no_work() -> None:
+    """It starts warm, so that all that it has is the energy of its vibration."""
+    structure = next(models(strip(2)))
+    case = fd.Case(structure, HELD, [fd.Temperature(20.0, 1e-4, 2e-3)])
+    end = fd.trace(case, load_factors=[1.0]).displacement.values[-1]
+    aside = end + 1e-6 * np.sin(np.arange(end.size)).reshape(end.shape)
+    aside[[0, 1, 2]] = end[[0, 1, 2]]
+    start = fd.State(displacement=aside)
+    motion = fd.simulate(case, 1e-3, "energy_momentum", dt=1e-5, every=1e-4, initial=start)
+    energy = stored(motion, structure) + motion.kinetic.values
+    assert energy[0] > 0.0
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-3)
+    assert np.abs(motion.work).max() < 1e-3 * energy[0]
 
 
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")  # energies are rounding

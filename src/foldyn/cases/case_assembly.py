@@ -23,6 +23,7 @@ from foldyn.errors import Faults, InputError
 from foldyn.mechanics.following import Following
 from foldyn.mechanics.term import Term
 from foldyn.structures.discretized import read_only
+from foldyn.structures.swelling import Swelling
 
 Terms = tuple[tuple[NDArray[np.float64], History], ...]
 Summands = Iterable[tuple[NDArray[np.float64], Any]]
@@ -246,6 +247,12 @@ class Loaded:
         """Forces that depend on the displacement, of each load that has them, with its history."""
         found = ((load.following(self.structure, place), load) for place, load in self._loads())
         return tuple((part, load.history) for part, load in found if part is not None)
+
+    @cached_property
+    def swellings(self) -> tuple[tuple[Swelling, History], ...]:
+        """What panels are that would stretch and curl, by each load, with its history."""
+        found = ((load.swelling(self.structure, place), load) for place, load in self._loads())
+        return tuple((own, load.history) for own, load in found if own is not None)
 
     @cached_property
     def gravity_terms(self) -> Terms:

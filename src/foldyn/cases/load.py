@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from foldyn.cases.decode import Part
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.following import Following
+from foldyn.structures.swelling import Swelling
 
 
 class Load(Part):
@@ -57,6 +58,10 @@ class Load(Part):
 
     def following(self, structure: Any, place: str) -> Following | None:
         """Forces that depend on the displacement, at factor 1; None if it has none."""
+        return None
+
+    def swelling(self, structure: Any, place: str) -> Swelling | None:
+        """How panels would stretch and curl at factor 1; None if they would not."""
         return None
 
     def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:

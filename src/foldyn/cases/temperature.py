@@ -87,7 +87,8 @@ class Temperature(Load):
             return laminate.expansion, laminate.curvature
         return self.expansion or 0.0, self.curvature or 0.0
 
-    def _swelling(self, structure: Any, place: str) -> Swelling:
+    def swelling(self, structure: Any, place: str) -> Swelling:
+        """See `Load`."""
         if structure.pattern is None:
             raise InputError(f"{place}: this structure has no pattern with panels")
         chosen = np.zeros(len(structure.pattern.faces))
@@ -98,8 +99,8 @@ class Temperature(Load):
 
     def following(self, structure: Any, place: str) -> Following:
         """See `Load`."""
-        return self._swelling(structure, place).forces
+        return self.swelling(structure, place).forces
 
     def turns(self, structure: Any, place: str) -> NDArray[np.float64]:
         """See `Load`."""
-        return self._swelling(structure, place).turns
+        return self.swelling(structure, place).turns

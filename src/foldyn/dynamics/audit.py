@@ -1,6 +1,8 @@
 """Energy audit: kinetic + strain + air + dissipated - work stays what it was at the start.
 
-Air is what a sheet in air has lost to it.
+Air is what a sheet in air has lost to it. Heat acts by forces whose work a free sheet stores and
+gives back (`mechanics.heat`): strain energies and work both leave that out, but it is at play, and
+the error is measured by it as well.
 
 The audit says nothing where the energies at play are no larger than rounding errors: those of the
 energies themselves, of the bars' forces at displacements of that size, and of the dihedrals, which

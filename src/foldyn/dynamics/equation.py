@@ -36,6 +36,7 @@ from foldyn.dynamics.system import Entries, Packed, Scratch
 from foldyn.jit.compiled import addressed, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at, run_at, value_at
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.heat import Warm, warm
 from foldyn.mechanics.term import (
     ADDRESS,
     ADVANCE_CLOCK,
@@ -90,6 +91,9 @@ class Recording(NamedTuple):
     out: Samples
     whole: int  # context of the setting
     fluid: int  # adds what moves the fluid; 0 without added mass
+    warm: int  # evaluates what strain energies lack by heat; 0 without any,
+    heat: int  # its context,
+    lacking: NDArray  # (groups,) and its result, J
 
 
 class Equation(NamedTuple):
@@ -176,9 +180,20 @@ def _sample(r, u, v, a, t):
         m.terms, m.system, m.mass, rows_at(u, rows), rows_at(v, rows), rows_at(a, rows),
         course.tally, m.s, out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
     )  # fmt: skip
+    last = out.energy.shape[1] - 1
     if r.fluid != 0:
-        out.energy[k, out.energy.shape[1] - 4] += m.added.carried[0]
-        out.energy[k, out.energy.shape[1] - 3] += fluid
+        out.energy[k, last - 3] += m.added.carried[0]
+        out.energy[k, last - 2] += fluid
+    if r.warm != 0:
+        run_at(r.warm, (r.heat,))
+        total = 0.0
+        for g in range(r.lacking.size):
+            out.energy[k, g] += r.lacking[g]
+            total += r.lacking[g]
+        if course.tally.samples == 0:  # what is stored at the start is no work
+            course.tally.work -= total
+            out.energy[k, last] -= total
+        out.energy[k, last] += total
     states_of(m.terms, out.memory[k])
     sound = 0.0
     for c in range(out.energy.shape[1]):
@@ -325,6 +340,11 @@ class EquationOfMotion:
         self.setting = Setting(model.terms, system, mass, share, s, packed.added)
         self._whole = whole = Context(self.setting)
         self.balance = balance = Context(_balance(self.setting, whole))
+        self._heat = (
+            Context(Warm(packed.heat, s.displacement, s.factor, np.zeros(system.energies)))
+            if packed.heat
+            else None
+        )
         self._slow = slow = slow_contacts(packed, work, s, balance.value) if slows else None
         remembers = model.terms.kernel[:, ADVANCE_CLOCK].any()
         equation = Equation(
@@ -354,8 +374,19 @@ class EquationOfMotion:
         if self._out is not out:  # contexts are filled by Python: once for each window of samples
             whole = self._whole
             fluid = observe_fluid.at(whole) if self.setting.added.acts else 0
-            given = self.setting, self._course, out, whole.address, fluid
-            self._recording = recording = Context(Recording(*given))
+            heat = self._heat
+            self._recording = recording = Context(
+                Recording(
+                    self.setting,
+                    self._course,
+                    out,
+                    whole.address,
+                    fluid,
+                    warm=warm.at(heat) if heat else 0,
+                    heat=heat.address if heat else 0,
+                    lacking=heat.value.energy if heat else np.zeros(0),
+                )
+            )
             self._sampled = Context(
                 self.still.value._replace(sample=_sample.at(recording), recording=recording.address)
             )

@@ -278,7 +278,12 @@ class Motion:
         """Go back to the start."""
         self.course = self.beginning
         self._flow = self._state[0] if self.origin.flow is None else self.origin.flow
-        self.output = Output(self.case, self.plan, self._sampler, self._branches, self._keeping)
+        heat = self.packed.heat
+        if heat is not None:
+            heat.seen[:] = np.nan, 0.0
+        self.output = Output(
+            self.case, self.plan, self._sampler, self._branches, self._keeping, heat
+        )
         self._looked = False
 
     def _advance(self, engine: Compiled | Implicit | OnCard, report: Reporter) -> None:

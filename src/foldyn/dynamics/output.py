@@ -15,6 +15,7 @@ from foldyn.dynamics.checkpoint import Keeping
 from foldyn.dynamics.motion_state import Samples, StepPlan, samples
 from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.timing import expected_samples
+from foldyn.mechanics.heat import Heat
 from foldyn.results import Quantity
 from foldyn.results.columns import PIECE, Column, Columns, pieces
 
@@ -37,6 +38,8 @@ class Output:
         Of laws with memory.
     keeping : Keeping, optional
         Where samples go when the memory for them is full.
+    heat : Heat, optional
+        What it exchanges with the sheet is at play in the balance as well.
 
     Attributes
     ----------
@@ -48,8 +51,9 @@ class Output:
 
     def __init__(
         self, case: Case, plan: StepPlan, sampler: Sampler, branches: int,
-        keeping: Keeping | None = None,
+        keeping: Keeping | None = None, heat: Heat | None = None,
     ) -> None:  # fmt: skip
+        self._heat = heat
         self._case, self._plan, self._sampler, self._branches = case, plan, sampler, branches
         self._keeping, self._air = keeping, case.air is not None
         self._names = audited(case.energy_groups, self._air)
@@ -101,6 +105,8 @@ class Output:
         new = self.written(stored)
         seen = self.balance.count - new.first
         self.balance.add(new.energy[seen:], new.displacement[seen:])
+        if self._heat is not None:
+            self.balance.scale = max(self.balance.scale, float(self._heat.seen[1]))
         return self.balance
 
     def first_off(self, stored: int, limit: float) -> int:

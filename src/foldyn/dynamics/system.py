@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case, History
+from foldyn.cases.heat import heat_of
 from foldyn.cases.waveforms import CONSTANT, Callbacks, Waveforms, evaluate
 from foldyn.cases.waveforms import pack as pack_waveforms
 from foldyn.dynamics.actuation import Actuators, actuators
@@ -36,6 +37,7 @@ from foldyn.jit.compiled import inner
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.following import Following, joined
+from foldyn.mechanics.heat import Heat
 
 ROUNDING = 1e-14  # of the motion of supports: motions of others that are none
 
@@ -105,6 +107,7 @@ class Packed(NamedTuple):
     numbering: Numbering
     modal: ModalRows  # in the case's own order
     added: AddedMass
+    heat: Heat | None
 
     @property
     def model(self) -> Any:
@@ -165,7 +168,11 @@ def pack(
         lightness=lightness(mass) if case.contact is not None else np.zeros(0),
     )
     added = added_mass(case, start, by.rank, by.rows, len(body.hinges), histories)
-    return Packed(body, system, mass, callbacks, by, modal, added)
+    heated = [(own, histories.index(history)) for own, history in case.swellings]
+    heat = heat_of(case.structure, heated, len(histories), body.sheet.series()[1])
+    if heat is not None:
+        heat = heat._replace(loads=heat.loads.placed(by.rank))
+    return Packed(body, system, mass, callbacks, by, modal, added, heat)
 
 
 def _driven(case: Case, histories: list[History]) -> Assembly:

@@ -167,7 +167,8 @@ class Shell(Discretized):
         tension = -(model.membrane @ np.ones(3)) * free[:, None] * model.per_length2
         corners = self.triangles[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]]
         turns = chord_turns(self.nodes[corners.reshape(-1, 3)]).reshape(-1, 3)
-        moment = np.einsum("tkm,tm->tk", model.bending, -curvature[panel, None] * turns)
+        turned_by = -curvature[panel, None] * turns
+        moment = np.einsum("tkm,tm->tk", model.bending, turned_by)
         has, turned = model.hinge >= 0, model.rotation >= 0
         on_hinge = np.bincount(
             model.hinge[has], (model.weight * moment)[has], minlength=len(model.hinges)
@@ -182,7 +183,13 @@ class Shell(Discretized):
             moments(model.rest[hinges], rows, on_hinge),
             pushes(self.nodes.size + np.arange(model.rotations), model.per_reach * hidden),
         )
-        return Swelling(np.zeros(len(self.folds)), joined((part, 0) for part in parts))
+        pushed = (model.membrane @ np.ones(3)) * free[:, None]
+        return Swelling(
+            np.zeros(len(self.folds)),
+            joined((part, 0) for part in parts),
+            (np.broadcast_to(free[:, None], pushed.shape).ravel(), turned_by.ravel()),
+            (pushed.ravel(), moment.ravel()),
+        )
 
     @cached_property
     def folds(self) -> NDArray:

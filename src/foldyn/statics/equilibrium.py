@@ -14,10 +14,12 @@ from scipy import sparse
 from foldyn.cases import Actuate, Case
 from foldyn.cases.air import refuse_air, refuse_wind
 from foldyn.cases.case_assembly import SomeLoads
+from foldyn.cases.heat import heat_of
 from foldyn.errors import InputError
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.following import following_force, following_tangent, joined
+from foldyn.mechanics.heat import add_heat
 from foldyn.statics.moving_planes import Plates
 from foldyn.statics.path_memory import REFUSED, Memories
 from foldyn.statics.problem import EPS
@@ -130,6 +132,8 @@ class OrigamiProblem:
         self.motion = self._plates.joined(motion, self._plates.length)
         self._moves = np.append(moves, self._plates.held)
         angles = body.sheet.rest_angles.shape
+        heated = [(own, k) for k, kind in enumerate((steady, growing)) for own, _ in kind.swellings]
+        self.heat = heat_of(structure, heated, 2, body.sheet.series()[1])
         self.actuation = Actuation(
             body, _total(growing.rest_terms, angles), _total(steady.rest_terms, angles)
         )
@@ -319,14 +323,28 @@ class OrigamiProblem:
 
     def energies(self, u: NDArray, factor: float) -> NDArray:
         """Strain energies (J) by `groups`."""
-        return self.body(u, factor).energies(self.dofs(u))
+        q, body = self.dofs(u), self.body(u, factor)
+        out = body.energies(q)
+        if self.heat is not None:
+            heat = self.heat._replace(offset=body.sheet.series()[1])
+            add_heat(heat, q, _factors(1.0, factor), out)
+        return out
+
+    def working(self, u: NDArray, factor: float) -> NDArray:
+        """External forces (m,), N, without those of heat, which is no load."""
+        force = self.external(u, factor)
+        if self.heat is None:
+            return force
+        pushed = following_force(self.heat.loads, self.dofs(u), _factors(1.0, factor))
+        return force - self._plates.joined(self._ties.force(pushed))
 
     def actuation_rate(self, u: NDArray, factor: float) -> float:
-        """Derivative (J) of the energy with respect to the factor at fixed u: by actuation."""
-        if not self.actuation.acts:
+        """Derivative (J) of the energy with respect to the factor at fixed u: of folds, by heat."""
+        if not self.actuation.acts and self.heat is None:
             return 0.0
+        first = 1 if self.heat is None else 0  # of bars: without heat it stays
         ahead, behind = self.energies(u, factor + PROBE), self.energies(u, factor - PROBE)
-        return float((ahead - behind)[1:].sum() / (2.0 * PROBE))
+        return float((ahead - behind)[first:].sum() / (2.0 * PROBE))
 
 
 def _factors(steady: float, growing: float) -> NDArray:

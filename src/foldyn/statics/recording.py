@@ -364,7 +364,7 @@ def _work(
     """Work (J) of loads, supports and actuators since the first point, by trapezoids."""
     forces = []
     for point, residual in zip(points, residuals, strict=True):
-        force = problem.external(point.u, point.factor)
+        force = problem.working(point.u, point.factor)
         force[problem.held] += residual[problem.held]
         forces.append(force)
     rates = [problem.actuation_rate(p.u, p.factor) for p in points]

@@ -19,6 +19,7 @@ of the facet with its mirror image at rest, less the flat one.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from itertools import pairwise
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -157,6 +158,17 @@ def curl_moments(
             out[place : place + 2] = 0.5 * moment, -moment if shared in seen else moment
             seen.add(shared)
             place += 2
+    return out
+
+
+def free_angles(plates: EdgePlates, moment: NDArray) -> NDArray:
+    """Angles (nq,), rad, at which moments (nq,), N m, leave plates without stress."""
+    out = np.zeros(len(moment))
+    for p, (start, end) in enumerate(pairwise(plates.start)):
+        if np.any(moment[start:end]):
+            stiffness = plates.stiffness[plates.entry[p] : plates.entry[p + 1]]
+            square = stiffness.reshape(end - start, end - start)
+            out[start:end] = np.linalg.pinv(square, hermitian=True) @ moment[start:end]
     return out
 
 

@@ -243,26 +243,34 @@ def energies(
 
 def swelling(
     kinds: Sequence[PanelKind], gives: EdgeGives | None, x: NDArray, strain: NDArray
-) -> list[Following]:
+) -> tuple[list[Following], NDArray, NDArray]:
     """What panels push with that would, if they were free, stretch by `strain` (np,).
 
-    Gives count from where the swelling has put them.
+    Gives count from where the swelling has put them. Free strains (k,) and what they push with,
+    J, are those of all bars in turn.
 
     x : (n, 3) rest positions of the nodes, m.
     """
     parts, free = [], strain * (1.0 + 0.5 * strain)
+    strains, pushes = [np.zeros(0)], [np.zeros(0)]
     for which, own in kinds:
-        tension = -own.stiffness.sum(axis=1) * free[which] * own.per_length2
+        push = own.stiffness.sum(axis=1) * free[which]
+        tension = -push * own.per_length2
+        strains.append(np.broadcast_to(free[which], push.shape).ravel())
+        pushes.append(push.ravel())
         bars = own.nodes[:, own.ends].transpose(1, 0, 2).reshape(-1, 2)
         parts.append(tensions(x, bars, tension.ravel()))
     if gives:
         ends = gives.bars
         alike = np.repeat(free[gives.panel][:, None], ends.shape[1], axis=1)
         g = gives.balanced(alike)[gives.number]
-        tension = -np.einsum("pbk,pk->pb", gives.across, g) * gives.per_length2
+        push = np.einsum("pbk,pk->pb", gives.across, g)
+        tension = -push * gives.per_length2
+        strains.append(alike.ravel())
+        pushes.append(push.ravel())
         there = gives.per_length2 > 0.0
         parts.append(tensions(x, ends[there], tension[there]))
-    return parts
+    return parts, np.concatenate(strains), np.concatenate(pushes)
 
 
 def _packed(x: NDArray, ends: NDArray, panels: tuple, nodes: tuple, coupled: tuple) -> PanelKind:

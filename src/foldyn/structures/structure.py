@@ -37,7 +37,13 @@ from foldyn.structures.clamps import clamps
 from foldyn.structures.condensed_plates import CondensedPlatesTerm, balanced
 from foldyn.structures.creases import PerCrease, per_crease
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
-from foldyn.structures.edge_angles import EdgePlates, curl_moments, outlines, plates_model
+from foldyn.structures.edge_angles import (
+    EdgePlates,
+    curl_moments,
+    free_angles,
+    outlines,
+    plates_model,
+)
 from foldyn.structures.mass import MASS_RULES, Surface, lumped
 from foldyn.structures.membranes import PanelKind, swelling
 from foldyn.structures.mesh import double_areas, hinge_angles
@@ -321,39 +327,47 @@ class Structure(Discretized):
 
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """See `Discretized`; a bar between panels takes their mean strain."""
+        stress, none = np.zeros(0), np.zeros(0)
         if self.membranes:
-            parts = swelling(self.membranes, self.edge_gives, self.nodes, strain)
+            own = self.membranes, self.edge_gives, self.nodes, strain
+            parts, longer, push = swelling(*own)
         else:
             stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
             free = mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
-            tension = -stiffness * self.bar_law.stress(1.0 + free)
-            parts = [tensions(self.nodes, self.bars, tension)]
+            stress, longer, push = self.bar_law.stress(1.0 + free), none, none
+            parts = [tensions(self.nodes, self.bars, -stiffness * stress)]
         if self.edge_plates is not None:
             sheet = self.body.sheet
-            turns = np.zeros(len(sheet.rest_angles))
+            turns, inner = np.zeros(len(sheet.rest_angles)), none
+            moment, on_edges, own = self._curled(self.edge_plates, curvature)
             if np.any(curvature):
-                moment, push = self._curled(self.edge_plates, curvature)
                 parts.append(moment)
-                if self.without_edge_angles:
-                    turns[len(turns) - sheet.offsets :] = push
-                else:
-                    parts.append(pushes(sheet.hidden[: len(push)], push))
-            return Swelling(turns, joined((part, 0) for part in parts))
+                if not self.without_edge_angles:
+                    parts.append(pushes(sheet.hidden[: len(on_edges)], on_edges))
+            if self.without_edge_angles:
+                turns[len(turns) - sheet.offsets :] = inner = on_edges
+            free = free_angles(self.edge_plates, own)
+            forces = joined((part, 0) for part in parts)
+            return Swelling(turns, forces, (longer, free), (push, own), stress, inner)
         of_hinges, of_clamps = self._chords
+        turn, own = none, none
         if len(self.clamps):
             turn = of_clamps.turns(curvature)
-            parts.append(self._clamping(self.clamp_stiffness * turn))
-        return Swelling(of_hinges.turns(curvature), joined((part, 0) for part in parts))
+            own = self.clamp_stiffness * turn
+            parts.append(self._clamping(own))
+        forces = joined((part, 0) for part in parts)
+        return Swelling(of_hinges.turns(curvature), forces, (longer, turn), (push, own), stress)
 
     def _clamping(self, moment: NDArray) -> Following:
         """Moments (c,), N m, on the hinges of clamped edges."""
         points = clamps(self.nodes, self.clamps, self.clamp_stiffness, 0).points
         return moments(points, np.column_stack([self.clamps, np.full(len(moment), RIDES)]), moment)
 
-    def _curled(self, plates: EdgePlates, curvature: NDArray) -> tuple[Following, NDArray]:
+    def _curled(self, plates: EdgePlates, curvature: NDArray) -> tuple[Following, NDArray, NDArray]:
         """Moments on the hinges of plates, and forces (r,), N, on the dofs of their edge angles.
 
-        The energies of the plates are linear in these curvatures.
+        With the moments (nq,), N m, of all angles of plates. The energies of the plates are linear
+        in these curvatures.
         """
         area = 0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
         area = np.bincount(self.triangle_panel, area)
@@ -368,6 +382,7 @@ class Structure(Discretized):
         return (
             joined((part, 0) for part in parts),
             np.bincount(-1 - plates.angle[~on_hinge], push, minlength=count),
+            moment,
         )
 
     @cached_property

@@ -25,10 +25,18 @@ from foldyn.mechanics.following import Following
 
 
 class Swelling(NamedTuple):
-    """What swollen panels add to a structure."""
+    """What swollen panels add to a structure.
+
+    Parts with quadratic energies have free strains, in the plane and in bending, and what these
+    push with: `mechanics.heat`.
+    """
 
     turns: NDArray  # (nr,) changes of rest angles, rad
     forces: Following
+    free: tuple[NDArray, NDArray]  # Green strains (.,), angles (.,) rad
+    push: tuple[NDArray, NDArray]  # (.,) J, (.,) N m
+    stress: NDArray = np.zeros(0)  # (nb,) of single bars, over Young's modulus
+    inner: NDArray = np.zeros(0)  # (r,) forces on dofs in balance, N
 
 
 def chord_turns(corners: NDArray) -> NDArray:

@@ -1,0 +1,51 @@
+"""What the strain energies of a case lack where panels are warm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.mechanics import angles
+from foldyn.mechanics.following import joined
+from foldyn.mechanics.heat import Heat
+from foldyn.structures.swelling import Swelling
+
+IN_PLANE, BENDING = ("strain_membrane", "strain_bars"), ("strain_bending", "strain_bends")
+
+
+def heat_of(
+    structure: Any, parts: Sequence[tuple[Swelling, int]], histories: int, offset: NDArray
+) -> Heat | None:
+    """Heat of swollen states with the numbers of their histories; None of none.
+
+    offset : (., 4) of the sheet, with its dofs in balance; see `SheetTerm.series`.
+    """
+    if not parts:
+        return None
+    loads = joined((own.forces, row) for own, row in parts)
+    quadratic = np.zeros((2, histories, histories))
+    for one, i in parts:
+        for other, j in parts:
+            for g in range(2):
+                quadratic[g, i, j] += one.push[g] @ other.free[g]
+    bars, law, count = len(parts[0][0].stress), structure.bar_law, len(loads.moment)
+    volume = structure.sheet.youngs_modulus * structure.bar_area if bars else np.zeros(0)
+    names = list(structure.energy_groups)
+    groups = [next(names.index(n) for n in kind if n in names) for kind in (IN_PLANE, BENDING)]
+    return Heat(
+        loads=loads,
+        angles=angles(loads.corners.reshape(-1, 3), np.arange(4 * count).reshape(-1, 4)),
+        groups=np.array(groups),
+        quadratic=quadratic,
+        stress=np.array([own.stress for own, _ in parts], float),
+        row=np.array([row for _, row in parts], np.int64),
+        volume=np.asarray(volume * structure.bar_length if bars else volume, float),
+        code=law.code if bars else 0,
+        addresses=np.array((law.addresses if bars else None) or (0, 0, 0), np.int64),
+        inner=np.array([own.inner for own, _ in parts], float),
+        offset=offset,
+        seen=np.array([np.nan, 0.0]),
+    )

@@ -1,0 +1,119 @@
+"""Strain energy of panels that would, if they were free, stretch and curl.
+
+Heat acts as loads do that follow the sheet (`mechanics.following`), and a free sheet gives way to
+them without stress. What is stored is the energy of the strains that differ from the free ones:
+the energy of all strains, plus the potential of these loads, plus what brings it to zero where each
+part of the sheet has its free strain.
+
+- parts with quadratic energies: half of what the free strains push with, times the free strains;
+- a bar of any law, free at the Green strain E and pushing with the stress S: V (S E - W(E)), V its
+  volume times Young's modulus.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.jit.compiled import addressed, inner_scalar, kernel
+from foldyn.jit.intrinsics import flat
+from foldyn.materials.switch import bar_energy, bar_slope, bar_stress
+from foldyn.mechanics.dihedral import dihedral_gradient
+from foldyn.mechanics.following import Following, _hinge
+
+ITERATIONS = 30  # of Newton's method for the free strain of a bar; a few are enough
+SHARP = 1e-15  # Green strain
+
+
+class Heat(NamedTuple):
+    """What s swollen states of a sheet push with, h histories; groups of stretching and bending."""
+
+    loads: Following
+    angles: NDArray  # (.,) dihedrals of its hinges at rest, rad
+    groups: NDArray  # (2,)
+    quadratic: NDArray  # (2, h, h) J
+    stress: NDArray  # (s, b) of bars, over Young's modulus
+    row: NDArray  # (s,) of the histories
+    volume: NDArray  # (b,) times Young's modulus, J
+    code: int  # of the law of the bars
+    addresses: NDArray  # (3,) of its energy, stress and slope
+    inner: NDArray  # (s, r) forces on dofs in balance, N
+    offset: NDArray  # (., 4) see `SheetTerm.series`; those dofs are the last r rows
+    seen: NDArray  # (2,) what energies lacked in a motion at first, and most since then, J
+
+
+class Warm(NamedTuple):
+    """Heat in a motion: what is evaluated, and where the energies (groups,) go."""
+
+    heat: Heat
+    displacement: NDArray
+    factor: NDArray
+    energy: NDArray
+
+
+@inner_scalar
+def free_energy(code, stress, addresses):
+    """S E - W(E) of a bar that is free at the Green strain E of a stress; over Young's modulus."""
+    green, e = 0.0, 0.0
+    for _ in range(ITERATIONS):
+        step = (stress - bar_stress(code, e, addresses[1])) / bar_slope(code, e, addresses[2])
+        green += step
+        e = 2.0 * green / (1.0 + math.sqrt(1.0 + 2.0 * green))
+        if abs(step) <= SHARP:
+            break
+    return stress * green - bar_energy(code, e, addresses[0])
+
+
+@kernel
+def add_heat(heat, u, factor, out):
+    """Add what strain energies lack, J, to their groups; u flat, factors (h, k) in column 0."""
+    loads, stretching, bending = heat.loads, heat.groups[0], heat.groups[1]
+    for g in range(2):
+        for i in range(heat.quadratic.shape[1]):
+            for j in range(heat.quadratic.shape[2]):
+                part = factor[i, 0] * factor[j, 0] * heat.quadratic[g, i, j]
+                out[heat.groups[g]] += 0.5 * part
+    for b in range(heat.volume.size):
+        stress = 0.0
+        for s in range(heat.row.size):
+            stress += factor[heat.row[s], 0] * heat.stress[s, b]
+        out[stretching] += heat.volume[b] * free_energy(heat.code, stress, heat.addresses)
+    for e in range(loads.tension.size):
+        pull = loads.tension[e] * factor[loads.tension_row[e], 0]
+        for c in range(3):
+            moved = u[3 * loads.bars[e, 1] + c] - u[3 * loads.bars[e, 0] + c]
+            out[stretching] += 0.5 * pull * moved * (2.0 * loads.vectors[e, c] + moved)
+    points, gradient = np.empty((4, 3)), np.empty((4, 3))
+    for h in range(loads.moment.size):
+        _hinge(loads, u, h, points, gradient)
+        p = flat(points)
+        angle = dihedral_gradient(
+            p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
+        )[0]
+        moment = loads.moment[h] * factor[loads.moment_row[h], 0]
+        out[bending] -= moment * (angle - heat.angles[h])
+    for e in range(loads.push.size):
+        push = loads.push[e] * factor[loads.push_row[e], 0]
+        out[bending] -= push * u[loads.hidden[e]]
+    first = heat.offset.shape[0] - heat.inner.shape[1]
+    for s in range(heat.inner.shape[0]):
+        for k in range(heat.inner.shape[1]):
+            push = heat.inner[s, k] * factor[heat.row[s], 0]
+            out[bending] -= push * heat.offset[first + k, 1]
+
+
+@addressed()
+def warm(m):
+    """The same where a motion is, to `m.energy`."""
+    for g in range(m.energy.size):
+        m.energy[g] = 0.0
+    add_heat(m.heat, flat(m.displacement), m.factor, m.energy)
+    total, seen = 0.0, m.heat.seen
+    for g in range(m.energy.size):
+        total += m.energy[g]
+    if np.isnan(seen[0]):
+        seen[0] = total
+    seen[1] = max(seen[1], abs(total - seen[0]))
