@@ -76,8 +76,8 @@ class Notice:
             self.tell(f"compiling {len(new)} more kernels, {_about(seconds)}")
         else:
             self.tell(
-                f"compiling {len(new)} kernels for their first use, {_about(seconds)}; they are "
-                "kept for later runs"
+                f"compiling {len(new)} kernels for their first use, {_about(seconds)}; others may "
+                "follow when they are needed, and all are kept for later runs"
             )
         self._told = True
 

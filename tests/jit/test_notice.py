@@ -38,7 +38,8 @@ def test_each_part_of_the_work_is_told_once_with_what_is_missing():
     slow.compile(range(140, 160))  # ten more
     slow.compile(range(160, 161))
     assert slow.told == [
-        "compiling 150 kernels for their first use, about 20 s; they are kept for later runs",
+        "compiling 150 kernels for their first use, about 20 s; others may follow when they are "
+        "needed, and all are kept for later runs",
         "compiling 10 more kernels, about 20 s",  # at the pace of those before
     ]
     assert pytest.approx(21.0) == 150 * PER_KERNEL
