@@ -190,5 +190,9 @@ class ModelRangeWarning(FoldynWarning):
     """Bars and hinges are asked for what is beyond their range: the shell gives it."""
 
 
+OF_MODELS = (StretchWarning, ModelRangeWarning)
+"""What studies and shipped cases say on their pages alone: they take their models on purpose."""
+
+
 class UnitsWarning(FoldynWarning):
     """A number is probably in other units: degrees are asked for, and SI."""

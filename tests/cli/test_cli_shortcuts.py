@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,10 @@ def read(tmp_path):
 
 
 def test_the_modes_of_a_motion(workplace, miura) -> None:
+    again = ("--no-figures", "--count", "3", "--secant", "2", "--out", "pulse")
     workplace.write(miura)
+    workplace.good("modes", "case.toml", *again)  # a pulse does not act at rest anyway
+    workplace.write(re.sub("history = .*", "", miura))
     done = workplace.call("modes", "case.toml", "--no-figures", "--count", "3", "--secant", "2")
     assert done.status == 0
     (line,) = done.err.splitlines()
@@ -86,7 +90,7 @@ def test_at_rest_moved_nodes_are_held(read, miura) -> None:
 
 def test_what_a_motion_starts_with_is_left_out(read, miura) -> None:
     text = changed(miura, "initial.spin = [0, 0, 0]")
-    with pytest.warns(FoldynWarning, match=r"leaves out loads\[0\], \[initial\]"):
+    with pytest.warns(FoldynWarning, match=r"leaves out \[initial\]"):
         found = read(text, "modes")
     assert found.initial() is None
 

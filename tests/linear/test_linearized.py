@@ -85,6 +85,8 @@ def test_equilibrium_is_the_end_of_the_path_under_the_loads():
     assert abs(again.stiffness - found.stiffness).max() < 1e-9 * abs(found.stiffness).max()
     with pytest.warns(FoldynWarning, match="do not act in the rest state.*'equilibrium'"):
         assert not linearize(case).displacement.any()
+    pulse = replace(LIFT, history=fd.HalfSine(0.1))  # which acts in motions alone
+    assert not linearize(fd.Case(case.structure, HELD, [pulse])).displacement.any()
     with pytest.warns(FoldynWarning, match="the loads of a free body must balance"):
         linearize(fd.Case(miura(**STRAIGHT), loads=[LIFT]), "equilibrium")
 

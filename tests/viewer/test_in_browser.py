@@ -36,6 +36,13 @@ def test_fits_the_window(opened, kind, width):
     assert tab.evaluate("document.documentElement.scrollWidth") <= width
 
 
+@pytest.mark.parametrize("width", [1700, 1100, 390])
+def test_text_begins_where_the_sheet_above_it_does(opened, width):
+    left = "[...document.querySelectorAll('.foldyn, h1, main > h2, main > p, main > .table')]"
+    places = opened("motion", width).evaluate(f"{left}.map((e) => e.getBoundingClientRect().left)")
+    assert len(places) > 1 and max(places) - min(places) < 1.0
+
+
 @pytest.mark.parametrize("painter", PAINTERS)
 def test_positions_are_those_of_the_result(opened, painter):
     tab = opened("motion", painter=painter)

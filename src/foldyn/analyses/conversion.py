@@ -101,7 +101,8 @@ def converted(path: Path, document: Document, kind: str, state: str) -> Document
     loads = [_without(load, "history") for load in document.get("loads", [])]
     drive = [load for load in loads if kind == "frf" and "force" in load]
     if atrest:
-        left += [f"loads[{i}]" for i, load in enumerate(loads) if load not in drive]
+        steady = ["history" not in load for load in document.get("loads", [])]
+        left += [f"loads[{i}]" for i, load in enumerate(loads) if steady[i] and load not in drive]
     if kind == "frf" and not drive:
         drive = [
             {"base": base["base"], "displacement": abs(base.get("displacement", 1.0))}

@@ -24,7 +24,7 @@ from foldyn.cli.folder import reason
 from foldyn.cli.folding import add_fold, run_fold
 from foldyn.cli.options import add_figures, add_film, add_results, flag, integer, number
 from foldyn.cli.signals import ENDINGS
-from foldyn.cli.streams import Outlet, noticed, steady_streams
+from foldyn.cli.streams import Outlet, Told, noticed, steady_streams
 from foldyn.cli.study import add_study, study
 from foldyn.cli.sweep import add_sweep, run_sweep
 from foldyn.cli.track import add_track, track
@@ -332,14 +332,13 @@ class _Warnings:
     """Writes each warning once, as a line of the command: mass rules would repeat them."""
 
     def __init__(self) -> None:
-        self.shown: set[str] = set()
+        self.shown = Told()
 
     def __call__(self, message: Warning | str, category: type[Warning], *_: object) -> None:
         name = "" if issubclass(category, FoldynWarning) else f"{category.__name__}: "
         text = f"foldyn: warning: {name}{message}"
-        if text not in self.shown:
+        if self.shown.add(text):
             print(text, file=sys.stderr)
-        self.shown.add(text)
 
 
 if __name__ == "__main__":

@@ -21,9 +21,9 @@ from foldyn.cli.options import BOTH
 from foldyn.cli.stamp import Owner
 from foldyn.cli.streams import Clock, noted_warnings, speech
 from foldyn.dynamics import SECONDS, Keeping
-from foldyn.errors import ComputationError, InputError, MotionInterrupted
+from foldyn.errors import OF_MODELS, ComputationError, InputError, MotionInterrupted
 from foldyn.plots import FIGURES
-from foldyn.studies import find_case
+from foldyn.studies import find_case, shipped_cases
 from foldyn.values import number
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ def run(given: Namespace) -> Path:
             _check_video(case_file)
     names = [one.file for one in task]
     say = speech(given.quiet)
+    unsaid = OF_MODELS if page and path in shipped_cases().values() else ()
     introduction = _introduction(case_file, task, caught, say)
     owner = Owner.of(command, path, folder)
     pages = ["report.html"] if page else []
@@ -78,7 +79,7 @@ def run(given: Namespace) -> Path:
         held(folder, given.out, [*names, *pages], owner, given.replace, DRAWN) as kept,
         _held_results(task),
     ):
-        with noted_warnings() as noted:
+        with noted_warnings(unsaid) as noted:
             bar = not given.quiet and sys.stderr.isatty()
             done = _computed(task, kept, introduction, bar, say)
         call = Call(given.typed, tuple(noted), **clock.spent())

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from foldyn.cli.folder import Results, held
 from foldyn.cli.options import add_results, flag
 from foldyn.cli.stamp import Owner
-from foldyn.cli.streams import Clock, progress_bar, speech
+from foldyn.cli.streams import Clock, Told, progress_bar, speech
 from foldyn.errors import ComputationError, FoldynError, InputError
 
 if TYPE_CHECKING:
@@ -161,6 +161,7 @@ def _computed(
     inside: str, say: Say, quiet: bool,
 ) -> list[Done]:  # fmt: skip
     """Compute with a progress bar, and say what took long, failed or was skipped."""
+    told = Told()
     with progress_bar(quiet, total=count, unit="run") as bar:
 
         def tell(done: Done) -> None:
@@ -173,9 +174,11 @@ def _computed(
             elif not done.skipped and done.seconds >= 10.0:
                 say(f"  {done.task.name}: {done.seconds:.0f} s")
             for text in done.warnings:
-                say(f"  {done.task.name}: warning: {text}")
+                told.add(text, done.task.name)
 
         ended = compute(tell, PROCESSES)
+    for text in told:
+        say(f"  warning: {text}")
     skipped = sum(done.skipped for done in ended)
     if skipped:
         say(f"skipped {skipped} of {len(ended)} runs: their results are in {results.folder}")

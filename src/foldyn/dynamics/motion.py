@@ -171,7 +171,7 @@ class Motion:
         return result
 
     def _stretch(self, result: xarray.Dataset) -> str:
-        """Warning where bars hold much of the strain energy; empty otherwise."""
+        """Warning where panels that stretch hold much of the strain energy; empty otherwise."""
         names = audited(self.case.energy_groups, self.case.air is not None)
         found = stretch(self.case.structure, {name: result[name].values for name in names})
         if found is None:

@@ -231,7 +231,7 @@ def _warn_of_instability(system: Linearized) -> None:
 
 
 def _warn_of_stretch(system: Linearized, frequency: NDArray, response: NDArray) -> None:
-    """Warn where bars hold much of the strain energy of the response (m, nf) at a peak of it."""
+    """Warn where stretching holds much of the strain energy of the response (m, nf) at a peak."""
     structure, motion = system.case.structure, np.nan_to_num(response).T
     limit = most(structure)
     if not np.isfinite(limit):

@@ -11,6 +11,7 @@ from scipy import sparse
 
 from foldyn.cases import Case, State
 from foldyn.cases.case_assembly import SomeLoads
+from foldyn.cases.history import STEADY
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import NO_POTENTIAL
@@ -63,12 +64,12 @@ def operating_point(
     Warns
     -----
     FoldynWarning
-        It is no equilibrium, or the case has loads, which do not act at rest.
+        It is no equilibrium, or the case has steady loads, which do not act at rest.
     """
     case.check_movable()
     if state is None:
         point = _judge(case, np.zeros_like(case.structure.nodes), 0.0, "rest")
-        if case.loads:
+        if any(getattr(load, "history", None) == STEADY for load in case.loads):
             _warn(
                 "state = None: the loads of the case do not act in the rest state; "
                 "state = 'equilibrium' takes the equilibrium under them"

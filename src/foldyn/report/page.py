@@ -77,8 +77,8 @@ td.number::after { content: attr(data-lacks); visibility: hidden; }
 .plot .keys button[aria-pressed="false"] { text-decoration: line-through; }
 .plot .keys button[aria-pressed="false"] svg { opacity: 0.25; }
 .plot .keys svg { flex: none; }
-body:has(.foldyn) { max-width: 86rem; }
-body:has(.foldyn) :is(figure, .plots) { max-width: 60rem; }
+body:has(main > .foldyn) { max-width: 86rem; }
+body:has(main > .foldyn) :is(figure, .plots) { max-width: 60rem; }
 @media (max-width: 40rem) {
   body { padding: 1rem 0.8rem 3rem; }
   h1 { font-size: 1.5rem; }

@@ -291,7 +291,7 @@ def _dataset(
 def _stretch_warning(
     problem: OrigamiProblem, points: Sequence[Point], energies: Sequence[NDArray]
 ) -> str:
-    """Warning where bars hold much of the strain energy; empty otherwise."""
+    """Warning where panels that stretch hold much of the strain energy; empty otherwise."""
     by_group = dict(zip(problem.groups, np.transpose(energies), strict=True))
     found = stretch(problem.structure, by_group)
     if found is None:

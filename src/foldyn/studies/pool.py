@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Protocol
 
-from foldyn.errors import FoldynError, FoldynWarning
+from foldyn.errors import OF_MODELS, FoldynError, FoldynWarning
 from foldyn.sweeps.pool import pool_of
 
 
@@ -105,5 +105,9 @@ def _make(task: Task, folder: Path) -> Done:
             failure = ""
         except FoldynError as error:
             failure = str(error)
-    messages = [str(one.message) for one in told if issubclass(one.category, FoldynWarning)]
+    messages = [
+        str(one.message)
+        for one in told
+        if issubclass(one.category, FoldynWarning) and not issubclass(one.category, OF_MODELS)
+    ]
     return Done(task, time.perf_counter() - began, False, failure, tuple(dict.fromkeys(messages)))

@@ -393,6 +393,8 @@ def _how(study: Study) -> str:
         f"method with steps of {n.dt:g} s, as for n5b8e. Other bars and hinges: N5B8, the settings "
         "of the shipped case files herkal/case1 to case4, RK4. "
         f"Motions of {n.duration:g} s sampled every 0.01 s. "
+        "Panels of the paper's models stretch too little in their plane and have no modes of their "
+        "own: what Foldyn warns of elsewhere is what is compared here. "
         "Results are in the folder runs, one NetCDF file each, with what happens at the pattern's "
         "vertices; a study that is started again computes what is missing, and what was computed "
         "with other settings or by another version of the program."

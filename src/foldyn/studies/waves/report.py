@@ -55,7 +55,9 @@ def _opening(study: Study) -> str:
         "Dimensions, masses and stiffnesses of the papers were not at hand. All parameters are "
         "ours and stand in the last table, so that claims can be compared and numbers cannot. "
         "Those of the Kresling chain come from a search for one in which the rarefaction overtakes "
-        "the compression: they show that it can happen, not how often it does."
+        "the compression: they show that it can happen, not how often it does. Models are those "
+        "of the papers, trusses and sheets without the panels' own vibrations, beyond what Foldyn "
+        "would warn of elsewhere."
     )
     if study.plan != FULL:
         text += "\n\nThis is a coarse run with fewer fold states, phases and cells."
