@@ -29,6 +29,10 @@ ROUND, DIGITS = 7.0, 1e-4
 """Largest angle in radians, and how near it is to a part of pi."""
 PARTS = np.array([*range(1, 13), 18])
 """Such parts: multiples of 10 and of 15 degrees among them."""
+LARGE = ("panel_angle", "dihedral", "crease_rest", "angle")
+"""Angles that are hardly as small as one in radians."""
+SMALL, TURN, ROUNDED = 0.35, 2.0 * np.pi, 1e-6
+"""Those in radians (20 degrees and more), and how near tenths of degrees are to whole ones."""
 SHOWN = 60
 """Characters of a value in a message."""
 T = TypeVar("T")
@@ -220,7 +224,8 @@ def number(
 def doubt_degrees(name: str, value: Any) -> None:
     """Warn of an angle (degrees), or of angles all of which are so, that is one in radians.
 
-    Below 7 and a simple part of pi to four digits, as np.pi / 3 or 1.0472.
+    Below 7 and a simple part of pi to four digits, as np.pi / 3 or 1.0472; of angles between panels
+    and of panels, which are hardly that small, any of 0.35 to 2 pi with two decimals or more.
     """
     angles = np.abs(np.ravel(np.asarray(value, float)))
     angles = angles[angles > 0.0]
@@ -229,16 +234,19 @@ def doubt_degrees(name: str, value: Any) -> None:
     parts = angles[:, None] * PARTS / np.pi
     whole_parts = np.rint(parts)
     near = (whole_parts > 0.0) & (np.abs(parts - whole_parts) <= DIGITS * parts)
+    meant = ""
     if near.any(axis=1).all():
         part = int(PARTS[near[0].argmax()])
         times = int(whole_parts[0, near[0].argmax()])
         pi = f"{'' if times == 1 else f'{times} '}pi{'' if part == 1 else f'/{part}'}"
-        warnings.warn(
-            f"{name} = {angles[0]:.5g} is {pi}, but angles are in degrees: give "
-            f"{180.0 * times / part:g} if that is meant in radians",
-            UnitsWarning,
-            stacklevel=3,
-        )
+        meant = f"is {pi}, but angles are in degrees: give {180.0 * times / part:g}"
+    elif name.rpartition(".")[2] in LARGE and (angles >= SMALL).all() and (angles <= TURN).all():
+        tenths = 10.0 * angles
+        if (np.abs(tenths - np.rint(tenths)) > ROUNDED).all():
+            meant = f"is small for an angle in degrees: give {np.degrees(angles[0]):.4g}"
+    if meant:
+        text = f"{name} = {angles[0]:.5g} {meant} if that is meant in radians"
+        warnings.warn(text, UnitsWarning, stacklevel=3)
 
 
 def length(name: str, value: Any) -> float:

@@ -12,6 +12,8 @@ from foldyn.patterns import Pattern
 from foldyn.structures.sheet import Sheet
 
 THICK = 0.2  # of the shortest edge of a panel: no thin sheet any more
+THIN, WIDE = 5e-5, 2.0  # of the shortest edge, and its length, m: of films that are sails
+SLAB = 0.1  # m: what folds is thinner
 SLOWEST, FASTEST = 10.0, 25e3  # m/s, sqrt(E / rho): from soft gels to diamond
 USUAL = 2000.0  # m/s
 PRESSURES = {"kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
@@ -35,6 +37,20 @@ def _doubts(pattern: Pattern, sheet: Sheet) -> Iterator[str]:
             f"edge of panel {worst}, {shortest[worst]:.3g} m, which is no thin sheet (at most "
             f"{THICK:g}): lengths are in m; if the thickness is meant in mm, give "
             f"{1e-3 * thickness[worst]:g}"
+        )
+    elif thickness.max() >= SLAB:
+        yield (
+            f"sheet: thickness = {thickness.max():g} m, of panels with edges of "
+            f"{shortest.min():.3g} m and more, is that of a slab (less than {SLAB:g}): lengths are "
+            f"in m; if those of sheet and pattern are meant in mm, give {1e-3 * thickness.max():g} "
+            "and a pattern a thousand times smaller"
+        )
+    least = int(np.where(shortest >= WIDE, thick, np.inf).argmin())
+    if thick[least] < THIN and shortest[least] >= WIDE:
+        yield (
+            f"pattern: panel {least} has edges of {shortest[least]:.3g} m and more and is "
+            f"{thickness[least]:g} m thick, below 1/{1.0 / THIN:.0f} of that: lengths are in m; "
+            "if those of the pattern are meant in mm, make it a thousand times smaller"
         )
     modulus, density = (sheet.values(name, count) for name in ("youngs_modulus", "density"))
     speed = np.sqrt(modulus / density)  # nan without a density
