@@ -24,7 +24,8 @@ def test_info(workplace) -> None:
     assert any(line.startswith(f"python {platform.python_version()}") for line in lines)
     for name in ("numpy", "numba", "xarray"):
         assert f"{name} {metadata.version(name)}" in lines
-    assert any(line.startswith("processors: ") for line in lines)
+    (here,) = (line.split() for line in lines if line.startswith("processors: "))
+    assert int(here[-1]) == min(8, int(here[1].rstrip(";")))  # no more than there are
     assert any(line.startswith("kernels of rk4: ") for line in lines)
     (parts,) = [line for line in lines if line.startswith("optional parts: ")]
     assert parts.startswith("optional parts: ffmpeg for MP4 animations, ")

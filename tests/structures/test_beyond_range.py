@@ -187,3 +187,17 @@ def test_what_stretches():
     assert most(fd.discretize(fd.patterns.kresling(), sheet)) == 0.1
     assert most(fd.discretize(angle_section(0.0), sheet)) == 0.5
     assert most(fd.shell(tube, sheet, divisions=2)) == np.inf
+
+
+@pytest.mark.parametrize("model", [fd.discretize, lambda p, s, **k: fd.shell(p, s, 2, **k)])
+def test_the_default_fold_law_locks(model):
+    """Its slope is 1/cos^2 of how far a crease rests into the range from 45 degrees to closed."""
+    sheet = fd.Sheet(4e9, 0.3, 0.005)
+    closed, open_ = (fd.patterns.simple_fold(dihedral=angle) for angle in (24.0, 41.0))
+    (text,) = told(lambda: model(closed, sheet))
+    stiffer = 1.0 / np.cos(0.5 * np.pi * (45.0 - 24.0) / 45.0) ** 2
+    assert "crease 0 rests at 336 degrees" in text and f"{stiffer:.3g} times as stiff" in text
+    assert told(lambda: model(open_, sheet)) == []
+    for law in ("linear", "enhanced", fd.EnhancedLinear(theta1=30, theta2=330)):
+        assert told(lambda law=law: model(closed, sheet, fold_law=law)) == []
+    assert len(told(lambda: model(open_, sheet, crease_rest=330.0))) == 1

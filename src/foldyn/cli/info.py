@@ -49,11 +49,13 @@ def info() -> str:
     clusters = _part(partial(_installed, "distributed"), "distributed")
     moving, drawn = (_part(partial(_installed, name), name) for name in ("nlopt", "cma"))
     drawings = _part(lambda: f"ezdxf {ezdxf().__version__}", "ezdxf")
+    processors = os.cpu_count() or 1
     lines = [
         f"foldyn {__version__}",
         f"python {platform.python_version()}, {platform.system()} {platform.machine()}",
         *(f"{name} {_version(name)}" for name in REQUIRED),
-        f"processors: {os.cpu_count()}; the motion of a large sheet runs on up to {MOST}",
+        f"processors: {processors}; the motion of a large sheet runs on up to "
+        f"{min(MOST, processors)}",
     ]
     for name in METHODS:
         lines.append(f"kernels of {name}: {'ready' if compiled(name) else 'compiled on first use'}")

@@ -26,6 +26,7 @@ from foldyn.shells.mesh import shell_mesh
 from foldyn.shells.sides import Sides, sides, stiffness, without_free_sides
 from foldyn.shells.term import GROUPS, ShellTerm
 from foldyn.structures import Sheet
+from foldyn.structures.beyond_range import doubt_locking
 from foldyn.structures.calibration import check_sheet
 from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness, per_crease
@@ -423,4 +424,5 @@ def shell(
         graded=graded,
     )
     _ = made.plates  # refuse panels that are not flat
+    doubt_locking(made)
     return made.marked()

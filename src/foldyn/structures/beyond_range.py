@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import ModelRangeWarning
+from foldyn.materials import EnhancedLinear
 from foldyn.patterns import Pattern
+from foldyn.structures.discretized import Discretized
 from foldyn.structures.mesh import lengths
 from foldyn.structures.rigid_plates import rigid_panels
 from foldyn.structures.sheet import Sheet
@@ -25,6 +27,7 @@ FEW = 16  # panels of a sheet with clamped edges
 SKEW = 33.0  # degrees, the smallest corner of a panel of four
 FOLDED = 0.05  # t/(L sin fold) of welds, above which they bow as they are not let
 FLAT = 0.15  # the same of creases
+LOCKING = 1.1  # times the stiffness of a crease: 5 % in frequency
 SMOOTH = 1e-3  # rad, of a fold that is none
 SHELL = "take the shell (fd.shell) (docs/fidelity.md, Beyond the range)"
 GIVING = f'take preset = "n5b8e", or {SHELL[5:]}'
@@ -39,6 +42,24 @@ def doubt_range(pattern: Pattern, sheet: Sheet, options: ModelOptions, folds: ND
         return
     for text in _doubts(pattern, sheet, options, folds):
         warnings.warn(text, ModelRangeWarning, stacklevel=3)
+
+
+def doubt_locking(structure: Discretized) -> None:
+    """Warn of creases that rest where the fold law that nobody chose locks already."""
+    law, rest = structure.options.fold_law, structure.fold_rest
+    if law != EnhancedLinear() or not len(rest):
+        return
+    stiffer = law.slope(rest, rest)
+    k = int(stiffer.argmax())
+    if stiffer[k] > LOCKING:
+        warnings.warn(
+            f"crease {k} rests at {np.degrees(rest[k]):.3g} degrees, beyond the angles (45 and "
+            f"315) from which the default fold law locks, {stiffer[k]:.3g} times as stiff as "
+            'between them: take fold_law = "linear", or "enhanced" with other angles '
+            "(docs/laws.md)",
+            ModelRangeWarning,
+            stacklevel=3,
+        )
 
 
 def _doubts(pattern: Pattern, sheet: Sheet, options: ModelOptions, folds: NDArray) -> Iterator[str]:

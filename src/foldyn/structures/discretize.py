@@ -16,7 +16,7 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned, pattern_of
 from foldyn.ram_limit import check_memory
 from foldyn.structures import calibration as calibrate
-from foldyn.structures.beyond_range import doubt_range
+from foldyn.structures.beyond_range import doubt_locking, doubt_range
 from foldyn.structures.clamps import boundary_edges, clamp_rows, clamp_stiffness
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
@@ -212,6 +212,7 @@ def discretize(
         edge_gives=gives,
     )
     _ = structure.plates  # refuse panels that are not flat
+    doubt_locking(structure)
     return structure.marked()
 
 
