@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 from pathlib import Path
@@ -126,3 +127,27 @@ def test_bad_input_has_status_2_and_writes_nothing(workplace, flap, arguments, m
     workplace.write("# nothing\n", "empty.txt")
     workplace.write("0 1 30\n", "other.txt")
     assert message in workplace.refused("fold", *arguments.split())
+
+
+def test_an_interrupt_keeps_the_states_until_then(workplace, flap, monkeypatch) -> None:
+    class Bar(contextlib.nullcontext):
+        done = 0
+
+        def __enter__(self):
+            return self
+
+        def reset(self, _):
+            pass
+
+        def update(self):
+            self.done += 1
+            if self.done == 3:
+                raise KeyboardInterrupt
+
+    monkeypatch.setattr("foldyn.cli.folding.progress_bar", lambda *_, **__: Bar())
+    told = workplace.call("fold", flap, "--to", "50%", "--steps", "5")
+    assert told.new == ["flap-folded.fold"]
+    assert told.err == (
+        "foldyn: interrupted after 3 of 5 steps\nfoldyn: kept what was computed: flap-folded.fold\n"
+    )
+    assert turned("flap-folded.fold") == pytest.approx(-54.0)

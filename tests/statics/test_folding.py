@@ -10,7 +10,7 @@ from scipy.spatial.distance import pdist
 from scipy.spatial.transform import Rotation
 
 import foldyn as fd
-from foldyn.errors import CrossingWarning, FoldynWarning, InputError
+from foldyn.errors import CrossingWarning, FoldynWarning, InputError, MotionInterrupted
 
 SQUARE, HALVES = [(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)]
 
@@ -257,6 +257,21 @@ def test_the_path_can_be_watched():
     np.testing.assert_array_equal(path["position"].values[-1], folding.pattern.vertices)
     jumps = np.abs(np.diff(path["position"].values, axis=0))
     assert jumps.max() < 0.6  # placed near each other, not turned about
+
+
+def test_an_interrupted_folding_has_the_steps_that_are_done():
+    def interrupt(step, _):
+        if step == 2:
+            raise KeyboardInterrupt
+
+    pattern = flat_miura((1, 1))
+    whole = fd.fold(pattern, {(1, 4): -100}, steps=4)
+    with pytest.raises(MotionInterrupted, match="interrupted after 2 of 4 steps") as stop:
+        fd.fold(pattern, {(1, 4): -100}, steps=4, progress=interrupt)
+    partial = stop.value.partial
+    assert partial.path.sizes["step"] == 3
+    np.testing.assert_array_equal(partial.path["position"], whole.path["position"][:3])
+    assert math.degrees(partial.pattern.dihedrals.max()) == pytest.approx(180 + 50, abs=1e-6)
 
 
 @pytest.mark.parametrize(

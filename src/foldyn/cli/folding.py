@@ -11,7 +11,7 @@ from foldyn.cli.folder import check_folder, drawing
 from foldyn.cli.options import add_film, add_reading, add_switches, frame_of, integer
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
-from foldyn.errors import InputError, within
+from foldyn.errors import InputError, MotionInterrupted, within
 from foldyn.input_files import read_text
 from foldyn.values import parsed
 
@@ -88,10 +88,14 @@ def run_fold(given: Namespace) -> Path:
         if given.film == "mp4":
             with within("--film mp4: "):
                 find_ffmpeg()
-        folding = _folded(pattern, source, given)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with ENDINGS.saving():
-        write(folding)
+        try:
+            folding = _folded(pattern, source, given)
+        except MotionInterrupted as stop:
+            if stop.partial is None:
+                raise
+            _write(stop.partial, out, write)
+            raise KeyboardInterrupt(f"{stop}\nfoldyn: kept what was computed: {out}") from None
+    _write(folding, out, write)
     call = Call(given.typed, tuple(noted), **clock.spent())
     say = speech(given.quiet)
     say(folding.report())
@@ -100,6 +104,12 @@ def run_fold(given: Namespace) -> Path:
         with drawing(out, f"\nfoldyn: kept what was computed: {out}"):
             say(f"wrote {', '.join(_drawn(folding, out, source.stem, given, call))}")
     return out
+
+
+def _write(folding: Folding, out: Path, write: Callable[[Folding], None]) -> None:
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with ENDINGS.saving():
+        write(folding)
 
 
 def _folded(pattern: Pattern, source: Path, given: Namespace) -> Folding:

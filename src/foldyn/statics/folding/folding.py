@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import CrossingWarning, FoldynWarning, InputError
+from foldyn.errors import CrossingWarning, FoldynWarning, InputError, MotionInterrupted
 from foldyn.mechanics.crossings import crossing_panels, pairs_text
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import pattern_of
@@ -27,6 +27,7 @@ from foldyn.statics.folding.ways import (
     PLANE,
     Bending,
     Way,
+    WayInterrupted,
     from_folded,
     from_pattern,
     largest_strain,
@@ -237,6 +238,8 @@ def fold(
     InputError
         An argument out of range; angles that contradict the assignments; a folded state that lies
         flat, but in no order of its layers (or not in the one that the pattern's file gives).
+    MotionInterrupted
+        From the keyboard (Ctrl-C); its `partial` is the folding until the last step that is done.
 
     Warns
     -----
@@ -283,7 +286,13 @@ def fold(
         if progress is not None:
             progress(step, steps)
 
-    way = _best_way(pattern, energy, BENDING[panels], targets, steps, start, tell)
+    try:
+        way = _best_way(pattern, energy, BENDING[panels], targets, steps, start, tell)
+    except WayInterrupted as stop:
+        done = len(stop.way.shapes) - 1
+        partial = _result(pattern, energy, stop.way, targets) if done else None
+        text = f"interrupted after {done} of {steps} steps"
+        raise MotionInterrupted(text, partial) from None
     folding = _result(pattern, energy, way, targets)
     _warn(folding)
     return folding

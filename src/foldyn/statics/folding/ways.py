@@ -51,6 +51,14 @@ class Way(NamedTuple):
     origin: str  # "pattern" or "folded"
 
 
+class WayInterrupted(KeyboardInterrupt):
+    """A way was interrupted from the keyboard: `way` is what there is of it."""
+
+    def __init__(self, way: Way) -> None:
+        super().__init__()
+        self.way = way
+
+
 def wrong_ways(energy: FoldEnergy, turns: NDArray, targets: NDArray) -> NDArray[np.int64]:
     """Mountains and valleys that have not turned their own way, unless they are to stay flat."""
     flat = np.abs(np.nan_to_num(targets, nan=1.0)) <= TURNED
@@ -71,10 +79,8 @@ def from_pattern(
     """Fold from the pattern as it is."""
     first = energy.creases(energy.start.turns)
     start = opened(energy, stiffness)
-    states, shares = _followed(
-        energy, stiffness, energy.start, start, (first, targets), steps, progress
-    )
-    return Way(states, shares, "pattern")
+    way = Way([energy.start], [0.0], "pattern")
+    return _followed(way, energy, stiffness, start, (first, targets), steps, progress)
 
 
 def from_folded(
@@ -92,41 +98,41 @@ def from_folded(
     x = (vertices - vertices.mean(axis=0)) / energy.size
     shape = energy.moved(energy.start._replace(turns=turns), x)
     start = ajar(energy, shape)
-    states, shares = _followed(
-        energy, stiffness, shape, start, (folded, targets), steps, progress, AJAR
-    )
-    return Way(states, shares, "folded")
+    way = Way([shape], [0.0], "folded")
+    return _followed(way, energy, stiffness, start, (folded, targets), steps, progress, AJAR)
 
 
 def _followed(
-    energy: FoldEnergy, stiffness: Stiffness, first: Shape, shape: Shape,
+    way: Way, energy: FoldEnergy, stiffness: Stiffness, shape: Shape,
     angles: tuple[NDArray, NDArray], steps: int, progress: Callable[[int], None],
     most: float = math.pi,
-) -> tuple[list[Shape], list[float]]:  # fmt: skip
+) -> Way:  # fmt: skip
     """Follow the least energy from `shape` while the rest angles go from the first to the second.
 
-    Where springs cannot be let go at a step, that is not tried again before the last one.
+    Where springs cannot be let go at a step, or not without bent panels, that is not tried again
+    before the last one.
     """
-    shapes, shares, before, plane = [first], [0.0], shape, True
-    lets_go = True
-    for k in range(1, steps + 1):
-        aimed = angles[0] + (angles[1] - angles[0]) * (k / steps)
-        last = k == steps
-        aim = _aim(energy, aimed, most)
-        ahead = 2.0 * shape.x - before.x
-        before, shape = shape, lowest(energy, shape, ahead, aim, stiffness)
-        shape = minimum(energy, shape, aim, stiffness, least=1e-10 if last else 1e-4)
-        kept = None
-        if lets_go or last:
-            kept = relaxed(energy, stiffness, shape, aim, angles[0], plane or last)
-        lets_go = kept is not None
-        plane = kept is not None and energy.bent(kept.turns).max(initial=0.0) <= PLANE
-        if last and kept is None:
-            kept = eased(energy, stiffness, shape, aim, angles[0])
-        shapes.append(shape if kept is None else kept)
-        shares.append(k / steps)
-        progress(k)
-    return shapes, shares
+    before, plane, lets_go = shape, True, True
+    try:
+        for k in range(1, steps + 1):
+            aimed = angles[0] + (angles[1] - angles[0]) * (k / steps)
+            aim, last = _aim(energy, aimed, most), k == steps
+            ahead = 2.0 * shape.x - before.x
+            before, shape = shape, lowest(energy, shape, ahead, aim, stiffness)
+            shape = minimum(energy, shape, aim, stiffness, least=1e-10 if last else 1e-4)
+            kept = None
+            if lets_go or last:
+                kept = relaxed(energy, stiffness, shape, aim, angles[0], plane or last)
+            lets_go = kept is not None
+            plane = kept is not None and energy.bent(kept.turns).max(initial=0.0) <= PLANE
+            if last and kept is None:
+                kept = eased(energy, stiffness, shape, aim, angles[0])
+            way.shapes.append(shape if kept is None else kept)
+            way.shares.append(k / steps)
+            progress(k)
+    except KeyboardInterrupt:
+        raise WayInterrupted(Way(way.shapes[: len(way.shares)], *way[1:])) from None
+    return way
 
 
 def relaxed(
