@@ -63,7 +63,7 @@ def test_a_located_bifurcation_is_told_once():
 
 
 def test_a_limit_point_that_was_asked_for_is_marked_and_not_warned_of():
-    options = {"first_step": 0.2 * SHALLOW.limit, "steps": 40}
+    options = {"first_step": 0.2 * SHALLOW.limit, "steps": 20}
     path, said = told(SHALLOW.case(), "arc_length", **options)
     assert not said and "limit" in path.point.values
     assert path.attrs["unstable_points"] == (path.negative_eigenvalues.values > 0).sum() > 0

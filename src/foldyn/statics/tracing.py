@@ -169,6 +169,8 @@ def trace(
 
     def stations() -> Walk:
         start = settle(solver, problem.start(begin), begin)
+        if initial is None and not steady:  # what the sheet releases by itself is no work
+            problem.energy_at_rest = float(problem.energies(start.point.u, begin).sum())
         first = kept(problem, start)
         if first.point.factor != plan.begin:
             *_, first = walk(solver, first, [plan.begin], False)
