@@ -122,6 +122,15 @@ def test_turns_that_displacements_do_not_tell_are_left_out(model):
     assert {"turn", "fold_moment", "energy"} <= set(fields(damped, path, still))
 
 
+def test_energies_of_warm_panels_are_left_out():
+    """Displacements tell the energies of all strains, not of those that produce stress."""
+    s = structure()
+    warm = fd.Case(s, SUPPORTS, [fd.Temperature(10.0, expansion=1e-5)])
+    still = xr.Dataset(coords={"time": [0.0]})
+    found = fields(warm, still, np.zeros((1, *s.nodes.shape)))
+    assert "fold_moment" in found and "energy" not in found
+
+
 def check(s, result):
     """Compare with the energies that the solver stored."""
     found = fields(fd.case_of(result), result, result["displacement"].values)
