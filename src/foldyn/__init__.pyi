@@ -111,6 +111,7 @@ from foldyn.patterns import (
     Pattern as Pattern,
     Screw as Screw,
     convex as convex,
+    flat_foldable as flat_foldable,
     thicken as thicken,
     welded as welded,
 )

@@ -16,7 +16,7 @@ HINGES, FACES = "hinge_offset", "faces"
 """Key of [pattern] that makes its panels thick, and its word for hinges in their faces."""
 FACETS = "facets"
 """Key of [pattern] for what lines assigned "F" are."""
-READING = ("scale", "unit", "frame", FACETS)
+READING = ("scale", "unit", "frame", FACETS, "tolerance", "flat_foldable")
 """Keys of [pattern] beside `file`: arguments of `read_pattern`."""
 INLINE = ("vertices", "faces", "assignments", "fold_angles", "families")
 """Keys of [pattern] for a pattern that the case file holds."""

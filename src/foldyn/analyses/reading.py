@@ -255,7 +255,8 @@ def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
         from foldyn.formats import read_pattern  # with all its libraries
 
         with within(f'pattern.file = "{table["file"]}": '):
-            return read_pattern(folder / table["file"], *(table.get(key) for key in READING))
+            given = {key: table[key] for key in READING if key in table}
+            return read_pattern(folder / table["file"], **given)
     with within("pattern: "):
         pattern = Pattern(
             table["vertices"], table["faces"], table.get("assignments"),

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.options import add_reading, add_switches, flag, frame_of, integer, number
+from foldyn.cli.options import add_reading, add_switches, flag, integer, number, reading_of
 from foldyn.cli.streams import speech
 from foldyn.errors import InputError
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 RESULT = ".nc"
 HDF5 = b"\x89HDF\r\n\x1a\n"
 """First bytes of a NetCDF file."""
-PATTERNS_ONLY = ("check", "unit")
+PATTERNS_ONLY = ("check", "unit", "tolerance", "flat_foldable")
 RESULTS_ONLY = ("format", "every", "frames", "seconds", "rows", "fields", "nodes")
 DECKS_ONLY = ("divisions", "modes", "element")
 """Options that belong to one kind of files."""
@@ -102,7 +102,9 @@ def _export(given: argparse.Namespace, what: Path | Case) -> None:
 
     for name in PATTERNS_ONLY:
         if getattr(given, name):
-            raise InputError(": only for pattern files; leave it out", f"--{name}")
+            raise InputError(
+                ": only for pattern files; leave it out", f"--{name.replace('_', '-')}"
+            )
     if given.frame is not None and not (given.frame.isascii() and given.frame.isdecimal()):
         raise InputError(f" = {given.frame}: give the number of a sample, from 0", "--frame")
     options = {name: getattr(given, name) for name in (*RESULTS_ONLY, *DECKS_ONLY, "scale")}
@@ -131,13 +133,12 @@ def _convert_pattern(given: argparse.Namespace, source: Path) -> None:
         for name in names:
             if getattr(given, name) is not None:
                 raise InputError(f": only for {kind}; leave it out", f"--{name}")
-    frame = frame_of(given.frame)
     if given.check:
-        pattern, diagnosis = diagnose(source, given.scale, given.unit, frame, "line")
+        pattern, diagnosis = diagnose(source, facets="line", **reading_of(given))
         print(f"{source}: {pattern!r}")
         print(diagnosis)
     else:
-        pattern = read_pattern(source, given.scale, given.unit, frame, "line")
+        pattern = read_pattern(source, facets="line", **reading_of(given))
     if given.out is not None:
         write_pattern(given.out, pattern)
         speech(given.quiet)(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.convert import RESULT
 from foldyn.cli.folder import check_folder, drawing
-from foldyn.cli.options import add_film, add_reading, add_switches, frame_of, integer
+from foldyn.cli.options import add_film, add_reading, add_switches, frame_of, integer, reading_of
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
 from foldyn.errors import InputError, MotionInterrupted, within
@@ -81,7 +81,7 @@ def run_fold(given: Namespace) -> Path:
     clock = Clock.now()
     source = Path(given.pattern)
     with noted_warnings() as noted:
-        pattern = read_pattern(source, given.scale, given.unit, frame_of(given.frame))
+        pattern = read_pattern(source, **reading_of(given))
         out = Path(f"{source.stem}-folded.fold" if given.out is None else given.out)
         write = _writer(out)
         check_folder(out.parent, given.out, [out.name])
@@ -121,7 +121,10 @@ def _folded(pattern: Pattern, source: Path, given: Namespace) -> Folding:
     if given.angles is not None:
         angles = read_angles(given.angles)
     elif given.to_frame is not None:
-        angles = read_pattern(source, given.scale, given.unit, frame_of(given.to_frame))
+        angles = read_pattern(
+            source,
+            **{**reading_of(given), "frame": frame_of(given.to_frame), "flat_foldable": False},
+        )
     with progress_bar(given.quiet, total=given.steps, unit="step") as bar:
 
         def tell(step: int, steps: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 from foldyn.plots import ANIMATIONS, FIGURES
 from foldyn.values import parsed
@@ -37,6 +38,18 @@ def add_reading(
     command.add_argument("--scale", type=number, help=scale)
     command.add_argument("--unit", help="unit of the coordinates of the file: mm, cm, m, in, ...")
     command.add_argument("--frame", help=frame)
+    command.add_argument(
+        "--tolerance", type=number, help="distance (m) within which points of the file are one"
+    )
+    flag(command, "--flat-foldable", "move vertices to the nearest places that fold flat")
+
+
+def reading_of(given: argparse.Namespace) -> dict[str, Any]:
+    """Arguments of `read_pattern` that `add_reading` takes."""
+    return {
+        "scale": given.scale, "unit": given.unit, "frame": frame_of(given.frame),
+        "tolerance": given.tolerance, "flat_foldable": given.flat_foldable,
+    }  # fmt: skip
 
 
 def frame_of(given: str | None) -> int | str | None:

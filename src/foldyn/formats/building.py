@@ -24,6 +24,7 @@ from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.values import LONGEST, SHORTEST, number
 
 _FARTHEST = 1e8  # from the origin, over the size: coordinates keep eight digits within the drawing
+_COARSEST = 0.05  # of the size: tolerance
 _SHUT = 179.0  # degrees: fold angles of closed creases
 _TURNED = 1e-3  # rad from pi: what counts as folded
 
@@ -35,7 +36,10 @@ class Built(NamedTuple):
     diagnosis: Diagnosis
 
 
-def built(drawing: Drawing, *, meters: float | None = None, scale: float = 1.0) -> Built:
+def built(
+    drawing: Drawing, *, meters: float | None = None, scale: float = 1.0,
+    tolerance: float | None = None,
+) -> Built:  # fmt: skip
     """Build the pattern of a drawing: repaired where that can be done, refused where not.
 
     Lines without faces, in the plane: ends that lie together are joined, lines are split where
@@ -52,6 +56,8 @@ def built(drawing: Drawing, *, meters: float | None = None, scale: float = 1.0) 
         assumed (`drawing.assumed`).
     scale : float
         Factor on all lengths, beside the unit.
+    tolerance : float, optional
+        Distance (m) within which points are one; by default one that suits the drawing.
 
     Returns
     -------
@@ -75,12 +81,18 @@ def built(drawing: Drawing, *, meters: float | None = None, scale: float = 1.0) 
     unit *= number("scale", scale, above=0.0)
     notes = Notes(drawing, unit)
     lines = _lines(drawing, unit, notes)
+    if tolerance is not None and tolerance > _COARSEST * lines.size:
+        raise InputError(
+            f" = {tolerance:g}: must be at most a {1 / _COARSEST:.0f}th of the sheet's size, "
+            f"{_COARSEST * lines.size:.3g} m here",
+            "tolerance",
+        )
     if drawing.faces is None:
         from foldyn.formats.flat_drawings import flat_panels
 
-        panels = flat_panels(lines, notes)
+        panels = flat_panels(lines, notes, tolerance)
     else:
-        panels = listed_panels(lines, drawing.faces, notes)
+        panels = listed_panels(lines, drawing.faces, notes, tolerance)
     panels, cut = opened(panels)
     if cut:
         notes.repairs.append(f"opened {count(cut, 'cut edge')}: each is two boundary edges")

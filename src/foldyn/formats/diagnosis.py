@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from foldyn.patterns.flat_foldability import FlatFoldability
 from foldyn.patterns.topology import Edge
@@ -32,6 +33,9 @@ class Diagnosis:
         Maekawa's and Kawasaki's conditions at the vertices inside.
     facets : tuple of pairs of int
         Flat creases that the file itself assigns "F", and that are not to be folded.
+    moves : ndarray, shape (n,)
+        How far (m) each vertex was moved, or would be by ``flat_foldable=True``, to fold flat;
+        empty where none needs to.
     """
 
     size: tuple[float, float, float]
@@ -40,6 +44,7 @@ class Diagnosis:
     doubts: tuple[str, ...]
     vertices: FlatFoldability
     facets: tuple[Edge, ...]
+    moves: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     def __str__(self) -> str:
         """Text of several lines."""
@@ -47,7 +52,17 @@ class Diagnosis:
         for title in ("assumptions", "repairs", "doubts"):
             told = getattr(self, title)
             lines += [f"{title}: none"] if not told else [f"{title}:", *(f"  {t}" for t in told)]
-        return "\n".join(lines + self._vertex_lines())
+        return "\n".join(lines + self._move_lines() + self._vertex_lines())
+
+    def _move_lines(self) -> list[str]:
+        """How far vertices move to fold flat, those first that move farthest."""
+        order = np.argsort(-self.moves, kind="stable")
+        shown = [f"{v} by {1e6 * self.moves[v]:.3g}" for v in order[:MOST_ROWS].tolist()]
+        if not shown:
+            return []
+        left = len(order) - len(shown)
+        more = f", {left} more by less" if left else ""
+        return [f"vertices moved, or to be moved, to fold flat (um): {', '.join(shown)}{more}"]
 
     def _vertex_lines(self) -> list[str]:
         """Table of the vertices inside, those first that cannot fold flat."""

@@ -16,13 +16,14 @@ from foldyn.formats import cp, dxf, fold, fold_writer, obj, opx, stl, svg, svg_w
 from foldyn.formats.building import Built, built
 from foldyn.formats.drawing import METERS, Drawing
 from foldyn.formats.facets import with_convex_panels, with_facets
+from foldyn.formats.slips import without_slips
 from foldyn.formats.writers import warn_of_boards
 from foldyn.input_files import path_of, read_text
 from foldyn.patterns import Pattern
 from foldyn.patterns.facets import LINE
 from foldyn.patterns.frames import Frame, fold_angles
 from foldyn.patterns.pattern import pattern_of
-from foldyn.values import choice, listed, number, of_kind
+from foldyn.values import choice, flag, length, listed, number, of_kind
 from foldyn.writing import write_bytes
 
 MOST = 32
@@ -86,6 +87,8 @@ def read_pattern(
     unit: str | None = None,
     frame: int | str | None = None,
     facets: Literal["weld", "line", "hinge"] | None = None,
+    tolerance: float | None = None,
+    flat_foldable: bool = False,
 ) -> Pattern:
     """Read a pattern from a file; its extension determines the format.
 
@@ -106,6 +109,12 @@ def read_pattern(
         creases that are flat. Without it facets, as with "weld", where all of them lie in one plane
         with their panels, which a warning says; else hinges. Files by Foldyn say which are facets.
         Unless it is "line", panels that are not convex are cut along welds, as `convex` does.
+    tolerance : float, optional
+        Distance (m) within which ends of lines, or points that panels should share, are one; by
+        default what suits the file.
+    flat_foldable : bool
+        Whether to move vertices of a flat drawing that nearly folds flat to the nearest places
+        where it does, as `fd.flat_foldable`; `diagnose` tells how far each is, or would be, moved.
 
     Returns
     -------
@@ -123,7 +132,7 @@ def read_pattern(
     FoldynWarning
         What was assumed, with the pattern's size, what was repaired, and what may not be meant.
     """
-    pattern, diagnosis = diagnose(path, scale, unit, frame, facets)
+    pattern, diagnosis = diagnose(path, scale, unit, frame, facets, tolerance, flat_foldable)
     size = " x ".join(f"{length:.4g}" for length in diagnosis.size)
     for told in (
         diagnosis.assumptions and f"{'; '.join(diagnosis.assumptions)}; the sheet is {size} m",
@@ -141,6 +150,8 @@ def diagnose(
     unit: str | None = None,
     frame: int | str | None = None,
     facets: Literal["weld", "line", "hinge"] | None = None,
+    tolerance: float | None = None,
+    flat_foldable: bool = False,
 ) -> Built:
     """Read a pattern as `read_pattern` does, and return what it says of it instead of warning.
 
@@ -157,6 +168,8 @@ def diagnose(
     """
     meters = None if unit is None else METERS[choice("unit", unit, METERS)]
     factor = 1.0 if scale is None else number("scale", scale, above=0.0)
+    mend = flag("flat_foldable", flat_foldable)
+    near = None if tolerance is None else length("tolerance", tolerance)
     file, fmt = _file_and_format(path)
     if fmt.read is None:
         raise InputError(f"{file}: {fmt.name} files can be written but not read.")
@@ -165,8 +178,9 @@ def diagnose(
     text = read_text(file, fmt.named, MOST, "leave out all but the pattern")
     with within("", file):
         drawing = fmt.read(text, *((frame,) if fmt.frames else ()))
-        made = built(drawing, meters=meters, scale=factor)
+        made = built(drawing, meters=meters, scale=factor, tolerance=near)
         made = _with_families(_without_repetition(made), drawing)
+        made = without_slips(made, mend, frame is not None)
         made = with_facets(made, drawing, facets)
         return made if facets == LINE else with_convex_panels(made)
 

@@ -10,14 +10,14 @@ from foldyn.formats import gaps
 from foldyn.formats.lines import Lines, single, without_points
 from foldyn.formats.notes import Notes, count
 from foldyn.formats.panels import Panels, compact, with_inner_borders
-from foldyn.formats.planar import check_crowding, joined, on_lines, split, tolerance_of
-from foldyn.formats.regions import areas, enclosed, sheet
+from foldyn.formats.planar import check_crowding, joined, on_lines, points_on, split, tolerance_of
+from foldyn.formats.regions import areas, enclosed, sheet, straightened
 
 _SAME = 1e-9  # of the size: ends that are farther apart are told of
 _PLANE = 1e-9  # of the size
 
 
-def flat_panels(lines: Lines, notes: Notes) -> Panels:
+def flat_panels(lines: Lines, notes: Notes, tolerance: float | None = None) -> Panels:
     """Panels that lines in the plane enclose.
 
     Parameters
@@ -26,6 +26,8 @@ def flat_panels(lines: Lines, notes: Notes) -> Panels:
         As drawn (m), with two coordinates, or three of which one is the same everywhere.
     notes : Notes
         Gets what is repaired and doubted.
+    tolerance : float, optional
+        Distance (m) within which ends are one; by default one that suits the lines.
 
     Raises
     ------
@@ -33,7 +35,7 @@ def flat_panels(lines: Lines, notes: Notes) -> Panels:
         The lines are not in the plane, enclose nothing, or are too many.
     """
     lines = _in_plane(lines, notes)
-    tolerance = tolerance_of(lines)
+    tolerance = tolerance_of(lines) if tolerance is None else tolerance
     whole = _joined(lines, tolerance, notes)
     whole, contradictions = single(whole)
     notes.contradict(contradictions)
@@ -43,6 +45,11 @@ def flat_panels(lines: Lines, notes: Notes) -> Panels:
     if len(pieces.ends) > len(whole.ends):
         more = len(pieces.ends) - len(whole.ends)
         notes.repairs.append(f"split lines where they meet: {count(more, 'piece')} more")
+    parted = pieces
+    pieces = straightened(parted, np.unique(points_on(whole, 0.5 * tolerance)[:, 1]), tolerance)
+    if len(pieces.ends) < len(parted.ends):
+        more = len(parted.ends) - len(pieces.ends)
+        notes.repairs.append(f"left out {count(more, 'end')} of lines upon others, within these")
     pieces, moved, farthest = gaps.closed(pieces, tolerance)
     if moved:
         notes.repairs.append(
@@ -96,7 +103,8 @@ def _uncut(drawn: Panels, kept: Panels, openings: NDArray, cuts: int) -> int:
         raise InputError(
             f": {cuts} of the outline's kind (black, B) are inside the sheet; as cuts they would "
             f"leave {1e6 * after:.4g} of its {1e6 * before:.4g} mm2: draw creases as such (those "
-            "without a letter magenta, U), and what cuts pieces off as cuts (green, C)",
+            "without a letter magenta, U), and what cuts pieces off as cuts (green, C); a "
+            "`tolerance` joins ends that miss each other",
             "lines",
         )
     return len(meant)
@@ -158,17 +166,17 @@ def _on_lines(lines: Lines, tolerance: float, notes: Notes) -> Lines:
     return placed
 
 
-def _tell_loose(loose: NDArray, lines: Lines, notes: Notes) -> None:
-    """Tell of lines that bound no panel."""
-    rows = np.unique(loose)
-    slits = rows[lines.letters[rows] == "C"]
-    rest = np.setdiff1d(rows, slits)
-    for which, told, what in (
-        (rest, notes.repairs, "left out {} or parts of them that bound no panel"),
-        (slits, notes.doubts, "left out {} that end inside a panel (end them on creases)"),
+def _tell_loose(loose: Lines, lines: Lines, notes: Notes) -> None:
+    """Tell of lines that bound no panel; long pieces of creases were to part two panels."""
+    folds = np.isin(loose.letters, ("M", "V", "U")) & (loose.lengths > 2 * gaps.GAP * lines.size)
+    slits = loose.letters == "C"
+    for which, told, noun, what in (
+        (~slits & ~folds, notes.repairs, "line", "or parts of them that bound no panel"),
+        (folds, notes.doubts, "crease", "or parts of them that bound no panel (end them on lines)"),
+        (slits, notes.doubts, "cut", "that end inside a panel (end them on creases)"),
     ):
-        if len(which):
-            noun = count(len(which), "line" if told is notes.repairs else "cut")
-            where = lines.points[lines.ends[which]].mean(axis=1)
-            names = notes.lines(which.tolist(), list(where))
-            told.append(f"{what.format(noun)}: {names}")
+        rows = np.unique(loose.source[which])
+        if len(rows):
+            where = lines.points[lines.ends[rows]].mean(axis=1)
+            names = notes.lines(rows.tolist(), list(where))
+            told.append(f"left out {count(len(rows), noun)} {what}: {names}")

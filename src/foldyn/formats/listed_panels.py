@@ -11,15 +11,17 @@ from foldyn.errors import InputError
 from foldyn.formats.lines import Lines, single, without_points
 from foldyn.formats.notes import Notes, count
 from foldyn.formats.panels import Panels, compact, components, with_inner_borders
-from foldyn.formats.t_junctions import with_corners_on_edges
-from foldyn.patterns.geometry import face_geometry, seams
+from foldyn.formats.t_junctions import ON_EDGE, with_corners_on_edges
+from foldyn.patterns.geometry import SAME_PLACE, face_geometry, seams
 from foldyn.patterns.topology import Edge, Faces, around, build_topology, checked_faces, edge_of
 from foldyn.values import show
 
 _ROUNDS = 8
 
 
-def listed_panels(lines: Lines, faces: Faces, notes: Notes) -> Panels:
+def listed_panels(
+    lines: Lines, faces: Faces, notes: Notes, tolerance: float | None = None
+) -> Panels:
     """Panels of a file, joined where they meet, with the letters of its lines.
 
     Boundary edges that lie in the same place, and whose letters do not say that they are boundary
@@ -33,6 +35,8 @@ def listed_panels(lines: Lines, faces: Faces, notes: Notes) -> Panels:
         Corners of the panels, as numbers of the points.
     notes : Notes
         Gets what is repaired and doubted.
+    tolerance : float, optional
+        Distance (m) within which points that panels should share are one.
 
     Raises
     ------
@@ -54,14 +58,15 @@ def listed_panels(lines: Lines, faces: Faces, notes: Notes) -> Panels:
             f"left out {count(twice, 'panel')} listed twice or of fewer than 3 corners"
         )
     merged = divided = 0
+    near = None if tolerance is None else tolerance / lines.size
     for _ in range(_ROUNDS):  # joined panels may close further seams
-        into, wound, points, normals = _seam_points(panels)
+        into, wound, points, normals = _seam_points(panels, near or SAME_PLACE)
         if into is not None:
             merged += int(np.count_nonzero(into != np.arange(len(into))))
             panels = _renumbered(panels, into)
             continue
         whole = replace(panels, faces=wound)
-        parted, more = with_corners_on_edges(whole, points, normals)
+        parted, more = with_corners_on_edges(whole, points, normals, near or ON_EDGE)
         if not more:
             break
         panels, divided = parted, divided + more
@@ -115,17 +120,18 @@ def _once(panels: Panels) -> tuple[Panels, int]:
 
 
 def _seam_points(
-    panels: Panels,
+    panels: Panels, near: float
 ) -> tuple[NDArray[np.int64] | None, Faces, NDArray[np.float64], NDArray[np.float64]]:
     """Number of the point that each is merged into, or None where panels meet as they should.
 
-    With it the panels, wound alike, their points in space, and their normals.
+    With it the panels, wound alike, their points in space, and their normals. `near` is how far
+    apart points are that are one, over the size.
     """
     points = np.zeros((len(panels.points), 3))
     points[:, : panels.points.shape[1]] = panels.points
     topology = build_topology(checked_faces(panels.faces, len(points)), len(points))
     normals = face_geometry(points, topology.faces).face_normals
-    pairs = seams(points, topology.faces, normals, topology.boundary)
+    pairs = seams(points, topology.faces, normals, topology.boundary, near)
     same: list[tuple[int, int]] = []
     for one, other in pairs:
         if {panels.letters.get(one), panels.letters.get(other)} & {"B", "C"}:

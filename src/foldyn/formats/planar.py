@@ -69,7 +69,7 @@ def on_lines(lines: Lines, tolerance: float) -> Lines:
 
     Ends within rounding of it stay as they are, and those near several lines.
     """
-    hits = _points_on(lines, 0.5 * tolerance)
+    hits = points_on(lines, 0.5 * tolerance)
     point, first, count = np.unique(hits[:, 1], return_index=True, return_counts=True)
     point, line = point[count == 1], hits[first[count == 1], 0]
     start = lines.points[lines.ends[line, 0]]
@@ -105,7 +105,7 @@ def split(lines: Lines, tolerance: float) -> Lines:
         if len(lines.ends) > MOST_LINES:
             raise too_many(f"{len(lines.ends)} lines")
         lines, hits = _with_crossings(lines, near_by, tolerance)
-        near = np.concatenate((hits, _points_on(lines, near_by)))
+        near = np.concatenate((hits, points_on(lines, near_by)))
         if not len(near):
             return lines
         lines, _ = single(without_points(_pieces(lines, near)))
@@ -179,7 +179,7 @@ def _cross(a: NDArray, b: NDArray) -> NDArray:
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
-def _points_on(lines: Lines, tolerance: float) -> NDArray:
+def points_on(lines: Lines, tolerance: float) -> NDArray:
     """Lines and points (k, 2) where a point lies on a line that does not end there."""
     used = np.unique(lines.ends)
     tree = STRtree(segments(lines))

@@ -15,7 +15,7 @@ from foldyn.formats.planar import segments
 from foldyn.patterns.topology import Faces, around, edge_of
 
 
-def enclosed(lines: Lines, tolerance: float) -> tuple[Panels, NDArray[np.int64], int]:
+def enclosed(lines: Lines, tolerance: float) -> tuple[Panels, Lines, int]:
     """Panels of lines that meet only at their ends.
 
     Parameters
@@ -28,8 +28,8 @@ def enclosed(lines: Lines, tolerance: float) -> tuple[Panels, NDArray[np.int64],
     Returns
     -------
     panels : Panels
-    loose : ndarray of int
-        Numbers of the lines that bound no panel: open ends, and links between separate parts.
+    loose : Lines
+        Those that bound no panel: open ends, and links between separate parts.
     divided : int
         Panels with others inside, divided into triangles.
 
@@ -46,14 +46,11 @@ def enclosed(lines: Lines, tolerance: float) -> tuple[Panels, NDArray[np.int64],
         )
     bound = {edge_of(a, b) for face in faces for a, b in around(face)}
     ends = [edge_of(a, b) for a, b in lines.ends.tolist()]
-    loose = np.flatnonzero([edge not in bound for edge in ends])
-    if len(loose):
-        kept = lines.taken(np.setdiff1d(np.arange(len(ends)), loose))
-        straight = _straightened(kept, np.unique(lines.ends[loose]), tolerance)
-        rest, loose = straight, lines.source[loose]
+    is_loose = np.array([edge not in bound for edge in ends])
+    rest, loose = lines, lines.taken(is_loose)
+    if is_loose.any():
+        rest = straightened(lines.taken(~is_loose), np.unique(loose.ends), tolerance)
         faces, divided = _faces(rest)
-    else:
-        rest, loose = lines, lines.source[loose]
     ends = [edge_of(a, b) for a, b in rest.ends.tolist()]
     letters = dict(zip(ends, rest.letters.tolist(), strict=True))
     angles = dict(zip(ends, rest.angles.tolist(), strict=True))
@@ -84,7 +81,7 @@ def _faces(lines: Lines) -> tuple[Faces, int]:
     return tuple(sorted(faces)), int(np.count_nonzero(hollow))
 
 
-def _straightened(lines: Lines, suspects: NDArray, tolerance: float) -> Lines:
+def straightened(lines: Lines, suspects: NDArray, tolerance: float) -> Lines:
     """Lines without those of the suspected points that lie within a line of one kind."""
     at: dict[int, set[int]] = {}
     drawn = {edge_of(a, b) for a, b in lines.ends.tolist()}

@@ -25,7 +25,10 @@ UPON = 1e-2
 
 
 def with_corners_on_edges(
-    panels: Panels, points: NDArray[np.float64], normals: NDArray[np.float64]
+    panels: Panels,
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    share: float = ON_EDGE,
 ) -> tuple[Panels, int]:
     """Panels with the vertices of those beside them as corners, and how many were put in.
 
@@ -41,6 +44,8 @@ def with_corners_on_edges(
         Coordinates, of flat panels too.
     normals : ndarray, shape (m, 3)
         Unit normals of the panels.
+    share : float
+        Distance of a vertex from an edge that it lies in, over the size.
     """
     sides = panels.sides()
     rim = [
@@ -51,7 +56,7 @@ def with_corners_on_edges(
     ]
     taken = Counter({edge: len(at) for edge, at in sides.items()})
     inside: dict[tuple[int, int], list[int]] = {}
-    for a, b, panel, found in _divided(rim, points, normals):
+    for a, b, panel, found in _divided(rim, points, normals, share):
         pieces = [edge_of(*piece) for piece in pairwise([a, *found, b])]
         own = set(found) & set(panels.faces[panel])
         if not own and all(taken[piece] < 2 for piece in pieces):
@@ -72,11 +77,11 @@ def with_corners_on_edges(
 
 
 def _divided(
-    rim: list[tuple[int, int, int]], points: NDArray, normals: NDArray
+    rim: list[tuple[int, int, int]], points: NDArray, normals: NDArray, share: float
 ) -> Iterator[tuple[int, int, int, list[int]]]:
     """Edges of a rim (start, end, panel) with the points that divide them, in order."""
     rows = np.array(rim, dtype=np.int64).reshape(-1, 3)
-    tolerance = ON_EDGE * float(np.linalg.norm(np.ptp(points, axis=0)))
+    tolerance = share * float(np.linalg.norm(np.ptp(points, axis=0)))
     lengths = np.linalg.norm(points[rows[:, 1]] - points[rows[:, 0]], axis=1)
     rows, lengths = rows[lengths > tolerance], lengths[lengths > tolerance]
     if not len(rows):

@@ -8,6 +8,7 @@ from foldyn.patterns.boards import Boards
 from foldyn.patterns.convex import convex
 from foldyn.patterns.facets import welded
 from foldyn.patterns.flat_foldability import FlatFoldability
+from foldyn.patterns.flat_foldable import flat_foldable
 from foldyn.patterns.generators.arc_miura import arc_miura
 from foldyn.patterns.generators.curved_pleat import curved_pleat
 from foldyn.patterns.generators.eggbox import eggbox
@@ -56,6 +57,7 @@ __all__ = [
     "curved_pleat",
     "eggbox",
     "flasher",
+    "flat_foldable",
     "kresling",
     "miura",
     "miura_tube",

@@ -25,6 +25,7 @@ _DEGENERATE = 1e-10
 SAME_PLACE = 1e-9  # of the pattern's size
 ASKEW = np.array([0.5377, 0.8339, 0.1244])  # shorter than 1
 LAYERS = 1e-6  # rad: panels that leave their edges at less than that lie upon each other
+_ASKANCE = 10.0  # the same where points count as one that are apart, over that distance
 CLOSED = 1e-3  # rad from closed: a crease's letter, not rounding, says to which side it has turned
 
 
@@ -173,7 +174,7 @@ def crease_dihedrals(
 
 
 def seams(
-    vertices: NDArray, faces: Faces, normals: NDArray, boundary: NDArray
+    vertices: NDArray, faces: Faces, normals: NDArray, boundary: NDArray, near: float = SAME_PLACE
 ) -> list[tuple[Edge, Edge]]:
     """Pairs of boundary edges whose ends lie in the same places and whose panels do not.
 
@@ -187,8 +188,10 @@ def seams(
         Unit normals of the faces.
     boundary : ndarray of int, shape (nb, 2)
         Edges of one face.
+    near : float
+        Distance of points that lie in the same place, over the size of the pattern.
     """
-    place = _places(vertices, boundary)
+    place = _places(vertices, boundary, near)
     ends = np.sort(place[boundary], axis=1)
     _, group, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
     doubled = np.flatnonzero(count[group.ravel()] > 1)
@@ -199,19 +202,19 @@ def seams(
     first: dict[int, int] = {}
     for k in doubled.tolist():
         other = first.setdefault(int(group.ravel()[k]), k)
-        if np.linalg.norm(inward[k] - inward[other]) > LAYERS:
+        if np.linalg.norm(inward[k] - inward[other]) > max(LAYERS, _ASKANCE * near):
             pairs.append((edge_of(*boundary[other].tolist()), edge_of(*boundary[k].tolist())))
     return pairs
 
 
-def _places(vertices: NDArray, boundary: NDArray) -> NDArray:
+def _places(vertices: NDArray, boundary: NDArray, near: float) -> NDArray:
     """Number of the place of each vertex (n,), the same for those of the boundary that coincide."""
     rim = np.unique(boundary)
     points, where = np.unique(vertices[rim], axis=0, return_inverse=True)
-    pairs = _pairs_nearer(points, SAME_PLACE * float(np.linalg.norm(np.ptp(vertices, axis=0))))
-    near = coo_array((np.ones(len(pairs)), tuple(pairs.T)), (len(points), len(points)))
+    pairs = _pairs_nearer(points, near * float(np.linalg.norm(np.ptp(vertices, axis=0))))
+    graph = coo_array((np.ones(len(pairs)), tuple(pairs.T)), (len(points), len(points)))
     places = np.arange(len(vertices)) + len(points)
-    places[rim] = connected_components(near, directed=False)[1][where.ravel()]
+    places[rim] = connected_components(graph, directed=False)[1][where.ravel()]
     return places
 
 

@@ -1,0 +1,61 @@
+"""Slips of drawing, by which a pattern that is to fold flat just fails to: told of, or mended."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from foldyn.errors import ComputationError, InputError
+from foldyn.formats.notes import count
+from foldyn.patterns.flat_foldability import flat_foldability
+from foldyn.patterns.flat_foldable import flat_foldable, slips
+
+if TYPE_CHECKING:
+    from foldyn.formats.building import Built
+
+_LISTED = 1e-9  # m, least move that is told
+
+
+def without_slips(made: Built, mend: bool, is_state: bool) -> Built:
+    """Move vertices to where they fold flat, if that is asked for, else offer it.
+
+    is_state : whether the pattern is one of several states, which strains may distort.
+    """
+    told, pattern = made.diagnosis, made.pattern
+    rows = slips(told.vertices)
+    if rows.size < (1 if mend else 2):  # panels about one vertex stay plane
+        return made
+    off = np.degrees(told.vertices.alternating[rows].max())
+    said = f"nearly flat-foldable: Kawasaki's sums are up to {off:.3g} degrees"
+    try:
+        mended = flat_foldable(pattern)
+    except (InputError, ComputationError) as error:
+        if mend:
+            raise InputError(
+                f": {error}; correct the drawing, or leave it out", "flat_foldable"
+            ) from None
+        if is_state and isinstance(error, InputError):
+            return made
+        remedy = (
+            "fold it anew from its flat drawing, read with flat_foldable = true"
+            if isinstance(error, InputError)
+            else f"{error}; a `tolerance` joins ends that miss each other"
+        )
+        text = f"{said}, by which panels bend when it folds; {remedy}"
+        return made._replace(diagnosis=replace(told, doubts=(*told.doubts, text)))
+    moves = np.linalg.norm(mended.vertices - pattern.vertices, axis=1)
+    number, most = int((moves > _LISTED).sum()), f"{1e3 * moves.max():.3g} mm"
+    if mend:
+        text = (
+            f"moved {count(number, 'vertex', 'vertices')} by up to {most} to where they fold flat"
+        )
+        vertices = flat_foldability(mended)
+        told = replace(told, repairs=(*told.repairs, text), moves=moves, vertices=vertices)
+        return made._replace(pattern=mended, diagnosis=told)
+    text = (
+        f"{said}, by which panels bend when it folds; flat_foldable = true moves "
+        f"{count(number, 'vertex', 'vertices')} by up to {most} to where they fold flat"
+    )
+    return made._replace(diagnosis=replace(told, doubts=(*told.doubts, text), moves=moves))
