@@ -17,16 +17,17 @@ the corners feel it, in the plane, over E t.
 
 from __future__ import annotations
 
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from foldyn.algebra.extrapolation import extrapolated
+from foldyn.algebra.superlu import factorize
 from foldyn.structures.graded import ROOM, Grading, graded
 from foldyn.structures.panel_plate import Outline, meshed
 
@@ -78,20 +79,80 @@ def _symmetric(stiffness: NDArray) -> NDArray:
     return stiffness
 
 
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """How panels are cut into quadratic triangles: the same for many.
+
+    Attributes
+    ----------
+    ends : (s, 2)
+        Of the triangles' sides; their middles are points after the others.
+    elements : (nt, 6)
+        Corners, and the middles of the sides from each to the next.
+    at : (m,)
+        The panel's corners.
+    along : list of arrays
+        Points on each edge, in order, without its ends.
+    """
+
+    ends: NDArray
+    elements: NDArray
+    at: NDArray
+    along: list[NDArray]
+
+    @cached_property
+    def size(self) -> int:
+        """Displacements of all points: at edges across them and along, elsewhere x and y."""
+        return 2 * (int(self.elements.max()) + 1)
+
+    @cached_property
+    def entries(self) -> tuple[NDArray, NDArray, NDArray]:
+        """Rows and pointers of the entries of their matrix by columns.
+
+        And places there of those of all triangles (nt 144,).
+        """
+        dofs = (2 * self.elements[:, :, None] + np.arange(2)).reshape(-1, 12)
+        keys = self.size * np.repeat(dofs, 12, axis=1) + np.tile(dofs, (1, 12))
+        found, place = np.unique(keys, return_inverse=True)
+        column, row = np.divmod(found, self.size)
+        return row, np.searchsorted(column, np.arange(self.size + 1)), place.ravel()
+
+
+class Loose(NamedTuple):
+    """Displacements that corners and gives leave free, in the order in which they are solved for.
+
+    Entries of their matrix by columns: rows, pointers, and places there of entries `take` of the
+    whole matrix and of the bows of each edge that is not straight.
+    """
+
+    free: NDArray
+    rows: NDArray
+    pointers: NDArray
+    put: NDArray
+    take: NDArray
+    bows: list[NDArray]
+
+
 class PanelMesh(NamedTuple):
     """Quadratic triangles of a panel."""
 
     x: NDArray  # (n, 2) corners and middles of the triangles
-    elements: NDArray  # (nt, 6) corners, and the middles of the sides from each to the next
-    at: NDArray  # (m,) the panel's corners
-    along: list[NDArray]  # points on each edge, in order, without its ends
+    cut: Cut
     radius: float | None = None  # within which corners are rigid, where they give way
 
 
 def _even(panel: Outline, n: int) -> PanelMesh:
     """A mesh with n pieces of each edge."""
-    points, triangles, at, edges = meshed(np.array(panel.corners), panel.center, n)
-    return _quadratic(points, triangles, at[: len(edges)], edges)
+    weights, cut = _evenly(len(panel.corners), panel.center is not None, n)
+    return _quadratic(weights @ [*panel.corners, *([panel.center] if panel.center else [])], cut)
+
+
+@lru_cache(maxsize=64)
+def _evenly(corners: int, center: bool, n: int) -> tuple[NDArray, Cut]:
+    """Weights (points, corners) of the corners, and of the center, in points; how it is cut."""
+    unit = np.eye(corners + center)
+    weights, triangles, at, edges = meshed(unit[:corners], unit[-1] if center else None, n)
+    return weights, _cut(len(weights), triangles, at[:corners], edges)
 
 
 def _graded(panel: Outline, radius: float) -> PanelMesh:
@@ -109,10 +170,19 @@ def _graded(panel: Outline, radius: float) -> PanelMesh:
     radius = min(radius, 0.999 * room / ROOM, 0.5 * length.min() / ROOM)
     cut = graded(length, RAYS, radius)
     x = np.stack([cut.points(piece) for piece in pieces])  # (m, arcs, 2 RAYS + 1, 2)
-    node = np.arange(x[..., 0].size).reshape(x.shape[:3])
+    used, fans = _fans(len(pieces), cut.arcs)
+    mesh = _quadratic(np.concatenate([x.reshape(-1, 2), corners])[used], fans)
+    return mesh._replace(radius=radius)
+
+
+@lru_cache(maxsize=64)
+def _fans(corners: int, arcs: int) -> tuple[NDArray, Cut]:
+    """Points that a graded mesh uses, of its pieces' and then the corners, and how it is cut."""
+    count = corners * arcs * (2 * RAYS + 1)
+    node = np.arange(count).reshape(corners, arcs, -1)
     node[:, -1, RAYS] = node[0, -1, RAYS]  # the mean; cuts belong to two pieces
     node[:, -1, :RAYS:-1] = np.roll(node[:, -1, :RAYS], 1, axis=0)
-    at = x[..., 0].size + np.arange(len(pieces))
+    at = count + np.arange(corners)
     a, b, c, d = node[:, :-1, :-1], node[:, 1:, :-1], node[:, 1:, 1:], node[:, :-1, 1:]
     halves = [  # cut alike on both sides of the middle ray
         np.where((np.arange(2 * RAYS) < RAYS)[:, None], np.stack(one, -1), np.stack(other, -1))
@@ -121,57 +191,97 @@ def _graded(panel: Outline, radius: float) -> PanelMesh:
     halves = [half.reshape(-1, 3) for half in halves]
     tips = np.stack(np.broadcast_arrays(at[:, None], node[:, 0, :-1], node[:, 0, 1:]), axis=-1)
     triangles = np.concatenate([tips.reshape(-1, 3), *halves])
-    following = np.roll(np.arange(len(pieces)), -1)
     edges = [
         np.array([at[k], *node[k, :, 0], *node[j, -2::-1, -1], at[j]])
-        for k, j in enumerate(following)
+        for k, j in enumerate(np.roll(np.arange(corners), -1))
     ]
     used, triangles = np.unique(triangles, return_inverse=True)
-    points = np.empty((at[-1] + 1, 2))
-    points[: x[..., 0].size], points[at] = x.reshape(-1, 2), corners
     edges = [np.searchsorted(used, edge) for edge in edges]
-    mesh = _quadratic(points[used], triangles.reshape(-1, 3), np.searchsorted(used, at), edges)
-    return mesh._replace(radius=radius)
+    at = np.searchsorted(used, at)
+    return used, _cut(len(used), triangles.reshape(-1, 3), at, edges)
 
 
-def _quadratic(points: NDArray, triangles: NDArray, at: NDArray, edges: list[NDArray]) -> PanelMesh:
-    """Triangles with the middles of their sides; `edges` with their ends."""
+def _quadratic(points: NDArray, cut: Cut) -> PanelMesh:
+    """Triangles with the middles of their sides."""
+    return PanelMesh(np.concatenate([points, points[cut.ends].mean(axis=1)]), cut)
+
+
+def _cut(points: int, triangles: NDArray, at: NDArray, edges: list[NDArray]) -> Cut:
+    """Sides of triangles between so many points; `edges` with their ends."""
     sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
     ends, side = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
-    middle = {pair: len(points) + k for k, pair in enumerate(map(tuple, ends.tolist()))}
-    elements = np.concatenate([triangles, len(points) + side.reshape(-1, 3)], axis=1)
+    middle = {pair: points + k for k, pair in enumerate(map(tuple, ends.tolist()))}
+    elements = np.concatenate([triangles, points + side.reshape(-1, 3)], axis=1)
     along = []
     for edge in (edge.tolist() for edge in edges):
         halves = [(middle[min(pair), max(pair)], pair[1]) for pair in pairwise(edge)]
         along.append(np.array([point for both in halves for point in both][:-1]))
-    return PanelMesh(np.concatenate([points, points[ends].mean(axis=1)]), elements, at, along)
+    return Cut(ends, elements, at, along)
+
+
+@lru_cache(maxsize=256)
+def _loose(cut: Cut, straight: tuple[bool, ...]) -> Loose:
+    """What is free where edges are straight or not."""
+    across = [2 * along for along, held in zip(cut.along, straight, strict=True) if not held]
+    inside = np.setdiff1d(np.arange(cut.size // 2), np.concatenate([cut.at, *cut.along]))
+    free = np.concatenate([*across, (2 * inside[:, None] + np.arange(2)).ravel()])
+    rows, pointers, _ = cut.entries
+    whole = sparse.csc_array((np.arange(len(rows)), rows, pointers), (cut.size, cut.size))
+    ends = np.cumsum([0, *map(len, across)])
+    bows = [np.arange(a, b) for a, b in pairwise(ends)]
+
+    def entries() -> Loose:
+        size, part = len(free), sparse.coo_array(whole[:, free][free])
+        keys = [size * part.coords[1] + part.coords[0]]
+        keys += [(size * bow[:, None] + bow).ravel() for bow in bows]
+        found, place = np.unique(np.concatenate(keys), return_inverse=True)
+        put, *of_bows = np.split(place, np.cumsum([len(key) for key in keys])[:-1])
+        column, row = np.divmod(found, size)
+        return Loose(
+            free, row, np.searchsorted(column, np.arange(size + 1)), put, part.data, of_bows
+        )
+
+    # any definite matrix with these entries says in which order they fill least
+    first = entries()
+    definite = -np.ones(len(first.rows))
+    column = np.repeat(np.arange(len(free)), np.diff(first.pointers))
+    definite[first.rows == column] = len(free)
+    order = np.argsort(factorize(_by_columns(definite, first.rows, first.pointers)).perm_c)
+    free, place = free[order], np.argsort(order)
+    bows = [place[bow] for bow in bows]
+    return entries()
+
+
+def _by_columns(data: NDArray, rows: NDArray, pointers: NDArray) -> sparse.csc_array:
+    size = len(pointers) - 1
+    places = rows.astype(np.int32), pointers.astype(np.int32)
+    return sparse.csc_array((data, *places), (size, size))
 
 
 def _condensed(
     panel: Outline, poissons_ratio: float, resistance: tuple[float, ...], mesh: PanelMesh
 ) -> NDArray:
-    moves, m = _moves(panel, mesh)
-    stiffness = np.ones(len(mesh.elements))
+    cut, loose = mesh.cut, _loose(mesh.cut, panel.straight)
+    stiffness = np.ones(len(cut.elements))
     if mesh.radius is not None:
-        stiffness[np.isin(mesh.elements[:, :3], mesh.at).any(axis=1)] = STIFF
-    whole = moves.T @ _stretching(mesh, poissons_ratio, stiffness) @ moves
-    bows = [
-        _bowing(mesh, k, factor)
-        for k, (factor, straight) in enumerate(zip(resistance, panel.straight, strict=True))
-        if not straight
-    ]
-    free = whole.shape[0] - m - sum(len(bow) for bow in bows)
-    parts = [sparse.csr_array((m, m)), *bows, sparse.csr_array((free, free))]
-    whole = sparse.csc_array(whole + sparse.block_diag(parts))
-    across = whole[m:, :m].toarray()
-    factor = splu(whole[m:, m:], "MMD_AT_PLUS_A", 0.0, options={"SymmetricMode": True})
-    return whole[:m, :m].toarray() - across.T @ factor.solve(across)
+        stiffness[np.isin(cut.elements[:, :3], cut.at).any(axis=1)] = STIFF
+    axes, given = _moves(mesh)
+    whole = _stretching(mesh, axes, poissons_ratio, stiffness)
+    inner = np.zeros(len(loose.rows))
+    inner[loose.put] = whole.data[loose.take]
+    bowing = [k for k, straight in enumerate(panel.straight) if not straight]
+    for k, places in zip(bowing, loose.bows, strict=True):
+        inner[places] += _bowing(mesh, k, resistance[k]).ravel()
+    moved = whole @ given
+    factors = factorize(_by_columns(inner, loose.rows, loose.pointers), ordered=True)
+    across = moved[loose.free]
+    return given.T @ moved - across.T @ factors.solve(across)
 
 
 def _bowing(mesh: PanelMesh, edge: int, resistance: float) -> NDArray:
     """Stiffness (points, ...) of the bows of an edge at its points, waves of sines."""
-    points = mesh.along[edge]
-    start, end = mesh.x[mesh.at[edge]], mesh.x[mesh.at[(edge + 1) % len(mesh.at)]]
+    points, at = mesh.cut.along[edge], mesh.cut.at
+    start, end = mesh.x[at[edge]], mesh.x[at[(edge + 1) % len(at)]]
     length = float(np.linalg.norm(end - start))
     place = np.linalg.norm(mesh.x[points] - start, axis=1)
     fade = 1.0
@@ -188,61 +298,47 @@ def _bowing(mesh: PanelMesh, edge: int, resistance: float) -> NDArray:
         # the shortest ones fade, as a last whole wave would make the stiffness jump with the length
         part = np.clip(1.5 - number / count, 0.0, 1.0)
         fade = part**2 * (3.0 - 2.0 * part)
-    return (shapes.T * (fade * resistance * wave**3 * 0.5 * length)) @ shapes
+    shapes = shapes * np.sqrt(fade * resistance * wave**3 * 0.5 * length)[:, None]
+    return shapes.T @ shapes
 
 
-def _moves(panel: Outline, mesh: PanelMesh) -> tuple[sparse.csr_array, int]:
-    """Displacements of all points by those of the corners, gives, and what is free.
+def _moves(mesh: PanelMesh) -> tuple[NDArray, NDArray]:
+    """Axes (n, 2, 2) of the displacements of points, by rows; how corners and gives move them.
 
-    The number of the first two as well.
+    At edges the axes are across and along. Edges that are straight stay so.
     """
-    x, at, along = mesh.x, mesh.at, mesh.along
-    rows, columns, values = [], [], []
-    kept = count = (2 if mesh.radius is None else 4) * len(at)
-
-    def put(points: NDArray, column: NDArray, value: NDArray) -> None:
-        """By one column each: both components of the displacements of some points."""
-        rows.append((2 * points[:, None] + np.arange(2)).ravel())
-        columns.append(np.repeat(column, 2))
-        values.append(value.ravel())
-
+    x, at, along = mesh.x, mesh.cut.at, mesh.cut.along
+    axes = np.tile(np.eye(2), (len(x), 1, 1))
+    given = np.zeros((len(x), 2, (2 if mesh.radius is None else 4) * len(at)))
     for k, corner in enumerate(at):
-        for axis in range(2):
-            put(np.array([corner]), np.array([2 * k + axis]), np.eye(2)[axis])
-    inside = np.setdiff1d(np.arange(len(x)), np.concatenate([at, *along]))
+        given[corner, :, 2 * k : 2 * k + 2] = np.eye(2)
     for k, points in enumerate(along):
         ends = k, (k + 1) % len(at)
         edge = x[at[ends[1]]] - x[at[ends[0]]]
         length = np.linalg.norm(edge)
         tangent = edge / length
         normal, place = np.array([-tangent[1], tangent[0]]), (x[points] - x[at[k]]) @ tangent
+        axes[points] = normal, tangent
         radius = mesh.radius or 0.0
         for side, far in enumerate((place, length - place)):
             share = 1.0 - far / length
             slid = 1.0 - np.clip((far - radius) / (length - 2.0 * radius), 0.0, 1.0)
-            for axis, unit in enumerate(np.eye(2)):
-                column = np.full(len(points), 2 * ends[side] + axis)
-                along_it = np.outer(slid, (unit @ tangent) * tangent)
-                put(points, column, along_it + np.outer(share, (unit @ normal) * normal))
+            columns = slice(2 * ends[side], 2 * ends[side] + 2)
+            given[points, 0, columns] = np.outer(share, normal)
+            given[points, 1, columns] = np.outer(slid, tangent)
             if radius:
                 half = 0.5 * length
                 held = np.log(np.maximum(far, radius) / half) / np.log(radius / half)
                 gives = (slid - np.maximum(held, 0.0)) * (1 - 2 * side)
-                column = np.full(len(points), 2 * (len(at) + k) + side)
-                put(points, column, np.outer(gives, tangent))
-        if not panel.straight[k]:
-            put(points, count + np.arange(len(points)), np.tile(normal, (len(points), 1)))
-            count += len(points)
-    for axis in range(2):
-        put(inside, count + np.arange(len(inside)), np.tile(np.eye(2)[axis], (len(inside), 1)))
-        count += len(inside)
-    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sparse.csr_array(sparse.coo_array(entries, shape=(2 * len(x), count))), kept
+                given[points, 1, 2 * (len(at) + k) + side] = gives
+    return axes, given.reshape(-1, given.shape[2])
 
 
-def _stretching(mesh: PanelMesh, poissons_ratio: float, stiffness: NDArray) -> sparse.csr_array:
+def _stretching(
+    mesh: PanelMesh, axes: NDArray, poissons_ratio: float, stiffness: NDArray
+) -> sparse.csc_array:
     """Stiffness of the displacements of all points in plane stress, E t = `stiffness` (nt,)."""
-    nu, x, elements = poissons_ratio, mesh.x, mesh.elements
+    nu, x, elements = poissons_ratio, mesh.x, mesh.cut.elements
     elastic = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, 0.5 * (1 - nu)]]) / (1 - nu**2)
     corners = x[elements[:, :3]]
     spans = corners[:, 1:] - corners[:, :1]
@@ -259,6 +355,8 @@ def _stretching(mesh: PanelMesh, poissons_ratio: float, stiffness: NDArray) -> s
         strain[:, 2, :, 0], strain[:, 2, :, 1] = slopes[:, 1], slopes[:, 0]
         strain = strain.reshape(-1, 3, 12)
         block = block + strain.transpose(0, 2, 1) @ (part[:, None, None] * elastic @ strain)
-    dofs = (2 * elements[:, :, None] + np.arange(2)).reshape(-1, 12)
-    places = (np.repeat(dofs, 12, axis=1).ravel(), np.tile(dofs, (1, 12)).ravel())
-    return sparse.csr_array(sparse.coo_array((np.ravel(block), places), (x.size, x.size)))
+    for _ in range(2):  # first by rows, then, symmetric as they are, by columns
+        block = axes[elements] @ np.reshape(block, (-1, 6, 2, 12))
+        block = block.reshape(-1, 12, 12).transpose(0, 2, 1)
+    rows, pointers, place = mesh.cut.entries
+    return _by_columns(np.bincount(place, np.ravel(block), len(rows)), rows, pointers)

@@ -220,10 +220,10 @@ def _parts(points: NDArray, triangles: NDArray) -> NDArray:
 
 
 def meshed(
-    x: NDArray, center: tuple[float, float] | None, n: int
+    x: NDArray, center: Sequence[float] | NDArray | None, n: int
 ) -> tuple[NDArray, NDArray, NDArray, list[NDArray]]:
-    """Points (p, 2), triangles, those at corners and center, and those along each edge."""
-    points = x if center is None else np.concatenate([x, [center]])
+    """Points (p, ...), triangles, those at corners and center, and those along each edge."""
+    points = x if center is None else np.concatenate([x, np.asarray(center)[None]])
     facets = [(0, 1, 2)] if center is None else facets_of(points, len(x))
     i, j = (axis.ravel() for axis in np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij"))
     kept = i + j <= n
