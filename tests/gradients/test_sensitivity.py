@@ -9,7 +9,7 @@ import pytest
 from differences import Design
 
 import foldyn as fd
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.gradients.numbers import numbers_of
 from foldyn.gradients.parameters import Columns, Parameters, Slope
 from foldyn.mechanics.pullback import Arrays
@@ -66,7 +66,7 @@ def test_expressions_follow_the_chain_rule():
 
 def test_a_case_file_is_changed_by_its_keys(tmp_path):
     (tmp_path / "cell.toml").write_text(CASE)
-    values = {"pattern.panel_angle": 60.0, "sheet.thickness": 0.02}
+    values = {"pattern.panel_angle": 61.0, "sheet.thickness": 0.02}
     found = fd.sensitivity(tmp_path / "cell.toml", values, "frequency[1]")
 
     def own(panel_angle: float, thickness: float) -> fd.Case:
@@ -74,7 +74,7 @@ def test_a_case_file_is_changed_by_its_keys(tmp_path):
         made = fd.discretize(pattern, fd.Sheet(1e6, 0.25, thickness, 900.0))
         return fd.Case(made, [fd.Fix("xmin")])
 
-    other = fd.sensitivity(own, {"panel_angle": 60.0, "thickness": 0.02}, "frequency[1]", MODES)
+    other = fd.sensitivity(own, {"panel_angle": 61.0, "thickness": 0.02}, "frequency[1]", MODES)
     assert found["gradient_pattern.panel_angle"].values == pytest.approx(
         other["gradient_panel_angle"].values, rel=1e-6
     )
@@ -189,6 +189,26 @@ def test_stiffnesses_of_several_decades():
         return float(one["gradient_one"].values[0])
 
     assert found == pytest.approx([own(k) for k in range(4)], rel=1e-8)
+
+
+@pytest.mark.parametrize("preset", ["plate", "herkal"])
+def test_a_kink_of_the_design_is_warned_of(preset):
+    """Plates bend otherwise beyond corners of 120 degrees; rectangles along either diagonal."""
+    flat = fd.patterns.simple_fold(b=1.2, dihedral=110.0)
+
+    def build(shift: float) -> fd.Case:
+        points = flat.vertices.copy()
+        points[5, 2] += shift
+        pattern = fd.Pattern(points, flat.faces)
+        if preset == "plate":
+            pattern = fd.patterns.miura(panel_angle=60.0 + shift, dihedral=110.0)
+        options = {"preset": preset, "bend_law": "linear" if preset == "herkal" else None}
+        made = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.02, 900.0), **options)
+        return fd.Case(made, [fd.Fix([0, 1, 2, 3])])
+
+    with pytest.warns(FoldynWarning, match=r"shift: the numbers of the case .* have a kink here"):
+        fd.sensitivity(build, {"shift": 0.0}, "mass", MODES, sizes={"shift": 0.1})
+    fd.sensitivity(build, {"shift": 0.01}, "mass", MODES)  # beside it there is none
 
 
 @pytest.mark.parametrize("size", [0.0, -0.01, 1e-12])

@@ -13,6 +13,7 @@ more, and then entries are changed one by one, as thicknesses of panels that sha
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping
 from itertools import combinations, islice
 from typing import Any, NamedTuple
@@ -20,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import FoldynError, InputError, within
+from foldyn.errors import FoldynError, FoldynWarning, InputError, within
 from foldyn.gradients.numbers import Gradient
 from foldyn.mechanics.pullback import Arrays
 from foldyn.values import numbers, show
@@ -29,6 +30,11 @@ STEP = 1e-3  # of the size of a parameter
 LEAST = 1e-6  # of a value: smaller changes are hidden by its rounding
 GOLDEN = 0.6180339887498949  # multiples of it, less whole numbers, differ from each other
 SILENT = 1e-11, 1e-12  # of a number, and of the largest of its array: rounding of a change
+KINK = (
+    "{}: the numbers of the case ({}) have a kink here, where their slopes jump, as where another "
+    "diagonal of a panel becomes the shorter one, or a corner passes 120 degrees: the gradient is "
+    "the mean of both sides; move the design a little"
+)
 Values = Mapping[str, Any]
 Build = Callable[..., Any]
 
@@ -132,6 +138,9 @@ class Parameters:
         def change(direction: NDArray) -> dict[str, NDArray]:
             near = at(direction, STEP), at(direction, -STEP)
             far = at(direction, 2.0 * STEP), at(direction, -2.0 * STEP)
+            for key, each in here.numbers.items():
+                if _kinked(each, *(one[key] - each for one in (*near, *far))):
+                    warnings.warn(KINK.format(name, key), FoldynWarning, stacklevel=5)
             return {
                 key: _difference(*(each[key] for each in (*near, *far, here.numbers)))
                 for key in here.numbers
@@ -187,6 +196,20 @@ def _difference(
 ) -> NDArray:
     """Rate of numbers from those a step and two steps ahead and behind."""
     return _seen((8.0 * (ahead - behind) - (far_ahead - far_behind)) / (12.0 * STEP), here)
+
+
+def _kinked(
+    here: NDArray, ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDArray
+) -> bool:
+    """Whether slopes of numbers jump: what is of the second order then grows with the step alone.
+
+    The last four are changes of the numbers, a step and two steps ahead and behind.
+    """
+    bent, far = np.abs(ahead + behind), np.abs(far_ahead + far_behind)
+    least = max(
+        1e-3 * np.abs(ahead - behind).max(initial=0.0), 1e-9 * np.abs(here).max(initial=0.0)
+    )
+    return bool(((bent > least) & (far < 3.0 * bent)).any())
 
 
 def _seen(rate: NDArray, here: NDArray) -> NDArray:

@@ -112,6 +112,11 @@ def sensitivity(
     ComputationError
         The analysis fails.
 
+    Warns
+    -----
+    FoldynWarning
+        Numbers of the case have a kink there: the gradient is the mean of both sides.
+
     Notes
     -----
     Derivatives of the mechanics are analytic, those of the numbers that a case is made of by its
@@ -127,7 +132,7 @@ def sensitivity(
     ...     sheet = fd.Sheet(1e6, 0.25, 0.01, 1000.0)
     ...     return fd.Case(fd.discretize(pattern, sheet), [fd.Fix("xmin")])
     >>> found = fd.sensitivity(
-    ...     build, {"panel_angle": 60.0}, "frequency[1]", {"kind": "modes", "count": 3}
+    ...     build, {"panel_angle": 62.0}, "frequency[1]", {"kind": "modes", "count": 3}
     ... )
     >>> found["gradient_panel_angle"].dims
     ('measure',)
