@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import foldyn as fd
+from foldyn.dynamics import modal_damping
 from foldyn.errors import InputError
 from foldyn.linear import linearize
 from foldyn.linear.matched import matched
@@ -320,6 +321,16 @@ def test_a_base_moves_all_that_stands_on_it():
 
 
 # ---------------------------------------------------------------------------- messages
+
+
+def test_damping_of_all_modes_says_how_many_are_internal(monkeypatch):
+    monkeypatch.setattr(modal_damping, "MOST_MODES", 20)
+    case = miura(supports=[fd.Fix("xmin")], damping=fd.ModalDamping(0.02))
+    told = r"of 82 free dofs, 44 of them internal amplitudes, are too many: .* up to 20; give count"
+    with pytest.raises(InputError, match=told):
+        fd.modes(case, 3, internal=3)
+    few = replace(case, damping=fd.ModalDamping(0.02, count=3))
+    assert fd.modes(few, 3, internal=3).damping_ratio.values == pytest.approx(0.02)
 
 
 BUBBLE = 'the mass is "bubble"; take mass = "condensed"'

@@ -174,9 +174,11 @@ def _swinging(
     """The lowest modes that swing, as many as are damped and others of the last one's frequency."""
     wanted = damping.modes
     if wanted is None and pencil.finite > MOST_MODES:
+        inner = int((free >= case.elastic_body.size).sum())
+        among = f", {inner} of them internal amplitudes," if inner else ""
         raise InputError(
-            f": all modes of {pencil.finite} free dofs are too many; give count, or a list of "
-            "ratios",
+            f": all modes of {pencil.finite} free dofs{among} are too many: damping of all is "
+            f"for up to {MOST_MODES}; give count, or a list of ratios",
             "damping.modal",
         )
     sought = pencil.finite if wanted is None else min(wanted + BEYOND, pencil.finite)
