@@ -108,3 +108,16 @@ def test_stepped_sines_keep_the_state_about_which_they_are_damped(damping):
         case, method="stepped_sine", integrator="newmark", dt=5e-3, **options
     ).receptance.values
     assert np.abs(found - exact).max() < 5e-3 * np.abs(exact).max()
+
+
+def test_rest_angles_of_the_damping_stay_those_of_the_first_start():
+    turn = fd.Actuate("all", fold_angle=50.0, history=fd.Ramp(1.0))
+    case, dt = fd.Case(S, HELD, [turn], STIFF), 2.0**-6
+    options = {"method": "newmark", "dt": dt, "every": 4}
+    whole = fd.simulate(case, 32 * dt, initial=fd.State(BENT), start=0.25, **options)
+    first = fd.simulate(case, 16 * dt, initial=fd.State(BENT), start=0.25, **options)
+    assert fd.initial_state(first).origin_of(BENT.shape).time == 0.25
+    last = fd.simulate(
+        case, 16 * dt, initial=fd.initial_state(first), start=0.25 + 16 * dt, **options
+    )
+    assert np.array_equal(end(last)["displacement"], end(whole)["displacement"])

@@ -126,3 +126,21 @@ def test_simulated_motions_decay_as_the_frequency_response_says(kind, model, met
     mass = case.nodal_mass[:, None]
     first, last = ((shape * mass * run.velocity.values[k]).sum() for k in (1, 2))
     assert -np.log(last / first) / (2.0 * np.pi) == pytest.approx(ratio, rel=0.05)
+
+
+@pytest.mark.filterwarnings("ignore:the pressure acts on panels with free edges")
+@pytest.mark.parametrize("kind", ["stiffness at the start", "modes at the start"])
+@pytest.mark.parametrize("load", [fd.Actuate("all", fold_angle=55.0), fd.Pressure(4.0)])
+def test_damping_at_the_start_is_that_of_folds_and_pressure_there(load, kind):
+    """A mode of unit mass dissipates 2 zeta omega v^2, with rest angles as they are turned."""
+    pattern = fd.patterns.miura(cells=(1, 1), a=0.9, b=0.7, panel_angle=70, dihedral=110)
+    s = fd.discretize(pattern, fd.Sheet(1e8, 0.3, 0.012, 250.0))
+    case = fd.Case(s, [fd.Fix([0, 1, 4, 3])], [load], KINDS[kind][0])
+    modes = fd.modes(case, 2, state="equilibrium")
+    for k in range(2):
+        start = fd.State(modes.displacement.values, 1e-3 * modes["shape"].values[k])
+        dt = 1e-5 / float(modes.frequency[k])
+        run = fd.simulate(case, 10 * dt, "newmark", dt, every=10, initial=start)
+        power = float(run.dissipated[-1]) / (10 * dt)
+        rate = 4.0 * np.pi * float(modes.damping_ratio[k] * modes.frequency[k])
+        assert power / 1e-6 == pytest.approx(rate, rel=2e-3)

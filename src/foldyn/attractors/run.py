@@ -83,7 +83,7 @@ def step_of(case: Case, method: str, state: State | None, longest: float) -> flo
     """Step (s) of a method with fixed steps: half the critical one about a state, or `longest`."""
     shape, chosen = case.structure.nodes.shape, suited(method, case)
     case, at = with_mass(chosen, case), state or State()
-    modal = modal_rows(case, at.origin_of(shape).displacement)
+    modal = modal_rows(case, at.origin_of(shape))
     critical = chosen.critical_step(case, at.of_nodes("displacement", shape), modal)
     return min(DEFAULT_FRACTION * critical, longest)
 

@@ -15,7 +15,7 @@ from foldyn.attractors.diagram import FREQUENCY, RESOLUTION, SWEEPS, Steady, bra
 from foldyn.attractors.drive import at_frequency, drive_frequency, driven_frequency, with_histories
 from foldyn.attractors.jumps import Jump, is_jump, jump_variables, jumps_between
 from foldyn.attractors.run import Run, Stretch, check_measure, extremes, measured, told_once
-from foldyn.cases import Case, Chirp, Harmonic, Origin, State
+from foldyn.cases import Case, Chirp, Harmonic, State
 from foldyn.dynamics.progress import Reporter, reporter
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.time_domain import overall
@@ -246,7 +246,7 @@ class Glide(NamedTuple):
         turns = (self.line.start + 0.5 * self.line.slope * t) * t
         place, speed = self.stretch.displacement[k], self.stretch.velocity[k]
         origin = None if state is None else state.origin
-        here = State(place, speed, origin=origin and Origin(origin.displacement))
+        here = State(place, speed, origin=origin and replace(origin, flow=None, looked=0))
         return replace(self.run, state=here), frequency, float(turns % 1.0) / frequency
 
 

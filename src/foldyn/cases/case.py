@@ -19,7 +19,7 @@ from foldyn.cases.case_assembly import Damped, Loaded
 from foldyn.cases.clamped_edges import supported_points
 from foldyn.cases.contact import Contact
 from foldyn.cases.damping import Damping, Rayleigh, dampings
-from foldyn.cases.history import History, as_history
+from foldyn.cases.history import History, as_history, factor
 from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
 from foldyn.cases.state import State
@@ -193,6 +193,14 @@ class Case(Loaded, Damped):
     def elastic_body(self) -> Assembly:
         """The same without contact: what vibrations, damping and critical steps are about."""
         return self.structure.body.with_terms(*self.terms)
+
+    def elastic_body_at(self, time: float | None) -> Assembly:
+        """The same with the rest angles at a time (s), or under the constant loads alone."""
+        body, turns = self.elastic_body, self.rest_terms
+        if not turns:
+            return body
+        turned = sum(change * factor(history, time) for change, history in turns)
+        return body.folded(body.sheet.rest_angles + turned)
 
     @cached_property
     def remembering(self) -> tuple[Remembering, ...]:

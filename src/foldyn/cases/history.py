@@ -148,6 +148,11 @@ class Function(History):
         return getattr(self.function, "__name__", repr(self.function))
 
 
+def factor(history: History, time: float | None) -> float:
+    """Factor at a time (s); without one that of the constant loads alone."""
+    return float(history.code == waveforms.CONSTANT) if time is None else float(history(time))
+
+
 def as_history(history: History | Callable[[Any], Any] | None) -> History:
     """Turn None (a constant), a history or any callable into a history."""
     if history is None:

@@ -39,6 +39,8 @@ class Origin:
     ----------
     displacement : ndarray, shape (n, 3)
         There, m: that about which damping has its `state = "start"`.
+    time : float, optional
+        When (s), for the rest angles there; without it those of the constant loads alone.
     flow : ndarray, shape (n, 3), optional
         Displacement (m) at which the flow of added mass was found last; where it goes on unless
         known.
@@ -47,6 +49,7 @@ class Origin:
     """
 
     displacement: NDArray
+    time: float | None = None
     flow: NDArray | None = None
     looked: int = 0
 
@@ -109,10 +112,12 @@ class State(Checked):
             raise InputError(f": {name} of shape {array.shape}: the case has {shape}", field)
         return array
 
-    def origin_of(self, shape: tuple[int, ...], field: str = "initial") -> Origin:
-        """Where the motion of nodes (n, 3) began that goes on from here."""
+    def origin_of(
+        self, shape: tuple[int, ...], time: float | None = None, field: str = "initial"
+    ) -> Origin:
+        """Where the motion of nodes (n, 3) began that goes on from here at a time (s)."""
         if self.origin is None:
-            return Origin(self.of_nodes("displacement", shape, field))
+            return Origin(self.of_nodes("displacement", shape, field), time)
         if self.origin.displacement.shape != shape:
             raise InputError(
                 f": origin of shape {self.origin.displacement.shape}: the case has {shape}", field

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.cases import Case, History
-from foldyn.dynamics.modal_damping import ModalRows
+from foldyn.cases import Case, History, Origin
+from foldyn.dynamics.modal_damping import ModalRows, about
 from foldyn.errors import InputError
 from foldyn.mechanics.air_drag import AirDragTerm, air_drag
 from foldyn.mechanics.assembly import Assembly
@@ -27,12 +27,11 @@ from foldyn.mechanics.viscous import Viscous, ViscousTerm, viscous
 from foldyn.mechanics.viscous_panels import ViscousPanelsTerm, viscous_panels
 
 
-def damping_terms(case: Case, start: NDArray | None, modal: ModalRows) -> list[Term]:
-    """All terms that damp a motion from `start` (n, 3), or from rest; `modal` is its damping."""
-    terms, body, rayleigh = dampers(case), case.elastic_body, case.rayleigh
+def damping_terms(case: Case, start: Origin | None, modal: ModalRows) -> list[Term]:
+    """All terms that damp a motion that began at `start`, or at rest; `modal` is its damping."""
+    terms, rayleigh = dampers(case), case.rayleigh
     if rayleigh.beta > 0.0:
-        state = start if rayleigh.state == "start" else None
-        state = np.zeros_like(case.structure.nodes) if state is None else state
+        state, body = about(case, start if rayleigh.state == "start" else None)
         terms.insert(0, DampingMatrix(_tangent(body, body.dofs(state)) * rayleigh.beta))
     modal.warn()
     return [*terms, DampingRows(modal.rows)] if len(modal.rows) else terms

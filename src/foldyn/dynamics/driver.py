@@ -198,8 +198,8 @@ def prepare(
     u, v = check_start(case, initial)
     check_touching(case, u, float(start), float(start) + duration)
     remembered = case.memory_in(initial)
-    origin = (initial or State()).origin_of(u.shape)
-    modal = modal_rows(case, origin.displacement)
+    origin = (initial or State()).origin_of(u.shape, float(start))
+    modal = modal_rows(case, origin)
     chosen = Choice(integrator.name, "")
     if method == AUTO:
         timing.counted_in_seconds(duration, every)
@@ -213,7 +213,7 @@ def prepare(
     critical = integrator.critical_step(case, u, modal)
     plan = _plan(case, integrator, duration, dt, every, critical, force, tolerance, float(start))
     _warn_of_damping(case, integrator, u, critical)
-    warn_of_unstable_damping(case, origin.displacement)
+    warn_of_unstable_damping(case, origin)
     if plan.dt < SHARPEST * abs(plan.start):
         raise InputError(
             f" = {plan.start:g} s: steps of {plan.dt:.3g} s are lost in its rounding; start "
@@ -243,7 +243,7 @@ def prepare(
             FoldynWarning,
             stacklevel=3,
         )
-    packed = pack(case, timing.apart(plan, critical), origin.displacement, modal)
+    packed = pack(case, timing.apart(plan, critical), origin, modal)
     if device == "gpu":
         check_taken(case, packed)
     sampler = Sampler(case, {} if sample is None else sample, u, v, plan.start)

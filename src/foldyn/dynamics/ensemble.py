@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -154,12 +155,17 @@ def simulate_many(
     if reason:
         facts["device_reason"] = reason
     outcome = [ended.get(k, "done") for k in range(len(motions))]
-    return _dataset(case, out, outcome, _origins(motions, float(out.time[-1])), facts)
+    return _dataset(case, out, outcome, _origins(motions, out.time), facts)
 
 
-def _origins(motions: Sequence[Motion], last: float) -> dict[str, Any]:
-    """Where motions began, over the models, if anything depends on it; the last sample's time."""
-    found = [origin_variables(one.reached, last) for one in motions if one.reached]
+def _origins(motions: Sequence[Motion], times: NDArray) -> dict[str, Any]:
+    """Where motions with samples at some times began, over the models, if anything depends on it.
+
+    Their flow is that of the last sample if they end there.
+    """
+    plan = motions[0].plan
+    end = math.nan if plan.steps % plan.every else float(times[-1])
+    found = [origin_variables(one.reached, end) for one in motions if one.reached]
     return {
         name: (("model", *dims), np.stack([own[name][1] for own in found]), about)
         for name, (dims, _, about) in (found[0] if len(found) == len(motions) else {}).items()
@@ -198,9 +204,9 @@ def _from_start(like: Motion, initial: State | None) -> Motion:
     if not (np.isfinite(bound) and is_stable(growth, bound, case.rayleigh, like.plan.dt, rate)):
         critical = like.method.critical_step(case, u, like.packed.modal)
     sampler = Sampler(case, {}, *u_v, like.plan.start)
-    state = *u_v, None, None
+    state, origin = (*u_v, None, None), Origin(u, like.plan.start)
     return Motion(
-        case, like.method, like.plan, critical, like.force, state, Origin(u), like.packed, sampler
+        case, like.method, like.plan, critical, like.force, state, origin, like.packed, sampler
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from foldyn.cases.contact_checks import check_contact, check_driven
 from foldyn.cases.ties import check_tied
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.inertia import moving_energy
+from foldyn.dynamics.modal_damping import about
 from foldyn.dynamics.motion_state import TALLY, Course, StepPlan
 from foldyn.dynamics.system import Packed, carry_supports, place, scratch
 from foldyn.dynamics.timing import histories
@@ -80,10 +82,11 @@ def _origin(sample: Any) -> Origin | None:
         for name in ORIGIN
         if name in sample
     }
-    origin, flow = places["origin"].to_numpy(), places.get("flow")
+    begun, flow = places["origin"].attrs.get("time"), places.get("flow")
+    origin = Origin(places["origin"].to_numpy(), begun)
     if flow is None or flow.attrs.get("time") != float(sample["time"]):
-        return Origin(origin)
-    return Origin(origin, flow.to_numpy(), int(flow.attrs["looked"]))
+        return origin
+    return replace(origin, flow=flow.to_numpy(), looked=int(flow.attrs["looked"]))
 
 
 def _continuation(sample: Any) -> Continuation | None:
@@ -183,13 +186,13 @@ def check_steady(case: Case, start: float, end: float) -> None:
             )
 
 
-def warn_of_unstable_damping(case: Case, u: NDArray) -> None:
-    """Warn where damping follows the stiffness at a start u (n, 3), and this is not positive."""
+def warn_of_unstable_damping(case: Case, start: Origin) -> None:
+    """Warn where damping follows the stiffness at a start, and this is not positive."""
     if case.rayleigh.beta == 0.0 or case.rayleigh.state != "start":
         return
     free = np.asarray(case.free_dofs)
-    body = case.elastic_body
-    whole = case.constraints.matrix(body.tangent(body.dofs(u)))
+    place, body = about(case, start)
+    whole = case.constraints.matrix(body.tangent(body.dofs(place)))
     matrix = sparse.csc_array(whole[free][:, free])
     shift = ZERO * float(np.abs(matrix.diagonal()).max())  # rigid motions and slack bends: zero
     try:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.cases import Case
+from foldyn.cases import Case, Origin
 from foldyn.cases.waveforms import CALLED
 from foldyn.dynamics import (
     central_difference,
@@ -196,7 +196,7 @@ class Integrator(NamedTuple):
         if self.growth is None:
             return np.inf
         if modal is None:
-            modal = modal_rows(case, None if u is None else np.asarray(u, float))
+            modal = modal_rows(case, None if u is None else Origin(np.asarray(u, float)))
         rate = damper_rate(case, u) + modal.rate
         omega = largest_frequency(case, u)
         return MARGIN * stability_limit(self.growth, omega, case.rayleigh, rate)

@@ -22,11 +22,13 @@ from scipy import sparse
 from scipy.sparse import linalg
 
 from foldyn.algebra.eigen import Pencil, Spectrum, lowest
-from foldyn.cases import Case, ModalDamping
+from foldyn.cases import Case, ModalDamping, Origin
 from foldyn.cases.added_mass import added_mass_at
+from foldyn.cases.history import factor
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import Superlinear
 from foldyn.mechanics.assembly import Assembly
+from foldyn.mechanics.following import following_tangent, joined
 from foldyn.statics.rigid import free_rigid_motions
 
 SOFT = 0.01  # of k: slope below which a superlinear hinge stands at its rest angle to rounding
@@ -96,23 +98,35 @@ class ModalRows(NamedTuple):
             )
 
 
-def modal_rows(case: Case, start: NDArray | None = None) -> ModalRows:
-    """Modal damping of a case for a motion from `start` (n, 3), or from rest.
+def modal_rows(case: Case, start: Origin | None = None) -> ModalRows:
+    """Modal damping of a case for a motion that began at `start`, or at rest.
 
     Raises
     ------
     InputError
         The state is unstable; there are not as many modes.
     """
-    damping, body = case.modal_damping, case.elastic_body
+    damping = case.modal_damping
     if damping is None:
-        return ModalRows(np.zeros((0, body.size)), 0.0, 0)
-    state = start if damping.state == "start" else None
-    state = np.zeros_like(case.structure.nodes) if state is None else state
+        return ModalRows(np.zeros((0, case.elastic_body.size)), 0.0, 0)
+    state, body = about(case, start if damping.state == "start" else None)
     q = body.dofs(state)
     change, soft = soft_slopes(case, body, q)
     stiffness = body.tangent(q) if change is None else sparse.csr_array(body.tangent(q) + change)
+    loads = joined((part, k) for k, (part, _) in enumerate(case.following_terms))
+    if loads.acts and start is not None and damping.state == "start":
+        factors = np.zeros((len(case.following_terms), 3))
+        factors[:, 0] = [factor(history, start.time) for _, history in case.following_terms]
+        pushed = following_tangent(loads, q, factors)
+        stiffness = sparse.csr_array(stiffness + 0.5 * (pushed + pushed.T))
     return rows_of(damping, case, stiffness, moving_mass(case, state), state)._replace(soft=soft)
+
+
+def about(case: Case, start: Origin | None) -> tuple[NDArray, Assembly]:
+    """Displacement (n, 3) about which damping is, and the body there: at rest without a start."""
+    if start is None:
+        return np.zeros_like(case.structure.nodes), case.elastic_body
+    return start.displacement, case.elastic_body_at(start.time)
 
 
 def mass_of(case: Case) -> sparse.csr_array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -215,8 +216,8 @@ class Motion:
         texts = [self.doubt()]
         if resists_turns(self.case, self.packed):
             seen, scale = self.output.evenly_spaced(self.stored, LOOKS), self.output.balance.scale
-            place = self.origin.displacement
-            texts.append(turns_told(self.case, self.packed, place, *seen, scale))
+            given = self.case, self.packed, self.origin.displacement
+            texts.append(turns_told(*given, *seen, scale))
         for text in filter(None, texts):
             warnings.warn(text, FoldynWarning, stacklevel=5)
 
@@ -318,8 +319,7 @@ class Motion:
             report(Progress(now - plan.start, plan.end - plan.start, step, self.audit()))
             if step == plan.steps if plan.steps else now >= plan.end:
                 return
-            new = step > done or step == 0
-            if self.packed.added.acts and new and self._looked_at(step) == 0:
+            if self.packed.added.acts and self._looked_at(step) == 0 and (step > done or not step):
                 self._renew_flow(engine)
             self._checkpoint_if_due(engine)
             if plan.steps and step % self.recheck_after == 0 and step > done:
@@ -340,29 +340,27 @@ class Motion:
         except FoldynError as error:
             why = f"at t = {self.course.tally.time:.6g} s the flow about the sheet is lost: {error}"
             self._stop(why, ComputationError, error)
-        if not found:
-            return
-        self._flow = self.packed.numbering.outward(self.course.u)
-        if isinstance(engine, Compiled):
+        if found:
+            self._flow = self.packed.numbering.outward(self.course.u)
+        if found and isinstance(engine, Compiled):
             engine.accelerate()
 
     @property
     def end(self) -> State:
         """The state at its last sample, with all that it takes to go on from there."""
         last = self.output.written(self.stored)
-        memory = last.memory[-1].copy() if last.memory.size else None
-        u, v = last.displacement[-1].copy(), last.velocity[-1].copy()
-        continuation = self._continuations().get("continuation", (0.0, None))[1]
-        return State(u, v, memory, continuation, self.reached)
+        u, v, memory = (a[-1].copy() for a in (last.displacement, last.velocity, last.memory))
+        _, continuation = self._continuations().get("continuation", (0.0, None))
+        return State(u, v, memory if memory.size else None, continuation, self.reached)
 
     @property
     def reached(self) -> Origin | None:
         """Where the motion began, with the flow at its end; None where nothing depends on it."""
         acts, steps = self.packed.added.acts, int(self.course.tally.steps)
-        if not (acts or self.case.damped_at_start):
+        if not acts and not self.case.damped_at_start:
             return None
-        flow = self._flow if acts else None
-        return Origin(self.origin.displacement, flow, self._looked_at(steps))
+        flow, looked = (self._flow, self._looked_at(steps)) if acts else (None, 0)
+        return replace(self.origin, flow=flow, looked=looked)
 
     def _continuations(self) -> dict[str, tuple[float, Continuation]]:
         """What an implicit method went on from, and needs to go on if it stands at a sample.
@@ -383,8 +381,8 @@ class Motion:
 
     def _identity(self) -> dict[str, Any]:
         *state, continued = self._state
-        state += [continued.values if continued else None]
-        state += [self.origin.displacement, self.origin.flow]
+        origin = self.origin.displacement, self.origin.time, self.origin.flow
+        state += [continued.values if continued else None, *origin]
         return identity(self.case, self.method, self.plan, state, self._sampler.rows)
 
     def finished(self, keeping: Keeping) -> xarray.Dataset | None:
@@ -481,7 +479,7 @@ class Motion:
             plan = plan._replace(end=plan.start + length, interval=length)
         sampler = Sampler(self.case, {}, *self.start, plan.start)
         # with memory of its own: this motion may go on
-        packed = pack(self.case, apart(plan, self.critical), self.origin.displacement)
+        packed = pack(self.case, apart(plan, self.critical), self.origin)
         motion = Motion(
             self.case, self.method, plan, self.critical, True, self._state, self.origin, packed,
             sampler,

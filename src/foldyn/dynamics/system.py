@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.cases import Case, History
+from foldyn.cases import Case, History, Origin
 from foldyn.cases.heat import heat_of
 from foldyn.cases.waveforms import CONSTANT, Callbacks, Waveforms, evaluate
 from foldyn.cases.waveforms import pack as pack_waveforms
@@ -116,11 +116,11 @@ class Packed(NamedTuple):
 
 
 def pack(
-    case: Case, span: float, start: NDArray | None = None, modal: ModalRows | None = None
+    case: Case, span: float, start: Origin | None = None, modal: ModalRows | None = None
 ) -> Packed:
     """Arrays of a case; `span` (s) is short against the variations of the loads.
 
-    start : displacement (n, 3) where the motion began, about which damping may be; rest by default.
+    start : where the motion began, about which damping may be; rest by default.
     modal : the modal damping of a motion from there, if it is known.
     """
     histories: list[History] = []
@@ -167,7 +167,8 @@ def pack(
         alpha=float(case.rayleigh.alpha),
         lightness=lightness(mass) if case.contact is not None else np.zeros(0),
     )
-    added = added_mass(case, start, by.rank, by.rows, len(body.hinges), histories)
+    place = start and start.displacement
+    added = added_mass(case, place, by.rank, by.rows, len(body.hinges), histories)
     heated = [(own, histories.index(history)) for own, history in case.swellings]
     heat = heat_of(case.structure, heated, len(histories), body.sheet.series()[1])
     if heat is not None:

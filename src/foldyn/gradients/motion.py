@@ -65,7 +65,7 @@ class MotionGradient:
         """Numbers of a case by which gradients are taken."""
         packed = self._motion.packed
         made = with_mass(self._motion.method, case)
-        other = pack(made, packed.system.waves.span, self._motion.origin.displacement)
+        other = pack(made, packed.system.waves.span, self._motion.origin)
         return numbers_of_motion(other, self._motion.start)
 
     def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:

@@ -169,7 +169,7 @@ def motions(
         if given != {name: value for name, value in other.arguments.items() if name in given}:
             raise InputError(f"{NONE} a motion with other steps")
         start = check_start(other.case, state)
-        packed = pack(other.case, motion.packed.system.waves.span, motion.origin.displacement)
+        packed = pack(other.case, motion.packed.system.waves.span, motion.origin)
         if not np.array_equal(packed.numbering.order, motion.packed.numbering.order):
             raise InputError(f"{NONE} a motion whose nodes are numbered otherwise")
         course = begin(other.case, *start, None, None, motion.plan, packed)

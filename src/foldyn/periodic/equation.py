@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.cases import Case
+from foldyn.cases import Case, Origin
 from foldyn.dynamics.dampers import damping_terms
 from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of, modal_rows
@@ -36,8 +36,8 @@ class Equation:
         Who asks, for messages.
     driven : bool
         False leaves out all that varies, and the damping.
-    origin : ndarray, shape (n, 3), optional
-        Displacement (m) about which damping has its ``state = "start"``; rest by default.
+    origin : Origin, optional
+        About which damping has its ``state = "start"``; rest by default.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Equation:
     """
 
     def __init__(
-        self, case: Case, name: str, driven: bool = True, origin: NDArray | None = None
+        self, case: Case, name: str, driven: bool = True, origin: Origin | None = None
     ) -> None:
         check_smooth(case, name)
         check_held(case, name)

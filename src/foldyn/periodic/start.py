@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from foldyn.cases import Case, Constant, Impose, State
+from foldyn.cases import Case, Constant, Impose, Origin, State
 from foldyn.cases.contact_checks import check_contact
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.linearized import equivalent_slope
@@ -62,18 +62,19 @@ def equilibrium(case: Case) -> NDArray:
     return trace(still, "newton", [0.0, 1.0])["displacement"].values[-1]
 
 
-def origin_of(case: Case, start: Any) -> NDArray | None:
-    """Displacement (n, 3) about which damping has its start; None where none has.
+def origin_of(case: Case, start: Any) -> Origin | None:
+    """About what damping has its start; None where none has.
 
     That of the state or the result with which the search begins, or the equilibrium.
     """
     if not case.damped_at_start:
         return None
     if isinstance(start, State):
-        return start.origin_of(case.structure.nodes.shape, "start").displacement
+        return start.origin_of(case.structure.nodes.shape, field="start")
     if isinstance(start, xr.Dataset) and "origin" in start:
-        return check_variable(start, "origin", PLACE, place="start: ").to_numpy()
-    return equilibrium(case)
+        found = check_variable(start, "origin", PLACE, place="start: ")
+        return Origin(found.to_numpy(), found.attrs.get("time"))
+    return Origin(equilibrium(case))
 
 
 def coefficients(balance: Balance, start: Any, omega: float, level: float = 1.0) -> NDArray:

@@ -140,6 +140,8 @@ def origin_variables(origin: Origin, time: float = math.nan) -> dict[str, Any]:
         for name, own in ORIGIN.items()
         if places[name] is not None
     }
+    if origin.time is not None:
+        data["origin"][2]["time"] = origin.time
     if "flow" in data:
         data["flow"][2].update(time=time, looked=origin.looked)
     return data

@@ -39,7 +39,7 @@ POINTS: Mapping[str, Quantity] = {
 def periodic_dataset(
     case: Case, time: ArrayLike, motion: Mapping[str, ArrayLike], coefficient: NDArray,
     floquet: ArrayLike, stable: bool, periods: int, statistics: Mapping[str, Any],
-    origin: NDArray | None = None,
+    origin: Origin | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Dataset of one periodic motion, which carries its case.
 
@@ -58,11 +58,11 @@ def periodic_dataset(
         Periods of the drive in one of the motion.
     statistics : mapping
         Facts about the computation, each stored as an attribute.
-    origin : ndarray, shape (n, 3), optional
-        Displacement (m) about which damping has its start.
+    origin : Origin, optional
+        About which damping has its start.
     """
     data = variables(MOTION, "time", motion)
-    data |= {} if origin is None else origin_variables(Origin(origin))
+    data |= {} if origin is None else origin_variables(origin)
     own = POINTS["coefficient"]
     data["coefficient"] = variable(own.dims, coefficient, own.units, own.text)
     single = {"stable": bool(stable), "periods": int(periods)}
@@ -78,7 +78,7 @@ def periodic_dataset(
 
 def points_dataset(
     kind: str, case: Case, values: Mapping[str, ArrayLike], statistics: Mapping[str, Any],
-    units: str = "m", origin: NDArray | None = None,
+    units: str = "m", origin: Origin | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Dataset of the points of a response curve or a backbone, which carries its case.
 
@@ -92,7 +92,7 @@ def points_dataset(
         Facts about the computation, each stored as an attribute.
     units : str
         Of the amplitude.
-    origin : ndarray, shape (n, 3), optional
+    origin : Origin, optional
         As of `periodic_dataset`.
     """
     size = POINTS["amplitude"]._replace(units=units)
@@ -100,7 +100,7 @@ def points_dataset(
         size = size._replace(text="largest displacement of any node from the equilibrium")
     known = {**POINTS, "amplitude": size}
     data = variables(known, "point", {k: v for k, v in values.items() if k != "frequency"})
-    data |= {} if origin is None else origin_variables(Origin(origin))
+    data |= {} if origin is None else origin_variables(origin)
     text = "frequency of the motion" if kind == "backbone" else POINTS["frequency"].text
     frequency = np.asarray(values["frequency"], float)
     along: dict[str, Any] = {
