@@ -56,7 +56,8 @@ class Products:
         at_rest = soft_at_rest(linear.case, body, self.q)[0]
         self._sheet = body.sheet.weakened(at_rest) if at_rest.any() else body.sheet
         self._soft = at_rest.any() and self._sheet.folds.stiffness != body.sheet.folds.stiffness
-        self._pullback = Pullback(body.on(self._sheet) if at_rest.any() else body)
+        self._balanced = Pullback(body)  # where soft hinges, too, have their small slope
+        self._pullback = Pullback(body.on(self._sheet)) if at_rest.any() else self._balanced
         self._mass = sparse.csr_array(linear.case.mass)
         self._mass.sort_indices()
         self._rows = np.repeat(np.arange(self._mass.shape[0]), np.diff(self._mass.indptr))
@@ -118,7 +119,7 @@ class Products:
     def add_state(self, state: NDArray, total: dict[str, NDArray]) -> None:
         """Add what a gradient (m,) by the state has as that moves with the design."""
         if self._moves:
-            self._balance.add_seen(state, self._pullback, total, self._factor)
+            self._balance.add_seen(state, self._balanced, total, self._factor)
 
 
 def refuse(linear: Linearized, what: str) -> None:
