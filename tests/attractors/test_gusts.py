@@ -78,3 +78,9 @@ def test_other_histories_are_refused_by_their_place(search):
         measure = X if other.structure is case.structure else RISE
         with pytest.raises(InputError, match=place):
             search(other, measure, [0.1, 0.2], **options)
+
+
+def test_a_wind_that_jumps_in_a_motion_is_refused_by_its_place():
+    air = fd.Air(added_mass=False, velocity=(0.0, 0.0, 1.0), history=fd.Step(0.1))
+    with pytest.raises(InputError, match=r"air: the wind .* jumps at t = 0\.1 s"):
+        fd.simulate(gusty(2.0).altered(air=air), 0.2)
