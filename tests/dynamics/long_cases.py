@@ -58,7 +58,7 @@ def blown() -> fd.Case:
     """A cell that folds by itself in gusts of a dense gas, which moves with it."""
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=120)
     s = fd.discretize(pattern, SHEET)
-    gas = fd.Air(10.0, (1.0, 0.0, 2.0), history=fd.Harmonic(3.0), resolution=2)
+    gas = fd.Air(10.0, (0.4, 0.0, 0.8), history=fd.Harmonic(3.0), resolution=2)
     fold = fd.Actuate("all", fraction=0.6, history=fd.Ramp(0.5, smooth=True))
     return fd.Case(s, [fd.Fix([0, 1, 2])], [fold], air=gas)
 
