@@ -68,7 +68,9 @@ MODELS = {
     "n5b8e with bars": lambda pattern, sheet, **o: fd.discretize(
         pattern, sheet, preset="n5b8e", membrane="bars", **o
     ),
-    "herkal": lambda pattern, sheet, **o: fd.discretize(pattern, sheet, preset="herkal", **o),
+    "herkal": lambda pattern, sheet, **o: fd.discretize(
+        pattern, sheet, preset="herkal", bend_law="linear", **o
+    ),
     "shell": lambda pattern, sheet, **o: fd.shell(pattern, sheet, divisions=4, **o),
 }
 
@@ -122,13 +124,17 @@ def test_turns_that_displacements_do_not_tell_are_left_out(model):
     assert {"turn", "fold_moment", "energy"} <= set(fields(damped, path, still))
 
 
-def test_energies_of_warm_panels_are_left_out():
-    """Displacements tell the energies of all strains, not of those that produce stress."""
-    s = structure()
-    warm = fd.Case(s, SUPPORTS, [fd.Temperature(10.0, expansion=1e-5)])
-    still = xr.Dataset(coords={"time": [0.0]})
-    found = fields(warm, still, np.zeros((1, *s.nodes.shape)))
-    assert "fold_moment" in found and "energy" not in found
+@pytest.mark.parametrize("model", MODELS)
+def test_warm_panels_store_what_they_may_not_do(model):
+    pattern = fd.patterns.miura((1, 1), 0.1, 0.08, 60, 90)
+    s = MODELS[model](pattern, SHEET, fold_law="linear")
+    loads = [
+        fd.Temperature(2.0, expansion=1e-6, panels=[0, 3]),
+        fd.Temperature(-1.0, expansion=3e-6, curvature=2e-3, panels=[1, 3], history=fd.Ramp(0.01)),
+    ]
+    case = fd.Case(s, [fd.Fix(pattern.faces[0])], loads)
+    check(s, fd.trace(case, load_factors=[0.5, 1.0], constant=[0]))
+    check(s, fd.simulate(case, 1e-3, method="newmark", dt=1e-4, every=5e-4))
 
 
 def check(s, result):

@@ -68,6 +68,15 @@ def free_energy(code, stress, addresses):
 
 
 @kernel
+def free_energies(code, stress, addresses):
+    """`free_energy` at stresses (n,)."""
+    out = np.empty(stress.size)
+    for i in range(out.size):
+        out[i] = free_energy(code, stress[i], addresses)
+    return out
+
+
+@kernel
 def add_heat(heat, u, factor, out):
     """Add what strain energies lack, J, to their groups; u flat, factors (h, k) in column 0."""
     loads, stretching, bending = heat.loads, heat.groups[0], heat.groups[1]

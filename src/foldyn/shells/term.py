@@ -182,18 +182,20 @@ class ShellTerm(SheetTerm):
         sides = float((apart * np.sqrt(self.model.per_length2)).max(initial=0.0))
         return largest_turn(sides, self.angles(q), self.angles(other))
 
-    def plate_energies(self, q: NDArray) -> NDArray:
+    def plate_energies(self, q: NDArray, strain: NDArray, turn: NDArray) -> NDArray:
         """See `SheetTerm`: of stretching and bending."""
         model, work, (u, x) = self.model, shell_work(self.model), self._split(q)
         fold(model, u, x, work)
         ride(model, u, work)
         apart = u[np.roll(model.triangles, -1, axis=1)] - u[model.triangles]
         longer = np.einsum("tkc,tkc->tk", apart, 2.0 * model.side + apart)
-        strain = 0.5 * longer * model.per_length2
-        turn = np.append(work.turn, 0.0)[model.hinge] * model.weight  # without one: number -1
-        turn += model.sign * model.per_reach * np.append(x, 0.0)[model.rotation]
-        stretching = np.einsum("tk,tkm,tm->t", strain, model.membrane, strain)
-        return 0.5 * (stretching + np.einsum("tk,tkm,tm->t", turn, model.bending, turn))
+        green = 0.5 * longer * model.per_length2
+        beta = np.append(work.turn, 0.0)[model.hinge] * model.weight  # without one: number -1
+        beta += model.sign * model.per_reach * np.append(x, 0.0)[model.rotation]
+        if strain.size:
+            green, beta = green - strain.reshape(-1, 3), beta - turn.reshape(-1, 3)
+        stretching = np.einsum("tk,tkm,tm->t", green, model.membrane, green)
+        return 0.5 * (stretching + np.einsum("tk,tkm,tm->t", beta, model.bending, beta))
 
     def scale(self) -> NDArray:
         """Stiffness of the triangles' sides in the plane times their lengths, summed at nodes.

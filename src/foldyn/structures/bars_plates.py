@@ -178,7 +178,7 @@ class BarsPlatesTerm(SheetTerm):
         bars = self._bars.turn(q[: self._nodal], other[: self._nodal])
         return largest_turn(bars, self.angles(q), self.angles(other))
 
-    def plate_energies(self, q: NDArray) -> NDArray:
+    def plate_energies(self, q: NDArray, strain: NDArray, turn: NDArray) -> NDArray:
         """See `SheetTerm`."""
         model, work, (displacement, rotation) = self.model, plates_work(self.model), self._split(q)
         turn_hinges(model, displacement, work)
@@ -186,6 +186,7 @@ class BarsPlatesTerm(SheetTerm):
         from_rest[len(model.fold_rest) :] -= model.bend_rest
         turned = np.append(from_rest, (self.per_hidden * rotation)[::-1])  # number -1 comes last
         angle, size = turned[model.angle], np.diff(model.start)
+        angle = angle - turn if turn.size else angle
         plate = np.repeat(np.arange(len(size)), size**2)
         row, column = np.divmod(np.arange(len(plate)) - model.entry[plate], size[plate])
         first = model.start[plate]

@@ -222,18 +222,29 @@ def coupling(
 
 
 def energies(
-    kinds: Sequence[PanelKind], gives: EdgeGives | None, rest: NDArray, u: NDArray, panels: int
-) -> NDArray:
-    """Energy (samples, panels), J, of the membranes at displacements u (samples, n, 3), m."""
-    x, out = rest + u, np.zeros((len(u), panels))
+    kinds: Sequence[PanelKind], gives: EdgeGives | None, rest: NDArray, u: NDArray, panels: int,
+    free: NDArray | None = None,
+) -> NDArray:  # fmt: skip
+    """Energy (samples, panels), J, of the membranes at displacements u (samples, n, 3), m.
+
+    free : (samples, k) free strains of all bars in turn, as `swelling` has them.
+    """
+    x, out, first = rest + u, np.zeros((len(u), panels)), 0
     for which, own in kinds:
         start, end = (x[:, own.nodes[:, place]] for place in own.ends.T)
         square = np.einsum("spbc,spbc->bsp", end - start, end - start)
         strain = 0.5 * (square * own.per_length2[:, None] - 1.0)
+        if free is not None:
+            bars, samples, count = strain.shape
+            end = first + bars * count
+            own_free, first = free[:, first:end].reshape(samples, bars, count), end
+            strain -= own_free.transpose(1, 0, 2)
         out[:, which] = 0.5 * np.einsum("isp,ijp,jsp->sp", strain, own.stiffness, strain)
     for sample, here in enumerate(u if gives else ()):
         assert gives is not None
         strain = gives.strains(here)
+        if free is not None:
+            strain = strain - free[sample, first:].reshape(strain.shape)
         g = gives.balanced(strain)[gives.number]
         pull = np.einsum("pb,pbk->pk", strain, gives.across)
         pull += 0.5 * np.einsum("pj,pjk->pk", g, gives.stiffness)

@@ -37,8 +37,7 @@ def fields(case: Case, result: Any, displacement: NDArray) -> dict[str, Field]:
     """Fields of a motion or path with displacements (samples, n, 3), by name.
 
     What displacements do not tell is left out: moments and energies where laws have memory, and
-    turns as well where panels give way beside such creases or, in motions, beside damped ones;
-    energies where panels are warm.
+    turns as well where panels give way beside such creases or, in motions, beside damped ones.
     Speeds are not among them: the page takes them from displacements.
     """
     structure, out = case.structure, {}
@@ -54,9 +53,8 @@ def fields(case: Case, result: Any, displacement: NDArray) -> dict[str, Field]:
     out["turn"] = Field("turn of creases from rest", "°", "crease", turn, True)
     if not memory_acts(case, result):
         out["fold_moment"] = Field("moment of creases", "N m", "crease", found.moment, True)
-        if not case.swellings:
-            density = energy_density(structure, displacement, found)
-            out["energy"] = Field("strain energy per area", "J/m²", "panel", density, False)
+        density = energy_density(structure, displacement, found)
+        out["energy"] = Field("strain energy per area", "J/m²", "panel", density, False)
     return out
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from foldyn.materials.prony import CreaseDampers
 from foldyn.materials.series import in_series
 from foldyn.mechanics import angles
 from foldyn.mechanics.following import following_force, joined
+from foldyn.mechanics.heat import free_energies
 from foldyn.structures import Structure, membranes
 from foldyn.structures.mesh import double_areas
 
@@ -26,6 +28,8 @@ class States(NamedTuple):
     pairs, energy : ends (k, 2) of the hinges and their energies (samples, k), J.
     plates : energy of each panel as a plate, or of each triangle of a shell (samples, p), J.
     rest : rest angles as loads turn them (samples, nr), rad.
+    stress, free : with which single warm bars push (samples, nb), over Young's modulus, and Green
+        strains of membranes without stress (samples, .); no columns where no panel is warm.
     """
 
     turn: NDArray
@@ -34,6 +38,8 @@ class States(NamedTuple):
     energy: NDArray
     plates: NDArray
     rest: NDArray
+    stress: NDArray
+    free: NDArray
 
 
 def memory_acts(case: Case, result: Any) -> bool:
@@ -56,12 +62,22 @@ def creases_known(case: Case, result: Any) -> bool:
 def states(case: Case, result: Any, displacement: NDArray) -> States:
     """States at displacements (samples, n, 3), m, with unknowns without mass in balance."""
     body, structure, kind = case.body, case.structure, case.structure.hinge_kinds[0]
-    loads, rest, factors = _loads(case, result, len(displacement))
+    acting = list(_acting(case, result, len(displacement)))
+    rest = np.tile(body.sheet.rest_angles, (len(displacement), 1))
+    for load, factor in acting:
+        for change, _ in load.rest_terms:
+            rest += np.outer(factor, change)
     changes, hinges = rest - body.sheet.rest_angles, body.sheet.fold_hinges()
     angle = hinge_angles(structure, hinges.nodes, displacement)
-    plates = np.zeros((len(displacement), 0))
+    plates, (stress, free, curl) = (
+        np.zeros((len(displacement), 0)),
+        _warm(acting, len(displacement)),
+    )
     if len(body.hidden):
-        pushes = joined((part, k) for k, load in enumerate(loads) for part in load)
+        parts = [
+            (part, k) for k, (load, _) in enumerate(acting) for part, _ in load.following_terms
+        ]
+        pushes, factors = joined(parts), np.reshape([f for _, f in acting], (-1, len(displacement)))
         hidden, none = np.zeros(len(body.hidden)), sparse.csr_array((0, len(body.hidden)))
         found, kept = [], []
         for k, u in enumerate(displacement):
@@ -71,7 +87,7 @@ def states(case: Case, result: Any, displacement: NDArray) -> States:
             hidden = q[body.hidden]
             there = np.minimum(hinges.hidden, body.size)
             angle[k] -= (np.append(q, 0.0)[there] * hinges.hidden_turn).sum(axis=1)
-            found.append(here.sheet.plate_energies(q))
+            found.append(here.sheet.plate_energies(q, free[k], curl[k]))
         plates = np.array(found)
     if count := body.sheet.offsets:
         angle += changes[:, -count:] + body.sheet.rest_angles[-count:]
@@ -81,25 +97,38 @@ def states(case: Case, result: Any, displacement: NDArray) -> States:
     places = (np.arange(len(hinges.fold)), hinges.fold)
     shape = len(hinges.fold), len(structure.folds)
     of_crease = sparse.csr_array((np.ones(len(hinges.fold)), places), shape)
-    pairs = hinges.nodes[:, :2]
-    return States(turn @ of_crease, moment @ of_crease, pairs, energy, plates, rest)
+    return States(
+        turn @ of_crease,
+        moment @ of_crease,
+        hinges.nodes[:, :2],
+        energy,
+        plates,
+        rest,
+        stress,
+        free,
+    )
 
 
-def _loads(case: Case, result: Any, samples: int) -> tuple[list[list[Any]], NDArray, NDArray]:
-    """Following forces of each load, rest angles (samples, nr), and factors (loads, samples)."""
-    rest = np.tile(case.body.sheet.rest_angles, (samples, 1))
+def _acting(case: Case, result: Any, samples: int) -> Iterator[tuple[SomeLoads, NDArray]]:
+    """Each load of a case with its factor (samples,)."""
     constant = set(np.atleast_1d(result.attrs.get("constant", [])).astype(int).tolist())
-    following, factors = [], np.ones((len(case.loads), samples))
     for k, load in enumerate(case.loads):
+        factor = np.ones(samples)
         if "time" in result.sizes:
-            factors[k] = load.history(result["time"].values)
+            factor = load.history(result["time"].values)
         elif k not in constant:
-            factors[k] = result["load_factor"].values
-        alone = SomeLoads(case, [k])
-        for change, _ in alone.rest_terms:
-            rest += np.outer(factors[k], change)
-        following.append([part for part, _ in alone.following_terms])
-    return following, rest, factors
+            factor = result["load_factor"].values
+        yield SomeLoads(case, [k]), factor
+
+
+def _warm(acting: Sequence[tuple[SomeLoads, NDArray]], samples: int) -> list[NDArray]:
+    """Stresses of single bars, free strains and free angles of warm panels, (samples, .) each."""
+    warm = [(factor, own) for load, factor in acting for own, _ in load.swellings]
+    kinds = [(factor, (own.stress, *own.free)) for factor, own in warm]
+    none = np.zeros((samples, 0))
+    if not kinds:
+        return [none] * 3
+    return [np.sum([np.outer(factor, of[k]) for factor, of in kinds], axis=0) for k in range(3)]
 
 
 def hinge_angles(structure: Any, hinges: NDArray, displacement: NDArray) -> NDArray:
@@ -131,13 +160,20 @@ def energy_density(structure: Any, displacement: NDArray, found: States) -> NDAr
     panels = np.zeros((len(displacement), len(area)))
     if isinstance(structure, Structure):
         panels += membranes.energies(
-            structure.membranes, structure.edge_gives, structure.nodes, displacement, len(area)
-        )
+            structure.membranes, structure.edge_gives, structure.nodes, displacement, len(area),
+            found.free if found.free.shape[1] else None,
+        )  # fmt: skip
         if not structure.membranes:
             stiffness = structure.sheet.youngs_modulus * structure.bar_area * structure.bar_length
-            stretch = 1.0 + bar_strain(structure, displacement)
+            strain, law = bar_strain(structure, displacement), structure.bar_law
+            energy = law.energy(1.0 + strain)
+            if found.stress.shape[1]:
+                addresses = np.array(law.addresses or (0, 0, 0), np.int64)
+                lacking = free_energies(law.code, found.stress.ravel(), addresses)
+                energy += lacking.reshape(strain.shape)
+                energy -= found.stress * strain * (1.0 + 0.5 * strain)
             pairs.append(structure.bars)
-            parts.append(stiffness * structure.bar_law.energy(stretch))
+            parts.append(stiffness * energy)
         if found.plates.shape[1]:
             panels += found.plates
         else:
