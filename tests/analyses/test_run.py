@@ -7,7 +7,7 @@ import pytest
 
 import foldyn as fd
 from case_texts import HELD_FOLD_TEXT as FOLD
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 
 PUSH = "[[loads]]\nnodes = [0, 1]\nforce = [-1e-3, 0, 0]\n"
 MOTION = '[analysis]\nkind = "dynamics"\nduration = 0.02\n'
@@ -28,8 +28,11 @@ def test_settings_of_a_path_count(read) -> None:
     text += "load_factors = [0, 1]\n"
     counts = [read(f"{text}largest_turn = {turn}\n").run().sizes["step"] for turn in (0.02, 5.0)]
     assert counts[0] > counts[1]
-    finer = read(text).run(largest_turn=0.02, until={"node": 0, "axis": "x", "displacement": -1.0})
+    never = {"node": 0, "axis": "x", "displacement": -1.0}
+    with pytest.warns(FoldynWarning, match="has not reached `until`"):
+        finer = read(text).run(largest_turn=0.02, until=never)
     assert finer.sizes["step"] == counts[0]
+    assert finer.attrs["status"] == "until not reached"
 
 
 def test_each_mass_rule_and_other_arguments(read) -> None:
