@@ -188,7 +188,7 @@ def _edges(loads, u, t, a, b):
 
 
 @inner
-def _hinge(loads, u, h, points, gradient):
+def hinge_of(loads, u, h, points, gradient):
     """Corners of a hinge and the gradient of its dihedral, (4, 3) both; whether a wing rides."""
     j, k = loads.hinges[h, 0], loads.hinges[h, 1]
     for v in range(4):
@@ -220,7 +220,7 @@ def add_following(loads, u, factor, out):
                 out[3 * loads.triangles[t, v] + c] += push
     for h in range(loads.moment.size):
         moment = loads.moment[h] * factor[loads.moment_row[h], 0]
-        rides = _hinge(loads, u, h, points, gradient)
+        rides = hinge_of(loads, u, h, points, gradient)
         for c in range(3):
             if rides:
                 gradient[0, c] += 0.5 * gradient[3, c]
@@ -279,7 +279,7 @@ def put_following(loads, u, factor, symmetric, out):
                         out[at] = -p * value
                         at += 1
     for h in range(loads.moment.size):
-        rides = _hinge(loads, u, h, points, gradient)
+        rides = hinge_of(loads, u, h, points, gradient)
         block[:] = 0.0
         add_hessian(points, gradient, -loads.moment[h] * factor[loads.moment_row[h], 0], block)
         if rides:

@@ -22,7 +22,7 @@ from foldyn.jit.compiled import addressed, inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import bar_energy, bar_slope, bar_stress
 from foldyn.mechanics.dihedral import dihedral_gradient
-from foldyn.mechanics.following import Following, _hinge
+from foldyn.mechanics.following import Following, hinge_of
 
 ITERATIONS = 30  # of Newton's method for the free strain of a bar; a few are enough
 SHARP = 1e-15  # Green strain
@@ -32,7 +32,7 @@ class Heat(NamedTuple):
     """What s swollen states of a sheet push with, h histories; groups of stretching and bending."""
 
     loads: Following
-    angles: NDArray  # (.,) dihedrals of its hinges at rest, rad
+    angles: NDArray  # (k,) dihedrals of the hinges of its loads at rest, rad
     groups: NDArray  # (2,)
     quadratic: NDArray  # (2, h, h) J
     stress: NDArray  # (s, b) of bars, over Young's modulus
@@ -97,7 +97,7 @@ def add_heat(heat, u, factor, out):
             out[stretching] += 0.5 * pull * moved * (2.0 * loads.vectors[e, c] + moved)
     points, gradient = np.empty((4, 3)), np.empty((4, 3))
     for h in range(loads.moment.size):
-        _hinge(loads, u, h, points, gradient)
+        hinge_of(loads, u, h, points, gradient)
         p = flat(points)
         angle = dihedral_gradient(
             p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
