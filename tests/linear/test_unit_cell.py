@@ -266,7 +266,7 @@ def test_compressed_sheets_that_are_unstable_are_in_equilibrium(preset):
     assert fd.bands(cell, [[0.5, 0.5]], 2, state=state).attrs["residual"] == 0.0
 
 
-@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("error", "ignore::foldyn.errors.ModelRangeWarning")
 def test_small_changes_of_periods_count():
     """Below the tolerance at which vertices meet."""
     cell, tower = miura(), kresling()
