@@ -269,3 +269,16 @@ def test_lines_without_letters_that_are_welded_beside_others_are_told(letters):
     for clear in (ridge("FMF"), roof.changed(assignments="FMF")):
         assert fd.welded(clear).faces == ((0, 2, 3, 1), (2, 4, 5, 3))
     fd.welded(roof, [(0, 3), (2, 5)])
+
+
+@pytest.mark.parametrize("bend", [2e-4, -5e-3])
+def test_the_advice_for_bent_panels_that_are_not_convex_fits(bend):
+    # a vertex within an edge, and a corner out of the plane, as folding leaves them
+    panel = [(0, 0, 0), (0, 0.4, 0), (0, 1, 0), (0.6, 1.2, bend), (0.6, 0.2, 0)]
+    pattern = fd.Pattern(panel, [range(5)])
+    with pytest.raises(
+        InputError, match=r"cannot see every edge; cut it with fd\.convex\("
+    ) as told:
+        fd.discretize(pattern, STEEL)
+    assert "n4b5" not in str(told.value)  # which has slivers there, or bends elsewhere
+    assert len(fd.discretize(fd.convex(pattern), STEEL).triangles) >= 3

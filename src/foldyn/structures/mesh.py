@@ -78,7 +78,7 @@ def n5b8(pattern: Pattern, centers: Mapping[int, NDArray] | None = None) -> Mesh
         return [(a, b, hub) for a, b in around(face)], [(hub, a) for a in face]
 
     nodes = np.concatenate([pattern.vertices, points[sizes > 3]])
-    remedy = f'its center cannot see every edge; {CUT}, or use scheme = "n4b5"'
+    remedy = f"its center cannot see every edge; {CUT}"
     return _mesh(pattern, nodes, np.array(number), spokes, remedy)
 
 
@@ -93,7 +93,7 @@ def n4b5(pattern: Pattern) -> Mesh:
         return _cut(list(pattern.faces[panel]), pattern, panel)
 
     none = np.full(len(pattern.faces), -1)
-    remedy = "correct the panel or cut it into triangles"
+    remedy = f"it is bent, or not convex; {CUT}"
     return _mesh(pattern, pattern.vertices, none, diagonals, remedy)
 
 
