@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.formats import diagnose
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
@@ -142,3 +143,36 @@ def test_a_result_is_known_by_its_content(result) -> None:
 )
 def test_bad_input_for_a_result(result, arguments, message) -> None:
     assert message in result[0].refused("convert", "run.nc", *arguments)
+
+
+def test_slips_of_drawing_are_told_and_mended(files) -> None:
+    flat = fd.patterns.miura(cells=(2, 2), a=0.03, b=0.04, panel_angle=65, dihedral=180)
+    off = flat.vertices + [(5e-5 * (k % 3), 0, 0) for k in range(len(flat.vertices))]
+    fd.write_pattern("hand.fold", flat.changed(vertices=off))
+    told = files.good("convert", "--check", "hand.fold")
+    assert "nearly flat-foldable" in told.out and "to be moved, to fold flat (um): " in told.out
+    told = files.call("convert", "hand.fold", "true.fold", "--flat-foldable", "--tolerance", "1e-4")
+    assert told.status == 0 and "to where they fold flat" in told.err
+    mended = diagnose("true.fold")
+    assert not mended.diagnosis.doubts
+    assert np.abs(mended.pattern.vertices - off).max() < 1e-4
+    fd.save(fd.fold(fd.patterns.simple_fold(dihedral=150), 40, steps=1).path, "x.nc")
+    told = files.call("convert", "x.nc", "x.fold", "--flat-foldable")
+    assert told.status == 2 and "--flat-foldable: only for pattern files" in told.err
+
+
+def test_slips_of_drawing_in_case_files(files) -> None:
+    flat = fd.patterns.miura(cells=(2, 2), a=0.03, b=0.04, panel_angle=65, dihedral=180)
+    off = flat.vertices + [(5e-5 * (k % 3), 0, 0) for k in range(len(flat.vertices))]
+    fd.write_pattern("hand.fold", flat.changed(vertices=off))
+    rest = "[sheet]\nyoungs_modulus = 1e9\npoissons_ratio = 0.3\nthickness = 2e-4\ndensity = 800\n"
+    case = '[pattern]\nfile = "hand.fold"\n{}\n' + rest + '[analysis]\nkind = "modes"\ncount = 7\n'
+    Path("x.toml").write_text(case.format("tolerance = 1e-4\nflat_foldable = true"))
+    with pytest.warns(FoldynWarning, match="to where they fold flat"):
+        pattern = fd.read_case("x.toml").case().structure.pattern
+    assert diagnose("hand.fold", flat_foldable=True).pattern.vertices == pytest.approx(
+        pattern.vertices
+    )
+    Path("x.toml").write_text(case.format("tolerance = 0.5"))
+    with pytest.raises(InputError, match=r"tolerance = 0\.5: must be at most a 20th"):
+        fd.read_case("x.toml")
