@@ -103,6 +103,18 @@ def test_the_mesh_converges_as_its_elements_do():
     assert 1.6 < order < 2.4
 
 
+def test_panels_of_as_many_corners_are_cut_alike():
+    one, other = (
+        _even(sides(np.array(corners)).outline, 4)
+        for corners in (
+            ((0, 0), (1, 0), (1.1, 0.9), (0, 1)),
+            ((0, 0), (2, 0.1), (1.6, 1), (0.3, 1)),
+        )
+    )
+    assert one.cut is other.cut and len(one.x) == len(other.x)
+    assert not np.allclose(one.x, other.x)
+
+
 def test_edges_that_are_held_more_and_more_become_straight():
     corners, free = SHAPES["lozenge"], strained(SHAPES["lozenge"])
 

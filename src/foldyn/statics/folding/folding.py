@@ -91,7 +91,8 @@ class Folding:
 
     def __repr__(self) -> str:
         """One line."""
-        return f"<Folding {self.kind}, {self._turned}, strain {self.strain:.2g}>"
+        strain = f", strain {self.strain:.2g}" if self.kind == "stretched" else ""
+        return f"<Folding {self.kind}, {self._turned}{strain}>"
 
     def _repr_html_(self) -> str | None:
         """A picture for notebooks."""
