@@ -24,12 +24,6 @@ SHELL = "shell"
 MODELS = (*PRESETS, SHELL)
 STEPS = 25  # of a motion by implicit methods
 METHODS = ("rk4", "central_difference", "newmark", "generalized_alpha")
-ELSEWHERE = {
-    "strain",
-    "effective_mass",
-    "peak_frequency",
-    "peak_height",
-}  # measures mended elsewhere
 RARE = {"limit_load", "barrier", "barrier_back"}  # of sheets that snap: see test_path_gradient
 CONSTRAINTS = ("none", "oblique", "equal", "plate", "rigid")
 LAWS = ("linear", "enhanced", fd.PlateSuperlinear(onset=2.0), fd.EnhancedLinear(100.0, 260.0))
@@ -229,7 +223,7 @@ def _measure(rng: Any, kind: str, case: fd.Case, analysis: Mapping[str, Any]) ->
     fits = [
         name
         for name in DERIVATIVES
-        if name not in ELSEWHERE | RARE
+        if name not in RARE
         and (not MEASURES[name].kinds or kind in MEASURES[name].kinds)
         and (name == "load_at") == (analysis.get("method") in ("arc_length", "mgdcm"))
     ]

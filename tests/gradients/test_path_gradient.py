@@ -159,3 +159,23 @@ def test_barriers_share_the_landscape(monkeypatch: pytest.MonkeyPatch) -> None:
     found = fd.sensitivity(tower, {"stiffness": 6e-3}, ["barrier", "barrier_back"], SNAP)
     assert len(count) == 1
     assert found["gradient_stiffness"].values.all()
+
+
+def test_the_energy_of_bends_near_the_kink_of_their_law():
+    """Turned by a small load far less than differences of their rest angles would turn them."""
+    pattern = fd.patterns.simple_fold(b=1.1, dihedral=105.0)
+    sheet = fd.Sheet(1e6, 0.25, 0.03)
+    made = fd.discretize(pattern, sheet, preset="herkal", crease_stiffness=0.05)
+    case = fd.Case(made, [fd.Fix([0, 1, 2, 3])], [fd.Force([4, 5], (2e-4, 0.0, 3e-4))])
+    given = {"method": "newton", "load_factors": [1.0]}
+    found = fd.sensitivity(case, ["bend_rest"], "strain_energy", {"kind": "statics", **given})
+    way = np.random.default_rng(6).uniform(-1.0, 1.0, len(made.bend_rest))
+
+    def energy(by: float) -> float:
+        other = replace(made, bend_rest=made.bend_rest + by * way)
+        path = fd.trace(replace(case, structure=other), **given)
+        return float(sum(path[name][-1] for name in case.energy_groups))
+
+    h = 1e-7
+    expected = (energy(h) - energy(-h)) / (2.0 * h)
+    assert found["gradient_bend_rest"].values[0] @ way == pytest.approx(expected, rel=1e-3)

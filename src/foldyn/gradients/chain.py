@@ -15,7 +15,7 @@ from foldyn.errors import InputError
 from foldyn.gradients.expressions import Expression
 from foldyn.gradients.measures import Derivative, Seeds
 from foldyn.gradients.numbers import Gradient
-from foldyn.gradients.parameters import Parameters
+from foldyn.gradients.parameters import SHORTER, Parameters
 from foldyn.mechanics.pullback import Arrays
 from foldyn.sweeps.measure import Asked
 
@@ -167,7 +167,11 @@ class Chain(NamedTuple):
 
     def _explicit(self, frozen: Callable[[Case], float]) -> dict[str, NDArray]:
         """Derivatives of a measure where the result stays as it is."""
-        slopes = self.design.slopes(lambda case: Arrays({"value": np.array([frozen(case)])}, {}))
+
+        def number(case: Case) -> Arrays:
+            return Arrays({"value": np.array([frozen(case)])}, {})
+
+        slopes = self.design.slopes(number, SHORTER)
         return {name: slope.pulled({"value": np.ones(1)}) for name, slope in slopes.items()}
 
 

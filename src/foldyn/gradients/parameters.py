@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations, islice
 from typing import Any, NamedTuple
 
@@ -27,6 +27,8 @@ from foldyn.mechanics.pullback import Arrays
 from foldyn.values import numbers, show
 
 STEP = 1e-3  # of the size of a parameter
+SHORTER = STEP, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8  # of measures, as energies near a kink of a law
+SMOOTH = 1e-5  # of a change: what is of the third order within a step that is short enough
 LEAST = 1e-6  # of a value: smaller changes are hidden by its rounding
 GOLDEN = 0.6180339887498949  # multiples of it, less whole numbers, differ from each other
 SILENT = 1e-11, 1e-12  # of a number, and of the largest of its array: rounding of a change
@@ -122,12 +124,19 @@ class Parameters:
                 name,
             ) from error
 
-    def slopes(self, numbers_of: Callable[[Any], Arrays], names: Any = None) -> dict[str, Slope]:
-        """How the numbers of the case change with each of the parameters."""
-        here = numbers_of(self.case())
-        return {name: self._slope(name, numbers_of, here) for name in (names or self.values)}
+    def slopes(
+        self, numbers_of: Callable[[Any], Arrays], steps: Sequence[float] = (STEP,)
+    ) -> dict[str, Slope]:
+        """How the numbers of the case change with each of the parameters.
 
-    def _slope(self, name: str, numbers_of: Callable[[Any], Arrays], here: Arrays) -> Any:
+        steps : of differences; shorter ones where the numbers are not smooth within the others.
+        """
+        here = numbers_of(self.case())
+        return {name: self._slope(name, numbers_of, here, steps) for name in self.values}
+
+    def _slope(
+        self, name: str, numbers_of: Callable[[Any], Arrays], here: Arrays, steps: Sequence[float]
+    ) -> Any:
         value, size = self.values[name], self.size(name)
 
         def at(direction: NDArray, by: float) -> Mapping[str, NDArray]:
@@ -136,13 +145,16 @@ class Parameters:
             return found.numbers
 
         def change(direction: NDArray) -> dict[str, NDArray]:
-            near = at(direction, STEP), at(direction, -STEP)
-            far = at(direction, 2.0 * STEP), at(direction, -2.0 * STEP)
+            for step in steps:
+                near = at(direction, step), at(direction, -step)
+                far = at(direction, 2.0 * step), at(direction, -2.0 * step)
+                if all(_smooth(*(one[key] for one in (*near, *far))) for key in here.numbers):
+                    break
             for key, each in here.numbers.items():
                 if _kinked(each, *(one[key] - each for one in (*near, *far))):
                     warnings.warn(KINK.format(name, key), FoldynWarning, stacklevel=5)
             return {
-                key: _difference(*(each[key] for each in (*near, *far, here.numbers)))
+                key: _difference(step, *(each[key] for each in (*near, *far, here.numbers)))
                 for key in here.numbers
             }
 
@@ -192,10 +204,17 @@ class Parameters:
 
 
 def _difference(
-    ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDArray, here: NDArray
-) -> NDArray:
+    step: float, ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDArray,
+    here: NDArray,
+) -> NDArray:  # fmt: skip
     """Rate of numbers from those a step and two steps ahead and behind."""
-    return _seen((8.0 * (ahead - behind) - (far_ahead - far_behind)) / (12.0 * STEP), here)
+    return _seen((8.0 * (ahead - behind) - (far_ahead - far_behind)) / (12.0 * step), here)
+
+
+def _smooth(ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDArray) -> bool:
+    """Whether numbers change by twice as much in twice the step, but for a little."""
+    one, two = ahead - behind, far_ahead - far_behind
+    return bool((np.abs(two - 2.0 * one) <= SMOOTH * np.abs(one).max(initial=0.0)).all())
 
 
 def _kinked(
