@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -21,9 +22,9 @@ CLOSING = 10.0  # stiffness of sides, so that closed creases stay within 180
 AJAR = math.radians(179.8)  # most turn of creases that are to open from the folded state
 OPENED = 0.1  # part of what was asked: a crease that has opened by less stays closed
 FREE_MARGIN = math.radians(1.0)  # of mountains and valleys without an angle to reach
-WEAKER = 1e-3  # springs of the creases, before what they held is let go
+WEAKER = (0.1, 0.01, 0.001)  # springs, in turn, before what they held is let go
 LESS = 0.3  # of the strain must be left with these
-HELD = 0.2  # of what creases have turned: change by which a state counts as kept
+HELD = 0.3  # of what creases have turned: change by which a state counts as kept
 TURNED = 1e-3  # rad, least turn that counts as one
 ISOMETRIC = 1e-9  # strain
 PLANE = 1e-6  # rad, bend of a panel
@@ -112,7 +113,7 @@ def _followed(
     Where springs cannot be let go at a step, or not without bent panels, that is not tried again
     before the last one.
     """
-    before, plane, lets_go = shape, True, True
+    before, plane, lets_go, kept = shape, True, True, None
     try:
         for k in range(1, steps + 1):
             aimed = angles[0] + (angles[1] - angles[0]) * (k / steps)
@@ -120,9 +121,8 @@ def _followed(
             ahead = 2.0 * shape.x - before.x
             before, shape = shape, lowest(energy, shape, ahead, aim, stiffness)
             shape = minimum(energy, shape, aim, stiffness, least=1e-10 if last else 1e-4)
-            kept = None
             if lets_go or last:
-                kept = relaxed(energy, stiffness, shape, aim, angles[0], plane or last)
+                kept = relaxed(energy, stiffness, shape, kept, aim, angles[0], plane or last)
             lets_go = kept is not None
             plane = kept is not None and energy.bent(kept.turns).max(initial=0.0) <= PLANE
             if last and kept is None:
@@ -136,11 +136,13 @@ def _followed(
 
 
 def relaxed(
-    energy: FoldEnergy, stiffness: Stiffness, shape: Shape, aim: Aim, first: NDArray, plane: bool
-) -> Shape | None:
+    energy: FoldEnergy, stiffness: Stiffness, shape: Shape, before: Shape | None, aim: Aim,
+    first: NDArray, plane: bool,
+) -> Shape | None:  # fmt: skip
     """The shape without the springs of its creases, if it stays near.
 
-    How near is measured by how far the creases have turned since the `first` state.
+    How near is measured by how far the creases have turned since the `first` state. What was kept
+    at the step `before` mostly leads to it with few steps of Newton's.
 
     First, if they may end `plane`, panels stay as stiff as they are, as in a pattern that can be
     folded rigidly; failing that they bend as they like, as thin paper does.
@@ -149,11 +151,19 @@ def relaxed(
     turned = np.abs(energy.creases(shape.turns) - first).sum() + TURNED
     aim = aim._replace(least=np.zeros_like(energy.signs))
     free = aim._replace(angles=np.full_like(aim.angles, np.nan))
-    for thin in (False, True) if plane else (True,):
-        bends = stiffness.bends * np.array([WEAKER, 0.0] if thin else [1.0, 1.0])
-        weak = stiffness._replace(bends=bends[0], creases=stiffness.creases * WEAKER)
-        kept: Shape | None = minimum(energy, shape, aim, weak)
-        if largest_strain(kept) > max(ISOMETRIC, LESS * largest_strain(shape)):
+    for thin, start in product((False, True) if plane else (True,), (before, shape)):
+        if start is None:
+            continue
+        bends = stiffness.bends * np.array([WEAKER[-1], 0.0] if thin else [1.0, 1.0])
+        weak = stiffness._replace(bends=bends[0], creases=stiffness.creases * WEAKER[-1])
+        if start is not shape:
+            kept = settled(energy, start, aim, weak, 1e-6)
+        else:  # in stages: springs that are weak at once take many steps
+            kept = shape
+            for weaker in WEAKER:
+                weak = weak._replace(creases=stiffness.creases * weaker)
+                kept = minimum(energy, kept, aim, weak)
+        if kept is None or largest_strain(kept) > max(ISOMETRIC, LESS * largest_strain(shape)):
             continue  # strained by more than the springs
         kept = settled(energy, kept, free, weak._replace(bends=bends[1], creases=0.0), 1e-10)
         if kept is None or largest_strain(kept) > ISOMETRIC:
@@ -171,7 +181,7 @@ def eased(
     """The shape with springs and bends so much weaker as it stays near and strains get less."""
     turned = np.abs(energy.creases(shape.turns) - first).sum() + TURNED
     wrong, kept = len(wrong_ways(energy, shape.turns, aim.angles)), shape
-    for weaker in (0.1, 0.01, 0.001):
+    for weaker in WEAKER:
         weak = stiffness._replace(
             bends=stiffness.bends * weaker, creases=stiffness.creases * weaker
         )
