@@ -340,3 +340,20 @@ def test_sheets_that_collide_askew_keep_both_momenta_and_lose_what_friction_take
         across.append(run.velocity.values[-1][~upper, 0].mean())
     # friction takes the upper sheet's speed across, and gives it to the lower one
     assert across[1] > across[0] + 0.05
+
+
+@pytest.mark.parametrize(("method", "dt"), [("rk4", None), ("dormand_prince", None), (ALPHA, 1e-5)])
+def test_a_plane_that_would_jump_is_refused_by_name(method, dt):
+    up = {"motion": (0, 0, 3e-3), "history": fd.Step(4e-3)}
+    plane = fd.Plane((0, 0, -5e-3), (0, 0, 1), **up)
+    case = fd.Case(strip(2), contact=fd.Contact(planes=[plane]))
+    with pytest.raises(InputError, match=r"contact: a plane with the history step jumps .* 0.004"):
+        fd.simulate(case, 0.01, method, dt=dt, every=1e-3)
+
+
+def test_steps_that_are_chosen_end_where_the_motion_of_a_plane_has_corners():
+    """A press that comes down late, in a pulse much shorter than the steps before it."""
+    down = fd.Table([0.0, 0.031, 0.0312, 0.0314, 1.0], [0.0, 0.0, 1.0, 0.0, 0.0])
+    plane = fd.Plane((0, 0, 2e-3), (0, 0, -1), motion=(0, 0, -1e-3), history=down)
+    case = fd.Case(strip(2), contact=fd.Contact(planes=[plane], panels=False))
+    assert set(down.times[1:4]) <= set(driver.prepare(case, 0.05, "dormand_prince").plan.stops)

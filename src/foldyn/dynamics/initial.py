@@ -173,12 +173,13 @@ def _check_tied_velocity(case: Case, velocity: NDArray) -> None:
 
 
 def check_steady(case: Case, start: float, end: float) -> None:
-    """Refuse a support or a fold that would have to jump, and a wind that moves fluid."""
+    """Refuse a support, plane or fold that would have to jump, and a wind that moves fluid."""
     for what, history in histories(case):
         times = [time for time in history.jumps() if start < time < end]
         drags = what == "the wind" and not (case.air and case.air.added_mass)
         if times and what != "a load" and not drags:
-            section = {"an actuation": "loads", "the wind": "air"}.get(what, "supports")
+            sections = {"an actuation": "loads", "the wind": "air", "a plane": "contact"}
+            section = sections.get(what, "supports")
             instead = ", or added_mass = false" if section == "air" else ""
             raise InputError(
                 f"{section}: {what} with the history {history.kind} jumps at t = {times[0]:g} s, "

@@ -182,6 +182,7 @@ def histories(case: Case) -> Iterator[tuple[str, History]]:
         "an imposed displacement": case.imposed_terms,
         "a base motion": case.base_terms,
         "the wind": case.wind_terms,
+        "a plane": case.obstacle_terms,
         "an actuation": [(turn, history) for turn, history in case.rest_terms if turn[:rest].any()],
     }
     for what, terms in driven.items():
@@ -189,7 +190,7 @@ def histories(case: Case) -> Iterator[tuple[str, History]]:
 
 
 def knots(case: Case) -> NDArray[np.float64]:
-    """Times (s) at which loads, supports, the wind or rest angles jump or turn a corner."""
+    """Times (s) at which loads, supports, planes, the wind or rest angles jump or turn a corner."""
     return np.unique([time for _, history in histories(case) for time in history.knots() or ()])
 
 
