@@ -26,14 +26,11 @@ from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.newton import Newton
 from foldyn.dynamics.implicit.scheme import (
-    ENOUGH,
     NOT_CONVERGED,
     NOT_FINITE,
-    ROUNDING,
     SOLVED,
-    STALL,
-    Goal,
     Scheme,
+    judge,
 )
 from foldyn.dynamics.system import place
 from foldyn.mechanics.contact.candidates import NORMAL, POINT
@@ -117,10 +114,9 @@ class TouchingNewton(Newton):
         before, again, last = scheme.displacement().copy(), False, 0.0
         norm, reference = self._residual(h, t)
         for _ in range(MOST):
-            if not norm < np.inf:
-                return NOT_FINITE
-            if _solved(goal, norm, reference, last):
-                return SOLVED
+            verdict = judge(goal, norm, reference, last, np.inf)
+            if verdict in (SOLVED, NOT_FINITE):
+                return verdict
             scheme.tangent(matrix, before, again)
             matrix.added = self._tangent()
             try:
@@ -223,12 +219,3 @@ class TouchingNewton(Newton):
             short = np.zeros(len(free))
             np.maximum.at(short, nodes, 0.5 * np.minimum(gap, d0) - now)
             self.scheme.shift += np.where(free, short[:, None] * normal, 0.0)
-
-
-def _solved(goal: Goal, norm: float, reference: float, last: float) -> bool:
-    """Whether a residual (N), after the last one, is that of a step that is solved; see `judge`."""
-    forces = max(reference, goal.least)
-    if norm <= goal.tolerance * forces:
-        return True
-    rounding = max(ENOUGH * forces, ROUNDING * goal.rounding)
-    return last > 0.0 and norm > STALL * last and norm <= rounding

@@ -34,6 +34,7 @@ GROWTH = 1e8  # of the residual, at which the iteration has lost its way
 # what is left where the residual no longer falls: rounding, if it is below one of these
 ENOUGH = 1e-8  # of the forces at play
 ROUNDING = 8.0  # times the rounding of forces
+OF_MOTION = 1e-5  # of the inertia that resists a step as it is predicted: residual at most
 STALL = 0.5  # share of the residual that an iteration leaves, above which it does not fall
 
 SOLVED, GO_ON, NEW_MATRIX, NOT_CONVERGED, NOT_FINITE = range(5)
@@ -44,6 +45,7 @@ class Goal(NamedTuple):
 
     tolerance: float  # relative to the forces at play
     least: float  # forces at play at least
+    most: float  # residual at most: of small motions about a preload, whose forces are large
     rounding: float  # of the bars' forces and, in a very short step, of the inertia
 
 
@@ -57,7 +59,7 @@ def judge(goal, norm, reference, last, lowest):
     if not norm < np.inf:
         return NOT_FINITE
     forces = max(reference, goal.least)
-    if norm <= goal.tolerance * forces:
+    if norm <= min(goal.tolerance * forces, goal.most):
         return SOLVED
     if norm > STALL * last and norm <= max(ENOUGH * forces, ROUNDING * goal.rounding) and last > 0:
         return SOLVED
@@ -225,9 +227,11 @@ class Scheme(ABC):
 
     def goal(self, h: float) -> Goal:
         """What the residual of a step h (s) is judged by."""
-        inertia = self.weights(h).mass * self.packed.mass.diagonal[:, None] * self.shift
-        rounding = self.rounding + EPS * float(np.linalg.norm(inertia))
-        return Goal(self.tolerance, self.hinge_forces(), rounding)
+        mass = self.packed.mass.diagonal[:, None]
+        inertia = self.weights(h).mass * float(np.linalg.norm(mass * self.shift))
+        rounding = self.rounding + EPS * inertia
+        most = max(OF_MOTION * inertia, rounding)
+        return Goal(self.tolerance, self.hinge_forces(), most, rounding)
 
     def hinge_forces(self) -> float:
         """Norm of the hinges' forces at old.q, N: forces at play even where all is at rest."""
