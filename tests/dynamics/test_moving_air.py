@@ -1,12 +1,15 @@
 """Added mass in wind: what matters is the velocity relative to the air, and its acceleration."""
 
+import warnings
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 import foldyn as fd
+from foldyn.dynamics import prepare
 from foldyn.dynamics.methods import METHODS
-from foldyn.errors import InputError
+from foldyn.errors import InputError, ModelRangeWarning
 
 SIDE = 0.2
 WIND = np.array([0.4, -0.3, 0.6])
@@ -155,3 +158,26 @@ def test_what_knows_no_flow_at_rest_refuses_wind():
             fd.frf(case, push, [3.0], method=method)
     with pytest.raises(InputError, match=r"air.velocity = .*: statics would leave wind out"):
         fd.trace(case.altered(loads=[push]))
+
+
+@pytest.mark.parametrize(
+    ("changes", "speed", "warns"),
+    [
+        ({}, 0.0, True),
+        ({"history": fd.Harmonic(3.0)}, 0.0, True),
+        ({}, 30.0, False),  # beside which the wind hardly matters
+        ({"velocity": (0.0, 0.0, 0.0)}, 0.0, False),
+        ({"added_mass": "local"}, 0.0, False),
+        ({"added_mass": False, "drag": True}, 0.0, False),
+    ],
+)
+def test_sheets_that_stand_in_a_wind_with_added_mass_are_warned_of(changes, speed, warns):
+    pattern = fd.patterns.simple_fold(a=SIDE, b=0.8 * SIDE, dihedral=95)
+    structure = fd.discretize(pattern, fd.Sheet(2e7, 0.3, 2e-3, density=500.0))
+    case = fd.Case(structure, air=fluid(**{"velocity": WIND, "resolution": 2} | changes))
+    start = fd.State(velocity=np.full(structure.nodes.shape, speed))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        prepare(case, 1e-3, initial=start)
+    said = [str(each.message) for each in caught if each.category is ModelRangeWarning]
+    assert [text.startswith("air: in a wind of 0.78") for text in said] == [True] * warns

@@ -22,6 +22,7 @@ from foldyn.dynamics.initial import (
     check_start,
     check_steady,
     check_touching,
+    warn_of_standing_in_wind,
     warn_of_unstable_damping,
 )
 from foldyn.dynamics.method_choice import AUTO, Choice, choose
@@ -214,6 +215,7 @@ def prepare(
     plan = _plan(case, integrator, duration, dt, every, critical, force, tolerance, float(start))
     _warn_of_damping(case, integrator, u, critical)
     warn_of_unstable_damping(case, origin)
+    warn_of_standing_in_wind(case, v)
     if plan.dt < SHARPEST * abs(plan.start):
         raise InputError(
             f" = {plan.start:g} s: steps of {plan.dt:.3g} s are lost in its rounding; start "

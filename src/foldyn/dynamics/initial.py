@@ -23,7 +23,7 @@ from foldyn.dynamics.modal_damping import about
 from foldyn.dynamics.motion_state import TALLY, Course, StepPlan
 from foldyn.dynamics.system import Packed, carry_supports, place, scratch
 from foldyn.dynamics.timing import histories
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning
 from foldyn.mechanics.following import following_force
 from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.results.contents import check_variable
@@ -32,6 +32,7 @@ from foldyn.values import whole
 
 AXES = "xyz"
 FIRST = 0.15  # first step over the largest one, times the fifth root of the tolerance
+SLOW_WIND = 0.05  # of the speed at the start: its square, which pushes, does not matter
 LOOKS = 501  # times at which supports and planes are looked at, beside the corners of histories
 ZERO = 1e-10  # of the largest stiffness: eigenvalues of less are none
 
@@ -208,6 +209,30 @@ def warn_of_unstable_damping(case: Case, start: Origin) -> None:
             f"{'them' if negative > 1 else 'it'}: the stiffness is not positive where the motion "
             'starts; take state = "rest", or start from a stable state',
             FoldynWarning,
+            stacklevel=4,
+        )
+
+
+def warn_of_standing_in_wind(case: Case, v: NDArray) -> None:
+    """Warn where the flow's change pushes, unless the sheet starts much faster than the wind.
+
+    v : (n, 3) velocities at the start, m/s.
+    """
+    air = case.air
+    if (
+        air is None
+        or air.added_mass is not True
+        or len(np.unique(case.structure.triangle_panel)) < 2
+    ):
+        return
+    wind = float(np.linalg.norm(air.velocity))
+    if wind > SLOW_WIND * float(np.linalg.norm(v, axis=1).max()):
+        warnings.warn(
+            f"air: in a wind of {wind:g} m/s panels that stand lack a moment of up to 0.3 times "
+            "1/2 density U^2 A a/2 (U the wind, A and a a panel's area and width): added mass "
+            'finds its flow anew only when a hinge has turned by 3 degrees; added_mass = "local", '
+            "of each panel alone, lacks none",
+            ModelRangeWarning,
             stacklevel=4,
         )
 
