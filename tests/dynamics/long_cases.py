@@ -63,9 +63,17 @@ def blown() -> fd.Case:
     return fd.Case(s, [fd.Fix([0, 1, 2])], [fold], air=gas)
 
 
+def warmed() -> fd.Case:
+    """A cell that stretches and curls as it gets warm and cold again."""
+    pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=110)
+    s = fd.discretize(pattern, SHEET)
+    heat = fd.Temperature(40.0, expansion=2e-4, curvature=1e-3, history=fd.HalfSine(duration=0.5))
+    return fd.Case(s, [fd.Fix([0, 1, 2])], [heat])
+
+
 CASES = {
     "sheet": sheet, "actuated": actuated, "creeping": creeping, "sliding": sliding,
-    "touching": touching, "blown": blown,
+    "touching": touching, "blown": blown, "warmed": warmed,
 }  # fmt: skip
 
 

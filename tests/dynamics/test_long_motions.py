@@ -81,6 +81,7 @@ KINDS = {  # name of the case, its arguments, and what of the methods
     "actuated": (["rk4", "generalized_alpha"], {"duration": 0.6, "every": 0.01}),
     "blown": (["rk4", "dormand_prince"], {"duration": 1.2, "every": 0.02}),
     "creeping": (["dormand_prince", "generalized_alpha"], {**SECOND, "dt": 0.002}),
+    "warmed": (["rk4"], {"duration": 0.5, "every": 0.01}),
     "sliding": (["energy_momentum"], {"duration": 0.02, "every": 0.001}),
 }
 RUNS = [(kind, method) for kind, (methods, _) in KINDS.items() for method in methods]

@@ -374,6 +374,8 @@ def state_parts(packed: Packed, course: Course) -> dict[str, Any]:
     if packed.added.acts:
         own = packed.added
         parts["added_mass"] = [own.flow, own.resistance, own.guess, own.angle, own.made]
+    if packed.heat is not None:
+        parts["heat"] = [packed.heat.seen]
     return parts
 
 

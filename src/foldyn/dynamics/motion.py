@@ -280,8 +280,9 @@ class Motion:
         self.course = self.beginning
         self._flow = self._state[0] if self.origin.flow is None else self.origin.flow
         heat = self.packed.heat
-        if heat is not None:
-            heat.seen[:] = np.nan, 0.0
+        if heat is not None:  # motions share the rest
+            heat = heat._replace(seen=np.array([np.nan, 0.0]))
+            self.packed = self.packed._replace(heat=heat)
         self.output = Output(
             self.case, self.plan, self._sampler, self._branches, self._keeping, heat
         )
