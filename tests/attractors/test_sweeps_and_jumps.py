@@ -10,11 +10,12 @@ import pytest
 from two_bars import SIZE, TURN, X, at, duffing, place
 
 import foldyn as fd
-from foldyn.attractors.diagram import repeats_after
+from foldyn.attractors.diagram import Steady, repeats_after
 from foldyn.attractors.jumps import jumps_between
 from foldyn.attractors.run import extremes
 from foldyn.attractors.sweep import Line
 from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
+from one_hinge import WING, one_hinge
 
 ALPHA, FORCE = 0.05, 0.06
 DT = TURN / 100
@@ -285,3 +286,17 @@ def test_a_swept_sine_has_no_jumps_where_curves_are_but_steep(cubic, alpha, forc
     step = max(1, int(0.01 / abs(np.diff(found.frequency[0])[0]) / TURN))
     change = found.amplitude.values[:, step:] / found.amplitude.values[:, :-step]
     assert np.abs(np.log(change)).max() > 0.2  # within a hundredth of the frequency
+
+
+def test_steps_from_a_sweep_begin_with_what_creases_remember_there(monkeypatch):
+    """A crease that has yielded in the sweep has a permanent turn where motions are held."""
+    drive = fd.Force([WING], (0, 0, 2e-3), fd.Harmonic(0.7))
+    law = fd.Plastic(yield_moment=3e-3, law="linear")
+    case = one_hinge(law, loads=[drive], damping=fd.Rayleigh(alpha=0.3), hold=False)
+    held = []
+    point = Steady.point
+    monkeypatch.setattr(Steady, "point", lambda *a: held.append(a[1].state) or point(*a))
+    lift = fd.Quantity("m", "lift", (), lambda u, v, t: u[WING, 2])
+    fd.swept_sine(case, lift, (0.4, 0.9), 25.0, sweep="up", resolution=0.2, settle=2, dt=0.01)
+    assert held
+    assert np.abs(held[0].memory).max() > 0.01

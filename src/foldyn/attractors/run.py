@@ -32,6 +32,7 @@ class Stretch(NamedTuple):
     time: NDArray[np.float64]  # (k,) s
     displacement: NDArray[np.float64]  # (k, n, 3) m
     velocity: NDArray[np.float64]  # (k, n, 3) m/s
+    memory: NDArray[np.float64] | None = None  # (k, b, 2) of laws that have one
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,8 @@ class Run:
             start=start,
         )  # fmt: skip
         found = motion.samples(report)
-        stretch = Stretch(found.time, found.displacement, found.velocity)
+        memory = found.memory if found.memory.size else None
+        stretch = Stretch(found.time, found.displacement, found.velocity, memory)
         return stretch, replace(self, state=motion.end)
 
 
@@ -110,7 +112,7 @@ def measured(measure: Quantity, stretch: Stretch, name: str = "measure") -> NDAr
     """Values (k,) of a measure at the samples of a stretch."""
     assert measure.function is not None
     try:
-        values = [measure.function(u, v, float(t)) for t, u, v in zip(*stretch, strict=True)]
+        values = [measure.function(u, v, float(t)) for t, u, v in zip(*stretch[:3], strict=True)]
     except Exception as error:
         raise InputError(f": raised {type(error).__name__}: {error}", name) from error
     try:

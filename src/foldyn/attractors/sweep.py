@@ -245,8 +245,9 @@ class Glide(NamedTuple):
         t, frequency, state = self.stretch.time[k], float(self.rates[cycle]), self.run.state
         turns = (self.line.start + 0.5 * self.line.slope * t) * t
         place, speed = self.stretch.displacement[k], self.stretch.velocity[k]
-        origin = None if state is None else state.origin
-        here = State(place, speed, origin=origin and replace(origin, flow=None, looked=0))
+        memory = None if self.stretch.memory is None else self.stretch.memory[k]
+        origin = state and state.origin and replace(state.origin, flow=None, looked=0)
+        here = State(place, speed, memory, origin=origin)
         return replace(self.run, state=here), frequency, float(turns % 1.0) / frequency
 
 
