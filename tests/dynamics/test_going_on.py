@@ -121,3 +121,19 @@ def test_rest_angles_of_the_damping_stay_those_of_the_first_start():
         case, 16 * dt, initial=fd.initial_state(first), start=0.25 + 16 * dt, **options
     )
     assert np.array_equal(end(last)["displacement"], end(whole)["displacement"])
+
+
+def test_each_motion_of_many_goes_on_from_where_it_began_itself():
+    case, dt = fd.Case(S, HELD, [PUSH], MODAL, air=WATER), 2.0**-12
+    options = {"method": "rk4", "dt": dt, "every": 24 * dt}
+    first = fd.simulate(case, 72 * dt, initial=fd.State(BENT), **options)
+    starts = [fd.initial_state(first), fd.State(DROPPED)]
+    many = fd.simulate_many([case] * 2, 48 * dt, initial=starts, start=72 * dt, **options)
+    for k, start in enumerate(starts):
+        one = fd.simulate(case, 48 * dt, initial=start, start=72 * dt, **options)
+        alone, beside = (fd.initial_state(each).origin for each in (one, many.isel(model=k)))
+        assert (
+            (beside.time, beside.looked) == (alone.time, alone.looked) == (k * 72 * dt, (8, 0)[k])
+        )
+        assert np.array_equal(beside.displacement, alone.displacement)
+        assert np.array_equal(beside.flow, alone.flow)

@@ -27,7 +27,7 @@ from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning
 from foldyn.mechanics.following import following_force
 from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.results.contents import check_variable
-from foldyn.results.quantities import CONTINUATIONS, ORIGIN, PLACE
+from foldyn.results.quantities import CONTINUATIONS, ORIGIN
 from foldyn.values import whole
 
 AXES = "xyz"
@@ -71,23 +71,23 @@ def initial_state(result: Any, at: int = -1) -> State:
         ).to_numpy()
     if "time" not in sample:
         return State(**state)
-    return State(**state, continuation=_continuation(sample), origin=_origin(sample))
+    origin = origin_of(sample, "initial_state: ")
+    return State(**state, continuation=_continuation(sample), origin=origin)
 
 
-def _origin(sample: Any) -> Origin | None:
-    """Where the motion began of a sample, if its result says so."""
+def origin_of(sample: Any, place: str) -> Origin | None:
+    """Where the motion of a sample began, if its result says so."""
+
+    def known(name: str) -> NDArray:
+        return check_variable(sample, name, ORIGIN[name].dims, place=place).to_numpy()
+
     if "origin" not in sample:
         return None
-    places = {
-        name: check_variable(sample, name, PLACE, place="initial_state: ")
-        for name in ORIGIN
-        if name in sample
-    }
-    begun, flow = places["origin"].attrs.get("time"), places.get("flow")
-    origin = Origin(places["origin"].to_numpy(), begun)
-    if flow is None or flow.attrs.get("time") != float(sample["time"]):
+    begun = float(known("origin_time"))
+    origin = Origin(known("origin"), None if np.isnan(begun) else begun)
+    if "flow" not in sample or known("flow_time") != float(sample["time"]):
         return origin
-    return replace(origin, flow=flow.to_numpy(), looked=int(flow.attrs["looked"]))
+    return replace(origin, flow=known("flow"), looked=int(known("flow_looked")))
 
 
 def _continuation(sample: Any) -> Continuation | None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case, Constant, Impose, Origin, State
 from foldyn.cases.contact_checks import check_contact
+from foldyn.dynamics import initial
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.linearized import equivalent_slope
 from foldyn.periodic.balance import AtFrequency, Balance, Converged, newton
@@ -18,8 +19,6 @@ from foldyn.periodic.continuation import Step, Stride, point_at, steps
 from foldyn.periodic.families import ByLevel
 from foldyn.periodic.fourier import values_of
 from foldyn.periodic.orbit import Orbit
-from foldyn.results.contents import check_variable
-from foldyn.results.quantities import PLACE
 from foldyn.statics import trace
 from foldyn.statics.equilibrium import drives
 from foldyn.statics.tracing import displacement_of
@@ -71,10 +70,8 @@ def origin_of(case: Case, start: Any) -> Origin | None:
         return None
     if isinstance(start, State):
         return start.origin_of(case.structure.nodes.shape, field="start")
-    if isinstance(start, xr.Dataset) and "origin" in start:
-        found = check_variable(start, "origin", PLACE, place="start: ")
-        return Origin(found.to_numpy(), found.attrs.get("time"))
-    return Origin(equilibrium(case))
+    found = initial.origin_of(start, "start: ") if isinstance(start, xr.Dataset) else None
+    return found or Origin(equilibrium(case))
 
 
 def coefficients(balance: Balance, start: Any, omega: float, level: float = 1.0) -> NDArray:

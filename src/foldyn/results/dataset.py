@@ -134,17 +134,14 @@ def trajectory_dataset(
 
 def origin_variables(origin: Origin, time: float = math.nan) -> dict[str, Any]:
     """Variables that say where a motion began that goes on at a time (s)."""
-    places = {"origin": origin.displacement, "flow": origin.flow}
-    data: dict[str, Any] = {
-        name: variable(own.dims, places[name], own.units, own.text)
-        for name, own in ORIGIN.items()
-        if places[name] is not None
+    begun = math.nan if origin.time is None else origin.time
+    values: dict[str, Any] = {"origin": origin.displacement, "origin_time": begun}
+    if origin.flow is not None:
+        values |= {"flow": origin.flow, "flow_time": time, "flow_looked": origin.looked}
+    return {
+        name: variable(ORIGIN[name].dims, value, ORIGIN[name].units, ORIGIN[name].text)
+        for name, value in values.items()
     }
-    if origin.time is not None:
-        data["origin"][2]["time"] = origin.time
-    if "flow" in data:
-        data["flow"][2].update(time=time, looked=origin.looked)
-    return data
 
 
 def path_dataset(

@@ -68,7 +68,10 @@ CONTINUATIONS: Mapping[str, str] = {
 """What motions of implicit methods have besides, along the dimension continued."""
 ORIGIN: Mapping[str, Quantity] = {
     "origin": Quantity("m", "displacement about which damping has its start", PLACE),
+    "origin_time": Quantity("s", "when the motion was there; nan: under the constant loads alone"),
     "flow": Quantity("m", "displacement at which the flow was found last", PLACE),
+    "flow_time": Quantity("s", "time at which the motion has that flow"),
+    "flow_looked": Quantity(text="steps until then since that flow was checked"),
 }
 """What motions have besides whose damping or added mass depends on where they began."""
 SINCE = "since rest, or since the state from which a path was started"
