@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.dynamics.sampling import CONTACT_FORCE
+from foldyn.errors import ComputationError
 from foldyn.structures import Structure
 from foldyn.viewer.states import (
     bar_strain,
@@ -37,7 +38,8 @@ def fields(case: Case, result: Any, displacement: NDArray) -> dict[str, Field]:
     """Fields of a motion or path with displacements (samples, n, 3), by name.
 
     What displacements do not tell is left out: moments and energies where laws have memory, and
-    turns as well where panels give way beside such creases or, in motions, beside damped ones.
+    turns as well where panels give way beside such creases or, in motions, beside damped ones, or
+    find no balance.
     Speeds are not among them: the page takes them from displacements.
     """
     structure, out = case.structure, {}
@@ -48,7 +50,10 @@ def fields(case: Case, result: Any, displacement: NDArray) -> dict[str, Field]:
         out["bar_strain"] = _strain_field(bar_strain(structure, displacement))
     if not creases_known(case, result):
         return out
-    found = states(case, result, displacement)
+    try:
+        found = states(case, result, displacement)
+    except ComputationError:  # a motion that has exploded: its panels balance no more
+        return out
     turn = np.degrees(found.turn)
     out["turn"] = Field("turn of creases from rest", "°", "crease", turn, True)
     if not memory_acts(case, result):

@@ -62,22 +62,20 @@ def creases_known(case: Case, result: Any) -> bool:
 def states(case: Case, result: Any, displacement: NDArray) -> States:
     """States at displacements (samples, n, 3), m, with unknowns without mass in balance."""
     body, structure, kind = case.body, case.structure, case.structure.hinge_kinds[0]
-    acting = list(_acting(case, result, len(displacement)))
-    rest = np.tile(body.sheet.rest_angles, (len(displacement), 1))
+    samples = len(displacement)
+    acting = list(_acting(case, result, samples))
+    rest = np.tile(body.sheet.rest_angles, (samples, 1))
     for load, factor in acting:
         for change, _ in load.rest_terms:
             rest += np.outer(factor, change)
     changes, hinges = rest - body.sheet.rest_angles, body.sheet.fold_hinges()
     angle = hinge_angles(structure, hinges.nodes, displacement)
-    plates, (stress, free, curl) = (
-        np.zeros((len(displacement), 0)),
-        _warm(acting, len(displacement)),
-    )
+    plates, (stress, free, curl) = np.zeros((samples, 0)), _warm(acting, samples)
     if len(body.hidden):
-        parts = [
+        parts = (
             (part, k) for k, (load, _) in enumerate(acting) for part, _ in load.following_terms
-        ]
-        pushes, factors = joined(parts), np.reshape([f for _, f in acting], (-1, len(displacement)))
+        )
+        pushes, factors = joined(parts), np.reshape([f for _, f in acting], (-1, samples))
         hidden, none = np.zeros(len(body.hidden)), sparse.csr_array((0, len(body.hidden)))
         found, kept = [], []
         for k, u in enumerate(displacement):
@@ -97,16 +95,8 @@ def states(case: Case, result: Any, displacement: NDArray) -> States:
     places = (np.arange(len(hinges.fold)), hinges.fold)
     shape = len(hinges.fold), len(structure.folds)
     of_crease = sparse.csr_array((np.ones(len(hinges.fold)), places), shape)
-    return States(
-        turn @ of_crease,
-        moment @ of_crease,
-        hinges.nodes[:, :2],
-        energy,
-        plates,
-        rest,
-        stress,
-        free,
-    )
+    turned, pairs = (turn @ of_crease, moment @ of_crease), hinges.nodes[:, :2]
+    return States(*turned, pairs, energy, plates, rest, stress, free)
 
 
 def _acting(case: Case, result: Any, samples: int) -> Iterator[tuple[SomeLoads, NDArray]]:
