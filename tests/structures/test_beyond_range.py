@@ -93,6 +93,20 @@ def test_skew_panels():
         assert told(lambda p=pattern, s=sheet: fd.discretize(p, s, preset="n5b8e")) == []
 
 
+def test_limits_themselves_are_within_range_whatever_rounding_says():
+    for dihedral in (100, 115, 125, 140):
+        skew = fd.patterns.miura(panel_angle=33, dihedral=dihedral)
+        assert told(lambda p=skew: fd.discretize(p, fd.Sheet(4e9, 0.3, 0.005))) == []
+    for ratio in (0.1, 0.2, 0.35, 0.4):
+        foam = fd.Sheet(3e7, ratio, 4e-3)
+        for width in (0.03, 0.05, 0.07):
+            flap = fd.patterns.simple_fold(a=width, b=0.1, dihedral=120)
+            stiff = 3.0 * foam.bending_modulus / width
+            assert (
+                told(lambda p=flap, s=foam, k=stiff: fd.discretize(p, s, crease_stiffness=k)) == []
+            )
+
+
 @pytest.mark.parametrize(("fold", "sine"), [(90.0, 1.0), (30.0, 0.5)])
 def test_folded_welds(fold, sine):
     """Told of a thickness over length and sine of the fold beyond 0.05; nothing of flat welds."""

@@ -29,6 +29,7 @@ FOLDED = 0.05  # t/(L sin fold) of welds, above which they bow as they are not l
 FLAT = 0.15  # the same of creases
 LOCKING = 1.1  # times the stiffness of a crease: 5 % in frequency
 SMOOTH = 1e-3  # rad, of a fold that is none
+DIGITS = 6  # decimals of what is compared with these, so that rounding passes none
 SHELL = "take the shell (fd.shell) (docs/fidelity.md, Beyond the range)"
 GIVING = f'take preset = "n5b8e", or {SHELL[5:]}'
 
@@ -111,7 +112,7 @@ def _relative_stiffness(pattern: Pattern, sheet: Sheet, folds: NDArray) -> NDArr
     modulus = sheet.values("bending_modulus", len(pattern.faces))[pattern.crease_faces]
     length = lengths(pattern.vertices, pattern.creases)
     width = pattern.face_areas[pattern.crease_faces] / length[:, None]
-    return folds / length * (width / modulus).mean(axis=1)
+    return np.round(folds / length * (width / modulus).mean(axis=1), DIGITS)
 
 
 def _strips(pattern: Pattern) -> NDArray[np.bool_]:
@@ -136,7 +137,7 @@ def _smallest_corner(pattern: Pattern, rigid: Collection[int]) -> tuple[float, i
         angle = np.degrees(np.arccos(((ahead * back).sum(axis=1) / size).clip(-1.0, 1.0).max()))
         if angle < least:
             least, panel = float(angle), k
-    return least, panel
+    return round(least, DIGITS), panel
 
 
 def _slenderness(
@@ -146,4 +147,5 @@ def _slenderness(
     thickness = sheet.values("thickness", len(pattern.faces))[faces].max(axis=1, initial=0.0)
     sine = np.linalg.norm(np.cross(*pattern.face_normals[faces].transpose(1, 0, 2)), axis=1)
     across = lengths(pattern.vertices, edges) * sine
-    return np.divide(thickness, across, out=np.zeros(len(edges)), where=sine > SMOOTH)
+    share = np.divide(thickness, across, out=np.zeros(len(edges)), where=sine > SMOOTH)
+    return share.round(DIGITS)
