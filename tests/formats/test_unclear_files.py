@@ -189,6 +189,7 @@ def test_transforms_about_an_origin():
         ("transform: translate(10%, 0)", 'line 1.transform = "translate.10%, 0.": is no transform'),
         ("transform: rotate3d(1, 0, 0, 60deg)", "line 1.transform = .* is no transform"),
         ("transform: rotate(3px)", "line 1.transform = .* is no transform"),
+        ("transform: translate(calc(1mm + 2px), 0)", "or apply it to the coordinates"),
         ("translate: 3px 4px", 'line 1.translate = "3px 4px": is not read from CSS'),
         ("rotate: 30deg", 'line 1.rotate = "30deg": is not read from CSS'),
     ],

@@ -94,7 +94,11 @@ def placing(text: str, place: str) -> Placing:
         m = Matrix(" ".join(plain))
         found = np.array([[m.a, m.c, m.e], [m.b, m.d, m.f]], dtype=np.float64)
     except (ValueError, TypeError, KeyError, IndexError, OverflowError, AttributeError):
-        raise InputError(f" = {show(text)}: is no transform", f"{place}.transform") from None
+        raise InputError(
+            f" = {show(text)}: is no transform of the plane by numbers, lengths and angles, as "
+            "rotate(30deg) translate(5px, 2mm); write it so, or apply it to the coordinates",
+            f"{place}.transform",
+        ) from None
     if not np.isfinite(found).all():
         raise InputError(f" = {show(text)}: must be finite", f"{place}.transform")
     return found
