@@ -106,6 +106,11 @@ class Cut:
         return 2 * (int(self.elements.max()) + 1)
 
     @cached_property
+    def beside(self) -> NDArray:
+        """Triangles with points on edges."""
+        return np.flatnonzero(np.isin(self.elements, np.concatenate(self.along)).any(axis=1))
+
+    @cached_property
     def entries(self) -> tuple[NDArray, NDArray, NDArray]:
         """Rows and pointers of the entries of their matrix by columns.
 
@@ -334,29 +339,42 @@ def _moves(mesh: PanelMesh) -> tuple[NDArray, NDArray]:
     return axes, given.reshape(-1, given.shape[2])
 
 
+@lru_cache(maxsize=64)
+def _by_slopes(nu: float) -> NDArray:
+    """Stiffness (16, 144) of triangles of area 1/2 by the products of their slopes.
+
+    Those (2, 2) of the coordinates that are 1 at the second and at the third corner.
+    """
+    both, linear = 0.0, np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+    for place in MIDDLES:
+        after = np.roll(np.eye(3), -1, axis=0)
+        corners = (4 * place - 1)[:, None] * np.eye(3)
+        middles = 4 * (np.roll(place, -1)[:, None] * np.eye(3) + place[:, None] * after)
+        shapes = np.concatenate([corners, middles]) @ linear
+        both = both + np.einsum("ar,bs->arbs", shapes, shapes) / 6.0
+    same, shear = np.eye(2), 0.5 * (1.0 - nu)
+    elastic = nu * np.einsum("ic,jd->icjd", same, same)
+    elastic += shear * np.einsum("ij,cd->icjd", same, same)
+    elastic += shear * np.einsum("id,jc->icjd", same, same)
+    return np.einsum("arbs,icjd->crdsaibj", both, elastic / (1.0 - nu**2)).reshape(16, 144)
+
+
 def _stretching(
     mesh: PanelMesh, axes: NDArray, poissons_ratio: float, stiffness: NDArray
 ) -> sparse.csc_array:
     """Stiffness of the displacements of all points in plane stress, E t = `stiffness` (nt,)."""
-    nu, x, elements = poissons_ratio, mesh.x, mesh.cut.elements
-    elastic = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, 0.5 * (1 - nu)]]) / (1 - nu**2)
-    corners = x[elements[:, :3]]
+    elements, turned = mesh.cut.elements, mesh.cut.beside
+    corners = mesh.x[elements[:, :3]]
     spans = corners[:, 1:] - corners[:, :1]
-    inverse, part = np.linalg.inv(spans), stiffness * np.linalg.det(spans) / 6.0
-    gradient = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)
-    following, block = np.roll(gradient, -1, axis=2), 0.0
-    for place in MIDDLES:
-        slopes = np.concatenate(
-            [gradient * (4 * place - 1), 4 * (np.roll(place, -1) * gradient + place * following)],
-            axis=2,
-        )
-        strain = np.zeros((len(elements), 3, 6, 2))
-        strain[:, 0, :, 0], strain[:, 1, :, 1] = slopes[:, 0], slopes[:, 1]
-        strain[:, 2, :, 0], strain[:, 2, :, 1] = slopes[:, 1], slopes[:, 0]
-        strain = strain.reshape(-1, 3, 12)
-        block = block + strain.transpose(0, 2, 1) @ (part[:, None, None] * elastic @ strain)
+    slopes = np.linalg.inv(spans).reshape(-1, 4)
+    squares = (
+        (stiffness * np.linalg.det(spans))[:, None, None] * slopes[:, :, None] * slopes[:, None]
+    )
+    block = squares.reshape(-1, 16) @ _by_slopes(poissons_ratio)
+    own = block[turned]
     for _ in range(2):  # first by rows, then, symmetric as they are, by columns
-        block = axes[elements] @ np.reshape(block, (-1, 6, 2, 12))
-        block = block.reshape(-1, 12, 12).transpose(0, 2, 1)
+        own = axes[elements[turned]] @ own.reshape(-1, 6, 2, 12)
+        own = own.reshape(-1, 12, 12).transpose(0, 2, 1)
+    block[turned] = own.reshape(-1, 144)
     rows, pointers, place = mesh.cut.entries
     return _by_columns(np.bincount(place, np.ravel(block), len(rows)), rows, pointers)
