@@ -31,8 +31,10 @@ def heat_of(
         for other, j in parts:
             for g in range(2):
                 quadratic[g, i, j] += one.push[g] @ other.free[g]
-    bars, law, count = len(parts[0][0].stress), structure.bar_law, len(loads.moment)
-    volume = structure.sheet.youngs_modulus * structure.bar_area if bars else np.zeros(0)
+    count, code, addresses, volume = len(loads.moment), 0, None, np.zeros(0)
+    if len(parts[0][0].stress):
+        code, addresses = structure.bar_law.code, structure.bar_law.addresses
+        volume = structure.sheet.youngs_modulus * structure.bar_area * structure.bar_length
     names = list(structure.energy_groups)
     groups = [next(names.index(n) for n in kind if n in names) for kind in (IN_PLANE, BENDING)]
     return Heat(
@@ -42,9 +44,9 @@ def heat_of(
         quadratic=quadratic,
         stress=np.array([own.stress for own, _ in parts], float),
         row=np.array([row for _, row in parts], np.int64),
-        volume=np.asarray(volume * structure.bar_length if bars else volume, float),
-        code=law.code if bars else 0,
-        addresses=np.array((law.addresses if bars else None) or (0, 0, 0), np.int64),
+        volume=volume,
+        code=code,
+        addresses=np.array(addresses or (0, 0, 0), np.int64),
         inner=np.array([own.inner for own, _ in parts], float),
         offset=offset,
         seen=np.array([np.nan, 0.0]),

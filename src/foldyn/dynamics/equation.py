@@ -340,10 +340,8 @@ class EquationOfMotion:
         self.setting = Setting(model.terms, system, mass, share, s, packed.added)
         self._whole = whole = Context(self.setting)
         self.balance = balance = Context(_balance(self.setting, whole))
-        self._heat = (
-            Context(Warm(packed.heat, s.displacement, s.factor, np.zeros(system.energies)))
-            if packed.heat
-            else None
+        self._heat = packed.heat and Context(
+            Warm(packed.heat, s.displacement, s.factor, np.zeros(system.energies))
         )
         self._slow = slow = slow_contacts(packed, work, s, balance.value) if slows else None
         remembers = model.terms.kernel[:, ADVANCE_CLOCK].any()
@@ -372,21 +370,13 @@ class EquationOfMotion:
     def sampled(self, out: Samples) -> Context:
         """The equation with samples that go to `out`."""
         if self._out is not out:  # contexts are filled by Python: once for each window of samples
-            whole = self._whole
+            whole, heat = self._whole, self._heat
             fluid = observe_fluid.at(whole) if self.setting.added.acts else 0
-            heat = self._heat
-            self._recording = recording = Context(
-                Recording(
-                    self.setting,
-                    self._course,
-                    out,
-                    whole.address,
-                    fluid,
-                    warm=warm.at(heat) if heat else 0,
-                    heat=heat.address if heat else 0,
-                    lacking=heat.value.energy if heat else np.zeros(0),
-                )
-            )
+            lacks: tuple[int, int, NDArray] = 0, 0, np.zeros(0)
+            if heat:
+                lacks = warm.at(heat), heat.address, heat.value.energy
+            given = self.setting, self._course, out, whole.address, fluid
+            self._recording = recording = Context(Recording(*given, *lacks))
             self._sampled = Context(
                 self.still.value._replace(sample=_sample.at(recording), recording=recording.address)
             )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.jit.compiled import inner_scalar, kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.contact.distances import (
     apart,
     between,
@@ -103,15 +103,8 @@ def _closest(x, triangles, pairs, nodes, weights):
                 p = point(x, v)
                 wa, wb, wc, _ = closest_on_triangle(p, pa, pb, pc)
                 r = apart(p, pa, pb, pc, wa, wb, wc)
-                square = dot(r, r)
-                count = _counted(square, best, count)
-                best = min(best, square)
-                if square <= (1.0 + TIE) * best and count < MOST:
-                    nodes[count, 0], nodes[count, 1] = v, a
-                    nodes[count, 2], nodes[count, 3] = b, c
-                    weights[count, 0], weights[count, 1] = 1.0, -wa
-                    weights[count, 2], weights[count, 3] = -wb, -wc
-                    count += 1
+                found = (v, a, b, c), (1.0, -wa, -wb, -wc)
+                best, count = _kept(dot(r, r), found, best, count, nodes, weights)
         for one in range(3):
             a, b = triangles[pairs[k, 0], one], triangles[pairs[k, 0], (one + 1) % 3]
             pa, pb = point(x, a), point(x, b)
@@ -120,19 +113,22 @@ def _closest(x, triangles, pairs, nodes, weights):
                 pc, pd = point(x, c), point(x, d)
                 s, t, _ = closest_of_segments(pa, pb, pc, pd)
                 r = between(pa, pb, pc, pd, s, t)
-                square = dot(r, r)
-                count = _counted(square, best, count)
-                best = min(best, square)
-                if square <= (1.0 + TIE) * best and count < MOST:
-                    nodes[count, 0], nodes[count, 1] = a, b
-                    nodes[count, 2], nodes[count, 3] = c, d
-                    weights[count, 0], weights[count, 1] = 1.0 - s, s
-                    weights[count, 2], weights[count, 3] = t - 1.0, -t
-                    count += 1
+                found = (a, b, c, d), (1.0 - s, s, t - 1.0, -t)
+                best, count = _kept(dot(r, r), found, best, count, nodes, weights)
     return np.sqrt(best), count
 
 
-@inner_scalar
-def _counted(square, best, count):
-    """How many pairs of points stay the closest ones beside another: none if that is closer."""
-    return 0 if square < (1.0 - TIE) * best else count
+@inner
+def _kept(square, found, best, count, nodes, weights):
+    """Keep a pair of points if it is as close as the others, which go if it is closer.
+
+    Returns the square of the least distance, and the number of pairs.
+    """
+    if square < (1.0 - TIE) * best:
+        count = 0
+    best = min(best, square)
+    if square <= (1.0 + TIE) * best and count < MOST:
+        for k in range(4):
+            nodes[count, k], weights[count, k] = found[0][k], found[1][k]
+        count += 1
+    return best, count
