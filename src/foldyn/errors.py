@@ -187,7 +187,7 @@ class StretchWarning(FoldynWarning):
 
 
 class ModelRangeWarning(FoldynWarning):
-    """Bars and hinges are asked for what is beyond their range: the shell gives it."""
+    """Bars and hinges are used beyond their range, where a shell is not."""
 
 
 OF_MODELS = (StretchWarning, ModelRangeWarning)

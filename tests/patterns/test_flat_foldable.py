@@ -102,7 +102,7 @@ def test_both_sides_of_a_cut_stay_together():
 @pytest.mark.parametrize(
     ("pattern", "error", "message"),
     [
-        (fd.patterns.miura(dihedral=120), InputError, "pattern: is folded; repair the flat"),
+        (fd.patterns.miura(dihedral=120), InputError, "pattern: is folded; mend the flat"),
         (
             fd.thicken(fd.patterns.simple_fold(dihedral=180), 1e-3),
             InputError,

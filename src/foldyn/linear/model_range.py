@@ -37,7 +37,7 @@ def warn_beyond(
         numbers = f"{above[0] + 1} to {above[-1] + 1}"
         numbers = numbers if together else ", ".join(str(k + 1) for k in above)
         what = f"{name} {numbers} lies" if len(above) == 1 else f"{name}s {numbers} lie"
-    remedy = "take the shell (fd.shell)"
+    remedy = "take the shell, fd.shell"
     if internal == 0:
         scheme = "" if structure.options.scheme == "n5b8e" else 'preset = "n5b8e" with '
         remedy = f"take {scheme}internal = 3, or the shell"

@@ -86,9 +86,7 @@ def flat_foldable(pattern: Pattern) -> Pattern:
         raise InputError(": has thick panels; move the vertices of the thin pattern", "pattern")
     height = float(np.ptp(pattern.vertices[:, 2]))
     if height > _PLANE * pattern.size or (np.abs(pattern.dihedrals - np.pi) > EXACT).any():
-        raise InputError(
-            ": is folded; repair the flat drawing, and fold what is read of it", "pattern"
-        )
+        raise InputError(": is folded; mend the flat drawing, and fold that", "pattern")
     vertices = flat_foldability(pattern)
     rows = slips(vertices)
     if not rows.size:

@@ -25,12 +25,12 @@ STIFF = 3.0  # k w/G of a crease beside panels of width w: the sheet bends acros
 STIFF_STRIP, SQUARE = 0.3, 1.4  # the same where creases do not meet, of panels longer than that
 FEW = 16  # panels of a sheet with clamped edges
 SKEW = 33.0  # degrees, the smallest corner of a panel of four
-FOLDED = 0.05  # t/(L sin fold) of welds, above which they bow as they are not let
+FOLDED = 0.05  # t/(L sin fold) of welds, above which they bow, which the model does not allow
 FLAT = 0.15  # the same of creases
 LOCKING = 1.1  # times the stiffness of a crease: 5 % in frequency
 SMOOTH = 1e-3  # rad, of a fold that is none
 DIGITS = 6  # decimals of what is compared with these, so that rounding passes none
-SHELL = "take the shell (fd.shell) (docs/fidelity.md, Beyond the range)"
+SHELL = "take the shell, fd.shell (docs/fidelity.md, Beyond the range)"
 GIVING = f'take preset = "n5b8e", or {SHELL[5:]}'
 
 
@@ -100,7 +100,7 @@ def _doubts(pattern: Pattern, sheet: Sheet, options: ModelOptions, folds: NDArra
     if thick.max(initial=0.0) > FLAT and pattern.boards is None:  # whose planes are no panels
         yield (
             f"crease {int(thick.argmax())} is nearly flat, or closed (t/(L sin fold) = "
-            f"{thick.max():.2g}, at most {FLAT:g}): it bows, which this model does not let it, "
+            f"{thick.max():.2g}, at most {FLAT:g}): it bows, which this model does not allow, "
             f"and half the modes are more than 5 % off: {GIVING}"
         )
     if options.clamped and len(pattern.faces) <= FEW:
