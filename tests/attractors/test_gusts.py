@@ -56,11 +56,13 @@ def test_a_gust_glides_and_sets_the_period():
     assert section.sizes["time"] == 3 and np.ptp(section.displacement.values[:, 0, 2]) < 1e-6
 
 
-def test_wind_without_drag_is_no_drive():
+def test_wind_drives_by_added_mass_too_and_still_air_does_not():
     case = gusty(2.0)
     air = fd.Air(added_mass=True, drag=False, velocity=(0, 0, 1.0), history=fd.Harmonic(2.0))
     assert drive_frequency(case) == 2.0
-    assert drive_frequency(case.altered(air=air)) == 0.0
+    assert drive_frequency(case.altered(air=air)) == 2.0
+    still = fd.Air(history=fd.Harmonic(2.0))
+    assert drive_frequency(case.altered(air=still)) == 0.0
 
 
 @pytest.mark.parametrize("search", [fd.bifurcation_diagram, fd.swept_sine])
