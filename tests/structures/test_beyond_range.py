@@ -18,11 +18,13 @@ MIURA = fd.patterns.miura(cells=(1, 1), a=0.05, b=0.045, panel_angle=65, dihedra
 
 
 def told(make) -> list[str]:
-    """What is said of the range of a model."""
+    """What is said of the range of a model, at the user's line."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         make()
-    return [str(one.message) for one in caught if one.category is ModelRangeWarning]
+    found = [one for one in caught if one.category is ModelRangeWarning]
+    assert {one.filename for one in found} <= {__file__}
+    return [str(one.message) for one in found]
 
 
 def strip(panels: int, width: float) -> fd.Pattern:
@@ -183,7 +185,10 @@ def test_responses_and_bands_above_the_range():
     assert 0 < inside < 9
     assert told(lambda: fd.bands(cell, long, count=inside)) == []
     for found in (fd.bands, fd.linear.damped_bands):
-        (text,) = told(lambda f=found: f(cell, long, count=9))
+        with pytest.warns(ModelRangeWarning) as caught:
+            found(cell, long, count=9)
+        assert [one.filename for one in caught] == [__file__]
+        text = str(caught[0].message)
         assert text.startswith(f"bands {inside + 1} to 9 lie above") and "internal" not in text
     assert len(told(lambda: fd.linear.attenuation(cell, [1.01 * limit], phase=1.0))) == 1
     assert told(lambda: fd.linear.attenuation(cell, [0.99 * limit], phase=1.0)) == []

@@ -13,7 +13,11 @@ from foldyn.structures.plate_frequency import range_of
 
 
 def warn_beyond(
-    structure: Discretized, frequency: NDArray, name: str = "", internal: int | None = None
+    structure: Discretized,
+    frequency: NDArray,
+    name: str = "",
+    internal: int | None = None,
+    level: int = 3,
 ) -> None:
     """Warn of frequencies (k,), Hz, above the range of the model.
 
@@ -26,6 +30,8 @@ def warn_beyond(
         What they are numbered as, "mode" or "band"; nothing where they are themselves the input.
     internal : int or None
         Internal amplitudes of each panel; None where the analysis takes none.
+    level : int
+        Whose line the warning shows, as in `warnings.warn`.
     """
     limit, share = range_of(structure, internal or 0)
     above = np.flatnonzero(frequency > limit)
@@ -45,5 +51,5 @@ def warn_beyond(
         f"{what} above {limit:.4g} Hz, {share:g} of the panels' own frequency, where most modes of "
         f"this model are more than 10 % off or missing: {remedy} (docs/fidelity.md, Vibration)",
         ModelRangeWarning,
-        stacklevel=4,
+        stacklevel=level,
     )

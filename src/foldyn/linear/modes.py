@@ -159,7 +159,7 @@ def spectrum_of(
     _warn(spectrum)
     _warn_of_stretch(linear, spectrum)
     frequency = np.sqrt(spectrum.values.clip(min=0.0)) / TURN
-    warn_beyond(case.structure, frequency, "mode", linear.internal)
+    warn_beyond(case.structure, frequency, "mode", linear.internal, level=4)
     statistics = {
         "count": count,
         "state": state if isinstance(state, str) else "rest" if state is None else "given",
