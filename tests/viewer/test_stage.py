@@ -127,14 +127,14 @@ def test_where_supports_move_their_force_is_charted():
     """The load factor is their displacement; at every point their force is minus the springs'."""
     strip = fd.patterns.simple_fold(0.1, 0.1, 150)
     made = fd.discretize(strip, fd.Sheet(1e9, 0.3, 1e-3), crease_stiffness=0.2)
-    supports = [fd.Fix([4, 5]), fd.Fix([0, 1], "z"), fd.Impose([0, 1], "x", 0.02)]
+    supports = [fd.Fix([4, 5]), fd.Fix([0, 1], "z"), fd.Impose([0, 1], "x", -0.02)]
     path = fd.trace(fd.Case(made, supports), method="displacement", steps=3)
     part = stage({"path": path}, {"path": fd.case_of(path)}, "title", [2])
     (about,) = part.about["results"]
     pulled = path["reaction"].sel(support=path["support_node"].isin([0, 1])).values
     wanted = pulled[:, path["support_axis"].values[path["support_node"].isin([0, 1])] == "x"].sum(1)
-    assert about["way"] == "x"
-    np.testing.assert_allclose(decoded(part.arrays, about["force"]), wanted, rtol=1e-6)
+    assert about["way"] == "-x" and part.about["axis"] == 0
+    np.testing.assert_allclose(decoded(part.arrays, about["force"]), -wanted, rtol=1e-6)
     np.testing.assert_allclose(decoded(part.arrays, about["load"]), path["load_factor"])
     loaded = results("path")
     part = stage(loaded, {name: fd.case_of(result) for name, result in loaded.items()}, "t", [0])

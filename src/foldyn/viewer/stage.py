@@ -97,6 +97,8 @@ def stage(
             own = {"name": name, "sheet": key, "alone": len(results) == 1}
             listed += _LISTED[kind](arrays, f"r{len(listed)}", case, result, own)
     about |= {"sheets": sheets, "results": listed, **_more(kind, results, cases, nodes)}
+    if listed and "way" in listed[0]:  # along which supports move
+        about["axis"] = "xyz".index(listed[0]["way"][-1])
     if backdrop:
         about["backdrop"] = backdrop.about()
     return Stage(about, arrays)
