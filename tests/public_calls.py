@@ -299,6 +299,7 @@ def solved(folder: Path) -> Calls:
         "read_case": (fd.read_case, {
             "path": folder / "case.toml", "model": "bars_and_hinges", "divisions": None,
         }),
+        "flat_foldable": (fd.flat_foldable, {"pattern": fd.patterns.miura(dihedral=180)}),
         "read_pattern": (fd.read_pattern, reading),
         "diagnose": (fd.diagnose, reading),
         "write_pattern": (fd.write_pattern, {

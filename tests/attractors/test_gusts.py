@@ -83,6 +83,6 @@ def test_other_histories_are_refused_by_their_place(search):
 
 
 def test_a_wind_that_jumps_in_a_motion_is_refused_by_its_place():
-    air = fd.Air(added_mass=False, velocity=(0.0, 0.0, 1.0), history=fd.Step(0.1))
+    air = fd.Air(velocity=(0.0, 0.0, 1.0), history=fd.Step(0.1))
     with pytest.raises(InputError, match=r"air: the wind .* jumps at t = 0\.1 s"):
         fd.simulate(gusty(2.0).altered(air=air), 0.2)

@@ -205,7 +205,7 @@ STAGES: Sequence[Uses] = (
             partial(moved, *REMEMBER, law=PRONY, damping=[fd.CreaseDamping(0.2)], model="n5b8e"),
         ],
         "paths": [
-            partial(traced, 1e-3, supports=SPRINGS, loads=FOLLOWING, clamped="xmin"),
+            partial(traced, 1e-3, supports=SPRINGS, loads=[*TURNING, *FOLLOWING], clamped="xmin"),
             waited,
         ],
     },

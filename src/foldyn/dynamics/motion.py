@@ -279,14 +279,9 @@ class Motion:
         """Go back to the start."""
         self.course = self.beginning
         self._flow = self._state[0] if self.origin.flow is None else self.origin.flow
-        heat = self.packed.heat
-        if heat is not None:  # motions share the rest
-            heat = heat._replace(seen=np.array([np.nan, 0.0]))
-            self.packed = self.packed._replace(heat=heat)
-        self.output = Output(
-            self.case, self.plan, self._sampler, self._branches, self._keeping, heat
-        )
-        self._looked = False
+        self.packed = self.packed.begun()
+        given = self.plan, self._sampler, self._branches, self._keeping, self.packed.heat
+        self.output, self._looked = Output(self.case, *given), False
 
     def _advance(self, engine: Compiled | Implicit | OnCard, report: Reporter) -> None:
         """Advance to the end, in stretches; after each, report the progress, and audit."""

@@ -114,6 +114,12 @@ class Packed(NamedTuple):
         """The arrays of the sheet."""
         return self.body.sheet.model
 
+    def begun(self) -> Packed:
+        """The same for a motion that begins, with its own memory of the heat at play."""
+        if self.heat is None:
+            return self
+        return self._replace(heat=self.heat._replace(seen=np.array([np.nan, 0.0])))
+
 
 def pack(
     case: Case, span: float, start: Origin | None = None, modal: ModalRows | None = None

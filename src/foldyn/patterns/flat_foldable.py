@@ -79,7 +79,7 @@ def flat_foldable(pattern: Pattern) -> Pattern:
     >>> drawn[4, 0] += 0.002
     >>> mended = fd.flat_foldable(flat.changed(vertices=drawn))
     >>> print(abs(mended.vertices - drawn).max().round(4))
-    0.0008
+    0.0004
     """
     pattern = pattern_of(pattern)
     if pattern.boards is not None:
