@@ -222,6 +222,7 @@ def solved(folder: Path) -> Calls:
     (folder / "case.toml").write_text(CASE)
     reading = {
         "path": folder / "pattern.fold", "scale": 2.0, "unit": "m", "frame": 0, "facets": "hinge",
+        "tolerance": 1e-6, "flat_foldable": False,
     }  # fmt: skip
     return {
         "simulate": (fd.simulate, {

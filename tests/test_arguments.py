@@ -25,7 +25,7 @@ MADE = {"Structure", "Shell", "Folding", "Fidelity", "View"}
 """Made by functions."""
 OWN = {"BarLaw", "HingeLaw", "CustomBarLaw", "CustomHingeLaw"}
 """For laws of users, which are functions."""
-LEFT = {"name", "boards", "custom", "memory", "continuation", "options", "sample"}
+LEFT = {"name", "boards", "custom", "memory", "continuation", "origin", "options", "sample"}
 """Parameters that calls may leave out."""
 WRONG = (
     None, "word", 5.5, -1, True, [], [None], ["a"], {"a": 1}, object(), np.array([1.0, 2.0]),
