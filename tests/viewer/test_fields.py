@@ -137,6 +137,13 @@ def test_warm_panels_store_what_they_may_not_do(model):
     check(s, fd.simulate(case, 1e-3, method="newmark", dt=1e-4, every=5e-4))
 
 
+def test_creases_of_rigid_shells_have_all_of_their_energy():
+    pattern = fd.patterns.miura((1, 1), 0.1, 0.08, 60, 90)
+    s = fd.shell(pattern, SHEET, divisions=2, rigid="all", fold_law="linear")
+    case = fd.Case(s, [fd.Fix(pattern.faces[0])], [fd.Force([8], (0.0, 0.0, 1e-3))])
+    check(s, fd.trace(case, load_factors=[0.5, 1.0]))
+
+
 def check(s, result):
     """Compare with the energies that the solver stored."""
     found = fields(fd.case_of(result), result, result["displacement"].values)

@@ -71,7 +71,7 @@ def states(case: Case, result: Any, displacement: NDArray) -> States:
     changes, hinges = rest - body.sheet.rest_angles, body.sheet.fold_hinges()
     angle = hinge_angles(structure, hinges.nodes, displacement)
     plates, (stress, free, curl) = np.zeros((samples, 0)), _warm(acting, samples)
-    if len(body.hidden):
+    if len(body.hidden) or not isinstance(structure, Structure):  # also a shell of rigid panels
         parts = (
             (part, k) for k, (load, _) in enumerate(acting) for part, _ in load.following_terms
         )
