@@ -86,7 +86,7 @@ def test_meshes_converge():
     square = np.c_[np.asarray(PANELS["square"], float), np.zeros(4)]
     shape = outline(square, square.mean(axis=0), [True] * 4, [True] * 4)
     pieces = np.array([4, 8, 16])
-    stiffness = condensed(shape, 0.3, (*pieces.tolist(), 32))
+    stiffness = [condensed([shape], 0.3, n)[0] for n in (*pieces.tolist(), 32)]
     found = [np.linalg.eigvalsh(each)[3] for each in stiffness]
     error = np.abs(np.array(found[:3]) - (4.0 * found[3] - found[2]) / 3.0)
     assert 1.5 < observed_order(1.0 / pieces, error) < 2.1

@@ -13,6 +13,7 @@ their size.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -22,27 +23,31 @@ from scipy.linalg import null_space
 from foldyn.algebra.extrapolation import extrapolated
 from foldyn.structures.panel_plate import Outline, PanelPlate, facets_of, mass_of
 from foldyn.structures.plate_boundary import condensed
+from foldyn.structures.shared import shared
 
-COARSE, FINE = 8, 16  # pieces of each edge in the two meshes: powers of 2
+COARSE, FINE = 8, 16  # pieces of each edge in the two meshes
 
 
-@lru_cache(maxsize=4096)
-def panel_stiffness(panel: Outline, poissons_ratio: float) -> NDArray:
+@shared(lambda panel, nu: (len(panel.corners), panel.center is None, nu))
+def panel_stiffness(kinds: Sequence[tuple[Outline, float]]) -> list[NDArray]:
     """Stiffness (q, q) of a panel's angles over its bending stiffness E t^3/(12 (1 - nu^2)).
 
-    The angles: turns of the spokes, in the order of the corners (none in a triangle), then of the
-    creased edges, then the bows, in their order. A turn is the increase of a dihedral, seen from
-    the front, and a bow positive towards it.
+    By its outline and Poisson's ratio. The angles: turns of the spokes, in the order of the corners
+    (none in a triangle), then of the creased edges, then the bows, in their order. A turn is the
+    increase of a dihedral, seen from the front, and a bow positive towards it.
     """
-    coarse, fine = condensed(panel, poissons_ratio, (COARSE, FINE))
-    stiffness = extrapolated(coarse, fine, FINE / COARSE)
-    held = heights_and_slopes(panel)
-    stiffness = held.T @ stiffness @ held
-    turned = least_heights(panel, len(stiffness))
-    out = turned.T @ stiffness @ turned
-    out = 0.5 * (out + out.T)
-    out.setflags(write=False)
-    return out
+    panels = [panel for panel, _ in kinds]
+    coarse, fine = (condensed(panels, kinds[0][1], n) for n in (COARSE, FINE))
+    found = []
+    for panel, *both in zip(panels, coarse, fine, strict=True):
+        held = heights_and_slopes(panel)
+        stiffness = held.T @ extrapolated(*both, ratio=FINE / COARSE) @ held
+        turned = least_heights(panel, len(stiffness))
+        out = turned.T @ stiffness @ turned
+        out = 0.5 * (out + out.T)
+        out.setflags(write=False)
+        found.append(out)
+    return found
 
 
 @lru_cache(maxsize=4096)

@@ -86,6 +86,8 @@ def edge_plates(
             beside.append(k)
         return shared[k, what]
 
+    bending = [(panel, kinds[kind[p]].poissons_ratio) for p, panel in enumerate(panels) if panel]
+    found = iter(panel_stiffness.each(bending))
     angles: list[list[int]] = []
     matrices: list[NDArray] = []
     for p, face in enumerate(pattern.faces):
@@ -113,8 +115,7 @@ def edge_plates(
         for edge in (edge for edge, bow in zip(edges, panel.bowed, strict=True) if bow):
             turned.append(-1 - number(hinge[edge], "bow"))
             parts.append(np.ones((1, 1)))
-        own = kinds[kind[p]]
-        matrix = own.bending_modulus * panel_stiffness(panel, own.poissons_ratio)
+        matrix = kinds[kind[p]].bending_modulus * next(found)
         if any(k >= folds + bends for k in turned):
             turns = block_diag(*parts)
             matrix = turns.T @ matrix @ turns

@@ -7,7 +7,6 @@ heights of the points and the slopes across the sides.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -87,16 +86,11 @@ class PanelPlate:
     def __init__(self, panel: Outline, poissons_ratio: float, n: int) -> None:
         x = np.array(panel.corners)
         self.points, self.triangles, at, edges = meshed(x, panel.center, n)
-        side, sign, ends = _sides(self.triangles)
+        side, sign, ends = sides_of(self.triangles)
         self.stiffness = _plate(self.points, self.triangles, side, sign, poissons_ratio)
         self._ends = ends
-        number = {pair: len(self.points) + k for k, pair in enumerate(map(tuple, ends.tolist()))}
         self.heights = [{node: 1.0} for node in at.tolist()]
-        sides = []
-        for nodes in (edge.tolist() for edge in edges):
-            pairs = [(min(pair), max(pair)) for pair in pairwise(nodes)]
-            sign = np.where(np.diff(nodes) > 0, 1.0, -1.0)
-            sides.append((np.array([number[pair] for pair in pairs]), sign))
+        sides = across_edges(edges, ends, len(self.points))
         self.slopes, self.bows, self.lines, self._turning = edge_functions(panel, edges, sides)
 
     def uneven(self, count: int) -> list[dict[int, float]]:
@@ -254,12 +248,26 @@ def meshed(
     return nodes, triangles, found(points), edges
 
 
-def _sides(triangles: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+def sides_of(triangles: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     """Number and sign (nt, 3) of the triangles' sides, positive from low to high; ends (s, 2)."""
     pairs = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)
     ends, side = np.unique(np.sort(pairs, axis=2).reshape(-1, 2), axis=0, return_inverse=True)
     sign = np.where(pairs[:, :, 0] < pairs[:, :, 1], 1.0, -1.0)
     return side.reshape(-1, 3), sign, ends
+
+
+def across_edges(edges: Sequence[NDArray], ends: NDArray, heights: int) -> list[tuple]:
+    """Of each edge the numbers (n,) of the slopes across its sides, with their signs.
+
+    edges : points along each edge; of all sides `ends` are the ends, and slopes follow heights.
+    """
+    number = {pair: heights + k for k, pair in enumerate(map(tuple, ends.tolist()))}
+    found = []
+    for nodes in edges:
+        pairs = np.sort(np.stack([nodes[:-1], nodes[1:]], axis=1), axis=1).tolist()
+        sign = np.where(np.diff(nodes) > 0, 1.0, -1.0)
+        found.append((np.array([number[a, b] for a, b in pairs]), sign))
+    return found
 
 
 def plate_blocks(corners: NDArray, sign: NDArray, poissons_ratio: float) -> NDArray:

@@ -1,13 +1,18 @@
-"""A panel's plate, condensed to the edges of the panel and its center.
+"""Panels' plates, condensed to the corners and the center, turns of the edges, and their bows.
 
-`PanelPlate` cuts each facet of a panel evenly. Four facets with n pieces of each edge make one with
-2 n, twice as large: all four are the same, one of them turned by 180 degrees. So the stiffness of
-a facet that its edges feel is found from that of half of it, with few unknowns each time, and its
-inside is never assembled.
+`PanelPlate` cuts each facet of a panel evenly: all its triangles are the same, half of them turned
+by 180 degrees. So the stiffness of a panel's plate is a sum of that of its facets, each cut by
+nothing, with factors that all panels with as many corners share. A scale of 1/n makes the stiffness
+of heights n^2 times as large, and leaves that of slopes.
 
-The edges' unknowns, around a facet from its first corner: the heights of its points, then the
-outward slopes of its sides. A scale of 1/2 makes the stiffness of heights four times as large, and
-leaves that of slopes.
+The unknowns at an edge of n pieces, whatever is held there:
+
+    heights   w_i = (1 - i/n) w_0 + i/n w_n + n/(n - 1) L b + e_i - e_(i-1),    i = 1 ... n - 1
+    slopes    s_i = s + d_i - d_(i-1),                                          i = 1 ... n
+
+with the bow b, the mean slope s, and e and d, which are 0 at both ends: all of them are where the
+edge is straight, and where it is clamped. What is 0 stands alone in the matrix, with the
+stiffness 1.
 """
 
 from __future__ import annotations
@@ -18,155 +23,136 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
-from foldyn.structures.panel_plate import Outline, edge_functions, facets_of, plate_blocks, rows_of
-
-Place = tuple[int, int]
-
-
-class Joint(NamedTuple):
-    """How parts with k unknowns make a whole: the first of its unknowns are its edges'."""
-
-    number: NDArray  # (parts, k) unknown of the whole
-    sign: NDArray  # (parts, k)
-    kept: int
-    size: int
+from foldyn.algebra.condensing import Condensing
+from foldyn.structures.panel_plate import (
+    Outline,
+    across_edges,
+    facets_of,
+    meshed,
+    plate_blocks,
+    sides_of,
+)
 
 
-class Numbering:
-    """Numbers of what parts share; a slope seen from the other side has the other sign."""
+class Cut(NamedTuple):
+    """How the plates of panels with m corners are cut and condensed.
 
-    def __init__(self, first: Sequence[object]) -> None:
-        self._number = {key: k for k, key in enumerate(first)}
-        self._kept, self._seen = len(self._number), set()
+    Attributes
+    ----------
+    pairs : (k, 2)
+        Unknowns with an entry in the stiffness. Those that stay are the last: heights of corners
+        and center, s of the edges, L b of the edges.
+    factors : (k, 36 facets)
+        Entries by those of the stiffness of the facets.
+    edge : (size,)
+        Where unknowns are 0: k where edge k is straight, m + k where it is clamped, 2 m nowhere.
+    condensing : Condensing
+    """
 
-    def joint(self, parts: Sequence[Sequence[object]], slopes: int) -> Joint:
-        """Joint of parts with these keys of their unknowns, the last of which are slopes."""
-        number, sign = [], []
-        for keys in parts:
-            number.append([self._number.setdefault(key, len(self._number)) for key in keys])
-            heights = len(keys) - slopes
-            sign.append(
-                [-1.0 if k >= heights and key in self._seen else 1.0 for k, key in enumerate(keys)]
-            )
-            self._seen.update(keys[heights:])
-        return Joint(np.array(number), np.array(sign), self._kept, len(self._number))
-
-
-def _around(corners: Sequence[Place], n: int) -> tuple[list[Place], list[Place]]:
-    """Points around a triangle on a lattice, and the middles of its sides, times 2."""
-    points, middles = [], []
-    for k in range(3):
-        (i, j), (p, q) = corners[k], corners[(k + 1) % 3]
-        step = (p - i) // n, (q - j) // n
-        points += [(i + s * step[0], j + s * step[1]) for s in range(n)]
-        middles += [
-            (2 * i + (2 * s + 1) * step[0], 2 * j + (2 * s + 1) * step[1]) for s in range(n)
-        ]
-    return points, middles
-
-
-def _keys(corners: Sequence[Place], n: int) -> list[object]:
-    points, middles = _around(corners, n)
-    return [*(("height", p) for p in points), *(("slope", p) for p in middles)]
-
-
-@lru_cache(maxsize=16)
-def _quarters(n: int) -> Joint:
-    """Of four facets with n pieces of each edge."""
-    a, b, c = (0, 0), (2 * n, 0), (0, 2 * n)
-    ab, bc, ca = (n, 0), (n, n), (0, n)
-    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (bc, ca, ab)]
-    return Numbering(_keys((a, b, c), 2 * n)).joint([_keys(part, n) for part in parts], 3 * n)
+    pairs: NDArray
+    factors: sparse.csr_array
+    edge: NDArray
+    condensing: Condensing
 
 
 @lru_cache(maxsize=64)
-def _facets(corners: int, n: int) -> Joint:
-    """Of the facets about the center: heights along the edges and in the center, then slopes."""
-    heights = [("edge", k, s) for k in range(corners) for s in range(n)]
-    slopes = [("side", k, s) for k in range(corners) for s in range(n)]
-    parts = []
-    for k in range(corners):
-        after = (k + 1) % corners
-        out = [("spoke", after, s) for s in range(1, n)]  # from the corner to the center
-        back = [("spoke", k, s) for s in range(n - 1, 0, -1)]
-        points = [*heights[k * n : (k + 1) * n], ("edge", after, 0), *out, "center", *back]
-        sides = [*slopes[k * n : (k + 1) * n], *(("across", after, s) for s in range(n))]
-        parts.append([*points, *sides, *(("across", k, s) for s in range(n - 1, -1, -1))])
-    return Numbering([*heights, "center", *slopes]).joint(parts, 3 * n)
+def _cut(m: int, center: bool, n: int) -> Cut:
+    """Of panels with a center or without, with n pieces of each edge, at least 2."""
+    unit, facets = np.eye(m + center), m if center else 1
+    points, triangles, at, edges = meshed(unit[:m], unit[-1] if center else None, n)
+    # those turned begin at another corner, so that their sides have the facet's numbers
+    triangles = triangles.reshape(facets, n * n, 3)
+    turned = n * (n + 1) // 2
+    triangles[:, turned:] = np.roll(triangles[:, turned:], -1, axis=2)
+    triangles = triangles.reshape(-1, 3)
+    side, sign, ends = sides_of(triangles)
+    basis, edge = _basis(at, edges, across_edges(edges, ends, len(points)), len(points) + len(ends))
+    size, count = len(edge), 36 * facets
+    dofs = np.concatenate([triangles, len(points) + side], axis=1)
+    scale = np.concatenate([np.full(triangles.shape, float(n)), sign], axis=1)
+    value = (scale[:, :, None] * scale[:, None, :]).ravel()
+    row, column = np.repeat(dofs, 6, axis=1).ravel(), np.tile(dofs, (1, 6)).ravel()
+    source = (36 * np.repeat(np.arange(facets), n * n)[:, None] + np.arange(36)).ravel()
+    for _ in range(2):  # basis' A basis: first by rows, then by columns
+        places = row, count * column + source
+        part = sparse.coo_array((value, places), shape=(size, count * size))
+        found = sparse.coo_array(basis.T @ sparse.csr_array(part))
+        value, (column, rest) = found.data, found.coords
+        row, source = np.divmod(rest, count)
+    lower = row >= column
+    keys, place = np.unique(row[lower] * size + column[lower], return_inverse=True)
+    pairs = np.stack(np.divmod(keys, size), axis=1)
+    factors = sparse.csr_array((value[lower], (place, source[lower])), (len(pairs), count))
+    return Cut(pairs, factors, edge, Condensing(pairs, size, len(at) + 2 * m))
 
 
-def _joined(parts: NDArray, joint: Joint) -> NDArray:
-    """Stiffness (..., kept, kept) of a whole of parts (..., parts, k, k)."""
-    whole = np.zeros((*parts.shape[:-3], joint.size, joint.size))
-    for k, (number, sign) in enumerate(zip(joint.number, joint.sign, strict=True)):
-        whole[..., number[:, None], number] += sign[:, None] * parts[..., k, :, :] * sign
-    own, other = whole[..., : joint.kept, : joint.kept], whole[..., joint.kept :, joint.kept :]
-    across = whole[..., joint.kept :, : joint.kept]
-    return own - np.swapaxes(across, -1, -2) @ np.linalg.solve(other, across)
+def _basis(
+    at: NDArray, edges: Sequence[NDArray], sides: Sequence[tuple[NDArray, NDArray]], size: int
+) -> tuple[sparse.csr_array, NDArray]:
+    """Heights and slopes (size,) of a plate by its unknowns; where these are 0, see `Cut`.
 
-
-def facet_stiffness(corners: NDArray, poissons_ratio: float, levels: int) -> list[NDArray]:
-    """Stiffness (f, 6 n, 6 n) of facets with corners (f, 3, 2), n = 1, 2, 4, ... 2^levels."""
-    found = [plate_blocks(corners, np.ones((len(corners), 3)), poissons_ratio)]
-    for level in range(levels):
-        n = 2**level
-        scale = np.repeat([2.0, 1.0], 3 * n)
-        quarter = scale[:, None] * found[-1] * scale
-        parts = np.broadcast_to(quarter[:, None], (len(quarter), 4, 6 * n, 6 * n))
-        found.append(_joined(parts, _quarters(n)))
-    return found
-
-
-def edge_stiffness(panel: Outline, poissons_ratio: float, pieces: Sequence[int]) -> list[NDArray]:
-    """Stiffness that the edges and the center of a panel feel, G = 1, in meshes of different sizes.
-
-    In the order: heights around the panel, that of its center, if it has one, and slopes.
-
-    pieces : of each edge in each mesh, powers of 2.
+    at, edges, sides : heights of corners and center; of the points on each edge (n + 1,); slopes
+        across the sides of each edge and their signs (n,), 1 where they are outward.
     """
-    levels, corners = [n.bit_length() - 1 for n in pieces], np.array(panel.corners)
-    if panel.center is None:
-        found = facet_stiffness(corners[None], poissons_ratio, max(levels))
-        return [found[level][0] for level in levels]
-    points = np.concatenate([corners, [panel.center]])
-    facets = points[np.array(facets_of(points, len(corners)))]
-    found = facet_stiffness(facets, poissons_ratio, max(levels))
-    return [
-        _joined(found[level], _facets(len(corners), n))
-        for level, n in zip(levels, pieces, strict=True)
-    ]
+    m, n = len(edges), len(sides[0][0])
+    first = size - len(at) - 2 * m  # of those that stay
+    own = 2 * n - 3  # e and d of an edge
+    steps = np.arange(1, n) / n
+    where = np.full(size, 2 * m)
+    inside = np.setdiff1d(np.arange(size), np.concatenate([at, *edges, *(s for s, _ in sides)]))
+    stay = np.arange(first, size)
+    parts = [(inside, np.arange(len(inside)), 1.0), (at, stay[: len(at)], 1.0)]
+    for k, (points, (across, sign)) in enumerate(zip(edges, sides, strict=True)):
+        between = points[1:-1]
+        e, d = np.split(len(inside) + own * k + np.arange(own), [n - 2])
+        mean, bow = stay[len(at) + k], stay[len(at) + m + k]
+        where[[*e, bow]], where[d] = k, m + k
+        parts += [
+            (between, stay[k], 1.0 - steps), (between, stay[(k + 1) % m], steps),
+            (between, bow, n / (n - 1.0)), (between[:-1], e, 1.0), (between[1:], e, -1.0),
+            (across, mean, sign), (across[:-1], d, sign[:-1]), (across[1:], d, -sign[1:]),
+        ]  # fmt: skip
+    rows, columns, values = (
+        np.concatenate(each)
+        for each in zip(*(np.broadcast_arrays(*part) for part in parts), strict=True)
+    )
+    return sparse.csr_array((values, (rows, columns)), (size, size)), where
 
 
-def condensed(panel: Outline, poissons_ratio: float, pieces: Sequence[int]) -> list[NDArray]:
+def condensed(panels: Sequence[Outline], poissons_ratio: float, n: int) -> list[NDArray]:
     """Stiffness of the heights of corners and center, mean outward slopes of creases, and bows.
 
-    Arguments as of `edge_stiffness`.
+    For G = 1, of at most eight panels with as many corners each.
+
+    n : pieces of each edge.
     """
-    felt = edge_stiffness(panel, poissons_ratio, pieces)
-    return [_held(panel, each, n) for each, n in zip(felt, pieces, strict=True)]
+    m, center = len(panels[0].corners), panels[0].center is not None
+    cut = _cut(m, center, n)
+    corners = np.array([[*panel.corners, *([panel.center] if center else [])] for panel in panels])
+    facets = corners[:, facets_of(corners[0], m)[: None if center else 1]].reshape(-1, 3, 2)
+    blocks = plate_blocks(facets, np.ones((len(facets), 3)), poissons_ratio)
+    straight, bowed, creased, clamped = (
+        np.array([getattr(panel, name) for panel in panels])
+        for name in ("straight", "bowed", "creased", "clamped")
+    )
+    free = 1.0 - np.concatenate([straight, clamped, np.zeros((len(panels), 1))], axis=1).T[cut.edge]
+    row, column = cut.pairs.T
+    values = cut.factors @ blocks.reshape(len(panels), -1).T * (free[row] * free[column])
+    values[row == column] += 1.0 - free
+    stiffness = cut.condensing(values)
+    lengths = np.linalg.norm(np.roll(corners[:, :m], -1, axis=1) - corners[:, :m], axis=2)
+    scale = np.concatenate([np.ones((len(panels), len(corners[0]) + m)), lengths], axis=1)
+    stiffness *= scale[:, :, None] * scale[:, None, :]
+    held = np.concatenate([np.ones((len(panels), len(corners[0])), bool), creased, bowed], axis=1)
+    return _held(stiffness, held)
 
 
-def _held(panel: Outline, stiffness: NDArray, n: int) -> NDArray:
-    """The same, of what edges with n pieces each feel."""
-    m = len(panel.corners)
-    around = np.append(np.arange(m * n), 0)
-    nodes = [around[k * n : (k + 1) * n + 1] for k in range(m)]
-    sides = [len(stiffness) - m * n + np.arange(k * n, (k + 1) * n) for k in range(m)]
-    functions = edge_functions(panel, nodes, [(side, np.ones(n)) for side in sides])
-    first = n * np.arange(m + (panel.center is not None))
-    count, held = len(first), len(functions.slopes) + len(functions.bows)
-    others = np.setdiff1d(np.arange(len(stiffness)), first)
-    rows = rows_of([*functions.slopes, *functions.bows, *functions.lines], len(stiffness)).toarray()
-    # the least energy of x with C x = g, by its multipliers
-    inner, across = stiffness[np.ix_(others, others)], stiffness[np.ix_(others, first)]
-    loose = np.linalg.solve(inner, np.column_stack([across, rows[:, others].T]))
-    moved, pulled = loose[:, :count], loose[:, count:]
-    wanted = np.zeros((len(rows), count + held))
-    wanted[:, :count] = rows[:, others] @ moved - rows[:, first]
-    wanted[:held, count:] = np.eye(held)
-    whole = np.zeros((len(stiffness), count + held))
-    whole[first, :count] = np.eye(count)
-    whole[others] = pulled @ np.linalg.solve(rows[:, others] @ pulled, wanted)
-    whole[others, :count] -= moved
-    return whole.T @ stiffness @ whole
+def _held(stiffness: NDArray, held: NDArray) -> list[NDArray]:
+    """Stiffness of the unknowns that are held (c, k), the others at ease."""
+    rows, columns = held[:, :, None], held[:, None, :]
+    loose = np.where(rows | columns, 0.0, stiffness) + held[:, :, None] * np.eye(held.shape[1])
+    across = np.where(~rows & columns, stiffness, 0.0)
+    found = stiffness - np.swapaxes(across, 1, 2) @ np.linalg.solve(loose, across)
+    return [own[np.ix_(kept, kept)] for own, kept in zip(found, held, strict=True)]

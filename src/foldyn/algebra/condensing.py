@@ -1,0 +1,116 @@
+"""Definite matrices with the same places of entries, condensed to their last unknowns by eights.
+
+Which entries Cholesky's factors have is found once, in an order in which they are few. The numbers
+of eight matrices stand side by side: one pass through the places factorizes all eight.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.algebra.superlu import SingularTangentError, factorize
+from foldyn.jit.compiled import kernel
+from foldyn.jit.eights import COUNT, eight, put
+
+
+class Condensing:
+    """How matrices (size, size) are condensed to their `kept` last unknowns.
+
+    Parameters
+    ----------
+    pairs : (k, 2)
+        Unknowns with an entry, each pair once, in any order; all on the diagonal among them.
+    size, kept : int
+    """
+
+    def __init__(self, pairs: NDArray, size: int, kept: int) -> None:
+        free = size - kept
+        rank = np.append(_order(pairs[(pairs < free).all(axis=1)], free), np.arange(free, size))
+        row, column = rank[pairs].max(axis=1), rank[pairs].min(axis=1)
+        last = np.arange(free, size)
+        below = [set() for _ in range(free)] + [set(range(j, size)) for j in range(free, size)]
+        for i, j in zip(row.tolist(), column.tolist(), strict=True):
+            below[j].add(i)
+        found: list[int] = []
+        for own in below:  # what an unknown is coupled to is coupled where that is eliminated
+            coupled = sorted(own)
+            found += coupled
+            if len(coupled) > 1:
+                below[coupled[1]].update(coupled[1:])
+        rows = np.array(found)
+        columns = np.repeat(np.arange(size), [len(own) for own in below])
+        keys = columns * size + rows
+        self._put = np.searchsorted(keys, column * size + row)
+        self._block = np.searchsorted(
+            keys, np.minimum.outer(last, last) * size + np.maximum.outer(last, last)
+        )
+        pointers = np.searchsorted(columns, np.arange(size + 1))
+        entry = np.flatnonzero((rows > columns) & (columns < free))
+        entry = entry[np.argsort(rows[entry], kind="stable")]
+        starts = np.searchsorted(rows[entry], np.arange(size + 1))
+        places = rows, pointers, entry, pointers[columns[entry] + 1], starts
+        self._places = tuple(place.astype(np.int32) for place in places)
+        self._free, self._size = free, size
+
+    def __call__(self, values: NDArray) -> NDArray:
+        """What is left (c, kept, kept) of at most eight matrices with entries (k, c).
+
+        Raises
+        ------
+        SingularTangentError
+            A matrix is not positive definite.
+        """
+        count = values.shape[1]
+        numbers = np.zeros((len(self._places[0]), COUNT))
+        numbers[self._put] = values[:, np.minimum(np.arange(COUNT), count - 1)]
+        where = np.zeros(self._size, np.int64)
+        condense(*self._places, self._free, where, numbers.ravel())
+        out = np.moveaxis(numbers[self._block][..., :count], -1, 0)
+        if not np.isfinite(out).all():
+            raise SingularTangentError("the matrix is not positive definite")
+        return out
+
+
+def _order(pairs: NDArray, size: int) -> NDArray:
+    """Places (size,) of unknowns in an order in which factors have few entries.
+
+    Any definite matrix with these pairs of unknowns says which.
+    """
+    off = pairs[pairs[:, 0] != pairs[:, 1]]
+    diagonal = np.arange(size)
+    rows = np.concatenate([off[:, 0], off[:, 1], diagonal])
+    columns = np.concatenate([off[:, 1], off[:, 0], diagonal])
+    values = np.append(-np.ones(2 * len(off)), np.full(size, float(size)))
+    matrix = sparse.csc_array(sparse.coo_array((values, (rows, columns)), shape=(size, size)))
+    return factorize(matrix).perm_c
+
+
+@kernel
+def condense(rows, pointers, entry, until, starts, free, where, numbers):
+    """Eliminate the `free` first unknowns of eight matrices.
+
+    rows, pointers : (k,) of the entries by columns, that on the diagonal first; (n + 1,).
+    entry, until, starts : those (e,) off the diagonal by rows, in columns that are eliminated; the
+        ends of their columns; (n + 1,).
+    where : (n,) scratch.
+    numbers : (8 k,) entries; factors take their place, and in the last columns what is left.
+    """
+    for j in range(starts.size - 1):
+        for p in range(pointers[j], pointers[j + 1]):
+            where[rows[p]] = COUNT * p
+        for e in range(starts[j], starts[j + 1]):
+            factor = eight(numbers, COUNT * np.int64(entry[e]))
+            for p in range(entry[e], until[e]):
+                at = where[rows[p]]
+                product = factor * eight(numbers, COUNT * np.int64(p))
+                put(numbers, at, eight(numbers, at) - product)
+        if j < free:
+            first = COUNT * np.int64(pointers[j])
+            scale = 1.0 / math.sqrt(eight(numbers, first))
+            for p in range(pointers[j] + 1, pointers[j + 1]):
+                at = COUNT * np.int64(p)
+                put(numbers, at, scale * eight(numbers, at))
