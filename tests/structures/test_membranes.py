@@ -15,7 +15,7 @@ from foldyn import checks
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics import threads
 from foldyn.structures.membranes import Sides, coupling
-from foldyn.structures.panel_membrane import _condensed, _even, membrane_stiffness
+from foldyn.structures.panel_membrane import Kind, _condensed, _even, membrane_stiffness
 from foldyn.structures.panel_plate import outline
 
 STEEL = fd.Sheet(200e9, 0.3, 3e-4, 7850.0)
@@ -97,7 +97,7 @@ def test_the_mesh_converges_as_its_elements_do():
     own, free = sides(SHAPES["square"]), strained(SHAPES["square"])
     lowest = []
     for mesh in (_even(own.outline, n) for n in (4, 8, 16)):
-        found = _condensed(own.outline, 0.3, own.resistance, mesh)
+        found = _condensed([Kind(own.outline, 0.3, own.resistance)], [mesh])[0]
         lowest.append(np.linalg.eigvalsh(free.T @ found @ free)[0])
     order = np.log2((lowest[0] - lowest[1]) / (lowest[1] - lowest[2]))
     assert 1.6 < order < 2.4

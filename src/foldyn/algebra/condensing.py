@@ -25,6 +25,13 @@ class Condensing:
     pairs : (k, 2)
         Unknowns with an entry, each pair once, in any order; all on the diagonal among them.
     size, kept : int
+
+    Attributes
+    ----------
+    entries : int
+        Of the factors.
+    places : (k,)
+        Of the pairs among them.
     """
 
     def __init__(self, pairs: NDArray, size: int, kept: int) -> None:
@@ -44,7 +51,7 @@ class Condensing:
         rows = np.array(found)
         columns = np.repeat(np.arange(size), [len(own) for own in below])
         keys = columns * size + rows
-        self._put = np.searchsorted(keys, column * size + row)
+        self.places = np.searchsorted(keys, column * size + row)
         self._block = np.searchsorted(
             keys, np.minimum.outer(last, last) * size + np.maximum.outer(last, last)
         )
@@ -52,24 +59,28 @@ class Condensing:
         entry = np.flatnonzero((rows > columns) & (columns < free))
         entry = entry[np.argsort(rows[entry], kind="stable")]
         starts = np.searchsorted(rows[entry], np.arange(size + 1))
-        places = rows, pointers, entry, pointers[columns[entry] + 1], starts
-        self._places = tuple(place.astype(np.int32) for place in places)
+        factors = rows, pointers, entry, pointers[columns[entry] + 1], starts
+        self._factors = tuple(part.astype(np.int32) for part in factors)
+        self.entries = len(rows)
         self._free, self._size = free, size
 
     def __call__(self, values: NDArray) -> NDArray:
-        """What is left (c, kept, kept) of at most eight matrices with entries (k, c).
+        """What is left (c, kept, kept) of at most eight matrices with entries (k, c)."""
+        numbers = np.zeros((self.entries, COUNT))
+        numbers[self.places] = values[:, np.minimum(np.arange(COUNT), values.shape[1] - 1)]
+        return self.left(numbers)[: values.shape[1]]
+
+    def left(self, numbers: NDArray) -> NDArray:
+        """What is left (8, kept, kept) of eight matrices (`entries`, 8), whose factors replace it.
 
         Raises
         ------
         SingularTangentError
             A matrix is not positive definite.
         """
-        count = values.shape[1]
-        numbers = np.zeros((len(self._places[0]), COUNT))
-        numbers[self._put] = values[:, np.minimum(np.arange(COUNT), count - 1)]
         where = np.zeros(self._size, np.int64)
-        condense(*self._places, self._free, where, numbers.ravel())
-        out = np.moveaxis(numbers[self._block][..., :count], -1, 0)
+        condense(*self._factors, self._free, where, numbers.reshape(-1))
+        out = np.moveaxis(numbers[self._block], -1, 0)
         if not np.isfinite(out).all():
             raise SingularTangentError("the matrix is not positive definite")
         return out

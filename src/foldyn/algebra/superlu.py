@@ -48,17 +48,14 @@ class Factorization(Solution, Protocol):
 Factorizer = Callable[[sparse.csc_array], Factorization]
 
 
-def factorize(
-    matrix: sparse.csc_array, symmetric: bool = True, pivot: float = 0.0, ordered: bool = False
-) -> Any:
+def factorize(matrix: sparse.csc_array, symmetric: bool = True, pivot: float = 0.0) -> Any:
     """Factors by SciPy's SuperLU, with its own attributes.
 
     symmetric : pivots stay on the diagonal, unless one is smaller than `pivot` times the largest
         entry of its column.
-    ordered : the matrix is so already that its factors fill little; a symmetric one.
     """
     symmetrically = {
-        "permc_spec": "NATURAL" if ordered else "MMD_AT_PLUS_A",
+        "permc_spec": "MMD_AT_PLUS_A",
         "diag_pivot_thresh": pivot,
         "options": {"SymmetricMode": True},
     }

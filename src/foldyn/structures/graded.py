@@ -55,14 +55,12 @@ class Grading(NamedTuple):
         return np.concatenate([half, 1.0 - half[-2::-1]])
 
     def points(self, corners: NDArray) -> NDArray[np.float64]:
-        """Points (arcs, 2 rays + 1, dimensions) of a piece, a bilinear patch.
+        """Points (..., arcs, 2 rays + 1, dimensions) of pieces, bilinear patches.
 
-        corners : (4, dimensions) the panel's corner, the middle of the edge that leaves it, the
-            mean of the panel's corners, and the middle of the edge that ends in it.
+        corners : (..., 4, dimensions) the panel's corner, the middle of the edge that leaves it,
+            the mean of the panel's corners, and the middle of the edge that ends in it.
         """
-        corner, one, center, other = corners
-        x, y = self.ends
-        along = np.stack([one - corner, other - corner])
+        corner, one, center, other = np.moveaxis(corners, -2, 0)[..., None, None, :]
         reach = self.reach(corners)
         if reach.min() < ROOM * self.radius:
             raise InputError(
@@ -71,14 +69,19 @@ class Grading(NamedTuple):
                 f"most {reach.min() / ROOM:.3g}",
                 "vertex_radius",
             )
-        share = self.distances(reach)
-        x, y = (share * x)[..., None], (share * y)[..., None]
-        return corner + x * along[0] + y * along[1] + x * y * (center - one - other + corner)
+        share = np.moveaxis(self.distances(reach), 0, -2)
+        x, y = ((share * end)[..., None] for end in self.ends)
+        return (
+            corner
+            + x * (one - corner)
+            + y * (other - corner)
+            + x * y * (center - one - other + corner)
+        )
 
     def reach(self, corners: NDArray) -> NDArray[np.float64]:
-        """Lengths (2 rays + 1,) of the rays of a piece."""
-        along = np.stack([corners[1] - corners[0], corners[3] - corners[0]])
-        return np.linalg.norm(np.stack(self.ends, axis=1) @ along, axis=1)
+        """Lengths (..., 2 rays + 1) of the rays of pieces."""
+        along = np.stack([corners[..., k, :] - corners[..., 0, :] for k in (1, 3)], axis=-2)
+        return np.linalg.norm(np.stack(self.ends, axis=1) @ along, axis=-1)
 
     @property
     def steps(self) -> NDArray[np.float64]:

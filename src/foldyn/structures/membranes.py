@@ -35,7 +35,7 @@ from foldyn.mechanics.membranes import Membranes
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
 from foldyn.structures.mesh import Mesh, hinge_angles
-from foldyn.structures.panel_membrane import giving_stiffness, membrane_stiffness
+from foldyn.structures.panel_membrane import Kind, grading_of, membrane_stiffness
 from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
 
@@ -80,6 +80,12 @@ def membranes(
     parts: list[tuple] = []
     properties, kind = sheet.kinds(len(pattern.faces))
     first = np.searchsorted(mesh.inner_panel, np.arange(len(pattern.faces) + 1))
+    known = {
+        p: _known(own, properties[kind[p]], pattern.face_areas[p], gives[p])
+        for p, own in enumerate(sides)
+        if own.convex
+    }
+    found = dict(zip(known, membrane_stiffness.each([*known.values()]), strict=True))
     for p, (face, panel) in enumerate(zip(pattern.faces, sides, strict=True)):
         hub = mesh.centers[p]
         nodes = np.array([*face, hub] if hub >= 0 else face)
@@ -87,13 +93,11 @@ def membranes(
         place = {int(node): k for k, node in enumerate(nodes)}
         ring = [(k, (k + 1) % len(face)) for k in range(len(face))]
         ends = (*ring, *((place[a], place[b]) for a, b in inner.tolist()))
-        own, radius = properties[kind[p]], None
+        own = properties[kind[p]]
         own_ends = [(edge_of(a, b), end) for a, b in around(face) for end in (a, b)]
         number = np.array([numbers.get(end, -1) for end in own_ends])
-        if gives[p]:
-            radius = own.thickness / float(np.sqrt(2.0 * pattern.face_areas[p]))
         shared, free = number >= 0, np.array([edge in loose for edge, _ in own_ends])
-        part = coupling(panel, ends, own.poissons_ratio, radius, shared, free)
+        part = coupling(panel, ends, own.poissons_ratio, found.get(p), shared, free)
         part *= own.youngs_modulus * own.thickness
         bars = len(ends)
         kinds.setdefault((len(nodes), ends), []).append((p, nodes, part[:bars, :bars]))
@@ -103,6 +107,13 @@ def membranes(
         _packed(mesh.nodes, np.array(ends), *zip(*members, strict=True))
         for (_, ends), members in kinds.items()
     ), _gives(mesh.nodes, parts, [edge for edge, _ in numbers]) if parts else None
+
+
+def _known(panel: Sides, sheet: Sheet, area: float, gives: bool) -> Kind:
+    """What the membrane of a panel depends on."""
+    radius = sheet.thickness / float(np.sqrt(2.0 * area))  # an outline's area is 1/2
+    grading = grading_of(panel.outline, radius) if gives else None
+    return Kind(panel.outline, sheet.poissons_ratio, panel.resistance, grading)
 
 
 def _numbers(pattern: Pattern, gives: Sequence[bool]) -> dict[tuple[Edge, int], int]:
@@ -180,11 +191,11 @@ def _sides(
 
 def coupling(
     sides: Sides, ends: tuple[tuple[int, int], ...], poissons_ratio: float,
-    radius: float | None = None, shared: NDArray = NONE, free: NDArray = NONE,
+    stiff: NDArray | None = None, shared: NDArray = NONE, free: NDArray = NONE,
 ) -> NDArray:  # fmt: skip
     """Stiffness over E t of the elongations of bars (b,) between corners and center, and of gives.
 
-    radius : of the corners, over the outline's unit of length; None where they do not give way.
+    stiff : of a convex panel; without it that of corners that do not give way.
     shared, free : (2m,) gives that stay, k, and that follow; there are no others. The result is
         (b + k, b + k).
     """
@@ -200,10 +211,9 @@ def coupling(
     alone = 1.0 / ((1.0 - poissons_ratio) * length.sum() * length)  # an outline's area is 1/2
     if not sides.convex:
         return np.diag(alone)
-    if radius is None:
+    if stiff is None:
         stiff = membrane_stiffness(panel, poissons_ratio, sides.resistance)
-    else:
-        stiff = giving_stiffness(panel, poissons_ratio, sides.resistance, radius)
+    if len(stiff) > corners:
         kept = np.concatenate([np.arange(corners), corners + np.flatnonzero(shared)])
         follow = corners + np.flatnonzero(free)
         across, own = stiff[np.ix_(follow, kept)], stiff[np.ix_(follow, follow)]

@@ -17,66 +17,79 @@ the corners feel it, in the plane, over E t.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
+from foldyn.algebra.condensing import Condensing
 from foldyn.algebra.extrapolation import extrapolated
-from foldyn.algebra.superlu import factorize
+from foldyn.jit.eights import COUNT
+from foldyn.mechanics.quadratic_triangles import PRODUCTS, add_triangles, squares
 from foldyn.structures.graded import ROOM, Grading, graded
 from foldyn.structures.panel_plate import Outline, meshed
+from foldyn.structures.shared import shared
 
 COARSE, FINE = 4, 8  # pieces of each edge in the two meshes; twice as many in triangles
 RAYS = 2  # of a graded mesh, in half a corner
 STIFF = 1e3  # times as stiff as the rest: rigid corners
 WAVES = 2.0  # in a bow of an edge, for each of its radii
-MIDDLES = 0.5 * (np.ones((3, 3)) - np.eye(3))  # of the sides: three points integrate exactly
 
 
-@lru_cache(maxsize=4096)
-def membrane_stiffness(
-    panel: Outline, poissons_ratio: float, resistance: tuple[float, ...]
-) -> NDArray:
-    """Stiffness (2m, 2m) over E t of the displacements (x, y) of the m corners in the plane.
+class Kind(NamedTuple):
+    """What a panel's membrane depends on, but for E t.
 
-    Parameters
+    Attributes
     ----------
-    panel : Outline
+    outline : Outline
         Its straight edges do not bow.
     poissons_ratio : float
     resistance : tuple of float
         What q^3 is multiplied by above, over E t, of both panels at each other edge: in the unit
         of length of the outline, squared.
+    grading : Grading, optional
+        Of a panel whose corners give way along its edges, rigid within the radius.
     """
-    more = 1 if panel.center else 2
+
+    outline: Outline
+    poissons_ratio: float
+    resistance: tuple[float, ...]
+    grading: Grading | None = None
+
+    @property
+    def topology(self) -> tuple:
+        """The same for panels that are cut and condensed alike."""
+        arcs = self.grading and self.grading.arcs
+        panel = self.outline
+        return len(panel.corners), panel.center is None, arcs, all(panel.straight)
+
+
+@shared(lambda *given: Kind(*given).topology)
+def membrane_stiffness(given: Sequence[tuple]) -> list[NDArray]:
+    """Stiffness (2m, 2m) over E t of the displacements (x, y) of the m corners in the plane.
+
+    Its arguments are the fields of a `Kind`. With a grading (4m, 4m): after the displacements come
+    the gives, of each edge in turn, at its first and at its last corner: how far the points near it
+    slide along the edge, away from the corner.
+    """
+    kinds = [Kind(*each) for each in given]
+    if kinds[0].grading:
+        return _symmetric(_condensed(kinds, _graded(kinds)))
+    more = 1 if kinds[0].outline.center else 2
     coarse, fine = (
-        _condensed(panel, poissons_ratio, resistance, _even(panel, more * n))
-        for n in (COARSE, FINE)
+        _condensed(kinds, [_even(kind.outline, more * n) for kind in kinds]) for n in (COARSE, FINE)
     )
     return _symmetric(extrapolated(coarse, fine, FINE / COARSE))
 
 
-@lru_cache(maxsize=4096)
-def giving_stiffness(
-    panel: Outline, poissons_ratio: float, resistance: tuple[float, ...], radius: float
-) -> NDArray:
-    """The same (4m, 4m) of corners that give way along their edges, rigid within a radius.
-
-    After the displacements of the corners come the gives: of each edge in turn, at its first and
-    at its last corner, how far the points near it slide along the edge, away from the corner.
-    """
-    return _symmetric(_condensed(panel, poissons_ratio, resistance, _graded(panel, radius)))
-
-
-def _symmetric(stiffness: NDArray) -> NDArray:
-    stiffness = 0.5 * (stiffness + stiffness.T)
+def _symmetric(stiffness: NDArray) -> list[NDArray]:
+    stiffness = 0.5 * (stiffness + np.swapaxes(stiffness, 1, 2))
     stiffness.setflags(write=False)
-    return stiffness
+    return list(stiffness)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,43 +112,6 @@ class Cut:
     elements: NDArray
     at: NDArray
     along: list[NDArray]
-
-    @cached_property
-    def size(self) -> int:
-        """Displacements of all points: at edges across them and along, elsewhere x and y."""
-        return 2 * (int(self.elements.max()) + 1)
-
-    @cached_property
-    def beside(self) -> NDArray:
-        """Triangles with points on edges."""
-        return np.flatnonzero(np.isin(self.elements, np.concatenate(self.along)).any(axis=1))
-
-    @cached_property
-    def entries(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Rows and pointers of the entries of their matrix by columns.
-
-        And places there of those of all triangles (nt 144,).
-        """
-        dofs = (2 * self.elements[:, :, None] + np.arange(2)).reshape(-1, 12)
-        keys = self.size * np.repeat(dofs, 12, axis=1) + np.tile(dofs, (1, 12))
-        found, place = np.unique(keys, return_inverse=True)
-        column, row = np.divmod(found, self.size)
-        return row, np.searchsorted(column, np.arange(self.size + 1)), place.ravel()
-
-
-class Loose(NamedTuple):
-    """Displacements that corners and gives leave free, in the order in which they are solved for.
-
-    Entries of their matrix by columns: rows, pointers, and places there of entries `take` of the
-    whole matrix and of the bows of each edge that is not straight.
-    """
-
-    free: NDArray
-    rows: NDArray
-    pointers: NDArray
-    put: NDArray
-    take: NDArray
-    bows: list[NDArray]
 
 
 class PanelMesh(NamedTuple):
@@ -160,24 +136,35 @@ def _evenly(corners: int, center: bool, n: int) -> tuple[NDArray, Cut]:
     return weights, _cut(len(weights), triangles, at[:corners], edges)
 
 
-def _graded(panel: Outline, radius: float) -> PanelMesh:
-    """A mesh that is graded toward corners, down to a radius or to what a short edge has room for.
+def grading_of(panel: Outline, radius: float) -> Grading:
+    """How a mesh is graded toward corners, down to a radius or to what a short edge has room for.
 
     As that of a shell (`structures.graded`).
     """
     corners = np.array(panel.corners)
-    middles, mean = 0.5 * (corners + np.roll(corners, -1, axis=0)), corners.mean(axis=0)
-    pieces = [
-        np.stack([corner, middles[k], mean, middles[k - 1]]) for k, corner in enumerate(corners)
+    length = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+    room = Grading(radius, 2, RAYS).reach(_pieces(corners)).min()
+    return graded(length, RAYS, min(radius, 0.999 * room / ROOM, 0.5 * length.min() / ROOM))
+
+
+def _pieces(corners: NDArray) -> NDArray:
+    """Pieces (..., m, 4, 2) that panels (..., m, 2) are cut into, one at each corner."""
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=-2))
+    mean = np.broadcast_to(corners.mean(axis=-2, keepdims=True), corners.shape)
+    return np.stack([corners, middles, mean, np.roll(middles, 1, axis=-2)], axis=-2)
+
+
+def _graded(kinds: Sequence[Kind]) -> list[PanelMesh]:
+    """Meshes with as many arcs each."""
+    gradings = [kind.grading for kind in kinds if kind.grading]
+    corners = np.array([kind.outline.corners for kind in kinds])
+    radius = np.array([grading.radius for grading in gradings])[:, None, None]
+    x = gradings[0]._replace(radius=1.0).points(_pieces(corners / radius))
+    used, fans = _fans(corners.shape[1], gradings[0].arcs)
+    points = np.concatenate([radius * x.reshape(len(x), -1, 2), corners], axis=1)[:, used]
+    return [
+        _quadratic(own, fans, grading.radius) for own, grading in zip(points, gradings, strict=True)
     ]
-    length = 2.0 * np.linalg.norm(middles - corners, axis=1)
-    room = min(Grading(radius, 2, RAYS).reach(piece).min() for piece in pieces)
-    radius = min(radius, 0.999 * room / ROOM, 0.5 * length.min() / ROOM)
-    cut = graded(length, RAYS, radius)
-    x = np.stack([cut.points(piece) for piece in pieces])  # (m, arcs, 2 RAYS + 1, 2)
-    used, fans = _fans(len(pieces), cut.arcs)
-    mesh = _quadratic(np.concatenate([x.reshape(-1, 2), corners])[used], fans)
-    return mesh._replace(radius=radius)
 
 
 @lru_cache(maxsize=64)
@@ -206,9 +193,9 @@ def _fans(corners: int, arcs: int) -> tuple[NDArray, Cut]:
     return used, _cut(len(used), triangles.reshape(-1, 3), at, edges)
 
 
-def _quadratic(points: NDArray, cut: Cut) -> PanelMesh:
+def _quadratic(points: NDArray, cut: Cut, radius: float | None = None) -> PanelMesh:
     """Triangles with the middles of their sides."""
-    return PanelMesh(np.concatenate([points, points[cut.ends].mean(axis=1)]), cut)
+    return PanelMesh(np.concatenate([points, points[cut.ends].mean(axis=1)]), cut, radius)
 
 
 def _cut(points: int, triangles: NDArray, at: NDArray, edges: list[NDArray]) -> Cut:
@@ -224,157 +211,209 @@ def _cut(points: int, triangles: NDArray, at: NDArray, edges: list[NDArray]) -> 
     return Cut(ends, elements, at, along)
 
 
-@lru_cache(maxsize=256)
-def _loose(cut: Cut, straight: tuple[bool, ...]) -> Loose:
-    """What is free where edges are straight or not."""
-    across = [2 * along for along, held in zip(cut.along, straight, strict=True) if not held]
-    inside = np.setdiff1d(np.arange(cut.size // 2), np.concatenate([cut.at, *cut.along]))
-    free = np.concatenate([*across, (2 * inside[:, None] + np.arange(2)).ravel()])
-    rows, pointers, _ = cut.entries
-    whole = sparse.csc_array((np.arange(len(rows)), rows, pointers), (cut.size, cut.size))
-    ends = np.cumsum([0, *map(len, across)])
-    bows = [np.arange(a, b) for a, b in pairwise(ends)]
+class Unknowns(NamedTuple):
+    """What moves the points of panels that are cut alike.
 
-    def entries() -> Loose:
-        size, part = len(free), sparse.coo_array(whole[:, free][free])
-        keys = [size * part.coords[1] + part.coords[0]]
-        keys += [(size * bow[:, None] + bow).ravel() for bow in bows]
-        found, place = np.unique(np.concatenate(keys), return_inverse=True)
-        put, *of_bows = np.split(place, np.cumsum([len(key) for key in keys])[:-1])
-        column, row = np.divmod(found, size)
-        return Loose(
-            free, row, np.searchsorted(column, np.arange(size + 1)), put, part.data, of_bows
-        )
+    Unknowns are the displacements of points inside, (x, y); where edges bow, those of their points
+    across them, from the line between the ends; those of the corners, and how far these give way.
 
-    # any definite matrix with these entries says in which order they fill least
-    first = entries()
-    definite = -np.ones(len(first.rows))
-    column = np.repeat(np.arange(len(free)), np.diff(first.pointers))
-    definite[first.rows == column] = len(free)
-    order = np.argsort(factorize(_by_columns(definite, first.rows, first.pointers)).perm_c)
-    free, place = free[order], np.argsort(order)
-    bows = [place[bow] for bow in bows]
-    return entries()
-
-
-def _by_columns(data: NDArray, rows: NDArray, pointers: NDArray) -> sparse.csc_array:
-    size = len(pointers) - 1
-    places = rows.astype(np.int32), pointers.astype(np.int32)
-    return sparse.csc_array((data, *places), (size, size))
-
-
-def _condensed(
-    panel: Outline, poissons_ratio: float, resistance: tuple[float, ...], mesh: PanelMesh
-) -> NDArray:
-    cut, loose = mesh.cut, _loose(mesh.cut, panel.straight)
-    stiffness = np.ones(len(cut.elements))
-    if mesh.radius is not None:
-        stiffness[np.isin(cut.elements[:, :3], cut.at).any(axis=1)] = STIFF
-    axes, given = _moves(mesh)
-    whole = _stretching(mesh, axes, poissons_ratio, stiffness)
-    inner = np.zeros(len(loose.rows))
-    inner[loose.put] = whole.data[loose.take]
-    bowing = [k for k, straight in enumerate(panel.straight) if not straight]
-    for k, places in zip(bowing, loose.bows, strict=True):
-        inner[places] += _bowing(mesh, k, resistance[k]).ravel()
-    moved = whole @ given
-    factors = factorize(_by_columns(inner, loose.rows, loose.pointers), ordered=True)
-    across = moved[loose.free]
-    return given.T @ moved - across.T @ factors.solve(across)
-
-
-def _bowing(mesh: PanelMesh, edge: int, resistance: float) -> NDArray:
-    """Stiffness (points, ...) of the bows of an edge at its points, waves of sines."""
-    points, at = mesh.cut.along[edge], mesh.cut.at
-    start, end = mesh.x[at[edge]], mesh.x[at[(edge + 1) % len(at)]]
-    length = float(np.linalg.norm(end - start))
-    place = np.linalg.norm(mesh.x[points] - start, axis=1)
-    fade = 1.0
-    if mesh.radius is None:
-        wave = np.pi / length * np.arange(1, len(points) + 1)
-        shapes = 2.0 / (len(points) + 1) * np.sin(np.outer(wave, place))
-    else:  # of bows that are linear between the points
-        count = WAVES * length / mesh.radius
-        number = np.arange(1, int(np.ceil(1.5 * count)))
-        wave = np.pi / length * number
-        at = np.concatenate([[0.0], place, [length]])
-        slopes = np.diff(np.sin(np.outer(wave, at)), axis=1) / np.diff(at)
-        shapes = -2.0 / length * np.diff(slopes, axis=1) / wave[:, None] ** 2
-        # the shortest ones fade, as a last whole wave would make the stiffness jump with the length
-        part = np.clip(1.5 - number / count, 0.0, 1.0)
-        fade = part**2 * (3.0 - 2.0 * part)
-    shapes = shapes * np.sqrt(fade * resistance * wave**3 * 0.5 * length)[:, None]
-    return shapes.T @ shapes
-
-
-def _moves(mesh: PanelMesh) -> tuple[NDArray, NDArray]:
-    """Axes (n, 2, 2) of the displacements of points, by rows; how corners and gives move them.
-
-    At edges the axes are across and along. Edges that are straight stay so.
+    Attributes
+    ----------
+    starts : (n + 1,)
+        Of each point in the two following.
+    number : (k,)
+        Of the unknowns that move each point, in turn.
+    axes : (k, 2)
+        How these move it; 0 at edges.
+    along : list of arrays (points, j)
+        Which of them move the points of each edge.
+    bows : list of arrays (points,)
+        Numbers of the bows of each edge.
+    free, size : int
+        Unknowns, without and with those of the corners.
     """
-    x, at, along = mesh.x, mesh.cut.at, mesh.cut.along
-    axes = np.tile(np.eye(2), (len(x), 1, 1))
-    given = np.zeros((len(x), 2, (2 if mesh.radius is None else 4) * len(at)))
-    for k, corner in enumerate(at):
-        given[corner, :, 2 * k : 2 * k + 2] = np.eye(2)
-    for k, points in enumerate(along):
-        ends = k, (k + 1) % len(at)
-        edge = x[at[ends[1]]] - x[at[ends[0]]]
-        length = np.linalg.norm(edge)
-        tangent = edge / length
-        normal, place = np.array([-tangent[1], tangent[0]]), (x[points] - x[at[k]]) @ tangent
-        axes[points] = normal, tangent
-        radius = mesh.radius or 0.0
-        for side, far in enumerate((place, length - place)):
-            share = 1.0 - far / length
-            slid = 1.0 - np.clip((far - radius) / (length - 2.0 * radius), 0.0, 1.0)
-            columns = slice(2 * ends[side], 2 * ends[side] + 2)
-            given[points, 0, columns] = np.outer(share, normal)
-            given[points, 1, columns] = np.outer(slid, tangent)
-            if radius:
-                half = 0.5 * length
-                held = np.log(np.maximum(far, radius) / half) / np.log(radius / half)
-                gives = (slid - np.maximum(held, 0.0)) * (1 - 2 * side)
-                given[points, 1, 2 * (len(at) + k) + side] = gives
-    return axes, given.reshape(-1, given.shape[2])
+
+    starts: NDArray
+    number: NDArray
+    axes: NDArray
+    along: list[NDArray]
+    bows: list[NDArray]
+    free: int
+    size: int
+
+
+class Plan(NamedTuple):
+    """What stands where in the stiffness of all panels that are cut alike.
+
+    Attributes
+    ----------
+    unknowns : Unknowns
+    places : see `add_triangles`
+    bows : list of arrays
+        Places of the entries of bows of each edge, the lower half by rows.
+    condensing : Condensing
+    """
+
+    unknowns: Unknowns
+    places: NDArray
+    bows: list[NDArray]
+    condensing: Condensing
+
+
+def _unknowns(cut: Cut, bowing: bool, gives: bool) -> Unknowns:
+    m, n, edges = len(cut.at), int(cut.elements.max()) + 1, np.concatenate(cut.along)
+    inside = np.setdiff1d(np.arange(n), np.concatenate([cut.at, edges]))
+    first, per_edge = 2 * len(inside), bowing + 4 + 2 * gives
+    free = first + bowing * len(edges)
+    counts = np.full(n, 2)
+    counts[edges] = per_edge
+    starts = np.append(0, np.cumsum(counts))
+    number, axes = np.zeros(starts[-1], np.int64), np.zeros((starts[-1], 2))
+    x = np.append(2 * np.arange(len(inside)), free + 2 * np.arange(m))
+    for c in range(2):
+        at = starts[np.append(inside, cut.at)] + c
+        number[at], axes[at, c] = x + c, 1.0
+    along, bows = [], []
+    for k, points in enumerate(cut.along):
+        corners = np.array([k, (k + 1) % m])
+        moving = (2 * corners[:, None] + np.arange(2)).ravel()
+        moving = np.append(moving, 2 * (m + k) + np.arange(2 * gives))
+        along.append(starts[points][:, None] + np.arange(per_edge))
+        number[along[k][:, bowing:]] = free + moving
+        if bowing:
+            bows.append(np.arange(first, first + len(points)))
+            number[along[k][:, 0]] = bows[k]
+            first += len(points)
+    return Unknowns(starts, number, axes, along, bows, free, free + (4 if gives else 2) * m)
 
 
 @lru_cache(maxsize=64)
-def _by_slopes(nu: float) -> NDArray:
-    """Stiffness (16, 144) of triangles of area 1/2 by the products of their slopes.
+def _plan(cut: Cut, bowing: bool, gives: bool) -> Plan:
+    """Where edges bow, unless all are straight."""
+    unknowns = _unknowns(cut, bowing, gives)
+    starts, size = unknowns.starts, unknowns.size
+    # of all ordered pairs of points of a triangle; the lower half of the matrix is enough
+    one, other = np.repeat(cut.elements, 6, axis=1).ravel(), np.tile(cut.elements, (1, 6)).ravel()
+    counts = np.diff(starts)[one], np.diff(starts)[other]
+    each = counts[0] * counts[1]
+    pair = np.repeat(np.arange(len(one)), each)
+    within = np.arange(len(pair)) - np.repeat(np.cumsum(each) - each, each)
+    row, column = np.divmod(within, counts[1][pair])
+    row = unknowns.number[starts[one][pair] + row]
+    column = unknowns.number[starts[other][pair] + column]
+    lower = row >= column
+    keys = [row[lower] * size + column[lower]]
+    for own in unknowns.bows:
+        i, j = np.tril_indices(len(own))
+        keys.append(own[i] * size + own[j])
+    found, place = np.unique(np.concatenate(keys), return_inverse=True)
+    pairs = np.stack(np.divmod(found, size), axis=1)
+    condensing = Condensing(pairs, size, size - unknowns.free)
+    own, *bows = np.split(condensing.places[place], np.cumsum([*map(len, keys)])[:-1])
+    places = np.full(len(row), -1, np.int32)
+    places[lower] = COUNT * own
+    return Plan(unknowns, places, bows, condensing)
 
-    Those (2, 2) of the coordinates that are 1 at the second and at the third corner.
+
+def _condensed(kinds: Sequence[Kind], meshes: Sequence[PanelMesh]) -> NDArray:
+    """Stiffness (c, 2m, 2m) of the corners of at most eight panels, cut alike; see `Kind`."""
+    cut, some = meshes[0].cut, np.minimum(np.arange(COUNT), len(kinds) - 1)
+    straight = np.array([kinds[k].outline.straight for k in some])
+    gives = meshes[0].radius is not None
+    plan = _plan(cut, not straight.all(), gives)
+    x = np.stack([meshes[k].x for k in some], axis=-1)
+    radius = np.array([meshes[k].radius or 0.0 for k in some])
+    nu = np.array([kinds[k].poissons_ratio for k in some])
+    numbers = np.zeros((plan.condensing.entries, COUNT))
+    shapes = np.repeat(plan.unknowns.axes[:, :, None], COUNT, axis=2)
+    for k, points in enumerate(cut.along):
+        edge = _edge(x[points], x[cut.at[k]], x[cut.at[(k + 1) % len(cut.at)]])
+        moves = _moves(edge, radius if gives else None)
+        if plan.bows:
+            moves.insert(0, np.broadcast_to(edge.normal * ~straight[:, k], moves[0].shape))
+            for lane, (kind, mesh) in enumerate(zip(kinds, meshes, strict=True)):
+                own = len(points), float(edge.length[lane]), mesh.radius
+                numbers[plan.bows[k], lane] = _bowing(kind, k, *own)
+        shapes[plan.unknowns.along[k]] = np.stack(moves, axis=1)
+    numbers[:, len(kinds) :] = numbers[:, len(kinds) - 1 : len(kinds)]
+    stiffness = np.repeat(1.0 / (1.0 - nu[None] ** 2), len(cut.elements), axis=0)
+    if gives:
+        stiffness[np.isin(cut.elements[:, :3], cut.at).any(axis=1)] *= STIFF
+    slopes = squares(x[cut.elements[:, :3]], stiffness)
+    add_triangles(
+        cut.elements, plan.unknowns.starts, plan.places, shapes.ravel(), slopes.ravel(), PRODUCTS,
+        nu, numbers.reshape(-1),
+    )  # fmt: skip
+    return plan.condensing.left(numbers)[: len(kinds)]
+
+
+class Edge(NamedTuple):
+    """The same edge of eight panels."""
+
+    normal: NDArray  # (2, 8)
+    tangent: NDArray
+    length: NDArray  # (8,)
+    place: NDArray  # (p, 8) of points, from its start
+
+
+def _edge(x: NDArray, start: NDArray, end: NDArray) -> Edge:
+    """With points x (p, 2, 8), from `start` to `end` (2, 8)."""
+    length = np.linalg.norm(end - start, axis=0)
+    tangent = (end - start) / length
+    normal = np.stack([-tangent[1], tangent[0]])
+    return Edge(normal, tangent, length, ((x - start) * tangent).sum(axis=1))
+
+
+def _moves(edge: Edge, radius: NDArray | None) -> list[NDArray]:
+    """How corners, by x and y, and gives at radii (8,) move points on an edge: (p, 2, 8) each.
+
+    Edges stay straight.
     """
-    both, linear = 0.0, np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
-    for place in MIDDLES:
-        after = np.roll(np.eye(3), -1, axis=0)
-        corners = (4 * place - 1)[:, None] * np.eye(3)
-        middles = 4 * (np.roll(place, -1)[:, None] * np.eye(3) + place[:, None] * after)
-        shapes = np.concatenate([corners, middles]) @ linear
-        both = both + np.einsum("ar,bs->arbs", shapes, shapes) / 6.0
-    same, shear = np.eye(2), 0.5 * (1.0 - nu)
-    elastic = nu * np.einsum("ic,jd->icjd", same, same)
-    elastic += shear * np.einsum("ij,cd->icjd", same, same)
-    elastic += shear * np.einsum("id,jc->icjd", same, same)
-    return np.einsum("arbs,icjd->crdsaibj", both, elastic / (1.0 - nu**2)).reshape(16, 144)
+    moves, gives = [], []
+    within, half = 0.0 if radius is None else radius, 0.5 * edge.length
+    for sign, far in ((1.0, edge.place), (-1.0, edge.length - edge.place)):
+        share = 1.0 - far / edge.length
+        slid = 1.0 - np.clip((far - within) / (edge.length - 2.0 * within), 0.0, 1.0)
+        for c in range(2):
+            across, along = edge.normal[c] * edge.normal, edge.tangent[c] * edge.tangent
+            moves.append(share[:, None] * across + slid[:, None] * along)
+        if radius is not None:
+            held = np.log(np.maximum(far, radius) / half) / np.log(radius / half)
+            gives.append(sign * (slid - np.maximum(held, 0.0))[:, None] * edge.tangent)
+    return moves + gives
 
 
-def _stretching(
-    mesh: PanelMesh, axes: NDArray, poissons_ratio: float, stiffness: NDArray
-) -> sparse.csc_array:
-    """Stiffness of the displacements of all points in plane stress, E t = `stiffness` (nt,)."""
-    elements, turned = mesh.cut.elements, mesh.cut.beside
-    corners = mesh.x[elements[:, :3]]
-    spans = corners[:, 1:] - corners[:, :1]
-    slopes = np.linalg.inv(spans).reshape(-1, 4)
-    squares = (
-        (stiffness * np.linalg.det(spans))[:, None, None] * slopes[:, :, None] * slopes[:, None]
-    )
-    block = squares.reshape(-1, 16) @ _by_slopes(poissons_ratio)
-    own = block[turned]
-    for _ in range(2):  # first by rows, then, symmetric as they are, by columns
-        own = axes[elements[turned]] @ own.reshape(-1, 6, 2, 12)
-        own = own.reshape(-1, 12, 12).transpose(0, 2, 1)
-    block[turned] = own.reshape(-1, 144)
-    rows, pointers, place = mesh.cut.entries
-    return _by_columns(np.bincount(place, np.ravel(block), len(rows)), rows, pointers)
+def _bowing(kind: Kind, k: int, points: int, length: float, radius: float | None) -> NDArray:
+    """Stiffness of the bows of edge k at so many points: the lower half, by rows.
+
+    Those of a straight edge, which move nothing, have the stiffness 1.
+    """
+    if kind.outline.straight[k]:
+        return np.eye(points)[np.tril_indices(points)]
+    if kind.resistance[k] == 0.0:
+        return np.zeros(points * (points + 1) // 2)
+    part = None if radius is None else float(f"{radius / length:.12g}")
+    return kind.resistance[k] / length**2 * _waves(points, part)
+
+
+@lru_cache(maxsize=256)
+def _waves(points: int, radius: float | None) -> NDArray:
+    """The same of an edge of length and resistance 1, whose bows are waves of sines.
+
+    radius : where points are graded, see `Grading`; elsewhere they are equally far apart.
+    """
+    fade, number = 1.0, np.arange(1, points + 1)
+    if radius is None:
+        shapes = 2.0 / (points + 1) * np.sin(np.outer(np.pi * number, number / (points + 1)))
+    else:  # of bows that are linear between the points
+        nodes = np.concatenate([[0.0], Grading(radius, (points + 1) // 4, RAYS).places(1.0), [1.0]])
+        at = np.interp(np.arange(0, len(nodes) - 0.75, 0.5), np.arange(len(nodes)), nodes)
+        count = WAVES / radius
+        number = np.arange(1, int(np.ceil(1.5 * count)))
+        slopes = np.diff(np.sin(np.outer(np.pi * number, at)), axis=1) / np.diff(at)
+        shapes = -2.0 * np.diff(slopes, axis=1) / (np.pi * number[:, None]) ** 2
+        # the shortest ones fade, as a last whole wave would make the stiffness jump with the length
+        part = np.clip(1.5 - number / count, 0.0, 1.0)
+        fade = part**2 * (3.0 - 2.0 * part)
+    shapes = shapes * np.sqrt(0.5 * fade * (np.pi * number) ** 3)[:, None]
+    return (shapes.T @ shapes)[np.tril_indices(points)]
