@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 
 from foldyn.algebra.extrapolation import extrapolated
-from foldyn.structures.panel_plate import Outline, PanelPlate, facets_of, mass_of
+from foldyn.structures.panel_plate import Outline, PanelPlate, facets_of, mass_of, plane_slopes
 from foldyn.structures.plate_boundary import condensed
 from foldyn.structures.shared import shared
 
@@ -93,32 +93,31 @@ def _points(panel: Outline) -> NDArray:
     return np.array([*panel.corners, panel.center] if panel.center else panel.corners)
 
 
-def _gradient(points: NDArray) -> NDArray:
-    """Rows (2, 3): slopes of the plane over three points (3, 2) for heights there."""
-    inverse = np.linalg.inv(points[1:] - points[0])
-    return np.column_stack([-inverse.sum(axis=1), inverse])
+def _planes(points: NDArray, corners: int) -> NDArray:
+    """Slopes (m, 2, points) of the facets, for heights of the points."""
+    facets = np.array(facets_of(points, corners))
+    slopes = np.zeros((corners, 2, len(points)))
+    np.put_along_axis(slopes, facets[:, None], plane_slopes(points[facets]), axis=2)
+    return slopes
 
 
 def _facet_slopes(points: NDArray, corners: int) -> NDArray:
     """Outward slopes (m, points) of the facets across their edges, for heights of the points."""
-    slopes = np.zeros((corners, len(points)))
-    for k, facet in enumerate(facets_of(points, corners)):
-        along = points[(k + 1) % corners] - points[k]
-        outward = np.array([along[1], -along[0]]) / np.linalg.norm(along)
-        slopes[k, list(facet)] = outward @ _gradient(points[list(facet)])
-    return slopes
+    along = np.roll(points[:corners], -1, axis=0) - points[:corners]
+    return _across(-along, _planes(points, corners))
 
 
 def _spoke_turns(points: NDArray, corners: int) -> NDArray:
     """Turns (m, points) of the spokes for heights of the points."""
-    turns = np.zeros((corners, len(points)))
-    facets = facets_of(points, corners)
-    for k in range(corners):
-        along = points[k] - points[corners]
-        left = np.array([-along[1], along[0]]) / np.linalg.norm(along)
-        for facet, sign in ((facets[k], -1.0), (facets[k - 1], 1.0)):
-            turns[k, list(facet)] += sign * left @ _gradient(points[list(facet)])
-    return turns
+    slopes = _planes(points, corners)
+    along = points[:corners] - points[corners]
+    return _across(along, np.roll(slopes, 1, axis=0) - slopes)
+
+
+def _across(along: NDArray, slopes: NDArray) -> NDArray:
+    """Slopes (m, points) to the left of lines (m, 2), of those (m, 2, points)."""
+    x, y = (along / np.linalg.norm(along, axis=1)[:, None]).T
+    return x[:, None] * slopes[:, 1] - y[:, None] * slopes[:, 0]
 
 
 def _paraboloid(panel: Outline) -> NDArray:

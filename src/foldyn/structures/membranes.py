@@ -27,7 +27,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import null_space
 
 from foldyn.mechanics.edge_gives import EdgeGives
 from foldyn.mechanics.following import Following, tensions
@@ -40,6 +39,7 @@ from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
 
 NONE = np.zeros(0, bool)
+ROUNDING = 1e-13  # of the largest singular value: those that are 0
 STRAIGHT = 100.0  # resistance, over E t and the area, from which edges are straight
 
 
@@ -224,11 +224,19 @@ def coupling(
     center = held[corners:, corners:]
     off = np.column_stack([np.linalg.solve(center, held[corners:, :corners]), np.eye(len(center))])
     whole += off.T @ center @ off
-    back, curved = np.linalg.pinv(longer), null_space(longer.T)
+    left, size, right = np.linalg.svd(longer)
+    rank = int((size > ROUNDING * size[0]).sum())
+    back, curved = (right[:rank].T / size[:rank]) @ left[:, :rank].T, left[:, rank:]
     soft = curved.T @ (curved / alone[:, None])
     across = back[:corners].T @ stiff[:corners, corners:]
     between = back.T @ whole @ back + curved @ np.linalg.solve(soft, curved.T)
-    return np.block([[between, across], [across.T, stiff[corners:, corners:]]])
+    out = np.empty((len(bars) + across.shape[1],) * 2)
+    out[: len(bars), : len(bars)], out[: len(bars), len(bars) :] = between, across
+    out[len(bars) :, : len(bars)], out[len(bars) :, len(bars) :] = (
+        across.T,
+        stiff[corners:, corners:],
+    )
+    return out
 
 
 def energies(

@@ -410,8 +410,11 @@ def _waves(points: int, radius: float | None) -> NDArray:
         at = np.interp(np.arange(0, len(nodes) - 0.75, 0.5), np.arange(len(nodes)), nodes)
         count = WAVES / radius
         number = np.arange(1, int(np.ceil(1.5 * count)))
-        slopes = np.diff(np.sin(np.outer(np.pi * number, at)), axis=1) / np.diff(at)
-        shapes = -2.0 * np.diff(slopes, axis=1) / (np.pi * number[:, None]) ** 2
+        half = np.sin(np.outer(np.pi * number, at[: len(nodes)]))
+        mirrored = (-1.0) ** (number[:, None] + 1) * half[:, -2::-1]
+        kinks = np.diff(np.diff(np.eye(len(at)), axis=0) / np.diff(at)[:, None], axis=0)
+        shapes = np.concatenate([half, mirrored], axis=1) @ kinks.T
+        shapes *= -2.0 / (np.pi * number[:, None]) ** 2
         # the shortest ones fade, as a last whole wave would make the stiffness jump with the length
         part = np.clip(1.5 - number / count, 0.0, 1.0)
         fade = part**2 * (3.0 - 2.0 * part)

@@ -51,9 +51,11 @@ def outline(
     """
     middle = x.mean(axis=0)
     points = x if center is None else np.concatenate([x, center[None]])
-    _, _, axes = np.linalg.svd(x - middle)
-    normal = np.cross(x - middle, np.roll(x, -1, axis=0) - middle).sum(axis=0)
-    plane = axes[:2] if np.cross(axes[0], axes[1]) @ normal > 0.0 else axes[1::-1]
+    spokes = x - middle
+    _, _, axes = np.linalg.svd(spokes, full_matrices=False)
+    twisted = spokes.T @ np.roll(spokes, -1, axis=0)
+    normal = (twisted - twisted.T)[[1, 2, 0], [2, 0, 1]]
+    plane = axes[:2] if np.linalg.det([*axes[:2], normal]) > 0.0 else axes[1::-1]
     flat = (points - middle) @ plane.T
     edge = flat[1] - flat[0]
     e = edge / np.linalg.norm(edge)
@@ -270,6 +272,12 @@ def across_edges(edges: Sequence[NDArray], ends: NDArray, heights: int) -> list[
     return found
 
 
+def plane_slopes(corners: NDArray) -> NDArray:
+    """Slopes (nt, 2, 3) of the planes over triangles (nt, 3, 2), for heights of the corners."""
+    inverse = np.linalg.inv(corners[:, 1:] - corners[:, :1])
+    return np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)
+
+
 def plate_blocks(corners: NDArray, sign: NDArray, poissons_ratio: float) -> NDArray:
     """Stiffness (nt, 6, 6) of heights of the corners (nt, 3, 2) of triangles, and of slopes.
 
@@ -280,10 +288,8 @@ def plate_blocks(corners: NDArray, sign: NDArray, poissons_ratio: float) -> NDAr
     along = np.roll(corners, -1, axis=1) - corners
     outward = np.stack([along[:, :, 1], -along[:, :, 0]], axis=2)
     outward /= np.linalg.norm(along, axis=2)[:, :, None]
-    inverse = np.linalg.inv(corners[:, 1:] - corners[:, :1])
-    gradient = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)
     turns = np.zeros((len(corners), 3, 6))  # of the sheet at each side, beta
-    turns[:, :, :3] = -outward @ gradient
+    turns[:, :, :3] = -outward @ plane_slopes(corners)
     turns[:, np.arange(3), 3 + np.arange(3)] = sign
     return turns.transpose(0, 2, 1) @ bending @ turns
 
