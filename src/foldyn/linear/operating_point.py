@@ -17,6 +17,7 @@ from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import NO_POTENTIAL
 from foldyn.statics import OrigamiProblem, trace
 from foldyn.statics.equilibrium import drives, is_actuated
+from foldyn.statics.newton import Solver
 from foldyn.statics.path_memory import AT_REST, REFUSED
 from foldyn.statics.problem import Balance, balance
 from foldyn.statics.rigid import free_rigid_motions
@@ -86,7 +87,11 @@ def operating_point(
 
 
 def _equilibrium(case: Case) -> NDArray:
-    """Displacement (n, 3) under the loads of a case in full, near its rest state."""
+    """Displacement (n, 3) under the loads of a case in full, near its rest state.
+
+    Superlinear hinges take one more step of Newton's method: what statics leaves of the forces as
+    rounding turns one 1e-6 rad from rest by 1e-4 of that, and its slope shows it.
+    """
     factors = [0.0, 1.0] if drives(case, ()) else [0.0]
     nodes, body = case.structure.nodes, case.body
     holds = body.holds(np.zeros(body.size))
@@ -95,7 +100,12 @@ def _equilibrium(case: Case) -> NDArray:
         for told in ("the path loses stability", NO_POTENTIAL[:20]):
             warnings.filterwarnings("ignore", told, FoldynWarning)
         path = trace(case, "newton", factors, inertia_relief=free)
-    return path["displacement"].values[-1]
+    found = path["displacement"].values[-1]
+    if len(body.sheet.soft_hinges(body.dofs(found)).offset):
+        problem = OrigamiProblem(case, inertia_relief=free)
+        again = Solver(problem).correct(problem.state(found, factors[-1]), factors[-1])
+        return problem.displacement(again.u)
+    return found
 
 
 def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> OperatingPoint:
