@@ -5,9 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import eigvals
 
 import foldyn as fd
 from foldyn.errors import InputError
+from foldyn.linear.linearized import linearize
 from pairwise import in_pairs
 
 PATTERN = fd.patterns.simple_fold(a=0.9, b=1.1, dihedral=100)
@@ -45,15 +47,18 @@ TIMED = [
 
 
 @cache
-def made(kind: str, model: Any) -> fd.Case:
-    damping, supports, law = KINDS[kind]
+def sheet_of(law: Any, model: Any, pattern: fd.Pattern = PATTERN) -> Any:
     options: dict[str, Any] = {"crease_stiffness": 60.0, "fold_law": law}
     if model == "shell":
-        s = fd.shell(PATTERN, SHEET, divisions=2, **options)
-    else:
-        soft = {"bend_law": "linear"} if model in ("herkal", "merlin2") else {}
-        s = fd.discretize(PATTERN, SHEET, preset=model, **soft, **options)
-    return fd.Case(s, [HELD, *supports], [PRELOAD], damping)
+        return fd.shell(pattern, SHEET, divisions=2, **options)
+    soft = {"bend_law": "linear"} if model in ("herkal", "merlin2") else {}
+    return fd.discretize(pattern, SHEET, preset=model, **soft, **options)
+
+
+@cache
+def made(kind: str, model: Any) -> fd.Case:
+    damping, supports, law = KINDS[kind]
+    return fd.Case(sheet_of(law, model), [HELD, *supports], [PRELOAD], damping)
 
 
 def case_of(kind: str, model: str) -> fd.Case | None:
@@ -231,3 +236,149 @@ def test_gradients_have_the_damping_or_refuse_it(kind, measure, analysis):
         return
     below, (_, slope), above = gradient(0.02 - 2e-6), gradient(0.02), gradient(0.02 + 2e-6)
     assert slope == pytest.approx((above[0] - below[0]) / 4e-6, rel=1e-4)
+
+
+# ------------------------------------------------------------------ long motions
+ALONE = {"stiffness at rest": fd.Rayleigh(beta=BETA), "modes at rest": fd.ModalDamping(RATIO)}
+SWUNG = PATTERN.vertices[0] - PATTERN.vertices[2]
+AWAY = (SWUNG / np.linalg.norm(SWUNG)).tolist()  # from the crease
+SWING = [
+    (kind, model) for kind in KINDS for model in ("plate", "n5b8e", "merlin2")
+    if not (kind == "strain rates" and model == "n5b8e")
+]  # fmt: skip
+
+
+def swing(kind: str, model: str, **changes: Any) -> fd.Case:
+    """One panel is held, the other swings about the crease: one dof, which any damper meets."""
+    damping, supports, law = KINDS[kind]
+    s = sheet_of(law, model)
+    inside = range(6, len(s.nodes))
+    moved = [v for v in inside if s.nodes[v, 0] < s.nodes[2, 0]]
+    held = [2, 3, 4, 5, *(v for v in inside if v not in moved)]
+    along = [fd.Fix([0, 1], "y"), fd.Fix([0, 1], direction=AWAY), fd.Link([0, 1], axes="z")]
+    riding = [fd.Link(moved, to=(0, 1, 2))] * bool(moved)
+    given = {"damping": ALONE.get(kind, damping)} | changes
+    return fd.Case(s, [fd.Fix(held), *along, *riding, *supports], **given)
+
+
+def decay(case: fd.Case) -> tuple[float, float, fd.State]:
+    """Rate (1/s) and period (s) of its free vibrations, and a small one where it begins."""
+    mode = fd.modes(case, 1)
+    ratio, omega = float(mode.damping_ratio[0]), 2.0 * np.pi * float(mode.frequency[0])
+    period = 2.0 * np.pi / (omega * np.sqrt(1.0 - ratio**2))
+    return ratio * omega, period, fd.State(None, 1e-3 * mode["shape"].values[0])
+
+
+@pytest.mark.parametrize(("kind", "model"), SWING)
+def test_exponents_are_the_rates_at_which_vibrations_decay(kind, model):
+    case = swing(kind, model)
+    rate, period, _ = decay(case)
+    options = {"settle": period, "interval": 0.5 * period, "dt": period / 120.0}
+    if model == "n5b8e" and kind in ("creases", "relaxing damped creases"):
+        with pytest.raises(InputError, match=r"damping: .* CreaseDamping"):
+            fd.lyapunov_exponent(case, period, **options)
+        return
+    assert 0.15 < rate < 1.2
+    found = fd.lyapunov_exponent(case, 3.0 * period, **options)
+    assert float(found.exponent) == pytest.approx(-rate, rel=0.02)
+
+
+@pytest.mark.parametrize(("kind", "model"), SWING)
+def test_motions_of_basins_settle_at_that_rate(kind, model):
+    """What three periods leave of the speed; the states after that repeat to the size of all."""
+    case = swing(kind, model)
+    rate, period, start = decay(case)
+    found = fd.basins(
+        case, lambda kick: fd.State(None, kick * start.velocity), {"kick": [1.0]}, 3.0 * period,
+        record=4, same=0.9, method="rk4", dt=period / 120.0,
+    )  # fmt: skip
+    left = float((found.velocity[0, 0].values * start.velocity).sum() / (start.velocity**2).sum())
+    assert -np.log(left) / (3.0 * period) == pytest.approx(rate, rel=0.05)
+
+
+def test_the_drag_of_a_wind_damps_as_it_blows():
+    """Pressure 1/2 rho Cd (U - r w)^2 on a panel: c = rho Cd U b a^3 / 3 about its side."""
+    normal = np.cross(SWUNG, (0.0, 1.0, 0.0)) / np.linalg.norm(SWUNG)
+    air = fd.Air(1.2, normal.tolist(), added_mass=False, drag_coefficient=2.0)
+    still = swing("creases", "plate", damping=())
+    mode = fd.modes(still, 1)
+    turn = np.linalg.norm(mode["shape"].values[0, 0]) / 0.9  # rad, of a modal mass of 1 kg m2
+    rate = 0.5 * turn**2 * 1.2 * 2.0 * 1.1 * 0.9**3 / 3.0
+    period, case = 1.0 / float(mode.frequency[0]), still.altered(air=air)
+    found = fd.lyapunov_exponent(
+        case, 30.0 * period, settle=30.0 * period, interval=0.5 * period, dt=period / 60.0
+    )
+    assert float(found.exponent) == pytest.approx(-rate, rel=0.05)
+    for refused in (fd.modes, lambda one: fd.frf(one, TINY, [1.0])):
+        with pytest.raises(InputError, match=r"air\.velocity = .*: .* would leave wind out"):
+            refused(case)
+
+
+# ------------------------------------------------------------------ waves
+DRUM = fd.patterns.kresling(sides=6, radius=1.0, height=0.9)
+SIDE = fd.Pattern(DRUM.vertices[[0, 1, 6, 7]], [(0, 1, 3), (0, 3, 2)])
+STRONG = {"dashpot to the ground": 600.0, "dashpot along a line": 5e3}
+
+
+def drum(kind: str, model: str, sides: int) -> fd.Case:
+    """A storey of a Kresling tower that stands on its lower ring, or one side of six."""
+    damping, _, law = KINDS[kind]
+    low = [*range(6 if sides == 6 else 2)]
+    top = [v + len(low) for v in low]
+    supports: list[Any] = [fd.Fix(low)]
+    if kind == "dashpot to the ground":
+        supports.append(fd.Dashpot(STRONG[kind], nodes=top, direction="z"))
+    if kind == "dashpot along a line":
+        supports.append(fd.Dashpot(STRONG[kind], between=[*zip(low, top, strict=True)]))
+    return fd.Case(sheet_of(law, model, DRUM if sides == 6 else SIDE), supports, (), damping)
+
+
+REPEATED = [
+    (kind, model) for kind in KINDS for model in ("plate", "n5b8e", "herkal", "shell")
+    if not (kind == "strain rates" and model in ("n5b8e", "shell"))
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "model"), REPEATED)
+def test_damped_waves_of_a_side_are_the_poles_of_the_ring(kind, model):
+    """Each wave whose phase closes is a free vibration of the whole."""
+    cell = fd.UnitCell(drum(kind, model, 1), screw=fd.Screw("z", 60.0, 0.0))
+    phases = [[0.0], [np.pi / 3.0], [np.pi]]
+    if "modes" in kind or "relaxing" in kind:
+        for waves in (fd.bands, fd.linear.damped_bands):
+            with pytest.raises(InputError, match=r"damping: modes of|fold_law = .*remembers"):
+                waves(cell, phases, 2)
+        return
+    found = fd.linear.damped_bands(cell, phases, 2)
+    rates, whole = found.rate.values.ravel(), linearize(drum(kind, model, 6))
+    k, c, m = (part.toarray() for part in (whole.stiffness, whole.damping, whole.mass))
+    one, none = np.eye(len(k)), np.zeros_like(k)
+    poles = eigvals(np.block([[none, one], [-k, -c]]), np.block([[one, none], [none, m]]))
+    off = np.abs(rates[:, None] - poles[np.isfinite(poles)]).min(axis=1)
+    assert (off < 1e-7 * np.abs(rates)).all()
+    assert found.damping_ratio.values.max() > 2e-6
+
+
+# ------------------------------------------------------------------ what is no damping
+def test_creases_that_yield_are_refused_by_all_that_would_leave_it_out():
+    """They take energy from motions and paths alone."""
+    case = fd.Case(sheet_of(fd.Plastic(10.0), "plate"), [HELD], [PRELOAD])
+    driven = case.altered(loads=[PRELOAD, fd.Force([0, 1], TINY.vector, fd.Harmonic(1.0))])
+    cell = fd.UnitCell(fd.Case(sheet_of(fd.Plastic(10.0), "plate", SIDE)),
+                       screw=fd.Screw("z", 60.0, 0.0))  # fmt: skip
+    modes = {"kind": "modes", "count": 1, "state": fd.State()}
+    for asked in (
+        lambda: fd.periodic_motion(driven, harmonics=2),
+        lambda: fd.lyapunov_exponent(case, 1.0),
+        lambda: fd.basins(case, lambda x: fd.State(), {"x": [0.0]}, 1.0),
+        lambda: fd.linear.damped_bands(cell, [[0.0]], 1),
+        lambda: fd.sensitivity(case, ["fold_stiffness"], "frequency[1]", modes),
+    ):
+        with pytest.raises(InputError, match=r"yield|remember"):
+            asked()
+
+
+def test_basins_refuse_friction():
+    case = made("drag", "plate").altered(contact=fd.Contact(thickness=0.02, friction=0.3))
+    with pytest.raises(InputError, match=r"contact\.friction: .* without what friction"):
+        fd.basins(case, lambda x: fd.State(), {"x": [0.0]}, 1.0)

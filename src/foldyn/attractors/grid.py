@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.attractors.diagram import repeats_after
 from foldyn.attractors.drive import drive_frequency
 from foldyn.attractors.kept import KeptEnds
-from foldyn.attractors.run import PER_PERIOD, divisor, step_of, told_once
+from foldyn.attractors.run import PER_PERIOD, check_relaxing, divisor, step_of, told_once
 from foldyn.cases import Case, State
 from foldyn.dynamics import initial_state, prepare, simulate_many
 from foldyn.dynamics.ensemble import device_for
@@ -67,7 +67,7 @@ def basins(
     Parameters
     ----------
     case : Case
-        Without hinges that remember. Its `Harmonic` histories set the period; without any,
+        Without hinges that yield or creep. Its `Harmonic` histories set the period; without any,
         attractors are equilibria.
     initial : callable
         Gives the `State` at a point of the grid, called with its values by their names.
@@ -103,7 +103,8 @@ def basins(
     Raises
     ------
     InputError
-        An argument out of range, what `simulate_many` refuses, or hinges that remember.
+        An argument out of range, what `simulate_many` refuses, friction, or hinges that yield or
+        creep.
 
     Warns
     -----
@@ -125,10 +126,12 @@ def basins(
     """
     began = time.perf_counter()
     of_kind("case", case, Case)
-    if case.remembering:
+    check_relaxing(case, "what they keep is no part of the grid")
+    if case.contact is not None and case.contact.rubs:
         raise InputError(
-            "structure: some of its hinges remember (prony, plastic or damped creases that give "
-            "way), and their state is no part of the grid; take an elastic law"
+            ": motions go on from the states in which they have settled, without what friction "
+            "holds there; give friction = 0.0",
+            "contact.friction",
         )
     names, places = _grid(grid, len(case.structure.nodes))
     starts = _starts(case, initial, names, places)

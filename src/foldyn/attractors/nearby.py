@@ -11,13 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.attractors.drive import drive_frequency
-from foldyn.attractors.run import PER_PERIOD, divisor, step_of, told_once
+from foldyn.attractors.run import PER_PERIOD, check_relaxing, divisor, step_of, told_once
 from foldyn.cases import Case, State
 from foldyn.dynamics import METHODS, Motion, prepare
 from foldyn.dynamics.failures import failure
+from foldyn.dynamics.methods import suited, with_mass
 from foldyn.dynamics.motion_state import Outcome
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
+from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import variable
 from foldyn.values import choice, number, of_kind
@@ -53,7 +55,7 @@ def lyapunov_exponent(
     Parameters
     ----------
     case : Case
-        Without contact and hinges that remember.
+        Without contact, and hinges that yield or creep.
     duration : float
         How long the rate is averaged (s).
     settle : float
@@ -82,7 +84,8 @@ def lyapunov_exponent(
     Raises
     ------
     InputError
-        An argument out of range, contact, added mass of air, or hinges that remember.
+        An argument out of range, contact, added mass of air, hinges that yield or creep, or damped
+        creases of the scheme "n5b8e".
     InstabilityError
         A motion grew without bound.
     MotionInterrupted
@@ -174,10 +177,11 @@ def _check(case: Case, method: str, initial: State | None) -> None:
         raise InputError(
             ": the exponent takes a mass that stays; give added_mass = false", "air.added_mass"
         )
-    if case.remembering:
+    check_relaxing(case, "the exponent takes smooth forces")
+    if any(part.alone for part in with_mass(suited(method, case), case).remembering):
         raise InputError(
-            "structure: some of its hinges remember (prony, plastic or damped creases that give "
-            "way), and their state is part of the distance; take an elastic law"
+            "damping: turns of damped creases of n5b8e are rounding between motions as near as the "
+            'exponent takes; take preset = "plate", or other damping than CreaseDamping'
         )
 
 
@@ -200,13 +204,9 @@ class Pair:
         self._motions: list[Motion] = [prepare(*given), prepare(*given)]
         self.dt = self._motions[0].plan.dt
         self._interval, self._speed = interval, interval / (2.0 * math.pi)
-        shape = case.structure.nodes.shape
-        x = np.zeros(case.structure.nodes.size)
-        free = case.constraints.free
-        free = free[free < x.size]
-        x[free] = np.random.default_rng(SEED).standard_normal(len(free))
-        aside = case.constraints.displacement(x).reshape(shape)
-        self._aside = self._motions[0].packed.numbering.inward(aside)
+        self._ties, self._numbering = case.constraints, self._motions[0].packed.numbering
+        chance = np.random.default_rng(SEED).standard_normal(case.structure.nodes.shape)
+        self._aside = self._tied(self._numbering.inward(chance))
 
     def growth(self, intervals: int, report: Reporter) -> Iterator[float]:
         """Growth of the logarithm of the distance in one interval after the other."""
@@ -218,7 +218,7 @@ class Pair:
             engines.append(engine)
             self._advance(motion, engine, 0)  # records the start
         size = max(self._size(first), SMALL * float(first.case.structure.bar_length.max()))
-        difference = self._aside, np.zeros_like(self._aside), np.zeros_like(self._aside)
+        difference = [self._aside, *(0.0 * array for array in _arrays(first)[1:])]
         away = self._distance(*difference[:2])
         steps = first.plan.every
         for k in range(intervals):
@@ -228,6 +228,7 @@ class Pair:
             for motion, engine in zip(self._motions, engines, strict=True):
                 self._advance(motion, engine, steps)
             difference = [b - a for a, b in zip(_arrays(first), _arrays(second), strict=True)]
+            difference[:3] = map(self._tied, difference[:3])
             away = self._distance(*difference[:2])
             grown = math.log(max(away, 1e-300) / wanted)
             if not abs(grown) < MOST:
@@ -252,6 +253,12 @@ class Pair:
         if error is not None:
             raise error
 
+    def _tied(self, values: NDArray) -> NDArray:
+        """What supports and ties allow of values (rows, 3) in memory: rounding would not decay."""
+        x = self._numbering.outward(values)
+        x[self._ties.determined] = 0.0
+        return self._numbering.inward(self._ties.displacement(x.ravel()).reshape(x.shape))
+
     def _look(self, motion: Motion) -> None:
         """Stop where energies do not balance, or the step has become too long."""
         motion.audit()
@@ -264,7 +271,8 @@ class Pair:
         return math.hypot(float(np.linalg.norm(u)), self._speed * float(np.linalg.norm(v)))
 
 
-def _arrays(motion: Motion) -> tuple[NDArray, NDArray, NDArray]:
-    """What a motion goes on from: displacement, velocity and acceleration, in memory."""
-    course = motion.course
-    return course.u, course.v, course.carry
+def _arrays(motion: Motion) -> list[NDArray]:
+    """What a motion goes on from: displacement, velocity, acceleration, what hinges remember."""
+    course, memory = motion.course, motion.packed.body.find(HingeMemory)
+    remembered = [] if memory is None else [memory.own.angle, memory.own.state]
+    return [course.u, course.v, course.carry, *remembered]

@@ -96,6 +96,14 @@ def divisor(interval: float, dt: float) -> float:
     return interval / math.ceil(interval / dt * (1.0 - 1e-12))
 
 
+def check_relaxing(case: Case, why: str) -> None:
+    """Refuse hinges that yield or creep, for a reason."""
+    if not all(part.law.relaxes for part in case.remembering):
+        raise InputError(
+            f"structure: some of its hinges yield or creep, and {why}; take prony or an elastic law"
+        )
+
+
 def check_measure(measure: Any, nodes: int, name: str = "measure") -> Quantity:
     """Refuse what gives no number of a state of some nodes, of which that at rest is tried."""
     of_kind(name, measure, Quantity)

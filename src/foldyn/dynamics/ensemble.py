@@ -26,6 +26,7 @@ from foldyn.dynamics.motion_state import Samples
 from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.stability import damper_rate, frequency_bound, is_stable
 from foldyn.errors import ComputationError, FoldynWarning, InputError, StretchWarning
+from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.mechanics.lanes import WIDTH
 from foldyn.results.dataset import origin_variables, result_dataset
 from foldyn.results.quantities import MOTION, energies_of, variable, variables
@@ -52,11 +53,12 @@ def simulate_many(
 ) -> xarray.Dataset:
     """Integrate the motions of many models of one topology at once.
 
-    All have as many nodes and the same supported dofs and groups of strain energy; all else may
-    differ. Each motion is that of ``simulate(case, duration, method, dt)``, but for rounding. By
-    central differences, models with the same bars, hinges and kinds of laws stand in the lanes of
-    vectors, eight a vector, and the vectors are shared among threads: two to three times quicker
-    than one motion after the other for small models. On a GPU all take their steps at once.
+    All have as many nodes and branches of laws with memory, and the same supported dofs and groups
+    of strain energy; all else may differ. Each motion is that of ``simulate(case, duration, method,
+    dt)``, but for rounding. By central differences, models with the same bars, hinges and kinds of
+    laws stand in the lanes of vectors, eight a vector, and the vectors are shared among threads:
+    two to three times quicker than one motion after the other for small models. On a GPU all take
+    their steps at once.
 
     Parameters
     ----------
@@ -134,7 +136,8 @@ def simulate_many(
     times = plan.start + plan.dt * plan.every * np.arange(timing.expected_samples(plan))
     timing.check_samples(len(cases) * len(times), nodes, supported)
     names = audited(case.energy_groups, case.air is not None)
-    shapes = (nodes, 3), (nodes, 3), (supported,), (len(names),), (0, 0)
+    memory = _shape(case)["branches of laws"], VARIABLES
+    shapes = (nodes, 3), (nodes, 3), (supported,), (len(names),), memory
     out = Samples._make([times, *(np.empty((len(cases), len(times), *s)) for s in shapes), 0])
     for k, motion in enumerate(motions):
         motion.plan, motion.force = plan, force  # one step for all
@@ -214,7 +217,11 @@ def _shape(case: Case) -> dict[str, Any]:
     """What the results of all cases share."""
     supported, energies = case.reaction_dofs.tolist(), [*case.energy_groups]
     energies += ["air"] * (case.air is not None)
-    return {"nodes": len(case.structure.nodes), "supported dofs": supported, "energies": energies}
+    branches = sum(part.count for part in case.remembering)
+    return {
+        "nodes": len(case.structure.nodes), "supported dofs": supported, "energies": energies,
+        "branches of laws": branches,
+    }  # fmt: skip
 
 
 def _name(device: str) -> str:
@@ -241,7 +248,7 @@ def _integrate(
             motions[k].integrate()
         except ComputationError as error:
             ended[k] = str(error)
-        for array, own in zip(out[1:5], motions[k].output.window[1:5], strict=True):
+        for array, own in zip(out[1:-1], motions[k].output.window[1:-1], strict=True):
             array[k], array[k, motions[k].stored :] = own, np.nan
     return ended
 
@@ -310,6 +317,8 @@ def _dataset(
         np.moveaxis(out.energy, 2, 0),
         strict=True,
     )
+    if out.memory.size:
+        values["memory"] = out.memory
     timed = variables(known, "time", values).items()
     data = origins | {name: (("model", *dims), *about) for name, (dims, *about) in timed}
     data["outcome"] = variable(("model",), np.array(outcome), "", "what became of the motion")

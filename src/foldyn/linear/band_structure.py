@@ -43,7 +43,7 @@ def bands(
     """Frequencies of Bloch waves: the bands of a repeated case.
 
     Solves K(k) phi = lambda M(k) phi for the lowest eigenvalues lambda = (2 pi f)^2, K the tangent
-    of the repeated sheet in the state.
+    of the repeated sheet in the state. Damping plays no part: `damped_bands` has it.
 
     Parameters
     ----------

@@ -40,14 +40,14 @@ class Remembering(NamedTuple):
     @property
     def stiffness(self) -> NDArray:
         """Stiffness (k,), N m/rad, that parameters of the branches refer to."""
-        if self._alone:
+        if self.alone:
             return np.where(np.isfinite(self.hinges.beside), self.hinges.beside, 0.0)
         stiffness, softness = self.hinges.stiffness, self.hinges.softness
         least = np.divide(LEAST, softness, out=np.zeros_like(softness), where=softness > 0.0)
         return np.maximum(stiffness, least)
 
     @property
-    def _alone(self) -> bool:
+    def alone(self) -> bool:
         """Whether it is dampers beside edge angles in balance, which know no stiffness."""
         alone = isinstance(self.law, CreaseDampers)
         return alone and bool(np.isfinite(self.hinges.beside).any())
@@ -59,7 +59,7 @@ class Remembering(NamedTuple):
         What yields or creeps is in series with its crease, and so with the panels. What relaxes is
         beside the crease: of the panels it knows a part.
         """
-        if self._alone:
+        if self.alone:
             return (damper_branch(self.stiffness, self.damping),)
         stiffness = self.stiffness
         own = self.law.branches(stiffness, self.hinges.length)
