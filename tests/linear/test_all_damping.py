@@ -296,6 +296,21 @@ def test_motions_of_basins_settle_at_that_rate(kind, model):
     assert -np.log(left) / (3.0 * period) == pytest.approx(rate, rel=0.05)
 
 
+@pytest.mark.filterwarnings("ignore:the energy balance of the motion")
+def test_damped_creases_of_plates_are_of_first_order_but_by_energy_momentum():
+    case = swing("creases", "plate")
+    _, period, start = decay(case)
+
+    def end(method: str, steps: int) -> float:
+        run = fd.simulate(case, 2 * period, method, period / steps, every=2 * steps, initial=start)
+        return float(run.displacement[-1, 0, 2])
+
+    exact = end("energy_momentum", 400)
+    for method, least, most in (("newmark", 1.0, 1.5), ("energy_momentum", 1.9, 2.7)):
+        wrong = [abs(end(method, steps) - exact) for steps in (50, 200)]
+        assert least < 0.5 * np.log2(wrong[0] / wrong[1]) < most
+
+
 def test_the_drag_of_a_wind_damps_as_it_blows():
     """Pressure 1/2 rho Cd (U - r w)^2 on a panel: c = rho Cd U b a^3 / 3 about its side."""
     normal = np.cross(SWUNG, (0.0, 1.0, 0.0)) / np.linalg.norm(SWUNG)
