@@ -12,13 +12,12 @@ from differences import Design
 import foldyn as fd
 from foldyn.dynamics import rk4_adjoint
 from foldyn.errors import InputError
-from pairwise import in_pairs
 
 MOTION = {"kind": "dynamics", "method": "rk4", "dt": 1e-3, "duration": 0.4, "every": 20}
 PRESETS = ("merlin2", "plate", "n5b8e")
 MEASURES = (
     "displacement[8,z]", "displacement_at[8,x,0.2]", "velocity[7,z]", "maximum[8,z]",
-    "integral[8,z]", "mean_square[7,z]", "largest_displacement", "strain",
+    "integral[8,z]", "mean_square[7,z]", "largest_displacement",
 )  # fmt: skip
 
 
@@ -41,15 +40,15 @@ def built(preset: Any, **fixed: Any) -> Any:
     return lambda **given: cell(preset=preset, **fixed, **given)
 
 
-@pytest.mark.parametrize(("preset", "measure"), in_pairs(PRESETS, MEASURES))
-def test_gradients_agree_with_differences(preset, measure):
+@pytest.mark.parametrize("preset", PRESETS)
+def test_gradients_agree_with_differences(preset):
     stiffness = np.random.default_rng(5).uniform(0.4, 0.6, 4)
     values = {"force": 0.4, "alpha": 0.5, "stiffness": stiffness}
-    design = Design(built(preset), values, [measure], MOTION)
-    if measure == "strain":  # a difference of stretches near 1
-        design.step = 4e-3
-    errors = design.errors()
-    assert max(errors.values()) < 1e-6, errors
+    stretched = Design(built(preset), values, ["strain"], MOTION)
+    stretched.step = 4e-3  # a difference of stretches near 1
+    for design in (Design(built(preset), values, [*MEASURES], MOTION), stretched):
+        errors = design.errors()
+        assert max(errors.values()) < 1e-6, errors
 
 
 @pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
