@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import cycle
 
 import numpy as np
 import pytest
@@ -71,8 +72,7 @@ def half_steps(what, method, steps, every):
 
 
 @pytest.mark.matrix
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("kind", "method"), [*zip(KINDS, cycle(METHODS), strict=False)])
 def test_threads_share_a_motion(monkeypatch, method, kind):
     what = KINDS[kind]()
     given = half_steps(what, method, 200, 7)

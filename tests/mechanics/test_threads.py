@@ -21,6 +21,7 @@ from foldyn.mechanics import threads as threads_module
 from foldyn.mechanics.model import node_order, renumber
 from foldyn.mechanics.strips import reach, shares, strips
 from foldyn.mechanics.threads import BROKEN, part, run_together, team, wait
+from pairwise import in_pairs
 
 # relative to the norm of the force: sums of some ten numbers in another order
 ROUNDING = 1e-14
@@ -95,9 +96,7 @@ def test_strips_give_the_force_of_the_whole(monkeypatch, cells, laws):
     np.testing.assert_array_equal(work.angle, angle)
 
 
-@pytest.mark.parametrize("laws", LAWS)
-@pytest.mark.parametrize("window", [64, 16384])
-@pytest.mark.parametrize("count", [2, 3, 4])
+@pytest.mark.parametrize(("count", "window", "laws"), in_pairs([2, 3, 4], [64, 16384], LAWS))
 def test_threads_agree_to_rounding_and_repeat_to_the_bit(monkeypatch, count, window, laws):
     model, u = sheet((60, 2), laws)
     force, angle = alone(model, u)
@@ -107,7 +106,7 @@ def test_threads_agree_to_rounding_and_repeat_to_the_bit(monkeypatch, count, win
     first = together(model, u, works)
     assert relative(first, force) < ROUNDING
     np.testing.assert_array_equal(works[0].angle, angle)
-    for _ in range(20):
+    for _ in range(10):
         np.testing.assert_array_equal(together(model, u, works), first)
 
 
