@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import runpy
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,6 @@ from fuzz_judge import fuzz
 from fuzz_targets import TARGETS
 
 SHORT = 20  # a few seconds
-MAIN = runpy.run_path(str(Path(__file__).with_name("__main__.py")))
 
 
 @pytest.mark.matrix
@@ -20,14 +18,6 @@ def test_damaged_input_is_read_or_refused(target):
     assert not report.findings, str(report)
     assert report.mutations == SHORT
     assert report.refused  # what is damaged shows
-
-
-def test_each_fuzzer_has_run_long_and_found_nothing():
-    rows = {row["target"]: row for row in MAIN["stored"]()}
-    assert set(rows) == set(TARGETS)
-    for row in rows.values():
-        assert int(row["mutations"]) >= MAIN["MANY"], row
-        assert row["findings"] == "0", row
 
 
 # ------------------------------------------------------------------------ the judge itself
