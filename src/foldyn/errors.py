@@ -6,6 +6,8 @@ that fails raises `ComputationError` (exit status 1) and carries what was comput
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
@@ -172,10 +174,19 @@ class MotionInterrupted(KeyboardInterrupt):
 
 
 class FoldynWarning(UserWarning):
-    """Something works, but perhaps not as intended."""
+    """Something works, but perhaps not as intended: one line, and the page that explains it.
 
-    def __init__(self, message: object = "") -> None:
-        super().__init__(shortened(str(message)))
+    Parameters
+    ----------
+    message : str
+        What is doubtful, with its value and the remedy.
+    page : str
+        Where `docs` explains it: "modes.md#choose-the-state".
+    """
+
+    def __init__(self, message: object = "", page: str = "") -> None:
+        text = "; ".join(line.strip() for line in str(message).splitlines())
+        super().__init__(shortened(f"{text} (docs/{page})" if page else text))
 
 
 class CrossingWarning(FoldynWarning):
@@ -196,3 +207,17 @@ OF_MODELS = (StretchWarning, ModelRangeWarning)
 
 class UnitsWarning(FoldynWarning):
     """A number is probably in other units: degrees are asked for, and SI."""
+
+
+INSIDE = sys.stdlib_module_names | {"foldyn", "numba", "scipy", "xarray"}
+"""What stands between a warning and the line of the user who is warned."""
+
+
+def warn(message: str, page: str, category: type[FoldynWarning] = FoldynWarning) -> None:
+    """Warn at the user's line; arguments as of `FoldynWarning`."""
+    frame = sys._getframe(1)
+    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in INSIDE:
+        frame = frame.f_back
+    place = frame.f_code.co_filename, frame.f_lineno
+    known = frame.f_globals.setdefault("__warningregistry__", {})  # as `warnings.warn` has it
+    warnings.warn_explicit(category(message, page), category, *place, registry=known)

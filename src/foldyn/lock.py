@@ -6,12 +6,11 @@ import os
 import socket
 import sys
 import time
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from foldyn.errors import FoldynWarning
+from foldyn.errors import warn
 
 
 class LockedError(Exception):
@@ -60,11 +59,10 @@ def _take(path: Path) -> int:
             os.close(opened)
             raise LockedError(said) from None
         except OSError as error:  # a file system without locks
-            warnings.warn(
+            warn(
                 f"{path}: cannot be locked ({error.strerror}): see that no other process "
                 "writes there",
-                FoldynWarning,
-                stacklevel=4,
+                "command-line.md#folders-of-results",
             )
             return opened
 

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from foldyn.errors import FoldynWarning
+from foldyn.errors import warn
 
 Result = TypeVar("Result")
 
@@ -67,5 +66,5 @@ def name_of(inputs: Any) -> str:
 
 def warn_of_damage(file: Path, then: str = "it is computed again") -> None:
     """Tell that a file cannot be used, and what happens then."""
-    text = f"{file}: is damaged, or holds something else; {then}"
-    warnings.warn(text, FoldynWarning, stacklevel=3)
+    text = f"{file}: is damaged, missing, or of another kind; {then}"
+    warn(text, "results.md#damaged-files")

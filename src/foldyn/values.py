@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import difflib
 import math
-import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from numbers import Integral, Real
@@ -17,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.errors import InputError, UnitsWarning
+from foldyn.errors import InputError, UnitsWarning, warn
 
 LARGEST, SMALLEST = 1e50, 1e-50
 """Sizes of numbers other than 0, in SI units: their fourth powers and quotients stay in range."""
@@ -246,7 +245,7 @@ def doubt_degrees(name: str, value: Any) -> None:
             meant = f"is small for an angle in degrees: give {np.degrees(angles[0]):.4g}"
     if meant:
         text = f"{name} = {angles[0]:.5g} {meant} if that is meant in radians"
-        warnings.warn(text, UnitsWarning, stacklevel=3)
+        warn(text, "sheets.md#units", UnitsWarning)
 
 
 def length(name: str, value: Any) -> float:

@@ -37,7 +37,8 @@ def test_a_motion_beside_the_shell(workplace) -> None:
     assert done.status == 0
     assert done.err.splitlines() == [
         "foldyn: warning: case.toml: foldyn fidelity leaves out [initial]: small vibrations about "
-        "rest are compared, and displacements under the loads"
+        "rest are compared, and displacements under the loads "
+        "(docs/command-line.md#modes-frequency-responses-and-bands)"
     ]
     folder = "case-fidelity"
     names = ("fidelity.png", "laws.png", "report.html", "result.nc", "structure.png")

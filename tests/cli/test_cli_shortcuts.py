@@ -46,7 +46,8 @@ def test_the_modes_of_a_motion(workplace, miura) -> None:
     (line,) = done.err.splitlines()
     assert line == (
         "foldyn: warning: case.toml: foldyn modes leaves out loads[0]: nothing acts or moves in "
-        "the state of rest (--state equilibrium takes the equilibrium under the loads)"
+        "the state of rest (--state equilibrium takes the equilibrium under the loads) "
+        "(docs/command-line.md#modes-frequency-responses-and-bands)"
     )
     # a folder of its own: the motion's may be there already
     assert done.new == ["case-modes", "case-modes/result.nc"]

@@ -41,7 +41,7 @@ def test_flaps_cross_beyond_the_angle_at_which_they_meet(model):
     assert [str(one.message) for one in said] == [
         "panels pass through each other: 0 and 2, first at point 13 (load factor 0.928571), and "
         "at 2 of the 15 samples. Nothing keeps them apart: what follows is not what a real sheet "
-        "does"
+        "does; give the case contact (docs/results.md#panels-that-cross)"
     ]
     assert path["crossing_panels"].values.tolist() == [[0, 2]]
     assert path["crossing_first"].values.tolist() == [13]  # of 50 degrees

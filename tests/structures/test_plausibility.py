@@ -29,11 +29,11 @@ def told(compute) -> list[str]:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ((2e11, 0.3, 0.3, 7850.0), "thickness = 0.3 m is 7.5 times the shortest .* give 0.0003$"),
-        ((200.0, 0.3, 1e-4, 7850.0), "200 Pa .* at 0.16 m/s .* meant in GPa, give 2e[+]11$"),
-        ((3500.0, 0.3, 1e-4, 1200.0), "3500 Pa .* at 1.71 m/s .* meant in MPa, give 3.5e[+]09$"),
-        ((2e11, 0.3, 1e-4, 7.85), "7.85 kg/m3: .* if density is meant in g/cm3, give 7850$"),
-        ((2e11, 0.3, 1e-4, 7.85e-9), "if density is meant in t/mm3, give 7850$"),
+        ((2e11, 0.3, 0.3, 7850.0), "thickness = 0.3 m is 7.5 times the shortest .* give 0.0003 "),
+        ((200.0, 0.3, 1e-4, 7850.0), "200 Pa .* at 0.16 m/s .* meant in GPa, give 2e[+]11 "),
+        ((3500.0, 0.3, 1e-4, 1200.0), "3500 Pa .* at 1.71 m/s .* meant in MPa, give 3.5e[+]09 "),
+        ((2e11, 0.3, 1e-4, 7.85), "7.85 kg/m3: .* if density is meant in g/cm3, give 7850 "),
+        ((2e11, 0.3, 1e-4, 7.85e-9), "if density is meant in t/mm3, give 7850 "),
     ],
 )
 def test_sheets(model, given, message):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 from foldyn.analyses.motion import MASSLESS_METHODS
 from foldyn.analyses.vibration import STATES
 from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.structures import PRESETS, ModelOptions
 from foldyn.values import choice
 
@@ -84,7 +83,7 @@ def _tell(path: Path, command: str, left: list[str], why: str) -> None:
     """Warn of what a command leaves out of a file, if it does."""
     if left:
         text = f"{path}: foldyn {command} leaves out {', '.join(left)}: {why}"
-        warnings.warn(text, FoldynWarning, stacklevel=4)
+        warn(text, "command-line.md#modes-frequency-responses-and-bands")
 
 
 def converted(path: Path, document: Document, kind: str, state: str) -> Document:

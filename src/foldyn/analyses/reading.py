@@ -22,7 +22,7 @@ from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.clamped_edges import straightened
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
-from foldyn.errors import Faults, FoldynWarning, InputError, within
+from foldyn.errors import Faults, FoldynWarning, InputError, warn, within
 from foldyn.input_files import from_toml, path_of, read_text
 from foldyn.patterns import GENERATORS, Pattern, convex, thicken, welded
 from foldyn.patterns.convex import what_was_cut
@@ -282,7 +282,7 @@ def _facets(pattern: Pattern, table: Mapping[str, Any]) -> Pattern:
     pattern = pattern if wanted == HINGE else welded(pattern, join=wanted == WELD)
     parts = pattern if wanted == LINE else convex(pattern)
     if parts is not pattern:
-        warnings.warn(f"pattern: {what_was_cut(pattern, parts)}", FoldynWarning, stacklevel=2)
+        warn(f"pattern: {what_was_cut(pattern, parts)}", "facets.md#panels-that-are-not-convex")
     return parts
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,7 +22,7 @@ from foldyn.attractors.run import (
 )
 from foldyn.cases import Case, State
 from foldyn.dynamics.progress import Progress, Reporter, reporter
-from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
+from foldyn.errors import ComputationError, InputError, MotionInterrupted, warn
 from foldyn.results import Quantity
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import variable
@@ -165,10 +164,9 @@ def bifurcation_diagram(
                     if not found:
                         raise
                     last = f"{swept.name} {found[-1].value:g}"
-                    warnings.warn(
+                    warn(
                         f"the sweep {way} ends after the {last}: {error}",
-                        FoldynWarning,
-                        stacklevel=2,
+                        "long-motions.md#sweeps-and-jumps",
                     )
                 jumps += bracketed(steady, way, found, resolution)
     except KeyboardInterrupt:

@@ -6,7 +6,6 @@ import itertools
 import math
 import os
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -23,7 +22,7 @@ from foldyn.dynamics import initial_state, prepare, simulate_many
 from foldyn.dynamics.ensemble import device_for
 from foldyn.dynamics.gpu.choice import DEVICES
 from foldyn.dynamics.progress import Progress, Reporter, reporter
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.ram_limit import check_memory
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import PLACE, variable
@@ -166,11 +165,10 @@ def basins(
     label, first_of, periods = told_apart(ends, weights, same, size)
     lost = int((label < 0).sum())
     if lost:
-        warnings.warn(
+        warn(
             f"{lost} of {len(label)} motions do not repeat in {record // 2} periods (basin -1): "
             "chaotic, or not settled yet; a longer duration or record tells",
-            FoldynWarning,
-            stacklevel=2,
+            "long-motions.md#basins-of-attraction",
         )
     about |= {"same": same, "wall_seconds": time.perf_counter() - began, **used}
     about["period"] = period if frequency else None

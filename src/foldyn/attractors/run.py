@@ -162,5 +162,5 @@ def told_once() -> Iterator[None]:
         text = str(one.message)
         kind = one.category, re.sub(r"[-+\d.e%]+", "", text)
         if kind not in known:
-            warnings.warn(text, one.category, stacklevel=4)
+            warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
         known.add(kind)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from foldyn.attractors.drive import drive_frequency
 from foldyn.attractors.run import Stretch, check_measure, measured
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.ram_limit import check_memory
 from foldyn.results import Quantity, case_of
 from foldyn.results.attributes import facts, own_attributes
@@ -106,7 +105,7 @@ def poincare_section(
         times = _passages(stretch, plane, number("level", level), direction)
     times = times[times >= after]
     if not len(times):
-        warnings.warn(_missed(stretch, after, period, level), FoldynWarning, stacklevel=2)
+        warn(_missed(stretch, after, period, level), "long-motions.md#doublings-and-chaos")
     found = at_times(stretch, times)
     values = {"displacement": found.displacement, "velocity": found.velocity}
     along = {"time": variable(("time",), found.time, "s", "time")}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable
 
 import numpy as np
@@ -11,7 +10,7 @@ from scipy import sparse
 
 from foldyn.cases.case import Case
 from foldyn.cases.constraints import AGREES
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.mechanics.contact.candidates import NORMAL, POINT
 from foldyn.mechanics.crossings import crossing_panels, pairs_text
 
@@ -93,11 +92,10 @@ def _check_panels(case: Case, u: NDArray) -> None:
             f": at the start panels meet, or fold onto themselves{most}; {APART}", "contact"
         )
     if not u.any() and energy > 0.0:
-        warnings.warn(
+        warn(
             f"contact: at rest panels are nearer to each other than the sheet is thick{most}; "
             f"they will be pushed apart with an energy of {energy:.3g} J",
-            FoldynWarning,
-            stacklevel=5,
+            "contact.md#limits",
         )
 
 

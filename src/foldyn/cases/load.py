@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.decode import Part
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.mechanics.following import Following
 from foldyn.structures.swelling import Swelling
 
@@ -101,9 +100,8 @@ def check_held(
             place,
         )
     if told:
-        warnings.warn(
+        warn(
             f"{place}: {what} acts in part where supports hold its nodes: {listed}; that part "
             "only adds to the reactions",
-            FoldynWarning,
-            stacklevel=5,
+            "loads.md#loads",
         )

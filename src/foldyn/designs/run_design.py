@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,7 +17,7 @@ from foldyn.designs.problem import Problem, problem_of
 from foldyn.designs.result import Design, End, history_of
 from foldyn.designs.search import Row, Search
 from foldyn.designs.space import Space, space_of
-from foldyn.errors import ComputationError, FoldynWarning
+from foldyn.errors import ComputationError, warn
 from foldyn.sweeps.evaluations import Evaluation, Evaluations
 from foldyn.sweeps.pool import Here
 from foldyn.values import MOST, choice, number, whole
@@ -268,18 +267,16 @@ def _found(
         violated = ", ".join(
             f"{text} by {amount:.3g}" for text, amount in violations.items() if amount
         )
-        warnings.warn(
+        warn(
             f"none of {len(search.rows)} designs is feasible; the nearest one violates {violated}. "
             "Widen the bounds, relax constraints, or take more starts",
-            FoldynWarning,
-            stacklevel=4,
+            "design-optimization.md#what-comes-back",
         )
     elif _insensitive(search, best) and not ends[best.start].converged:
-        warnings.warn(
+        warn(
             f"no parameter changes {problem.objective.text} at the best design: it need not be an "
             "optimum; start elsewhere, or take another objective",
-            FoldynWarning,
-            stacklevel=4,
+            "design-optimization.md#what-comes-back",
         )
     gradient: dict[str, Any] = {}
     if best.slopes is not None:

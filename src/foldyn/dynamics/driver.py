@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -33,7 +32,7 @@ from foldyn.dynamics.motion_state import StepPlan
 from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.system import pack
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.results import Quantity
 from foldyn.values import choice, flag, number, of_kind
 
@@ -239,11 +238,11 @@ def prepare(
         timing.warn_of_functions(case)
     steps = (plan.end - plan.start) / plan.dt
     if steps > MANY_STEPS:
-        warnings.warn(
+        warn(
             f"{steps:.3g} steps of {plan.dt:.3g} s will take a long time (critical step "
-            f"{critical:.3g} s); stiff bars, light nodes and strong damping make it small",
-            FoldynWarning,
-            stacklevel=3,
+            f"{critical:.3g} s; stiff bars, light nodes and strong damping make it small): take "
+            'method = "generalized_alpha"',
+            "integrators.md#steps",
         )
     packed = pack(case, timing.apart(plan, critical), origin, modal)
     if device == "gpu":
@@ -315,12 +314,11 @@ def _warn_of_damping(case: Case, method: Integrator, u: NDArray, critical: float
     slow = replace(case, damping=Rayleigh(case.rayleigh.alpha), supports=supports)
     without = method.critical_step(slow, u)
     if without > DAMPING_COST * critical:
-        warnings.warn(
+        warn(
             f"{' and '.join(fast)} make{'' if len(fast) > 1 or case.dashpots else 's'} "
             f"the critical step {without / critical:.0f} "
             f"times smaller ({critical:.3g} s instead of {without:.3g} s): an explicit method must "
             "resolve the damping of the fastest vibration; an implicit one need not: "
             'method = "generalized_alpha" (alpha costs nothing)',
-            FoldynWarning,
-            stacklevel=4,
+            "damping.md#in-the-analyses",
         )

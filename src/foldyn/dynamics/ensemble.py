@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -25,7 +24,7 @@ from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.motion_state import Samples
 from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.stability import damper_rate, frequency_bound, is_stable
-from foldyn.errors import ComputationError, FoldynWarning, InputError, StretchWarning
+from foldyn.errors import ComputationError, InputError, StretchWarning, warn
 from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.mechanics.lanes import WIDTH
 from foldyn.results.dataset import origin_variables, result_dataset
@@ -281,28 +280,31 @@ def _on_gpu(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]:
 def _warn(motions: Sequence[Motion], ended: Mapping[int, str], energy: NDArray) -> float:
     """Warn of what went wrong, or is doubtful; the largest relative energy error."""
     if ended:
-        warnings.warn(
+        warn(
             f"{len(ended)} of {len(motions)} motions ended before their time (see `outcome`), the "
-            f"first of cases[{min(ended)}]: {ended[min(ended)]}", FoldynWarning, stacklevel=3,
-        )  # fmt: skip
+            f"first of cases[{min(ended)}]: {ended[min(ended)]}",
+            "integrators.md#many-models-at-once",
+        )
     sound = {k: motion for k, motion in enumerate(motions) if k not in ended}
     doubts = {k: text for k, motion in sound.items() if (text := motion.doubt())}
     off = {k: motion.audit() for k, motion in sound.items()}
     if doubts:
         worst = max(doubts, key=lambda k: off[k])
         told = f"cases[{worst}] (the worst of {len(doubts)}): {doubts[worst]}"
-        warnings.warn(told, FoldynWarning, stacklevel=3)
+        warn(told, "integrators.md#accuracy")
     first, pairs = motions[0].case, zip(motions, energy, strict=True)
     names = audited(first.energy_groups, first.air is not None)
     found = [stretch(m.case.structure, dict(zip(names, e.T, strict=True))) for m, e in pairs]
     shares = [one.share if one else 0.0 for one in found]
     if any(shares):
-        warnings.warn(
+        warn(
             f"panels that stretch hold {max(shares):.0%} of the strain energy of "
             f"cases[{np.argmax(shares)}] where that is largest, the most of "
             f"{np.count_nonzero(shares)} motions with more than {most(first.structure):.0%}, "
-            f"{remedy(first.structure)}", StretchWarning, stacklevel=3,
-        )  # fmt: skip
+            f"{remedy(first.structure)}",
+            "models.md#where-panels-stretch",
+            StretchWarning,
+        )
     return max(off.values(), default=0.0)
 
 

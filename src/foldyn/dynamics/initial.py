@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
@@ -23,7 +22,7 @@ from foldyn.dynamics.modal_damping import about
 from foldyn.dynamics.motion_state import TALLY, Course, StepPlan
 from foldyn.dynamics.system import Packed, carry_supports, place, scratch
 from foldyn.dynamics.timing import histories
-from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning
+from foldyn.errors import InputError, ModelRangeWarning, warn
 from foldyn.mechanics.following import following_force
 from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.results.contents import check_variable
@@ -203,13 +202,12 @@ def warn_of_unstable_damping(case: Case, start: Origin) -> None:
     except SingularTangentError:
         return
     if negative:
-        warnings.warn(
+        warn(
             f'damping: with state = "start" beta K0 drives {negative} '
             f"motion{'s' if negative > 1 else ''} instead of damping "
             f"{'them' if negative > 1 else 'it'}: the stiffness is not positive where the motion "
             'starts; take state = "rest", or start from a stable state',
-            FoldynWarning,
-            stacklevel=4,
+            "damping.md#rayleigh",
         )
 
 
@@ -227,13 +225,13 @@ def warn_of_standing_in_wind(case: Case, v: NDArray) -> None:
         return
     wind = float(np.linalg.norm(air.velocity))
     if wind > SLOW_WIND * float(np.linalg.norm(v, axis=1).max()):
-        warnings.warn(
+        warn(
             f"air: in a wind of {wind:g} m/s panels that stand lack a moment of up to 0.3 times "
             "1/2 density U^2 A a/2 (U the wind, A and a a panel's area and width): added mass "
             'finds its flow anew only when a hinge has turned by 3 degrees; added_mass = "local", '
             "of each panel alone, lacks none",
+            "air.md#limits",
             ModelRangeWarning,
-            stacklevel=4,
         )
 
 

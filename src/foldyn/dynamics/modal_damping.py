@@ -13,7 +13,6 @@ which vanishes in translations of the whole.
 from __future__ import annotations
 
 import math
-import warnings
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +24,7 @@ from foldyn.algebra.eigen import Pencil, Spectrum, lowest
 from foldyn.cases import Case, ModalDamping, Origin
 from foldyn.cases.added_mass import added_mass_at
 from foldyn.cases.history import factor
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.materials import Superlinear
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import following_tangent, joined
@@ -80,21 +79,19 @@ class ModalRows(NamedTuple):
     def warn(self) -> None:
         """Warn where modes are left out, or are no modes by themselves."""
         if self.alike:
-            warnings.warn(
+            warn(
                 f"damping: {self.alike} modes have frequencies in common, but different ratios, or "
                 "some of them none: as any of their sums is a mode too, all of one frequency get "
                 "the mean; give them the same ratio",
-                FoldynWarning,
-                stacklevel=5,
+                "damping.md#modal",
             )
         if self.soft:
-            warnings.warn(
+            warn(
                 f"damping: {self.soft} hinges of the superlinear law stand at their rest angle, "
                 "where their slope vanishes: motions that only they resist are no modes, and modal "
                 'damping leaves them out; take preset = "plate" in place of this law, or Rayleigh '
                 "damping beside it",
-                FoldynWarning,
-                stacklevel=5,
+                "damping.md#modal",
             )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
@@ -39,10 +38,10 @@ from foldyn.errors import (
     ComputationError,
     CrossingWarning,
     FoldynError,
-    FoldynWarning,
     InstabilityError,
     MotionInterrupted,
     StretchWarning,
+    warn,
 )
 from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.results import trajectory_dataset
@@ -165,10 +164,10 @@ class Motion:
         if len(crossings.first):
             when = f"t = {self.output.time(crossings.first[0]):.6g} s"
             text = crossings.text(when, self.stored)
-            warnings.warn(text, CrossingWarning, stacklevel=4)
+            warn(text, "results.md#panels-that-cross", CrossingWarning)
         result = self._dataset(crossings)
         if text := self._stretch(result):
-            warnings.warn(text, StretchWarning, stacklevel=4)
+            warn(text, "models.md#where-panels-stretch", StretchWarning)
         return result
 
     def _stretch(self, result: xarray.Dataset) -> str:
@@ -206,20 +205,20 @@ class Motion:
             f"auto chose, its energy balance is off by {self.output.balance.relative:.1%} of the "
             f"energies at play; {ask} saves the first attempt"
         )
-        warnings.warn(text, FoldynWarning, stacklevel=5)
+        warn(text, "integrators.md#integrators")
         self._start()  # gives its samples' memory back
         if self._keeping is not None:
             self._keeping.remove()
         return self._other.run(progress, self._keeping)
 
     def _judge(self) -> None:
-        texts = [self.doubt()]
+        if text := self.doubt():
+            warn(text, "integrators.md#accuracy")
         if resists_turns(self.case, self.packed):
             seen, scale = self.output.evenly_spaced(self.stored, LOOKS), self.output.balance.scale
             given = self.case, self.packed, self.origin.displacement
-            texts.append(turns_told(*given, *seen, scale))
-        for text in filter(None, texts):
-            warnings.warn(text, FoldynWarning, stacklevel=5)
+            if text := turns_told(*given, *seen, scale):
+                warn(text, "damping.md#rayleigh")
 
     def integrate(
         self, progress: bool | Reporter | None = None, keeping: Keeping | None = None,

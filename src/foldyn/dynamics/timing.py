@@ -8,7 +8,6 @@ beforehand how far what the method sees of a history lies from the history.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator
 from numbers import Integral, Real
 
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, History
 from foldyn.cases.waveforms import CALLED
 from foldyn.dynamics.motion_state import StepPlan
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.ram_limit import GIB, check_memory
 from foldyn.values import number, show, single, whole
 
@@ -207,12 +206,11 @@ def warn_of_functions(case: Case) -> None:
     """Warn of functions of time, which steps of variable length sample here and there only."""
     for what, history in histories(case):
         if history.knots() is None:
-            warnings.warn(
+            warn(
                 f"the history of {what} is a function whose jumps and corners are unknown: each "
                 "step looks at it at eight points, and a pulse shorter than their distance may be "
                 "missed; say when they are: fd.Function(f, at=[0.2, 0.25]), at=[] if it is smooth",
-                FoldynWarning,
-                stacklevel=4,
+                "integrators.md#steps",
             )
             return
 
@@ -228,12 +226,11 @@ def warn_of_coarse_steps(
     for what, history in histories(case):
         share = overlooked(history, plan, looks, memory, implicit)
         if share > NOTICED:
-            warnings.warn(
+            warn(
                 f"steps of {plan.dt:.3g} s do not resolve the history {history.kind} of {what}: "
                 f"what they see of it is off by {share:.0%}; take a smaller dt, or a method that "
                 'chooses its steps: "dormand_prince", or an implicit one without dt',
-                FoldynWarning,
-                stacklevel=4,
+                "integrators.md#steps",
             )
 
 

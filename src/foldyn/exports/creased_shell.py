@@ -7,7 +7,6 @@ share of its stiffness.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +16,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from foldyn.cases import Case
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.linear.shell_of import check_reduced, shell_of
 from foldyn.materials import MemoryLaw
 from foldyn.patterns import Pattern
@@ -235,11 +234,10 @@ def fold_slopes(structure: Discretized) -> NDArray:
     low, high = law.linear_between or (np.nan, np.nan)
     curved = np.flatnonzero(~((low < rest) & (rest < high)))
     if len(curved):
-        warnings.warn(
+        warn(
             f"fold_law = {law}: {len(curved)} of {len(rest)} folds are not linear about rest, and "
             "become linear springs with their slope there: frequencies are right, statics are not",
-            FoldynWarning,
-            stacklevel=5,
+            "exports.md#input-decks",
         )
     return slope
 
@@ -304,8 +302,7 @@ def _check(case: Case) -> None:
         if has
     ]
     if left:
-        warnings.warn(
+        warn(
             f"{' and '.join(left)} are left out: they change neither frequencies nor statics",
-            FoldynWarning,
-            stacklevel=4,
+            "exports.md#input-decks",
         )

@@ -9,7 +9,6 @@ displacements of modes too; ordinates of dataset 58 have thirteen.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
@@ -19,7 +18,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.exports.chosen import chosen_fields, chosen_nodes
 from foldyn.patterns import Pattern
 from foldyn.results.contents import pattern_of
@@ -162,10 +161,9 @@ def _modes(result: xr.Dataset, nodes: NDArray) -> Iterator[Dataset]:
     frequency, ratio = result["frequency"].values, result["damping_ratio"].values
     unstable = np.flatnonzero(np.isnan(frequency)) + 1
     if len(unstable):
-        warnings.warn(
+        warn(
             f"modes {unstable.tolist()} are unstable, have no frequency and are left out",
-            FoldynWarning,
-            stacklevel=4,
+            "exports.md#modal-software",
         )
     for mode, f in enumerate(frequency.tolist()):
         if not math.isnan(f):

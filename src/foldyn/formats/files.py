@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from foldyn.errors import FoldynWarning, InputError, within
+from foldyn.errors import InputError, warn, within
 from foldyn.formats import cp, dxf, fold, fold_writer, obj, opx, stl, svg, svg_writer
 from foldyn.formats.building import Built, built
 from foldyn.formats.drawing import METERS, Drawing
@@ -140,7 +139,7 @@ def read_pattern(
         *diagnosis.doubts,
     ):
         if told:
-            warnings.warn(f"{path}: {told}", FoldynWarning, stacklevel=2)
+            warn(f"{path}: {told}", "pattern-files.md#repairs")
     return pattern
 
 

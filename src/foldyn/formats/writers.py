@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.patterns import Pattern
 from foldyn.patterns.geometry import seams
 from foldyn.patterns.topology import Edge, edge_lookup
@@ -66,20 +64,18 @@ def letters(pattern: Pattern) -> list[tuple[Edge, str, float]]:
 def warn_of_angles(pattern: Pattern, kind: str) -> None:
     """Say that a file has no place for the angles to fold to."""
     if not np.isnan(pattern.fold_angles).all():
-        warnings.warn(
+        warn(
             f"pattern: {kind} files have no place for fold angles, which are left out; write .fold "
             "to keep them",
-            FoldynWarning,
-            stacklevel=4,
+            "pattern-files.md#pattern-files",
         )
 
 
 def warn_of_boards(pattern: Pattern) -> None:
     """Say that a file cannot hold the thickness of a pattern's panels; `write_pattern` calls it."""
     if pattern.boards is not None:
-        warnings.warn(
+        warn(
             "pattern: the file has no place for the thickness of its panels and holds the planes "
             "through their hinge lines; write the thin pattern, and thicken what is read",
-            FoldynWarning,
-            stacklevel=3,
+            "sheets.md#thick-panels",
         )

@@ -13,7 +13,6 @@ more, and then entries are changed one by one, as thicknesses of panels that sha
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations, islice
 from typing import Any, NamedTuple
@@ -21,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import FoldynError, FoldynWarning, InputError, within
+from foldyn.errors import FoldynError, InputError, warn, within
 from foldyn.gradients.numbers import Gradient
 from foldyn.mechanics.pullback import Arrays
 from foldyn.values import numbers, show
@@ -152,7 +151,7 @@ class Parameters:
                     break
             for key, each in here.numbers.items():
                 if _kinked(each, *(one[key] - each for one in (*near, *far))):
-                    warnings.warn(KINK.format(name, key), FoldynWarning, stacklevel=5)
+                    warn(KINK.format(name, key), "gradients.md#where-there-is-no-gradient")
             return {
                 key: _difference(step, *(each[key] for each in (*near, *far, here.numbers)))
                 for key in here.numbers

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import warnings
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 
 UNREADABLE = "could not be parsed"  # Numba's words for a value that it ignores
 
@@ -38,7 +38,7 @@ def start() -> None:
         text = str(warning.message)
         if UNREADABLE in text:
             text = f"{text.splitlines()[0].rstrip('.')}; Numba ignores it"
-            warnings.warn(text, FoldynWarning, stacklevel=2)
+            warn(text, "tutorial.md#install")
         else:
             warnings.warn_explicit(text, warning.category, warning.filename, warning.lineno)
     if getattr(config, "DISABLE_JIT", 0):

@@ -22,7 +22,6 @@ import pickle
 import shutil
 import stat
 import tempfile
-import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache, cached_property
@@ -36,7 +35,7 @@ from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 from numba.misc.appdirs import AppDirs
 
-from foldyn.errors import FoldynWarning
+from foldyn.errors import warn
 from foldyn.jit.sources import Part, digest, made_from, read
 from foldyn.notice import NOTICE
 from foldyn.writing import remove_leftovers, write_bytes
@@ -197,7 +196,7 @@ def folder_for(source: Path) -> Path | None:
 @cache
 def _warn(text: str) -> None:
     """Warn, once of each, and say what to do."""
-    warnings.warn(f"{text}; {REMEDY}", FoldynWarning, stacklevel=2)
+    warn(f"{text}; {REMEDY}", "tutorial.md#install")
 
 
 def _writable(folder: Path) -> bool:

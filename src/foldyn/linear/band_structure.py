@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import time
-import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import State
-from foldyn.errors import FoldynWarning
+from foldyn.errors import warn
 from foldyn.linear.group_velocity import Waves, slopes_of
 from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.linear.model_range import warn_beyond
@@ -119,11 +118,10 @@ def bands(
     values = np.array([each.values for each in found])
     unstable = int((values < 0.0).any(axis=0).sum())
     if unstable:
-        warnings.warn(
+        warn(
             f"the state is unstable: {unstable} of the {count} bands have waves with a negative "
-            "eigenvalue, which have no frequency (nan)",
-            FoldynWarning,
-            stacklevel=2,
+            "eigenvalue, which have no frequency (nan); give a stable state",
+            "waves.md#prestressed-and-folded-states",
         )
     with np.errstate(invalid="ignore"):
         frequency = np.sqrt(values) / TURN

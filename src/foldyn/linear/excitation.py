@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import BaseMotion, Case, Constant, Force
 from foldyn.cases.directions import AXES
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynWarning, InputError, warn
 from foldyn.linear.linearized import Linearized
 from foldyn.values import show
 
@@ -138,7 +138,7 @@ def _forces(case: Case, parts: list[Force], amplitude: float) -> Drive:
             raise InputError(str(error).replace("loads[", "drive[", 1)) from None
     for warning in caught:
         text = str(warning.message).replace("loads[", "drive[", 1)
-        warnings.warn(text, FoldynWarning, stacklevel=4)
+        warnings.warn_explicit(text, warning.category, warning.filename, warning.lineno)
     vector = amplitude * driven.force_terms[0][0]
     vector[driven.fixed] = 0.0
     size = float(np.linalg.norm(vector, axis=1).sum())
@@ -218,4 +218,4 @@ def warn_at(frequency: NDArray, text: str) -> None:
     listed = ", ".join(f"{f:.6g}" for f in frequency[:NAMED])
     more = " and others" if frequency.size > NAMED else ""
     message = f"frequencies: {text.format(f'{listed} Hz{more}')}"
-    warnings.warn(message, FoldynWarning, stacklevel=4)
+    warn(message, "frequency-response.md#methods")

@@ -16,7 +16,7 @@ from foldyn.algebra.extrapolation import convergence, limits
 from foldyn.arguments import brief
 from foldyn.cases import Case
 from foldyn.cases.clamped_edges import straightened
-from foldyn.errors import FoldynWarning, InputError, within
+from foldyn.errors import FoldynWarning, InputError, warn, within
 from foldyn.linear.compared import OWN, Fidelity
 from foldyn.linear.matched import SPARE, matched
 from foldyn.linear.modes import modes
@@ -345,10 +345,9 @@ def _seconds(case: Case, count: int, secant: float | None, taken: Sequence[float
 
 def _warn_of_imbalance(residual: float) -> None:
     if residual > BALANCED:
-        warnings.warn(
+        warn(
             f"the rest state is no equilibrium: its residual is {residual:.2g} of the forces at "
             "play (creases with a rest angle of their own, or laws that have a moment at rest); "
             "what is compared are not free vibrations",
-            FoldynWarning,
-            stacklevel=3,
+            "fidelity.md#your-own-pattern",
         )

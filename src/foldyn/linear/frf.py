@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.algebra.eigen import SHIFT, Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
 from foldyn.dynamics.progress import Reporter, reporter
-from foldyn.errors import FoldynWarning, InputError, StretchWarning
+from foldyn.errors import InputError, StretchWarning, warn
 from foldyn.linear.excitation import NAMED, Answer, absolute, drive_of
 from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
@@ -222,11 +221,10 @@ def _warn_of_instability(system: Linearized) -> None:
     pencil = Pencil(system.stiffness, system.mass)
     unstable = pencil.below(-SHIFT * pencil.scale)
     if unstable:
-        warnings.warn(
+        warn(
             f"the state is an unstable equilibrium ({unstable} negative eigenvalues): a motion "
-            "leaves it, and the response is that of the equations only",
-            FoldynWarning,
-            stacklevel=3,
+            "leaves it, and the response is that of the equations only; give a stable state",
+            "modes.md#rigid-and-unstable-modes",
         )
 
 
@@ -244,11 +242,11 @@ def _warn_of_stretch(system: Linearized, frequency: NDArray, response: NDArray) 
     if told.any():
         share = (bars[told] / strain[peaks[told]]).clip(max=1.0)
         listed = ", ".join(f"{f:.4g}" for f in frequency[peaks[told]][:NAMED])
-        warnings.warn(
+        warn(
             f"panels that stretch hold more than {limit:.0%} of the strain energy of the response "
             f"at {listed} Hz ({share.max():.0%} at most), {remedy(structure)}",
+            "models.md#where-panels-stretch",
             StretchWarning,
-            stacklevel=3,
         )
 
 

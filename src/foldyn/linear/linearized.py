@@ -22,7 +22,6 @@ rest it is the slope there.
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -42,7 +41,7 @@ from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of, modal_rows, rows_of, soft_slopes
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.linear.hereditary import Branches, branches_of
 from foldyn.linear.internal_modes import Amplitudes, amplitudes, check_internal
 from foldyn.linear.operating_point import operating_point
@@ -226,13 +225,12 @@ def linearize(
     exact = body.tangent(point.dofs)
     change, soft = slope_change(case, body, point.dofs, amplitude)
     if soft:
-        warnings.warn(
+        warn(
             f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
             "vanishes: they count without stiffness, and motions that only they resist have the "
             "frequency zero. Give secant = an amplitude in degrees, such as 1, for the slopes of "
             'an oscillation of that amplitude, or take preset = "plate" in place of this law',
-            FoldynWarning,
-            stacklevel=3,
+            "modes.md#bends-without-a-slope",
         )
     stiffness = exact if change is None else sparse.csr_array(exact + change)
     loads = point.load_stiffness()
@@ -278,11 +276,10 @@ def _symmetric(loads: sparse.csr_array, free: NDArray) -> sparse.csr_array:
     """Symmetric part of the stiffness (m, m) of loads; warns where there is more to it."""
     share = asymmetry(sparse.csr_array(loads[free][:, free]))
     if share > ASYMMETRIC:
-        warnings.warn(
+        warn(
             f"{NO_POTENTIAL.format(share)} modes and frequency responses take its symmetric part, "
             "which misses how such a load may feed vibrations (flutter): simulated motions do not",
-            FoldynWarning,
-            stacklevel=4,
+            "loads.md#pressure",
         )
     return sparse.csr_array(0.5 * (loads + loads.T))
 

@@ -8,7 +8,6 @@ sheet; dofs without mass are in balance as they are in the repeated sheet.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,7 +20,7 @@ from foldyn.cases import State
 from foldyn.dynamics.dampers import damping_matrix
 from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.linear.bloch import Bloch, NotAlikeError, hermitian
 from foldyn.linear.cell_patch import Patch, cell_patch
 from foldyn.linear.cell_reach import CellReach
@@ -184,7 +183,7 @@ def linearize_cell(
 
 
 def _warn(message: str) -> None:
-    warnings.warn(message, FoldynWarning, stacklevel=4)
+    warn(message, "waves.md#prestressed-and-folded-states")
 
 
 def _reference(patch: Patch, tangent: sparse.csr_array) -> sparse.csr_array:

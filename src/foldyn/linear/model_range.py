@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import ModelRangeWarning
+from foldyn.errors import ModelRangeWarning, warn
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.plate_frequency import range_of
 
@@ -17,7 +15,6 @@ def warn_beyond(
     frequency: NDArray,
     name: str = "",
     internal: int | None = None,
-    level: int = 3,
 ) -> None:
     """Warn of frequencies (k,), Hz, above the range of the model.
 
@@ -30,8 +27,6 @@ def warn_beyond(
         What they are numbered as, "mode" or "band"; nothing where they are themselves the input.
     internal : int or None
         Internal amplitudes of each panel; None where the analysis takes none.
-    level : int
-        Whose line the warning shows, as in `warnings.warn`.
     """
     limit, share = range_of(structure, internal or 0)
     above = np.flatnonzero(frequency > limit)
@@ -47,9 +42,9 @@ def warn_beyond(
     if internal == 0:
         scheme = "" if structure.options.scheme == "n5b8e" else 'preset = "n5b8e" with '
         remedy = f"take {scheme}internal = 3, or the shell"
-    warnings.warn(
+    warn(
         f"{what} above {limit:.4g} Hz, {share:g} of the panels' own frequency, where most modes of "
-        f"this model are more than 10 % off or missing: {remedy} (docs/fidelity.md, Vibration)",
+        f"this model are more than 10 % off or missing: {remedy}",
+        "fidelity.md#vibration",
         ModelRangeWarning,
-        stacklevel=level,
     )

@@ -9,7 +9,6 @@ along the axis.
 from __future__ import annotations
 
 import time
-import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,7 +20,7 @@ from foldyn.algebra.eigen import EPS, Pencil, Spectrum, lowest
 from foldyn.algebra.superlu import factorize
 from foldyn.cases import Case, State
 from foldyn.dynamics.modal_damping import mass_of
-from foldyn.errors import FoldynWarning, StretchWarning
+from foldyn.errors import StretchWarning, warn
 from foldyn.linear.hereditary import Branches, damped_mode
 from foldyn.linear.linearized import Linearized, linearize
 from foldyn.linear.model_range import warn_beyond
@@ -159,7 +158,7 @@ def spectrum_of(
     _warn(spectrum)
     _warn_of_stretch(linear, spectrum)
     frequency = np.sqrt(spectrum.values.clip(min=0.0)) / TURN
-    warn_beyond(case.structure, frequency, "mode", linear.internal, level=4)
+    warn_beyond(case.structure, frequency, "mode", linear.internal)
     statistics = {
         "count": count,
         "state": state if isinstance(state, str) else "rest" if state is None else "given",
@@ -231,11 +230,10 @@ def _warn_of_twins(linear: Linearized, values: NDArray, shapes: NDArray) -> None
     for k in range(1, len(values)):
         near = abs(values[k] - values[k - 1]) <= TWINS * abs(values[k])
         if near and abs(shapes[:, k] @ (linear.mass @ shapes[:, k - 1])) > RIGID:
-            warnings.warn(
+            warn(
                 f"the memory of the creases makes two modes one ({np.sqrt(values[k]) / TURN:.4g} "
                 "Hz): another one near it is missing; frequency responses are not concerned",
-                FoldynWarning,
-                stacklevel=4,
+                "laws.md#in-other-analyses",
             )
 
 
@@ -294,18 +292,16 @@ def _rounding(pencil: Pencil, spectrum: Spectrum) -> float:
 def _warn(spectrum: Spectrum) -> None:
     unstable = int((spectrum.values < 0.0).sum())
     if unstable:
-        warnings.warn(
+        warn(
             f"the state is an unstable equilibrium: {unstable} of the {len(spectrum.values)} modes "
-            "have a negative eigenvalue and no frequency (nan)",
-            FoldynWarning,
-            stacklevel=3,
+            "have a negative eigenvalue and no frequency (nan); give a stable state",
+            "modes.md#rigid-and-unstable-modes",
         )
     if spectrum.missed:
-        warnings.warn(
+        warn(
             f"the count of eigenvalues differs by {abs(spectrum.missed)} from the modes found: "
             "frequencies may be missing; ask for another count of modes",
-            FoldynWarning,
-            stacklevel=3,
+            "modes.md#completeness-and-rounding",
         )
 
 
@@ -320,12 +316,12 @@ def _warn_of_stretch(linear: Linearized, spectrum: Spectrum) -> None:
     if len(told):
         worst = told[share[told].argmax()]
         numbers = ", ".join(str(k + 1) for k in told)
-        warnings.warn(
+        warn(
             f"panels that stretch hold more than {limit:.0%} of the strain energy of "
             f"mode{'s' * (len(told) > 1)} {numbers} (mode {worst + 1}: "
             f"{min(share[worst], 1.0):.0%}), {remedy(structure)}",
+            "models.md#where-panels-stretch",
             StretchWarning,
-            stacklevel=3,
         )
 
 

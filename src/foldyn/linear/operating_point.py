@@ -12,7 +12,7 @@ from scipy import sparse
 from foldyn.cases import Case, State
 from foldyn.cases.case_assembly import SomeLoads
 from foldyn.cases.history import STEADY
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynWarning, InputError, warn
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import NO_POTENTIAL
 from foldyn.statics import OrigamiProblem, trace
@@ -158,4 +158,4 @@ def _imbalance(point: OperatingPoint, case: Case) -> str:
 
 
 def _warn(message: str) -> None:
-    warnings.warn(message, FoldynWarning, stacklevel=5)
+    warn(message, "modes.md#choose-the-state")

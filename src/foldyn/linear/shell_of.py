@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from foldyn.cases import Case, Rayleigh
-from foldyn.errors import FoldynWarning, InputError, within
+from foldyn.errors import InputError, warn, within
 from foldyn.linear.reference import DIVISIONS
 from foldyn.patterns import Pattern
 from foldyn.shells import Shell, ShellOptions, shell
@@ -129,12 +128,11 @@ def meshes(pattern: Pattern, given: Sequence[int] | None) -> tuple[int, int]:
         if size > MOST_TRIANGLES:
             continue
         if half < DIVISIONS[0]:
-            warnings.warn(
+            warn(
                 f"the shell with {DIVISIONS[1]} divisions would have {whole_size} triangles: it "
                 f"has {2 * half} divisions and {size} triangles; divisions = {DIVISIONS} takes "
                 "the time for the finer one",
-                FoldynWarning,
-                stacklevel=4,
+                "fidelity.md#your-own-pattern",
             )
         return half, 2 * half
     raise InputError(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from foldyn.arguments import Check
 from foldyn.cases import Table
 from foldyn.dynamics.progress import Reporter
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.linear.excitation import Answer
 from foldyn.linear.time_domain import Duration, Integration, Rig, overall
 from foldyn.ram_limit import check_memory
@@ -305,12 +304,11 @@ def respond(
     left = float((size[:, end].max(axis=1) / np.where(whole > 0.0, whole, 1.0)).max())
     if left > LEFT:
         decay = 2.0 * np.log(1.0 / LEFT) / record.duration
-        warnings.warn(
+        warn(
             f"duration: {left:.1%} of the motion is left at the end of {record.duration:.3g} s, "
             "which blurs the response; give a longer duration, more damping, or "
             f"window_rate = {decay:.2g} (1/s)",
-            FoldynWarning,
-            stacklevel=4,
+            "frequency-response.md#responses-from-simulated-motions",
         )
     estimate = frequency_response(drive, responses, record.every, estimator)
     return Answer(

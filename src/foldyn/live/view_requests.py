@@ -15,7 +15,7 @@ from foldyn.analyses import CaseFile
 from foldyn.analyses.conversion import converted
 from foldyn.analyses.reading import case_of_document
 from foldyn.dynamics import prepare
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynWarning, InputError, warn
 from foldyn.values import choice
 
 KINDS: Mapping[str, str] = {
@@ -77,11 +77,10 @@ def computed(path: Path, document: Document, kind: str) -> tuple[CaseFile, xr.Da
     if work <= MOST_WORK:
         return case_file, case_file.run()
     duration = asked["duration"] * MOST_WORK / work
-    warnings.warn(
+    warn(
         f"the motion is shown for {duration:.3g} s of {asked['duration']:g} s, so that it is "
         "computed soon; foldyn run computes the whole",
-        FoldynWarning,
-        stacklevel=2,
+        "pages.md#change-parameters-in-the-viewer",
     )
     return case_file, case_file.run(duration=duration, every=duration / SAMPLES)
 
@@ -91,11 +90,10 @@ def _curve_of_motions(case_file: CaseFile) -> xr.Dataset:
     free = len(case_file.case().free_dofs)
     if free <= MOST_FREE or case_file.analysis.arguments.get("modes"):
         return case_file.run()
-    warnings.warn(
+    warn(
         f"the curve is computed in the span of {MODES} modes, so that it is there soon, instead of "
         f"with {free} free dofs; foldyn run takes all of them",
-        FoldynWarning,
-        stacklevel=3,
+        "pages.md#change-parameters-in-the-viewer",
     )
     return case_file.run(modes=MODES)
 

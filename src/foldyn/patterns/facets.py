@@ -8,14 +8,13 @@ welds, lines across which the sheet runs on.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.patterns.crease_data import crease_rows
 from foldyn.patterns.pattern import Pattern, pattern_of
 from foldyn.patterns.topology import Edge, around, edge_lookup, vertex_pair
@@ -114,11 +113,10 @@ def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
             which = (
                 f"{guessed.size} of {len(letters)} creases, as {_pair(pattern.creases[guessed[0]])}"
             )
-            warnings.warn(
+            warn(
                 f"facets: {which}, lie flat and have no letter, and are welded; assign letters to "
                 "those that fold, or name the facets",
-                FoldynWarning,
-                stacklevel=3,
+                "facets.md#facets",
             )
         return rows
     if isinstance(facets, str):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.patterns import crease_data
 from foldyn.patterns.boards import Boards
 from foldyn.patterns.geometry import crease_dihedrals, face_geometry, seams
@@ -392,12 +391,11 @@ def _warn_of_contradictions(given: NDArray, creases: NDArray, dihedrals: NDArray
         k = int(wrong[0])
         a, b = creases[k].tolist()
         more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
-        warnings.warn(
+        warn(
             f'assignments: crease ({a}, {b}){more} is given as "{given[k]}", but its dihedral '
             f"is {np.degrees(dihedrals[k]):.1f} degrees seen from the front (valleys are below "
-            "180, mountains above): the letter is kept; turn the faces over or correct it.",
-            FoldynWarning,
-            stacklevel=3,
+            "180, mountains above): the letter is kept; turn the faces over or correct it",
+            "patterns.md#your-own-patterns",
         )
 
 
@@ -406,10 +404,9 @@ def _warn_of_seams(pairs: list[tuple[Edge, Edge]], open_edges: set[Edge]) -> Non
     if doubtful:
         one, other = doubtful[0]
         more = f" (and {len(doubtful) - 1} more such pairs)" if len(doubtful) > 1 else ""
-        warnings.warn(
+        warn(
             f"vertices: the boundary edges {one} and {other}{more} lie in the same place but are "
             "not joined, so that the panels part there: for a crease give both panels the same "
-            f'vertices; for a cut give assignments = {{{one}: "B"}}, or "C" in a FOLD file.',
-            FoldynWarning,
-            stacklevel=3,
+            f'vertices; for a cut give assignments = {{{one}: "B"}}, or "C" in a FOLD file',
+            "patterns.md#your-own-patterns",
         )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynWarning, InputError, warn
 from foldyn.patterns.boards import Boards
 from foldyn.patterns.generators.arguments import check_size
 from foldyn.patterns.tiling import glue, half_edges
@@ -195,11 +195,10 @@ class Transforms:
         zero = np.zeros(3)
         made, joined = _joined(self, [(self, zero), (other, zero)], near)
         if not joined:
-            warnings.warn(
+            warn(
                 "other: the patterns share no edge and are two parts of one; move one of them so "
                 "that boundary edges coincide, or give a larger tolerance",
-                FoldynWarning,
-                stacklevel=2,
+                "patterns.md#your-own-patterns",
             )
         return made
 

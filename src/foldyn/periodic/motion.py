@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.attractors.drive import HARMONIC
 from foldyn.cases import Case, State
-from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.errors import ComputationError, InputError, warn
 from foldyn.periodic.balance import Balance, newton
 from foldyn.periodic.collocation import Shooting
 from foldyn.periodic.equation import Equation
@@ -206,11 +205,10 @@ def frequency_of(balance: Balance, given: float | None) -> float:
 def warn_of_truncation(truncation: float, harmonics: int, field: str) -> None:
     """Warn where a motion needs more harmonics."""
     if truncation > TRUNCATED:
-        warnings.warn(
+        warn(
             f"{field} = {harmonics}: twice as many would change the motion by about "
             f"{truncation:.1g} of it; give more",
-            FoldynWarning,
-            stacklevel=3,
+            "nonlinear-vibration.md#one-motion",
         )
 
 
@@ -218,11 +216,10 @@ def warn_of_reduction(reduction: Any) -> None:
     """Warn where modes leave out much of the motions; their `reduction`, or None."""
     most = 0.0 if reduction is None else float(np.max(reduction))
     if most > REDUCED:
-        warnings.warn(
+        warn(
             f"modes: what they leave out would change the motion by {most:.1g} of it or more; give "
             "more",
-            FoldynWarning,
-            stacklevel=3,
+            "nonlinear-vibration.md#big-sheets",
         )
 
 
@@ -230,11 +227,10 @@ def warn_of_crossing(orbits: Sequence[Orbit]) -> None:
     """Warn of motions through what touches."""
     crossed = [f"{orbit.omega / TURN:.6g} Hz" for orbit in orbits if orbit.crosses()]
     if crossed:
-        warnings.warn(
+        warn(
             f"contact: the motion at {', '.join(crossed[:NAMED])} passes through what it touches, "
             "so that it is none; start elsewhere, or give more harmonics",
-            FoldynWarning,
-            stacklevel=3,
+            "nonlinear-vibration.md#one-motion",
         )
 
 

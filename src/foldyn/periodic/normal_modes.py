@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-import warnings
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,7 @@ from foldyn.cases import Case, State
 from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter, reporter
-from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
+from foldyn.errors import ComputationError, InputError, MotionInterrupted, warn
 from foldyn.periodic.about_rest import AboutRest
 from foldyn.periodic.balance import Balance
 from foldyn.periodic.continuation import LOST, Point, Step, Stride, corrected, point_at, steps
@@ -341,11 +340,10 @@ def _follow(
     for step in steps(family, kept[0], stride, lambda point: reached(point) / ends[1] - 1.0):
         if not isinstance(step, Step):
             remedy = "a smaller longest_step, or more harmonics" if step == LOST else "most_points"
-            warnings.warn(
+            warn(
                 f"the backbone ends at an amplitude of {reached(kept[-1]):.3g} m; the points "
                 f"before are kept. Remedy: {remedy}",
-                FoldynWarning,
-                stacklevel=3,
+                "nonlinear-vibration.md#backbones",
             )
             return False
         kept.append(step.after)
@@ -365,11 +363,10 @@ def _values(orbits: list[Orbit], place: NDArray) -> dict[str, Any]:
     energies = np.array([_energy(orbit, place) for orbit in orbits])
     worst = float(energies[:, 1].max())
     if worst > LOOSE:
-        warnings.warn(
+        warn(
             f"harmonics: the energy of a motion changes by {worst:.1g} of it along the motion, and "
             "should be constant: give more",
-            FoldynWarning,
-            stacklevel=3,
+            "nonlinear-vibration.md#backbones",
         )
     return {"energy": energies[:, 0], "energy_drift": energies[:, 1]}
 

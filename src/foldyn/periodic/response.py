@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,7 @@ from foldyn.attractors.run import check_measure
 from foldyn.cases import Case, State
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter, reporter
-from foldyn.errors import FoldynWarning, InputError, MotionInterrupted
+from foldyn.errors import InputError, MotionInterrupted, warn
 from foldyn.periodic.balance import Balance
 from foldyn.periodic.bifurcations import DOUBLING, FOLD, PITCHFORK, Event, events
 from foldyn.periodic.continuation import (
@@ -291,8 +290,9 @@ class _Tracer:
                 ". Nothing damps the sheet, which in resonance swings without bound: give the case "
                 "damping, or stay on one side of the resonance"
             )
-        warnings.warn(
-            f"the branch at {last.point.p:.6g} {texts[why]}{cause}", FoldynWarning, stacklevel=5
+        warn(
+            f"the branch at {last.point.p:.6g} {texts[why]}{cause}",
+            "nonlinear-vibration.md#response-curves",
         )
 
     def _fork(self, family: Any, event: Event, depth: int, report: Reporter) -> None:
@@ -315,11 +315,10 @@ class _Tracer:
         for side in (1.0, -1.0) if event.name == PITCHFORK else (1.0,):
             first = branch_point(family, point.z, point.p, side * across, AWAY)
             if first is None:
-                warnings.warn(
+                warn(
                     f"harmonics: no branch is found at the {event.name} at {point.p:.6g}, which a "
                     "longer series may not have: give more harmonics",
-                    FoldynWarning,
-                    stacklevel=5,
+                    "nonlinear-vibration.md#response-curves",
                 )
             elif self.low <= first.p <= self.high:
                 self.branch = max(found.branch for found in self.found) + 1
@@ -334,11 +333,10 @@ def _warn_of_folds(found: list[_Found]) -> None:
         if one.bifurcation == FOLD and np.abs(one.floquet - 1.0).min() > APART
     ]
     if at:
-        warnings.warn(
+        warn(
             f"harmonics: no multiplier is 1 at the folds at {', '.join(at[:NAMED])}, which a "
             "longer series may not have: give more harmonics (or more steps)",
-            FoldynWarning,
-            stacklevel=4,
+            "nonlinear-vibration.md#one-motion",
         )
 
 

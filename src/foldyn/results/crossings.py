@@ -62,7 +62,7 @@ class Crossings(NamedTuple):
         return (
             f"panels pass through each other: {pairs_text(self.panels)}, first at {when}, and at "
             f"{len(self.crossed)} of the {seen}. Nothing keeps them apart: what follows is not "
-            "what a real sheet does"
+            "what a real sheet does; give the case contact"
         )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.arguments import Unit, brief
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.signals import records
 from foldyn.values import choice, number, whole
 
@@ -332,12 +331,11 @@ def half_power(
         natural = middle * np.cos(double) ** (-1.0 / power)
     asymmetry = float(abs(peak - middle) / (upper - lower))
     if asymmetry > _LOPSIDED:
-        warnings.warn(
+        warn(
             f"half power: the peak at {peak:.6g} Hz lies {asymmetry:.0%} of its width off the "
             "middle of the half-power points: other modes, noise or nonlinearity shape it, and the "
             "damping is not that of one mode; use circle_fits",
-            FoldynWarning,
-            stacklevel=2,
+            "signals.md#half-power-points",
         )
     return HalfPower(
         peak=peak,

@@ -8,7 +8,6 @@ structure leaves the path, although the points that follow are equilibria like a
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from itertools import pairwise
@@ -21,9 +20,9 @@ from scipy import sparse
 from foldyn.errors import (
     ComputationError,
     CrossingWarning,
-    FoldynWarning,
     MotionInterrupted,
     StretchWarning,
+    warn,
 )
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.results import path_dataset
@@ -176,12 +175,11 @@ def record(
         partial = dataset("stopped", stopped_because="interrupted")
         raise MotionInterrupted(f"interrupted after {len(points)} points", partial) from None
     if until is not None:
-        warnings.warn(
+        warn(
             f"the path ends at the load factor {points[-1].factor:.4g}, after {len(points)} "
             "points, and has not reached `until`: take more steps, or load factors that lead "
             "farther",
-            FoldynWarning,
-            stacklevel=3,
+            "statics.md#methods",
         )
     path = dataset("complete" if until is None else "until not reached")
     assert path is not None, "every path has a first point"
@@ -240,9 +238,9 @@ def _dataset(
     free, timed = METHODS[facts["method"]].rule is not None, problem.memories.timed
     message = stability_warning(points, from_rest, free, timed)
     if message:
-        warnings.warn(message, FoldynWarning, stacklevel=5)
+        warn(message, "statics.md#stability")
     if message := _asymmetry_warning(points[-1], problem):
-        warnings.warn(message, FoldynWarning, stacklevel=5)
+        warn(message, "loads.md#pressure")
     recorded = [_recorded(problem, point) for point in points]
     residuals, energies, reactions, touches = zip(*recorded, strict=True)
     begun = _begun(problem, points[0], energies[0]) if from_rest else 0.0
@@ -251,9 +249,9 @@ def _dataset(
     if len(crossings.first):
         at = int(crossings.first[0])
         when = f"point {at} (load factor {points[at].factor:.6g})"
-        warnings.warn(crossings.text(when, len(points)), CrossingWarning, stacklevel=5)
+        warn(crossings.text(when, len(points)), "results.md#panels-that-cross", CrossingWarning)
     if message := _stretch_warning(problem, points, energies):
-        warnings.warn(message, StretchWarning, stacklevel=5)
+        warn(message, "models.md#where-panels-stretch", StretchWarning)
     own = "an adaptive load, a function of the user's own, acted on it"
     result = path_dataset(
         problem.case,

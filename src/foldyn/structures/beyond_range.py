@@ -6,13 +6,12 @@ the range").
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import ModelRangeWarning
+from foldyn.errors import ModelRangeWarning, warn
 from foldyn.materials import EnhancedLinear
 from foldyn.patterns import Pattern
 from foldyn.structures.discretized import Discretized
@@ -30,7 +29,7 @@ FLAT = 0.15  # the same of creases
 LOCKING = 1.1  # times the stiffness of a crease: 5 % in frequency
 SMOOTH = 1e-3  # rad, of a fold that is none
 DIGITS = 6  # decimals of what is compared with these, so that rounding passes none
-SHELL = "take the shell, fd.shell (docs/fidelity.md, Beyond the range)"
+SHELL = "take the shell, fd.shell"
 GIVING = f'take preset = "n5b8e", or {SHELL[5:]}'
 
 
@@ -42,7 +41,7 @@ def doubt_range(pattern: Pattern, sheet: Sheet, options: ModelOptions, folds: ND
     if options.calibration != "plate":  # that of a published model, whatever its errors
         return
     for text in _doubts(pattern, sheet, options, folds):
-        warnings.warn(text, ModelRangeWarning, stacklevel=3)
+        warn(text, "fidelity.md#beyond-the-range", ModelRangeWarning)
 
 
 def doubt_locking(structure: Discretized) -> None:
@@ -53,13 +52,12 @@ def doubt_locking(structure: Discretized) -> None:
     stiffer = law.slope(rest, rest)
     k = int(stiffer.argmax())
     if stiffer[k] > LOCKING:
-        warnings.warn(
+        warn(
             f"crease {k} rests at {np.degrees(rest[k]):.3g} degrees, beyond the angles (45 and "
             f"315) from which the default fold law locks, {stiffer[k]:.3g} times as stiff as "
-            'between them: take fold_law = "linear", or "enhanced" with other angles '
-            "(docs/laws.md)",
+            'between them: take fold_law = "linear", or "enhanced" with other angles',
+            "laws.md#hinges",
             ModelRangeWarning,
-            stacklevel=3,
         )
 
 

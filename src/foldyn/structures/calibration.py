@@ -16,12 +16,10 @@ reproduces that exactly (`_merlin2_corners`, `_merlin2_edges`): published result
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import around, edge_of
 from foldyn.structures.mesh import Mesh, double_areas, lengths
@@ -154,12 +152,11 @@ def bar_areas(
             edges[pair] = edges.get(pair, 0.0) + value * stiffer
     if weak:
         shown = ", ".join(map(str, weak[:6])) + (", ..." if len(weak) > 6 else "")
-        warnings.warn(
+        warn(
             f"panel {shown}: two edges get (almost) no bar area, because H^2 is close to nu W^2 "
             "(W, H the lengths of its sides): it shears freely in its plane; use "
             'scheme = "n4b5", or panels of other proportions',
-            FoldynWarning,
-            stacklevel=3,
+            "theory.md#calibration",
         )
     return inner, edges
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.materials import BarLaw, HingeLaw
 from foldyn.materials.plate_superlinear import plate_onset
 from foldyn.patterns import Pattern
@@ -143,11 +142,10 @@ def discretize(
     )  # fmt: skip
     check_welds(options.rigid, pattern)
     if len(pattern.welds) and options.scheme != "n5b8e":
-        warnings.warn(
+        warn(
             f"pattern: its welds ({len(pattern.welds)}) become hinges, which bend as the sheet "
             'does only roughly: take preset = "n5b8e", or a shell',
-            FoldynWarning,
-            stacklevel=2,
+            "facets.md#models-and-accuracy",
         )
     nodes = len(pattern.vertices) + len(pattern.faces)
     check_memory("pattern", f"a structure of {nodes} nodes", PER_NODE * nodes, "take fewer panels")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 
 import numpy as np
 
-from foldyn.errors import UnitsWarning
+from foldyn.errors import UnitsWarning, warn
 from foldyn.patterns import Pattern
 from foldyn.structures.sheet import Sheet
 
@@ -23,7 +22,7 @@ DENSITIES = {"g/cm3": 1e3, "t/mm3": 1e12}
 def doubt_units(pattern: Pattern, sheet: Sheet) -> None:
     """Warn of a thickness or a wave speed that no sheet of such panels has."""
     for text in _doubts(pattern, sheet):
-        warnings.warn(text, UnitsWarning, stacklevel=3)
+        warn(text, "sheets.md#units", UnitsWarning)
 
 
 def _doubts(pattern: Pattern, sheet: Sheet) -> Iterator[str]:

@@ -24,7 +24,6 @@ docs/fidelity.md."""
 LEAST = 1e-9  # mean strain of the bars, below which rounding may be all there is
 FELT = 1e-3  # of the kinetic energy: less strain energy does not matter to a motion
 SHELL = "compare with the shell (foldyn fidelity, fd.fidelity) or take it (--model shell, fd.shell)"
-PAGE = "(docs/models.md, Where panels stretch)"
 
 
 class Stretch(NamedTuple):
@@ -54,13 +53,13 @@ def most(structure: Discretized) -> float:
 def remedy(structure: Discretized) -> str:
     """What to do where stretching has more than that share: the end of a message."""
     if not getattr(structure, "membranes", ()):
-        return f'where single bars are far too stiff: take membrane = "panel", or {SHELL} {PAGE}'
+        return f'where single bars are far too stiff: take membrane = "panel", or {SHELL}'
     if getattr(structure, "edge_gives", None) is None:
         return (
             'where edges that stay straight can be too stiff: take preset = "n5b8e" (and straight '
-            f"= edges held along their length), or {SHELL} {PAGE}"
+            f"= edges held along their length), or {SHELL}"
         )
-    return f"where closed and welded sheets are often 5 to 20 % off: {SHELL} {PAGE}"
+    return f"where closed and welded sheets are often 5 to 20 % off: {SHELL}"
 
 
 def stretch(structure: Discretized, energies: Mapping[str, NDArray]) -> Stretch | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from inspect import signature
 from typing import Any, TypeVar
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.cases.directions import AXES
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.linear.band_gaps import ALL, frequencies_of, legs
 from foldyn.linear.frf import quantity_of
 from foldyn.linear.peaks_of import kind_of, resonances
@@ -327,12 +326,11 @@ def _first(result: xr.Dataset, kind: str) -> NDArray:
 def _load_of(result: xr.Dataset, kind: str) -> float:
     low, high = _first(result, kind)
     if high - low > NEAR * abs(high):
-        warnings.warn(
+        warn(
             f"the first {kind} point lies between the load factors {low:.6g} and {high:.6g}, and "
             "no equilibrium was found nearer to it: the middle stands for it; smaller steps may "
             "find one",
-            FoldynWarning,
-            stacklevel=4,
+            "sweeps.md#measures",
         )
     return float(0.5 * (low + high))
 

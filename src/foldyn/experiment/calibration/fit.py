@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.errors import ComputationError, FoldynWarning, InputError, warn
 from foldyn.experiment.calibration.fit_evaluation import (
     PREDICTED,
     SLOPES,
@@ -168,8 +168,7 @@ def fit(
     if not lowest.converged:
         _warn(
             f"the search was {lowest.message}: the values are not those of the least misfit, and "
-            "their intervals mean nothing yet; start from these values, or nearer to the truth",
-            level=3,
+            "their intervals mean nothing yet; start from these values, or nearer to the truth"
         )
     _warn_of_pairing(made, values)
     return Fit(
@@ -420,5 +419,5 @@ def _warn_of_pairing(made: Problem, values: NDArray[np.float64]) -> None:
         _warn(f"at the values found: {error}")
 
 
-def _warn(text: str, level: int = 4) -> None:
-    warnings.warn(text, FoldynWarning, stacklevel=level)
+def _warn(text: str) -> None:
+    warn(text, "calibration.md#method")

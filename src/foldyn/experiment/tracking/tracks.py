@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError, warn
 from foldyn.experiment.tracking.corners import CornerSettings, find_corners
 from foldyn.experiment.tracking.films import Film, checked_box, open_film, read_photo
 from foldyn.experiment.tracking.follow import TRACKED, FollowSettings, Guide, Step, follow
@@ -252,7 +251,7 @@ def _check_length(film: Film, frames: int) -> None:
             f"{film.path}: breaks off: {frames} frames can be read, it should have "
             f"{film.declared}; the tracks end there. Copy it from the camera again"
         )
-        warnings.warn(message, FoldynWarning, stacklevel=3)
+        warn(message, "tracking.md#limits")
 
 
 def _matched(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import CrossingWarning, FoldynWarning, InputError, MotionInterrupted
+from foldyn.errors import CrossingWarning, InputError, MotionInterrupted, warn
 from foldyn.mechanics.crossings import crossing_panels, pairs_text
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import pattern_of
@@ -401,15 +400,15 @@ def _crossed(pattern: Pattern, energy: FoldEnergy, x: NDArray, turns: NDArray) -
 def _warn(folding: Folding) -> None:
     if folding.wrong:
         said = f"{len(folding.wrong)} mountains or valleys do not turn their way: creases"
-        warnings.warn(f"{said} {_named(folding, folding.wrong)}", FoldynWarning, stacklevel=3)
+        warn(f"{said} {_named(folding, folding.wrong)}", "folding.md#what-the-report-means")
     first = folding.path["fold_angle"].values[0]
     shut = unopened(first, folding.angles, folding.targets).tolist()
     if folding.started_from == "folded" and shut:
         said = f"{len(shut)} creases stay closed that were to open: creases"
-        warnings.warn(f"{said} {_named(folding, shut)}", FoldynWarning, stacklevel=3)
+        warn(f"{said} {_named(folding, shut)}", "folding.md#what-the-report-means")
     if folding.first_crossings:
         text = f"panels pass through each other {folding._where_crossed}"
-        warnings.warn(text, CrossingWarning, stacklevel=3)
+        warn(text, "results.md#panels-that-cross", CrossingWarning)
 
 
 def _named(folding: Folding, creases: Sequence[int]) -> str:

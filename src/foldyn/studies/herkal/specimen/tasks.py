@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -14,13 +13,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from foldyn import experiment, plots
-from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.errors import ComputationError, InputError
 from foldyn.experiment import Fit, Measurement, TimeHistory
 from foldyn.experiment.calibration.fit_page import write_fit
 from foldyn.input_files import file_digest, from_json, read_text
 from foldyn.program import program
 from foldyn.results import netcdf, save
-from foldyn.store import Store
+from foldyn.store import Store, warn_of_damage
 from foldyn.studies.herkal import calibration, vibration
 from foldyn.studies.herkal.specimen import evaluation, synthetic
 from foldyn.studies.herkal.specimen.measured import Data, measurement
@@ -82,8 +81,7 @@ class Part:
             return False
         for name, digest in files.items():
             if _digest(folder / FOLDER / name) != digest:
-                text = f"{folder / FOLDER / name}: is damaged or missing; it is computed again"
-                warnings.warn(text, FoldynWarning, stacklevel=2)
+                warn_of_damage(folder / FOLDER / name)
                 return False
         return True
 
