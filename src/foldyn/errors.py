@@ -6,6 +6,7 @@ that fails raises `ComputationError` (exit status 1) and carries what was comput
 
 from __future__ import annotations
 
+import re
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
@@ -215,9 +216,91 @@ INSIDE = sys.stdlib_module_names | {"foldyn", "numba", "scipy", "xarray"}
 
 def warn(message: str, page: str, category: type[FoldynWarning] = FoldynWarning) -> None:
     """Warn at the user's line; arguments as of `FoldynWarning`."""
+    _issue(category(message, page))
+
+
+def _issue(warning: Warning) -> None:
     frame = sys._getframe(1)
     while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in INSIDE:
         frame = frame.f_back
     place = frame.f_code.co_filename, frame.f_lineno
     known = frame.f_globals.setdefault("__warningregistry__", {})  # as `warnings.warn` has it
-    warnings.warn_explicit(category(message, page), category, *place, registry=known)
+    warnings.warn_explicit(warning, type(warning), *place, registry=known)
+
+
+_NUMBER = r"[-+]?\d[\d.]*(?:e[-+]?\d+)?"
+NUMBERS = re.compile(rf"(?<![\w\[]){_NUMBER}(?:, {_NUMBER})*")
+"""Numbers in a text, but for those that are part of a name, as "loads[0]" and "node8"."""
+NAMED = 6
+"""Places that are listed."""
+
+
+def listed(names: Sequence[object]) -> str:
+    """Names in a line, the first of many."""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"{', '.join(map(str, names[:NAMED]))}{more}"
+
+
+class Told:
+    """Warnings: those that differ in numbers alone are one, with where they apply.
+
+    Attributes
+    ----------
+    where : str
+        Where those apply that are noted now, such as the name of a run; "" if they tell it.
+    """
+
+    def __init__(self) -> None:
+        self.where = ""
+        self._found: dict[str, tuple[str, type[Warning], dict[str, bool]]] = {}
+
+    def add(self, text: str, where: str = "", category: type[Warning] = FoldynWarning) -> bool:
+        """Note a text, and say whether it is the first of its kind."""
+        key = NUMBERS.sub("#", text)
+        new = key not in self._found
+        self._found.setdefault(key, (text, category, {}))[2][where or text] = bool(where)
+        return new
+
+    def __iter__(self) -> Iterator[str]:
+        """Each once, with the names of where it applies, or how many there are like it."""
+        return (text for text, _ in self._texts())
+
+    def _texts(self) -> Iterator[tuple[str, type[Warning]]]:
+        for text, category, places in self._found.values():
+            named = [place for place, is_name in places.items() if is_name]
+            others = f" (and {len(places) - 1} with other numbers)" if len(places) > 1 else ""
+            yield text + (f" ({listed(named)})" if named else others), category
+
+    @contextmanager
+    def noting(self) -> Iterator[None]:
+        """Note what the block warns of, instead of showing it."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("always")
+            warnings.showwarning = lambda message, category, *_: self.add(  # type: ignore
+                str(message), self.where, category
+            )
+            yield
+
+    def kept(self) -> str:
+        """Foldyn's own as text, a line each, which begins with the kind."""
+        found = [(text, kind) for text, kind in self._texts() if issubclass(kind, FoldynWarning)]
+        return "\n".join(f"{kind.__name__}: {text}" for text, kind in found)
+
+    def add_kept(self, lines: str, where: str) -> None:
+        """Note what was kept as text."""
+        for kind, _, text in (line.partition(": ") for line in lines.splitlines()):
+            self.add(text, where, globals()[kind])
+
+    def issue(self) -> None:
+        """Warn of all, at the user's line."""
+        for text, category in self._texts():
+            _issue(category(text))  # type: ignore
+
+
+@contextmanager
+def told_once() -> Iterator[Told]:
+    """Warn at the end of the block of what it warned of, of each kind once."""
+    told = Told()
+    with told.noting():
+        yield told
+    told.issue()

@@ -103,7 +103,7 @@ def test_a_path_that_loses_stability_says_so_once(workplace) -> None:
     done = workplace.run(changed(FOLD_TEXT, strut))
     assert done.status == 0
     (line,) = done.err.splitlines()
-    assert line.startswith("foldyn: warning: the path loses stability: ")
+    assert line.startswith("foldyn: warning: case.toml: the path loses stability: ")
     unstable = fd.load("case-results/result.nc").attrs["unstable_points"]
     assert f"newton: 11 points, {unstable} of them unstable, to the load factor 1," in done.out
 

@@ -95,7 +95,7 @@ def test_a_load_on_supports_in_part_warns_and_runs(workplace, edited) -> None:
     done = workplace.run(edited("loads[0].nodes = [0, 7]"))
     assert done.status == 0
     (line,) = done.err.splitlines()
-    assert line.startswith("foldyn: warning: loads[0]: the force [0.01, 0.0, 0.0] acts in part")
+    assert line.startswith("foldyn: warning: case.toml: loads[0]: the force [0.01, 0.0, 0.0] acts")
 
 
 def test_the_shipped_cases_are_what_they_say(workplace) -> None:

@@ -153,7 +153,8 @@ def test_soft_hinges_are_told_of_once_and_in_the_report(workplace) -> None:
     done = workplace.call("run", "case.toml")
     assert done.status == 0
     (line,) = done.err.splitlines()  # once, not for every mass rule
-    assert line.startswith("foldyn: warning: 16 hinges of the superlinear law stand at their rest")
+    assert line.startswith("foldyn: warning: case.toml: 16 hinges of the superlinear law stand at")
+    assert line.endswith("(docs/modes.md#bends-without-a-slope) (circumcenter, panel)")
     page = Path("case-results/report.html").read_text(encoding="utf-8")
     assert "16 hinges of the superlinear law stand at their rest angle" in page
     workplace.write(changed(MODES, f"{herkal}; analysis.secant = 2"))

@@ -113,5 +113,5 @@ def test_of_many_motions_the_same_is_said_as_of_one():
     case = fd.Case(fold(), SUPPORTS, damping=fd.Rayleigh(0.5))
     u = np.zeros((len(case.structure.nodes), 3))
     u[[2, 3], 2] = 1e-13
-    with pytest.warns(FoldynWarning, match=r"^cases\[0\] \(the worst of 1\): nothing moves far"):
+    with pytest.warns(FoldynWarning, match=r"^cases\[0\]: nothing moves far"):
         fd.simulate_many([case], 0.3, every=0.03, initial=fd.State(u))

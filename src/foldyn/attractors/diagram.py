@@ -18,11 +18,10 @@ from foldyn.attractors.run import (
     check_measure,
     measured,
     swing,
-    told_once,
 )
 from foldyn.cases import Case, State
 from foldyn.dynamics.progress import Progress, Reporter, reporter
-from foldyn.errors import ComputationError, InputError, MotionInterrupted, warn
+from foldyn.errors import ComputationError, InputError, MotionInterrupted, told_once, warn
 from foldyn.results import Quantity
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import variable

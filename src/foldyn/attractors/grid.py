@@ -16,13 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.attractors.diagram import repeats_after
 from foldyn.attractors.drive import drive_frequency
 from foldyn.attractors.kept import KeptEnds
-from foldyn.attractors.run import PER_PERIOD, check_relaxing, divisor, step_of, told_once
+from foldyn.attractors.run import PER_PERIOD, check_relaxing, divisor, step_of
 from foldyn.cases import Case, State
 from foldyn.dynamics import initial_state, prepare, simulate_many
 from foldyn.dynamics.ensemble import device_for
 from foldyn.dynamics.gpu.choice import DEVICES
 from foldyn.dynamics.progress import Progress, Reporter, reporter
-from foldyn.errors import InputError, warn
+from foldyn.errors import InputError, told_once, warn
 from foldyn.ram_limit import check_memory
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import PLACE, variable

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.attractors.drive import drive_frequency
-from foldyn.attractors.run import PER_PERIOD, check_relaxing, divisor, step_of, told_once
+from foldyn.attractors.run import PER_PERIOD, check_relaxing, divisor, step_of
 from foldyn.cases import Case, State
 from foldyn.dynamics import METHODS, Motion, prepare
 from foldyn.dynamics.failures import failure
 from foldyn.dynamics.methods import suited, with_mass
 from foldyn.dynamics.motion_state import Outcome
 from foldyn.dynamics.progress import Progress, Reporter, reporter
-from foldyn.errors import ComputationError, InputError, MotionInterrupted
+from foldyn.errors import ComputationError, InputError, MotionInterrupted, told_once
 from foldyn.mechanics.inelastic_branches import HingeMemory
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import variable

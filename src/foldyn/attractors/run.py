@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -149,18 +145,3 @@ def swing(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Half the distance (...) between the extremes of samples (k, ...)."""
     top, bottom = extremes(values)
     return 0.5 * (top.max(axis=0) - bottom.min(axis=0))
-
-
-@contextmanager
-def told_once() -> Iterator[None]:
-    """Of warnings that differ in their numbers alone, as motion after motion gives, the first."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        yield
-    known = set()
-    for one in caught:
-        text = str(one.message)
-        kind = one.category, re.sub(r"[-+\d.e%]+", "", text)
-        if kind not in known:
-            warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
-        known.add(kind)

@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.attractors.diagram import FREQUENCY, RESOLUTION, SWEEPS, Steady, bracketed
 from foldyn.attractors.drive import at_frequency, drive_frequency, driven_frequency, with_histories
 from foldyn.attractors.jumps import Jump, is_jump, jump_variables, jumps_between
-from foldyn.attractors.run import Run, Stretch, check_measure, extremes, measured, told_once
+from foldyn.attractors.run import Run, Stretch, check_measure, extremes, measured
 from foldyn.cases import Case, Chirp, Harmonic, State
 from foldyn.dynamics.progress import Reporter, reporter
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError, InputError, told_once
 from foldyn.linear.time_domain import overall
 from foldyn.ram_limit import check_memory
 from foldyn.results import Quantity

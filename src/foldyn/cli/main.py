@@ -24,13 +24,13 @@ from foldyn.cli.folder import reason
 from foldyn.cli.folding import add_fold, run_fold
 from foldyn.cli.options import add_figures, add_film, add_results, flag, integer, number
 from foldyn.cli.signals import ENDINGS
-from foldyn.cli.streams import Outlet, Told, noticed, steady_streams
+from foldyn.cli.streams import Outlet, noticed, steady_streams
 from foldyn.cli.study import add_study, study
 from foldyn.cli.sweep import add_sweep, run_sweep
 from foldyn.cli.track import add_track, track
 from foldyn.cli.view import add_view, run_view
 from foldyn.cli.warm_up import add_warm_up, run_warm_up
-from foldyn.errors import ComputationError, FoldynWarning, InputError, shortened
+from foldyn.errors import ComputationError, FoldynWarning, InputError, Told, shortened
 from foldyn.ram_limit import HALF, at_most
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
@@ -286,7 +286,7 @@ def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
         os.environ["MPLBACKEND"] = "Agg"  # figures go to files alone
         with warnings.catch_warnings():
             warnings.simplefilter("always", FoldynWarning)
-            warnings.showwarning = _Warnings()
+            warnings.showwarning = _Warnings(getattr(given, "case", ""))
             most = 1.0 if given.command == "info" or given.force else HALF
             with at_most(most), noticed(getattr(given, "quiet", False)):
                 _call(given)
@@ -329,16 +329,16 @@ def _call(given: argparse.Namespace) -> None:
 
 
 class _Warnings:
-    """Writes each warning once, as a line of the command: mass rules would repeat them."""
+    """Writes each warning once, as a line of the command, which names the case file."""
 
-    def __init__(self) -> None:
-        self.shown = Told()
+    def __init__(self, case: str) -> None:
+        self.shown, self.place = Told(), f"{case}: " if case else ""
 
     def __call__(self, message: Warning | str, category: type[Warning], *_: object) -> None:
         name = "" if issubclass(category, FoldynWarning) else f"{category.__name__}: "
-        text = f"foldyn: warning: {name}{message}"
+        text = f"{name}{str(message).removeprefix(self.place)}"
         if self.shown.add(text):
-            print(text, file=sys.stderr)
+            print(f"foldyn: warning: {self.place}{text}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import sys
 import warnings
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -21,9 +21,9 @@ from foldyn.cli.options import BOTH
 from foldyn.cli.stamp import Owner
 from foldyn.cli.streams import Clock, noted_warnings, speech
 from foldyn.dynamics import SECONDS, Keeping
-from foldyn.errors import OF_MODELS, ComputationError, InputError, MotionInterrupted
+from foldyn.errors import ComputationError, InputError, MotionInterrupted, Told
 from foldyn.plots import FIGURES
-from foldyn.studies import find_case, shipped_cases
+from foldyn.studies import find_case
 from foldyn.values import number
 
 if TYPE_CHECKING:
@@ -57,13 +57,17 @@ def run(given: Namespace) -> Path:
     if given.model is not None:
         command, suffix = f"{command} --model {given.model}", f"{given.model}-{suffix}"
     folder = Path(f"{path.stem}-{suffix}" if given.out is None else given.out)
-    with warnings.catch_warnings(record=True) as caught:  # bad input gets its one message only
+    told = Told()
+    with told.noting():  # bad input gets its one message only
         case_file = _read(path, given)
         if getattr(given, "film", None):
             output = replace(case_file.output, animation=given.film)
             case_file = replace(case_file, output=output)
         changes = _device(case_file, getattr(given, "device", None))
-        task = [case_file.computation(mass, **changes) for mass in case_file.masses]
+        task = list[Computation]()
+        for mass in case_file.masses:
+            told.where = mass if len(case_file.masses) > 1 else ""
+            task.append(case_file.computation(mass, **changes))
         _keep(task, folder, given)
         with case_file.placing():
             case_file.analysis.check([one.compute for one in task], given.figures is not None)
@@ -71,15 +75,14 @@ def run(given: Namespace) -> Path:
             _check_video(case_file)
     names = [one.file for one in task]
     say = speech(given.quiet)
-    unsaid = OF_MODELS if page and path in shipped_cases().values() else ()
-    introduction = _introduction(case_file, task, caught, say)
     owner = Owner.of(command, path, folder)
     pages = ["report.html"] if page else []
     with (
         held(folder, given.out, [*names, *pages], owner, given.replace, DRAWN) as kept,
         _held_results(task),
     ):
-        with noted_warnings(unsaid) as noted:
+        with noted_warnings(path if page else None) as noted:
+            introduction = _introduction(case_file, told, say)
             bar = not given.quiet and sys.stderr.isatty()
             done = _computed(task, kept, introduction, bar, say)
         call = Call(given.typed, tuple(noted), **clock.spent())
@@ -161,9 +164,12 @@ def _computed(
     from foldyn.results import save
 
     done: dict[str, xarray.Dataset] = {}
+    told = Told()
     for one in task:
+        told.where = one.mass
         try:
-            done[one.mass] = one.run(progress, introduction)
+            with told.noting() if len(task) > 1 else nullcontext():
+                done[one.mass] = one.run(progress, introduction)
         except (ComputationError, MotionInterrupted) as error:
             failed = type(error)(f"{one.place}{error}", error.partial)
             if error.partial is not None:
@@ -171,6 +177,7 @@ def _computed(
                 results.keep(one.file, partial(save, error.partial))
                 if not isinstance(error, MotionInterrupted):
                     _saved(one, error.partial)
+            told.issue()
             raise failed from None
         result = done[one.mass]
         there = result.encoding.get("source") == str(results.folder / one.file)
@@ -180,6 +187,7 @@ def _computed(
         if mesh := mesh_error(result):
             say(f"  {one.mass}: {mesh}")
         _tell_missing(one.place, result, say)
+    told.issue()
     return done
 
 
@@ -217,17 +225,16 @@ def _check_video(case_file: CaseFile) -> None:
 
 
 def _introduction(
-    case_file: CaseFile,
-    task: list[Computation],
-    caught: list[warnings.WarningMessage],
-    say: Callable[[str], None],
+    case_file: CaseFile, told: Told, say: Callable[[str], None]
 ) -> Callable[[], None]:
     """Return a function that announces the run, once, when nothing is left to be refused."""
+    show = warnings.showwarning  # even where warnings are noted at that time
 
     @cache
     def introduce() -> None:
-        for one in caught:
-            warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
+        with warnings.catch_warnings():
+            warnings.showwarning = show
+            told.issue()
         structure = case_file.case().structure
         parts = PARTS[case_file.model]
         counted = ", ".join(f"{len(getattr(structure, part))} {part}" for part in parts)

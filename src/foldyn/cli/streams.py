@@ -6,17 +6,16 @@ Standard output and error may be closed, full or short of letters.
 from __future__ import annotations
 
 import os
-import re
 import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
-NUMBERS = re.compile(r"(?<![\w\[])[-+]?\d[\d.]*(e[-+]?\d+)?")
-"""Numbers in a text, but for those that are part of a name, as "loads[0]" and "node8"."""
+from foldyn.errors import OF_MODELS, Told
 
 
 class Outlet:
@@ -111,43 +110,17 @@ def progress_bar(quiet: bool, **options: Any) -> Any:
     return tqdm(disable=quiet or not sys.stderr.isatty(), leave=False, **options)
 
 
-NAMED = 6
-"""Places that are listed."""
-
-
-class Told:
-    """Texts of warnings: those that differ in numbers alone are one, with where they apply."""
-
-    def __init__(self) -> None:
-        self._found: dict[str, tuple[str, dict[str, bool]]] = {}
-
-    def add(self, text: str, where: str = "") -> bool:
-        """Note a text, and say whether it is the first of its kind.
-
-        where : such as the name of a run; by default the text itself tells.
-        """
-        key = NUMBERS.sub("#", text)
-        new = key not in self._found
-        self._found.setdefault(key, (text, {}))[1][where or text] = bool(where)
-        return new
-
-    def __iter__(self) -> Iterator[str]:
-        """Each once, with the names of where it applies, or how many there are like it."""
-        for text, places in self._found.values():
-            named = [place for place, is_name in places.items() if is_name]
-            if named:
-                more = f" and {len(named) - NAMED} more" if len(named) > NAMED else ""
-                yield f"{text} ({', '.join(named[:NAMED])}{more})"
-            elif len(places) > 1:
-                yield f"{text} (and {len(places) - 1} with other numbers)"
-            else:
-                yield text
-
-
 @contextmanager
-def noted_warnings(unsaid: tuple[type[Warning], ...] = ()) -> Iterator[Told]:
-    """Note warnings, which are shown all the same, but for those `unsaid`."""
+def noted_warnings(page_of: Path | None = None) -> Iterator[Told]:
+    """Note warnings, which are shown all the same.
+
+    page_of : case file that gets a page. A shipped one has its model on purpose: what that gets
+        only roughly is said there alone.
+    """
+    from foldyn.studies import shipped_cases
+
     noted, show = Told(), warnings.showwarning
+    unsaid = OF_MODELS if page_of in shipped_cases().values() else ()
 
     def both(message: Warning | str, category: type[Warning], *rest: Any) -> None:
         noted.add(str(message))

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from foldyn.cli.folder import Results, held
 from foldyn.cli.options import add_results, flag
 from foldyn.cli.stamp import Owner
-from foldyn.cli.streams import Clock, Told, progress_bar, speech
-from foldyn.errors import ComputationError, FoldynError, InputError
+from foldyn.cli.streams import Clock, progress_bar, speech
+from foldyn.errors import ComputationError, FoldynError, InputError, Told
 
 if TYPE_CHECKING:
     from foldyn.studies.herkal.specimen.measured import Data

@@ -119,7 +119,7 @@ def run_sweep(given: argparse.Namespace) -> Path:
     say = speech(given.quiet)
     say(_introduction(plan))
     with held(folder, given.out, names, owner, given.replace, DRAWN, [KEPT]) as results:
-        with noted_warnings() as noted:
+        with noted_warnings(None if given.no_figures else path) as noted:
             found = _swept(plan, given, results, say)
         spent = clock.spent()
         results.keep(RESULT, partial(save, found))

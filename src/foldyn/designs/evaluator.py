@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import time
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,7 +18,7 @@ from foldyn.analyses.keys import parts, replaced
 from foldyn.analyses.reading import read_document, validated
 from foldyn.cases import Case
 from foldyn.designs.space import Space
-from foldyn.errors import ComputationError, FoldynError, FoldynWarning, InputError, within
+from foldyn.errors import ComputationError, FoldynError, InputError, Told, within
 from foldyn.gradients.measures import derivative_of, one_number
 from foldyn.gradients.run_sensitivity import FUNCTIONS, case_file_at, sensitivity
 from foldyn.input_files import path_of
@@ -188,8 +187,8 @@ class Evaluate:
     def __call__(self, point: Point) -> Evaluation:
         """Evaluate a point."""
         began, values, failure, lasting = time.perf_counter(), {}, "", True
-        with warnings.catch_warnings(record=True) as told:
-            warnings.simplefilter("always")
+        told = Told()
+        with told.noting():
             try:
                 value, jacobian = self.evaluator(self.space.values(point), self.gradient)
                 values = {VALUES: value} | ({} if jacobian is None else {JACOBIAN: jacobian})
@@ -200,6 +199,4 @@ class Evaluate:
         bad = [name for name, array in values.items() if not np.isfinite(array).all()]
         if bad:
             values, failure = {}, f"gave a {bad[0]} that is not finite"
-        said = [str(one.message) for one in told if issubclass(one.category, FoldynWarning)]
-        warned = "; ".join(dict.fromkeys(said))
-        return Evaluation(values, failure, warned, time.perf_counter() - began, lasting)
+        return Evaluation(values, failure, told.kept(), time.perf_counter() - began, lasting)

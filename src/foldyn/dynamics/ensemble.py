@@ -24,7 +24,7 @@ from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.motion_state import Samples
 from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.stability import damper_rate, frequency_bound, is_stable
-from foldyn.errors import ComputationError, InputError, StretchWarning, warn
+from foldyn.errors import ComputationError, InputError, StretchWarning, listed, told_once, warn
 from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.mechanics.lanes import WIDTH
 from foldyn.results.dataset import origin_variables, result_dataset
@@ -108,22 +108,26 @@ def simulate_many(
     choice("device", device, DEVICES)
     threads = _threads(threads, len(cases))
     motions: list[Motion] = []
-    for k, (case, state) in enumerate(zip(cases, states, strict=True)):
-        of_kind(f"cases[{k}]", case, Case)
-        like = next((m for m in motions[:1] if dt is not None and _takes_starts(m, case)), None)
-        asked = "gpu" if device == "gpu" else "cpu"
-        try:
-            given = case, duration, method, dt, every, state
-            motions.append(
-                _from_start(like, state) if like
-                else prepare(*given, force=True, start=start, kept=True, device=asked)
-            )  # fmt: skip
-        except InputError as error:
-            place = f"cases[{k}]{'.' if error.field else ': '}"
-            raise error if error.field in COMMON else error.within(place) from None
-        for what, own in _shape(motions[k].case).items():
-            if own != _shape(motions[0].case)[what]:
-                raise InputError(f": has other {what} than cases[0]; all share them", f"cases[{k}]")
+    with told_once() as told:
+        for k, (case, state) in enumerate(zip(cases, states, strict=True)):
+            told.where = f"cases[{k}]"
+            of_kind(f"cases[{k}]", case, Case)
+            like = next((m for m in motions[:1] if dt is not None and _takes_starts(m, case)), None)
+            asked = "gpu" if device == "gpu" else "cpu"
+            try:
+                given = case, duration, method, dt, every, state
+                motions.append(
+                    _from_start(like, state) if like
+                    else prepare(*given, force=True, start=start, kept=True, device=asked)
+                )  # fmt: skip
+            except InputError as error:
+                place = f"cases[{k}]{'.' if error.field else ': '}"
+                raise error if error.field in COMMON else error.within(place) from None
+            for what, own in _shape(motions[k].case).items():
+                if own != _shape(motions[0].case)[what]:
+                    raise InputError(
+                        f": has other {what} than cases[0]; all share them", f"cases[{k}]"
+                    )
     least = int(np.argmin([motion.critical for motion in motions]))
     case, plan, critical = motions[0].case, motions[least].plan, motions[least].critical
     if plan.dt > critical and not force:
@@ -277,12 +281,17 @@ def _on_gpu(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]:
     return many.integrate(motions)
 
 
+def _cases(numbers: Iterable[int]) -> str:
+    """Cases in a line, the first of many."""
+    return listed([f"cases[{k}]" for k in numbers])
+
+
 def _warn(motions: Sequence[Motion], ended: Mapping[int, str], energy: NDArray) -> float:
     """Warn of what went wrong, or is doubtful; the largest relative energy error."""
     if ended:
         warn(
-            f"{len(ended)} of {len(motions)} motions ended before their time (see `outcome`), the "
-            f"first of cases[{min(ended)}]: {ended[min(ended)]}",
+            f"{len(ended)} of {len(motions)} motions ended before their time (see `outcome`): "
+            f"{_cases(ended)}, the first with: {ended[min(ended)]}",
             "integrators.md#many-models-at-once",
         )
     sound = {k: motion for k, motion in enumerate(motions) if k not in ended}
@@ -290,8 +299,8 @@ def _warn(motions: Sequence[Motion], ended: Mapping[int, str], energy: NDArray) 
     off = {k: motion.audit() for k, motion in sound.items()}
     if doubts:
         worst = max(doubts, key=lambda k: off[k])
-        told = f"cases[{worst}] (the worst of {len(doubts)}): {doubts[worst]}"
-        warn(told, "integrators.md#accuracy")
+        rank = f" (the worst of {_cases(doubts)})" if len(doubts) > 1 else ""
+        warn(f"cases[{worst}]{rank}: {doubts[worst]}", "integrators.md#accuracy")
     first, pairs = motions[0].case, zip(motions, energy, strict=True)
     names = audited(first.energy_groups, first.air is not None)
     found = [stretch(m.case.structure, dict(zip(names, e.T, strict=True))) for m, e in pairs]
@@ -299,8 +308,8 @@ def _warn(motions: Sequence[Motion], ended: Mapping[int, str], energy: NDArray) 
     if any(shares):
         warn(
             f"panels that stretch hold {max(shares):.0%} of the strain energy of "
-            f"cases[{np.argmax(shares)}] where that is largest, the most of "
-            f"{np.count_nonzero(shares)} motions with more than {most(first.structure):.0%}, "
+            f"cases[{np.argmax(shares)}] where that is largest (more than "
+            f"{most(first.structure):.0%} in {_cases(np.flatnonzero(shares))}), "
             f"{remedy(first.structure)}",
             "models.md#where-panels-stretch",
             StretchWarning,

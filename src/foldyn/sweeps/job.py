@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import inspect
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from foldyn.analyses.casefile import Moving
 from foldyn.analyses.keys import files_of, replaced
 from foldyn.analyses.reading import case_of_document
 from foldyn.analyses.ties import Tie
-from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.errors import ComputationError, InputError, Told
 from foldyn.program import program
 from foldyn.sweeps.evaluations import Evaluation
 from foldyn.sweeps.measure import Asked, Loaded
@@ -108,7 +107,7 @@ class BegunPoint:
     def __init__(self, job: Job, point: Point) -> None:
         self._job, self.compute = job, None
         self._seconds, self._lasting = 0.0, True
-        self._failures, self._told = list[str](), list[str]()
+        self._failures, self._told = list[str](), Told()
         with self._timed(), self._noted():
             if job.program != this_program():
                 raise RuntimeError("this worker has another version of Foldyn than who asks it")
@@ -129,8 +128,8 @@ class BegunPoint:
                 for each in self._job.measures:
                     with self._noted():
                         values[each.name] = each.of(result.copy(deep=False), case, shared)
-        failure, warned = ("; ".join(dict.fromkeys(t)) for t in (self._failures, self._told))
-        return Evaluation(values, failure, warned, self._seconds, self._lasting)
+        failure = "; ".join(dict.fromkeys(self._failures))
+        return Evaluation(values, failure, self._told.kept(), self._seconds, self._lasting)
 
     def _result(self) -> xarray.Dataset:
         """The result; of a path that stops, what there is of it, which is noted."""
@@ -149,10 +148,8 @@ class BegunPoint:
     def _timed(self) -> Iterator[None]:
         """Count the time of the block, and note what it warns of."""
         began = time.perf_counter()
-        with warnings.catch_warnings(record=True) as told:
-            warnings.simplefilter("always")
+        with self._told.noting():
             yield
-        self._told += [str(one.message) for one in told if issubclass(one.category, FoldynWarning)]
         self._seconds += time.perf_counter() - began
 
     @contextmanager

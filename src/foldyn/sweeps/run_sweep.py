@@ -13,7 +13,7 @@ import xarray as xr
 
 from foldyn.analyses.casefile import Moving
 from foldyn.dynamics.gpu.choice import choose
-from foldyn.errors import InputError
+from foldyn.errors import InputError, Told
 from foldyn.sweeps.evaluations import Evaluation, Evaluations
 from foldyn.sweeps.job import Job
 from foldyn.sweeps.measure import Measure
@@ -23,7 +23,7 @@ from foldyn.sweeps.pool import Pool, pool_of
 from foldyn.sweeps.side_by_side import SideBySide
 from foldyn.sweeps.table import dataset
 from foldyn.threads import processors
-from foldyn.values import whole
+from foldyn.values import show, whole
 
 MOST_PROCESSES = 1024
 """Processes at a time: more are a slip of the finger."""
@@ -115,6 +115,11 @@ def sweep(
         it took. The attribute `device` says where motions were computed, of "auto" with the reason
         (`device_reason`).
 
+    Warns
+    -----
+    FoldynWarning
+        Of each kind once, at the end, with the points.
+
     Raises
     ------
     InputError
@@ -157,8 +162,18 @@ def swept(
     with chosen as pool:
         evaluations = Evaluations[Point](pool, job.stamp, folder, follow)
         found = evaluations.at(points, _lost, first=True)
+    _tell(plan, found)
     facts = {"wall_seconds": time.perf_counter() - follow.began, "processes": count, **about}
     return dataset(plan, found, facts)
+
+
+def _tell(plan: Plan, found: Sequence[Evaluation]) -> None:
+    """Warn of what points were warned of, of each kind once, with the points."""
+    told, names = Told(), [one.key.rpartition(".")[2] for one in plan.varied]
+    for point, one in zip(plan.points, found, strict=True):
+        values = (f"{name} = {show(value)}" for name, value in zip(names, point, strict=True))
+        told.add_kept(one.warnings, " and ".join(values))
+    told.issue()
 
 
 def _device(plan: Plan, cores: int, scheduler: str | None) -> tuple[str, dict[str, str]]:
