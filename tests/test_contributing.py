@@ -24,7 +24,6 @@ EXISTING = {
     "A mass rule": ("", "", r"(def|import|:) centroid\b"),
     "A history": ("", "", r"\b(Chirp|CHIRP)\b"),
     "An integrator": ("leapfrog", "central_difference", r'(?<!")\bcentral_difference\b(?!")'),
-    "A law": ("cubic", "linear", r"\blinear\.(LinearBar|bar_(energy|stress|slope)|CODE)"),
     "A format": ("ply", "stl", r"\bstl\.write\b"),
     "An export": ("vtp", "vtkhdf", r"\bvtkhdf\.write\b"),
 }

@@ -1,4 +1,4 @@
-"""The terms of CONTRIBUTING, added to a copy of the package as the page says: three files each."""
+"""The terms and the law of CONTRIBUTING, added to a copy of the package as the page says."""
 
 from __future__ import annotations
 
@@ -47,6 +47,44 @@ assert max(apart) < 2e-2, apart
 from foldyn.cases.supports import support_from
 assert support_from({table}) == case.supports[1]
 """
+LAW_PROBE = """
+import numpy as np
+import foldyn as fd
+sheet = fd.Sheet(1e6, 0.25, 0.01, 1.0)
+pattern = fd.patterns.simple_fold(dihedral=120)
+plain, stiff = (fd.discretize(pattern, sheet, fold_law=law) for law in ("linear", "stiffening"))
+theta, rest = 2.6, float(stiff.fold_rest[0])
+assert stiff.fold_law.moment(theta, rest) == (theta - rest) * (1.0 + (theta - rest) ** 2)
+
+def case(law, rest):
+    structure = fd.discretize(
+        pattern, sheet, fold_law=law, crease_rest=rest, crease_stiffness=0.01
+    )
+    held = [fd.Fix([4, 5]), fd.Fix([0, 1], "z")]
+    return fd.Case(structure, held, [fd.Force([0, 1], (-1e-3, 0.0, 0.0))])
+
+from foldyn.materials.stiffening import Stiffening
+
+def end(growth, rest=125.0, method="statics"):
+    built = case(Stiffening(growth), rest)
+    if method == "statics":
+        return float(fd.trace(built, load_factors=[1.0]).displacement[-1].sel(node=0, axis="x"))
+    found = fd.simulate(built, 0.1, method, dt=4e-4)
+    return float(found.displacement[-1].sel(node=0, axis="x"))
+
+assert abs(end(2.0) - end(0.0)) > 1e-3 * abs(end(0.0))
+for method, analysis in (
+    ("statics", {"kind": "statics", "load_factors": [1.0]}),
+    ("rk4", {"kind": "dynamics", "duration": 0.1, "method": "rk4", "dt": 4e-4}),
+):
+    build = lambda growth, rest: case(Stiffening(growth), rest)
+    found = fd.sensitivity(build, {"growth": 2.0, "rest": 125.0}, "displacement[0,x]", analysis)
+    for name, h in (("growth", 1e-3), ("rest", 1e-2)):
+        ends = [end(**({"growth": 2.0, "rest": 125.0} | {name: x}), method=method)
+                for x in ({"growth": 2.0, "rest": 125.0}[name] + k * h for k in (-1, 1))]
+        difference = (ends[1] - ends[0]) / (2.0 * h)
+        assert abs(found[f"gradient_{name}"].values[0] / difference - 1.0) < 1e-3, (method, name)
+"""
 
 
 def blocks(title: str) -> list[str]:
@@ -76,8 +114,8 @@ def register(package: Path, module: str, name: str) -> None:
     path.write_text(text.replace("Dashpot | Link\n", f"Dashpot | Link | {name}\n"), "utf-8")
 
 
-def run(package: Path, **names: str) -> None:
-    command = [sys.executable, "-W", "ignore", "-c", PROBE.format(**names)]
+def run(package: Path, probe: str = PROBE, **names: str) -> None:
+    command = [sys.executable, "-W", "ignore", "-c", probe.format(**names) if names else probe]
     environment = {**os.environ, "PYTHONPATH": str(package.parent)}
     environment.pop("NUMBA_CACHE_DIR", None)
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
@@ -111,3 +149,15 @@ def test_a_sphere(copy):
         copy, imports="", group="strain_spheres", support="fd.Sphere(BELOW, 0.4, 20.0)",
         table="{'center': BELOW, 'radius': 0.4, 'sphere': 20.0}",
     )  # fmt: skip
+
+
+@pytest.mark.matrix
+def test_a_hinge_law(copy):
+    """It has moments, motions and gradients; only the line in the registry names it."""
+    (copy / "materials/stiffening.py").write_text(blocks("A law")[0], "utf-8")
+    path = copy / "materials/switch.py"
+    text = path.read_text("utf-8")
+    text = text.replace("ogden, plate_superlinear,", "ogden, plate_superlinear, stiffening,", 1)
+    last = "plate_superlinear.PlateSuperlinear,"
+    path.write_text(text.replace(last, f"{last} stiffening.Stiffening,", 1), "utf-8")
+    run(copy, LAW_PROBE)

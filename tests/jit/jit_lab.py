@@ -17,7 +17,7 @@ from foldyn.materials.superlinear import moment
 
 @kernel
 def probe(w, t):
-    return waveform(w, 0, t, False)[0], moment(t, -t)
+    return waveform(w, 0, t, False)[0], moment(t + t)
 """
 ASK = """
 import warnings

@@ -89,7 +89,7 @@ def by_numbers(x, y, out):
     for q in range(COUNT):
         out[0, q] = formula(x[q], y[q])
         out[1, q] = branch_free_atan2(x[q], y[q])
-        out[2, q] = superlinear.moment(x[q], y[q])
+        out[2, q] = superlinear.moment(x[q] - y[q])
         out[3, q] = per_cube_root(abs(x[q]))
 
 
@@ -98,7 +98,7 @@ def by_eights(x, y, out):
     a, b = eight(x, 0), eight(y, 0)
     put(out[0], 0, formula(a, b))
     put(out[1], 0, branch_free_atan2(a, b))
-    put(out[2], 0, superlinear.moment(a, b))
+    put(out[2], 0, superlinear.moment(a - b))
     put(out[3], 0, per_cube_root(abs(a)))
 
 

@@ -22,8 +22,8 @@ FILES = [  # kernels for GPUs are not kept, and import what is optional
 ]
 HALF_SINE = ("s = math.sin(math.pi * t / a)", "s = 3.0 * math.sin(math.pi * t / a)")
 LAW = (
-    "def moment(theta, rest):",
-    "def moment(theta, rest):\n    return 7.0\n\n\ndef was(theta, rest):",
+    "def moment(turn):",
+    "def moment(turn):\n    return 7.0\n\n\ndef was(turn):",
 )
 
 

@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import MISSING, fields
+
 import numpy as np
 
 import foldyn as fd
+from foldyn.materials import HINGE_LAWS, MemoryLaw
 from foldyn.materials.branch_switch import branch_table
 
+
+def example(kind, **given):
+    """A law of a kind, whose numbers without a default are 0.1."""
+    needed = [field for field in fields(kind) if field.default is MISSING]
+    return kind(**{field.name: 0.1 for field in needed} | given)
+
+
 LAWS = {
+    name: example(kind, law="linear")
+    for name, kind in HINGE_LAWS.items()
+    if issubclass(kind, MemoryLaw)
+} | {
     "prony": fd.Prony([0.3, 0.1], [0.02, 1.0], law="linear"),
     "plastic": fd.Plastic(0.05, isotropic=0.02, kinematic=0.1, law="linear"),
     "eyring": fd.Eyring(0.02, 1e-3, law="linear"),

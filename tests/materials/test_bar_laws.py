@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from foldyn.errors import InputError
-from foldyn.materials import BAR_LAWS, HINGE_LAWS, BarLaw, Ogden, bar_law, hinge_law, ogden
+from foldyn.materials import BAR_LAWS, BarLaw, Ogden, bar_law, hinge_law, ogden
 
 
 def exact_ogden(e: float) -> tuple[float, float, float]:

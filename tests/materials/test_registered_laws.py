@@ -6,29 +6,28 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from branch_runs import example
 
 import foldyn as fd
 from custom_laws import CUBIC
 from foldyn.errors import InputError
+from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.switches import by_code
 from foldyn.materials import (
     BAR_LAWS,
     HINGE_LAWS,
     BarLaw,
     HingeLaw,
-    MemoryLaw,
+    LinearHinge,
     bar_law,
     hinge_law,
-    switch,
 )
+from foldyn.materials.formulas import HingeFormulas
 from foldyn.materials.switch import move_rest
 
 STEP = 1e-5
 HINGES = {
-    **{name: hinge_law(name) for name, law in HINGE_LAWS.items() if not issubclass(law, MemoryLaw)},
-    # their elastic parts
-    "prony": fd.Prony(0.5, 0.1, law=fd.EnhancedLinear(90, 270)),
-    "plastic": fd.Plastic(0.1),
-    "eyring": fd.Eyring(0.01, 1e-3, law="linear"),
+    **{name: example(law) for name, law in HINGE_LAWS.items()},  # with memory: the elastic part
     # limits within the rest angles below: locked at rest
     "locked, stress-free": fd.EnhancedLinear(90, 270),
     "locked, as published": fd.EnhancedLinear(90, 270, rest="as_published"),
@@ -94,32 +93,17 @@ def test_a_hinge_law_has_no_kink_within_its_reach(name):
     )
 
 
-def test_every_function_of_the_switch_is_asked_for():
-    table = {name for name in vars(switch) if name.startswith(("bar_", "hinge_"))}
-    assert table - {"bar_table", "hinge_table"} == {*BarLaw.functions, *HingeLaw.functions}
-
-
-@pytest.mark.parametrize("row", range(5))
-def test_a_missing_branch_is_named_when_a_structure_is_built(row, monkeypatch):
-    known = HingeLaw.compiled
-
-    def compiled(*given):
-        table = known(*given)
-        table[row] = np.nan
-        return table
-
-    monkeypatch.setattr(HingeLaw, "compiled", staticmethod(compiled))
-    pattern, sheet = fd.patterns.simple_fold(), fd.Sheet(1e6, 0.25, 0.01)
-    with pytest.raises(InputError, match=rf"branch in {HingeLaw.functions[row]} of materials"):
-        fd.discretize(pattern, sheet, fold_law="linear")
+@kernel
+def follow(code, rest, parameters):
+    for i in range(rest.size):
+        move_rest(code, rest[i], parameters[i])
 
 
 @pytest.mark.parametrize("name", HINGES)
 def test_parameters_of_a_hinge_law_follow_its_rest_angle(name):
     law, rest = HINGES[name], REST[:, 0]
     moved = law.parameters(rest[::-1].copy())
-    for row, angle in zip(moved, rest, strict=True):
-        move_rest(law.code, angle, row)
+    follow(law.code, rest, moved)
     np.testing.assert_array_equal(moved, law.parameters(rest))
 
 
@@ -134,15 +118,61 @@ def test_a_hinge_law_is_linear_where_it_says_so(name):
     np.testing.assert_array_equal(law.moment(THETA, REST)[within], (THETA - REST)[within])
 
 
-def test_every_law_is_among_these():
-    assert set(HINGE_LAWS) <= set(HINGES)
+@scalar
+def of_turn(turn):
+    return turn
 
 
-def test_codes_of_registered_laws_differ():
-    """But for laws with memory, which have that of their elastic part."""
-    elastic = [law for law in HINGE_LAWS.values() if not issubclass(law, MemoryLaw)]
-    for laws in (BAR_LAWS.values(), elastic):
-        assert len({kind().code for kind in laws}) == len(laws)
+@scalar
+def of_turn_and_limit(turn, limit):
+    return turn
+
+
+@scalar
+def of_both(theta, rest):
+    return theta - rest
+
+
+@pytest.mark.parametrize(
+    ("formulas", "lacks"),
+    [
+        ((of_turn, of_turn), "slope"),
+        ((of_turn, of_turn_and_limit, of_turn), "by_parameters, the derivatives of the moment"),
+        ((of_both, of_turn, of_turn), "energy_by_rest and moment_by_rest, as a formula takes"),
+        ((of_both, of_turn, of_turn, None, of_both), "energy_by_rest and moment_by_rest"),
+    ],
+)
+def test_a_law_is_complete_or_refused_when_it_is_imported(formulas, lacks):
+    with pytest.raises(TypeError, match=lacks):
+        HingeFormulas(99, *formulas)
+
+
+@pytest.mark.parametrize(
+    ("declared", "said"),
+    [
+        ({"Cubic": (), "Linear": LinearHinge.formulas}, "Cubic is registered, but declares no"),
+        ({"Linear": LinearHinge.formulas, "Cubic": LinearHinge.formulas}, "Cubic and Linear have"),
+    ],
+)
+def test_laws_without_formulas_and_codes_of_others_are_refused(declared, said):
+    with pytest.raises(TypeError, match=said):
+        by_code(declared)
+
+
+@dataclass(frozen=True)
+class Forgetful(HingeLaw):
+    """Has parameters that depend on the rest angle, and does not say how they follow it."""
+
+    formulas = LinearHinge.formulas
+    name: str = "forgetful"
+
+    def parameters(self, rest):
+        return np.tile(rest[:, None], 4)
+
+
+def test_parameters_that_cannot_follow_a_rest_angle_are_refused():
+    with pytest.raises(InputError, match=r"bend_law: parameters of 'forgetful' depend on the rest"):
+        hinge_law(Forgetful(), "bend_law")
 
 
 @dataclass(frozen=True)
@@ -153,7 +183,9 @@ class UnknownBar(BarLaw):
 
 @dataclass(frozen=True)
 class UnknownHinge(HingeLaw):
-    code = 99
+    """Its code is that of another law, whose moments it would have."""
+
+    formulas = (HingeFormulas(LinearHinge.code, of_turn, of_turn, of_turn),)
     name: str = "unknown"
 
 

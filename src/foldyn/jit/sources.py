@@ -16,7 +16,7 @@ from __future__ import annotations
 import hashlib
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -46,6 +46,7 @@ _READ: set[Path] = set()
 REST = ""  # name of the statements that define no name
 
 Part = tuple[Path, str]  # the statements of a file that define a name
+_WRITTEN: dict[Part, tuple[str, frozenset[Part]]] = {}  # text that is no file's, and what it names
 
 
 class Module(NamedTuple):
@@ -62,12 +63,18 @@ def digest(source: Path, name: str) -> str:
     return hashlib.sha256(_tools().encode() + b"".join(parts)).hexdigest()[:16]
 
 
+def define(part: Part, text: str, named: Iterable[Part]) -> None:
+    """Let a name of a file be defined by a text that is made when the file is imported."""
+    _WRITTEN[part] = text, frozenset(named)
+
+
 @cache
 def _content(part: Part) -> bytes:
     """Digest of a part, with its place in the package."""
     path, name = part
     place = path.relative_to(PACKAGE).as_posix() if path.is_relative_to(PACKAGE) else path.name
-    return hashlib.sha256(f"{place} {name}\n{_module(path).parts.get(name)}".encode()).digest()
+    text = _WRITTEN[part][0] if part in _WRITTEN else _module(path).parts.get(name)
+    return hashlib.sha256(f"{place} {name}\n{text}".encode()).digest()
 
 
 def made_from(source: Path, name: str) -> set[Part]:
@@ -85,6 +92,8 @@ def made_from(source: Path, name: str) -> set[Part]:
 @cache
 def _needed(path: Path, name: str) -> frozenset[Part]:
     """Parts that a part of a file names."""
+    if (path, name) in _WRITTEN:
+        return _WRITTEN[path, name][1]
     own = _module(path)
     words = set(_WORD.findall(own.parts.get(name, "")))
     needed = {(path, word) for word in words & own.parts.keys()} | {(path, REST)}

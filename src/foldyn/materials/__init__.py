@@ -43,8 +43,8 @@ __all__ = [
     "hinge_law",
 ]
 
-BarLaw.compiled = staticmethod(switch.bar_table)
-HingeLaw.compiled = staticmethod(switch.hinge_table)
+BarLaw.compiled, BarLaw.known = staticmethod(switch.bar_table), switch.BARS
+HingeLaw.compiled, HingeLaw.known = staticmethod(switch.hinge_table), switch.HINGES
 
 BAR_LAWS: Mapping[str, type[BarLaw]] = {law.name: law for law in switch.BAR_LAWS}
 HINGE_LAWS: Mapping[str, type[HingeLaw]] = {

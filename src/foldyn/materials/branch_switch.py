@@ -4,50 +4,39 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner_scalar, kernel
+from foldyn.jit.switches import by_code, switch
 from foldyn.materials import crease_damper, eyring, plastic, prony
 
 MEMORY_LAWS = (prony.Prony, plastic.Plastic, eyring.Eyring)
+_BRANCHES = by_code(
+    {law.__name__: law.formulas for law in MEMORY_LAWS}
+    | {"the damper of creases": (crease_damper.FORMULAS,)}
+)
+_ARGUMENTS = "p, before, after, dt, one, other"
 
 
-@scalar
-def update(code, p, before, after, dt, one, other):
-    """State (two numbers), moment, slope, energy and loss of a branch, per unit stiffness.
-
-    Parameters
-    ----------
-    code : int
-    p : (4,) its parameters.
-    before, after : turn from the rest angle at the last accepted step, and now, rad.
-    dt : time since then, s; the slope is the derivative of the moment with respect to `after`.
-    one, other : the state at that step.
-
-    What has not moved in no time stays as it is, bit by bit.
-    """
-    if code == prony.CODE:
-        return prony.update(before, after, dt, one, p[0], p[1])
-    if code == plastic.CODE:
-        return plastic.update(before, after, one, other, p[0], p[1], p[2])
-    if code == eyring.CODE:
-        return eyring.update(before, after, dt, one, p[0], p[1])
-    if code == crease_damper.CODE:
-        return crease_damper.update(before, after, dt, one, p[0], p[1])
+@inner_scalar
+def _no_state(p, before, after, dt, one, other):
     return np.nan, np.nan, np.nan, np.nan, np.nan, np.nan
 
 
-@scalar
-def mean_moment(code, p, before, after, dt, one, other):
-    """Mean moment of a branch in a step, its derivative by `after`, and what is not lost.
-
-    The work along the turn is the change of the energy and the loss of `update` less the last one.
-    """
-    if code == prony.CODE:
-        return prony.mean_moment(before, after, dt, one, p[0], p[1])
-    if code == plastic.CODE:
-        return plastic.mean_moment(before, after, one, other, p[0], p[1], p[2])
-    if code == eyring.CODE:
-        return eyring.mean_moment(before, after, dt, one, p[0], p[1])
+@inner_scalar
+def _no_mean(p, before, after, dt, one, other):
     return np.nan, np.nan, np.nan
+
+
+update, mean_moment = (
+    switch(
+        __name__, name, f"code, {_ARGUMENTS}",
+        {
+            code: (f"{{0}}({_ARGUMENTS})", (formula,))
+            for code, one in _BRANCHES.items() if (formula := getattr(one, name))
+        },
+        (f"{{0}}({_ARGUMENTS})", (unknown,)),
+    )
+    for name, unknown in (("update", _no_state), ("mean_moment", _no_mean))
+)  # fmt: skip
 
 
 @kernel

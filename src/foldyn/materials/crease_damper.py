@@ -18,7 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import scalar
-from foldyn.materials.inelastic_law import Branch, columns
+from foldyn.materials.formulas import BranchFormulas
+from foldyn.materials.inelastic_law import Branch
+from foldyn.materials.law import columns
 
 CODE = 3  # among branches
 FEW = 1e-3  # of q h: below, series stand for what cancels
@@ -26,8 +28,9 @@ NO_TIME = 1e-6  # of 1 / q, in which loads that jump would turn a crease
 
 
 @scalar
-def update(before, after, dt, rate, time, pace):
+def update(p, before, after, dt, rate, turned):
     """Rate, turn, moment, slope, 0 and loss per k, after a turn in a time dt."""
+    time, pace = p[0], p[1]
     if dt == 0.0:
         now = rate + (after - before) * pace / NO_TIME
         return now, after, time * now, time * pace / NO_TIME, 0.0, 0.0
@@ -42,6 +45,9 @@ def update(before, after, dt, rate, time, pace):
     change = rate - now
     lost = dt * (now * now + 2.0 * (1.0 - w) * now * change + square * change * change)
     return now, after, time * now, time / (w * dt), 0.0, time * lost
+
+
+FORMULAS = BranchFormulas(CODE, update, None)
 
 
 def damper_branch(panels: NDArray, damping: NDArray) -> Branch:

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from foldyn.arguments import Check
 from foldyn.errors import InputError
 from foldyn.jit.compiled import inner_scalar, kernel, scalar
-from foldyn.materials.law import PARAMETERS, HingeLaw
+from foldyn.materials.formulas import HingeFormulas
+from foldyn.materials.law import HingeLaw, columns
 from foldyn.values import choice, number, writable
 
 STRESS_FREE, AS_PUBLISHED = 2, 3  # codes
@@ -57,7 +58,7 @@ def moment(theta, rest, theta1, theta2):
 
 
 @scalar
-def slope(theta, theta1, theta2):
+def slope(theta, rest, theta1, theta2):
     """Slope / k: 1 between theta1 and theta2, 1/cos^2 beyond."""
     if theta < theta1:
         return 1.0 / math.cos(HALF_PI * ((theta1 - theta) / theta1)) ** 2
@@ -67,7 +68,7 @@ def slope(theta, theta1, theta2):
 
 
 @scalar
-def limit_slopes(theta, theta1, theta2):
+def by_limits(theta, rest, theta1, theta2):
     """Derivatives of moment / k as published with respect to theta1 and theta2."""
     if theta < theta1:
         tangent = math.tan(HALF_PI * ((theta1 - theta) / theta1))
@@ -81,15 +82,40 @@ def limit_slopes(theta, theta1, theta2):
 
 
 @scalar
-def rest_slope(theta, rest):
+def energy_by_rest(theta, rest):
     """Derivative of energy / k as published with respect to rest."""
     return rest - theta
 
 
+@scalar
+def moment_by_rest(theta, rest):
+    """Derivative of moment / k with respect to rest, beside the one by the moment at rest."""
+    return -1.0
+
+
 @inner_scalar
-def stress_free_rest_slope(theta, rest, theta1, theta2):
-    """The same of the stress-free law, whose moment and energy at rest move along."""
-    return slope(rest, theta1, theta2) * (rest - theta)
+def relieved_energy(theta, rest, theta1, theta2, moment_at_rest, energy_at_rest):
+    """Energy / k of the stress-free law."""
+    return energy(theta, rest, theta1, theta2) - moment_at_rest * (theta - rest) - energy_at_rest
+
+
+@inner_scalar
+def relieved_moment(theta, rest, theta1, theta2, moment_at_rest):
+    """Moment / k of the stress-free law."""
+    return moment(theta, rest, theta1, theta2) - moment_at_rest
+
+
+@inner_scalar
+def relieved_by_parameters(theta, rest, theta1, theta2, moment_at_rest):
+    """Derivatives of that by theta1, theta2 and the moment at rest."""
+    by_first, by_second = by_limits(theta, rest, theta1, theta2)
+    return by_first, by_second, -1.0
+
+
+@inner_scalar
+def relieved_energy_by_rest(theta, rest, theta1, theta2):
+    """Derivative of its energy / k by rest, along which moment and energy at rest move."""
+    return slope(rest, rest, theta1, theta2) * (rest - theta)
 
 
 @inner_scalar
@@ -130,6 +156,16 @@ class EnhancedLinear(HingeLaw):
     rest: Annotated[str, Check(choice, known=("stress_free", "as_published"))] = "stress_free"
     name: str = "enhanced"
 
+    formulas = (
+        HingeFormulas(
+            STRESS_FREE, relieved_energy, relieved_moment, slope, relieved_by_parameters,
+            relieved_energy_by_rest, moment_by_rest, relieve,
+        ),
+        HingeFormulas(
+            AS_PUBLISHED, energy, moment, slope, by_limits, energy_by_rest, moment_by_rest
+        ),
+    )  # fmt: skip
+
     def agree(self) -> None:
         """Refuse angles that are not in order."""
         if not 0.0 < self.theta1 < self.theta2 < 360.0:
@@ -155,8 +191,7 @@ class EnhancedLinear(HingeLaw):
 
     def parameters(self, rest: NDArray) -> NDArray:
         """theta1, theta2 (rad), and the moment and energy at rest to subtract, per hinge."""
-        table = np.zeros((len(rest), PARAMETERS))
-        table[:, :2] = self.linear_between
+        table = columns(len(rest), *self.linear_between)
         if self.code == STRESS_FREE:
             _relieve_each(writable(rest), table)
         return table

@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 
 from foldyn.arguments import Check
 from foldyn.jit.compiled import inner_scalar, scalar
-from foldyn.materials.inelastic_law import Branch, MemoryLaw, columns
-from foldyn.materials.law import HingeLaw
+from foldyn.materials.formulas import BranchFormulas
+from foldyn.materials.inelastic_law import Branch, MemoryLaw
+from foldyn.materials.law import HingeLaw, columns
 from foldyn.values import number
 
 CODE = 2
@@ -34,22 +35,22 @@ LARGEST = 700.0  # exponent
 
 
 @scalar
-def update(before, after, dt, spring, barrier, rate):
+def update(p, before, after, dt, spring, other):
     """Elastic turn, 0, moment, slope, energy and loss per k, after a turn in a time dt.
 
-    barrier : M0 / k, rad; rate : r, rad/s.
+    p : M0 / k, rad, and r, rad/s.
     """
     turn = after - before
-    now, slope = _relaxed(turn, dt, spring, barrier, rate)
+    now, slope = _relaxed(turn, dt, spring, p[0], p[1])
     lost = 0.5 * (spring + now) * (turn - (now - spring))
     # the elastic law has the turn as a whole
     return now, 0.0, now - after, slope - 1.0, 0.5 * (now * now - after * after), lost
 
 
 @scalar
-def mean_moment(before, after, dt, spring, barrier, rate):
+def mean_moment(p, before, after, dt, spring, other):
     """Mean of the moments at the ends, its slope, and 0: its work is what is stored and lost."""
-    now, slope = _relaxed(after - before, dt, spring, barrier, rate)
+    now, slope = _relaxed(after - before, dt, spring, p[0], p[1])
     return 0.5 * (spring + now - before - after), 0.5 * (slope - 1.0), 0.0
 
 
@@ -100,6 +101,7 @@ class Eyring(MemoryLaw):
     law: str | HingeLaw = "enhanced"
     name: str = "eyring"
 
+    formulas = (BranchFormulas(CODE, update, mean_moment),)
     rate_dependent = True
 
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:

@@ -9,16 +9,18 @@ own law, so that all that does not know of branches takes it as that law.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from functools import cached_property
 from operator import attrgetter
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.materials.law import PARAMETERS, HingeLaw
+from foldyn.materials.formulas import BranchFormulas
+from foldyn.materials.law import HingeLaw
 
 VARIABLES = 2  # of the state of a branch
 
@@ -43,6 +45,8 @@ class MemoryLaw(HingeLaw):
     law: str | HingeLaw
     lookup: ClassVar[Callable[..., HingeLaw]]
     """`materials.hinge_law`; the registry, which knows these laws too, gives it to them."""
+    formulas: ClassVar[tuple[BranchFormulas, ...]] = ()
+    """Those of its branches, one for each of their codes."""
     rate_dependent: ClassVar[bool]
     """Whether its moment depends on time, not on the path alone."""
     relaxes: ClassVar[bool] = False
@@ -60,9 +64,9 @@ class MemoryLaw(HingeLaw):
         """Refuse an elastic part that is none."""
         _ = self.elastic
 
+    @abstractmethod
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
         """Its branches for hinges with stiffnesses (n,), N m/rad, and lengths (n,), m."""
-        raise NotImplementedError
 
     code: Any = property(attrgetter("elastic.code"))
     addresses: Any = property(attrgetter("elastic.addresses"))
@@ -84,14 +88,6 @@ class MemoryLaw(HingeLaw):
                 'has none there; give law = "linear" or "enhanced"',
                 field,
             )
-
-
-def columns(rows: int, *values: ArrayLike) -> NDArray:
-    """Parameters (n, 4) of a branch, the last ones zero."""
-    table = np.zeros((rows, PARAMETERS))
-    for column, value in enumerate(values):
-        table[:, column] = value
-    return table
 
 
 def memory_of(law: Any) -> MemoryLaw | None:

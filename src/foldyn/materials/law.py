@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -28,16 +28,20 @@ class Law(Checked, ABC):
 
     name: str
     code: int = CALLED
+    formulas: ClassVar[tuple[Any, ...]] = ()
+    """`BarFormulas` or `HingeFormulas` of each of its codes; its `code` is the first of these."""
     rest_state: tuple[float, ...]
-    functions: ClassVar[tuple[str, ...]]
-    """Functions of `switch.py` that make the rows of its table."""
     compiled: ClassVar[Callable[..., NDArray]]
     """All functions of a law by its code; the switch, which knows the laws, gives it to them."""
+    known: ClassVar[Mapping[int, Any]]
+    """The formulas by code that the switch has; likewise."""
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Let messages begin with the name of the class."""
+        """Let messages begin with the name of the class, and kernels find its formulas."""
         super().__init_subclass__(**options)
         cls.place = f"{cls.__name__}: "
+        if "formulas" in vars(cls) and isinstance(cls.code, int):
+            cls.code = cls.formulas[0].code
 
     @property
     def addresses(self) -> tuple[int, int, int] | None:
@@ -45,15 +49,14 @@ class Law(Checked, ABC):
         return None
 
     def check(self, field: str) -> None:
-        """Refuse a built-in law that the compiled switch lacks: it gives nan for such a law."""
+        """Refuse a law whose formulas the switch lacks: its code would have others, or none."""
         if type(self).addresses is not Law.addresses:  # asking for them would compile them
             return
-        unknown = np.isnan(self._table(*self.rest_state))
-        if lacks := [name for name, here in zip(self.functions, unknown, strict=False) if here]:
+        if self.known.get(self.code) not in self.formulas:
             raise InputError(
                 f": {self.name!r}, code {self.code}, is not a law that the kernels know; give a "
-                "CustomBarLaw or CustomHingeLaw (a new built-in law needs its branch in "
-                f"{', '.join(lacks)} of materials/switch.py)",
+                "CustomBarLaw or CustomHingeLaw (a new built-in law declares its formulas, and "
+                "has its place in materials/switch.py)",
                 field,
             )
 
@@ -66,7 +69,6 @@ class BarLaw(Law):
     """Axial law of a bar in terms of the stretch lambda = l / L, per unit Young's modulus."""
 
     rest_state = (1.0,)
-    functions = "bar_energy", "bar_stress", "bar_slope"
 
     def energy(self, stretch: ArrayLike) -> NDArray:
         """Energy density W / E_y at each stretch."""
@@ -90,13 +92,23 @@ class HingeLaw(Law):
     """Moment law of a hinge in terms of its dihedral (rad), per unit stiffness."""
 
     rest_state = (math.pi, math.pi)
-    functions = "hinge_energy", "hinge_moment", "hinge_slope", "hinge_rest_slope", "hinge_moment_by"
     linear_between: tuple[float, float] | None = None
     """Dihedrals (rad) between which the moment is k (theta - rest), if the law is linear at all."""
     follows_rest: bool = True
     """Whether the parameters of its compiled form depend on the rest angle."""
     closed_at_rest: bool = True
     """Whether a hinge can be at rest closed, with a dihedral of 0 or 2 pi."""
+
+    def check(self, field: str) -> None:
+        """Refuse what kernels do not know, and parameters that would stay behind a rest angle."""
+        super().check(field)
+        one, other = self.parameters(np.array([math.pi, 0.5 * math.pi]))
+        if (one != other).any() and self.known[self.code].follow is None:
+            raise InputError(
+                f": parameters of {self.name!r} depend on the rest angle, but its formulas have "
+                "no `follow`, which sets them as it turns",
+                field,
+            )
 
     def parameters(self, rest: NDArray) -> NDArray:
         """Parameters of the compiled form, shape (n, 4), for hinges with rest angles (n,)."""
@@ -135,3 +147,11 @@ class HingeLaw(Law):
             self.code, np.ascontiguousarray(theta.ravel()), flat_rest, parameters, address
         )
         return flat.reshape((len(flat), *theta.shape))
+
+
+def columns(rows: int, *values: ArrayLike) -> NDArray:
+    """Parameters (n, 4) of hinges, the last ones zero."""
+    table = np.zeros((rows, PARAMETERS))
+    for column, value in enumerate(values):
+        table[:, column] = value
+    return table

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from foldyn.jit.compiled import inner_scalar
+from foldyn.materials.formulas import BarFormulas, HingeFormulas
 from foldyn.materials.law import BarLaw, HingeLaw
 
 CODE = 0
@@ -31,28 +32,28 @@ def bar_slope(e):
 
 
 @inner_scalar
-def hinge_energy(theta, rest):
+def hinge_energy(turn):
     """Energy / k."""
-    return 0.5 * (theta - rest) ** 2
+    return 0.5 * turn**2
 
 
 @inner_scalar
-def hinge_moment(theta, rest):
+def hinge_moment(turn):
     """Moment / k."""
-    return theta - rest
+    return turn
 
 
 @inner_scalar
-def hinge_rest_slope(theta, rest):
-    """Derivative of energy / k with respect to rest."""
-    return rest - theta
+def hinge_slope(turn):
+    """Slope of the moment / k."""
+    return 1.0
 
 
 @dataclass(frozen=True)
 class LinearBar(BarLaw):
     """Stress proportional to Green strain."""
 
-    code = CODE
+    formulas = (BarFormulas(CODE, bar_energy, bar_stress, bar_slope),)
     name: str = "linear"
 
 
@@ -60,6 +61,6 @@ class LinearBar(BarLaw):
 class LinearHinge(HingeLaw):
     """Moment proportional to the change of the dihedral."""
 
-    code = CODE
+    formulas = (HingeFormulas(CODE, hinge_energy, hinge_moment, hinge_slope),)
     linear_between = (-math.inf, math.inf)
     name: str = "linear"

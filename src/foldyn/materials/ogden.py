@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 
 from foldyn.jit.compiled import scalar
+from foldyn.materials.formulas import BarFormulas
 from foldyn.materials.law import BarLaw
 
 CODE = 1
@@ -45,5 +46,5 @@ def slope(e):
 class Ogden(BarLaw):
     """Hyperelastic bar law that stiffens in tension and softens in compression (MERLIN2)."""
 
-    code = CODE
+    formulas = (BarFormulas(CODE, energy, stress, slope),)
     name: str = "ogden"

@@ -23,16 +23,21 @@ from numpy.typing import NDArray
 
 from foldyn.arguments import Check
 from foldyn.jit.compiled import scalar
-from foldyn.materials.inelastic_law import Branch, MemoryLaw, columns
-from foldyn.materials.law import HingeLaw
+from foldyn.materials.formulas import BranchFormulas
+from foldyn.materials.inelastic_law import Branch, MemoryLaw
+from foldyn.materials.law import HingeLaw, columns
 from foldyn.values import number
 
 CODE = 1
 
 
 @scalar
-def update(before, after, plastic, grown, limit, isotropic, kinematic):
-    """Plastic turn, its sum, moment, slope, energy and loss per k, after a turn."""
+def update(p, before, after, dt, plastic, grown):
+    """Plastic turn, its sum, moment, slope, energy and loss per k, after a turn.
+
+    p : yield moment, isotropic and kinematic hardening, over k.
+    """
+    limit, isotropic, kinematic = p[0], p[1], p[2]
     driven = after - plastic - kinematic * plastic
     beyond = abs(driven) - (limit + isotropic * grown)
     slope, lost = 0.0, 0.0
@@ -48,15 +53,15 @@ def update(before, after, plastic, grown, limit, isotropic, kinematic):
 
 
 @scalar
-def mean_moment(before, after, plastic, grown, limit, isotropic, kinematic):
+def mean_moment(p, before, after, dt, plastic, grown):
     """Mean of the moments at the ends, its slope, and what its work lacks of what is lost.
 
     It lacks something where the crease begins to yield within the turn. With the mean along the
     turn dofs without mass would ring from step to step. What is left of the loss is not negative:
     before the crease yields, it turns by twice the yield moment over its stiffness at most.
     """
-    now = update(before, after, plastic, grown, limit, isotropic, kinematic)
-    turn, more, whole = abs(after - before), now[1] - grown, 1.0 + isotropic + kinematic
+    now = update(p, before, after, dt, plastic, grown)
+    turn, more, whole = abs(after - before), now[1] - grown, 1.0 + p[1] + p[2]
     lacking = 0.5 * more * max(turn - whole * more, 0.0)
     return -0.5 * (plastic + now[0]), 0.5 * now[3], lacking
 
@@ -87,6 +92,7 @@ class Plastic(MemoryLaw):
     law: str | HingeLaw = "enhanced"
     name: str = "plastic"
 
+    formulas = (BranchFormulas(CODE, update, mean_moment),)
     rate_dependent = False
 
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.arguments import Check
 from foldyn.errors import InputError
 from foldyn.jit.compiled import scalar
-from foldyn.materials.law import PARAMETERS, HingeLaw
+from foldyn.materials.formulas import HingeFormulas
+from foldyn.materials.law import HingeLaw, columns
 from foldyn.values import number
 
 CODE = 4
@@ -26,49 +27,38 @@ FEW = 1e-4  # of (d/d0)^2: below, the energy is its series
 
 
 @scalar
-def energy(theta, rest, per_onset2):
+def energy(turn, per_onset2):
     """Energy / k = 3/7 d0^2 ((1 + (d/d0)^2)^(7/6) - 1)."""
-    d = theta - rest
-    z = d * d * per_onset2
+    z = turn * turn * per_onset2
     if z < FEW:
-        return 0.5 * d * d * (1.0 + z / 12.0 * (1.0 - 5.0 / 18.0 * z * (1.0 - 11.0 / 24.0 * z)))
+        series = 1.0 + z / 12.0 * (1.0 - 5.0 / 18.0 * z * (1.0 - 11.0 / 24.0 * z))
+        return 0.5 * turn * turn * series
     return 3.0 / 7.0 * math.expm1(7.0 / 6.0 * math.log1p(z)) / per_onset2
 
 
 @scalar
-def moment(theta, rest, per_onset2):
+def moment(turn, per_onset2):
     """Moment / k."""
-    d = theta - rest
-    return d * (1.0 + d * d * per_onset2) ** (1.0 / 6.0)
+    return turn * (1.0 + turn * turn * per_onset2) ** (1.0 / 6.0)
 
 
 @scalar
-def slope(theta, rest, per_onset2):
+def slope(turn, per_onset2):
     """Slope / k = (1 + 4/3 z)/(1 + z)^(5/6), z = (d/d0)^2."""
-    d = theta - rest
-    z = d * d * per_onset2
+    z = turn * turn * per_onset2
     return (1.0 + 4.0 / 3.0 * z) / (1.0 + z) ** (5.0 / 6.0)
 
 
 @scalar
-def onset_slope(theta, rest, per_onset2):
+def by_onset(turn, per_onset2):
     """Derivative of moment / k with respect to per_onset2."""
-    d = theta - rest
-    return d**3 / 6.0 * (1.0 + d * d * per_onset2) ** (-5.0 / 6.0)
-
-
-@scalar
-def rest_slope(theta, rest, per_onset2):
-    """Derivative of energy / k with respect to rest."""
-    return -moment(theta, rest, per_onset2)
+    return (turn**3 / 6.0 * (1.0 + turn * turn * per_onset2) ** (-5.0 / 6.0),)
 
 
 def onset_parameters(onset: ArrayLike) -> NDArray:
     """Parameters (n, 4) of hinges with onsets (n,), rad."""
     onset = np.asarray(onset, float)
-    table = np.zeros((len(onset), PARAMETERS))
-    table[:, 0] = onset**-2.0
-    return table
+    return columns(len(onset), onset**-2.0)
 
 
 @dataclass(frozen=True)
@@ -93,7 +83,7 @@ class PlateSuperlinear(HingeLaw):
     onset: Annotated[float | None, Check(number, above=0.0, most=360.0, unit="degrees")] = None
     name: str = "plate_superlinear"
 
-    code = CODE
+    formulas = (HingeFormulas(CODE, energy, moment, slope, by_onset),)
     follows_rest = False
 
     def check(self, field: str) -> None:

@@ -33,8 +33,9 @@ from numpy.typing import NDArray
 from foldyn.arguments import Check
 from foldyn.errors import InputError
 from foldyn.jit.compiled import scalar
-from foldyn.materials.inelastic_law import Branch, MemoryLaw, columns
-from foldyn.materials.law import HingeLaw
+from foldyn.materials.formulas import BranchFormulas
+from foldyn.materials.inelastic_law import Branch, MemoryLaw
+from foldyn.materials.law import HingeLaw, columns
 from foldyn.values import number_or_list, show
 
 CODE = 0  # among branches
@@ -42,9 +43,12 @@ FEW = 0.02  # of a relaxation time: below, the loss under a constant rate is its
 
 
 @scalar
-def update(before, after, dt, spring, share, rate):
-    """Spring's turn, 0, moment, slope, energy and loss per k, after a turn in a time dt."""
-    x = rate * dt
+def update(p, before, after, dt, spring, other):
+    """Spring's turn, 0, moment, slope, energy and loss per k, after a turn in a time dt.
+
+    p : share and rate (1/s) of the branch.
+    """
+    share, x = p[0], p[1] * dt
     left, turn = -math.expm1(-x), after - before
     mean = left / x if x > 0.0 else 1.0
     now = (1.0 - left) * spring + mean * turn
@@ -57,9 +61,9 @@ def update(before, after, dt, spring, share, rate):
 
 
 @scalar
-def mean_moment(before, after, dt, spring, share, rate):
+def mean_moment(p, before, after, dt, spring, other):
     """Mean moment along the turn, its slope, and 0: its work is what is stored and lost."""
-    x = rate * dt
+    share, x = p[0], p[1] * dt
     mean = -math.expm1(-x) / x if x > 0.0 else 1.0
     if x < FEW:
         rise = 0.5 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x / 5040))))
@@ -98,6 +102,7 @@ class Prony(MemoryLaw):
     law: str | HingeLaw = "enhanced"
     name: str = "prony"
 
+    formulas = (BranchFormulas(CODE, update, mean_moment),)
     rate_dependent = True
     relaxes = True
 

@@ -53,7 +53,7 @@ def crease_angle(code, theta, rest, a, b, c, d, share, address):
         phi = min(max(phi, 1e-3), TWO_PI - 1e-3)
     for _ in range(ITERATIONS):
         beyond = phi - theta + soft * hinge_moment(code, phi, rest, a, b, c, d, address[1])
-        slope = 1.0 + soft * hinge_slope(code, phi, rest, a, b, address[2])
+        slope = 1.0 + soft * hinge_slope(code, phi, rest, a, b, c, d, address[2])
         step = beyond / slope
         if locks:
             step = min(max(step, 0.5 * (phi - TWO_PI)), 0.5 * phi)
@@ -92,9 +92,9 @@ def series_moment(code, theta, rest, a, b, c, d, share, address):
 def series_slope(code, theta, rest, a, b, c, d, share, address):
     """Slope of the moment / k of a hinge at theta."""
     if straight(code, share):
-        return hinge_slope(code, theta, rest, a, b, address[2])
+        return hinge_slope(code, theta, rest, a, b, c, d, address[2])
     phi = crease_angle(code, theta, rest, a, b, c, d, share, address)
-    own = hinge_slope(code, phi, rest, a, b, address[2])
+    own = hinge_slope(code, phi, rest, a, b, c, d, address[2])
     return own / (share + (1.0 - share) * own)
 
 
@@ -102,9 +102,9 @@ def series_slope(code, theta, rest, a, b, c, d, share, address):
 def series_rest_slope(code, theta, rest, a, b, c, d, share, address):
     """Derivative of energy / k of a hinge with respect to its rest angle."""
     if straight(code, share):
-        return hinge_rest_slope(code, theta, rest, a, b, address[0])
+        return hinge_rest_slope(code, theta, rest, a, b, c, d, address[0])
     phi = crease_angle(code, theta, rest, a, b, c, d, share, address)
-    return hinge_rest_slope(code, phi, rest, a, b, address[0]) / share
+    return hinge_rest_slope(code, phi, rest, a, b, c, d, address[0]) / share
 
 
 @inner
@@ -117,8 +117,8 @@ def series_derivatives(code, theta, rest, a, b, c, d, share, address):
     if not straight(code, share):
         phi = crease_angle(code, theta, rest, a, b, c, d, share, address)
     own = hinge_moment(code, phi, rest, a, b, c, d, address[1])
-    slope = hinge_slope(code, phi, rest, a, b, address[2])
-    by_rest, by_a, by_b, by_c = hinge_moment_by(code, phi, rest, a, b, address[1])
+    slope = hinge_slope(code, phi, rest, a, b, c, d, address[2])
+    by_rest, by_a, by_b, by_c = hinge_moment_by(code, phi, rest, a, b, c, d, address[1])
     if straight(code, share):
         return own, slope, by_rest, by_a, by_b, by_c, 0.0
     whole = 1.0 / (share + (1.0 - share) * slope)

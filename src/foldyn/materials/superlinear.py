@@ -13,52 +13,48 @@ from numpy.typing import NDArray
 
 from foldyn.jit.compiled import scalar
 from foldyn.jit.eights import choose, per_cube_root
+from foldyn.materials.formulas import HingeFormulas
 from foldyn.materials.law import HingeLaw
 
 CODE = 1
 
 
 @scalar
-def energy(theta, rest):
+def energy(turn):
     """Energy / k = 3/7 |d|^(7/3)."""
-    d = abs(theta - rest)
+    d = abs(turn)
     return 3.0 / 7.0 * d * d * np.cbrt(d)
 
 
 @scalar
-def moment(theta, rest):
+def moment(turn):
     """Moment / k.
 
     Without branches, so that loops over it vectorize: (d y)(|d| y) with y = |d|^(-1/3) from a guess
     (3 % off) and two steps of order 4; exact to 3 ulp.
     """
-    d = theta - rest
-    a = choose(abs(d) > 1e-200, abs(d), 1e-200)  # below, y^3 would overflow; the moment is zero
+    a = choose(
+        abs(turn) > 1e-200, abs(turn), 1e-200
+    )  # below, y^3 would overflow; the moment is zero
     y = per_cube_root(a)
     r = 1.0 - a * y * y * y
     y = y + y * r * (1.0 / 3.0 + r * (2.0 / 9.0 + r * (14.0 / 81.0)))
     r = 1.0 - a * y * y * y
     y = y + y * r * (1.0 / 3.0 + r * (2.0 / 9.0 + r * (14.0 / 81.0)))
-    return (d * y) * (abs(d) * y)
+    return (turn * y) * (abs(turn) * y)
 
 
 @scalar
-def slope(theta, rest):
+def slope(turn):
     """Slope / k = 4/3 |d|^(1/3)."""
-    return 4.0 / 3.0 * np.cbrt(abs(theta - rest))
-
-
-@scalar
-def rest_slope(theta, rest):
-    """Derivative of energy / k with respect to rest."""
-    return -moment(theta, rest)
+    return 4.0 / 3.0 * np.cbrt(abs(turn))
 
 
 @dataclass(frozen=True)
 class Superlinear(HingeLaw):
     """Bend law with exponent 4/3: no stiffness at rest, stiffer as the panel bends."""
 
-    code = CODE
+    formulas = (HingeFormulas(CODE, energy, moment, slope),)
     name: str = "superlinear"
 
     def reach(self, theta: NDArray, rest: NDArray, parameters: NDArray) -> NDArray:

@@ -1,146 +1,92 @@
 """The one compiled switch from a law's integer code to its formulas.
 
-A new built-in law has its place in the list of its kind and a line in each function of it. A
-user's law is called at `address`; an unknown code, which has none, gives nan (`Law.check` refuses
-it earlier). Hinge parameters a, b, c, d are the four columns of `HingeLaw.parameters`.
+A new built-in law has its place in the list of its kind; the switch is made of the formulas that it
+declares. A user's law is called at `address`; an unknown code, which has none, gives nan
+(`Law.check` refuses it earlier). Hinge parameters a, b, c, d are the four columns of
+`HingeLaw.parameters`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from foldyn.jit.compiled import inner_scalar, kernel, scalar
+from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.jit.intrinsics import call1, call2
+from foldyn.jit.switches import by_code, switch
 from foldyn.materials import enhanced_linear, linear, ogden, plate_superlinear, superlinear
-from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
 
 BAR_LAWS = (ogden.Ogden, linear.LinearBar)
 HINGE_LAWS = (
     linear.LinearHinge, superlinear.Superlinear, enhanced_linear.EnhancedLinear,
     plate_superlinear.PlateSuperlinear,
 )  # fmt: skip
+BARS, HINGES = (
+    by_code({law.__name__: law.formulas for law in laws}) for laws in (BAR_LAWS, HINGE_LAWS)
+)
+_HINGE = "code, theta, rest, a, b, c, d, address"
 
 
 @inner_scalar
-def bar_energy(code, e, address):
-    """W / E_y at e = stretch - 1."""
-    if code == linear.CODE:
-        return linear.bar_energy(e)
-    if code == ogden.CODE:
-        return ogden.energy(e)
+def _of_stretch(address, e):
     return call1(address, 1.0 + e) if address != 0 else np.nan
 
 
 @inner_scalar
-def bar_stress(code, e, address):
-    """S / E_y at e = stretch - 1."""
-    if code == linear.CODE:
-        return linear.bar_stress(e)
-    if code == ogden.CODE:
-        return ogden.stress(e)
-    return call1(address, 1.0 + e) if address != 0 else np.nan
-
-
-@inner_scalar
-def bar_slope(code, e, address):
-    """(dS/dE) / E_y at e = stretch - 1."""
-    if code == linear.CODE:
-        return linear.bar_slope(e)
-    if code == ogden.CODE:
-        return ogden.slope(e)
-    return call1(address, 1.0 + e) if address != 0 else np.nan
-
-
-@inner_scalar
-def hinge_energy(code, theta, rest, a, b, c, d, address):
-    """Energy / k at dihedral theta."""
-    if code == linear.CODE:
-        return linear.hinge_energy(theta, rest)
-    if code == superlinear.CODE:
-        return superlinear.energy(theta, rest)
-    if code == plate_superlinear.CODE:
-        return plate_superlinear.energy(theta, rest, a)
-    if code == AS_PUBLISHED:
-        return enhanced_linear.energy(theta, rest, a, b)
-    if code == STRESS_FREE:
-        return enhanced_linear.energy(theta, rest, a, b) - c * (theta - rest) - d
+def _of_angles(address, theta, rest):
     return call2(address, theta, rest) if address != 0 else np.nan
 
 
 @inner_scalar
-def hinge_moment(code, theta, rest, a, b, c, d, address):
-    """Moment / k at dihedral theta."""
-    if code == linear.CODE:
-        return linear.hinge_moment(theta, rest)
-    if code == superlinear.CODE:
-        return superlinear.moment(theta, rest)
-    if code == plate_superlinear.CODE:
-        return plate_superlinear.moment(theta, rest, a)
-    if code == AS_PUBLISHED:
-        return enhanced_linear.moment(theta, rest, a, b)
-    if code == STRESS_FREE:
-        return enhanced_linear.moment(theta, rest, a, b) - c
-    return call2(address, theta, rest) if address != 0 else np.nan
-
-
-@inner_scalar
-def hinge_slope(code, theta, rest, a, b, address):
-    """Slope of the moment / k at dihedral theta."""
-    if code == linear.CODE:
-        return 1.0
-    if code == superlinear.CODE:
-        return superlinear.slope(theta, rest)
-    if code == plate_superlinear.CODE:
-        return plate_superlinear.slope(theta, rest, a)
-    if (code == AS_PUBLISHED) | (code == STRESS_FREE):
-        return enhanced_linear.slope(theta, a, b)
-    return call2(address, theta, rest) if address != 0 else np.nan
-
-
-@inner_scalar
-def hinge_rest_slope(code, theta, rest, a, b, address):
-    """Derivative of energy / k with respect to the rest angle; `address` is that of the energy."""
-    if code == linear.CODE:
-        return linear.hinge_rest_slope(theta, rest)
-    if code == superlinear.CODE:
-        return superlinear.rest_slope(theta, rest)
-    if code == plate_superlinear.CODE:
-        return plate_superlinear.rest_slope(theta, rest, a)
-    if code == AS_PUBLISHED:
-        return enhanced_linear.rest_slope(theta, rest)
-    if code == STRESS_FREE:
-        return enhanced_linear.stress_free_rest_slope(theta, rest, a, b)
+def _by_rest(address, theta, rest):
     if address == 0:
         return np.nan
-    h = 1e-5  # error 1e-10 of the energy's third derivative
+    h = 1e-5  # error 1e-10 of the third derivative
     return (call2(address, theta, rest + h) - call2(address, theta, rest - h)) / (2.0 * h)
 
 
 @inner_scalar
-def hinge_moment_by(code, theta, rest, a, b, address):
-    """Derivatives of the moment / k by the rest angle and by the parameters a, b and c."""
-    if code == linear.CODE:
-        return -1.0, 0.0, 0.0, 0.0
-    if code == superlinear.CODE:
-        return -superlinear.slope(theta, rest), 0.0, 0.0, 0.0
-    if code == plate_superlinear.CODE:
-        by_onset = plate_superlinear.onset_slope(theta, rest, a)
-        return -plate_superlinear.slope(theta, rest, a), by_onset, 0.0, 0.0
-    if (code == AS_PUBLISHED) | (code == STRESS_FREE):
-        by_first, by_second = enhanced_linear.limit_slopes(theta, a, b)
-        return -1.0, by_first, by_second, -1.0 if code == STRESS_FREE else 0.0
-    if address == 0:
-        return np.nan, 0.0, 0.0, 0.0
-    h = 1e-5  # error 1e-10 of the moment's third derivative
-    by_rest = (call2(address, theta, rest + h) - call2(address, theta, rest - h)) / (2.0 * h)
-    return by_rest, 0.0, 0.0, 0.0
+def _nothing(rest, parameters):
+    pass
 
 
-@scalar
-def move_rest(code, rest, parameters):
-    """Set what follows the rest angle in the four parameters of a hinge."""
-    if code == STRESS_FREE:
-        enhanced_linear.relieve(rest, parameters)
+# W, S and dS/dE per unit modulus at e = stretch - 1
+bar_energy, bar_stress, bar_slope = (
+    switch(
+        __name__, f"bar_{name}", "code, e, address",
+        {code: ("{0}(e)", (getattr(law, name),)) for code, law in BARS.items()},
+        ("{0}(address, e)", (_of_stretch,)),
+    )
+    for name in ("energy", "stress", "slope")
+)  # fmt: skip
+# energy, moment and slope of the moment per unit stiffness at the dihedral theta
+hinge_energy, hinge_moment, hinge_slope = (
+    switch(
+        __name__, f"hinge_{name}", _HINGE, {code: law.value(name) for code, law in HINGES.items()},
+        ("{0}(address, theta, rest)", (_of_angles,)),
+    )
+    for name in ("energy", "moment", "slope")
+)  # fmt: skip
+# derivative of the energy by the rest angle; `address` is that of the energy
+hinge_rest_slope = switch(
+    __name__, "hinge_rest_slope", _HINGE,
+    {code: law.energy_slope() for code, law in HINGES.items()},
+    ("{0}(address, theta, rest)", (_by_rest,)),
+)  # fmt: skip
+# derivatives of the moment by the rest angle and by a, b and c; `address` is that of the moment
+hinge_moment_by = switch(
+    __name__, "hinge_moment_by", _HINGE,
+    {code: law.moment_slopes() for code, law in HINGES.items()},
+    ("({0}(address, theta, rest), 0.0, 0.0, 0.0)", (_by_rest,)),
+)  # fmt: skip
+# sets what follows the rest angle in the four parameters of a hinge
+move_rest = switch(
+    __name__, "move_rest", "code, rest, parameters",
+    {
+        code: ("{0}(rest, parameters)", (law.follow,))
+        for code, law in HINGES.items() if law.follow is not None
+    },
+    ("{0}(rest, parameters)", (_nothing,)),
+)  # fmt: skip
 
 
 @kernel
@@ -156,14 +102,17 @@ def bar_table(code, e, address):
 
 @kernel
 def hinge_table(code, theta, rest, p, address):
-    """Rows (8, n) of one law at theta (n,): those of `HingeLaw.functions`, by a, b and c last."""
+    """Rows (8, n) of one law at theta (n,): energy, moment, slope and derivatives by other numbers.
+
+    Of the energy by the rest angle, and of the moment by that and by a, b and c.
+    """
     out = np.empty((8, theta.size))
     for i in range(theta.size):
-        t, r = theta[i], rest[i]
-        out[0, i] = hinge_energy(code, t, r, p[i, 0], p[i, 1], p[i, 2], p[i, 3], address[0])
-        out[1, i] = hinge_moment(code, t, r, p[i, 0], p[i, 1], p[i, 2], p[i, 3], address[1])
-        out[2, i] = hinge_slope(code, t, r, p[i, 0], p[i, 1], address[2])
-        out[3, i] = hinge_rest_slope(code, t, r, p[i, 0], p[i, 1], address[0])
-        by = hinge_moment_by(code, t, r, p[i, 0], p[i, 1], address[1])
+        t, r, a, b, c, d = theta[i], rest[i], p[i, 0], p[i, 1], p[i, 2], p[i, 3]
+        out[0, i] = hinge_energy(code, t, r, a, b, c, d, address[0])
+        out[1, i] = hinge_moment(code, t, r, a, b, c, d, address[1])
+        out[2, i] = hinge_slope(code, t, r, a, b, c, d, address[2])
+        out[3, i] = hinge_rest_slope(code, t, r, a, b, c, d, address[0])
+        by = hinge_moment_by(code, t, r, a, b, c, d, address[1])
         out[4, i], out[5, i], out[6, i], out[7, i] = by
     return out

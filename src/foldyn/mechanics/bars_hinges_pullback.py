@@ -174,8 +174,8 @@ def _laws(model, code, address, low, high, first, m, angle, law):
             return
     if (code == superlinear.CODE) and not gives_way(model.hinge_share, first, m):
         for q in range(m):
-            rest = model.hinge_rest[first + q]
-            turn, law[q] = angle[q] - rest, superlinear.moment(angle[q], rest)
+            turn = angle[q] - model.hinge_rest[first + q]
+            law[q] = superlinear.moment(turn)
             law[BLOCK + q] = 4.0 / 3.0 * law[q] * turn / (turn * turn + TINY)
             law[2 * BLOCK + q] = -law[BLOCK + q]
             for c in range(3, LAW):

@@ -234,7 +234,7 @@ def superlinear_moments(stiffness, rest, first, m, angle, value):
     """Moments of hinges of the superlinear law whose panels do not give way."""
     for q in range(m):
         e = first + q
-        value[q] = stiffness[e] * superlinear.moment(angle[q], rest[e])
+        value[q] = stiffness[e] * superlinear.moment(angle[q] - rest[e])
 
 
 @inner

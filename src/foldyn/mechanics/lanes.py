@@ -126,7 +126,7 @@ def add_hinges(model, position, force, angles, wrong, value, strain):
             put(angles, at, angle)
             rest, share = eight(model.hinge_rest, at), eight(model.hinge_share, at)
             if (code == superlinear.CODE) and not any_of(share < 1.0):
-                moment = superlinear.moment(angle, rest)
+                moment = superlinear.moment(angle - rest)
             elif code == LINEAR:
                 moment = angle - rest
             else:

@@ -229,8 +229,8 @@ def balance(model, u, work):
         if not model.constant or model.memory[0] != 0:
             for f in range(plates.fold_rest.size):
                 found = hinge_slope(
-                    plates.code, work.plates.fold_angle[f], plates.fold_rest[f], p[f, 0], p[f, 1],
-                    plates.addresses[2],
+                    plates.code, work.plates.fold_angle[f], plates.fold_rest[f],
+                    p[f, 0], p[f, 1], p[f, 2], p[f, 3], plates.addresses[2],
                 )  # fmt: skip
                 stiff = plates.fold_stiffness[f]
                 slope[f] = max(stiff * found + work.branches[f, 1], 0.0)

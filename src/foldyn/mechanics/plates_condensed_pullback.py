@@ -41,8 +41,9 @@ def rate_couples(model, work, back, out):
     out[:], p = 0.0, model.fold_parameters
     for f in range(model.fold_rest.size):
         work.slope[f] = model.fold_stiffness[f] * hinge_slope(
-            model.code, work.fold_angle[f], model.fold_rest[f], p[f, 0], p[f, 1], model.addresses[2]
-        )
+            model.code, work.fold_angle[f], model.fold_rest[f],
+            p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[2],
+        )  # fmt: skip
         for rotation in model.fold_rotations[f]:
             if rotation >= 0:
                 out[rotation] -= model.per_reach * work.slope[f] * back.rate[f]

@@ -142,8 +142,9 @@ def _add_folds(model, pattern, u, work, floor, data):
     for f in range(model.fold_rest.size):
         work.moment[f] = fold_moment(model, work, f)
         slope = hinge_slope(
-            model.code, work.fold_angle[f], model.fold_rest[f], p[f, 0], p[f, 1], model.addresses[2]
-        )
+            model.code, work.fold_angle[f], model.fold_rest[f],
+            p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[2],
+        )  # fmt: skip
         slope = model.fold_stiffness[f] * max(slope, floor)
         for c in range(12):
             along[c] = work.gradient[f, c]

@@ -254,7 +254,9 @@ def _add_creases(model, pattern, u, work, floor, data):
         work.moment[h] = model.piece_stiffness[k] * hinge_moment(
             model.code, turn, rest, p[k, 0], p[k, 1], p[k, 2], p[k, 3], model.addresses[1]
         )
-        slope = hinge_slope(model.code, turn, rest, p[k, 0], p[k, 1], model.addresses[2])
+        slope = hinge_slope(
+            model.code, turn, rest, p[k, 0], p[k, 1], p[k, 2], p[k, 3], model.addresses[2]
+        )
         slope = model.piece_stiffness[k] * max(slope, floor)
         for c in range(12):
             along[c] = work.gradient[h, c]

@@ -1,0 +1,142 @@
+"""What laws declare for kernels: compiled formulas, reached by the code of the law.
+
+A law's file declares all of it in one place, and a missing part is an error when it is imported.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from foldyn.jit.switches import Branch, arguments_of
+
+MOVING = 3  # parameters on which a moment may depend: gradients know no more
+
+
+@dataclass(frozen=True)
+class BarFormulas:
+    """Formulas of e = stretch - 1, per unit Young's modulus, compiled as `scalar`.
+
+    Parameters
+    ----------
+    code : int
+        One that no other bar law has.
+    energy, stress, slope : compiled functions
+        W, its derivative S by the Green strain E, and dS/dE.
+    """
+
+    code: int
+    energy: Any
+    stress: Any
+    slope: Any
+
+
+@dataclass(frozen=True)
+class HingeFormulas:
+    """Formulas of a hinge law per unit stiffness, compiled as `scalar`.
+
+    Each takes `turn`, the dihedral less the rest angle, or `theta` and `rest`; then as many of the
+    four `HingeLaw.parameters` as it needs, by names of its own.
+
+    Parameters
+    ----------
+    code : int
+        One that no other hinge law has.
+    energy, moment, slope : compiled functions
+        The energy, its derivative by the dihedral, and the derivative of that.
+    by_parameters : compiled function, optional
+        Derivatives of the moment by each parameter that it takes, three at most, as a tuple;
+        needed if it takes any.
+    energy_by_rest, moment_by_rest : compiled functions, optional
+        Derivatives by the rest angle; needed unless all formulas take the turn: then they are
+        those by the dihedral, with a minus.
+    follow : compiled function, optional
+        Of (rest, parameters): sets the parameters of a hinge that depend on its rest angle;
+        needed if there are any.
+    """
+
+    code: int
+    energy: Any
+    moment: Any
+    slope: Any
+    by_parameters: Any = None
+    energy_by_rest: Any = None
+    moment_by_rest: Any = None
+    follow: Any = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is incomplete: kernels would find nothing, or nan."""
+        formulas = self.energy, self.moment, self.slope
+        by_rest = self.energy_by_rest, self.moment_by_rest
+        lacks = []
+        if not all(map(of_turn, formulas)) and None in by_rest:
+            lacks.append("energy_by_rest and moment_by_rest, as a formula takes theta and rest")
+        if (count := parameters_of(self.moment)) and self.by_parameters is None:
+            lacks.append("by_parameters, the derivatives of the moment by its parameters")
+        if lacks:
+            raise TypeError(f"{self.energy.__module__}: the law lacks {', and '.join(lacks)}")
+        if count > MOVING:
+            raise TypeError(
+                f"{self.energy.__module__}: the moment takes {count} parameters; {MOVING} at most"
+            )
+
+    def value(self, name: str) -> Branch:
+        """The branch of the switch that returns a formula."""
+        return _call(0, formula := getattr(self, name)), (formula,)
+
+    def energy_slope(self) -> Branch:
+        """The same of the derivative of the energy by the rest angle."""
+        return _by_rest(self.energy_by_rest, self.moment)
+
+    def moment_slopes(self) -> Branch:
+        """The same of those of the moment by the rest angle and by three parameters."""
+        by_rest, functions = _by_rest(self.moment_by_rest, self.slope)
+        slopes, others = f"({by_rest},)", MOVING - parameters_of(self.moment)
+        if self.by_parameters is not None:
+            slopes += f" + {_call(1, self.by_parameters)}"
+            functions += (self.by_parameters,)
+        return slopes + (f" + ({'0.0, ' * others})" if others else ""), functions
+
+
+@dataclass(frozen=True)
+class BranchFormulas:
+    """Formulas of a branch of a law with memory, per unit stiffness, compiled as `scalar`.
+
+    Both take `p, before, after, dt, one, other`: the (4,) parameters of the branch; the turn from
+    the rest angle at the last accepted step, and now, rad; the time since then, s; and the state,
+    two numbers, at that step. What has not moved in no time stays as it is, bit by bit.
+
+    Parameters
+    ----------
+    code : int
+        One that no other branch has.
+    update : compiled function
+        State (two numbers), moment, its derivative by `after`, energy and loss.
+    mean_moment : compiled function
+        Mean moment in the step, its derivative by `after`, and what is not lost: the work along
+        the turn is the change of the energy and the loss of `update` less that. None for what only
+        explicit motions have.
+    """
+
+    code: int
+    update: Any
+    mean_moment: Any
+
+
+def of_turn(formula: Any) -> bool:
+    """Whether a formula of a hinge law takes the turn from rest, not both angles."""
+    return arguments_of(formula)[0] == "turn"
+
+
+def parameters_of(formula: Any) -> int:
+    """How many parameters it takes."""
+    return len(arguments_of(formula)) - (1 if of_turn(formula) else 2)
+
+
+def _call(place: int, formula: Any) -> str:
+    angles = ["theta - rest"] if of_turn(formula) else ["theta", "rest"]
+    return f"{{{place}}}({', '.join([*angles, *'abcd'[: parameters_of(formula)]])})"
+
+
+def _by_rest(own: Any, by_angle: Any) -> Branch:
+    return (f"-{_call(0, by_angle)}", (by_angle,)) if own is None else (_call(0, own), (own,))
