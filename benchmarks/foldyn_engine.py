@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from problem import Problem
 
-from foldyn.dynamics import rk4
 from foldyn.dynamics.initial import begin
 from foldyn.dynamics.methods import Compiled
 from foldyn.dynamics.motion_state import StepPlan, samples
+from foldyn.dynamics.runge_kutta import RK4, advance
 from foldyn.dynamics.system import pack
 from foldyn.mechanics import internal_force, workspace
 
@@ -44,7 +44,8 @@ class FoldynEngine:
         course = begin(case, start, np.zeros_like(start), None, None, plan, packed)
         course.tally.samples = 1  # so that no step is due for a sample
         out = samples(0, len(start), len(packed.system.supported), 6)
-        engine = Compiled(rk4.advance, packed, course, plan, self._threads)
+        further = (RK4.coefficients,)
+        engine = Compiled(advance, packed, course, plan, self._threads, further=further)
         began = time.perf_counter()
         code, _ = engine.advance(out, steps)
         seconds = time.perf_counter() - began

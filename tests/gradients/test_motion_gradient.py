@@ -10,7 +10,7 @@ import pytest
 from differences import Design
 
 import foldyn as fd
-from foldyn.dynamics import rk4_adjoint
+from foldyn.dynamics import runge_kutta_adjoint
 from foldyn.errors import InputError
 
 MOTION = {"kind": "dynamics", "method": "rk4", "dt": 1e-3, "duration": 0.4, "every": 20}
@@ -86,7 +86,7 @@ def test_few_kept_states_change_nothing(monkeypatch):
     values = {"force": 0.4, "stiffness": 0.5}
     once = {**MOTION, "every": 400}
     whole = fd.sensitivity(built("plate"), values, "displacement[8,z]", once)
-    monkeypatch.setattr(rk4_adjoint, "ROOM", (4 * 3 * 3 * 13 * 8 * 3.0, 3 * 2 * 8 * 39.0))
+    monkeypatch.setattr(runge_kutta_adjoint, "ROOM", (4 * 3 * 3 * 13 * 8 * 3.0, 3 * 2 * 8 * 39.0))
     parts = fd.sensitivity(built("plate"), values, "displacement[8,z]", once)
     for name in values:
         assert parts[f"gradient_{name}"].values == pytest.approx(

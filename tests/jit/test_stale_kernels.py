@@ -62,12 +62,12 @@ def test_what_a_kernel_is_made_from():
     assert {law, switch, fields} <= files_of("mechanics/bars_hinges.py", "_forces")
     assert "cases/waveforms.py" in files_of("dynamics/parts.py", "histories")
     # a loop holds none of what it calls by address
-    loop = files_of("dynamics/rk4.py", "advance")
+    loop = files_of("dynamics/runge_kutta.py", "advance")
     assert not {law, switch, "mechanics/force.py", "cases/waveforms.py"} & loop
     # and not from what only tells or draws, which would compile all anew with every change
     others = {"cases/document.py", "cases/case.py", "dynamics/driver.py", "shells/kernels.py"}
     assert not others & loop
-    assert "dynamics/rk4.py" not in files_of("mechanics/force.py", "internal_force")
+    assert "dynamics/runge_kutta.py" not in files_of("mechanics/force.py", "internal_force")
 
 
 def written(folder, texts):

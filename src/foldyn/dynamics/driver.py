@@ -274,7 +274,7 @@ def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrato
             "spectral_radius",
         )
     radius = number("spectral_radius", spectral_radius, least=0.0, most=1.0)
-    return method._replace(scheme=generalized_alpha.scheme(radius))
+    return replace(method, scheme=generalized_alpha.scheme(radius))
 
 
 def _plan(

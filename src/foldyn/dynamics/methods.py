@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,13 +17,13 @@ from foldyn.dynamics import (
     dormand_prince,
     energy_momentum,
     generalized_alpha,
-    rk4,
 )
 from foldyn.dynamics.checkpoint import restore, snapshot, state_parts
 from foldyn.dynamics.equation import EquationOfMotion, accelerate
 from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.modal_damping import ModalRows, modal_rows
 from foldyn.dynamics.motion_state import Course, Samples, StepPlan
+from foldyn.dynamics.runge_kutta import RK4, Tableau, advance
 from foldyn.dynamics.stability import (
     MARGIN,
     Growth,
@@ -50,7 +51,7 @@ class Compiled:
     Parameters
     ----------
     loop : callable
-        See `rk4.advance`.
+        See `Integrator`.
     packed : Packed
         The case.
     course : Course
@@ -59,13 +60,16 @@ class Compiled:
         On how many threads it shall run at most; fewer where elements reach too far.
     slows : bool
         Whether it gives slow contacts inertia: on one thread only.
+    further : tuple
+        Further arguments of the loop.
     """
 
     def __init__(
         self, loop: Callable[..., tuple[int, int]], packed: Packed, course: Course, plan: StepPlan,
-        threads: int, slows: bool = False,
+        threads: int, slows: bool = False, further: tuple[Any, ...] = (),
     ) -> None:  # fmt: skip
         self._loop, self._packed, self._course, self._plan = loop, packed, course, plan
+        self._further = further
         self._works = packed.body.workspaces(threads)
         self._memories = scratches(packed.system, self._works)
         self._equations = [
@@ -86,7 +90,7 @@ class Compiled:
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
-        case = self._course, self._plan, out.end, stretch
+        case = self._course, self._plan, out.end, stretch, *self._further
         arguments = [(equation.sampled(out), *case) for equation in self._equations]
         return run_together(self._loop, [work.team for work in self._works], arguments)[0]
 
@@ -134,7 +138,8 @@ def threads_of(packed: Packed) -> int:
     return 1 if alone else packed.body.threads
 
 
-class Integrator(NamedTuple):
+@dataclass(frozen=True)
+class Integrator:
     """An integrator.
 
     Parameters
@@ -144,7 +149,7 @@ class Integrator(NamedTuple):
         What tests hold it to.
     loop : callable
         The compiled function at its core: of an explicit method the loop over its steps, with
-        the arguments of `rk4.advance`; of an implicit one the residual of a step.
+        the arguments of `central_difference.advance`; of an implicit one the residual of a step.
     growth : callable, optional
         Of an explicit method: the largest factor by which a step multiplies a free vibration, as
         a function of omega, damping and dt.
@@ -158,6 +163,8 @@ class Integrator(NamedTuple):
         Whether it takes dofs without mass beside the displacements, as those of a shell.
     looks : tuple of float
         Where in a step, from 0 to 1, it looks at the loads.
+    tableau : Tableau, optional
+        Of an explicit Runge-Kutta method of fixed step: its loop, `runge_kutta.advance`, takes it.
     """
 
     name: str
@@ -169,6 +176,15 @@ class Integrator(NamedTuple):
     scheme: Callable[..., Any] | None = None
     massless: bool = False
     looks: tuple[float, ...] = (0.0, 1.0)
+    tableau: Tableau | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse one without a limit of its step, or whose cost nobody knows."""
+        if self.scheme is None and (self.growth is None or not self.evaluations):
+            raise TypeError(
+                f"{self.name}: an explicit method needs growth, which limits its steps, and "
+                "evaluations; an implicit one needs its scheme"
+            )
 
     @property
     def implicit(self) -> bool:
@@ -182,12 +198,15 @@ class Integrator(NamedTuple):
         if device == "gpu":
             from foldyn.dynamics.gpu.engine import OnCard
 
-            on_cpu = partial(Compiled, self.loop, packed, course, plan, threads_of(packed))
-            return OnCard(self, packed, course, plan, on_cpu)
+            return OnCard(self, packed, course, plan, partial(self._compiled, packed, course, plan))
         if self.scheme is not None:
             return Implicit(self.scheme, packed, course, plan, jumps(case))
+        return self._compiled(packed, course, plan)
+
+    def _compiled(self, packed: Packed, course: Course, plan: StepPlan) -> Compiled:
         threads = 1 if self.adaptive else threads_of(packed)
-        return Compiled(self.loop, packed, course, plan, threads, self.adaptive)
+        further = () if self.tableau is None else (self.tableau.coefficients,)
+        return Compiled(self.loop, packed, course, plan, threads, self.adaptive, further)
 
     def critical_step(
         self, case: Case, u: ArrayLike | None = None, modal: ModalRows | None = None
@@ -208,6 +227,14 @@ def _explicit(module: Any, evaluations: int, **traits: Any) -> Integrator:
     return Integrator(name, module.ORDER, module.advance, module.growth, evaluations, **traits)
 
 
+def runge_kutta(method: Tableau) -> Integrator:
+    """The explicit Runge-Kutta method of fixed step with a tableau."""
+    return Integrator(
+        method.name, method.order, advance, method.growth, len(method.weights),
+        looks=method.looks, tableau=method,
+    )  # fmt: skip
+
+
 def _implicit(name: str, module: Any, scheme: Callable[..., Any], **traits: Any) -> Integrator:
     return Integrator(name, module.ORDER, module.residual, scheme=scheme, **traits)
 
@@ -215,7 +242,7 @@ def _implicit(name: str, module: Any, scheme: Callable[..., Any], **traits: Any)
 METHODS: Mapping[str, Integrator] = {
     method.name: method
     for method in (
-        _explicit(rk4, 4, looks=(0.0, 0.5, 1.0)),
+        runge_kutta(RK4),
         _explicit(central_difference, 1),
         _explicit(dormand_prince, 6, adaptive=True),
         _implicit("newmark", generalized_alpha, generalized_alpha.newmark, massless=True),

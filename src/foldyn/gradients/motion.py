@@ -14,7 +14,7 @@ from foldyn.dynamics.central_difference_adjoint import CentralDifferenceAdjoint
 from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.implicit_adjoint import ImplicitAdjoint, Retraced
 from foldyn.dynamics.methods import with_mass
-from foldyn.dynamics.rk4_adjoint import RK4Adjoint, segment
+from foldyn.dynamics.runge_kutta_adjoint import RungeKuttaAdjoint, segment
 from foldyn.dynamics.system import pack
 from foldyn.errors import InputError
 from foldyn.gradients.numbers import Gradient, numbers_of_motion
@@ -44,12 +44,12 @@ class MotionGradient:
         motion = prepare(case, **given)
         refuse(motion)
         wanted = motion.plan.every
-        if motion.method.name == "rk4":
-            if (apart := segment(motion.plan, motion.packed.system.rows)) < wanted:
+        if motion.method.tableau is not None:
+            if (apart := segment(motion)) < wanted:
                 # samples between serve as states to go back from
                 motion = prepare(case, **{**given, "dt": motion.plan.dt, "every": apart})
             samples = motion.run(progress)
-            self._adjoint: Callable[[], Adjoint] = lambda: RK4Adjoint(motion, samples)
+            self._adjoint: Callable[[], Adjoint] = lambda: RungeKuttaAdjoint(motion, samples)
         elif motion.method.name == "central_difference":
             samples = motion.run(progress)
             self._adjoint = lambda: CentralDifferenceAdjoint(motion)

@@ -1,14 +1,14 @@
-"""The discrete adjoint of RK4: exact gradients of what `dynamics.rk4` computes.
+"""The discrete adjoint of explicit Runge-Kutta methods: exact gradients of what they compute.
 
-A step takes the state y = (u, v) to y + dt/6 (k1 + 2 k2 + 2 k3 + k4), k_s = f(y_s) the rates at its
-stages y_s. Backward, with the derivatives l of a number by the state at its end, a stage gets
+A step takes the state y = (u, v) to y + dt sum of w_s k_s, k_s = f(y_s) the slopes at its stages
+y_s = y + dt sum of c_sr k_r. Backward, with the derivatives l of a number by the state at its end,
+a stage gets
 
-    l_s = w_s l + c_s m_(s+1),    m_s = (df/dy at y_s)' l_s,
+    l_s = dt (w_s l + sum of c_rs m_r),    m_s = (df/dy at y_s)' l_s,
 
-w = dt (1/6, 1/3, 1/3, 1/6), c = dt (1/2, 1/2, 1) the shares of its rate in the next stage, and the
-state at the start has l + the sum of all m_s. A parameter gets the sum of (df/dp)' l_s. Of forces
-that needs their pullback alone (`mechanics.pullback`), with the weights M^-1 times the part of l_s
-that belongs to the acceleration.
+and the state at the start has l + the sum of all m_s. A parameter gets the sum of (df/dp)' l_s. Of
+forces that needs their pullback alone (`mechanics.pullback`), with the weights M^-1 times the part
+of l_s that belongs to the acceleration.
 
 Steps are taken again, some at a time, from states that are kept: of a segment of the motion the
 states at every stage (Griewank and Walther, Evaluating Derivatives, 2008, chapter 12).
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.adjoint import Adjoint
 from foldyn.dynamics.equation import EquationOfMotion, acceleration
-from foldyn.dynamics.motion_state import StepPlan
+from foldyn.dynamics.runge_kutta import add_kept, keep_slopes
 from foldyn.dynamics.system import carried
 from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.jit.context import Context, run_at
@@ -44,64 +44,72 @@ def _into(source, out):
 
 
 @kernel
-def retrace(equation, u, v, plan, first, count, stages):
-    """Take `count` steps of RK4 from number `first` on; u and v change in place.
+def retrace(equation, u, v, plan, method, first, count, stages):
+    """Take `count` steps from number `first` on; u and v change in place.
 
-    stages : (count, 4, 3, n, 3) or (0, ...), displacement, velocity and acceleration at each
-        stage. The arithmetic is that of `rk4.advance`, to the bit.
+    method : `Coefficients`.
+    stages : (count, s, 3, n, 3) or (0, ...), displacement, velocity and acceleration at each
+        stage. The arithmetic is that of `runge_kutta.advance`, to the bit.
     """
     stage = equation.stage
     at_u, at_v, a = stage[0], stage[1], stage[2]
     un, vn, ut, vt, fa = flat(u), flat(v), flat(at_u), flat(at_v), flat(a)
-    du, dv, dt = np.empty_like(un), np.empty_like(vn), plan.dt
+    du, dv, dt, last = np.zeros_like(un), np.zeros_like(vn), plan.dt, method.weight.size - 1
+    others = np.zeros(((last + 1) * method.mixed, 2, un.size))
     for k in range(count):
         now = plan.start + (first + k) * dt
         _into(u, at_u)
         _into(v, at_v)
-        for s in range(4):
-            acceleration(equation, at_u, at_v, now + 0.5 * ((s + 1) // 2) * dt, a)
+        for s in range(last + 1):
+            acceleration(equation, at_u, at_v, now + method.time[s] * dt, a)
             if stages.shape[0] > 0:
                 _into(at_u, stages[k, s, 0])
                 _into(at_v, stages[k, s, 1])
                 _into(a, stages[k, s, 2])
-            ahead = 0.5 * dt if s < 2 else dt
-            if s == 0:
+            weight = method.weight[s]
+            if s < last:
+                if method.mixed > 0:
+                    keep_slopes(method, s, dt, vt, fa, others)
+                ahead = method.ahead[s + 1, s] * dt
                 for i in range(un.size):
-                    du[i], dv[i] = vt[i], fa[i]
+                    du[i] += weight * vt[i]
+                    dv[i] += weight * fa[i]
                     ut[i], vt[i] = un[i] + ahead * vt[i], vn[i] + ahead * fa[i]
-            elif s < 3:
-                for i in range(un.size):
-                    du[i] += 2.0 * vt[i]
-                    dv[i] += 2.0 * fa[i]
-                    ut[i], vt[i] = un[i] + ahead * vt[i], vn[i] + ahead * fa[i]
-            else:
-                for i in range(un.size):
-                    un[i] += dt / 6.0 * (du[i] + vt[i])
-                    vn[i] += dt / 6.0 * (dv[i] + fa[i])
+                if method.mixed > 0:
+                    add_kept(s + 1, others, ut, vt)
+        share = dt / method.whole
+        for i in range(un.size):
+            un[i] += share * (du[i] + weight * vt[i])
+            vn[i] += share * (dv[i] + weight * fa[i])
+            du[i], dv[i] = 0.0, 0.0
 
 
 @kernel
-def pull_steps(balance, pulls, plan, first, stages, by_u, by_v, memory, mass, moved, out):
+def pull_steps(
+    balance, pulls, plan, method, first, stages, by_u, by_v, memory, by_slope, mass, moved, out
+):
     """Take the steps of `stages` backward; by_u and by_v (n, 3) change in place.
 
-    memory : (9, n, 3). mass : `Inertia`. moved : `System.moved`.
+    memory : (7, n, 3). by_slope : (s, 2, n, 3), zeros, for the sums of m. mass : `Inertia`.
+    moved : `System.moved`.
     """
     dt, loads, alpha = plan.dt, balance.loads, balance.alpha
     lumped, count = balance.solve == 0, by_u.size
     y, product, rate = memory[0], memory[1], memory[2]
-    yn, pn, rn, both = flat(y), flat(product), flat(rate), flat(memory[8])
-    ka, mu, mv = flat(memory[3]), flat(memory[4]), flat(memory[5])
-    su, sv, lu, lv = flat(memory[6]), flat(memory[7]), flat(by_u), flat(by_v)
+    yn, pn, rn, both = flat(y), flat(product), flat(rate), flat(memory[6])
+    ka, su, sv, lu, lv = (
+        flat(memory[3]), flat(memory[4]), flat(memory[5]), flat(by_u), flat(by_v)
+    )  # fmt: skip
     force, inverse = flat(balance.force), flat(balance.inverse)
     for i in range(count):
         both[i] = 0.0
     for k in range(stages.shape[0] - 1, -1, -1):
         for i in range(count):
-            mu[i], mv[i], su[i], sv[i] = 0.0, 0.0, 0.0, 0.0
-        for s in range(3, -1, -1):
-            t = plan.start + (first + k) * dt + 0.5 * ((s + 1) // 2) * dt
-            own = dt / 3.0 if 0 < s < 3 else dt / 6.0
-            ahead = 0.0 if s == 3 else (dt if s == 2 else 0.5 * dt)
+            su[i], sv[i] = 0.0, 0.0
+        for s in range(method.weight.size - 1, -1, -1):
+            t = plan.start + (first + k) * dt + method.time[s] * dt
+            own = method.weight[s] * dt / method.whole
+            mu, mv = flat(by_slope[s, 0]), flat(by_slope[s, 1])
             q, w = stages[k, s, 0], stages[k, s, 1]
             speed, rise = flat(w), flat(stages[k, s, 2])
             if balance.histories != 0:
@@ -112,13 +120,13 @@ def pull_steps(balance, pulls, plan, first, stages, by_u, by_v, memory, mass, mo
             v = balance.velocity if balance.carry != 0 else w
             if lumped:
                 for i in range(count):
-                    ka[i] = own * lv[i] + ahead * mv[i]
+                    ka[i] = own * lv[i] + mv[i]
                     yn[i] = inverse[i] * ka[i]
                     both[i] -= yn[i] * (rise[i] + alpha * speed[i])
                     pn[i], rn[i] = 0.0, 0.0
             else:
                 for i in range(count):
-                    ka[i] = own * lv[i] + ahead * mv[i]
+                    ka[i] = own * lv[i] + mv[i]
                     force[i], pn[i], rn[i] = ka[i], 0.0, 0.0
                 run_at(balance.solve, (balance.setting, y))
                 for i in range(mass.indptr.size - 1):
@@ -136,10 +144,17 @@ def pull_steps(balance, pulls, plan, first, stages, by_u, by_v, memory, mass, mo
             drag = 0.0
             for i in range(count):
                 drag += ka[i] * speed[i]
-                kv = own * lu[i] + ahead * mu[i]
-                mu[i], mv[i] = -pn[i], kv - alpha * ka[i] - rn[i]
-                su[i] += mu[i]
-                sv[i] += mv[i]
+                rn[i] = own * lu[i] + mu[i] - alpha * ka[i] - rn[i]
+                su[i] -= pn[i]
+                sv[i] += rn[i]
+                mu[i], mv[i] = 0.0, 0.0
+            for before in range(s):
+                ahead = method.ahead[s, before] * dt
+                if ahead != 0.0:
+                    mu, mv = flat(by_slope[before, 0]), flat(by_slope[before, 1])
+                    for i in range(count):
+                        mu[i] -= ahead * pn[i]
+                        mv[i] += ahead * rn[i]
             out.alpha[0] -= drag
         for i in range(count):
             lu[i] += su[i]
@@ -151,8 +166,8 @@ def pull_steps(balance, pulls, plan, first, stages, by_u, by_v, memory, mass, mo
                     out.mass[e] += both[3 * i] + both[3 * i + 1] + both[3 * i + 2]
 
 
-class RK4Adjoint(Adjoint):
-    """Backward through a motion by RK4; see `Adjoint`.
+class RungeKuttaAdjoint(Adjoint):
+    """Backward through a motion by an explicit Runge-Kutta method; see `Adjoint`.
 
     Parameters
     ----------
@@ -174,9 +189,12 @@ class RK4Adjoint(Adjoint):
             samples[name].transpose("time", "node", "axis").values
             for name in ("displacement", "velocity")
         )
-        shape = (4, 3, system.rows, 3)
-        self._memory, self._none = np.zeros((9, *shape[2:])), np.empty((0, *shape))
-        self._stages = np.empty((steps_at_once(system.rows), *shape))
+        self._method = motion.method.tableau.coefficients
+        count = len(self._method.weight)
+        shape = (count, 3, system.rows, 3)
+        self._memory, self._none = np.zeros((7, *shape[2:])), np.empty((0, *shape))
+        self._by_slope = np.zeros((count, 2, *shape[2:]))
+        self._stages = np.empty((steps_at_once(count, system.rows), *shape))
 
     def backward(self, first: int, last: int, by_u: NDArray, by_v: NDArray) -> None:
         """See `Adjoint`; a sample is at the first."""
@@ -197,10 +215,11 @@ class RK4Adjoint(Adjoint):
         count, most = last - first, len(self._stages)
         if count <= most:
             stages = self._stages[:count]
-            retrace(self._equation.still, u.copy(), v.copy(), self._steps, first, count, stages)
+            self._retrace(u.copy(), v.copy(), first, count, stages)
             pull_steps(
-                self._equation.balance, self._pullback.terms, self._steps, first, stages, by_u,
-                by_v, self._memory, self._inertia, self._moved, self._out,
+                self._equation.balance, self._pullback.terms, self._steps, self._method, first,
+                stages, by_u, by_v, self._memory, self._by_slope, self._inertia, self._moved,
+                self._out,
             )  # fmt: skip
             return
         # states are kept as far apart as there is room for them: most often once through is enough
@@ -209,22 +228,28 @@ class RK4Adjoint(Adjoint):
         for at in range(first, last, apart):
             kept.append((at, q.copy(), w.copy()))
             if at + apart < last:
-                retrace(self._equation.still, q, w, self._steps, at, apart, self._none)
+                self._retrace(q, w, at, apart, self._none)
         for at, q, w in reversed(kept):
             self._backward(at, min(at + apart, last), q, w, by_u, by_v)
 
+    def _retrace(self, u: NDArray, v: NDArray, first: int, count: int, stages: NDArray) -> None:
+        """Take steps again; see `retrace`."""
+        retrace(self._equation.still, u, v, self._steps, self._method, first, count, stages)
 
-def steps_at_once(rows: int) -> int:
+
+def steps_at_once(stages: int, rows: int) -> int:
     """Steps whose stages are kept, of a motion with so many rows of three dofs."""
-    return max(1, int(ROOM[0] / (4 * 3 * rows * 3 * 8)))
+    return max(1, int(ROOM[0] / (stages * 3 * rows * 3 * 8)))
 
 
-def segment(plan: StepPlan, rows: int) -> int:
+def segment(motion: Any) -> int:
     """Steps between samples from which a motion goes back: those that are asked for, or fewer.
 
     So many that all can be kept at once, if there is room for so many samples.
     """
-    most = max(steps_at_once(rows), int(plan.steps * 2 * 3 * 8 * rows / ROOM[1]))
+    plan, rows = motion.plan, motion.packed.system.rows
+    at_once = steps_at_once(len(motion.method.tableau.weights), rows)
+    most = max(at_once, int(plan.steps * 2 * 3 * 8 * rows / ROOM[1]))
     parts = next(
         k for k in range(1, plan.every + 1) if plan.every % k == 0 <= most - plan.every // k
     )
