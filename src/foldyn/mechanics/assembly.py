@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import compress
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -23,6 +24,7 @@ from scipy.sparse.linalg import splu
 from foldyn.errors import ComputationError
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.sheet_term import Blocks, SheetTerm, largest_turn
+from foldyn.mechanics.slots import add_at
 from foldyn.mechanics.step_tangent import FLOOR
 from foldyn.mechanics.tangent import Sparsity, entry_slots, joined
 from foldyn.mechanics.term import (
@@ -215,15 +217,21 @@ class Assembly:
     # ------------------------------------------------------------------ tangents
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
         """Derivative (m, m) of the forces; slopes per unit stiffness below `floor` are raised."""
-        return self._plus(self.sheet.tangent(q, floor), q, floor)
+        return self._plus(self.sheet.tangent(q, floor), q, q, floor)
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
         """The matrix that a step of Newton's method takes at q, after one from `before`."""
-        return self._plus(self.sheet.step_tangent(q, before), q, FLOOR)
+        old = q if before is None else before
+        return self._plus(self.sheet.step_tangent(q, before), q, old, FLOOR)
 
-    def _plus(self, matrix: sparse.csr_array, q: NDArray, floor: float) -> sparse.csr_array:
-        flat = np.ascontiguousarray(q, float).ravel()[: self.size]
-        for term in self.others:
+    def _plus(
+        self, matrix: sparse.csr_array, q: NDArray, before: NDArray, floor: float
+    ) -> sparse.csr_array:
+        flat, old = (np.ascontiguousarray(x, float).ravel()[: self.size] for x in (q, before))
+        known = [type(term).tangent is Term.tangent for term in self.others]
+        for term in compress(self.others, known):
+            matrix = term.slots.added(matrix, term.step_entries(flat, old, True, floor))
+        for term in compress(self.others, np.logical_not(known)):  # whose places change
             matrix = sparse.csr_array(matrix + term.tangent(flat, floor))
         return matrix
 
@@ -370,7 +378,8 @@ class AssembledBlocks:
     ) -> None:  # fmt: skip
         """See `Blocks`."""
         self._sheet.put(of.sheet, pattern, u, before, again, out)
-        self._add(pattern, [term.entries(u, FLOOR) for term in _with_places(of)], out)
+        own = [term.step_entries(u, before, again, FLOOR) for term in _with_places(of)]
+        self._add(pattern, own, out)
 
     def put_mean(
         self, of: Assembly, pattern: Sparsity, u0: NDArray, u1: NDArray, angle: NDArray,
@@ -378,12 +387,13 @@ class AssembledBlocks:
     ) -> None:  # fmt: skip
         """See `Blocks`."""
         self._sheet.put_mean(of.sheet, pattern, u0, u1, angle, before, again, out)
-        self._add(pattern, [term.mean_entries(u0, u1, FLOOR) for term in _with_places(of)], out)
+        step = u0, u1, before, again, FLOOR
+        self._add(pattern, [term.mean_entries(*step) for term in _with_places(of)], out)
 
     def _add(self, pattern: Sparsity, entries: Sequence[NDArray], out: NDArray) -> None:
         """Add the entries of further terms."""
         for slots, own in zip(self._slots_in(pattern), entries, strict=True):
-            np.add.at(out.reshape(-1), slots, own)
+            add_at(slots, own, out.reshape(-1))
 
     def filled(self, pattern: Sparsity) -> NDArray:
         """See `Blocks`."""

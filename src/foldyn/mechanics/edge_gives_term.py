@@ -63,7 +63,9 @@ class EdgeGivesTerm(Term):
         """See `Term`."""
         return panel_tangents(self.gives, nodal(q), nodal(q), self._gives(q)).ravel()
 
-    def mean_entries(self, q0: NDArray, q1: NDArray, floor: float = -np.inf) -> NDArray:
+    def mean_entries(
+        self, q0: NDArray, q1: NDArray, before: NDArray, again: bool, floor: float
+    ) -> NDArray:
         """See `Term`."""
         mean = 0.5 * (self._gives(q0) + self._gives(q1))
         return 0.5 * panel_tangents(self.gives, nodal(q0), nodal(q1), mean).ravel()
@@ -117,9 +119,11 @@ class BalancedGivesTerm(EdgeGivesTerm):
         """See `Term`: without the places, which would take more room than the matrix."""
         return sparse.csr_array(self._condensed(q, self._gives(q)))
 
-    def mean_entries(self, q0: NDArray, q1: NDArray, floor: float = -np.inf) -> NDArray:
+    def mean_entries(
+        self, q0: NDArray, q1: NDArray, before: NDArray, again: bool, floor: float
+    ) -> NDArray:
         """See `Term`."""
-        return Term.mean_entries(self, q0, q1, floor)
+        return Term.mean_entries(self, q0, q1, before, again, floor)
 
     def _condensed(self, q: NDArray, g: NDArray) -> NDArray:
         """Tangent of displacements, the gives g giving way with them."""

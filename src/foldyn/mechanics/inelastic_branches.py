@@ -119,7 +119,9 @@ class HingeMemory(Term):
         memory_tangents(own, u, out)
         return out[self._coupled[0]]
 
-    def mean_entries(self, q0: NDArray, q1: NDArray, floor: float = -np.inf) -> NDArray:
+    def mean_entries(
+        self, q0: NDArray, q1: NDArray, before: NDArray, again: bool, floor: float
+    ) -> NDArray:
         """See `Term`."""
         out = np.empty((len(self.own.rest), WIDTH, WIDTH))
         ends = in_rows(q0, self._rows), in_rows(q1, self._rows)

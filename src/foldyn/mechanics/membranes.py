@@ -194,20 +194,40 @@ def membrane_energy(membranes, u):
 
 
 @kernel
-def membrane_blocks(membranes, u0, u1, loose):
-    """Tangent (p, c, c, 3, 3), N/m, of all panels at u0 = u1; `loose`: as if strains were none.
+def strains_toward(membranes, u0, u1):
+    """Strains (b, p) at u1 but for what grows with the square of the way from u0 to there.
+
+    That is what bars of panels that turn are stretched by on their way along straight lines; see
+    `mechanics.step_tangent`.
+    """
+    count, bars = membranes.nodes.shape[0], membranes.ends.shape[0]
+    out, along = np.empty((bars, count)), np.empty(3)
+    for i in range(bars):
+        for p in range(count):
+            a = membranes.nodes[p, membranes.ends[i, 0]]
+            b = membranes.nodes[p, membranes.ends[i, 1]]
+            out[i, p] = strain_of(membranes, u0, p, i, along)
+            for c in range(3):
+                way = u1[b, c] - u1[a, c] - (u0[b, c] - u0[a, c])
+                out[i, p] += membranes.per_length2[i, p] * along[c] * way
+    return out
+
+
+@kernel
+def membrane_blocks(membranes, u0, u1, strain):
+    """Tangent (p, c, c, 3, 3), N/m, of all panels at u0 = u1, with the stresses of strains (b, p).
 
     From u0 to another u1 it is twice the derivative of their mean forces by u1.
     """
     count, bars = membranes.nodes.shape[1], membranes.ends.shape[0]
     out = np.zeros((membranes.nodes.shape[0], count, count, 3, 3))
-    strain, first, last = np.empty(bars), np.empty((bars, 3)), np.empty((bars, 3))
+    first, last = np.empty((bars, 3)), np.empty((bars, 3))
     rate, pulled = np.empty((bars, 2, 3)), np.empty((bars, count, 3))
     for p in range(out.shape[0]):
         pulled[:] = 0.0
         for i in range(bars):
-            strain[i] = 0.5 * strain_of(membranes, u0, p, i, first[i])
-            strain[i] += 0.5 * strain_of(membranes, u1, p, i, last[i])
+            strain_of(membranes, u0, p, i, first[i])
+            strain_of(membranes, u1, p, i, last[i])
             for c in range(3):
                 middle = 0.5 * (first[i, c] + last[i, c])
                 rate[i, 1, c] = membranes.per_length2[i, p] * middle
@@ -216,12 +236,12 @@ def membrane_blocks(membranes, u0, u1, loose):
             pull = 0.0
             for j in range(bars):
                 stiff = membranes.stiffness[i, j, p]
-                pull += stiff * strain[j]
+                pull += stiff * strain[j, p]
                 for c in range(3):
                     along = stiff * membranes.per_length2[j, p] * last[j, c]
                     pulled[i, membranes.ends[j, 1], c] += along
                     pulled[i, membranes.ends[j, 0], c] -= along
-            pull *= 0.0 if loose else membranes.per_length2[i, p]
+            pull *= membranes.per_length2[i, p]
             for end in range(2):
                 v, w = membranes.ends[i, end], membranes.ends[i, 1 - end]
                 for c in range(3):
@@ -422,19 +442,29 @@ class MembranesTerm(Term):
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
         """See `Term`."""
-        return self._entries(q, q, False)
+        return self.step_entries(q, q, False, floor)
 
-    def mean_entries(self, q0: NDArray, q1: NDArray, floor: float = -np.inf) -> NDArray:
+    def step_entries(self, q: NDArray, before: NDArray, again: bool, floor: float) -> NDArray:
         """See `Term`."""
-        return 0.5 * self._entries(q0, q1, False)
+        return self._entries(q, q, self._strains(before, q if again else before))
 
-    def _entries(self, q0: NDArray, q1: NDArray, loose: bool) -> NDArray:
-        return membrane_blocks(self.membranes, nodal(q0), nodal(q1), loose).ravel()
+    def mean_entries(
+        self, q0: NDArray, q1: NDArray, before: NDArray, again: bool, floor: float
+    ) -> NDArray:
+        """See `Term`."""
+        end = self._strains(before, q1 if again else before)
+        return 0.5 * self._entries(q0, q1, 0.5 * (self._strains(q0, q0) + end))
+
+    def _strains(self, q0: NDArray, q1: NDArray) -> NDArray:
+        return strains_toward(self.membranes, nodal(q0), nodal(q1))
+
+    def _entries(self, q0: NDArray, q1: NDArray, strain: NDArray) -> NDArray:
+        return membrane_blocks(self.membranes, nodal(q0), nodal(q1), strain).ravel()
 
     def unstrained(self, q: NDArray) -> Unstrained:
         """See `Term`."""
         size = (q.size, q.size)
-        entries = (self._entries(q, q, True), self.places)
+        entries = (self._entries(q, q, np.zeros_like(self.membranes.per_length2)), self.places)
         tangent = sparse.csr_array(sparse.coo_array(entries, size))
         return Unstrained(tangent, sparse.csr_array(size), lambda motion: 0.0)
 

@@ -40,6 +40,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -50,6 +51,7 @@ from scipy import sparse
 from foldyn.jit.compiled import Addressed, addressed, inner_scalar, kernel
 from foldyn.jit.context import Context, run_at, value_at
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.slots import Slots
 from foldyn.mechanics.threads import Team
 from foldyn.values import writable
 
@@ -161,6 +163,11 @@ class Term(ABC):
         none = np.zeros(0, np.int64)
         return none, none
 
+    @cached_property
+    def slots(self) -> Slots:
+        """Where they stand in the tangent of a model."""
+        return Slots(*self.places)
+
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
         """Derivative of its forces there (k,), N/m; those of the same place are added.
 
@@ -168,7 +175,13 @@ class Term(ABC):
         """
         return np.zeros(0)
 
-    def mean_entries(self, q0: NDArray, q1: NDArray, floor: float = -np.inf) -> NDArray:
+    def step_entries(self, q: NDArray, before: NDArray, again: bool, floor: float) -> NDArray:
+        """What a step of Newton's method takes for these (k,); see `sheet_term.Blocks.put`."""
+        return self.entries(q, floor)
+
+    def mean_entries(
+        self, q0: NDArray, q1: NDArray, before: NDArray, again: bool, floor: float
+    ) -> NDArray:
         """Derivative (k,) likewise of its mean forces from q0 to q1, after these, by q1."""
         return 0.5 * self.entries(0.5 * (q0 + q1), floor)
 

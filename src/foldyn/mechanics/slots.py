@@ -1,0 +1,49 @@
+"""Entries that are added to sparse matrices, again and again at the same places."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.jit.compiled import kernel
+
+
+class Slots:
+    """Where entries at rows and columns (k,) stand in matrices, most of which have one pattern."""
+
+    def __init__(self, row: NDArray, column: NDArray) -> None:
+        self._row, self._column = row.astype(np.int64), column.astype(np.int64)
+        self._found: tuple[NDArray, ...] = ()  # pattern of the last matrix, and what follows
+
+    def added(self, matrix: sparse.csr_array, entries: NDArray) -> sparse.csr_array:
+        """The matrix, or a fuller one, with entries (k,) added."""
+        if not len(entries):
+            return matrix
+        matrix.sort_indices()
+        of = matrix.indices, matrix.indptr
+        if not self._found or not all(map(np.array_equal, of, self._found)):
+            self._found = *of, *self._find(*of)
+        indices, indptr, own, slots = self._found[2:]
+        data = np.zeros(len(indices))
+        data[own] = matrix.data
+        add_at(slots, entries, data)
+        return sparse.csr_array((data, indices, indptr), matrix.shape)
+
+    def _find(self, indices: NDArray, indptr: NDArray) -> tuple[NDArray, ...]:
+        """Pattern of the sum, and slots there of what is in the matrix and of what is added."""
+        size = len(indptr) - 1
+        own = np.repeat(np.arange(size), np.diff(indptr)) * size + indices
+        new = self._row * size + self._column
+        both = np.union1d(own, new)
+        row, column = np.divmod(both, size)
+        ends = np.searchsorted(row, np.arange(size + 1))
+        pattern = column.astype(np.int32), ends.astype(np.int32)
+        return *pattern, np.searchsorted(both, own), np.searchsorted(both, new)
+
+
+@kernel
+def add_at(slots, values, out):
+    """Add values (k,) to out[slots]."""
+    for k in range(slots.size):
+        out[slots[k]] += values[k]
