@@ -1,18 +1,20 @@
 """Tangent stiffness of bars, folds and plates: exact, in a sparse matrix of a known pattern.
 
-Dofs are 3 node + axis, then the rotations. A plate's element has the dofs of the nodes of its
-hinges, then its rotations; a fold's those of its four nodes, then its two rotations.
+Dofs are 3 node + axis, then the rotations. A *place* is a node, with three dofs, or a rotation,
+with one. What couples two places is a block of adjacent entries in each of its rows, so that an
+element needs the first entries of its blocks only. Places of a plate are the nodes of its hinges,
+then its rotations; places of a fold are its four nodes, then its two rotations.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
-from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.materials.switch import hinge_slope
 from foldyn.mechanics.dihedral import add_hessian, carry_wing
 from foldyn.mechanics.plates import (
@@ -27,96 +29,114 @@ from foldyn.mechanics.plates import (
 
 
 class PlatesPattern(NamedTuple):
-    """Pattern of the tangent, and where its parts go; -1 where there is no dof.
+    """Pattern of the tangent, and where the blocks of elements go; -1 where there is no place.
 
-    Attributes
-    ----------
-    indptr, indices : (size + 1,), (nnz,)
-    bars : (entries of the bars' tangent,)
-        Place of each entry of the matrix (3n, 3n) of the bars.
-    folds : (nf, 14, 14)
-    width : (p,)
-        Dofs of each plate.
-    corner : (nq, 4)
-        Place of the nodes of each hinge among those of its plate.
-    rotation : (nq,)
-        Place of each rotation among the dofs of its plate.
-    start : (p + 1,)
-        First of the entries of each plate in `plates`.
-    plates : (sum of width^2,)
+    Entry (a, b) of a block comes a * (indptr[d + 1] - indptr[d]) + b entries after its first one,
+    d the first dof of its row.
     """
 
-    indptr: NDArray
-    indices: NDArray
-    bars: NDArray
-    folds: NDArray
-    width: NDArray
-    corner: NDArray
-    rotation: NDArray
-    start: NDArray
-    plates: NDArray
-
-
-def plates_pattern(model: BarsPlates, bars_indptr: NDArray, bars_indices: NDArray) -> PlatesPattern:
-    """Pattern of the tangent, given that (3n,) of the bars."""
-    n = model.nodes
-    size = 3 * n + model.rotations
-    folds = _dofs(model.hinges[: len(model.fold_rest)], model.fold_rotations, n)
-    elements, corner, rotation = (
-        [],
-        np.full((len(model.angle), 4), -1),
-        np.full(len(model.angle), -1),
+    indptr: NDArray  # (size + 1,)
+    indices: NDArray  # (nnz,)
+    bars: NDArray  # (entries of the tangent of the bars,) where they go
+    fold_dof: NDArray  # (nf, 6) first dofs of the places of each fold
+    fold: NDArray  # (nf, 36) first entries
+    begin: NDArray  # (p + 1,) first place of each plate
+    nodes: NDArray  # (p,) how many of its places are nodes
+    dof: NDArray  # (places of all plates,) first dofs
+    start: NDArray  # (p + 1,) first block of each plate
+    plate: NDArray  # (blocks of all plates,) first entries
+    corner: (
+        NDArray  # (nq, 4) which of its plate's places the nodes of each hinge, or a rotation, are
     )
-    for p in range(len(model.start) - 1):
-        own = np.arange(model.start[p], model.start[p + 1])
-        hinges, turned = own[model.angle[own] >= 0], own[model.angle[own] < 0]
-        rows = model.hinges[model.angle[hinges]]
-        nodes, place = np.unique(rows, return_inverse=True)
-        corner[hinges] = place.reshape(-1, 4)
-        rotation[turned] = 3 * len(nodes) + np.arange(len(turned))
-        elements.append(_dofs(nodes[None], (-1 - model.angle[turned])[None], n)[0])
-    bars = np.repeat(np.arange(3 * n), np.diff(bars_indptr)) * size + bars_indices.astype(np.int64)
-    diagonal = np.arange(size) * (size + 1)
-    parts = [diagonal, bars, _keys(folds, size).ravel()]
-    parts += [_keys(element, size).ravel() for element in elements]
-    known = np.unique(np.concatenate(parts))
-    known = known[known >= 0]
-    width = np.array([len(element) for element in elements], np.int64)
+    owner: NDArray  # (nh, 2) a plate, and the angle (nq) that is the hinge; -1 without one
 
-    def places(keys: NDArray) -> NDArray:
-        return np.where(keys >= 0, np.searchsorted(known, keys), -1)
 
+def plates_pattern(model: BarsPlates, bars: tuple[NDArray, NDArray]) -> PlatesPattern:
+    """Pattern of the tangent, given that of the blocks of the bars: indptr and indices."""
+    n, count = model.nodes, model.nodes + model.rotations
+    hinges, plates = model.hinges, len(model.start) - 1
+    of = np.repeat(np.arange(plates), np.diff(model.start))  # the plate of each angle
+    hinged, turned = np.flatnonzero(model.angle >= 0), np.flatnonzero(model.angle < 0)
+    corners = of[hinged, None] * count + hinges[model.angle[hinged]]
+    within, inverse = np.unique(corners, return_inverse=True)
+    keys = np.concatenate([within, of[turned] * count + n - 1 - model.angle[turned]])
+    order = np.argsort(keys, kind="stable")  # of each plate its nodes, then its rotations
+    place, of_place = keys[order] % count, keys[order] // count
+    begin = np.searchsorted(of_place, np.arange(plates + 1))
+    number = np.argsort(order) - begin[keys // count]
+    corner = np.zeros((len(model.angle), 4), np.int64)
+    corner[hinged] = number[inverse.reshape(-1, 4)]
+    corner[turned] = number[len(within) :, None]
+    owner = np.full((len(hinges), 2), -1)
+    owner[model.angle[hinged]] = np.column_stack([of[hinged], hinged])
+
+    turns = np.where(model.fold_rotations >= 0, n + model.fold_rotations, -1)
+    fold = np.concatenate([hinges[: len(model.fold_rest)], turns], axis=1)
+    wide = np.diff(begin)
+    start = np.concatenate([[0], np.cumsum(wide**2)])
+    block = np.repeat(np.arange(plates), wide**2)
+    row, column = np.divmod(np.arange(start[-1]) - start[block], wide[block])
+    own = place[begin[block] + row] * count + place[begin[block] + column]
+    known, sides = fold >= 0, np.repeat(np.arange(n), np.diff(bars[0])) * count + bars[1]
+    pairs = np.where(
+        known[:, :, None] & known[:, None], fold[:, :, None] * count + fold[:, None], -1
+    )
+    every = np.unique(np.concatenate([np.arange(count) * (count + 1), sides, pairs.ravel(), own]))
+    every = every[every >= 0]
+
+    width = np.where(np.arange(count) < n, 3, 1)
+    dof = np.concatenate([[0], np.cumsum(width)])  # first of each place
+    row, column = np.divmod(every, count)
+    behind = np.concatenate([[0], np.cumsum(width[column])])  # entries of one row of each place
+    ends = behind[np.searchsorted(row, np.arange(count + 1))]
+    length = np.repeat(np.diff(ends), width)  # of the rows of the matrix
+    indptr = np.concatenate([[0], np.cumsum(length)])
+    first = indptr[dof[row]] + behind[:-1] - ends[row]  # entry of each pair
+    once = np.repeat(dof[column] - behind[:-1], width[column]) + np.arange(behind[-1])
+    copy = np.arange(indptr[-1]) + np.repeat(np.repeat(ends[:-1], width) - indptr[:-1], length)
+
+    def entries(keys: NDArray) -> NDArray:
+        found = first[np.searchsorted(every, np.maximum(keys, 0))]
+        return np.where(keys >= 0, found, -1).astype(np.int32)
+
+    axis = np.arange(3)
+    stride = length[dof[sides // count]][:, None, None] * axis[:, None]
+    blocks = entries(sides)[:, None, None] + stride + axis
     return PlatesPattern(
-        indptr=np.searchsorted(known // size, np.arange(size + 1)).astype(np.int32),
-        indices=(known % size).astype(np.int32),
-        bars=places(bars),
-        folds=places(_keys(folds, size)),
-        width=width,
-        corner=corner,
-        rotation=rotation,
-        start=np.concatenate([[0], np.cumsum(width**2)]),
-        plates=_joined([places(_keys(element, size)).ravel() for element in elements]),
+        indptr=indptr.astype(np.int32),
+        indices=once.astype(np.int32)[copy],
+        bars=sparse.bsr_array((blocks, bars[1], bars[0]), shape=(3 * n, 3 * n)).tocsr().data,
+        fold_dof=np.where(known, dof[fold], -1).astype(np.int32),
+        fold=entries(pairs).reshape(-1, 36),
+        begin=begin.astype(np.int32),
+        nodes=np.bincount(of_place[place < n], minlength=plates).astype(np.int32),
+        dof=dof[place].astype(np.int32),
+        start=start,
+        plate=entries(own),
+        corner=corner.astype(np.int32),
+        owner=owner.astype(np.int32),
     )
 
 
-def _dofs(nodes: NDArray, rotations: NDArray, n: int) -> NDArray:
-    """Dofs (e, 3 k + r) of elements with nodes (e, k) and rotations (e, r), -1 without one."""
-    displaced = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), 3 * nodes.shape[1])
-    turned = np.where(rotations >= 0, 3 * n + rotations, -1)
-    return np.concatenate([displaced, turned], axis=1)
+@inner_scalar
+def _scatter(indptr, dof, first, nodes, block, data):
+    """Add a block of places, `nodes` nodes and then rotations, to the entries of the matrix."""
+    for i in range(dof.size):
+        if dof[i] < 0:
+            continue
+        stride = indptr[dof[i] + 1] - indptr[dof[i]]
+        p, rows = (3 * i, 3) if i < nodes else (2 * nodes + i, 1)
+        for j in range(dof.size):
+            if dof[j] < 0:
+                continue
+            q, columns = (3 * j, 3) if j < nodes else (2 * nodes + j, 1)
+            for a in range(rows):
+                at = first[i * dof.size + j] + a * stride
+                for b in range(columns):
+                    data[at + b] += block[p + a, q + b]
 
 
-def _keys(dofs: NDArray, size: int) -> NDArray:
-    """Number row * size + column of all pairs (..., d, d) of dofs (..., d); -1 without one."""
-    row, column = dofs[..., :, None], dofs[..., None, :]
-    return np.where((row >= 0) & (column >= 0), row * size + column, -1)
-
-
-def _joined(parts: Sequence[NDArray]) -> NDArray:
-    return np.concatenate([np.zeros(0, np.int64), *parts])
-
-
-@inner
+@inner_scalar
 def _curvature(model, u, work, h, points, gradient, out):
     """Moment of hinge h times the second derivative of its dihedral, to out (4, 3, 4, 3)."""
     for v in range(4):
@@ -137,7 +157,7 @@ def _curvature(model, u, work, h, points, gradient, out):
 @kernel
 def _add_folds(model, pattern, u, work, floor, data):
     points, gradient, turned = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3, 4, 3))
-    along, bent = np.empty(14), turned.reshape(12, 12)
+    along, bent, block = np.empty(14), turned.reshape(12, 12), np.empty((14, 14))
     p = model.fold_parameters
     for f in range(model.fold_rest.size):
         work.moment[f] = fold_moment(model, work, f)
@@ -149,60 +169,90 @@ def _add_folds(model, pattern, u, work, floor, data):
         for c in range(12):
             along[c] = work.gradient[f, c]
         along[12] = along[13] = -model.per_reach
-        _curvature(model, u, work, f, points, gradient, turned)
         for r in range(14):
             for q in range(14):
-                at = pattern.folds[f, r, q]
-                if at >= 0:
-                    data[at] += slope * along[r] * along[q]
-                    if r < 12 and q < 12:
-                        data[at] += bent[r, q]
+                block[r, q] = slope * along[r] * along[q]
+        _curvature(model, u, work, f, points, gradient, turned)
+        for r in range(12):
+            for q in range(12):
+                block[r, q] += bent[r, q]
+        _scatter(pattern.indptr, pattern.fold_dof[f], pattern.fold[f], 4, block, data)
+
+
+@inner_scalar
+def _plate_block(model, pattern, work, p, bend, resist, block):
+    """The matrix of plate p between its dofs, to `block`; adds the moments of its hinges."""
+    first, nodes = model.start[p], pattern.nodes[p]
+    count, wide = model.start[p + 1] - first, 3 * nodes
+    size = wide + pattern.begin[p + 1] - pattern.begin[p] - nodes
+    for k in range(count):
+        h = model.angle[first + k]
+        for r in range(wide):
+            bend[k, r] = 0.0
+        if h >= 0:
+            for v in range(4):
+                at = 3 * pattern.corner[first + k, v]
+                for c in range(3):
+                    bend[k, at + c] += work.gradient[h, 3 * v + c]
+    for r in range(size):
+        for q in range(size):
+            block[r, q] = 0.0
+    for k in range(count):
+        h, own, moment = model.angle[first + k], 2 * nodes + pattern.corner[first + k, 0], 0.0
+        for r in range(wide):
+            resist[r] = 0.0
+        for m in range(count):
+            stiff = model.stiffness[model.entry[p] + k * count + m]
+            moment += stiff * work.turn[m]
+            if model.angle[first + m] >= 0:
+                for r in range(wide):
+                    resist[r] += stiff * bend[m, r]
+            elif h < 0:
+                other = 2 * nodes + pattern.corner[first + m, 0]
+                block[own, other] = model.per_reach**2 * stiff
+        if h >= 0:
+            work.moment[h] += moment
+            for r in range(wide):
+                along = bend[k, r]
+                if along != 0.0:
+                    for q in range(wide):
+                        block[r, q] += along * resist[q]
+        else:
+            for r in range(wide):
+                block[own, r] = block[r, own] = model.per_reach * resist[r]
 
 
 @kernel
-def _add_plates(model, pattern, u, x, work, bend, resist, block, data):
-    points, gradient, turned = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3, 4, 3))
-    for p in range(pattern.width.size):
-        first, wide = model.start[p], pattern.width[p]
-        count = model.start[p + 1] - first
+def _add_plates(model, pattern, x, work, bend, resist, block, data):
+    for p in range(pattern.nodes.size):
         turn_plate(model, x, work, p)
-        bend[:] = 0.0
-        block[:] = 0.0
-        for k in range(count):
-            h = model.angle[first + k]
-            if h >= 0:
-                for v in range(4):
-                    for c in range(3):
-                        bend[k, 3 * pattern.corner[first + k, v] + c] += work.gradient[h, 3 * v + c]
-            else:
-                bend[k, pattern.rotation[first + k]] = model.per_reach
-        for k in range(count):
-            moment = 0.0
-            resist[k] = 0.0
-            for m in range(count):
-                stiff = model.stiffness[model.entry[p] + k * count + m]
-                moment += stiff * work.turn[m]
-                for r in range(wide):
-                    resist[k, r] += stiff * bend[m, r]
-            h = model.angle[first + k]
-            if h < 0:
-                continue
-            work.moment[h] = moment
-            _curvature(model, u, work, h, points, gradient, turned)
-            moved = 3 if rides(model, h) else 4
-            for v in range(moved):
-                for w in range(moved):
-                    row, column = pattern.corner[first + k, v], pattern.corner[first + k, w]
-                    for a in range(3):
-                        for b in range(3):
-                            block[3 * row + a, 3 * column + b] += turned[v, a, w, b]
-        for k in range(count):
-            for r in range(wide):
-                for q in range(wide):
-                    block[r, q] += bend[k, r] * resist[k, q]
-        for r in range(wide):
-            for q in range(wide):
-                data[pattern.plates[pattern.start[p] + r * wide + q]] += block[r, q]
+        _plate_block(model, pattern, work, p, bend, resist, block)
+        dof = pattern.dof[pattern.begin[p] : pattern.begin[p + 1]]
+        first = pattern.plate[pattern.start[p] : pattern.start[p + 1]]
+        _scatter(pattern.indptr, dof, first, pattern.nodes[p], block, data)
+
+
+@kernel
+def _add_bends(model, pattern, u, work, data):
+    """What the moments of the hinges of plates add."""
+    points, gradient, turned = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3, 4, 3))
+    dof, first, block = np.empty(4, np.int32), np.empty(16, np.int32), turned.reshape(12, 12)
+    for h in range(model.fold_rest.size, model.hinges.shape[0]):
+        p, k = pattern.owner[h]
+        if p < 0:
+            continue
+        _curvature(model, u, work, h, points, gradient, turned)
+        begin, wide = pattern.begin[p], pattern.begin[p + 1] - pattern.begin[p]
+        for v in range(4):
+            at = pattern.corner[k, v]
+            dof[v] = pattern.dof[begin + at]
+            for w in range(4):
+                first[4 * v + w] = pattern.plate[
+                    pattern.start[p] + at * wide + pattern.corner[k, w]
+                ]
+        if rides(model, h):
+            dof[3] = -1
+        _scatter(pattern.indptr, dof, first, 4, block, data)
 
 
 def add_plates_tangent(
@@ -211,11 +261,13 @@ def add_plates_tangent(
 ) -> None:  # fmt: skip
     """Add the tangent of folds and plates at displacements u (n, 3) and rotations x (r,).
 
+    work : `PlatesWork` without moments.
     floor : slopes of the folds' law per unit stiffness below it are raised to it.
     """
     turn_hinges(model, u, work)
     turn_folds(model, x, work)
     _add_folds(model, pattern, u, work, floor, data)
-    wide, count = int(pattern.width.max(initial=0)), int(np.diff(model.start).max(initial=0))
-    bend, resist = np.empty((2, count, wide))
-    _add_plates(model, pattern, u, x, work, bend, resist, np.empty((wide, wide)), data)
+    wide = 3 * int(np.diff(pattern.begin).max(initial=0))
+    bend = np.empty((int(np.diff(model.start).max(initial=0)), wide))
+    _add_plates(model, pattern, x, work, bend, np.empty(wide), np.empty((wide, wide)), data)
+    _add_bends(model, pattern, u, work, data)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, partial
 from typing import Any, Self
 
 import numpy as np
@@ -79,8 +80,8 @@ class BarsPlatesTerm(SheetTerm):
         """Pattern of the tangent."""
         if self._like:
             return self._like.sparsity
-        bars = self._bars.tangent(np.zeros(self._nodal))
-        return plates_pattern(self.model, bars.indptr, bars.indices)
+        bars = self._bars.sparsity
+        return plates_pattern(self.model, (bars.indptr, bars.indices))
 
     @property
     def linear_folds(self) -> bool:
@@ -89,32 +90,38 @@ class BarsPlatesTerm(SheetTerm):
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
         """See `SheetTerm`."""
-        return self._assembled(q, self._bars.tangent(q[: self._nodal]), floor)
+        return self._assembled(q, floor, partial(self._bars.tangent, q[: self._nodal]))
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
         """See `SheetTerm`."""
         q = np.ascontiguousarray(q, float).reshape(-1)
         old = None if before is None else np.reshape(before, -1)[: self._nodal]
-        return self._assembled(q, self._bars.step_tangent(q[: self._nodal], old), self._floor)
+        bars = partial(self._bars.step_tangent, q[: self._nodal], old)
+        return self._assembled(q, self._floor, bars)
 
     def mean_tangent(
         self, q0: NDArray, q1: NDArray, angle: NDArray, before: NDArray, again: bool
     ) -> sparse.csr_array:
         """See `SheetTerm`."""
         u0, u1, old = (self._split(q)[0] for q in (q0, q1, before))
-        bars = self._bars.mean_tangent(u0, u1, np.zeros(0), old, again)
-        return 0.5 * self._assembled(0.5 * (q0 + q1), 2.0 * bars, self._floor)
+
+        def bars() -> sparse.csr_array:
+            return 2.0 * self._bars.mean_tangent(u0, u1, np.zeros(0), old, again)
+
+        return 0.5 * self._assembled(0.5 * (q0 + q1), self._floor, bars)
 
     @property
     def _floor(self) -> float:
         """Least slope of the folds in steps; slopes of a user's law may fall on purpose."""
         return -np.inf if self.model.code < 0 else STEP_FLOOR
 
-    def _assembled(self, q: NDArray, bars: sparse.csr_array, floor: float) -> sparse.csr_array:
-        pattern = self.sparsity
+    def _assembled(
+        self, q: NDArray, floor: float, bars: Callable[[], sparse.csr_array]
+    ) -> sparse.csr_array:
+        pattern, work = self.sparsity, plates_work(self.model)
         data = np.zeros(len(pattern.indices))
-        data[pattern.bars] = bars.data
-        work = plates_work(self.model)
+        if len(self.model.bars.bar_runs):
+            data[pattern.bars] = bars().data
         add_plates_tangent(self.model, pattern, *self._split(q), work, floor, data)
         entries = (data, pattern.indices, pattern.indptr)
         return sparse.csr_array(entries, (self.size, self.size))
