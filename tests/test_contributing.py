@@ -13,6 +13,8 @@ import pytest
 import foldyn as fd
 from case_texts import HELD_MIURA_TEXT
 from foldyn.analyses import registry
+from foldyn.analyses.path import PathAnalysis
+from foldyn.arguments import arguments
 from foldyn.cases import case, loads
 from foldyn.cli.main import main
 from foldyn.values import number
@@ -67,6 +69,9 @@ def test_the_load(tmp_path, monkeypatch):
     names = example("A load", dict(vars(loads)))
     kinds = (*loads.LOADS, names["Squeeze"])
     monkeypatch.setattr(loads, "LOADS", kinds)
+    (listed,) = arguments(PathAnalysis.schema)["loads"].checks
+    for check in (loads.LOAD, listed.item):
+        monkeypatch.setattr(check, "kinds", kinds)
     monkeypatch.setattr(case, "LOADS", kinds)
     path = tmp_path / "case.toml"
     squeeze = "[[loads]]\nnodes = [6, 8]\nsqueeze = 1e-3\n"

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydantic import BaseModel
 
 import features
 import foldyn as fd
@@ -21,6 +20,7 @@ from foldyn.analyses import ANALYSES, read_case
 from foldyn.cases import LOADS, SUPPORTS, BaseMotion, Force, Table
 from foldyn.cases.decode import law_from
 from foldyn.cli.main import main
+from foldyn.tables import keys, table_under
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
@@ -250,10 +250,9 @@ def sections() -> list[tuple[str, str]]:
     found = [(name, key) for name in parts for kind in parts[name] for key in kind.by_key()]
     found += [(name, "history") for name in ("supports", "loads")]
     for schema in (kind.schema for kind in ANALYSES.values()):
-        for name, field in schema.model_fields.items():
-            types = [field.annotation, *getattr(field.annotation, "__args__", ())]
-            models = [one for one in types if isinstance(one, type) and issubclass(one, BaseModel)]
-            found += [(name, key) for model in models for key in model.model_fields]
+        for name in keys(schema):
+            table = table_under(name, schema)
+            found += [(name, key) for key in (keys(table) if table else ())]
     return sorted(set(found))
 
 

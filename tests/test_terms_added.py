@@ -44,8 +44,8 @@ for method in ("rk4", "central_difference", "dormand_prince", *implicit):
     assert float(found[{group!r}].max()) > 0.0
 apart = [np.abs(end - ends[0]).max() / np.abs(ends[0]).max() for end in ends]
 assert max(apart) < 2e-2, apart
-from foldyn.cases.supports import support_from
-assert support_from({table}) == case.supports[1]
+from foldyn.cases.supports import SUPPORT
+assert SUPPORT("", {table}) == case.supports[1]
 """
 LAW_PROBE = """
 import numpy as np

@@ -1,5 +1,7 @@
 """Arguments of data classes: declared with their types, checked where an object is made, shown.
 
+Tables of files are read by the same declarations (`foldyn.tables`).
+
 What an argument must be stands among the annotations of its type, its unit too, and the key that it
 has in a case file where that is another than its name:
 
@@ -14,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
 from functools import cache
 from html import escape
-from types import UnionType
+from types import MappingProxyType, UnionType
 from typing import (
     Annotated,
     Any,
@@ -35,6 +37,10 @@ from foldyn.values import flag, plain
 T = TypeVar("T")
 SOME = 6
 """Items of a list, and of an array, that a repr shows."""
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+CONTEXT = frozenset({"folder", "find", "beside", "others"})
+"""What checks of a file may ask for: where its paths start, how else a name in it is found, what
+its table says up to there, and the table at the same place of files of other kinds, by kind."""
 
 
 class Unit:
@@ -58,15 +64,25 @@ class Check(Unit):
     def __init__(self, check: Callable[..., Any], *, unit: str = "", **limits: Any) -> None:
         super().__init__(unit)
         self.check, self.limits = check, limits
-        if unit and "unit" in inspect.signature(check).parameters:
+        parameters = inspect.signature(check).parameters
+        if unit and "unit" in parameters:
             self.limits["unit"] = unit
+        self.asks = CONTEXT.intersection(parameters)
 
-    def __call__(self, name: str, value: Any) -> Any:
+    def __call__(self, name: str, value: Any, context: Mapping[str, Any] = NOTHING) -> Any:
         """The value as it is kept."""
-        return self.check(name, value, **self.limits)
+        asked = {word: context[word] for word in self.asks if word in context}
+        return self.check(name, value, **self.limits, **asked)
 
 
 Flag = Annotated[bool, Check(flag)]
+
+
+class Read:
+    """How an argument is read from a file, where its value there is another."""
+
+    def __init__(self, check: Check) -> None:
+        self.check = check
 
 
 class Key(str):
@@ -80,13 +96,20 @@ class Argument(NamedTuple):
     unit: str
     key: str
     default: Any
+    reader: Check | None = None
 
-    def checked(self, name: str, value: Any) -> Any:
+    def read(self, name: str, value: Any, context: Mapping[str, Any]) -> Any:
+        """The value from what a file says."""
+        if self.reader is not None:
+            value = self.reader(name, value, context)
+        return self.checked(name, value, context)
+
+    def checked(self, name: str, value: Any, context: Mapping[str, Any] = NOTHING) -> Any:
         """The value as it is kept; None is left alone where it is the default."""
         if value is None and self.default is None:
             return None
         for check in self.checks:
-            value = check(name, value)
+            value = check(name, value, context)
         return value
 
 
@@ -99,7 +122,8 @@ def arguments(kind: type) -> Mapping[str, Argument]:
         checks = tuple(note for note in notes if isinstance(note, Check))
         key = next((note for note in notes if isinstance(note, Key)), item.name)
         unit = next((note.unit for note in notes if isinstance(note, Unit) and note.unit), "")
-        found[item.name] = Argument(checks, unit, str(key), item.default)
+        reader = next((note.check for note in notes if isinstance(note, Read)), None)
+        found[item.name] = Argument(checks, unit, str(key), item.default, reader)
     return found
 
 
@@ -108,6 +132,8 @@ def _notes(hint: Any) -> Iterator[Any]:
     if hasattr(hint, "__metadata__"):
         yield from hint.__metadata__
         hint = hint.__origin__
+    if isinstance(own := getattr(hint, "in_files", None), Check):
+        yield own
     if get_origin(hint) in (Union, UnionType):
         for part in get_args(hint):
             yield from _notes(part)
@@ -122,9 +148,15 @@ class Checked:
     ----------
     place : str
         What stands before the arguments in messages: "settings: ".
+    missing : mapping of str to str
+        Remedies in messages where a file lacks a key that it must have.
+    in_files : Check or None
+        What reads an argument of this type, where the type alone says so.
     """
 
     place: ClassVar[str] = ""
+    missing: ClassVar[Mapping[str, str]] = NOTHING
+    in_files: ClassVar[Check | None] = None
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Give a subclass its repr before `dataclass` would give it a long one."""

@@ -134,14 +134,14 @@ class Faults:
 
     def add(self, error: InputError) -> None:
         """Add an error and its others."""
-        alone = InputError(error.reason, error.field, error.file)
+        alone = type(error)(error.reason, error.field, error.file)
         self.found += [alone, *error.others]
 
     def raise_all(self) -> None:
         """Raise all faults in one error, if there are any."""
         if self.found:
             first, *others = self.found
-            raise InputError(first.reason, first.field, first.file, others)
+            raise type(first)(first.reason, first.field, first.file, others)
 
 
 class ComputationError(FoldynError, RuntimeError):

@@ -244,7 +244,7 @@ def doubt_degrees(name: str, value: Any) -> None:
         if (np.abs(tenths - np.rint(tenths)) > ROUNDED).all():
             meant = f"is small for an angle in degrees: give {np.degrees(angles[0]):.4g}"
     if meant:
-        text = f"{name} = {angles[0]:.5g} {meant} if that is meant in radians"
+        text = f"{name.removeprefix('.')} = {angles[0]:.5g} {meant} if that is meant in radians"
         warn(text, "sheets.md#units", UnitsWarning)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -157,8 +155,3 @@ def test_files_that_cannot_be_read(tmp_path) -> None:
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match=r"broken\.toml: is not a text file in UTF-8"):
         read_case(path)
-
-
-def test_the_package_does_not_import_pydantic() -> None:
-    code = "import sys, foldyn.cases; assert 'pydantic' not in sys.modules"
-    subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": ":".join(sys.path)})

@@ -11,9 +11,9 @@ import xarray as xr
 import foldyn as fd
 from case_texts import FOLD_TEXT, LIFTED_TEXT
 from foldyn.analyses.provenance import inputs
-from foldyn.cases.contact import contact_from
 from foldyn.cases.document import from_document, to_document
 from foldyn.errors import InputError
+from foldyn.tables import read
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
 FOLD = fd.discretize(fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60), SHEET)
@@ -56,7 +56,7 @@ def test_a_case_in_writing_keeps_its_contact():
     [
         ({"thicknes": 1.0}, r"\.thicknes: unknown key; did you mean 'thickness'"),
         ({"thickness": -1.0}, r"\.thickness = -1"),
-        ({"planes": {}}, r"\.planes = .*: must be tables"),
+        ({"planes": {}}, r"\.planes = .*: must be a list of tables"),
         ({"planes": [{"point": [0, 0, 0]}]}, r"\.planes\[0\]\.normal: missing"),
         ({"planes": [{"point": [0, 0, 0], "normal": "z"}]}, r"\.planes\[0\]\.normal = "),
         (1, " = 1: must be a table"),
@@ -64,7 +64,7 @@ def test_a_case_in_writing_keeps_its_contact():
 )
 def test_tables_name_what_is_wrong(table, message):
     with pytest.raises(InputError, match=message):
-        contact_from(table)
+        read(fd.Contact, "", table)
 
 
 CONTACT = f"""{FOLD_TEXT}[contact]

@@ -9,7 +9,7 @@ import pytest
 
 import foldyn as fd
 from case_texts import FOLD_TEXT
-from foldyn.cases.loads import load_from
+from foldyn.cases.loads import LOAD
 from foldyn.errors import InputError
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1000.0)
@@ -108,8 +108,8 @@ def test_creases_that_cannot_fold_so(load, message):
     "key", ["angle = 100", "fold_angle = 80.5", 'fraction = "45%"', "fold_angle = [80.5, -3]"]
 )
 def test_from_a_table_and_back(key):
-    load = load_from(loads(f"creases = [0, 1]\n{key}"))
-    assert load_from(load.table()) == load
+    load = LOAD("", loads(f"creases = [0, 1]\n{key}"))
+    assert LOAD("", load.table()) == load
     assert len(load.table()) == 2
 
 

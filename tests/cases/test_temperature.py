@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.cases.loads import load_from
+from foldyn.cases.loads import LOAD
 from foldyn.checks import tangent_error
 from foldyn.dynamics import prepare
 from foldyn.errors import InputError
@@ -310,4 +310,4 @@ def test_the_code_of_the_page_runs() -> None:
     table = re.search(r"^```toml\n(.*?)^```$", page.read_text("utf-8"), re.M | re.S)
     assert table
     (load,) = tomllib.loads(table[1])["loads"]
-    assert load_from(load).layers == names["bimetal"].layers
+    assert LOAD("", load).layers == names["bimetal"].layers

@@ -246,7 +246,7 @@ def test_from_a_case_file_to_a_result_and_back(model, read, kept):
     ("panels", "message"),
     [
         ("panels = [9]\nthickness = 1", r"panels\[0\].panels: panel 9 is out of"),
-        ("panels = [0]", r"sheet: panels\[0\].panels: give what differs there"),
+        ("panels = [0]", r"sheet\.panels\[0\].panels: give what differs there"),
         ("thickness = 1", r"sheet.panels\[0\].panels: missing"),
         ("panels = [0, 0]\nthickness = 1", "panel 0 is listed twice"),
         ("panels = [0]\nthick = 1", r"panels\[0\].thick: unknown key"),

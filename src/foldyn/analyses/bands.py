@@ -5,12 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
-from pydantic import Field, PlainValidator, model_validator
 
 from foldyn.analyses.bands_page import bands_sections
 from foldyn.analyses.bars import bar
@@ -20,11 +19,16 @@ from foldyn.analyses.cell_states import (
     cell_states,
     coordinate,
     one_key,
-    some_periods,
-    stretches,
 )
-from foldyn.analyses.sections import Count, Positive, Section, section_of
+from foldyn.analyses.sections import (
+    AnalysisSection,
+    Count,
+    Positive,
+    Text,
+    whole_number,
+)
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, bar_closed
+from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.cases.loads import Actuate
 from foldyn.errors import InputError
@@ -33,6 +37,8 @@ from foldyn.linear.band_gaps import ALL
 from foldyn.patterns.screw import Screw
 from foldyn.results.dataset import bands_dataset
 from foldyn.results.quantities import BANDS, GAPS
+from foldyn.tables import Section, TableOf
+from foldyn.values import indices, number, number_or_list
 
 AROUND = {1: "G-X", 2: "G-X-M-Y-G"}
 """Paths around the zone by its dimensions, where a file names none."""
@@ -43,27 +49,26 @@ ABOVE = 1.05
 COORDINATES = ("distance", "wave_vector", "zone_wave_vector", "leg")
 
 
-class ScrewSection(section_of(Screw)):
-    """[analysis.screw]: arguments of `Screw`."""
-
-
-class BandsSection(Section):
+class BandsSection(AnalysisSection):
     """[analysis] of kind "bands"."""
 
-    kind: str
-    path: str | None = None
+    path: Text | None = None
     points: Count = 60
     count: Count = 6
-    zone: Annotated[int, Field(ge=2, le=MOST_ZONE)] | None = None
-    attenuation: Annotated[int, Field(ge=1, le=MOST_LEVELS)] | None = None
-    vary: Annotated[Any, PlainValidator(one_key)] = None
+    zone: Annotated[int | None, Check(whole_number, least=2, most=MOST_ZONE)] = None
+    attenuation: Annotated[int | None, Check(whole_number, most=MOST_LEVELS)] = None
+    vary: Annotated[Any, Check(one_key)] = None
     state: About = "rest"
-    stretch: Annotated[Any, PlainValidator(stretches)] = None
-    turn: float | None = None
+    stretch: Annotated[
+        float | Sequence[float] | None, Check(number_or_list, what="period", above=0.0)
+    ] = None
+    turn: Annotated[float | None, Check(number)] = None
     secant: Secant = None
-    periods: Annotated[Any, PlainValidator(some_periods)] = None
+    periods: Annotated[
+        int | Sequence[int] | None, Check(indices, what="period", alternative="of the pattern")
+    ] = None
     vectors: Any = None
-    screw: ScrewSection | None = None
+    screw: Annotated[Screw | None, TableOf(Screw)] = None
     tolerance: Positive = 1e-6
 
 
@@ -77,8 +82,9 @@ class BandsSchema(VibrationSchema):
     analysis: BandsSection
     output: BandsOutput = BandsOutput()
 
-    @model_validator(mode="after")
-    def _folds_only(self) -> Self:
+    def agree(self) -> None:
+        """Refuse loads that do more than fold."""
+        super().agree()
         for i, load in enumerate(self.loads):
             if self.initial is None and not isinstance(load, Actuate):
                 raise InputError(
@@ -87,7 +93,6 @@ class BandsSchema(VibrationSchema):
                     "initial.file",
                     f"loads[{i}]",
                 )
-        return self
 
 
 class BandsAnalysis(Analysis):

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from foldyn.analyses.provenance import Call, provenance
 from foldyn.analyses.sections import CaseSchema, DesignSection, SweepSection
 from foldyn.analyses.start import Start, start_of
+from foldyn.arguments import arguments
 from foldyn.cases import Case, State
 from foldyn.cases.models import MODELS
 from foldyn.dynamics import Keeping
@@ -128,7 +129,7 @@ class Analysis(ABC):
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
         """What the checked sections of a case file ask for."""
-        return cls({name: value for name, value in schema.analysis if name != "kind"})
+        return cls({k: value for k, value in schema.analysis.values().items() if k != "kind"})
 
     @abstractmethod
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
@@ -256,7 +257,7 @@ class CaseFile:
     def start_keys(self) -> dict[str, Any]:
         """What its table [initial] says; nothing where it has none."""
         section = getattr(self._schema, "initial", None)
-        return {} if section is None else section.model_dump(exclude_unset=True)
+        return {} if section is None else {key: getattr(section, key) for key in section.stated}
 
     def case(self, mass: str | None = None) -> Case:
         """Case with one of the mass rules, by default the first that the file names."""
@@ -351,7 +352,7 @@ class CaseFile:
     def _section(self, key: str) -> str:
         """Table in which the file has a key, with a dot; "" for what is none."""
         for name in ("analysis", "output", "model"):
-            if key and key in type(getattr(self._schema, name)).model_fields:
+            if key in arguments(type(getattr(self._schema, name))):
                 return f"{name}."
         return ""
 

@@ -15,10 +15,9 @@ from foldyn.analyses.ranges import Varied, varied
 from foldyn.analyses.vibration import about
 from foldyn.cases import Case, State
 from foldyn.cases.units import unit_of
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError, InputError, within
 from foldyn.linear import UnitCell, relaxed
-from foldyn.patterns.screw import Screw
-from foldyn.values import indices, number_or_list, one_or_each, show
+from foldyn.values import one_or_each, show
 
 MOST_STATES = 200
 ASIDE = ("analysis", "output", "sweep", "design", "title")
@@ -28,8 +27,13 @@ STATED = ("stretch", "turn")
 """but for these of [analysis]."""
 
 
-def one_key(value: Any) -> Varied:
+def one_key(name: str, value: Any) -> Varied:
     """The one key along which the states of a file follow each other."""
+    with within(name):
+        return _one_key(value)
+
+
+def _one_key(value: Any) -> Varied:
     one, *more = varied(value, sampled=False)
     if more:
         raise InputError(
@@ -42,16 +46,6 @@ def one_key(value: Any) -> Varied:
     if not one.numeric or len(one.values) > MOST_STATES:
         raise InputError(f" = {show(value)}: give numbers, at most {MOST_STATES}")
     return one
-
-
-def stretches(value: Any) -> Any:
-    """One factor on the periods, or one for each."""
-    return number_or_list("", value, "period", above=0.0)
-
-
-def some_periods(value: Any) -> tuple[int, ...]:
-    """Numbers of periods of the pattern."""
-    return indices("", value, "period", "of the pattern")
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +138,7 @@ def cell_states(case_file: CaseFile, mass: str, given: Mapping[str, Any]) -> lis
 
 def _cell(case: Case, given: Mapping[str, Any]) -> UnitCell:
     """The cell of a case, which repeats as the file says."""
-    vectors, tolerance = given["vectors"], given["tolerance"]
-    screw = None if given["screw"] is None else Screw(**given["screw"].model_dump())
+    vectors, screw, tolerance = given["vectors"], given["screw"], given["tolerance"]
     if given["periods"] is None:
         return UnitCell(case, vectors, screw, tolerance)
     if vectors is not None or screw is not None:

@@ -7,13 +7,18 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 import xarray
-from pydantic import Field, PlainValidator, model_validator
 
 from foldyn import plots
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of
-from foldyn.analyses.sections import CaseSchema, Count, Positive, Section
+from foldyn.analyses.sections import (
+    AnalysisSection,
+    CaseSchema,
+    Count,
+    Positive,
+)
 from foldyn.analyses.vibration import Secant
+from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.cases.models import SHELL
 from foldyn.errors import InputError
@@ -25,22 +30,26 @@ from foldyn.linear.shell_of import checked_divisions
 from foldyn.report.album import Album, ByRule
 from foldyn.report.sections import Heading, Table, Text
 from foldyn.report.sections import Section as PageSection
+from foldyn.tables import Section
 from foldyn.values import choice, show
 
 
-def _names(value: Any) -> list[str]:
+def _names(name: str, value: Any) -> list[str]:
     if not isinstance(value, list):
-        raise InputError(f' = {show(value)}: must be a list of names, as in ["plate"]')
-    return [choice(f"[{i}]", name, MODELS) for i, name in enumerate(value)]
+        raise InputError(f' = {show(value)}: must be a list of names, as in ["plate"]', name)
+    return [choice(f"{name}[{i}]", one, MODELS) for i, one in enumerate(value)]
 
 
-class FidelitySection(Section):
+def _divisions(name: str, value: Any) -> Any:
+    return checked_divisions(value, name)
+
+
+class FidelitySection(AnalysisSection):
     """[analysis] of kind "fidelity"."""
 
-    kind: str
     count: Count = 6
-    divisions: Annotated[Any, PlainValidator(lambda value: checked_divisions(value, ""))] = None
-    models: Annotated[list[str] | None, PlainValidator(_names)] = None
+    divisions: Annotated[Any, Check(_divisions)] = None
+    models: Annotated[list[str] | None, Check(_names)] = None
     secant: Secant = None
     vertex_radius: Positive | None = None
 
@@ -53,17 +62,16 @@ class FidelitySchema(CaseSchema):
     """A case file of kind "fidelity"."""
 
     analysis: FidelitySection
-    output: FidelityOutput = Field(default_factory=FidelityOutput)
+    output: FidelityOutput = FidelityOutput()
 
-    @model_validator(mode="after")
-    def _is_no_shell(self) -> Self:
+    def agree(self) -> None:
+        """Refuse the shell."""
         if self.model.kind == SHELL:
             raise InputError(
                 f" = {show(SHELL)}: bars and hinges are compared with the shell, which is made "
                 "from them; leave out kind and what only a shell has",
                 "model.kind",
             )
-        return self
 
 
 class FidelityAnalysis(Analysis):

@@ -5,31 +5,35 @@ What shakes the structure stands under [[drive]].
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Self
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
-from pydantic import Field, PlainValidator, model_validator
 
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, movable
 from foldyn.analyses.frf_page import frf_sections
 from foldyn.analyses.motion import check_massless
-from foldyn.analyses.sections import Positive, ShownSection, one_of, part, section_of
+from foldyn.analyses.sections import (
+    AnalysisSection,
+    Positive,
+    ShownSection,
+    one_of,
+)
 from foldyn.analyses.vibration import About, Internal, Secant, VibrationSchema, about, bar_closed
-from foldyn.arguments import arguments
+from foldyn.arguments import Check, arguments
 from foldyn.cases import BaseMotion, Case, Force
-from foldyn.cases.decode import check_keys, part_from
+from foldyn.cases.decode import PartOf
 from foldyn.cases.directions import DIRECTIONS
 from foldyn.cases.models import SHELL
 from foldyn.dynamics import Progress
-from foldyn.errors import InputError, within
+from foldyn.errors import InputError
 from foldyn.linear import frf
 from foldyn.linear.frf import METHODS, PER_FORCE
 from foldyn.linear.internal_modes import check_internal
+from foldyn.tables import ListOf, check_keys
 from foldyn.values import number, show, whole
 
 MOST_FREQUENCIES = 100_000
@@ -37,93 +41,96 @@ OPTIONS = frozenset(key for method in METHODS.values() for key in arguments(meth
 """Options of all methods."""
 
 
-def _frequencies(value: Any) -> NDArray[np.float64]:
+def _frequencies(name: str, value: Any) -> NDArray[np.float64]:
     if isinstance(value, dict):
-        return _range(value)
+        return _range(name, value)
     if not isinstance(value, list) or not value:
         raise InputError(
             f" = {show(value)}: must be {{ first = 1, last = 25, count = 241 }}, in Hz, or a list "
-            "of frequencies"
+            "of frequencies",
+            name,
         )
-    listed = [number(f"[{i}]", item, least=0.0) for i, item in enumerate(value)]
+    listed = [number(f"{name}[{i}]", item, least=0.0) for i, item in enumerate(value)]
     for i in range(1, len(listed)):
         if listed[i] <= listed[i - 1]:
             raise InputError(
-                f"[{i}] = {show(value[i])}: must be greater than the frequency before it "
-                f"({show(value[i - 1])})"
+                f" = {show(value[i])}: must be greater than the frequency before it "
+                f"({show(value[i - 1])})",
+                f"{name}[{i}]",
             )
     return np.array(listed)
 
 
-def _range(table: dict[str, Any]) -> NDArray[np.float64]:
+def _range(name: str, table: dict[str, Any]) -> NDArray[np.float64]:
     """Frequencies spaced evenly, first and last among them."""
     known = ("first", "last", "count")
-    check_keys(table, known)
+    check_keys(table, known, name)
     for key in known:
         if key not in table:
-            raise InputError(": missing; give first and last (Hz) and their count", f".{key}")
-    first = number(".first", table["first"], least=0.0)
-    last = number(".last", table["last"], above=first)
-    count = whole(".count", table["count"], least=2, most=MOST_FREQUENCIES)
+            raise InputError(": missing; give first and last (Hz) and their count", f"{name}.{key}")
+    first = number(f"{name}.first", table["first"], least=0.0)
+    last = number(f"{name}.last", table["last"], above=first)
+    count = whole(f"{name}.count", table["count"], least=2, most=MOST_FREQUENCIES)
     return np.linspace(first, last, count)
 
 
-class FrfSection(*(section_of(method.options) for method in METHODS.values())):
+class FrfSection(*(method.options for method in METHODS.values()), AnalysisSection):
     """[analysis] of kind "frf"."""
 
-    kind: str
-    frequencies: Annotated[Any, PlainValidator(_frequencies)]
+    frequencies: Annotated[Any, Check(_frequencies)]
     method: Annotated[str, one_of(METHODS)] = "direct"
     state: About = "rest"
     secant: Secant = None
     internal: Internal = 0
     amplitude: Positive = 1.0
 
-    @model_validator(mode="after")
-    def _fits_the_method(self) -> Self:
-        given, method = self.model_fields_set, METHODS[self.method]
+    def agree(self) -> None:
+        """Ask for what fits the method."""
+        given, method = self.stated, METHODS[self.method]
         for key in sorted(given & OPTIONS):
             owners = [name for name, other in METHODS.items() if key in arguments(other.options)]
             if self.method not in owners:
                 raise InputError(
                     f": only for method = {' or '.join(show(owner) for owner in owners)}; leave it "
                     "out",
-                    f".{key}",
+                    key,
                 )
         if "secant" in given and method.by_amplitude:
             raise InputError(
                 f" = {show(self.secant)}: the method {self.method} goes by the amplitude of the "
                 "drive; leave it out, and give amplitude",
-                ".secant",
+                "secant",
             )
         if self.internal and method.by_amplitude:
             raise InputError(
                 f" = {self.internal}: the method {self.method} goes by the amplitude of the drive, "
                 'internal amplitudes are for small vibrations; take method = "direct" or "modal", '
                 "or leave it out",
-                ".internal",
+                "internal",
             )
-        with within("."):
-            method.options(**self.options())
-        return self
+        method.options(**self.options())
 
     def options(self) -> dict[str, Any]:
         """What the file says of the options of its method."""
-        return {key: getattr(self, key) for key in OPTIONS if key in self.model_fields_set}
-
-
-def _drive(table: Any, folder: Path | None) -> Force | BaseMotion:
-    """A force on nodes, or a motion of the base, from its table of [[drive]]."""
-    if isinstance(table, Mapping):
-        number(".displacement", table.get("displacement", 1.0), above=0.0)
-        table = {**table, "history": {"kind": "constant"}}
-    asked = "nodes and force, or base (the axis of a base that moves)"
-    return part_from(table, (Force, BaseMotion), "drive", folder, asked)
+        return {key: getattr(self, key) for key in OPTIONS & self.stated}
 
 
 NO_HISTORY = (
     "a drive has an amplitude only, analysis.method says how it goes over time; leave it out"
 )
+DRIVE = PartOf(
+    (Force, BaseMotion), "drive", "nodes and force, or base (the axis of a base that moves)"
+)
+
+
+def _drive(name: str, table: Any) -> Force | BaseMotion:
+    """A force on nodes, or a motion of the base, from its table of [[drive]]."""
+    if isinstance(table, Mapping):
+        if "history" in table:
+            raise InputError(f" = {show(table['history'])}: {NO_HISTORY}", f"{name}.history")
+        number(f"{name}.displacement", table.get("displacement", 1.0), above=0.0)
+        table = {**table, "history": {"kind": "constant"}}
+    return DRIVE(name, table)
 
 
 class FrfOutput(ShownSection):
@@ -137,17 +144,14 @@ class FrfSchema(VibrationSchema):
     """A case file of kind "frf"."""
 
     analysis: FrfSection
-    drive: list[Annotated[Any, part(_drive, history=NO_HISTORY)]] = Field(min_length=1)
+    drive: Annotated[Sequence[Any], ListOf(Check(_drive), least=1)]
     output: FrfOutput = FrfOutput()
 
-    @model_validator(mode="after")
-    def _moves_the_model(self) -> Self:
+    def agree(self) -> None:
+        """Let the integrator move the model, and a base drive alone."""
+        super().agree()
         if self.model.kind == SHELL:
             check_massless(self, "integrator")
-        return self
-
-    @model_validator(mode="after")
-    def _drives_alike(self) -> Self:
         bases = [i for i, one in enumerate(self.drive) if isinstance(one, BaseMotion)]
         if bases and len(self.drive) > 1:
             raise InputError(
@@ -160,7 +164,6 @@ class FrfSchema(VibrationSchema):
                 "as transmissibility; leave it out",
                 "output.quantity",
             )
-        return self
 
 
 class FrfAnalysis(Analysis):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from foldyn.errors import InputError
-from foldyn.values import show
+from foldyn.values import SHOWN, show
 
 LONGEST = 200
 """Characters of a key: no case file nests its tables that deep."""
@@ -31,6 +31,15 @@ def parts(key: Any) -> tuple[str | int, ...]:
             '"sheet.thickness" or "loads[0].force[2]"'
         )
     return tuple(int(p) if p.isdigit() else p for p in re.findall(r"\w+", key))
+
+
+def dotted(location: Sequence[str | int]) -> str:
+    """Path of a key: ("loads", 0, "nodes") becomes "loads[0].nodes"."""
+    text = ""
+    for part in location:
+        word = f"[{part}]" if isinstance(part, int) else part[:SHOWN]
+        text += f".{word}" if text and isinstance(part, str) else word
+    return text
 
 
 def value_at(document: Mapping[str, Any], key: str) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -12,8 +12,15 @@ from numpy.typing import NDArray
 from foldyn import plots
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
-from foldyn.analyses.sections import Animation, Count, Section, ShownSection, some_shapes
+from foldyn.analyses.sections import (
+    AnalysisSection,
+    Animation,
+    Count,
+    ShownSection,
+    some_shapes,
+)
 from foldyn.analyses.vibration import About, Internal, Secant, VibrationSchema, about, bar_closed
+from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.linear import character, mac, modes, pair_modes
 from foldyn.linear.internal_modes import check_internal
@@ -28,10 +35,9 @@ MOST_TRIANGLES = 25_000
 """Triangles that each of its pictures has at most, unless a single mode has more."""
 
 
-class ModesSection(Section):
+class ModesSection(AnalysisSection):
     """[analysis] of kind "modes"."""
 
-    kind: str
     count: Count = 6
     state: About = "rest"
     secant: Secant = None
@@ -41,8 +47,10 @@ class ModesSection(Section):
 class ModesOutput(ShownSection):
     """[output] of modes: what is shown, and along which axis and at which nodes it is judged."""
 
-    shapes: Annotated[int | tuple[int, ...], some_shapes("modes", "mode", least=1)] = 6
-    animation: Animation | None = None
+    shapes: Annotated[
+        int | Sequence[int], Check(some_shapes, drawn="modes", what="mode", least=1)
+    ] = 6
+    animation: Animation = None
 
 
 class ModesSchema(VibrationSchema):

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Annotated, Any, Self
 
 import numpy as np
 import xarray
-from pydantic import Field, PlainValidator, model_validator
 
 from foldyn import plots
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of
-from foldyn.analyses.sections import Animation, CaseSchema, Positive, Section, ShownSection, one_of
+from foldyn.analyses.sections import (
+    AnalysisSection,
+    Animation,
+    CaseSchema,
+    Positive,
+    ShownSection,
+    Switch,
+    one_of,
+)
 from foldyn.analyses.start import MotionStart
+from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.cases.models import SHELL
 from foldyn.dynamics import METHODS, Keeping, prepare
@@ -43,32 +52,31 @@ MASSLESS_METHODS = tuple(name for name, method in METHODS.items() if method.mass
 """Integrators that take dofs without mass, as the rotations of a shell are."""
 
 
-def _every(value: Any) -> int | float:
+def _every(name: str, value: Any) -> int | float:
     if isinstance(value, int) and not isinstance(value, bool):
-        return whole("", value, least=1, what="steps")
-    return number("", value, above=0.0)
+        return whole(name, value, least=1, what="steps")
+    return number(name, value, above=0.0)
 
 
-class MotionSection(Section):
+class MotionSection(AnalysisSection):
     """[analysis] of kind "dynamics"."""
 
-    kind: str
     duration: Positive
     method: Annotated[str, one_of((AUTO, *METHODS))] = "rk4"
     dt: Positive | None = None
-    force: bool = False
+    force: Switch = False
     tolerance: Positive | None = None
-    start: float = 0.0
-    spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+    start: Annotated[float, Check(number)] = 0.0
+    spectral_radius: Annotated[float | None, Check(number, least=0.0, most=1.0)] = None
     device: Annotated[str, one_of(("cpu", "gpu"))] = "cpu"
 
 
 class MotionOutput(ShownSection):
     """[output] of a motion: what is kept and shown."""
 
-    every: Annotated[Any, PlainValidator(_every)] = None
+    every: Annotated[int | float | None, Check(_every)] = None
     max_frequency: Positive | None = None
-    animation: Animation | None = None
+    animation: Animation = None
 
 
 class MotionSchema(CaseSchema):
@@ -78,13 +86,12 @@ class MotionSchema(CaseSchema):
     analysis: MotionSection
     output: MotionOutput = MotionOutput()
 
-    @model_validator(mode="after")
-    def _moves_the_model(self) -> Self:
+    def agree(self) -> None:
+        """Let the method move the model."""
         if self.model.kind == SHELL:
-            if "method" not in self.analysis.model_fields_set:
-                self.analysis.method = AUTO
+            if "method" not in self.analysis.stated:
+                self._set(analysis=replace(self.analysis, method=AUTO))
             check_massless(self, "method", (AUTO, *MASSLESS_METHODS))
-        return self
 
 
 def check_massless(schema: Any, key: str, fit: Sequence[str] = MASSLESS_METHODS) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from typing import Annotated, Any, Self
@@ -10,68 +10,72 @@ from typing import Annotated, Any, Self
 import numpy as np
 import xarray
 from numpy.typing import NDArray
-from pydantic import Field, PlainValidator, ValidationInfo
 
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
 from foldyn.analyses.path_page import path_sections
 from foldyn.analyses.sections import (
+    AnalysisSection,
     Animation,
     CaseSchema,
     Count,
     ModelSection,
     Positive,
-    Section,
     ShownSection,
+    Switch,
     check_mass,
-    contact_part,
     one_of,
-    part,
     some_shapes,
+    still,
 )
 from foldyn.analyses.start import StoredStart
-from foldyn.cases import Case, resolve_nodes
+from foldyn.arguments import Check
+from foldyn.cases import Case, Contact, resolve_nodes
 from foldyn.cases.directions import DIRECTIONS
-from foldyn.cases.loads import load_from
-from foldyn.cases.supports import support_from
+from foldyn.cases.loads import LOAD
+from foldyn.cases.supports import SUPPORT
 from foldyn.errors import InputError
 from foldyn.plots.along import critical_word, is_loose
 from foldyn.statics import METHODS, Point, Settings, trace
 from foldyn.statics.newton import settings_of
-from foldyn.statics.reached import Reached, reached_from
+from foldyn.statics.reached import UNTIL, Reached
+from foldyn.tables import ListOf, TableOf
 from foldyn.values import indices, number, show
 
 SETTINGS = ("tolerance", "largest_turn", "stability")
 """Keys that are settings of the solver."""
 
 
-def _one_mass(value: Any, info: ValidationInfo) -> list[str]:
+def _one_mass(name: str, value: Any, beside: Mapping[str, Any]) -> list[str]:
     if isinstance(value, list):
         raise InputError(
             f" = {show(value)}: a path is computed once; give one rule, or none: only gravity and "
-            "inertia relief use the mass"
+            "inertia relief use the mass",
+            name,
         )
-    return [check_mass("", value, info)]
+    return [check_mass(name, value, beside)]
 
 
-def _constant(value: Any) -> str | tuple[int, ...]:
+def _constant(name: str, value: Any) -> str | tuple[int, ...]:
     if value == "gravity":
         return "gravity"
     if isinstance(value, str):
-        raise InputError(f' = {show(value)}: give "gravity", or numbers of [[loads]], as in [0]')
-    return indices("", value, "load", 'or "gravity"')
+        raise InputError(
+            f' = {show(value)}: give "gravity", or numbers of [[loads]], as in [0]', name
+        )
+    return indices(name, value, "load", 'or "gravity"')
 
 
-def _load_factors(value: Any) -> list[float]:
+def _load_factors(name: str, value: Any) -> list[float]:
     if not isinstance(value, list) or not value:
-        raise InputError(f" = {show(value)}: must be a list of numbers, as in [0, 0.5, 1]")
-    return [number(f"[{i}]", item) for i, item in enumerate(value)]
+        raise InputError(f" = {show(value)}: must be a list of numbers, as in [0, 0.5, 1]", name)
+    return [number(f"{name}[{i}]", item) for i, item in enumerate(value)]
 
 
-def _durations(value: Any) -> float | list[float]:
+def _durations(name: str, value: Any) -> float | list[float]:
     if isinstance(value, list):
-        return [number(f"[{i}]", item, least=0.0, unit="s") for i, item in enumerate(value)]
-    return number("", value, least=0.0, unit="s")
+        return [number(f"{name}[{i}]", item, least=0.0, unit="s") for i, item in enumerate(value)]
+    return number(name, value, least=0.0, unit="s")
 
 
 TIMELESS = (
@@ -83,44 +87,43 @@ NO_BASE = (
 )
 
 
-class PathSection(Section):
+class PathSection(AnalysisSection):
     """[analysis] of kind "statics"."""
 
-    kind: str
     method: Annotated[str, one_of(METHODS)] = "newton"
-    load_factors: Annotated[list[float] | None, PlainValidator(_load_factors)] = None
+    load_factors: Annotated[list[float] | None, Check(_load_factors)] = None
     steps: Count | None = None
-    duration: Annotated[float | list[float] | None, PlainValidator(_durations)] = None
-    first_step: float | None = None
-    constant: Annotated[str | tuple[int, ...], PlainValidator(_constant)] = ()
-    until: Annotated[Reached | None, PlainValidator(reached_from)] = None
-    inertia_relief: bool = False
-    tolerance: Annotated[float, Field(ge=1e-14, le=1e-2)] = Settings.tolerance
+    duration: Annotated[float | list[float] | None, Check(_durations)] = None
+    first_step: Annotated[float | None, Check(number)] = None
+    constant: Annotated[str | Sequence[int], Check(_constant)] = ()
+    until: Annotated[Reached | None, UNTIL] = None
+    inertia_relief: Switch = False
+    tolerance: Annotated[float, Check(number, least=1e-14, most=1e-2)] = Settings.tolerance
     largest_turn: Positive = Settings.largest_turn
-    stability: bool = Settings.stability
+    stability: Switch = Settings.stability
 
 
 class PathOutput(ShownSection):
     """[output] of a path: what is shown."""
 
     axis: Annotated[Any, one_of(DIRECTIONS)] = None
-    shapes: Annotated[int | tuple[int, ...], some_shapes("shapes", "point")] = 4
-    animation: Animation | None = None
+    shapes: Annotated[int | Sequence[int], Check(some_shapes, drawn="shapes", what="point")] = 4
+    animation: Animation = None
 
 
 class PathModel(ModelSection):
     """[model] of a path, with one mass rule at most."""
 
-    mass: Annotated[list[str] | None, PlainValidator(_one_mass)] = None
+    mass: Annotated[str | None, Check(_one_mass)] = None
 
 
 class PathSchema(CaseSchema):
     """A case file of kind "statics"."""
 
     model: PathModel = PathModel()
-    supports: list[Annotated[Any, part(support_from, base=NO_BASE, history=TIMELESS)]] = []
-    loads: list[Annotated[Any, part(load_from, history=TIMELESS)]] = []
-    contact: Annotated[Any, contact_part(TIMELESS)] = None
+    supports: Annotated[Sequence[Any], ListOf(SUPPORT.without(base=NO_BASE, history=TIMELESS))] = ()
+    loads: Annotated[Sequence[Any], ListOf(LOAD.without(history=TIMELESS))] = ()
+    contact: Annotated[Contact | None, Check(still, why=TIMELESS), TableOf(Contact)] = None
     initial: StoredStart | None = None
     analysis: PathSection
     output: PathOutput = PathOutput()

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from inspect import signature
 from typing import Any
 
-from foldyn.cases.decode import check_keys
-from foldyn.errors import Faults, InputError
+from foldyn.errors import Faults, InputError, within
 from foldyn.patterns import GENERATORS
 from foldyn.patterns.facets import FACETS as KINDS_OF_FACETS
+from foldyn.tables import check_keys, check_table
 from foldyn.values import choice, nearest, number_or_list, numbers, show
 
 HINGES, FACES = "hinge_offset", "faces"
@@ -22,10 +22,13 @@ INLINE = ("vertices", "faces", "assignments", "fold_angles", "families")
 """Keys of [pattern] for a pattern that the case file holds."""
 
 
-def checked_pattern(value: Any) -> dict[str, Any]:
+def checked_pattern(name: str, value: Any) -> dict[str, Any]:
     """The table, if it is one of a pattern; else InputError."""
-    if not isinstance(value, Mapping):
-        raise InputError(f" = {show(value)}: must be a table, written [pattern]")
+    with within(name):
+        return _checked(check_table(name, value))
+
+
+def _checked(value: Mapping[str, Any]) -> dict[str, Any]:
     sources = [key for key in ("kind", "file", "vertices") if key in value]
     if len(sources) > 1:
         raise InputError(f": give only one of {' and '.join(sources)}")

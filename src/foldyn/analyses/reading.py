@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from foldyn.analyses.casefile import CaseFile, Output
 from foldyn.analyses.conversion import converted, flagged, remodeled
-from foldyn.analyses.keys import replaced
-from foldyn.analyses.messages import describe, dotted
+from foldyn.analyses.keys import dotted, replaced
 from foldyn.analyses.pattern_section import FACES, FACETS, HINGES, READING
 from foldyn.analyses.registry import ANALYSES, schema_of
 from foldyn.cases import Case, resolve_nodes
@@ -27,7 +25,8 @@ from foldyn.input_files import from_toml, path_of, read_text
 from foldyn.patterns import GENERATORS, Pattern, convex, thicken, welded
 from foldyn.patterns.convex import what_was_cut
 from foldyn.patterns.facets import HINGE, LINE, WELD
-from foldyn.structures import Sheet, sheet_from
+from foldyn.structures import Sheet
+from foldyn.tables import read, told
 from foldyn.values import LARGEST, MOST, SMALLEST, show
 
 MOST_MIB = 2
@@ -111,12 +110,11 @@ def read_as(
 
 def validated(path: Path, document: Mapping[str, Any]) -> Any:
     """Sections of a case file, checked one by one and with each other."""
-    shape: Any = schema_of(document)
+    others = {kind: analysis.schema for kind, analysis in ANALYSES.items()}
     try:
-        return shape.model_validate(document, context={"folder": path.parent})
-    except ValidationError as error:
-        shapes = {kind: analysis.schema for kind, analysis in ANALYSES.items()}
-        raise InputError(describe(error, shape, shapes), "", path) from None
+        return read(schema_of(document), "", document, path.parent, others=others)
+    except InputError as error:
+        raise told(error, path) from None
 
 
 def case_of_document(
@@ -133,12 +131,9 @@ def case_of_document(
     model = MODELS[schema.model.kind]
     kind, faults = ANALYSES[schema.analysis.kind], Faults()
     made = pattern is not None
-    sheet: Any = None
-    resolved: Any = None
+    sheet, resolved = schema.sheet, None
     with faults.collected():
         pattern = pattern if made else _pattern(schema.pattern, path.parent)
-    with faults.collected():
-        sheet = sheet_from(schema.sheet.model_dump())
     if HINGES in schema.pattern and not made and not faults.found:
         with faults.collected():
             pattern = _thick(pattern, sheet, schema.pattern[HINGES])
@@ -185,7 +180,7 @@ def case_of_document(
             if chosen is None
             else resolve_nodes(case.structure, chosen, "output.nodes")
         )
-    shown = {name: value for name, value in schema.output if name not in ("nodes", "every")}
+    shown = {k: v for k, v in schema.output.values().items() if k not in ("nodes", "every")}
     case_file = CaseFile(
         path, schema.title, pattern, sheet, schema.model.kind, masses, analysis,
         Output(nodes, chosen is not None, **shown), schema, make,

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator
-
 from foldyn.analyses.bands import BandsAnalysis
 from foldyn.analyses.casefile import Analysis
 from foldyn.analyses.fidelity import FidelityAnalysis
@@ -16,7 +14,9 @@ from foldyn.analyses.motion import MotionAnalysis
 from foldyn.analyses.path import PathAnalysis
 from foldyn.analyses.response import ResponseAnalysis
 from foldyn.analyses.sections import CaseSchema
+from foldyn.arguments import Check
 from foldyn.errors import InputError
+from foldyn.tables import check_table
 from foldyn.values import choice
 
 ANALYSES: Mapping[str, type[Analysis]] = {
@@ -34,14 +34,11 @@ ANALYSES: Mapping[str, type[Analysis]] = {
 """By the name that `analysis.kind` has for them."""
 
 
-def _known_kind(value: Any) -> Any:
+def _known_kind(name: str, value: Any) -> Any:
     """Refuse an analysis whose kind is missing or unknown."""
-    if not isinstance(value, Mapping):
-        return value
-    if "kind" not in value:
-        raise InputError(f": missing; choose one of {', '.join(ANALYSES)}", ".kind")
-    choice(".kind", value["kind"], ANALYSES)
-    return value
+    if "kind" not in check_table(name, value):
+        raise InputError(f": missing; choose one of {', '.join(ANALYSES)}", f"{name}.kind")
+    return choice(f"{name}.kind", value["kind"], ANALYSES)
 
 
 class UnknownSchema(CaseSchema):
@@ -49,7 +46,7 @@ class UnknownSchema(CaseSchema):
 
     initial: Any = None
     drive: Any = None
-    analysis: Annotated[dict[str, Any], BeforeValidator(_known_kind)]
+    analysis: Annotated[Any, Check(_known_kind)]
     output: Any = None
 
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Self
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any
 
 import numpy as np
 import xarray
-from pydantic import Field, PlainValidator, model_validator
 
 from foldyn import plots
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
-from foldyn.analyses.sections import CaseSchema, Count, Section
+from foldyn.analyses.sections import (
+    AnalysisSection,
+    CaseSchema,
+    Count,
+    whole_number,
+)
 from foldyn.analyses.vibration import bar_closed
+from foldyn.arguments import Check
 from foldyn.dynamics import Progress
 from foldyn.errors import InputError
 from foldyn.periodic import response_curve
@@ -21,41 +26,38 @@ from foldyn.periodic.drive import Drive
 from foldyn.report.album import Album, ByRule, by_mass_rule
 from foldyn.report.sections import Heading, Table
 from foldyn.report.sections import Section as PageSection
+from foldyn.tables import Section
 from foldyn.values import number, show
 
 
-def _ends(value: Any) -> list[float] | None:
-    if value is None:
-        return None
+def _ends(name: str, value: Any) -> list[float]:
     if not isinstance(value, list) or len(value) != 2:
-        raise InputError(f" = {show(value)}: must be two numbers, as in [2.0, 5.0]")
-    ends = [number(f"[{k}]", one, above=0.0) for k, one in enumerate(value)]
+        raise InputError(f" = {show(value)}: must be two numbers, as in [2.0, 5.0]", name)
+    ends = [number(f"{name}[{k}]", one, above=0.0) for k, one in enumerate(value)]
     if ends[0] == ends[1]:
-        raise InputError(f" = {show(value)}: must be two different numbers")
+        raise InputError(f" = {show(value)}: must be two different numbers", name)
     return ends
 
 
-class ResponseSection(Section):
+class ResponseSection(AnalysisSection):
     """[analysis] of kind "response"."""
 
-    kind: str
-    frequencies: Annotated[Any, PlainValidator(_ends)] = None
-    amplitudes: Annotated[Any, PlainValidator(_ends)] = None
+    frequencies: Annotated[Sequence[float] | None, Check(_ends)] = None
+    amplitudes: Annotated[Sequence[float] | None, Check(_ends)] = None
     harmonics: Count = 9
     modes: Count | None = None
-    branches: Annotated[int, Field(ge=0)] = 1
-    longest_step: Annotated[float, Field(gt=0, le=1)] = 0.1
-    most_points: Annotated[int, Field(ge=2)] = 500
+    branches: Annotated[int, Check(whole_number, least=0)] = 1
+    longest_step: Annotated[float, Check(number, above=0.0, most=1.0)] = 0.1
+    most_points: Annotated[int, Check(whole_number, least=2)] = 500
 
-    @model_validator(mode="after")
-    def _goes_along_one(self) -> Self:
+    def agree(self) -> None:
+        """Go along one of the two."""
         if (self.frequencies is None) == (self.amplitudes is None):
             raise InputError(
                 ": give both ends of the frequencies (Hz), as frequencies = [2.0, 5.0], or of a "
                 "factor on the drive, as amplitudes = [0.1, 2.0]",
-                ".frequencies",
+                "frequencies",
             )
-        return self
 
 
 class ResponseOutput(Section):
@@ -66,7 +68,7 @@ class ResponseSchema(CaseSchema):
     """A case file of kind "response"."""
 
     analysis: ResponseSection
-    output: ResponseOutput = Field(default_factory=ResponseOutput)
+    output: ResponseOutput = ResponseOutput()
 
 
 class ResponseAnalysis(Analysis):

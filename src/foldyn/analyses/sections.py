@@ -1,34 +1,21 @@
-"""The case file's contract: the sections that all kinds of analysis share, their keys and types.
+"""The case file's contract: the tables that all kinds of analysis share, their keys and types.
 
-Each kind's own sections are in its file of `analyses`. Limits of values live here only where a
+Each kind's own tables are in its file of `analyses`. Limits of values live here only where a
 message should name the key; everything else is checked by the objects that are built from the
-sections. Validators raise InputError with a text that continues the key's path (" = -1: must be
-...", ".kind: missing ...").
+tables.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import MISSING
-from pathlib import Path
-from typing import Annotated, Any, Self
-
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    PlainValidator,
-    ValidationInfo,
-    create_model,
-    model_validator,
-)
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, Any
 
 from foldyn.analyses.pattern_section import checked_pattern
 from foldyn.analyses.ranges import SAMPLINGS, varied
 from foldyn.analyses.ties import ties_of
-from foldyn.arguments import Argument, Checked, arguments
-from foldyn.cases.air import air_from
-from foldyn.cases.contact import contact_from
+from foldyn.arguments import Check, arguments
+from foldyn.cases.air import Air
+from foldyn.cases.contact import Contact
 from foldyn.cases.damping import (
     CreaseDamping,
     Damping,
@@ -40,161 +27,183 @@ from foldyn.cases.damping import (
 )
 from foldyn.cases.decode import law_from
 from foldyn.cases.directions import AXES, check_pairs
-from foldyn.cases.loads import load_from
-from foldyn.cases.masses import mass_from
+from foldyn.cases.loads import LOAD
+from foldyn.cases.masses import MASS
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import check_nodes
-from foldyn.cases.supports import support_from
+from foldyn.cases.supports import SUPPORT
 from foldyn.errors import InputError, within
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.plots import ANIMATIONS
-from foldyn.structures import PRESETS, PanelSheet, Sheet
+from foldyn.structures import PRESETS, Sheet
 from foldyn.structures.creases import per_crease
 from foldyn.structures.rigid_plates import checked_panels
 from foldyn.structures.structure import CALIBRATIONS, MEMBRANES, SCHEMES
-from foldyn.values import MOST, choice, indices, number_or_list, numbers, show, vector
+from foldyn.tables import ListOf, Section, TableOf, check_table
+from foldyn.values import (
+    MOST,
+    choice,
+    indices,
+    number,
+    number_or_list,
+    numbers,
+    show,
+    vector,
+    whole,
+)
 
 MOST_SHAPES = 12
 """Deformed shapes or modes that one figure shows at most."""
 
 
-class Section(BaseModel):
-    """A table of the case file: no unknown keys, no coercion, no NaN or infinity."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
-
-
-def section_of(kind: type[Checked]) -> Any:
-    """Section whose keys are the arguments of a data class, with the checks declared there."""
-    keys: dict[str, Any] = {
-        one.key: (Annotated[Any, _validator(one)], ... if one.default is MISSING else one.default)
-        for one in arguments(kind).values()
-    }
-    return create_model(f"_{kind.__name__}", __base__=Section, **keys)
+def text(name: str, value: Any) -> str:
+    """Return `value` when it is a text."""
+    if not isinstance(value, str):
+        raise InputError(f" = {show(value)}: must be text", name)
+    return value
 
 
-def _validator(argument: Argument) -> PlainValidator:
-    return PlainValidator(lambda value: argument.checked("", value))
+def switch(name: str, value: Any) -> bool:
+    """Return `value` when it is true or false."""
+    if not isinstance(value, bool):
+        raise InputError(f" = {show(value)}: must be true or false", name)
+    return value
 
 
-def one_of(known: Iterable[str]) -> PlainValidator:
-    """Accept one of the known words."""
-    return PlainValidator(lambda value: choice("", value, known))
+def whole_number(name: str, value: Any, *, least: int = 1, most: int = MOST) -> int:
+    """Return `value` when it is a whole number within bounds."""
+    number(name, whole(name, value), least=least, most=most)
+    return value
 
 
-def some_shapes(drawn: str, what: str, least: int = -MOST) -> PlainValidator:
-    """Accept how many shapes are drawn, or their numbers.
+def table(name: str, value: Any) -> dict[str, Any]:
+    """Return a table of any keys."""
+    return dict(check_table(name, value))
+
+
+def some_shapes(
+    name: str, value: Any, drawn: str, what: str, least: int = -MOST
+) -> int | tuple[int, ...]:
+    """Return how many shapes are drawn, or their numbers.
 
     drawn : their name in messages, "modes"
     what : what the numbers count, "mode"
     least : the least of these numbers
     """
-
-    def count_or_numbers(value: Any) -> int | tuple[int, ...]:
-        if isinstance(value, int) and not isinstance(value, bool):
-            if not 1 <= value <= MOST_SHAPES:
-                raise InputError(
-                    f" = {value}: give 1 to {MOST_SHAPES} {drawn}, or a list of {what} numbers"
-                )
-            return value
-        chosen = indices("", value, what, f"or how many {drawn} to draw")
-        if min(chosen) < least:
-            raise InputError(f" = {show(value)}: {what}s are counted from {least}")
-        if len(chosen) > MOST_SHAPES:
-            raise InputError(f": {len(chosen)} {what}s; give at most {MOST_SHAPES}")
-        return chosen
-
-    return PlainValidator(count_or_numbers)
+    if isinstance(value, int) and not isinstance(value, bool):
+        if not 1 <= value <= MOST_SHAPES:
+            raise InputError(
+                f" = {value}: give 1 to {MOST_SHAPES} {drawn}, or a list of {what} numbers", name
+            )
+        return value
+    chosen = indices(name, value, what, f"or how many {drawn} to draw")
+    if min(chosen) < least:
+        raise InputError(f" = {show(value)}: {what}s are counted from {least}", name)
+    if len(chosen) > MOST_SHAPES:
+        raise InputError(f": {len(chosen)} {what}s; give at most {MOST_SHAPES}", name)
+    return chosen
 
 
-def _masses(value: Any, info: ValidationInfo) -> list[str]:
+def _masses(name: str, value: Any, beside: Mapping[str, Any]) -> list[str]:
     names = value if isinstance(value, list) else [value]
-    known = known_masses(info)
     if not names:
-        raise InputError(f" = []: give at least one of {', '.join(known)}")
-    for i, name in enumerate(names):
-        check_mass(f"[{i}]" if isinstance(value, list) else "", name, info)
-        if name in names[:i]:
-            raise InputError(f"[{i}] = {show(name)}: is listed twice")
+        raise InputError(f" = []: give at least one of {', '.join(known_masses(beside))}", name)
+    for i, one in enumerate(names):
+        place = f"{name}[{i}]" if isinstance(value, list) else name
+        check_mass(place, one, beside)
+        if one in names[:i]:
+            raise InputError(f" = {show(one)}: is listed twice", place)
     return names
 
 
-def known_masses(info: ValidationInfo) -> list[str]:
+def known_masses(beside: Mapping[str, Any]) -> list[str]:
     """Distributions of mass of the model, or of all models where its kind is wrong."""
-    kinds = [info.data["kind"]] if "kind" in info.data else list(MODELS)
+    kinds = [beside["kind"]] if "kind" in beside else list(MODELS)
     return [name for kind in kinds for name in MODELS[kind].masses]
 
 
-def check_mass(place: str, name: Any, info: ValidationInfo) -> str:
+def check_mass(name: str, value: Any, beside: Mapping[str, Any]) -> str:
     """Return a distribution of mass that the model has."""
-    known = known_masses(info)
+    known = known_masses(beside)
     for kind, other in MODELS.items():
-        if isinstance(name, str) and name in other.masses and name not in known:
+        if isinstance(value, str) and value in other.masses and value not in known:
             raise InputError(
-                f"{place} = {show(name)}: only for model.kind = {show(kind)}; choose one of "
-                f"{', '.join(known)}"
+                f" = {show(value)}: only for model.kind = {show(kind)}; choose one of "
+                f"{', '.join(known)}",
+                name,
             )
-    return choice(place, name, known)
+    return choice(name, value, known)
 
 
-def part(read: Callable[[Any, Path | None], Any], **why: str) -> PlainValidator:
-    """Accept the table of a load or support; some keys may be refused, each for a reason."""
-
-    def read_part(value: Any, info: ValidationInfo) -> Any:
-        for key in why:
-            if isinstance(value, Mapping) and key in value:
-                raise InputError(f" = {show(value[key])}: {why[key]}", f".{key}")
-        return read(value, (info.context or {}).get("folder"))
-
-    return PlainValidator(read_part)
+def still(name: str, value: Any, why: str) -> Any:
+    """Refuse histories of planes in a table of contact."""
+    planes = value.get("planes", []) if isinstance(value, Mapping) else []
+    for i, plane in enumerate(planes if isinstance(planes, list) else []):
+        if isinstance(plane, Mapping) and "history" in plane:
+            raise InputError(f" = {show(plane['history'])}: {why}", f"{name}.planes[{i}].history")
+    return value
 
 
-def contact_part(history: str = "") -> PlainValidator:
-    """Accept the table of contact; histories of planes may be refused, for a reason."""
-
-    def read(value: Any, folder: Path | None) -> Any:
-        planes = value.get("planes", []) if isinstance(value, Mapping) else []
-        for i, plane in enumerate(planes if isinstance(planes, list) else []):
-            if history and isinstance(plane, Mapping) and "history" in plane:
-                given = show(plane["history"])
-                raise InputError(f" = {given}: {history}", f".planes[{i}].history")
-        return contact_from(value, folder)
-
-    return part(read)
-
-
-def _per_crease(value: Any) -> Any:
-    """Accept a number for all creases, one for each, or a table by name."""
+def _per_crease(name: str, value: Any) -> Any:
+    """Return a number for all creases, one for each, or a table by name."""
     return per_crease(
-        "", value if isinstance(value, Mapping) else number_or_list("", value, "crease")
+        name, value if isinstance(value, Mapping) else number_or_list(name, value, "crease")
     )
 
 
-Positive = Annotated[float, Field(gt=0)]
-Count = Annotated[int, Field(ge=1, le=MOST)]
-Whole = Annotated[int, Field(ge=-MOST, le=MOST)]
-Nodes = Annotated[Any, PlainValidator(lambda value: check_nodes("", value))]
-Vector = Annotated[Any, PlainValidator(lambda value: vector("", value))]
-BarLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, BAR_LAWS))]
-HingeLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, HINGE_LAWS))]
-PerCrease = Annotated[Any, PlainValidator(_per_crease)]
-Edges = Annotated[Any, PlainValidator(lambda value: _edges(value))]
-Rigid = Annotated[Any, PlainValidator(lambda value: checked_panels(value, MOST, ""))]
-Animation = Annotated[str, one_of(ANIMATIONS)]
+def _law(name: str, value: Any, laws: Mapping[str, type]) -> Any:
+    with within(name):
+        return law_from(value, laws)
 
 
-def _edges(value: Any) -> Any:
-    return check_nodes("", value) if isinstance(value, str) else check_pairs("", value)
+def _edges(name: str, value: Any) -> Any:
+    return check_nodes(name, value) if isinstance(value, str) else check_pairs(name, value)
 
 
-class PanelsSection(section_of(PanelSheet)):
-    """[[sheet.panels]]: arguments of `PanelSheet`."""
+def _rigid(name: str, value: Any) -> Any:
+    return checked_panels(value, MOST, name)
 
 
-class SheetSection(section_of(Sheet)):
-    """[sheet]: arguments of `Sheet`."""
+def _ratios(name: str, value: Any) -> list[list[float]]:
+    array = numbers(name, value)
+    if array.shape != (2, 2):
+        raise InputError(
+            f" = {show(value)}: must be two pairs of a frequency (Hz) and the damping ratio there, "
+            "as in [[9.3, 0.135], [16.7, 0.09]]",
+            name,
+        )
+    return array.tolist()
 
-    panels: list[PanelsSection] = []
+
+def _vary(name: str, value: Any, beside: Mapping[str, Any]) -> Any:
+    with within(name):
+        return varied(value, beside.get("samples") is not None)
+
+
+def _ties(name: str, value: Any) -> Any:
+    with within(name):
+        return ties_of(value)
+
+
+def one_of(known: Iterable[str]) -> Check:
+    """Accept one of some words."""
+    return Check(choice, known=known)
+
+
+Text = Annotated[str, Check(text)]
+Texts = Annotated[Sequence[str], ListOf(Check(text), tables=False)]
+Anything = Annotated[Mapping[str, Any], Check(table)]
+Switch = Annotated[bool, Check(switch)]
+Positive = Annotated[float, Check(number, above=0.0)]
+Count = Annotated[int, Check(whole_number)]
+Whole = Annotated[int, Check(whole_number, least=-MOST)]
+Seed = Annotated[int, Check(whole_number, least=0)]
+Nodes = Annotated[Any, Check(check_nodes)]
+Vector = Annotated[Any, Check(vector)]
+HingeLaw = Annotated[Any, Check(_law, laws=HINGE_LAWS)]
+PerCrease = Annotated[Any, Check(_per_crease)]
+Edges = Annotated[Any, Check(_edges)]
+Animation = Annotated[str | None, one_of(ANIMATIONS)]
 
 
 class ModelSection(Section):
@@ -204,41 +213,47 @@ class ModelSection(Section):
     preset: Annotated[Any, one_of(PRESETS)] = None
     scheme: Annotated[Any, one_of(SCHEMES)] = None
     divisions: Count | None = None
-    mass: Annotated[list[str] | None, PlainValidator(_masses)] = None
-    bar_law: BarLawSpec = None
-    fold_law: HingeLawSpec = None
-    bend_law: HingeLawSpec = None
+    mass: Annotated[list[str] | None, Check(_masses)] = None
+    bar_law: Annotated[Any, Check(_law, laws=BAR_LAWS)] = None
+    fold_law: HingeLaw = None
+    bend_law: HingeLaw = None
     calibration: Annotated[Any, one_of(CALIBRATIONS)] = None
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
     clamped: Edges = None
-    rigid: Rigid = None
+    rigid: Annotated[Any, Check(_rigid)] = None
     vertex_radius: Positive | None = None
     straight: Edges = None
     membrane: Annotated[Any, one_of(MEMBRANES)] = None
 
-    @model_validator(mode="after")
-    def _fits_the_kind(self) -> Self:
+    def agree(self) -> None:
+        """Refuse keys of the other model."""
         model = MODELS[self.kind]
         strange = [
             key
-            for key in type(self).model_fields
-            if key in self.model_fields_set - {"kind"} and key not in model.keys
+            for key in arguments(type(self))
+            if key in self.stated - {"kind"} and key not in model.keys
         ]
         if strange:
             owner = next(kind for kind, other in MODELS.items() if strange[0] in other.keys)
             raise InputError(
-                f".{strange[0]}: only for model.kind = {show(owner)}; {model.name} "
+                f": only for model.kind = {show(owner)}; {model.name} "
                 f"{'have' if self.kind == BARS_AND_HINGES else 'has'} no {', '.join(strange)}: "
-                f"leave {'it' if len(strange) == 1 else 'them'} out"
+                f"leave {'it' if len(strange) == 1 else 'them'} out",
+                strange[0],
             )
-        return self
 
     @property
     def options(self) -> dict[str, Any]:
         """What the file says of the options of its model, but for the mass."""
-        given = self.model_fields_set - {"kind", "mass"}
+        given = self.stated - {"kind", "mass"}
         return {key: getattr(self, key) for key in MODELS[self.kind].keys if key in given}
+
+
+class AnalysisSection(Section):
+    """[analysis]; kinds of analysis add their keys."""
+
+    kind: Text
 
 
 class ShownSection(Section):
@@ -248,42 +263,26 @@ class ShownSection(Section):
     axis: Annotated[Any, one_of(AXES)] = None
 
 
-def _ratios(value: Any) -> list[list[float]]:
-    array = numbers("", value)
-    if array.shape != (2, 2):
-        raise InputError(
-            f" = {show(value)}: must be two pairs of a frequency (Hz) and the damping ratio there, "
-            "as in [[9.3, 0.135], [16.7, 0.09]]"
-        )
-    return array.tolist()
-
-
-def _dampings(kind: Any) -> PlainValidator:
-    """Accept what stands under the key of a kind of damping."""
-    return PlainValidator(lambda value: dampings_of(kind, value))
-
-
-class DampingSection(section_of(Rayleigh)):
+class DampingSection(Rayleigh, Section):
     """[damping]: Rayleigh coefficients, or two damping ratios; modes, creases, strain rates."""
 
-    ratios: Annotated[Any, PlainValidator(_ratios)] = None
-    modal: Annotated[Any, _dampings(ModalDamping)] = ()
-    creases: Annotated[Any, _dampings(CreaseDamping)] = ()
-    strain: Annotated[Any, _dampings(StrainDamping)] = ()
+    ratios: Annotated[Any, Check(_ratios)] = None
+    modal: Annotated[Any, Check(dampings_of, kind=ModalDamping)] = ()
+    creases: Annotated[Any, Check(dampings_of, kind=CreaseDamping)] = ()
+    strain: Annotated[Any, Check(dampings_of, kind=StrainDamping)] = ()
 
-    @model_validator(mode="after")
-    def _either(self) -> Self:
-        if self.ratios is not None and self.model_fields_set & {"alpha", "beta"}:
+    def agree(self) -> None:
+        """Ask for coefficients or ratios."""
+        if self.ratios is not None and self.stated & {"alpha", "beta"}:
             raise InputError(
                 f" = {show(self.ratios)}: they give alpha and beta; leave those out, or ratios",
-                ".ratios",
+                "ratios",
             )
-        return self
 
     def made(self) -> Damping | tuple[Damping, ...]:
         """The damping."""
         others = [*self.modal, *self.creases, *self.strain]
-        if others and not self.model_fields_set & {"alpha", "beta", "ratios"}:
+        if others and not self.stated & {"alpha", "beta", "ratios"}:
             return dampings(others)
         return dampings([self._rayleigh(), *others])
 
@@ -300,42 +299,40 @@ class SweepSection(Section):
 
     samples: Count | None = None
     method: Annotated[str, one_of(SAMPLINGS)] = SAMPLINGS[0]
-    seed: Annotated[int, Field(ge=0, le=MOST)] = 0
-    vary: Annotated[
-        Any, PlainValidator(lambda v, info: varied(v, info.data.get("samples") is not None))
-    ]
-    ties: Annotated[Any, PlainValidator(ties_of)] = ()
-    measures: list[str] = []
+    seed: Seed = 0
+    vary: Annotated[Any, Check(_vary)]
+    ties: Annotated[Any, Check(_ties)] = ()
+    measures: Texts = ()
 
 
 class DesignSection(Section):
     """[design]: arguments of `design`."""
 
-    bounds: dict[str, Any]
-    minimize: str | None = None
-    maximize: str | None = None
-    subject_to: list[str] = []
-    start: dict[str, Any] = {}
-    method: str = "slsqp"
+    bounds: Anything
+    minimize: Text | None = None
+    maximize: Text | None = None
+    subject_to: Texts = ()
+    start: Anything | None = None
+    method: Text = "slsqp"
     starts: Count = 1
-    seed: Annotated[int, Field(ge=0, le=MOST)] = 0
+    seed: Seed = 0
     tolerance: Positive = 1e-6
     slack: Positive = 1e-4
     max_evaluations: Count = 1000
 
 
 class CaseSchema(Section):
-    """The sections that every case file may have."""
+    """The tables that every case file may have."""
 
-    title: str = ""
-    pattern: Annotated[dict[str, Any], PlainValidator(checked_pattern)]
-    sheet: SheetSection
+    title: Text = ""
+    pattern: Annotated[Mapping[str, Any], Check(checked_pattern)]
+    sheet: Annotated[Sheet, TableOf(Sheet)]
     model: ModelSection = ModelSection()
     damping: DampingSection = DampingSection()
-    supports: list[Annotated[Any, part(support_from)]] = []
-    loads: list[Annotated[Any, part(load_from)]] = []
-    masses: list[Annotated[Any, part(mass_from)]] = []
-    contact: Annotated[Any, contact_part()] = None
-    air: Annotated[Any, part(air_from)] = None
+    supports: Annotated[Sequence[Any], ListOf(SUPPORT)] = ()
+    loads: Annotated[Sequence[Any], ListOf(LOAD)] = ()
+    masses: Annotated[Sequence[Any], ListOf(MASS)] = ()
+    contact: Annotated[Contact | None, TableOf(Contact)] = None
+    air: Annotated[Air | None, TableOf(Air)] = None
     sweep: SweepSection | None = None
     design: DesignSection | None = None

@@ -3,34 +3,35 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import PlainValidator, model_validator
 
-from foldyn.analyses.sections import Section, Vector, Whole
+from foldyn.analyses.sections import Vector, Whole
+from foldyn.arguments import Check
 from foldyn.cases import Case, State
 from foldyn.cases.directions import AXES
 from foldyn.dynamics import initial_state
 from foldyn.errors import InputError, within
 from foldyn.results import load
 from foldyn.results.contents import check_variable
+from foldyn.tables import Section
 from foldyn.values import show
 
 TOLERANCE = 1e-9
 """Velocity of a supported node, relative to the largest, that counts as rounding."""
 
 
-def _result_file(value: Any) -> str:
+def _result_file(name: str, value: Any) -> str:
     if not isinstance(value, str) or not value:
-        raise InputError(f" = {show(value)}: must be the path of a result, as result.nc")
+        raise InputError(f" = {show(value)}: must be the path of a result, as result.nc", name)
     return value
 
 
 class StoredStart(Section):
     """[initial]: a state of a stored result."""
 
-    file: Annotated[str, PlainValidator(_result_file)]
+    file: Annotated[str, Check(_result_file)]
     at: Whole = -1
 
 
@@ -39,22 +40,21 @@ class MotionStart(Section):
 
     velocity: Vector = None
     spin: Vector = None
-    file: Annotated[Any, PlainValidator(_result_file)] = None
+    file: Annotated[Any, Check(_result_file)] = None
     at: Whole = -1
 
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        given = self.model_fields_set
+    def agree(self) -> None:
+        """Ask for one kind of start."""
+        given = self.stated
         rigid = sorted(given & {"velocity", "spin"})
         if not given:
             raise InputError(": give velocity or spin or both, or file (a result)")
         if "file" in given and rigid:
             raise InputError(
-                f": holds the velocities too; leave out {' and '.join(reversed(rigid))}", ".file"
+                f": holds the velocities too; leave out {' and '.join(reversed(rigid))}", "file"
             )
         if "at" in given and "file" not in given:
-            raise InputError(": is the number of a sample of a result; give file too", ".at")
-        return self
+            raise InputError(": is the number of a sample of a result; give file too", "at")
 
 
 class Start(NamedTuple):

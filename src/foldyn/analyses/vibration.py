@@ -5,28 +5,28 @@ Supports and loads are preloads: they act in full in its equilibrium and have no
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Annotated, Any, Self
-
-from pydantic import Field, model_validator
+from typing import Annotated, Any
 
 from foldyn.analyses.casefile import CaseFile
-from foldyn.analyses.sections import CaseSchema, one_of, part
+from foldyn.analyses.sections import CaseSchema, one_of, whole_number
 from foldyn.analyses.start import StoredStart
+from foldyn.arguments import Check
 from foldyn.cases import Impose
-from foldyn.cases.loads import load_from
+from foldyn.cases.loads import LOAD
 from foldyn.cases.models import SHELL
-from foldyn.cases.supports import support_from
+from foldyn.cases.supports import SUPPORT
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
 from foldyn.linear.internal_modes import MOST
-from foldyn.values import show
+from foldyn.tables import ListOf
+from foldyn.values import number, show
 
 STATES = ("rest", "equilibrium")
 """States about which a case file may have its structure vibrate, beside a stored one."""
 About = Annotated[str, one_of(STATES)]
-Secant = Annotated[float, Field(gt=0, le=180)] | None
-Internal = Annotated[int, Field(ge=0, le=MOST)]
+Secant = Annotated[float | None, Check(number, above=0.0, most=180.0)]
+Internal = Annotated[int, Check(whole_number, least=0, most=MOST)]
 TIMELESS = (
     "small vibrations are about one state, in which loads and displacements act in full; leave it "
     "out"
@@ -40,14 +40,14 @@ NO_BASE = (
 class VibrationSchema(CaseSchema):
     """What case files of small vibrations share."""
 
-    supports: list[Annotated[Any, part(support_from, base=NO_BASE, history=TIMELESS)]] = []
-    loads: list[Annotated[Any, part(load_from, history=TIMELESS)]] = []
+    supports: Annotated[Sequence[Any], ListOf(SUPPORT.without(base=NO_BASE, history=TIMELESS))] = ()
+    loads: Annotated[Sequence[Any], ListOf(LOAD.without(history=TIMELESS))] = ()
     initial: StoredStart | None = None
     analysis: Any
 
-    @model_validator(mode="after")
-    def _knows_the_model(self) -> Self:
-        if self.model.kind == SHELL and "secant" in self.analysis.model_fields_set:
+    def agree(self) -> None:
+        """Ask for what the model knows, and for one state."""
+        if self.model.kind == SHELL and "secant" in self.analysis.stated:
             raise InputError(
                 f" = {show(self.analysis.secant)}: is for superlinear bends, and a shell has none; "
                 "leave it out",
@@ -59,19 +59,14 @@ class VibrationSchema(CaseSchema):
                 "it out",
                 "analysis.internal",
             )
-        return self
-
-    @model_validator(mode="after")
-    def _has_one_state(self) -> Self:
-        stated = "state" in self.analysis.model_fields_set
-        if self.initial is not None and stated:
+        if self.initial is not None and "state" in self.analysis.stated:
             raise InputError(
                 f" = {show(self.analysis.state)}: the state is that of initial.file; leave out one "
                 "of the two",
                 "analysis.state",
             )
         if self.initial is not None or self.analysis.state != "rest":
-            return self
+            return
         remedy = 'write state = "equilibrium" under [analysis], or leave it out'
         if self.loads:
             raise InputError(f": does not act in the state of rest; {remedy}", "loads[0]")
@@ -81,7 +76,6 @@ class VibrationSchema(CaseSchema):
                     f": moves nothing in the state of rest; {remedy}, or hold its nodes by axes",
                     f"supports[{i}]",
                 )
-        return self
 
 
 def about(case_file: CaseFile, mass: str) -> dict[str, Any]:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
 from foldyn.arguments import Check, Flag
-from foldyn.cases.decode import Part, check_keys
-from foldyn.cases.history import STEADY, Factor
+from foldyn.cases.decode import Factor, Part
+from foldyn.cases.history import STEADY
 from foldyn.errors import InputError
 from foldyn.structures.mesh import double_areas
 from foldyn.values import flag, number, show, vector, whole
@@ -106,14 +105,6 @@ def _side_ratio(structure: Any) -> float:
     moments = np.einsum("t,tci,tcj->ij", area, away, away)  # of triangles, times 24
     _, shorter, longer = np.sqrt(np.linalg.eigvalsh(moments).clip(min=0.0))
     return float(shorter / longer)
-
-
-def air_from(table: Any, folder: Path | None = None) -> Air:
-    """Air from its table in a case file."""
-    if not isinstance(table, Mapping):
-        raise InputError(f" = {show(table)}: must be a table, written [air]")
-    check_keys(table, Air.by_key())
-    return Air.of(table, folder)
 
 
 def refuse_air(case: Any, name: str) -> None:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.arguments import Check, Flag
-from foldyn.cases.decode import Part, check_keys, part_from
-from foldyn.cases.history import Factor, as_history
-from foldyn.errors import InputError, within
+from foldyn.arguments import Check, Flag, Read
+from foldyn.cases.decode import Factor, Part, PartOf
+from foldyn.cases.history import as_history
+from foldyn.errors import InputError
 from foldyn.mechanics.contact.boards import BoardSheets
 from foldyn.mechanics.contact.candidates import (
     FRICTION,
@@ -25,7 +24,8 @@ from foldyn.mechanics.contact.candidates import (
     Sheets,
 )
 from foldyn.mechanics.contact.potential import STIFFNESS
-from foldyn.values import length, number, objects, show, vector
+from foldyn.tables import ListOf
+from foldyn.values import length, number, objects, vector
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,11 @@ class Contact(Part):
     friction: Annotated[float, Check(number, least=0.0)] = 0.0
     stiffness: Annotated[float | None, Check(number, above=0.0, unit="N/m")] = None
     panels: Flag = True
-    planes: Annotated[Sequence[Plane], Check(objects, kinds=(Plane,))] = ()
+    planes: Annotated[
+        Sequence[Plane],
+        Check(objects, kinds=(Plane,)),
+        Read(ListOf(PartOf((Plane,), "contact.planes"))),
+    ] = ()
 
     def agree(self) -> None:
         """Ask for something that touches."""
@@ -159,18 +163,3 @@ class Contact(Part):
             row[MOTION : MOTION + 3] = plane.motion or 0.0
             row[HISTORY] = -1
         return table
-
-
-def contact_from(table: Any, folder: Path | None = None) -> Contact:
-    """Contact from its table in a case file."""
-    if not isinstance(table, Mapping):
-        raise InputError(f" = {show(table)}: must be a table, written [contact]")
-    check_keys(table, Contact.by_key())
-    given = table.get("planes", [])
-    if not isinstance(given, list):
-        raise InputError(f" = {show(given)}: must be tables, written [[contact.planes]]", ".planes")
-    planes = []
-    for i, plane in enumerate(given):
-        with within(f".planes[{i}]"):
-            planes.append(part_from(plane, (Plane,), "contact.planes", folder))
-    return Contact.of({**table, "planes": planes})

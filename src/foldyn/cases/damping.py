@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.arguments import Check
-from foldyn.cases.decode import Part, check_keys
+from foldyn.cases.decode import Part
 from foldyn.cases.selection import Creases, resolve_creases
-from foldyn.errors import InputError, within
+from foldyn.errors import InputError
+from foldyn.tables import ListOf, read
 from foldyn.values import choice, number, number_or_list, show, whole
 
 STATES = ("rest", "start")
@@ -244,30 +245,25 @@ def damping_from(table: Mapping[str, Any]) -> Damping | tuple[Damping, ...]:
     """Damping from its stored table; without any it is Rayleigh's, of nothing."""
     nested = {kind.key: kind for kind in DAMPINGS if kind.key}
     own = {key: value for key, value in table.items() if key not in nested}
-    parts: list[Damping] = [Rayleigh.of(own)] if own else []
+    parts: list[Damping] = [read(Rayleigh, "", own)] if own else []
     for key, kind in nested.items():
         if key in table:
-            parts += dampings_of(kind, table[key])
+            parts += dampings_of(f".{key}", table[key], kind)
     return dampings(parts)
 
 
-def dampings_of(kind: Any, value: Any) -> list[Damping]:
+def dampings_of(name: str, value: Any, kind: type[Damping]) -> tuple[Damping, ...]:
     """Dampings of a kind: from a table, from several, or from its first argument alone."""
     if kind.several and isinstance(value, list) and value and isinstance(value[0], Mapping):
-        parts = []
-        for i, item in enumerate(value):
-            with within(f"[{i}]"):
-                parts.append(_damping_of(kind, item))
-        return parts
-    return [_damping_of(kind, value)]
+        return ListOf(Check(_damping_of, kind=kind))(name, value)
+    return (_damping_of(name, value, kind),)
 
 
-def _damping_of(kind: Any, value: Any) -> Damping:
+def _damping_of(name: str, value: Any, kind: type[Damping]) -> Damping:
     if isinstance(value, Mapping):
-        check_keys(value, kind.by_key())
-        return kind.of(value)
+        return read(kind, name, value)
     first = next(iter(kind.by_key()))
     try:
-        return kind.of({first: value})
+        return read(kind, name, {first: value})
     except InputError as error:  # the value stands in the place of its table
-        raise InputError(error.reason, error.field.removeprefix(f".{first}")) from None
+        raise InputError(error.reason, error.field.replace(f".{first}", "", 1)) from None

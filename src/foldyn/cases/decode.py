@@ -10,32 +10,34 @@ import inspect
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import MISSING
 from pathlib import Path
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Annotated, Any, ClassVar
 
-from foldyn.arguments import Checked, arguments
+from foldyn.arguments import Check, Checked, Read, arguments
 from foldyn.cases.histories import HISTORIES, History, Table
+from foldyn.cases.history import as_history
 from foldyn.errors import Faults, InputError, within
 from foldyn.mechanics.term import Term
-from foldyn.values import choice, plain, show, suggest
+from foldyn.tables import check_keys, check_table, needs, read
+from foldyn.values import choice, plain, show
 
-P = TypeVar("P", bound="Part")
 
-
-def history_from(table: Any, folder: Path | None = None) -> History:
+def history_from(name: str, table: Any, folder: Path | None = None) -> History:
     """History from its table, such as ``{kind = "pulse", duration = 1.0}``.
 
     Parameters
     ----------
+    name : str
+        Place of the table.
     table : mapping
     folder : Path, optional
         Where the relative path of a table's CSV file starts; without it no file is read.
     """
-    kind, arguments = _kind_of(table, HISTORIES)
-    if kind == Table.kind and folder is not None and not arguments.keys() & {"times", "values"}:
-        return _table_from_file(arguments, folder)
-    return call_from(HISTORIES[kind], arguments)
+    with within(name):
+        kind, arguments = _kind_of(table, HISTORIES)
+        if kind == Table.kind and folder is not None and not arguments.keys() & {"times", "values"}:
+            return _table_from_file(arguments, folder)
+        return call_from(HISTORIES[kind], arguments)
 
 
 def law_from(spec: Any, laws: Mapping[str, type]) -> Any:
@@ -93,21 +95,6 @@ def call_from(
     return made
 
 
-def check_keys(table: Mapping[str, Any], known: Iterable[str]) -> None:
-    """Refuse keys that are not known, with suggestions and the keys that are."""
-    known, faults = list(known), Faults()
-    for key in table:
-        if key not in known:
-            faults.add(InputError(f": {unknown_key(key, known)}", f".{key}"))
-    faults.raise_all()
-
-
-def unknown_key(key: str, known: Iterable[str]) -> str:
-    """Text for an unknown key."""
-    known = list(known)
-    return f"unknown key; {suggest(key, known)}known keys: {', '.join(known) or 'none'}"
-
-
 def _kind_of(table: Any, kinds: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     listed = ", ".join(kinds)
     if not isinstance(table, Mapping):
@@ -130,6 +117,13 @@ def _table_from_file(arguments: Mapping[str, Any], folder: Path) -> Table:
         return Table.from_csv(folder / file, **columns)
 
 
+Factor = Annotated[
+    History | Callable[[Any], Any] | None,
+    Check(lambda _, history: as_history(history)),
+    Read(Check(history_from)),
+]
+
+
 class Part(Checked):
     """A load, a support, a point mass or a kind of damping: a frozen data class.
 
@@ -137,14 +131,10 @@ class Part(Checked):
 
     Attributes
     ----------
-    missing : mapping of str to str
-        Remedies in messages where a key is missing that must not be, beside those of arguments
-        without a default.
     apart : str
         What the message says where another kind's keys stand beside its own.
     """
 
-    missing: ClassVar[Mapping[str, str]] = {}
     apart: ClassVar[str] = ""
 
     @classmethod
@@ -157,40 +147,6 @@ class Part(Checked):
         """Its arguments by the keys of its table."""
         return {argument.key: name for name, argument in arguments(cls).items()}
 
-    @classmethod
-    def of(cls, table: Mapping[str, Any], folder: Path | None = None) -> Self:
-        """Make it from its table; errors name fields inside the table.
-
-        Parameters
-        ----------
-        table : mapping
-        folder : Path, optional
-            Where relative paths of CSV files start; without it no file is read.
-        """
-        for key, remedy in cls.needed().items():
-            if key not in table:
-                raise InputError(f": missing; {remedy}", f".{key}")
-        keys = cls.by_key()
-        given = {keys[key]: value for key, value in table.items()}
-        if "history" in given:
-            with within(".history"):
-                given["history"] = history_from(given["history"], folder)
-        try:
-            return cls(**given)
-        except InputError as error:
-            inside = error.field[len(error.key) :]
-            key = next((key for key, name in keys.items() if name == error.key), error.key)
-            raise InputError(error.reason, f".{key}{inside}" if key else inside) from None
-
-    @classmethod
-    def needed(cls) -> dict[str, str]:
-        """Keys that its table must have, and what to do where one is missing."""
-        return {
-            one.key: f"give it ({one.unit})" if one.unit else "give its value"
-            for one in arguments(cls).values()
-            if one.default is MISSING
-        } | dict(cls.missing)
-
     def table(self) -> dict[str, Any]:
         """Its table of plain values, without the history and what is None."""
         given = {key: getattr(self, name) for key, name in self.by_key().items()}
@@ -198,34 +154,57 @@ class Part(Checked):
         return {key: plain(value) for key, value in given.items() if value is not None}
 
 
-def part_from(
-    table: Any, kinds: Sequence[type[P]], section: str, folder: Path | None = None, asked: str = ""
-) -> P:
-    """Part of one of some kinds from its table, which the keys tell; see `Part.of`.
+class PartOf(Check):
+    """A table that is a part of one of some kinds, which its keys tell.
 
     Among the kinds of which there are keys that no other has, or if there are none among all, that
     is the first that has all keys, or else the last.
 
-    section : where such tables stand in a case file.
-    asked : what a message asks for where there are no keys at all.
+    Parameters
+    ----------
+    kinds : sequence of type
+    section : str
+        Where such tables stand in a case file.
+    asked : str
+        What a message asks for where there are no keys at all.
+    **refused
+        Keys that such a file may not have, each with the reason.
     """
-    if not isinstance(table, Mapping):
-        raise InputError(f" = {show(table)}: must be a table")
-    keys = {kind: kind.by_key() for kind in kinds}
-    counts = Counter(key for known in keys.values() for key in known)
-    check_keys(table, sorted(counts, key="history".__eq__))
-    given = [key for key in table if key != "history"]
-    if not given:
-        asked = asked or ", or ".join(" and ".join(kind.needed()) for kind in kinds)
-        raise InputError(f": give {asked}")
-    own = [key for key in given if counts[key] == 1] or given
-    fit = [kind for kind in kinds if keys[kind].keys() & own]
-    kind = next((kind for kind in fit if keys[kind].keys() >= table.keys()), fit[-1])
-    others = [key for key in table if key not in keys[kind]]
-    if others:
-        first = next(key for key in own if key in keys[kind])
-        raise InputError(
-            f": {kind.apart}; leave out {' and '.join(others)}, or write [[{section}]] for each",
-            f".{first}",
-        )
-    return kind.of(table, folder)
+
+    def __init__(
+        self, kinds: Sequence[type[Part]], section: str, asked: str = "", **refused: str
+    ) -> None:
+        super().__init__(self._read)
+        self.kinds, self.section, self.asked, self.refused = kinds, section, asked, refused
+
+    def without(self, **refused: str) -> PartOf:
+        """The same, of a file that may not have some keys, each for a reason."""
+        return PartOf(self.kinds, self.section, self.asked, **refused)
+
+    def _read(self, name: str, value: Any, folder: Path | None = None) -> Any:
+        for key, why in self.refused.items():
+            if isinstance(value, Mapping) and key in value:
+                raise InputError(f" = {show(value[key])}: {why}", f"{name}.{key}")
+        return read(self._kind(name, value), name, value, folder)
+
+    def _kind(self, name: str, value: Any) -> type[Part]:
+        table = check_table(name, value)
+        keys = {kind: kind.by_key() for kind in self.kinds}
+        counts = Counter(key for known in keys.values() for key in known)
+        check_keys(table, sorted(counts, key="history".__eq__), name)
+        given = [key for key in table if key != "history"]
+        if not given:
+            asked = self.asked or ", or ".join(" and ".join(needs(kind)) for kind in self.kinds)
+            raise InputError(f": give {asked}", name)
+        own = [key for key in given if counts[key] == 1] or given
+        fit = [kind for kind in self.kinds if keys[kind].keys() & own]
+        kind = next((kind for kind in fit if keys[kind].keys() >= table.keys()), fit[-1])
+        others = [key for key in table if key not in keys[kind]]
+        if others:
+            first = next(key for key in own if key in keys[kind])
+            raise InputError(
+                f": {kind.apart}; leave out {' and '.join(others)}, or write [[{self.section}]] "
+                "for each",
+                f"{name}.{first}",
+            )
+        return kind

@@ -18,21 +18,22 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.air import air_from
+from foldyn.cases.air import Air
 from foldyn.cases.case import Case
-from foldyn.cases.contact import Contact, contact_from
+from foldyn.cases.contact import Contact
 from foldyn.cases.damping import damping_from, damping_table
 from foldyn.cases.decode import law_from
 from foldyn.cases.histories import HISTORIES, History, Table
 from foldyn.cases.history import STEADY, as_history
-from foldyn.cases.loads import Load, load_from
-from foldyn.cases.masses import mass_from
+from foldyn.cases.loads import LOAD, Load
+from foldyn.cases.masses import MASS
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
-from foldyn.cases.supports import support_from
+from foldyn.cases.supports import SUPPORT
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS, HingeLaw
 from foldyn.patterns import Boards, Pattern
-from foldyn.structures import Sheet, discretize, sheet_from
+from foldyn.structures import Sheet, discretize
+from foldyn.tables import read
 from foldyn.values import plain
 
 LAWS: Mapping[str, Mapping[str, type]] = {
@@ -314,11 +315,11 @@ class _Writer:
 
 
 def _read(sections: Mapping[str, Any]) -> Case:
-    supports = [support_from(item) for item in sections["supports"]]
-    loads = [load_from(item) for item in sections["loads"]]
-    masses = [mass_from(item) for item in sections.get("masses", ())]
-    contact = contact_from(sections["contact"]) if "contact" in sections else None
-    air = air_from(sections["air"]) if "air" in sections else None
+    supports = [SUPPORT("", item) for item in sections["supports"]]
+    loads = [LOAD("", item) for item in sections["loads"]]
+    masses = [MASS("", item) for item in sections.get("masses", ())]
+    contact = read(Contact, "", sections["contact"]) if "contact" in sections else None
+    air = read(Air, "", sections["air"]) if "air" in sections else None
     structure = _structure(sections)
     with warnings.catch_warnings():  # they were issued when the case was first made
         warnings.simplefilter("ignore", FoldynWarning)
@@ -335,7 +336,7 @@ def _structure(sections: Mapping[str, Any]) -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
         pattern = _stored_pattern(sections["pattern"])
-        sheet = sheet_from(sections["sheet"])
+        sheet = read(Sheet, "sheet", sections["sheet"])
         kind = model.pop("kind", BARS_AND_HINGES)
         least = len(pattern.vertices) + len(pattern.edges) * (model.get("divisions", 1) - 1)
         _check_whole(least <= len(nodes), nodes, f"at least {least} nodes")  # before it is meshed

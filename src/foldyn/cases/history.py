@@ -172,6 +172,3 @@ def as_history(history: History | Callable[[Any], Any] | None) -> History:
 
 
 STEADY = Constant()
-Factor = Annotated[
-    History | Callable[[Any], Any] | None, Check(lambda _, history: as_history(history))
-]

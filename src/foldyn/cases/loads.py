@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.arguments import Check, Key
-from foldyn.cases.decode import part_from
+from foldyn.cases.decode import Factor, PartOf
 from foldyn.cases.directions import signed
 from foldyn.cases.folding import (
     PerCrease,
@@ -22,7 +21,7 @@ from foldyn.cases.folding import (
     within_reach,
 )
 from foldyn.cases.following_loads import CreaseMoment, Pressure
-from foldyn.cases.history import STEADY, Factor
+from foldyn.cases.history import STEADY
 from foldyn.cases.load import Load, check_held
 from foldyn.cases.selection import Creases, Nodes, resolve_creases, resolve_nodes
 from foldyn.cases.shared_loads import LineLoad, TotalForce
@@ -210,9 +209,6 @@ LOADS: tuple[type[Load], ...] = (
     CreaseMoment,
     Temperature,
 )
-"""All kinds. Which one a table of a case file means, its keys tell (`part_from`)."""
-
-
-def load_from(table: Any, folder: Path | None = None) -> Load:
-    """Load from its table in a case file."""
-    return part_from(table, LOADS, "loads", folder)
+"""All kinds. Which one a table of a case file means, its keys tell."""
+LOAD = PartOf(LOADS, "loads")
+"""A load in a case file."""

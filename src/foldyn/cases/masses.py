@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.arguments import Check
-from foldyn.cases.decode import Part, part_from
+from foldyn.cases.decode import Part, PartOf
 from foldyn.cases.selection import Nodes, resolve_nodes
 from foldyn.values import number
 
@@ -43,6 +42,5 @@ def nodal_masses(masses: Sequence[PointMass], structure: Any) -> NDArray[np.floa
     return total
 
 
-def mass_from(table: Any, folder: Path | None = None) -> PointMass:
-    """Point mass from its table in a case file."""
-    return part_from(table, (PointMass,), "masses", folder)
+MASS = PartOf((PointMass,), "masses")
+"""A point mass in a case file."""

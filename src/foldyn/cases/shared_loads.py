@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.arguments import Check, Key
-from foldyn.cases.history import STEADY, Factor
+from foldyn.cases.decode import Factor
+from foldyn.cases.history import STEADY
 from foldyn.cases.load import Load, check_held
 from foldyn.cases.regions import (
     Edges,

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, get_args
 
 import numpy as np
 
 from foldyn.arguments import Check, Flag, Key
 from foldyn.cases.dashpots import Dashpot
-from foldyn.cases.decode import Part, part_from
+from foldyn.cases.decode import Factor, Part, PartOf
 from foldyn.cases.directions import AXES, Axes, Axis, Direction
-from foldyn.cases.history import STEADY, Factor
+from foldyn.cases.history import STEADY
 from foldyn.cases.selection import Nodes
 from foldyn.cases.springs import Spring
 from foldyn.errors import InputError
@@ -193,13 +192,11 @@ Support = Fix | Impose | BaseMotion | Spring | Dashpot | Link
 SUPPORTS: tuple[type[Support], ...] = get_args(Support)
 
 
-ASKED = (
+SUPPORT = PartOf(
+    SUPPORTS,
+    "supports",
     "nodes and axes or direction (held), nodes, axis and displacement (moved), base and history (a "
     "base that moves), nodes and link or to (tied together), or nodes or between with stiffness "
-    "(springs) or dashpot (damped)"
+    "(springs) or dashpot (damped)",
 )
-
-
-def support_from(table: Any, folder: Path | None = None) -> Support:
-    """Support from its table in a case file."""
-    return part_from(table, SUPPORTS, "supports", folder, ASKED)
+"""A support in a case file."""

@@ -18,7 +18,6 @@ REQUIRED = (
     "numba",
     "xarray",
     "h5netcdf",
-    "pydantic",
     "matplotlib",
     "tqdm",
     "shapely",

@@ -38,8 +38,8 @@ def planned(path: Path, changes: Mapping[str, Any]) -> tuple[CaseFile, Plan]:
             "design",
             path,
         )
-    asked = case_file.design.model_dump() | dict(changes)
-    asked["start"] = _starts(document, asked["bounds"]) | asked["start"]
+    asked = case_file.design.values() | dict(changes)
+    asked["start"] = _starts(document, asked["bounds"]) | (asked["start"] or {})
     try:
         return case_file, plan_of(path, analysis=None, **asked)
     except InputError as error:

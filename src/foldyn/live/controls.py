@@ -9,11 +9,13 @@ from dataclasses import dataclass
 from inspect import signature
 from typing import Any
 
-from foldyn.analyses.messages import dotted
-from foldyn.analyses.sections import DampingSection, SheetSection
+from foldyn.analyses.keys import dotted
+from foldyn.arguments import arguments
+from foldyn.cases.damping import Rayleigh
 from foldyn.cases.units import unit_of
 from foldyn.errors import InputError
 from foldyn.patterns import GENERATORS
+from foldyn.structures import Sheet
 from foldyn.values import choice, number, whole
 
 ANGLES: Mapping[str, tuple[float, float]] = {
@@ -152,8 +154,8 @@ def _counted(annotation: Any) -> bool:
 
 
 def _of_sheet(table: Mapping[str, Any]) -> Iterator[Control]:
-    for name, field in SheetSection.model_fields.items():
-        value = table.get(name, field.default)
+    for name, argument in arguments(Sheet).items():
+        value = table.get(name, argument.default)
         if not _is_number(value):
             continue
         if name == "poissons_ratio":
@@ -170,7 +172,7 @@ def _of_damping(document: Mapping[str, Any]) -> Iterator[Control]:
                 yield _positive(("damping", "ratios", i, k), value, unit)
         return
     for name, end in UNDAMPED.items():
-        value = table.get(name, DampingSection.model_fields[name].default)
+        value = table.get(name, arguments(Rayleigh)[name].default)
         most = SPAN["damping"] * value or end
         yield Control(("damping", name), value, 0.0, most, unit_of(name, value))
 

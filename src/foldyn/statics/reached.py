@@ -9,10 +9,10 @@ from typing import Annotated, Any
 from numpy.typing import NDArray
 
 from foldyn.arguments import Check
-from foldyn.cases.decode import Part, part_from
+from foldyn.cases.decode import Part, PartOf
 from foldyn.cases.directions import AXES, Axis
 from foldyn.cases.selection import resolve_nodes
-from foldyn.errors import InputError, within
+from foldyn.errors import InputError
 from foldyn.values import number, whole
 
 
@@ -44,9 +44,8 @@ class Reached(Part):
         return bool(moved / self.displacement >= 1.0)
 
 
-def reached_from(table: Any) -> Reached:
-    """What ends a path from its table, as a case file has it."""
-    return part_from(table, (Reached,), "analysis.until", asked="node, axis and displacement")
+UNTIL = PartOf((Reached,), "analysis.until", "node, axis and displacement")
+"""What ends a path, in a case file and as an argument."""
 
 
 def until_of(given: Any, structure: Any) -> Callable[[NDArray, float], bool] | None:
@@ -55,7 +54,6 @@ def until_of(given: Any, structure: Any) -> Callable[[NDArray, float], bool] | N
         return None
     if callable(given) and not isinstance(given, Reached):
         return given  # type: ignore[return-value]
-    with within("until"):
-        end = given if isinstance(given, Reached) else reached_from(given)
+    end = given if isinstance(given, Reached) else UNTIL("until", given)
     resolve_nodes(structure, (end.node,), "until.node")
     return end

@@ -5,7 +5,7 @@ from foldyn.structures.laminate import Laminate
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import hinge_angles
 from foldyn.structures.presets import PRESETS
-from foldyn.structures.sheet import PanelSheet, Sheet, sheet_from
+from foldyn.structures.sheet import PanelSheet, Sheet
 from foldyn.structures.structure import ModelOptions, Structure
 
 __all__ = [
@@ -18,5 +18,4 @@ __all__ = [
     "Structure",
     "discretize",
     "hinge_angles",
-    "sheet_from",
 ]

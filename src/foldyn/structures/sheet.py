@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.arguments import Check, Checked
-from foldyn.errors import InputError, within
+from foldyn.arguments import Check, Checked, Read
+from foldyn.errors import InputError
+from foldyn.tables import ListOf, TableOf
 from foldyn.values import indices, length, number, objects, show
 
 
@@ -115,7 +116,11 @@ class Sheet(Checked):
     thickness: Length
     density: Density | None = None
     length_scale_ratio: Annotated[float, Check(number, above=0.0)] = 1.0
-    panels: Annotated[Sequence[PanelSheet], Check(objects, kinds=(PanelSheet,))] = ()
+    panels: Annotated[
+        Sequence[PanelSheet],
+        Check(objects, kinds=(PanelSheet,)),
+        Read(ListOf(TableOf(PanelSheet))),
+    ] = ()
 
     place = "sheet: "
 
@@ -175,15 +180,6 @@ class Sheet(Checked):
                     f"sheet: panels[{i}].panels: panel {beyond[0]} is out of range; this pattern "
                     f"has panels 0 to {count - 1}"
                 )
-
-
-def sheet_from(table: Mapping[str, Any]) -> Sheet:
-    """Sheet from its table, in which `panels` is a list of tables."""
-    parts = []
-    for i, part in enumerate(table.get("panels", ())):
-        with within(f"sheet: panels[{i}]."):
-            parts.append(PanelSheet(**part))
-    return Sheet(**{**table, "panels": parts})
 
 
 def _numbers(part: PanelSheet) -> tuple[int, ...]:

@@ -152,7 +152,7 @@ def _chosen(
         whole("samples", count, least=1)
     with within("vary"):
         keys = varied(vary, count is not None)
-    return SweepSection.model_construct(
+    return SweepSection(
         samples=count,
         method=choice("method", method or SAMPLINGS[0], SAMPLINGS),
         seed=whole("seed", seed or 0, least=0, most=MOST),

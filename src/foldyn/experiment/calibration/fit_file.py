@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from inspect import signature
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, ConfigDict, Field, ValidationError, ValidationInfo
-
-from foldyn.analyses.messages import describe
 from foldyn.analyses.reading import read_document
-from foldyn.analyses.sections import Count, Section, one_of
-from foldyn.cases.decode import call_from, check_keys
+from foldyn.analyses.sections import Anything, Count, Seed, Switch, Text, one_of, text
+from foldyn.arguments import Check
+from foldyn.cases.decode import call_from
 from foldyn.errors import InputError, within
 from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
 from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes
@@ -28,7 +26,8 @@ from foldyn.experiment.calibration.modal import (
 )
 from foldyn.experiment.calibration.parameters import Parameter
 from foldyn.experiment.calibration.responses import FrequencyResponse
-from foldyn.values import MOST, show
+from foldyn.tables import ListOf, Section, check_keys, check_table, keys, read, told
+from foldyn.values import number, show
 
 CLASSES = {
     one.kind: one
@@ -46,43 +45,43 @@ NAMED = (TimeHistory.kind, Spectrum.kind, FrequencyResponse.kind)
 """Kinds whose nodes a fit file must name."""
 
 
-def _case(name: str, info: ValidationInfo) -> Path:
+def _case(name: str, value: Any, folder: Path, find: Callable[[str], Path] | None) -> Path:
     """Case file beside the fit file, or one that is found by its name."""
-    folder, find = info.context["folder"], info.context["find"]  # type: ignore[index]
-    if os.path.isfile(folder / name) or find is None:  # false where a name is too long
-        return folder / name
-    with within(": "):
-        return find(name)
+    case = text(name, value)
+    if os.path.isfile(folder / case) or find is None:  # false where a name is too long
+        return folder / case
+    with within(f"{name}: "):
+        return find(case)
 
 
 class DataSection(Section):
     """One of the [[data]]; its other keys depend on its kind."""
 
-    model_config = ConfigDict(extra="allow")
-
     kind: Annotated[str, one_of(READERS)]
-    file: str
-    case: Annotated[str, AfterValidator(_case)] | None = None
-    set: dict[str, Any] = Field(default_factory=dict)
-    held_out: bool = False
+    file: Text
+    case: Annotated[Path | None, Check(_case)] = None
+    set: Anything | None = None
+    held_out: Switch = False
 
 
-def _measurement(section: DataSection, info: ValidationInfo) -> Measurement:
-    given = section.model_extra or {}
-    check_keys(given, [*DataSection.model_fields, *_known(section.kind)])
+def _measurement(name: str, value: Any, folder: Path, find: Any) -> Measurement:
+    own = {key: one for key, one in check_table(name, value).items() if key in keys(DataSection)}
+    section = read(DataSection, name, own, folder, find)
+    given = {key: one for key, one in value.items() if key not in own}
+    check_keys(given, [*keys(DataSection), *_known(section.kind)], name)
     if "nodes" not in given and section.kind in NAMED:
-        raise InputError(": missing; name the nodes that were measured", ".nodes")
-    folder: Path = info.context["folder"]  # type: ignore[index]
+        raise InputError(": missing; name the nodes that were measured", f"{name}.nodes")
     if issubclass(CLASSES[section.kind], ModalParameters) and "shapes" in given:
-        if not isinstance(given["shapes"], str):
-            raise InputError(f" = {show(given['shapes'])}: must be the name of a file", ".shapes")
-        given = {**given, "shapes": folder / given["shapes"]}
-    with within(": "):
+        shapes = given["shapes"]
+        if not isinstance(shapes, str):
+            raise InputError(f" = {show(shapes)}: must be the name of a file", f"{name}.shapes")
+        given = {**given, "shapes": folder / shapes}
+    with within(f"{name}: "):
         return READERS[section.kind](
             folder / section.file,
             **{"name": Path(section.file).stem, **given},
             case=section.case,
-            changes=section.set,
+            changes=section.set or {},
             held_out=section.held_out,
         )
 
@@ -101,23 +100,28 @@ class SolverSection(Section):
     """[solver]: other arguments of `fit`."""
 
     starts: Count = 1
-    seed: Annotated[int, Field(ge=0, le=MOST)] = 0
+    seed: Seed = 0
     processes: Count = 1
-    confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
+    confidence: Annotated[float, Check(number, above=0.0, below=1.0)] = 0.95
 
 
-def _parameter(table: dict[str, Any]) -> Parameter:
-    return call_from(Parameter, table)
+def _parameter(name: str, value: Any) -> Parameter:
+    with within(name):
+        return call_from(Parameter, check_table("", value))
+
+
+def _tied(name: str, value: Any) -> dict[str, str]:
+    return {key: text(f"{name}.{key}", one) for key, one in check_table(name, value).items()}
 
 
 class FitSchema(Section):
     """A fit file."""
 
-    title: str = ""
-    case: Annotated[str, AfterValidator(_case)]
-    parameters: list[Annotated[dict[str, Any], AfterValidator(_parameter)]] = Field(min_length=1)
-    ties: dict[str, str] = Field(default_factory=dict)
-    data: list[Annotated[DataSection, AfterValidator(_measurement)]] = Field(min_length=1)
+    title: Text = ""
+    case: Annotated[Path, Check(_case)]
+    parameters: Annotated[Sequence[Parameter], ListOf(Check(_parameter), least=1)]
+    ties: Annotated[Mapping[str, str] | None, Check(_tied)] = None
+    data: Annotated[Sequence[Measurement], ListOf(Check(_measurement), least=1)]
     solver: SolverSection = SolverSection()
 
 
@@ -168,12 +172,11 @@ def read_fit(
         Something in it, or in a file that it names, cannot be used.
     """
     path = Path(path)
-    context = {"folder": path.parent, "find": find}
     try:
-        schema: Any = FitSchema.model_validate(read_document(path), context=context)
-    except ValidationError as error:
-        raise InputError(describe(error, FitSchema, {}), file=path) from None
+        schema = read(FitSchema, "", read_document(path), path.parent, find)
+    except InputError as error:
+        raise told(error, path) from None
     return FitFile(
         path, schema.title, schema.case, tuple(schema.data), tuple(schema.parameters),
-        schema.ties, schema.solver.model_dump(),
+        dict(schema.ties or {}), schema.solver.values(),
     )  # fmt: skip

@@ -1,0 +1,217 @@
+"""Tables of files, read as data classes declare them; see `foldyn.arguments`.
+
+All mistakes of a file are told together, each with its place. The place of a key is that of its
+table, a dot and the key; that of a whole file is "".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import MISSING, dataclass
+from functools import partial
+from typing import Any, ClassVar, TypeVar, dataclass_transform
+
+from foldyn.arguments import NOTHING, Check, Checked, arguments
+from foldyn.errors import Faults, InputError
+from foldyn.values import SHOWN, nearest, show, suggest
+
+C = TypeVar("C", bound=Checked)
+MOST_TOLD = 12
+"""Mistakes of a file that are told one by one."""
+
+
+class UnknownKeyError(InputError):
+    """A key that its table does not have."""
+
+
+def read(
+    kind: type[C], name: str, table: Any, folder: Any = None, find: Any = None,
+    others: Mapping[str, type[Checked]] = NOTHING,
+) -> C:  # fmt: skip
+    """Object of a data class from its table in a file.
+
+    Parameters
+    ----------
+    kind : type
+    name : str
+        Place of the table.
+    table : mapping
+    folder, find, others
+        For checks that ask for them; see `foldyn.arguments.CONTEXT`.
+    """
+    check_table(name, table)
+    own = {argument.key: field for field, argument in arguments(kind).items()}
+    faults, found = Faults(), {}
+    needed, unknown = needs(kind), [key for key in table if key not in own]
+    for key in unknown:
+        reason = _of_others(key, others) or unknown_key(key, own)
+        faults.add(UnknownKeyError(f": {reason}", f"{name}.{key[:SHOWN]}"))
+    meant = {nearest(key, own) for key in unknown}  # that these are missing need not be said
+    for field, argument in arguments(kind).items():
+        key, place = argument.key, f"{name}.{argument.key}"
+        if key in table:
+            inner = _within_others(key, others)
+            context = {"folder": folder, "find": find, "beside": found, "others": inner}
+            with faults.collected():
+                found[field] = argument.read(place, table[key], context)
+        elif key not in needed:
+            found[field] = argument.default
+        elif key not in meant:
+            faults.add(InputError(f": missing; {needed[key]}", place))
+    faults.raise_all()
+    made = object.__new__(kind)
+    made._set(**found)
+    if isinstance(made, Section):
+        made._set(stated=frozenset(own[key] for key in table))
+    with _placed(name, kind):
+        made.agree()
+    return made
+
+
+def _of_others(key: str, others: Mapping[str, type[Checked]]) -> str:
+    """Text for a key that tables of other kinds have at that place."""
+    owners = [show(kind) for kind, other in others.items() if key in keys(other)]
+    if not owners:
+        return ""
+    *first, last = owners
+    listed = f"{', '.join(first)} or {last}" if first else last
+    return f"only for analysis.kind = {listed}; leave it out"
+
+
+def _within_others(key: str, others: Mapping[str, type[Checked]]) -> dict[str, type[Checked]]:
+    """Tables under a key in files of other kinds."""
+    return {kind: one for kind, other in others.items() if (one := table_under(key, other))}
+
+
+@contextmanager
+def _placed(name: str, kind: type[Checked]) -> Iterator[None]:
+    """Say where arguments that do not go together stand in a file."""
+    try:
+        yield
+    except InputError as error:
+        key = arguments(kind)[error.key].key if error.key in arguments(kind) else error.key
+        inside = f".{key}{error.field[len(error.key) :]}" if error.field else ""
+        raise InputError(error.reason, f"{name}{inside}", error.file, error.others) from None
+
+
+def needs(kind: type[Checked]) -> dict[str, str]:
+    """Keys that the table of a data class must have, and what to do where one is missing."""
+    return {
+        one.key: f"give it ({one.unit})" if one.unit else "give its value"
+        for one in arguments(kind).values()
+        if one.default is MISSING
+    } | dict(kind.missing)
+
+
+def keys(kind: type[Checked]) -> list[str]:
+    """Keys of the table of a data class."""
+    return [argument.key for argument in arguments(kind).values()]
+
+
+def table_under(key: str, kind: type[Checked]) -> type[Checked] | None:
+    """Data class of the table under a key of another table; None for other values."""
+    for argument in arguments(kind).values():
+        for check in argument.checks if argument.key == key else ():
+            inner = check.item if isinstance(check, ListOf) else check
+            if isinstance(inner, TableOf):
+                return inner.kind
+    return None
+
+
+def check_table(name: str, value: Any) -> Mapping[str, Any]:
+    """Return `value` when it is a table."""
+    if isinstance(value, Mapping):
+        return value
+    written = f", written [{name[1:]}]" if name.startswith(".") and "[" not in name else ""
+    raise InputError(f" = {show(value)}: must be a table{written}", name)
+
+
+def check_keys(table: Mapping[str, Any], known: Iterable[str], name: str = "") -> None:
+    """Refuse keys that are not known, with suggestions and the keys that are."""
+    known, faults = list(known), Faults()
+    for key in table:
+        if key not in known:
+            faults.add(InputError(f": {unknown_key(key, known)}", f"{name}.{key}"))
+    faults.raise_all()
+
+
+def unknown_key(key: str, known: Iterable[str]) -> str:
+    """Text for an unknown key."""
+    known = list(known)
+    return f"unknown key; {suggest(key, known)}known keys: {', '.join(known) or 'none'}"
+
+
+class TableOf(Check):
+    """A table that is read as a data class."""
+
+    def __init__(self, kind: type[Checked]) -> None:
+        super().__init__(partial(read, kind))
+        self.kind = kind
+
+
+class ListOf(Check):
+    """A list.
+
+    Parameters
+    ----------
+    item : Check
+        What each of its items must be.
+    tables : bool
+        Whether these are tables, which [[...]] begins.
+    least : int
+        How many there must be.
+    """
+
+    def __init__(self, item: Check, tables: bool = True, least: int = 0) -> None:
+        super().__init__(item)
+        self.item, self.tables, self.least = item, tables, least
+
+    def __call__(self, name: str, value: Any, context: Mapping[str, Any] = NOTHING) -> Any:
+        """See `Check`."""
+        if not isinstance(value, list):
+            of = f" of tables, written [[{name[1:]}]]" if self.tables else ""
+            raise InputError(f" = {show(value)}: must be a list{of}", name)
+        if len(value) < self.least:
+            raise InputError(f" = {show(value)}: must have at least one entry", name)
+        faults, found = Faults(), []
+        for i, item in enumerate(value):
+            with faults.collected():
+                found.append(self.item(f"{name}[{i}]", item, context))
+        faults.raise_all()
+        return found
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+class Section(Checked):
+    """A table of a file alone: a frozen data class whose arguments are its keys.
+
+    Attributes
+    ----------
+    stated : frozenset of str
+        Arguments that the file gives.
+    """
+
+    stated: ClassVar[frozenset[str]] = frozenset()
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Make the data class, and what reads it."""
+        super().__init_subclass__(**options)
+        dataclass(frozen=True, kw_only=True)(cls)
+        cls.in_files = TableOf(cls)
+
+    def __post_init__(self) -> None:
+        """Nothing: defaults need no check, and a table is checked as it is read."""
+
+    def values(self) -> dict[str, Any]:
+        """Its arguments by name."""
+        return {name: getattr(self, name) for name in arguments(type(self))}
+
+
+def told(error: InputError, file: object) -> InputError:
+    """The error of a file that was read: unknown keys first, for others may follow from them."""
+    found = sorted((error, *error.others), key=lambda one: not isinstance(one, UnknownKeyError))
+    shown = [InputError(one.reason, one.field.removeprefix(".")) for one in found[:MOST_TOLD]]
+    if len(found) > MOST_TOLD:
+        shown.append(InputError(f"{len(found) - MOST_TOLD} more"))
+    return InputError(shown[0].reason, shown[0].field, file, shown[1:])
