@@ -12,7 +12,7 @@ has in a case file where that is another than its name:
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cache
 from html import escape
@@ -32,6 +32,7 @@ from typing import (
 import numpy as np
 
 from foldyn.errors import within
+from foldyn.json_schema import Schema, of_checked, of_type
 from foldyn.values import flag, plain
 
 T = TypeVar("T")
@@ -59,11 +60,15 @@ class Check(Unit):
         ``check(name, value, **limits)`` gives the value as it is kept, or raises `InputError`.
     unit : str
         For tables, and for messages of checks that take it.
+    words : iterable of str, optional
+        Texts that the check accepts, where `limits` do not say so.
     """
 
-    def __init__(self, check: Callable[..., Any], *, unit: str = "", **limits: Any) -> None:
+    def __init__(
+        self, check: Callable[..., Any], *, unit: str = "", words: Iterable[str] = (), **limits: Any
+    ) -> None:
         super().__init__(unit)
-        self.check, self.limits = check, limits
+        self.check, self.limits, self.words = check, limits, words
         parameters = inspect.signature(check).parameters
         if unit and "unit" in parameters:
             self.limits["unit"] = unit
@@ -73,6 +78,11 @@ class Check(Unit):
         """The value as it is kept."""
         asked = {word: context[word] for word in self.asks if word in context}
         return self.check(name, value, **self.limits, **asked)
+
+    def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
+        """JSON Schema of what it accepts of a type; tables of data classes become definitions."""
+        words = {"known": [*self.words]} if self.words else {}
+        return of_checked(hint, self.check, {**self.limits, **words})
 
 
 Flag = Annotated[bool, Check(flag)]
@@ -96,6 +106,7 @@ class Argument(NamedTuple):
     unit: str
     key: str
     default: Any
+    hint: Any = Any
     reader: Check | None = None
 
     def read(self, name: str, value: Any, context: Mapping[str, Any]) -> Any:
@@ -103,6 +114,13 @@ class Argument(NamedTuple):
         if self.reader is not None:
             value = self.reader(name, value, context)
         return self.checked(name, value, context)
+
+    def schema(self, definitions: dict[str, Schema]) -> Schema:
+        """JSON Schema of what a file may say."""
+        check = self.reader or (self.checks[-1] if self.checks else None)
+        schema = check.schema(self.hint, definitions) if check else of_type(self.hint, NOTHING)
+        plainly = isinstance(self.default, bool | int | float | str) and "$ref" not in schema
+        return {**schema, "default": self.default} if plainly else schema
 
     def checked(self, name: str, value: Any, context: Mapping[str, Any] = NOTHING) -> Any:
         """The value as it is kept; None is left alone where it is the default."""
@@ -123,7 +141,7 @@ def arguments(kind: type) -> Mapping[str, Argument]:
         key = next((note for note in notes if isinstance(note, Key)), item.name)
         unit = next((note.unit for note in notes if isinstance(note, Unit) and note.unit), "")
         reader = next((note.check for note in notes if isinstance(note, Read)), None)
-        found[item.name] = Argument(checks, unit, str(key), item.default, reader)
+        found[item.name] = Argument(checks, unit, str(key), item.default, hints[item.name], reader)
     return found
 
 
@@ -152,11 +170,14 @@ class Checked:
         Remedies in messages where a file lacks a key that it must have.
     in_files : Check or None
         What reads an argument of this type, where the type alone says so.
+    like : sequence
+        Functions and classes whose docstrings say what its arguments are.
     """
 
     place: ClassVar[str] = ""
     missing: ClassVar[Mapping[str, str]] = NOTHING
     in_files: ClassVar[Check | None] = None
+    like: ClassVar[Sequence[Any]] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Give a subclass its repr before `dataclass` would give it a long one."""

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, TypeVar, dataclass_transform
 
 from foldyn.arguments import NOTHING, Check, Checked, arguments
 from foldyn.errors import Faults, InputError
+from foldyn.json_schema import Schema, closed, described, explained
 from foldyn.values import SHOWN, nearest, show, suggest
 
 C = TypeVar("C", bound=Checked)
@@ -149,6 +150,10 @@ class TableOf(Check):
         super().__init__(partial(read, kind))
         self.kind = kind
 
+    def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
+        """See `Check`."""
+        return schema_of(self.kind, definitions)
+
 
 class ListOf(Check):
     """A list.
@@ -180,6 +185,32 @@ class ListOf(Check):
                 found.append(self.item(f"{name}[{i}]", item, context))
         faults.raise_all()
         return found
+
+    def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
+        """See `Check`."""
+        items = self.item.schema(str, definitions)
+        return {"type": "array", "items": items, "minItems": self.least}
+
+
+def schema_of(
+    kind: type[Checked], definitions: dict[str, Schema], without: Iterable[str] = (), word: str = ""
+) -> Schema:
+    """JSON Schema of the table of a data class, as one of the definitions.
+
+    without : keys that it may not have.
+    word : what its key `kind` says, if it has one for others to tell it by.
+    """
+    name = "-".join((kind.__name__, *without))
+    if name not in definitions:
+        texts = explained(*kind.mro(), *kind.like)
+        own = {field: one for field, one in arguments(kind).items() if one.key not in without}
+        properties = {
+            one.key: described(one.schema(definitions), texts.get(field))
+            for field, one in own.items()
+        }
+        required = [key for key in needs(kind) if key in properties]
+        definitions[name] = closed(properties, required, kind, word)
+    return {"$ref": f"#/definitions/{name}"}
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)

@@ -43,12 +43,6 @@ def test_shapes_follow_the_argument():
     np.testing.assert_array_equal(law.energy(transposed), law.energy(transposed.copy()))
 
 
-@pytest.mark.parametrize("name", ["linear", "superlinear", "enhanced", "plate_superlinear"])
-def test_hinge_laws_that_need_nothing_more_are_made_by_name(name):
-    law = hinge_law(name)
-    assert isinstance(law, HINGE_LAWS[name]) and law.name == name
-
-
 @pytest.mark.parametrize("spec", ["Ogden", "", None, 3, ["ogden"], Ogden, hinge_law("linear")])
 def test_wrong_bar_law(spec):
     with pytest.raises(InputError, match=r"bar_law.*ogden, linear"):

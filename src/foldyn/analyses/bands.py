@@ -32,7 +32,7 @@ from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.cases.loads import Actuate
 from foldyn.errors import InputError
-from foldyn.linear import UnitCell, attenuation, band_gaps, bands, damped_bands
+from foldyn.linear import UnitCell, attenuation, band_gaps, bands, damped_bands, modes
 from foldyn.linear.band_gaps import ALL
 from foldyn.patterns.screw import Screw
 from foldyn.results.dataset import bands_dataset
@@ -50,8 +50,31 @@ COORDINATES = ("distance", "wave_vector", "zone_wave_vector", "leg")
 
 
 class BandsSection(AnalysisSection):
-    """[analysis] of kind "bands"."""
+    """[analysis] of kind "bands".
 
+    Parameters
+    ----------
+    path : str
+        Points of the Brillouin zone, as "G-X-M-Y-G".
+    points : int
+        Wave vectors along the path.
+    count : int
+        How many bands, the lowest ones.
+    zone : int, optional
+        Wave vectors along each period of the whole zone, for exact full gaps.
+    attenuation : int, optional
+        Frequencies of an attenuation spectrum along the legs of the path that follow one period.
+    vary : mapping, optional
+        Several states: one key of the file, and its values or range.
+    stretch : float or sequence of float, optional
+        Equilibrium with periods times this factor, one or one for each.
+    turn : float, optional
+        Equilibrium with this angle (degrees) from cell to cell of a tube.
+    periods : int or sequence of int, optional
+        Numbers of the periods of the pattern that repeat it; all by default.
+    """
+
+    like = (modes, UnitCell)
     path: Text | None = None
     points: Count = 60
     count: Count = 6

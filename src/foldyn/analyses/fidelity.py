@@ -47,6 +47,7 @@ def _divisions(name: str, value: Any) -> Any:
 class FidelitySection(AnalysisSection):
     """[analysis] of kind "fidelity"."""
 
+    like = (fidelity,)
     count: Count = 6
     divisions: Annotated[Any, Check(_divisions)] = None
     models: Annotated[list[str] | None, Check(_names)] = None

@@ -6,6 +6,7 @@ What shakes the structure stands under [[drive]].
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -77,7 +78,8 @@ def _range(name: str, table: dict[str, Any]) -> NDArray[np.float64]:
 class FrfSection(*(method.options for method in METHODS.values()), AnalysisSection):
     """[analysis] of kind "frf"."""
 
-    frequencies: Annotated[Any, Check(_frequencies)]
+    like = (frf,)
+    frequencies: Annotated[Sequence[float] | Mapping[str, float], Check(_frequencies)]
     method: Annotated[str, one_of(METHODS)] = "direct"
     state: About = "rest"
     secant: Secant = None
@@ -118,33 +120,46 @@ class FrfSection(*(method.options for method in METHODS.values()), AnalysisSecti
 NO_HISTORY = (
     "a drive has an amplitude only, analysis.method says how it goes over time; leave it out"
 )
-DRIVE = PartOf(
-    (Force, BaseMotion), "drive", "nodes and force, or base (the axis of a base that moves)"
+
+
+class DriveOf(PartOf):
+    """A table of [[drive]]: a force on nodes, or a motion of the base."""
+
+    def _made(self, name: str, value: Any, folder: Path | None) -> Any:
+        if isinstance(value, Mapping):
+            number(f"{name}.displacement", value.get("displacement", 1.0), above=0.0)
+            value = {**value, "history": {"kind": "constant"}}
+        return super()._made(name, value, folder)
+
+
+DRIVE = DriveOf(
+    (Force, BaseMotion),
+    "drive",
+    "nodes and force, or base (the axis of a base that moves)",
+    history=NO_HISTORY,
 )
 
 
-def _drive(name: str, table: Any) -> Force | BaseMotion:
-    """A force on nodes, or a motion of the base, from its table of [[drive]]."""
-    if isinstance(table, Mapping):
-        if "history" in table:
-            raise InputError(f" = {show(table['history'])}: {NO_HISTORY}", f"{name}.history")
-        number(f"{name}.displacement", table.get("displacement", 1.0), above=0.0)
-        table = {**table, "history": {"kind": "constant"}}
-    return DRIVE(name, table)
-
-
 class FrfOutput(ShownSection):
-    """[output] of a frequency response: what is shown."""
+    """[output] of a frequency response: what is shown.
 
-    axis: Annotated[Any, one_of(DIRECTIONS)] = None
-    quantity: Annotated[Any, one_of(PER_FORCE)] = None
+    Parameters
+    ----------
+    axis : {"x", "y", "z", "-x", "-y", "-z"}, optional
+        Direction that figures show; by default that of the drive.
+    quantity : {"receptance", "mobility", "accelerance"}, optional
+        What is shown: displacement, velocity or acceleration per force.
+    """
+
+    axis: Annotated[str | None, one_of(DIRECTIONS)] = None
+    quantity: Annotated[str | None, one_of(PER_FORCE)] = None
 
 
 class FrfSchema(VibrationSchema):
     """A case file of kind "frf"."""
 
     analysis: FrfSection
-    drive: Annotated[Sequence[Any], ListOf(Check(_drive), least=1)]
+    drive: Annotated[Sequence[Any], ListOf(DRIVE, least=1)]
     output: FrfOutput = FrfOutput()
 
     def agree(self) -> None:

@@ -38,6 +38,7 @@ MOST_TRIANGLES = 25_000
 class ModesSection(AnalysisSection):
     """[analysis] of kind "modes"."""
 
+    like = (modes,)
     count: Count = 6
     state: About = "rest"
     secant: Secant = None
@@ -45,7 +46,15 @@ class ModesSection(AnalysisSection):
 
 
 class ModesOutput(ShownSection):
-    """[output] of modes: what is shown, and along which axis and at which nodes it is judged."""
+    """[output] of modes: what is shown, and along which axis and at which nodes it is judged.
+
+    Parameters
+    ----------
+    shapes : int or sequence of int
+        How many modes are drawn, or their numbers.
+    animation : {"gif", "mp4"}, optional
+        Film of the modes beside the page.
+    """
 
     shapes: Annotated[
         int | Sequence[int], Check(some_shapes, drawn="modes", what="mode", least=1)

@@ -24,7 +24,7 @@ from foldyn.analyses.start import MotionStart
 from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.cases.models import SHELL
-from foldyn.dynamics import METHODS, Keeping, prepare
+from foldyn.dynamics import METHODS, Keeping, prepare, simulate
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.timing import check_room, check_samples
 from foldyn.errors import InputError
@@ -61,6 +61,7 @@ def _every(name: str, value: Any) -> int | float:
 class MotionSection(AnalysisSection):
     """[analysis] of kind "dynamics"."""
 
+    like = (simulate,)
     duration: Positive
     method: Annotated[str, one_of((AUTO, *METHODS))] = "rk4"
     dt: Positive | None = None
@@ -72,7 +73,17 @@ class MotionSection(AnalysisSection):
 
 
 class MotionOutput(ShownSection):
-    """[output] of a motion: what is kept and shown."""
+    """[output] of a motion: what is kept and shown.
+
+    Parameters
+    ----------
+    every : int or float, optional
+        Steps (a whole number) or seconds between samples; by default the duration over 2000.
+    max_frequency : float, optional
+        Highest frequency of spectra that are drawn (Hz).
+    animation : {"gif", "mp4"}, optional
+        Film of the motion beside the page.
+    """
 
     every: Annotated[int | float | None, Check(_every)] = None
     max_frequency: Positive | None = None

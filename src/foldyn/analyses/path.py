@@ -90,6 +90,7 @@ NO_BASE = (
 class PathSection(AnalysisSection):
     """[analysis] of kind "statics"."""
 
+    like = (trace, Settings)
     method: Annotated[str, one_of(METHODS)] = "newton"
     load_factors: Annotated[list[float] | None, Check(_load_factors)] = None
     steps: Count | None = None
@@ -104,9 +105,19 @@ class PathSection(AnalysisSection):
 
 
 class PathOutput(ShownSection):
-    """[output] of a path: what is shown."""
+    """[output] of a path: what is shown.
 
-    axis: Annotated[Any, one_of(DIRECTIONS)] = None
+    Parameters
+    ----------
+    axis : {"x", "y", "z", "-x", "-y", "-z"}, optional
+        Direction that figures show; by default that of the largest motion.
+    shapes : int or sequence of int
+        How many deformed shapes are drawn, or the numbers of their points.
+    animation : {"gif", "mp4"}, optional
+        Film of the path beside the page.
+    """
+
+    axis: Annotated[str | None, one_of(DIRECTIONS)] = None
     shapes: Annotated[int | Sequence[int], Check(some_shapes, drawn="shapes", what="point")] = 4
     animation: Animation = None
 

@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from inspect import signature
 from typing import Any
 
+from foldyn.arguments import Check
 from foldyn.errors import Faults, InputError, within
-from foldyn.patterns import GENERATORS
+from foldyn.json_schema import Schema, any_of, closed, of_call
+from foldyn.patterns import GENERATORS, Pattern
 from foldyn.patterns.facets import FACETS as KINDS_OF_FACETS
 from foldyn.tables import check_keys, check_table
 from foldyn.values import choice, nearest, number_or_list, numbers, show
@@ -20,6 +22,22 @@ READING = ("scale", "unit", "frame", FACETS, "tolerance", "flat_foldable")
 """Keys of [pattern] beside `file`: arguments of `read_pattern`."""
 INLINE = ("vertices", "faces", "assignments", "fold_angles", "families")
 """Keys of [pattern] for a pattern that the case file holds."""
+
+
+class PatternOf(Check):
+    """The table of a pattern."""
+
+    def __init__(self) -> None:
+        super().__init__(checked_pattern)
+
+    def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
+        """See `Check`."""
+        table, text = {"type": "object"}, {"type": "string"}
+        more: dict[str, Schema] = {FACETS: {"enum": [*KINDS_OF_FACETS]}, HINGES: {}}
+        made = [of_call(make, word, more) for word, make in GENERATORS.items()]
+        read = closed({"file": text, **{key: {} for key in READING}, **more}, ["file"], Pattern)
+        own = {key: table if key == "families" else {} for key in INLINE}
+        return any_of([*made, read, closed({**own, **more}, INLINE[:2], Pattern)])
 
 
 def checked_pattern(name: str, value: Any) -> dict[str, Any]:

@@ -42,6 +42,7 @@ def _ends(name: str, value: Any) -> list[float]:
 class ResponseSection(AnalysisSection):
     """[analysis] of kind "response"."""
 
+    like = (response_curve,)
     frequencies: Annotated[Sequence[float] | None, Check(_ends)] = None
     amplitudes: Annotated[Sequence[float] | None, Check(_ends)] = None
     harmonics: Count = 9

@@ -8,9 +8,10 @@ tables.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Annotated, Any
 
-from foldyn.analyses.pattern_section import checked_pattern
+from foldyn.analyses.pattern_section import PatternOf
 from foldyn.analyses.ranges import SAMPLINGS, varied
 from foldyn.analyses.ties import ties_of
 from foldyn.arguments import Check, arguments
@@ -25,7 +26,7 @@ from foldyn.cases.damping import (
     dampings,
     dampings_of,
 )
-from foldyn.cases.decode import law_from
+from foldyn.cases.decode import KindOf, law_from
 from foldyn.cases.directions import AXES, check_pairs
 from foldyn.cases.loads import LOAD
 from foldyn.cases.masses import MASS
@@ -35,7 +36,8 @@ from foldyn.cases.supports import SUPPORT
 from foldyn.errors import InputError, within
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.plots import ANIMATIONS
-from foldyn.structures import PRESETS, Sheet
+from foldyn.shells import shell
+from foldyn.structures import PRESETS, Sheet, discretize
 from foldyn.structures.creases import per_crease
 from foldyn.structures.rigid_plates import checked_panels
 from foldyn.structures.structure import CALIBRATIONS, MEMBRANES, SCHEMES
@@ -52,6 +54,7 @@ from foldyn.values import (
     whole,
 )
 
+RULES = [name for model in MODELS.values() for name in model.masses]
 MOST_SHAPES = 12
 """Deformed shapes or modes that one figure shows at most."""
 
@@ -198,33 +201,43 @@ Positive = Annotated[float, Check(number, above=0.0)]
 Count = Annotated[int, Check(whole_number)]
 Whole = Annotated[int, Check(whole_number, least=-MOST)]
 Seed = Annotated[int, Check(whole_number, least=0)]
-Nodes = Annotated[Any, Check(check_nodes)]
-Vector = Annotated[Any, Check(vector)]
-HingeLaw = Annotated[Any, Check(_law, laws=HINGE_LAWS)]
-PerCrease = Annotated[Any, Check(_per_crease)]
-Edges = Annotated[Any, Check(_edges)]
+Nodes = Annotated[int | str | Sequence[int] | None, Check(check_nodes)]
+Vector = Annotated[Sequence[float] | None, Check(vector)]
+HingeLaw = Annotated[Any, KindOf(partial(_law, laws=HINGE_LAWS), HINGE_LAWS, named=True)]
+BarLaw = Annotated[Any, KindOf(partial(_law, laws=BAR_LAWS), BAR_LAWS, named=True)]
+PerCrease = Annotated[float | Sequence[float] | Mapping[str, float] | None, Check(_per_crease)]
+Edges = Annotated[str | Sequence[Sequence[int]] | None, Check(_edges)]
 Animation = Annotated[str | None, one_of(ANIMATIONS)]
 
 
 class ModelSection(Section):
-    """[model]: arguments of `discretize` or `shell`; what is left out has its default there."""
+    """[model]: arguments of `discretize` or `shell`; what is left out has its default there.
 
+    Parameters
+    ----------
+    kind : {"bars_and_hinges", "shell"}
+        What the pattern is modeled as.
+    mass : str or sequence of str
+        Mass rule; a list compares several.
+    """
+
+    like = (discretize, shell)
     kind: Annotated[str, one_of(MODELS)] = BARS_AND_HINGES
-    preset: Annotated[Any, one_of(PRESETS)] = None
-    scheme: Annotated[Any, one_of(SCHEMES)] = None
+    preset: Annotated[str | None, one_of(PRESETS)] = None
+    scheme: Annotated[str | None, one_of(SCHEMES)] = None
     divisions: Count | None = None
-    mass: Annotated[list[str] | None, Check(_masses)] = None
-    bar_law: Annotated[Any, Check(_law, laws=BAR_LAWS)] = None
+    mass: Annotated[str | Sequence[str] | None, Check(_masses, words=RULES)] = None
+    bar_law: BarLaw = None
     fold_law: HingeLaw = None
     bend_law: HingeLaw = None
-    calibration: Annotated[Any, one_of(CALIBRATIONS)] = None
+    calibration: Annotated[str | None, one_of(CALIBRATIONS)] = None
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
     clamped: Edges = None
-    rigid: Annotated[Any, Check(_rigid)] = None
+    rigid: Annotated[int | str | Sequence[int] | None, Check(_rigid, words=("all",))] = None
     vertex_radius: Positive | None = None
     straight: Edges = None
-    membrane: Annotated[Any, one_of(MEMBRANES)] = None
+    membrane: Annotated[str | None, one_of(MEMBRANES)] = None
 
     def agree(self) -> None:
         """Refuse keys of the other model."""
@@ -257,16 +270,36 @@ class AnalysisSection(Section):
 
 
 class ShownSection(Section):
-    """[output]: nodes that figures show, and the axis along which they do."""
+    """[output]: nodes that figures show, and the axis along which they do.
+
+    Parameters
+    ----------
+    nodes : int, sequence of int, or str
+        Node numbers or a selection; by default the loaded, driven or moved ones.
+    axis : {"x", "y", "z"}, optional
+        Component that figures show; by default that of the largest motion.
+    """
 
     nodes: Nodes = None
-    axis: Annotated[Any, one_of(AXES)] = None
+    axis: Annotated[str | None, one_of(AXES)] = None
 
 
 class DampingSection(Rayleigh, Section):
-    """[damping]: Rayleigh coefficients, or two damping ratios; modes, creases, strain rates."""
+    """[damping]: Rayleigh coefficients, or two damping ratios; modes, creases, strain rates.
 
-    ratios: Annotated[Any, Check(_ratios)] = None
+    Parameters
+    ----------
+    ratios : sequence of (float, float)
+        Instead of alpha and beta: two pairs of a frequency (Hz) and the damping ratio there.
+    modal : float, sequence of float, or table
+        Damping ratios of the lowest modes; see `ModalDamping`.
+    creases : float, table, or list of tables
+        Damping of creases (N m s/rad per m); see `CreaseDamping`.
+    strain : float
+        As beta (s), but for motions of any size; see `StrainDamping`.
+    """
+
+    ratios: Annotated[Sequence[Sequence[float]] | None, Check(_ratios)] = None
     modal: Annotated[Any, Check(dampings_of, kind=ModalDamping)] = ()
     creases: Annotated[Any, Check(dampings_of, kind=CreaseDamping)] = ()
     strain: Annotated[Any, Check(dampings_of, kind=StrainDamping)] = ()
@@ -295,18 +328,59 @@ class DampingSection(Rayleigh, Section):
 
 
 class SweepSection(Section):
-    """[sweep]: arguments of `sweep`."""
+    """[sweep]: arguments of `sweep`.
+
+    Parameters
+    ----------
+    vary : mapping
+        Keys of the file in quotes, each with a range A:B:N, A:B:N:log or a list of values; with
+        `samples` A:B or A:B:log.
+    samples : int, optional
+        Points that are drawn, instead of all combinations.
+    method : {"latin_hypercube", "sobol", "saltelli"}
+        How points are drawn.
+    seed : int
+        Of the points that are drawn.
+    ties : mapping, optional
+        Keys that follow others, each with its expression.
+    measures : sequence of str
+        What is measured of each result, as "peak_frequency[8]".
+    """
 
     samples: Count | None = None
     method: Annotated[str, one_of(SAMPLINGS)] = SAMPLINGS[0]
     seed: Seed = 0
-    vary: Annotated[Any, Check(_vary)]
-    ties: Annotated[Any, Check(_ties)] = ()
+    vary: Annotated[Mapping[str, Any], Check(_vary)]
+    ties: Annotated[Mapping[str, str] | Sequence[Any], Check(_ties)] = ()
     measures: Texts = ()
 
 
 class DesignSection(Section):
-    """[design]: arguments of `design`."""
+    """[design]: arguments of `design`.
+
+    Parameters
+    ----------
+    bounds : mapping
+        Keys of the file in quotes, each with its lower and upper bound.
+    minimize, maximize : str, optional
+        Expression of measures; one of the two.
+    subject_to : sequence of str
+        Constraints, as "frequency[1] >= 12".
+    start : mapping, optional
+        Values to start from; those of the file by default.
+    method : {"slsqp", "trust-constr", "mma", "cma"}
+        Method of the search.
+    starts : int
+        How many searches, all but the first from designs that are drawn.
+    seed : int
+        Of designs that are drawn.
+    tolerance : float
+        When a search ends.
+    slack : float
+        What counts as no violation of a constraint.
+    max_evaluations : int
+        Evaluations from each start, at most.
+    """
 
     bounds: Anything
     minimize: Text | None = None
@@ -322,10 +396,16 @@ class DesignSection(Section):
 
 
 class CaseSchema(Section):
-    """The tables that every case file may have."""
+    """The tables that every case file may have.
+
+    Parameters
+    ----------
+    title : str
+        For the page and its figures.
+    """
 
     title: Text = ""
-    pattern: Annotated[Mapping[str, Any], Check(checked_pattern)]
+    pattern: Annotated[Mapping[str, Any], PatternOf()]
     sheet: Annotated[Sheet, TableOf(Sheet)]
     model: ModelSection = ModelSection()
     damping: DampingSection = DampingSection()

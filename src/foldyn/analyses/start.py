@@ -29,14 +29,32 @@ def _result_file(name: str, value: Any) -> str:
 
 
 class StoredStart(Section):
-    """[initial]: a state of a stored result."""
+    """[initial]: a state of a stored result.
+
+    Parameters
+    ----------
+    file : str
+        Result of the same pattern and model, relative to the case file.
+    at : int
+        Number of its sample; the last by default.
+    """
 
     file: Annotated[str, Check(_result_file)]
     at: Whole = -1
 
 
 class MotionStart(Section):
-    """[initial] of a motion: a rigid motion, or a stored state."""
+    """[initial] of a motion: a rigid motion, or a stored state.
+
+    Parameters
+    ----------
+    velocity : sequence of float, shape (3,)
+        Velocity of the center of mass (m/s).
+    spin : sequence of float, shape (3,)
+        Angular velocity about it (rad/s).
+    """
+
+    like = (StoredStart,)
 
     velocity: Vector = None
     spin: Vector = None

@@ -17,8 +17,9 @@ from foldyn.arguments import Check, Checked, Read, arguments
 from foldyn.cases.histories import HISTORIES, History, Table
 from foldyn.cases.history import as_history
 from foldyn.errors import Faults, InputError, within
+from foldyn.json_schema import Schema, any_of, of_call
 from foldyn.mechanics.term import Term
-from foldyn.tables import check_keys, check_table, needs, read
+from foldyn.tables import check_keys, check_table, needs, read, schema_of
 from foldyn.values import choice, plain, show
 
 
@@ -117,10 +118,27 @@ def _table_from_file(arguments: Mapping[str, Any], folder: Path) -> Table:
         return Table.from_csv(folder / file, **columns)
 
 
+class KindOf(Check):
+    """A table whose `kind` is the name of one of some data classes, or the name alone."""
+
+    def __init__(self, read: Callable[..., Any], kinds: Mapping[str, Any], named: bool) -> None:
+        super().__init__(read)
+        self.kinds, self.named = kinds, named
+
+    def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
+        """See `Check`."""
+        tables = [
+            schema_of(kind, definitions, ("name",), word) for word, kind in self.kinds.items()
+        ]
+        if Table in self.kinds.values():
+            tables.append(of_call(Table.from_csv, Table.kind, {}))
+        return any_of([*([{"enum": [*self.kinds]}] if self.named else []), *tables])
+
+
 Factor = Annotated[
     History | Callable[[Any], Any] | None,
     Check(lambda _, history: as_history(history)),
-    Read(Check(history_from)),
+    Read(KindOf(history_from, HISTORIES, named=False)),
 ]
 
 
@@ -181,10 +199,17 @@ class PartOf(Check):
         """The same, of a file that may not have some keys, each for a reason."""
         return PartOf(self.kinds, self.section, self.asked, **refused)
 
+    def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
+        """See `Check`."""
+        return any_of(schema_of(kind, definitions, self.refused) for kind in self.kinds)
+
     def _read(self, name: str, value: Any, folder: Path | None = None) -> Any:
         for key, why in self.refused.items():
             if isinstance(value, Mapping) and key in value:
                 raise InputError(f" = {show(value[key])}: {why}", f"{name}.{key}")
+        return self._made(name, value, folder)
+
+    def _made(self, name: str, value: Any, folder: Path | None) -> Any:
         return read(self._kind(name, value), name, value, folder)
 
     def _kind(self, name: str, value: Any) -> type[Part]:

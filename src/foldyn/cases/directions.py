@@ -39,7 +39,7 @@ def check_direction(name: str, direction: Any) -> str | tuple[float, ...]:
     return vector(name, direction, nonzero=True)
 
 
-Axis = Annotated[str, Check(check_axis)]
+Axis = Annotated[str, Check(check_axis, words=AXES)]
 Axes = Annotated[str, Check(check_axes)]
 Direction = Annotated[str | Sequence[float], Check(check_direction)]
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import gc
+import json
 import os
 import shlex
 import sys
@@ -190,6 +191,11 @@ def parser() -> argparse.ArgumentParser:
     add_view(commands)
     add_warm_up(commands)
     commands.add_parser(
+        "schema",
+        help="JSON Schema of case files, by which editors complete and check them",
+        description="The JSON Schema (draft 7) of case files of this version.",
+    )
+    commands.add_parser(
         "info",
         help="versions, threads, optional parts, shipped cases",
         description="Versions, threads, optional parts found or missing, shipped cases.",
@@ -287,7 +293,8 @@ def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
         with warnings.catch_warnings():
             warnings.simplefilter("always", FoldynWarning)
             warnings.showwarning = _Warnings(getattr(given, "case", ""))
-            most = 1.0 if given.command == "info" or given.force else HALF
+            told = given.command in ("info", "schema")
+            most = 1.0 if told or given.force else HALF
             with at_most(most), noticed(getattr(given, "quiet", False)):
                 _call(given)
     except InputError as error:
@@ -319,6 +326,10 @@ def _call(given: argparse.Namespace) -> None:
         from foldyn.cli.info import info
 
         print(info())
+    elif given.command == "schema":
+        from foldyn.analyses.case_schema import case_schema
+
+        print(json.dumps(case_schema(), indent=1))
     elif given.command in OTHERS:
         OTHERS[given.command](given)
     else:

@@ -23,7 +23,9 @@ class Reached(Part):
     Parameters
     ----------
     node : int
+        Number of the node.
     axis : {"x", "y", "z"}
+        Axis along which it moves.
     displacement : float
         Displacement (m) from the rest position, not zero; reached where the node's own is as far
         from zero on the same side.

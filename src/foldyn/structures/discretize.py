@@ -69,7 +69,9 @@ def discretize(
     mass : str
         Mass rule, one of `foldyn.structures.MASS_RULES`.
     bar_law : {"ogden", "linear"} or BarLaw
+        Law of bars.
     fold_law, bend_law : {"linear", "superlinear", "enhanced", "plate_superlinear"} or HingeLaw
+        Laws of creases, and of hinges inside panels.
     calibration : {"standard", "merlin2", "plate"}
         "merlin2" assigns bend stiffnesses and bar areas in MERLIN2's order (see
         `foldyn.structures.calibration`); "plate" makes panels bend and twist as thin plates do, for

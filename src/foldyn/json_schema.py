@@ -1,0 +1,107 @@
+"""JSON Schema (draft 7) of types with limits, and texts of docstrings for it."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+from foldyn.values import length, vector
+
+Schema = dict[str, Any]
+BOUNDS = {
+    "above": "exclusiveMinimum", "least": "minimum", "below": "exclusiveMaximum", "most": "maximum",
+}  # fmt: skip
+TYPES = {bool: "boolean", int: "integer", float: "number", str: "string", Path: "string"}
+TRIPLE = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+_SECTION = re.compile(r"^(?:Parameters|Attributes)\n-+\n(.*?)(?=^[^\n]+\n---|\Z)", re.M | re.S)
+_ITEM = re.compile(r"^(\w[\w, ]*)(?: : .*)?\n((?: +.*\n?|\n)+)", re.M)
+
+
+def of_checked(hint: Any, check: Callable[..., Any], limits: Mapping[str, Any]) -> Schema:
+    """Schema of values of a type that a check with some limits accepts."""
+    if check is vector and str not in get_args(hint):
+        return TRIPLE
+    given = {key: one.default for key, one in inspect.signature(check).parameters.items()}
+    own = {"above": 0.0} if check is length else given
+    return of_type(hint, {**own, **limits})
+
+
+def of_type(hint: Any, limits: Mapping[str, Any]) -> Schema:
+    """Schema of a type whose numbers are within bounds, and whose texts are known words."""
+    origin, parts = get_origin(hint), [one for one in get_args(hint) if one is not NoneType]
+    if origin is Annotated:
+        return of_type(parts[0], limits)
+    if origin in (Union, UnionType):
+        return any_of(of_type(one, limits) for one in parts)
+    if origin in (list, tuple, Sequence):
+        return {"type": "array", "items": of_type(parts[0], limits)}
+    if origin in (dict, Mapping):
+        return {"type": "object", "additionalProperties": of_type(parts[1], limits)}
+    schema: Schema = {"type": TYPES[hint]} if hint in TYPES else {}
+    if hint in (int, float):
+        bounds = {word: limits.get(key) for key, word in BOUNDS.items()}
+        schema |= {word: bound for word, bound in bounds.items() if isinstance(bound, int | float)}
+    if hint is str and "known" in limits:
+        schema["enum"] = [*limits["known"]]
+    return schema
+
+
+def any_of(schemas: Any) -> Schema:
+    """Schema of what one of some accepts."""
+    found: list[Schema] = []
+    for one in schemas:
+        found += [one] if one not in found else []
+    if {} in found:
+        return {}
+    return found[0] if len(found) == 1 else {"anyOf": found}
+
+
+def described(schema: Schema, text: str | None) -> Schema:
+    """The schema with a text, where there is one."""
+    return {**schema, "description": text} if text else schema
+
+
+def closed(
+    properties: Mapping[str, Schema], required: Sequence[str], thing: Any, word: str = ""
+) -> Schema:
+    """Schema of a table without other keys, which a thing describes.
+
+    word : what its key `kind` says, if it has one.
+    """
+    kind = {"kind": {"enum": [word]}} if word else {}
+    schema = {
+        "type": "object",
+        "properties": {**kind, **properties},
+        "required": [*kind, *required],
+        "additionalProperties": False,
+    }
+    return described(schema, summary(thing))
+
+
+def of_call(function: Callable[..., Any], word: str, more: Mapping[str, Schema]) -> Schema:
+    """Schema of a table whose keys are its kind, the arguments of a function, and some more."""
+    hints, texts = get_type_hints(function), explained(function)
+    parameters = inspect.signature(function).parameters
+    own = {key: described(of_type(hints[key], {}), texts.get(key)) for key in parameters}
+    required = [key for key, one in parameters.items() if one.default is one.empty]
+    return closed({**own, **more}, required, function, word)
+
+
+def explained(*things: Any) -> dict[str, str]:
+    """Texts on arguments in the docstrings of functions and classes; the first on each counts."""
+    found: dict[str, str] = {}
+    for thing in things:
+        for part in _SECTION.findall(inspect.cleandoc(thing.__doc__ or "")):
+            for names, text in _ITEM.findall(part):
+                for name in names.split(", "):
+                    found.setdefault(name, " ".join(text.split()))
+    return found
+
+
+def summary(thing: Any) -> str:
+    """First sentence of a docstring."""
+    return " ".join(inspect.cleandoc(thing.__doc__ or "").partition("\n\n")[0].split())
