@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import random
 import signal
-import subprocess
 import sys
 import time
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -38,51 +36,39 @@ def kept(folder: Path) -> dict[str, tuple[int, int]]:
     }
 
 
-def more(points: Path, there: int, process: subprocess.Popen[str]) -> bool:
-    """Whether there are more points, or the sweep has ended."""
-    return len(kept(points)) > there or process.poll() is not None
-
-
-def killed_and_resumed(folder: Path, count: int, kills: int, seconds: float) -> None:
-    """Sweep, killed at random moments after new points were kept."""
-    (folder / "case.toml").write_text(MODES_TEXT)
-    (folder / "mine.py").write_text(MEASURE.format(seconds=seconds))
+@pytest.mark.matrix
+def test_a_sweep_that_is_killed_goes_on(tmp_path):
+    """Killed at a random moment after the first points were kept."""
+    count, seconds = 10, 0.1
+    (tmp_path / "case.toml").write_text(MODES_TEXT)
+    (tmp_path / "mine.py").write_text(MEASURE.format(seconds=seconds))
     vary = f"sheet.thickness=0.005:0.02:{count}"
     command = ("sweep", "case.toml", "--vary", vary, "--measure", "mine.py:slow")
     command = (*command, "--measure", "frequencies", "--processes", "2", "--no-figures")
-    points, moments, before = folder / "case-sweep" / "points", random.Random(0), {}
-    for _ in range(kills):
-        one = start(folder, *command)
-        wait_for(partial(more, points, len(before), one))
-        time.sleep(seconds * moments.uniform(0.0, 0.6 * count / kills))
-        workers = children(one.pid)
-        one.send_signal(signal.SIGKILL)
-        one.communicate(timeout=30)
-        wait_for(lambda workers=workers: not any(map(running, workers)), 10.0)
-        after = kept(points)
-        assert after.items() >= before.items()  # nothing lost, nothing computed again
-        assert len(after) > len(before) or len(before) == count
-        before = after
-    assert len(before) > 0
-    last = start(folder, *command)
+    points = tmp_path / "case-sweep" / "points"
+    one = start(tmp_path, *command)
+    wait_for(lambda: kept(points) or one.poll() is not None)
+    time.sleep(seconds * random.Random(0).uniform(0.0, 0.3 * count))
+    workers = children(one.pid)
+    one.send_signal(signal.SIGKILL)
+    one.communicate(timeout=30)
+    wait_for(lambda: not any(map(running, workers)), 10.0)
+    before = kept(points)
+    assert 0 < len(before) < count
+    last = start(tmp_path, *command)
     _, err = last.communicate(timeout=240)
     assert last.returncode == 0, err
-    assert kept(points).items() >= before.items()
+    assert kept(points).items() >= before.items()  # nothing lost, nothing computed again
     assert len(kept(points)) == count
     assert not [one for one in points.iterdir() if one.suffix != ".npz"]
-    found = fd.load(folder / "case-sweep" / "sweep.nc")
+    found = fd.load(tmp_path / "case-sweep" / "sweep.nc")
     thickness = np.linspace(0.005, 0.02, count)
-    alone = fd.sweep(folder / "case.toml", {"sheet.thickness": thickness}, ["frequencies"],
+    alone = fd.sweep(tmp_path / "case.toml", {"sheet.thickness": thickness}, ["frequencies"],
                      processes=1)  # fmt: skip
     np.testing.assert_array_equal(found["thickness"], alone["thickness"])
     np.testing.assert_array_equal(found["frequencies"], alone["frequencies"])
     np.testing.assert_array_equal(found["slow"], alone["frequencies"])
     assert found.attrs["failed"] == 0
-
-
-@pytest.mark.matrix
-def test_a_sweep_that_is_killed_goes_on(tmp_path):
-    killed_and_resumed(tmp_path, 20, 2, 0.1)
 
 
 DEADLY = """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -103,7 +104,21 @@ def test_the_study_writes_its_page_and_goes_on(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(studies, "QUICK", plan)
     monkeypatch.setattr("foldyn.cli.study.PROCESSES", 1)
     command = ["study", "waves", "--quick", "--out", str(tmp_path / "out")]
+
+    class Bar(contextlib.nullcontext):
+        def __enter__(self):
+            return self
+
+        def update(self):
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as first:
+        first.setattr("foldyn.cli.study.progress_bar", lambda *_, **__: Bar())
+        assert main(command) == 130
+    kept = f"foldyn: kept what was computed: {tmp_path / 'out' / 'runs'}; the same command goes on"
+    assert kept in capsys.readouterr().err
     assert main(command) == 0
+    assert "skipped 1 of 5 runs" in capsys.readouterr().out
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     for words in ("a coarse run", "two degrees of freedom", "Miura sheet", "eggbox sheet"):
         assert words in page
