@@ -155,11 +155,7 @@ TRANSIENTS: dict[str, dict[str, Any]] = {
     "impulse": {}, "burst_random": {"averages": 2}, "stepped_sine": {"settled": 1e-3, "cycles": 2},
 }  # fmt: skip
 METHODS = tuple(TRANSIENTS)
-IN_TIME = [
-    (kind, model, METHODS[(i + j) % 3])
-    for i, kind in enumerate(KINDS)
-    for j, model in enumerate(("plate", "shell"))
-]
+IN_TIME = [(kind, ("plate", "shell")[i % 2], METHODS[i % 3]) for i, kind in enumerate(KINDS)]
 
 
 @pytest.mark.filterwarnings("ignore:damping. .* resist", "ignore:.* of the motion is left")
@@ -188,8 +184,9 @@ def test_frequency_responses_from_motions_are_the_direct_ones(kind, model, metho
 
 
 @pytest.mark.filterwarnings("ignore:damping. .* resist")
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if "start" in kind or "relax" in kind])
 def test_steady_motions_of_diagrams_are_the_direct_responses(kind):
+    """Of kinds that depend on where the motion begins; the others are those of any motion."""
     case = made(kind, "plate")
     modes = fd.modes(case, 1, state="equilibrium")
     f, ratio = float(modes.frequency[0]), float(modes.damping_ratio[0])
