@@ -97,7 +97,8 @@ def _tower(rng) -> fd.Pattern:
     )  # fmt: skip
 
 
-QUICK = (7, 27)  # of either kind, with a plane, and in touch most of the time
+QUICK = (7, 27)  # towers, of either kind, with a plane, and in touch most of the time
+MORE = (9, 18, 36)  # the other patterns
 
 
 def crumpled(seed: int):
@@ -129,5 +130,5 @@ def test_nothing_crosses(seed):
 @pytest.mark.matrix
 def test_nothing_crosses_in_more_crumplings():
     pytest.importorskip("ipctk")
-    touched = [check(seed) for seed in SEEDS[::9]]
+    touched = [check(seed) for seed in MORE]
     assert sum(touched) >= len(touched) // 2
