@@ -9,6 +9,7 @@ matrix where that band would be too wide.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from foldyn.algebra.banded import Cholesky
 from foldyn.algebra.solvers import factorizer, takes_band
-from foldyn.algebra.superlu import SingularTangentError
+from foldyn.algebra.superlu import SingularTangentError, Solution
 from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.block_matrix import pairs_within
 from foldyn.mechanics.dihedral import add_hessian
@@ -58,7 +59,7 @@ class Curvature:
             stride = np.full(len(row), width)
             start = np.where(row > column, -1, width + 3 * row + 3 * column * width)
         else:
-            self._solver = factorizer("auto", size)[1]
+            self._factorizer = factorizer("auto", size)[1]
             blocks = _graph(np.column_stack([row, column]), nodes)
             full = sparse.bsr_array(
                 (np.ones((len(blocks.indices), 3, 3)), blocks.indices, blocks.indptr)
@@ -84,24 +85,30 @@ class Curvature:
         _put(x, self._hinges, hinges, self._places[1], self._band, out)
         return out
 
-    def solution(self, entries: NDArray, damping: float, force: NDArray) -> NDArray | None:
-        """Solution (n, 3) for a force (m,); None where the matrix is not positive definite.
+    def factorized(self, entries: NDArray, damping: float) -> Callable[[NDArray], NDArray] | None:
+        """Solutions (n, 3) for forces (m,); None where the matrix is not positive definite.
 
         damping : added to the diagonal, over its mean.
         """
-        damped, right, out = entries.copy(), force[self._dofs], np.empty(len(force))
+        damped = entries.copy()
         damped[self._diagonal] += damping * entries[self._diagonal].mean()
         try:
             if self._band:
-                out[self._dofs] = Cholesky(damped.reshape(self._shape).T).solve(right)
+                factors: Solution = Cholesky(damped.reshape(self._shape).T)
             else:
-                factors = self._solver(sparse.csc_array((damped, *self._pattern), self._shape))
-                if factors.negative():
+                matrix = sparse.csc_array((damped, *self._pattern), self._shape)
+                factors = indefinite = self._factorizer(matrix)
+                if indefinite.negative():
                     return None
-                out[self._dofs] = factors.solve(right)
         except SingularTangentError:
             return None
-        return out.reshape(-1, 3) if np.isfinite(out).all() else None
+
+        def solution(force: NDArray) -> NDArray:
+            out = np.empty(len(force))
+            out[self._dofs] = factors.solve(force[self._dofs])
+            return out.reshape(-1, 3)
+
+        return solution
 
 
 def _graph(pairs: NDArray, nodes: int) -> sparse.csc_array:

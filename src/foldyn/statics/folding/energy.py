@@ -146,20 +146,34 @@ class FoldEnergy:
             Parts(gradients, self._axis * slope, self._axis * pull),
         )
 
-    def gradient(self, at: Evaluated) -> NDArray:
-        """Gradient (m,) of the energy."""
+    def gradient(
+        self, at: Evaluated, first: Evaluated | None = None,
+        pulls: tuple[NDArray, NDArray] | None = None,
+    ) -> NDArray:  # fmt: skip
+        """Gradient (m,) of the energy.
+
+        pulls : of bars and hinges, as far as they pull along their gradients here; with the rest
+            they pull along those at the `first` shape, to which the matrix of the step belongs.
+        """
         out = np.zeros(at.shape.x.size)
-        for nodes, own in ((self._bars, at.bars), (self._hinges, at.hinges)):
-            forces = own.gradients * own.pulls[:, None]
+        here = pulls or (at.bars.pulls, at.hinges.pulls)
+        for nodes, own, old, pull in zip(
+            (self._bars, self._hinges), at[1:], (first or at)[1:], here, strict=True
+        ):
+            rest = own.pulls - pull
+            forces = own.gradients * pull[:, None] + old.gradients * rest[:, None]
             out += np.bincount(_dofs(nodes).ravel(), forces.ravel(), out.size)
         return out
 
-    def expected(self, at: Evaluated, step: NDArray) -> tuple[NDArray, NDArray]:
-        """What bars (nb,) and hinges (nh,) pull with after a step (n, 3), to first order."""
+    def expected(self, at: Evaluated, first: Evaluated, step: NDArray) -> tuple[NDArray, NDArray]:
+        """What bars (nb,) and hinges (nh,) pull with after a step (n, 3), to first order.
+
+        first : as of `gradient`.
+        """
         bars, hinges = (
             own.pulls
-            + own.slopes * np.einsum("kd,kd->k", own.gradients, step[nodes].reshape(len(nodes), -1))
-            for nodes, own in ((self._bars, at.bars), (self._hinges, at.hinges))
+            + old.slopes * np.einsum("kd,kd->k", old.gradients, step[nodes].reshape(len(nodes), -1))
+            for nodes, own, old in zip((self._bars, self._hinges), at[1:], first[1:], strict=True)
         )
         return bars, hinges
 

@@ -38,7 +38,7 @@ def opened(energy: FoldEnergy, stiffness: Stiffness) -> Shape:
     most = np.full(len(least), math.pi)
     perturbed = minimum(energy, energy.start, Aim(wish, least, most), PERTURBED, iterations=3)
     free = Aim(np.full(len(least), np.nan), least, most)
-    return minimum(energy, perturbed, free, stiffness, iterations=300)
+    return minimum(energy, perturbed, free, stiffness, iterations=100)
 
 
 def ajar(energy: FoldEnergy, folded: Shape) -> Shape:
