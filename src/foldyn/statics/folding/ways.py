@@ -23,6 +23,7 @@ AJAR = math.radians(179.8)  # most turn of creases that are to open from the fol
 OPENED = 0.1  # part of what was asked: a crease that has opened by less stays closed
 FREE_MARGIN = math.radians(1.0)  # of mountains and valleys without an angle to reach
 WEAKER = (0.1, 0.01, 0.001)  # springs, in turn, before what they held is let go
+ENOUGH = 60  # iterations before the last step: what is kept there does without springs
 LESS = 0.3  # of the strain must be left with these
 HELD = 0.3  # of what creases have turned: change by which a state counts as kept
 TURNED = 1e-3  # rad, least turn that counts as one
@@ -120,7 +121,8 @@ def _followed(
             aim, last = _aim(energy, aimed, most), k == steps
             ahead = 2.0 * shape.x - before.x
             before, shape = shape, lowest(energy, shape, ahead, aim, stiffness)
-            shape = minimum(energy, shape, aim, stiffness, least=1e-10 if last else 1e-4)
+            iterations, least = (150, 1e-10) if last else (ENOUGH, 1e-4)
+            shape = minimum(energy, shape, aim, stiffness, iterations, least)
             if lets_go or last:
                 kept = relaxed(energy, stiffness, shape, kept, aim, angles[0], plane or last)
             lets_go = kept is not None
@@ -148,6 +150,7 @@ def relaxed(
     folded rigidly; failing that they bend as they like, as thin paper does.
     """
     wrong = len(wrong_ways(energy, shape.turns, aim.angles))
+    most = max(ISOMETRIC, LESS * largest_strain(shape))
     turned = np.abs(energy.creases(shape.turns) - first).sum() + TURNED
     aim = aim._replace(least=np.zeros_like(energy.signs))
     free = aim._replace(angles=np.full_like(aim.angles, np.nan))
@@ -161,9 +164,11 @@ def relaxed(
         else:  # in stages: springs that are weak at once take many steps
             kept = shape
             for weaker in WEAKER:
+                if weaker == WEAKER[-1] and largest_strain(kept) > most:
+                    break
                 weak = weak._replace(creases=stiffness.creases * weaker)
                 kept = minimum(energy, kept, aim, weak)
-        if kept is None or largest_strain(kept) > max(ISOMETRIC, LESS * largest_strain(shape)):
+        if kept is None or largest_strain(kept) > most:
             continue  # strained by more than the springs
         kept = settled(energy, kept, free, weak._replace(bends=bends[1], creases=0.0), 1e-10)
         if kept is None or largest_strain(kept) > ISOMETRIC:
