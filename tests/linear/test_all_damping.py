@@ -36,6 +36,10 @@ KINDS: dict[str, Kind] = {
     "relaxing damped creases": (fd.CreaseDamping(1.0), (), fd.Prony([0.1], [0.5])),
 }
 MODELS = ("plate", "n5b8e", "herkal", "merlin2", "shell")
+BESIDE: dict[str, dict[str, Any]] = {
+    "n4b5": {"preset": "herkal", "scheme": "n4b5"},
+    "rigid panels": {"preset": "plate", "rigid": "all"},
+}
 EXPLICIT = ("rk4", "central_difference", "dormand_prince")
 IMPLICIT = ("newmark", "generalized_alpha", "energy_momentum")
 STIFF = ("stiffness at the start", "strain rates")  # a thousand times the explicit steps
@@ -51,8 +55,9 @@ def sheet_of(law: Any, model: Any, pattern: fd.Pattern = PATTERN) -> Any:
     options: dict[str, Any] = {"crease_stiffness": 60.0, "fold_law": law}
     if model == "shell":
         return fd.shell(pattern, SHEET, divisions=2, **options)
-    soft = {"bend_law": "linear"} if model in ("herkal", "merlin2") else {}
-    return fd.discretize(pattern, SHEET, preset=model, **soft, **options)
+    given = BESIDE.get(model, {"preset": model})
+    soft = {"bend_law": "linear"} if given["preset"] in ("herkal", "merlin2") else {}
+    return fd.discretize(pattern, SHEET, **given, **soft, **options)
 
 
 @cache
@@ -155,7 +160,8 @@ TRANSIENTS: dict[str, dict[str, Any]] = {
     "impulse": {}, "burst_random": {"averages": 2}, "stepped_sine": {"settled": 1e-3, "cycles": 2},
 }  # fmt: skip
 METHODS = tuple(TRANSIENTS)
-IN_TIME = [(kind, ("plate", "shell")[i % 2], METHODS[i % 3]) for i, kind in enumerate(KINDS)]
+MOVED = ("plate", "shell", "n5b8e", "herkal", *BESIDE)
+IN_TIME = [(kind, MOVED[i % len(MOVED)], METHODS[(i + i // 3) % 3]) for i, kind in enumerate(KINDS)]
 
 
 @pytest.mark.filterwarnings("ignore:damping. .* resist", "ignore:.* of the motion is left")
