@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import MISSING, dataclass, fields
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from foldyn.cases import (
     Table,
     as_history,
 )
+from foldyn.cases.history import Formula, Waveform
 from foldyn.errors import InputError
 
 SMALL = math.sin(math.pi / 8)
@@ -32,16 +34,49 @@ EXAMPLES = [
     Harmonic(frequency=2.0, phase=30.0),
     Chirp(start=0.5, end=3.0, duration=2.0, phase=30.0),
     Table(times=[0.0, 1.0, 3.0], values=[0.0, 2.0, -2.0]),
-    Function(lambda t: t**2),
+]
+# of others, numbers without a default are 0.7
+EXAMPLES += [
+    kind(**{field.name: 0.7 for field in fields(kind) if field.default is MISSING})
+    for kind in HISTORIES.values()
+    if kind not in map(type, EXAMPLES)
 ]
 
 
-def test_every_registered_history_has_an_example() -> None:
-    assert {type(history) for history in EXAMPLES} >= set(HISTORIES.values())
-    assert all(history.kind == kind for kind, history in HISTORIES.items())
+@pytest.mark.parametrize("history", [*EXAMPLES, Ramp(1.5, smooth=True)], ids=repr)
+def test_derivatives_and_jumps_are_as_declared(history) -> None:
+    times = np.linspace(-0.5, 4.0, 4501) + 1e-4
+    factor, rate, second = history.derivatives(times)
+    apart = np.diff(times)[0]
+
+    def changes(knots, values, slopes):
+        """Whether values are their slopes' integral between times without one of these in it."""
+        missed = np.diff(values) - 0.5 * apart * (slopes[1:] + slopes[:-1])
+        at = np.array([*knots, np.inf])
+        within = (at > times[:-1, None]) & (at <= times[1:, None])
+        return np.abs(missed)[~within.any(axis=1)].max()
+
+    assert changes(history.jumps(), factor, rate) < 1e-2
+    assert changes(history.knots(), factor, rate) < 1e-4
+    assert changes(history.knots(), rate, second) < 1e-3
 
 
-@pytest.mark.parametrize("history", EXAMPLES, ids=lambda history: history.kind)
+@dataclass(frozen=True)
+class Unknown(Formula):
+    """A history whose code is that of another one."""
+
+    kind = "unknown"
+    formulas = (Waveform(Pulse.code, None),)
+
+
+def test_a_formula_that_kernels_do_not_know_is_refused() -> None:
+    with pytest.raises(InputError, match="history unknown: its formula is not one that kernels"):
+        Unknown()(0.5)
+
+
+@pytest.mark.parametrize(
+    "history", [*EXAMPLES, Function(lambda t: t**2)], ids=lambda history: history.kind
+)
 def test_shape_follows_the_times(history) -> None:
     times = np.linspace(-0.5, 4.0, 12).reshape(3, 4)
     factors = history(times)

@@ -20,7 +20,10 @@ from foldyn.jit.sources import PACKAGE, digest, imports, made_from, read
 FILES = [  # kernels for GPUs are not kept, and import what is optional
     path for path in sorted(PACKAGE.rglob("*.py")) if path.parent.name != "gpu"
 ]
-HALF_SINE = ("s = math.sin(math.pi * t / a)", "s = 3.0 * math.sin(math.pi * t / a)")
+HALF_SINE = (
+    "s = math.sin(math.pi * t / duration)",
+    "s = 3.0 * math.sin(math.pi * t / duration)",
+)
 LAW = (
     "def moment(turn):",
     "def moment(turn):\n    return 7.0\n\n\ndef was(turn):",
@@ -43,11 +46,11 @@ def test_kernels_follow_the_sources_of_what_they_call(tmp_path, named):
     where = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")} if named else {}
     before = ask(package, **where)
     assert before == (1.0, 1.0, 0)
-    edit(package / "cases" / "waveforms.py", *HALF_SINE)
+    edit(package / "cases" / "histories.py", *HALF_SINE)
     edit(package / "materials" / "superlinear.py", *LAW)
     assert ask(package, **where) == (3.0, 7.0, 0)
     if named:  # both versions stay side by side
-        edit(package / "cases" / "waveforms.py", *HALF_SINE[::-1])
+        edit(package / "cases" / "histories.py", *HALF_SINE[::-1])
         edit(package / "materials" / "superlinear.py", *LAW[::-1])
         assert ask(package, **where) == (1.0, 1.0, 1)
 
@@ -60,10 +63,10 @@ def test_what_a_kernel_is_made_from():
     law, switch, fields = "materials/superlinear.py", "materials/switch.py", "mechanics/model.py"
     assert {law, switch, "jit/compiled.py"} <= files_of("shells/kernels.py", "_forces")
     assert {law, switch, fields} <= files_of("mechanics/bars_hinges.py", "_forces")
-    assert "cases/waveforms.py" in files_of("dynamics/parts.py", "histories")
+    assert "cases/histories.py" in files_of("dynamics/parts.py", "histories")
     # a loop holds none of what it calls by address
     loop = files_of("dynamics/runge_kutta.py", "advance")
-    assert not {law, switch, "mechanics/force.py", "cases/waveforms.py"} & loop
+    assert not {law, switch, "mechanics/force.py", "cases/histories.py"} & loop
     # and not from what only tells or draws, which would compile all anew with every change
     others = {"cases/document.py", "cases/case.py", "dynamics/driver.py", "shells/kernels.py"}
     assert not others & loop
@@ -117,7 +120,7 @@ def test_no_kernel_is_made_from_what_tells_reads_or_draws():
         "statics",
     }  # fmt: skip
     assert {place.name for place in places if place.parts[0] in ("algebra", "cases")} == {
-        "banded.py", "waveforms.py",
+        "banded.py", "histories.py", "history.py", "waveforms.py",
     }  # fmt: skip
 
 
@@ -331,8 +334,8 @@ def test_motions_follow_histories_and_shells_follow_laws(tmp_path):
     package = copy_package(tmp_path)
     bars, shell = "bars-rk4-linear", "shell-newmark-linear"
     before = motions(package, bars, shell)
-    edit(package / "cases" / "waveforms.py", *HALF_SINE)
+    edit(package / "cases" / "histories.py", *HALF_SINE)
     assert motions(package, bars)[bars][1] > 2.0 * before[bars][1]
-    edit(package / "cases" / "waveforms.py", *HALF_SINE[::-1])
+    edit(package / "cases" / "histories.py", *HALF_SINE[::-1])
     edit(package / "materials" / "linear.py", "return theta - rest", "return 1.2 * (theta - rest)")
     assert motions(package, shell)[shell][1] != before[shell][1]

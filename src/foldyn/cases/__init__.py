@@ -1,13 +1,13 @@
 """Cases: supports, links, loads, histories, damping, states."""
 
-from foldyn.cases import histories, loads
+from foldyn.cases import histories, loads, waveforms
 from foldyn.cases.air import Air
 from foldyn.cases.case import Case
 from foldyn.cases.contact import Contact, Plane
 from foldyn.cases.damping import CreaseDamping, ModalDamping, Rayleigh, StrainDamping
 from foldyn.cases.dashpots import Dashpot
 from foldyn.cases.histories import *  # noqa: F403 - what it lists
-from foldyn.cases.history import Function, as_history
+from foldyn.cases.history import Formula, Function, as_history
 from foldyn.cases.loads import *  # noqa: F403
 from foldyn.cases.masses import PointMass
 from foldyn.cases.selection import resolve_nodes
@@ -42,3 +42,5 @@ __all__ = [
 ]
 __all__ += histories.__all__
 __all__ += loads.__all__
+
+Formula.table = waveforms.table

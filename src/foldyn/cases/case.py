@@ -19,12 +19,11 @@ from foldyn.cases.case_assembly import Damped, Loaded
 from foldyn.cases.clamped_edges import supported_points
 from foldyn.cases.contact import Contact
 from foldyn.cases.damping import Damping, Rayleigh, dampings
-from foldyn.cases.history import History, as_history, factor
+from foldyn.cases.history import CONSTANT, History, as_history, factor
 from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
 from foldyn.cases.state import State
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
-from foldyn.cases.waveforms import CONSTANT
 from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.mechanics.air.added_mass import AddedMass

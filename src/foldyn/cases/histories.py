@@ -1,7 +1,7 @@
 """The built-in histories, and the registry of all.
 
-To add one: its formula in `waveforms`, a frozen dataclass with `kind`, `code` and `parameters`,
-and its line in `HISTORIES`.
+To add one: its formula, a frozen dataclass with `kind`, `formulas` and `parameters`, and its line
+in `HISTORIES`.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.arguments import Check, Flag
-from foldyn.cases import waveforms
 from foldyn.cases.csv_table import read_columns
-from foldyn.cases.history import Constant, Formula, History
+from foldyn.cases.history import Constant, Formula, History, Waveform
 from foldyn.errors import InputError
+from foldyn.jit.compiled import inner_scalar
 from foldyn.values import SMALLEST, number, numbers, show
 
 __all__ = [
@@ -27,6 +27,7 @@ __all__ = [
     "Table",
 ]  # fmt: skip
 
+TABLE = 8  # code
 SHARP = 0.01  # of the range of a table: how far a sharp corner leads away from a straight line
 
 
@@ -45,6 +46,12 @@ class _Lasting(Formula):
         return 0.0, self.duration
 
 
+@inner_scalar
+def pulse(t, duration):
+    """See `Waveform`."""
+    return (1.0 if 0.0 <= t < duration else 0.0), 0.0, 0.0
+
+
 @dataclass(frozen=True)
 class Pulse(_Lasting):
     """Factor 1 for 0 <= t < duration, else 0.
@@ -61,11 +68,21 @@ class Pulse(_Lasting):
     """
 
     kind: ClassVar[str] = "pulse"
-    code: ClassVar[int] = waveforms.PULSE
+    formulas = (Waveform(1, pulse),)
 
     def jumps(self) -> tuple[float, ...]:
         """See `History.jumps`."""
         return 0.0, self.duration
+
+
+@inner_scalar
+def half_sine(t, duration):
+    """See `Waveform`."""
+    if not 0.0 <= t < duration:
+        return 0.0, 0.0, 0.0
+    p = math.pi / duration
+    s = math.sin(math.pi * t / duration)
+    return s, p * math.cos(math.pi * t / duration), -p * p * s
 
 
 @dataclass(frozen=True)
@@ -79,7 +96,23 @@ class HalfSine(_Lasting):
     """
 
     kind: ClassVar[str] = "half_sine"
-    code: ClassVar[int] = waveforms.HALF_SINE
+    formulas = (Waveform(2, half_sine),)
+
+
+@inner_scalar
+def ramp(t, duration):
+    """See `Waveform`."""
+    rate = 1.0 / duration if 0.0 <= t < duration else 0.0
+    return min(max(t / duration, 0.0), 1.0), rate, 0.0
+
+
+@inner_scalar
+def smooth_ramp(t, duration):
+    """See `Waveform`."""
+    x = min(max(t / duration, 0.0), 1.0)
+    d = x * (1.0 - x)
+    factor = x * x * x * (10.0 + x * (6.0 * x - 15.0))
+    return factor, 30.0 * d * d / duration, 60.0 * d * (1.0 - 2.0 * x) / (duration * duration)
 
 
 @dataclass(frozen=True)
@@ -104,11 +137,18 @@ class Ramp(_Lasting):
 
     smooth: Flag = False
     kind: ClassVar[str] = "ramp"
+    formulas = Waveform(3, ramp), Waveform(4, smooth_ramp)
 
     @property
     def code(self) -> int:  # type: ignore[override]
         """Code of the compiled formula."""
-        return waveforms.SMOOTH_RAMP if self.smooth else waveforms.RAMP
+        return self.formulas[self.smooth].code
+
+
+@inner_scalar
+def step(t, begin):
+    """See `Waveform`."""
+    return (1.0 if t >= begin else 0.0), 0.0, 0.0
 
 
 @dataclass(frozen=True)
@@ -123,7 +163,7 @@ class Step(Formula):
 
     time: Annotated[float, Check(number, unit="s")] = 0.0
     kind: ClassVar[str] = "step"
-    code: ClassVar[int] = waveforms.STEP
+    formulas = (Waveform(5, step),)
 
     def parameters(self) -> tuple[float, ...]:
         """See `History.parameters`."""
@@ -132,6 +172,14 @@ class Step(Formula):
     def jumps(self) -> tuple[float, ...]:
         """See `History.jumps`."""
         return (self.time,)
+
+
+@inner_scalar
+def harmonic(t, frequency, phase):
+    """See `Waveform`."""
+    omega = 2.0 * math.pi * frequency
+    s = math.sin(omega * t + phase)
+    return s, omega * math.cos(omega * t + phase), -omega * omega * s
 
 
 @dataclass(frozen=True)
@@ -149,11 +197,22 @@ class Harmonic(Formula):
     frequency: Annotated[float, Check(number, above=0.0, unit="Hz")]
     phase: Annotated[float, Check(number, unit="degrees")] = 0.0
     kind: ClassVar[str] = "harmonic"
-    code: ClassVar[int] = waveforms.HARMONIC
+    formulas = (Waveform(6, harmonic),)
 
     def parameters(self) -> tuple[float, ...]:
         """See `History.parameters`."""
         return self.frequency, math.radians(self.phase)
+
+
+@inner_scalar
+def chirp(t, start, slope, phase, duration):
+    """See `Waveform`; slope (Hz/s) of the frequency."""
+    if not 0.0 <= t < duration:
+        return 0.0, 0.0, 0.0
+    angle = 2.0 * math.pi * ((start + 0.5 * slope * t) * t) + phase
+    omega = 2.0 * math.pi * (start + slope * t)
+    s, r = math.sin(angle), math.cos(angle)
+    return s, omega * r, 2.0 * math.pi * slope * r - omega * omega * s
 
 
 @dataclass(frozen=True)
@@ -183,7 +242,7 @@ class Chirp(Formula):
     duration: Annotated[float, Check(number, above=0.0, unit="s")]
     phase: Annotated[float, Check(number, unit="degrees")] = 0.0
     kind: ClassVar[str] = "chirp"
-    code: ClassVar[int] = waveforms.CHIRP
+    formulas = (Waveform(7, chirp),)
 
     def agree(self) -> None:
         """Refuse what does not swing."""
@@ -228,7 +287,7 @@ class Table(Formula):
     values: Annotated[Any, Check(numbers)]
     smooth: Flag = False
     kind: ClassVar[str] = "table"
-    code: ClassVar[int] = waveforms.TABLE
+    formulas = (Waveform(TABLE, None),)
 
     def agree(self) -> None:
         """Refuse times that do not increase, and values that are not one for each."""
@@ -322,7 +381,7 @@ class Table(Formula):
         return (self.times + 0.0).tobytes(), (self.values + 0.0).tobytes(), self.smooth  # no -0
 
 
-HISTORIES: Mapping[str, type[History]] = {
+HISTORIES: Mapping[str, type[Formula]] = {
     history.kind: history
     for history in (Constant, Pulse, HalfSine, Ramp, Step, Harmonic, Chirp, Table)
 }

@@ -9,15 +9,17 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.arguments import Check, Checked
-from foldyn.cases import waveforms
 from foldyn.errors import InputError
+from foldyn.jit.compiled import inner_scalar
 from foldyn.values import numbers, show
+
+CALLED, CONSTANT = -1, 0  # codes of the user's functions, and of the constant
 
 
 class History(Checked, ABC):
@@ -28,7 +30,7 @@ class History(Checked, ABC):
     """
 
     kind: ClassVar[str]
-    code: ClassVar[int] = waveforms.CALLED
+    code: ClassVar[int] = CALLED
 
     @abstractmethod
     def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -57,8 +59,30 @@ class History(Checked, ABC):
         return self.jumps()
 
 
+class Waveform(NamedTuple):
+    """A compiled formula: the factor and its first and second derivative in time.
+
+    It takes the time (s) and `parameters`, as many as it has arguments. Where a derivative jumps it
+    gives the value after the jump.
+    """
+
+    code: int  # one that no other has
+    formula: Any  # None where the history is its `polynomials`
+
+
 class Formula(History):
-    """A history whose formula is compiled, the one of its `code` in `waveforms`."""
+    """A history whose formula is compiled, for loops over time."""
+
+    formulas: ClassVar[tuple[Waveform, ...]] = ()
+    """One for each of its codes; its `code` is the first of these."""
+    table: ClassVar[Callable[[History, NDArray], NDArray]]
+    """Factors and derivatives at times; the kernels, which know the histories, give it to them."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Take the code of the formula."""
+        super().__init_subclass__(**options)
+        if "formulas" in vars(cls) and isinstance(cls.code, int):
+            cls.code = cls.formulas[0].code
 
     def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `History.factor`."""
@@ -67,9 +91,13 @@ class Formula(History):
     def derivatives(self, time: ArrayLike) -> NDArray[np.float64]:
         """Factor and its first and second derivative, shape (3, ...), at each time (s)."""
         times = np.asarray(time, dtype=np.float64)
-        packed = waveforms.pack([self], waveforms.Callbacks())
-        flat = np.ascontiguousarray(times.ravel())
-        return waveforms.waveform_table(packed, 0, flat).reshape((3, *times.shape))
+        return self.table(np.ascontiguousarray(times.ravel())).reshape((3, *times.shape))
+
+
+@inner_scalar
+def constant(t):
+    """See `Waveform`."""
+    return 1.0, 0.0, 0.0
 
 
 @dataclass(frozen=True)
@@ -77,7 +105,7 @@ class Constant(Formula):
     """Factor 1 at all times."""
 
     kind: ClassVar[str] = "constant"
-    code: ClassVar[int] = waveforms.CONSTANT
+    formulas = (Waveform(CONSTANT, constant),)
 
 
 def _times(name: str, value: Any) -> tuple[float, ...]:
@@ -150,7 +178,7 @@ class Function(History):
 
 def factor(history: History, time: float | None) -> float:
     """Factor at a time (s); without one that of the constant loads alone."""
-    return float(history.code == waveforms.CONSTANT) if time is None else float(history(time))
+    return float(history.code == CONSTANT) if time is None else float(history(time))
 
 
 def as_history(history: History | Callable[[Any], Any] | None) -> History:

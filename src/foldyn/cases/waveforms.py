@@ -1,8 +1,7 @@
 """Histories inside compiled loops: the formulas of the built-in ones, and calls of users' own.
 
-Each formula is written once, here; `History.factor` and the integrators both evaluate it. It gives
-the factor and its first and second derivative in time, which imposed motions need; where a
-derivative jumps, the value after the jump.
+`History.factor` and the integrators both evaluate a formula here: the factor and its first and
+second derivative in time, which imposed motions need.
 """
 
 from __future__ import annotations
@@ -15,11 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.cases.histories import HISTORIES, TABLE
+from foldyn.cases.history import CALLED, History
+from foldyn.errors import InputError
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import call1
+from foldyn.jit.switches import arguments_of, by_code, switch
 
-CONSTANT, PULSE, HALF_SINE, RAMP, SMOOTH_RAMP, STEP, HARMONIC, CHIRP, TABLE = range(9)
-CALLED = -1
 PARAMETERS = 4
 GAUSS_POINTS, GAUSS_WEIGHTS = (0.5 * x for x in np.polynomial.legendre.leggauss(8))
 GAUSS_POINTS += 0.5  # of an interval from 0 to 1
@@ -75,6 +76,11 @@ def pack(histories: Sequence[Any], callbacks: Callbacks, span: float = 0.0) -> W
     knots, cubics = [np.zeros(0)], [np.zeros((0, 4))]
     for row, history in enumerate(histories):
         given = history.parameters()
+        if history.code != CALLED and FORMULAS.get(history.code) not in history.formulas:
+            raise InputError(
+                f"history {history.kind}: its formula is not one that kernels know; give "
+                "fd.Function (a new built-in history has its place in cases/histories.py)"
+            )
         parameters[row, : len(given)] = given
         knot, cubic = history.polynomials()
         knots.append(knot)
@@ -92,6 +98,17 @@ def pack(histories: Sequence[Any], callbacks: Callbacks, span: float = 0.0) -> W
     )
 
 
+FORMULAS = by_code({kind: one.formulas for kind, one in HISTORIES.items()})
+formula_at = switch(
+    __name__, "formula_at", "code, t, a, b, c, d",
+    {
+        code: (f"{{0}}({', '.join('tabcd'[: len(arguments_of(one.formula))])})", (one.formula,))
+        for code, one in FORMULAS.items() if one.formula is not None
+    },
+    ("nan, nan, nan", ()),
+)  # fmt: skip
+
+
 @inner
 def waveform(w, row, t, derive):
     """Factor of a history at time t and its two derivatives (per s and s2).
@@ -99,42 +116,12 @@ def waveform(w, row, t, derive):
     derive : whether the derivatives are wanted; without it those of the user's functions, which
     cost several calls, are 0.
     """
-    code = w.code[row]
-    a, b, c, d = w.parameters[row, 0], w.parameters[row, 1], w.parameters[row, 2], 0.0
+    code, p = w.code[row], w.parameters[row]
     if code == CALLED:
         return _called(w.address[row], t, w.span, derive)
-    if code == PULSE:
-        return (1.0 if 0.0 <= t < a else 0.0), 0.0, 0.0
-    if code == HALF_SINE:
-        if not 0.0 <= t < a:
-            return 0.0, 0.0, 0.0
-        p = math.pi / a
-        s = math.sin(math.pi * t / a)
-        return s, p * math.cos(math.pi * t / a), -p * p * s
-    if code == RAMP:
-        return min(max(t / a, 0.0), 1.0), (1.0 / a if 0.0 <= t < a else 0.0), 0.0
-    if code == SMOOTH_RAMP:
-        x = min(max(t / a, 0.0), 1.0)
-        d = x * (1.0 - x)
-        factor = x * x * x * (10.0 + x * (6.0 * x - 15.0))
-        return factor, 30.0 * d * d / a, 60.0 * d * (1.0 - 2.0 * x) / (a * a)
-    if code == STEP:
-        return (1.0 if t >= a else 0.0), 0.0, 0.0
-    if code == HARMONIC:
-        omega = 2.0 * math.pi * a
-        s = math.sin(omega * t + b)
-        return s, omega * math.cos(omega * t + b), -omega * omega * s
-    if code == CHIRP:  # start, slope of the frequency, phase, duration
-        d = w.parameters[row, 3]
-        if not 0.0 <= t < d:
-            return 0.0, 0.0, 0.0
-        phase = 2.0 * math.pi * ((a + 0.5 * b * t) * t) + c
-        omega = 2.0 * math.pi * (a + b * t)
-        s, r = math.sin(phase), math.cos(phase)
-        return s, omega * r, 2.0 * math.pi * b * r - omega * omega * s
     if code == TABLE:
         return _tabulated(w, row, t)
-    return 1.0, 0.0, 0.0
+    return formula_at(code, t, p[0], p[1], p[2], p[3])
 
 
 @inner
@@ -218,3 +205,8 @@ def unseen(w, first, last, before, after, out):
                 total += GAUSS_WEIGHTS[k] * (high - low) * distance
             low = high
         out[row] = total / (last - first)
+
+
+def table(history: History, times: NDArray) -> NDArray:
+    """Factors and derivatives (3, n) of one history at times (n,), s."""
+    return waveform_table(pack([history], Callbacks()), 0, times)

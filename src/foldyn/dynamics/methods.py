@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases import Case, Origin
-from foldyn.cases.waveforms import CALLED
+from foldyn.cases.history import CALLED
 from foldyn.dynamics import (
     central_difference,
     dormand_prince,

@@ -18,7 +18,8 @@ from scipy import sparse
 
 from foldyn.cases import Case, History, Origin
 from foldyn.cases.heat import heat_of
-from foldyn.cases.waveforms import CONSTANT, Callbacks, Waveforms, evaluate
+from foldyn.cases.history import CONSTANT
+from foldyn.cases.waveforms import Callbacks, Waveforms, evaluate
 from foldyn.cases.waveforms import pack as pack_waveforms
 from foldyn.dynamics.actuation import Actuators, actuators
 from foldyn.dynamics.added_mass import AddedMass, added_mass

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, History
-from foldyn.cases.waveforms import CALLED
+from foldyn.cases.history import CALLED
 from foldyn.dynamics.motion_state import StepPlan
 from foldyn.errors import InputError, warn
 from foldyn.ram_limit import GIB, check_memory

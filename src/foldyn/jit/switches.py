@@ -7,6 +7,7 @@ branch for each code. That function is made here from what is declared, so nothi
 from __future__ import annotations
 
 import inspect
+import math
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -16,7 +17,7 @@ from foldyn.jit.compiled import inner_scalar
 from foldyn.jit.sources import define
 
 Branch = tuple[str, tuple[Any, ...]]
-"""What a branch returns, with {0}, {1}, ... for compiled functions, and these functions."""
+"""What a branch returns, with nan, and {0}, {1}, ... for compiled functions; and these."""
 
 
 def switch(
@@ -31,14 +32,15 @@ def switch(
         lines.append(f"    {test}return {formula.format(*called)}")
     home, text = str(sys.modules[module].__file__), "\n".join(lines)
     define((Path(home).resolve(), name), text, map(_part, known.values()))
-    scope = {"__name__": module, "inner_scalar": inner_scalar, **known}
+    scope = {"__name__": module, "inner_scalar": inner_scalar, "nan": math.nan, **known}
     exec(compile(text, home, "exec"), scope)
     return scope[name]
 
 
 def _part(function: Any) -> tuple[Path, str]:
-    """Where a compiled function is defined."""
-    return Path(inspect.getfile(function.py_func)).resolve(), function.__name__
+    """Where a compiled function or an intrinsic one is defined."""
+    text = function.py_func if hasattr(function, "py_func") else function._defn
+    return Path(inspect.getfile(text)).resolve(), function.__name__
 
 
 def by_code(declared: Mapping[str, Iterable[Any]]) -> dict[int, Any]:

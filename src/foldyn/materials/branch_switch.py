@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from foldyn.jit.compiled import inner_scalar, kernel
+from foldyn.jit.compiled import kernel
 from foldyn.jit.switches import by_code, switch
 from foldyn.materials import crease_damper, eyring, plastic, prony
 
@@ -16,16 +14,6 @@ _BRANCHES = by_code(
 _ARGUMENTS = "p, before, after, dt, one, other"
 
 
-@inner_scalar
-def _no_state(p, before, after, dt, one, other):
-    return np.nan, np.nan, np.nan, np.nan, np.nan, np.nan
-
-
-@inner_scalar
-def _no_mean(p, before, after, dt, one, other):
-    return np.nan, np.nan, np.nan
-
-
 update, mean_moment = (
     switch(
         __name__, name, f"code, {_ARGUMENTS}",
@@ -33,9 +21,9 @@ update, mean_moment = (
             code: (f"{{0}}({_ARGUMENTS})", (formula,))
             for code, one in _BRANCHES.items() if (formula := getattr(one, name))
         },
-        (f"{{0}}({_ARGUMENTS})", (unknown,)),
+        (", ".join(["nan"] * count), ()),
     )
-    for name, unknown in (("update", _no_state), ("mean_moment", _no_mean))
+    for name, count in (("update", 6), ("mean_moment", 3))
 )  # fmt: skip
 
 

@@ -27,16 +27,6 @@ _HINGE = "code, theta, rest, a, b, c, d, address"
 
 
 @inner_scalar
-def _of_stretch(address, e):
-    return call1(address, 1.0 + e) if address != 0 else np.nan
-
-
-@inner_scalar
-def _of_angles(address, theta, rest):
-    return call2(address, theta, rest) if address != 0 else np.nan
-
-
-@inner_scalar
 def _by_rest(address, theta, rest):
     if address == 0:
         return np.nan
@@ -44,17 +34,12 @@ def _by_rest(address, theta, rest):
     return (call2(address, theta, rest + h) - call2(address, theta, rest - h)) / (2.0 * h)
 
 
-@inner_scalar
-def _nothing(rest, parameters):
-    pass
-
-
 # W, S and dS/dE per unit modulus at e = stretch - 1
 bar_energy, bar_stress, bar_slope = (
     switch(
         __name__, f"bar_{name}", "code, e, address",
         {code: ("{0}(e)", (getattr(law, name),)) for code, law in BARS.items()},
-        ("{0}(address, e)", (_of_stretch,)),
+        ("{0}(address, 1.0 + e) if address != 0 else nan", (call1,)),
     )
     for name in ("energy", "stress", "slope")
 )  # fmt: skip
@@ -62,7 +47,7 @@ bar_energy, bar_stress, bar_slope = (
 hinge_energy, hinge_moment, hinge_slope = (
     switch(
         __name__, f"hinge_{name}", _HINGE, {code: law.value(name) for code, law in HINGES.items()},
-        ("{0}(address, theta, rest)", (_of_angles,)),
+        ("{0}(address, theta, rest) if address != 0 else nan", (call2,)),
     )
     for name in ("energy", "moment", "slope")
 )  # fmt: skip
@@ -85,7 +70,7 @@ move_rest = switch(
         code: ("{0}(rest, parameters)", (law.follow,))
         for code, law in HINGES.items() if law.follow is not None
     },
-    ("{0}(rest, parameters)", (_nothing,)),
+    ("None", ()),
 )  # fmt: skip
 
 

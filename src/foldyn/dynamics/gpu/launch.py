@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.waveforms import CALLED, waveform_table
+from foldyn.cases.history import CALLED
+from foldyn.cases.waveforms import waveform_table
 from foldyn.dynamics.gpu import card
 from foldyn.dynamics.gpu.arrays import CaseArrays
 from foldyn.dynamics.gpu.kernels import Span, State, Written, kernel
