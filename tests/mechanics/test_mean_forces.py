@@ -258,6 +258,8 @@ def _drag(own, u, v, t, force, powers):
 class Drag(Term):
     """Drag of the first node."""
 
+    without = ("stiffness",)
+
     def __init__(self, coefficient: float) -> None:
         self.coefficient = coefficient
 

@@ -270,6 +270,9 @@ class Assembly:
         for term, kept in zip(self.others, work.kept, strict=True):
             found.append(term.compiled(work, kept, group))
             group += len(term.energy_groups)
+        for term, one in zip(self.terms, found, strict=True):
+            if FORCES not in one.kernels or (term.energy_groups and ENERGIES not in one.kernels):
+                raise TypeError(f"{type(term).__name__} has no kernel for its forces or energies")
         return found
 
     def kept(self, work: Work, kind: type[Term]) -> Any:

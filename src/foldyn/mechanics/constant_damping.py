@@ -141,6 +141,7 @@ class DampingRows(Term):
     """Full rows G (r, m), sqrt(N s/m), which implicit steps add to factors; see `Term`."""
 
     damps = True
+    without = ("damping",)
 
     def __init__(self, rows: NDArray) -> None:
         self.rows = rows

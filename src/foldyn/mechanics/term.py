@@ -72,6 +72,14 @@ branch_states = addressed(ADDRESS)
 mean_forces = addressed(ADDRESS, ADDRESS, ADDRESS, NUMBER, NUMBER, ADDRESS, ADDRESS)
 
 
+PARTS = {
+    "stiffness": {"places", "entries"},
+    "damping": {"damping_places", "damping_entries"},
+    "gradients": {"arrays", "pulled"},
+}
+WHOLE = {"stiffness": "tangent", "damping": "damping"}  # what may stand for both parts
+
+
 class Compiled(NamedTuple):
     """A term as loops see it: its context, and its kernels by what they do."""
 
@@ -103,9 +111,10 @@ class Term(ABC):
     """What adds to the energy and the forces of a sheet: springs, contact, hinges with memory.
 
     A term never changes but for memory that is said to; what makes another one of it leaves it as
-    it was. `compiled` and, unless it has no stiffness, `places` and `entries` are all that it must
-    have: the defaults are those of a term on the nodes without anything else. Dofs q are (m,), as
-    in `mechanics.assembly`, or arrays (rows, 3).
+    it was. It must have `compiled`, and `places` and `entries` or, if it damps, `damping_places`
+    and `damping_entries`; if it has gradients, `arrays` and `pulled`. A class that lacks one of
+    these is refused when it is defined. Other defaults are those of a term on the nodes without
+    anything else. Dofs q are (m,), as in `mechanics.assembly`, or arrays (rows, 3).
 
     Attributes
     ----------
@@ -121,6 +130,8 @@ class Term(ABC):
         Whether its forces resist velocities, and dissipate all their work, or give it to the air.
     undifferentiated : str
         What it is called where gradients are refused, of a term that has no `pulled`.
+    without : tuple of str
+        "stiffness" or "damping" where its forces have some that solvers find elsewhere, or none.
     """
 
     energy_groups: ClassVar[Mapping[str, str]] = {}
@@ -129,6 +140,20 @@ class Term(ABC):
     owns_hidden: ClassVar[bool] = False
     damps: ClassVar[bool] = False
     undifferentiated: ClassVar[str] = ""
+    without: ClassVar[tuple[str, ...]] = ()
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Refuse a kind of term that lacks a part: solvers would take it for zero."""
+        super().__init_subclass__(**options)
+        names = [name for name in vars(Term) if not name.startswith("_")]
+        if any(getattr(getattr(cls, name), "__isabstractmethod__", False) for name in names):
+            return  # a base of others
+        has = {name for name in names if getattr(cls, name) is not getattr(Term, name)}
+        needed = "damping" if cls.damps else "stiffness"
+        for whole, parts in PARTS.items():
+            asked = parts & has or (whole == needed and needed not in cls.without)
+            if asked and WHOLE.get(whole) not in has and (lacks := sorted(parts - has)):
+                raise TypeError(f"{cls.__name__} has no {' and no '.join(lacks)}, for its {whole}")
 
     # ------------------------------------------------------------------ what is compiled
     @abstractmethod
