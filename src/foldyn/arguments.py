@@ -76,13 +76,25 @@ class Check(Unit):
 
     def __call__(self, name: str, value: Any, context: Mapping[str, Any] = NOTHING) -> Any:
         """The value as it is kept."""
+        return self.check(name, value, **self._options(context))
+
+    def _options(self, context: Mapping[str, Any]) -> dict[str, Any]:
         asked = {word: context[word] for word in self.asks if word in context}
-        return self.check(name, value, **self.limits, **asked)
+        return {**self.limits, **asked}
 
     def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
         """JSON Schema of what it accepts of a type; tables of data classes become definitions."""
         words = {"known": [*self.words]} if self.words else {}
         return of_checked(hint, self.check, {**self.limits, **words})
+
+
+class Placed(Check):
+    """A check whose function takes the value alone: what it says continues the name."""
+
+    def __call__(self, name: str, value: Any, context: Mapping[str, Any] = NOTHING) -> Any:
+        """See `Check`."""
+        with within(name):
+            return self.check(value, **self._options(context))
 
 
 Flag = Annotated[bool, Check(flag)]

@@ -50,6 +50,13 @@ def of_type(hint: Any, limits: Mapping[str, Any]) -> Schema:
     return schema
 
 
+def item_of(hint: Any) -> Any:
+    """Type of the items of a sequence, or of one among a union."""
+    if get_origin(hint) in (list, tuple, Sequence):
+        return get_args(hint)[0]
+    return next(filter(None, map(item_of, get_args(hint))), None)
+
+
 def any_of(schemas: Any) -> Schema:
     """Schema of what one of some accepts."""
     found: list[Schema] = []

@@ -6,15 +6,16 @@ table, a dot and the key; that of a whole file is "".
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any, ClassVar, TypeVar, dataclass_transform
 
 from foldyn.arguments import NOTHING, Check, Checked, arguments
 from foldyn.errors import Faults, InputError
-from foldyn.json_schema import Schema, closed, described, explained
+from foldyn.json_schema import Schema, closed, described, explained, item_of
 from foldyn.values import SHOWN, nearest, show, suggest
 
 C = TypeVar("C", bound=Checked)
@@ -52,7 +53,7 @@ def read(
     for field, argument in arguments(kind).items():
         key, place = argument.key, f"{name}.{argument.key}"
         if key in table:
-            inner = _within_others(key, others)
+            inner = _within_others(key, others) if table_under(key, kind) else NOTHING
             context = {"folder": folder, "find": find, "beside": found, "others": inner}
             with faults.collected():
                 found[field] = argument.read(place, table[key], context)
@@ -110,6 +111,7 @@ def keys(kind: type[Checked]) -> list[str]:
     return [argument.key for argument in arguments(kind).values()]
 
 
+@cache
 def table_under(key: str, kind: type[Checked]) -> type[Checked] | None:
     """Data class of the table under a key of another table; None for other values."""
     for argument in arguments(kind).values():
@@ -162,22 +164,23 @@ class ListOf(Check):
     ----------
     item : Check
         What each of its items must be.
-    tables : bool
-        Whether these are tables, which [[...]] begins.
-    least : int
+    what : str
+        For messages, of what else than tables it is: "a list of numbers, as in [0, 1]".
+    least, most : int
         How many there must be.
     """
 
-    def __init__(self, item: Check, tables: bool = True, least: int = 0) -> None:
+    def __init__(self, item: Check, what: str = "", least: int = 0, most: float = math.inf) -> None:
         super().__init__(item)
-        self.item, self.tables, self.least = item, tables, least
+        self.item, self.what, self.least, self.most = item, what, least, most
 
     def __call__(self, name: str, value: Any, context: Mapping[str, Any] = NOTHING) -> Any:
         """See `Check`."""
-        if not isinstance(value, list):
-            of = f" of tables, written [[{name[1:]}]]" if self.tables else ""
-            raise InputError(f" = {show(value)}: must be a list{of}", name)
-        if len(value) < self.least:
+        fits = isinstance(value, list) and self.least <= len(value) <= self.most
+        if not fits and (self.what or not isinstance(value, list)):
+            what = self.what or f"a list of tables, written [[{name[1:]}]]"
+            raise InputError(f" = {show(value)}: must be {what}", name)
+        if not fits:
             raise InputError(f" = {show(value)}: must have at least one entry", name)
         faults, found = Faults(), []
         for i, item in enumerate(value):
@@ -188,8 +191,9 @@ class ListOf(Check):
 
     def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
         """See `Check`."""
-        items = self.item.schema(str, definitions)
-        return {"type": "array", "items": items, "minItems": self.least}
+        items = self.item.schema(item_of(hint), definitions)
+        most = {"maxItems": self.most} if math.isfinite(self.most) else {}
+        return {"type": "array", "items": items, "minItems": self.least, **most}
 
 
 def schema_of(

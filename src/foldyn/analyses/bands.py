@@ -28,7 +28,7 @@ from foldyn.analyses.sections import (
     whole_number,
 )
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, bar_closed
-from foldyn.arguments import Check
+from foldyn.arguments import Check, Placed
 from foldyn.cases import Case
 from foldyn.cases.loads import Actuate
 from foldyn.errors import InputError
@@ -80,7 +80,7 @@ class BandsSection(AnalysisSection):
     count: Count = 6
     zone: Annotated[int | None, Check(whole_number, least=2, most=MOST_ZONE)] = None
     attenuation: Annotated[int | None, Check(whole_number, most=MOST_LEVELS)] = None
-    vary: Annotated[Any, Check(one_key)] = None
+    vary: Annotated[Mapping[str, Any] | None, Placed(one_key)] = None
     state: About = "rest"
     stretch: Annotated[
         float | Sequence[float] | None, Check(number_or_list, what="period", above=0.0)

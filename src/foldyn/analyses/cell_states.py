@@ -15,7 +15,7 @@ from foldyn.analyses.ranges import Varied, varied
 from foldyn.analyses.vibration import about
 from foldyn.cases import Case, State
 from foldyn.cases.units import unit_of
-from foldyn.errors import ComputationError, InputError, within
+from foldyn.errors import ComputationError, InputError
 from foldyn.linear import UnitCell, relaxed
 from foldyn.values import one_or_each, show
 
@@ -27,13 +27,8 @@ STATED = ("stretch", "turn")
 """but for these of [analysis]."""
 
 
-def one_key(name: str, value: Any) -> Varied:
+def one_key(value: Any) -> Varied:
     """The one key along which the states of a file follow each other."""
-    with within(name):
-        return _one_key(value)
-
-
-def _one_key(value: Any) -> Varied:
     one, *more = varied(value, sampled=False)
     if more:
         raise InputError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -16,9 +16,10 @@ from foldyn.analyses.sections import (
     CaseSchema,
     Count,
     Positive,
+    one_of,
 )
 from foldyn.analyses.vibration import Secant
-from foldyn.arguments import Check
+from foldyn.arguments import Placed
 from foldyn.cases import Case
 from foldyn.cases.models import SHELL
 from foldyn.errors import InputError
@@ -30,18 +31,8 @@ from foldyn.linear.shell_of import checked_divisions
 from foldyn.report.album import Album, ByRule
 from foldyn.report.sections import Heading, Table, Text
 from foldyn.report.sections import Section as PageSection
-from foldyn.tables import Section
-from foldyn.values import choice, show
-
-
-def _names(name: str, value: Any) -> list[str]:
-    if not isinstance(value, list):
-        raise InputError(f' = {show(value)}: must be a list of names, as in ["plate"]', name)
-    return [choice(f"{name}[{i}]", one, MODELS) for i, one in enumerate(value)]
-
-
-def _divisions(name: str, value: Any) -> Any:
-    return checked_divisions(value, name)
+from foldyn.tables import ListOf, Section
+from foldyn.values import show
 
 
 class FidelitySection(AnalysisSection):
@@ -49,8 +40,10 @@ class FidelitySection(AnalysisSection):
 
     like = (fidelity,)
     count: Count = 6
-    divisions: Annotated[Any, Check(_divisions)] = None
-    models: Annotated[list[str] | None, Check(_names)] = None
+    divisions: Annotated[int | Sequence[int] | None, Placed(checked_divisions, name="")] = None
+    models: Annotated[
+        Sequence[str] | None, ListOf(one_of(MODELS), 'a list of names, as in ["plate"]')
+    ] = None
     secant: Secant = None
     vertex_radius: Positive | None = None
 

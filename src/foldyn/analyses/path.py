@@ -40,7 +40,7 @@ from foldyn.statics import METHODS, Point, Settings, trace
 from foldyn.statics.newton import settings_of
 from foldyn.statics.reached import UNTIL, Reached
 from foldyn.tables import ListOf, TableOf
-from foldyn.values import indices, number, show
+from foldyn.values import indices, number, number_or_list, show
 
 SETTINGS = ("tolerance", "largest_turn", "stability")
 """Keys that are settings of the solver."""
@@ -66,18 +66,6 @@ def _constant(name: str, value: Any) -> str | tuple[int, ...]:
     return indices(name, value, "load", 'or "gravity"')
 
 
-def _load_factors(name: str, value: Any) -> list[float]:
-    if not isinstance(value, list) or not value:
-        raise InputError(f" = {show(value)}: must be a list of numbers, as in [0, 0.5, 1]", name)
-    return [number(f"{name}[{i}]", item) for i, item in enumerate(value)]
-
-
-def _durations(name: str, value: Any) -> float | list[float]:
-    if isinstance(value, list):
-        return [number(f"{name}[{i}]", item, least=0.0, unit="s") for i, item in enumerate(value)]
-    return number(name, value, least=0.0, unit="s")
-
-
 TIMELESS = (
     "a path has no time; leave it out: what loads and moves the structure grows with the load "
     "factor (or is named in analysis.constant)"
@@ -92,9 +80,15 @@ class PathSection(AnalysisSection):
 
     like = (trace, Settings)
     method: Annotated[str, one_of(METHODS)] = "newton"
-    load_factors: Annotated[list[float] | None, Check(_load_factors)] = None
+    load_factors: Annotated[
+        Sequence[float] | None,
+        ListOf(Check(number), "a list of numbers, as in [0, 0.5, 1]", least=1),
+    ] = None
     steps: Count | None = None
-    duration: Annotated[float | list[float] | None, Check(_durations)] = None
+    duration: Annotated[
+        float | Sequence[float] | None,
+        Check(number_or_list, what="interval", least=0.0, unit="s"),
+    ] = None
     first_step: Annotated[float | None, Check(number)] = None
     constant: Annotated[str | Sequence[int], Check(_constant)] = ()
     until: Annotated[Reached | None, UNTIL] = None

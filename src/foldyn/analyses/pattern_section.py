@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from inspect import signature
 from typing import Any
 
-from foldyn.arguments import Check
-from foldyn.errors import Faults, InputError, within
+from foldyn.arguments import Placed
+from foldyn.errors import Faults, InputError
 from foldyn.json_schema import Schema, any_of, closed, of_call
 from foldyn.patterns import GENERATORS, Pattern
 from foldyn.patterns.facets import FACETS as KINDS_OF_FACETS
-from foldyn.tables import check_keys, check_table
+from foldyn.tables import check_keys
 from foldyn.values import choice, nearest, number_or_list, numbers, show
 
 HINGES, FACES = "hinge_offset", "faces"
@@ -24,7 +24,7 @@ INLINE = ("vertices", "faces", "assignments", "fold_angles", "families")
 """Keys of [pattern] for a pattern that the case file holds."""
 
 
-class PatternOf(Check):
+class PatternOf(Placed):
     """The table of a pattern."""
 
     def __init__(self) -> None:
@@ -40,13 +40,10 @@ class PatternOf(Check):
         return any_of([*made, read, closed({**own, **more}, INLINE[:2], Pattern)])
 
 
-def checked_pattern(name: str, value: Any) -> dict[str, Any]:
+def checked_pattern(value: Any) -> dict[str, Any]:
     """The table, if it is one of a pattern; else InputError."""
-    with within(name):
-        return _checked(check_table(name, value))
-
-
-def _checked(value: Mapping[str, Any]) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        raise InputError(f" = {show(value)}: must be a table, written [pattern]")
     sources = [key for key in ("kind", "file", "vertices") if key in value]
     if len(sources) > 1:
         raise InputError(f": give only one of {' and '.join(sources)}")

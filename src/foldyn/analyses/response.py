@@ -26,25 +26,26 @@ from foldyn.periodic.drive import Drive
 from foldyn.report.album import Album, ByRule, by_mass_rule
 from foldyn.report.sections import Heading, Table
 from foldyn.report.sections import Section as PageSection
-from foldyn.tables import Section
+from foldyn.tables import ListOf, Section
 from foldyn.values import number, show
 
 
-def _ends(name: str, value: Any) -> list[float]:
-    if not isinstance(value, list) or len(value) != 2:
-        raise InputError(f" = {show(value)}: must be two numbers, as in [2.0, 5.0]", name)
-    ends = [number(f"{name}[{k}]", one, above=0.0) for k, one in enumerate(value)]
+def _apart(name: str, ends: list[float]) -> list[float]:
     if ends[0] == ends[1]:
-        raise InputError(f" = {show(value)}: must be two different numbers", name)
+        raise InputError(f" = {show(ends)}: must be two different numbers", name)
     return ends
+
+
+ENDS = ListOf(Check(number, above=0.0), "two numbers, as in [2.0, 5.0]", least=2, most=2)
+Ends = Annotated[Sequence[float] | None, ENDS, Check(_apart)]
 
 
 class ResponseSection(AnalysisSection):
     """[analysis] of kind "response"."""
 
     like = (response_curve,)
-    frequencies: Annotated[Sequence[float] | None, Check(_ends)] = None
-    amplitudes: Annotated[Sequence[float] | None, Check(_ends)] = None
+    frequencies: Ends = None
+    amplitudes: Ends = None
     harmonics: Count = 9
     modes: Count | None = None
     branches: Annotated[int, Check(whole_number, least=0)] = 1

@@ -8,13 +8,12 @@ tables.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
 from typing import Annotated, Any
 
 from foldyn.analyses.pattern_section import PatternOf
 from foldyn.analyses.ranges import SAMPLINGS, varied
 from foldyn.analyses.ties import ties_of
-from foldyn.arguments import Check, arguments
+from foldyn.arguments import Check, Placed, arguments
 from foldyn.cases.air import Air
 from foldyn.cases.contact import Contact
 from foldyn.cases.damping import (
@@ -154,17 +153,8 @@ def _per_crease(name: str, value: Any) -> Any:
     )
 
 
-def _law(name: str, value: Any, laws: Mapping[str, type]) -> Any:
-    with within(name):
-        return law_from(value, laws)
-
-
 def _edges(name: str, value: Any) -> Any:
     return check_nodes(name, value) if isinstance(value, str) else check_pairs(name, value)
-
-
-def _rigid(name: str, value: Any) -> Any:
-    return checked_panels(value, MOST, name)
 
 
 def _ratios(name: str, value: Any) -> list[list[float]]:
@@ -178,14 +168,8 @@ def _ratios(name: str, value: Any) -> list[list[float]]:
     return array.tolist()
 
 
-def _vary(name: str, value: Any, beside: Mapping[str, Any]) -> Any:
-    with within(name):
-        return varied(value, beside.get("samples") is not None)
-
-
-def _ties(name: str, value: Any) -> Any:
-    with within(name):
-        return ties_of(value)
+def _vary(value: Any, beside: Mapping[str, Any]) -> Any:
+    return varied(value, beside.get("samples") is not None)
 
 
 def one_of(known: Iterable[str]) -> Check:
@@ -194,7 +178,7 @@ def one_of(known: Iterable[str]) -> Check:
 
 
 Text = Annotated[str, Check(text)]
-Texts = Annotated[Sequence[str], ListOf(Check(text), tables=False)]
+Texts = Annotated[Sequence[str], ListOf(Check(text), "a list of texts")]
 Anything = Annotated[Mapping[str, Any], Check(table)]
 Switch = Annotated[bool, Check(switch)]
 Positive = Annotated[float, Check(number, above=0.0)]
@@ -203,8 +187,8 @@ Whole = Annotated[int, Check(whole_number, least=-MOST)]
 Seed = Annotated[int, Check(whole_number, least=0)]
 Nodes = Annotated[int | str | Sequence[int] | None, Check(check_nodes)]
 Vector = Annotated[Sequence[float] | None, Check(vector)]
-HingeLaw = Annotated[Any, KindOf(partial(_law, laws=HINGE_LAWS), HINGE_LAWS, named=True)]
-BarLaw = Annotated[Any, KindOf(partial(_law, laws=BAR_LAWS), BAR_LAWS, named=True)]
+HingeLaw = Annotated[Any, KindOf(law_from, HINGE_LAWS, named=True, laws=HINGE_LAWS)]
+BarLaw = Annotated[Any, KindOf(law_from, BAR_LAWS, named=True, laws=BAR_LAWS)]
 PerCrease = Annotated[float | Sequence[float] | Mapping[str, float] | None, Check(_per_crease)]
 Edges = Annotated[str | Sequence[Sequence[int]] | None, Check(_edges)]
 Animation = Annotated[str | None, one_of(ANIMATIONS)]
@@ -234,7 +218,10 @@ class ModelSection(Section):
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
     clamped: Edges = None
-    rigid: Annotated[int | str | Sequence[int] | None, Check(_rigid, words=("all",))] = None
+    rigid: Annotated[
+        int | str | Sequence[int] | None,
+        Placed(checked_panels, count=MOST, field="", words=("all",)),
+    ] = None
     vertex_radius: Positive | None = None
     straight: Edges = None
     membrane: Annotated[str | None, one_of(MEMBRANES)] = None
@@ -350,8 +337,8 @@ class SweepSection(Section):
     samples: Count | None = None
     method: Annotated[str, one_of(SAMPLINGS)] = SAMPLINGS[0]
     seed: Seed = 0
-    vary: Annotated[Mapping[str, Any], Check(_vary)]
-    ties: Annotated[Mapping[str, str] | Sequence[Any], Check(_ties)] = ()
+    vary: Annotated[Mapping[str, Any], Placed(_vary)]
+    ties: Annotated[Mapping[str, str] | Sequence[Any], Placed(ties_of)] = ()
     measures: Texts = ()
 
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from foldyn.arguments import Check, Checked, Read, arguments
+from foldyn.arguments import Check, Checked, Placed, Read, arguments
 from foldyn.cases.histories import HISTORIES, History, Table
 from foldyn.cases.history import as_history
 from foldyn.errors import Faults, InputError, within
@@ -23,22 +23,19 @@ from foldyn.tables import check_keys, check_table, needs, read, schema_of
 from foldyn.values import choice, plain, show
 
 
-def history_from(name: str, table: Any, folder: Path | None = None) -> History:
+def history_from(table: Any, folder: Path | None = None) -> History:
     """History from its table, such as ``{kind = "pulse", duration = 1.0}``.
 
     Parameters
     ----------
-    name : str
-        Place of the table.
     table : mapping
     folder : Path, optional
         Where the relative path of a table's CSV file starts; without it no file is read.
     """
-    with within(name):
-        kind, arguments = _kind_of(table, HISTORIES)
-        if kind == Table.kind and folder is not None and not arguments.keys() & {"times", "values"}:
-            return _table_from_file(arguments, folder)
-        return call_from(HISTORIES[kind], arguments)
+    kind, arguments = _kind_of(table, HISTORIES)
+    if kind == Table.kind and folder is not None and not arguments.keys() & {"times", "values"}:
+        return _table_from_file(arguments, folder)
+    return call_from(HISTORIES[kind], arguments)
 
 
 def law_from(spec: Any, laws: Mapping[str, type]) -> Any:
@@ -118,11 +115,13 @@ def _table_from_file(arguments: Mapping[str, Any], folder: Path) -> Table:
         return Table.from_csv(folder / file, **columns)
 
 
-class KindOf(Check):
+class KindOf(Placed):
     """A table whose `kind` is the name of one of some data classes, or the name alone."""
 
-    def __init__(self, read: Callable[..., Any], kinds: Mapping[str, Any], named: bool) -> None:
-        super().__init__(read)
+    def __init__(
+        self, read: Callable[..., Any], kinds: Mapping[str, Any], named: bool, **limits: Any
+    ) -> None:
+        super().__init__(read, **limits)
         self.kinds, self.named = kinds, named
 
     def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:

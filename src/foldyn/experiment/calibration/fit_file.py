@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 from foldyn.analyses.reading import read_document
 from foldyn.analyses.sections import Anything, Count, Seed, Switch, Text, one_of, text
-from foldyn.arguments import Check
+from foldyn.arguments import Check, Placed
 from foldyn.cases.decode import call_from
 from foldyn.errors import InputError, within
 from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
@@ -105,9 +105,8 @@ class SolverSection(Section):
     confidence: Annotated[float, Check(number, above=0.0, below=1.0)] = 0.95
 
 
-def _parameter(name: str, value: Any) -> Parameter:
-    with within(name):
-        return call_from(Parameter, check_table("", value))
+def _parameter(value: Any) -> Parameter:
+    return call_from(Parameter, check_table("", value))
 
 
 def _tied(name: str, value: Any) -> dict[str, str]:
@@ -119,7 +118,7 @@ class FitSchema(Section):
 
     title: Text = ""
     case: Annotated[Path, Check(_case)]
-    parameters: Annotated[Sequence[Parameter], ListOf(Check(_parameter), least=1)]
+    parameters: Annotated[Sequence[Parameter], ListOf(Placed(_parameter), least=1)]
     ties: Annotated[Mapping[str, str] | None, Check(_tied)] = None
     data: Annotated[Sequence[Measurement], ListOf(Check(_measurement), least=1)]
     solver: SolverSection = SolverSection()
