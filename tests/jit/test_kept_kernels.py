@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import hashlib
 import importlib.util
 import itertools
 import os
@@ -12,11 +11,8 @@ import stat
 from collections import namedtuple
 from pathlib import Path
 
-import numpy as np
 import pytest
 from jit_lab import ask, copy_package, python
-from llvmlite.binding import Linkage
-from numba import typeof
 
 from foldyn.errors import FoldynWarning
 from foldyn.jit import kernel_cache, sources
@@ -82,8 +78,8 @@ def test_damaged_files_are_compiled_anew(kernels, damage):
     assert again(1.5) == 3.0
     assert not again.stats.cache_hits
     assert files(again) == [file]
-    seal = file.read_bytes()[:32]
-    assert hashlib.sha256(file.read_bytes()[32:]).digest() == seal
+    whole = kernels()
+    assert (whole(1.5), sum(whole.stats.cache_hits.values())) == (3.0, 1)
 
 
 def test_only_the_last_versions_stay(kernels):
@@ -101,8 +97,12 @@ def test_fields_of_named_tuples_count(kernels):
     function = kernels("return x.a - x.b")
     assert function(one(3.0, 1.0)) == 2.0
     assert kernels("return x.a - x.b")(other(3.0, 1.0)) == -2.0
-    nested = [kernel_cache._spelled(typeof((np.zeros(2), pair(1.0, 2.0)))) for pair in (one, other)]
-    assert nested[0] != nested[1]
+
+
+def test_fields_of_named_tuples_within_tuples_count(kernels):
+    one, other = namedtuple("Pair", "a b"), namedtuple("Pair", "b a")
+    assert kernels("return x[1].a - x[1].b")((1.0, one(3.0, 1.0))) == 2.0
+    assert kernels("return x[1].a - x[1].b")((1.0, other(3.0, 1.0))) == -2.0
 
 
 def test_a_full_disk_is_told_and_does_no_harm(kernels, monkeypatch):
@@ -115,33 +115,6 @@ def test_a_full_disk_is_told_and_does_no_harm(kernels, monkeypatch):
     with pytest.warns(FoldynWarning, match="No space left on device; set NUMBA_CACHE_DIR"):
         assert function(1.5) == 3.0
     assert list(Path(function.stats.cache_path).iterdir()) == []
-
-
-def test_copies_of_called_functions_are_private():
-    """Else another function of that name, loaded before, would run in their place."""
-
-    @kernel
-    def inner(x):
-        for i in range(x.size):
-            for j in range(i):
-                if x[i] < x[j]:
-                    x[i], x[j] = x[j], x[i]
-        for i in range(x.size):
-            x[i] = np.sin(x[i]) + np.exp(x[i]) ** 1.5
-        return x.sum()
-
-    @kernel
-    def outer(x):
-        return inner(x) + inner(x[1:]) + inner(x[2:]) + inner(x[:-3])
-
-    outer._cache.disable()  # what is loaded from disk has no functions to look at
-    outer(np.ones(9))
-    (result,) = outer.overloads.values()
-    own = list(result.library.get_defined_functions())
-    copies = [function for function in own if "inner" in function.name]
-    assert copies  # it has not been inlined
-    assert {function.linkage for function in copies} == {Linkage.internal}
-    assert Linkage.linkonce_odr not in {function.linkage for function in own}
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.studies import find_case
-from foldyn.studies.herkal import calibration, coverage
+from foldyn.studies.herkal import calibration
 
 CASE = find_case("herkal/specimen")
 
@@ -67,14 +67,3 @@ def test_damping_from_node_8_alone(released, release_data) -> None:
     assert filmed == pytest.approx(modeled, rel=0.02)  # what noise does to the estimator
     assert modeled == pytest.approx(9.5, rel=0.05)  # the paper's film: 9.5 Hz and 16 %
     assert ratio == pytest.approx(0.16, abs=0.03)
-
-
-def test_stored_intervals_contain_the_truth_in_90_of_100_draws() -> None:
-    stored = coverage.stored()
-    truths = calibration.FOLDS | calibration.DAMPING
-    for key, truth in truths.items():
-        told = stored[key]
-        assert told["draws"] == len(told["lower"]) == 100
-        inside = np.array(told["lower"]) <= truth
-        inside &= truth <= np.array(told["upper"])
-        assert inside.sum() == told["contained"] >= 90

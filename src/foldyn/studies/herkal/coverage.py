@@ -74,11 +74,6 @@ def damping(draws: int, folder: Path) -> dict[str, Any]:
     )  # fmt: skip
 
 
-def stored() -> dict[str, Any]:
-    """The stored result."""
-    return json.loads(STORED.read_text(encoding="utf-8"))
-
-
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else DRAWS
     place = Path(sys.argv[2] if len(sys.argv) > 2 else "herkal-coverage")
