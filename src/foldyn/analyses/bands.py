@@ -14,19 +14,8 @@ from numpy.typing import NDArray
 from foldyn.analyses.bands_page import bands_sections
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
-from foldyn.analyses.cell_states import (
-    CellState,
-    cell_states,
-    coordinate,
-    one_key,
-)
-from foldyn.analyses.sections import (
-    AnalysisSection,
-    Count,
-    Positive,
-    Text,
-    whole_number,
-)
+from foldyn.analyses.cell_states import CellState, cell_states, coordinate, one_key
+from foldyn.analyses.sections import AnalysisSection, Count, Positive, Text, whole_number
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, bar_closed
 from foldyn.arguments import Check, Placed
 from foldyn.cases import Case

@@ -17,12 +17,7 @@ from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, movable
 from foldyn.analyses.frf_page import frf_sections
 from foldyn.analyses.motion import check_massless
-from foldyn.analyses.sections import (
-    AnalysisSection,
-    Positive,
-    ShownSection,
-    one_of,
-)
+from foldyn.analyses.sections import AnalysisSection, Positive, ShownSection, one_of
 from foldyn.analyses.vibration import About, Internal, Secant, VibrationSchema, about, bar_closed
 from foldyn.arguments import Check, arguments
 from foldyn.cases import BaseMotion, Case, Force

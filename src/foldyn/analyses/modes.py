@@ -12,13 +12,7 @@ from numpy.typing import NDArray
 from foldyn import plots
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
-from foldyn.analyses.sections import (
-    AnalysisSection,
-    Animation,
-    Count,
-    ShownSection,
-    some_shapes,
-)
+from foldyn.analyses.sections import AnalysisSection, Animation, Count, ShownSection, some_shapes
 from foldyn.analyses.vibration import About, Internal, Secant, VibrationSchema, about, bar_closed
 from foldyn.arguments import Check
 from foldyn.cases import Case

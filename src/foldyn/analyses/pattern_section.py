@@ -8,7 +8,7 @@ from typing import Any
 
 from foldyn.arguments import Placed
 from foldyn.errors import Faults, InputError
-from foldyn.json_schema import Schema, any_of, closed, of_call
+from foldyn.json_schema import Schema, any_of, closed, described, explained, of_call
 from foldyn.patterns import GENERATORS, Pattern
 from foldyn.patterns.facets import FACETS as KINDS_OF_FACETS
 from foldyn.tables import check_keys
@@ -32,12 +32,18 @@ class PatternOf(Placed):
 
     def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
         """See `Check`."""
-        table, text = {"type": "object"}, {"type": "string"}
-        more: dict[str, Schema] = {FACETS: {"enum": [*KINDS_OF_FACETS]}, HINGES: {}}
+        from foldyn.formats import read_pattern  # with all its libraries
+
+        more = {
+            FACETS: described({"enum": [*KINDS_OF_FACETS]}, 'What lines assigned "F" are.'),
+            HINGES: described({}, f'Thick panels: "{FACES}", or heights (m) of their hinges.'),
+        }
         made = [of_call(make, word, more) for word, make in GENERATORS.items()]
-        read = closed({"file": text, **{key: {} for key in READING}, **more}, ["file"], Pattern)
-        own = {key: table if key == "families" else {} for key in INLINE}
-        return any_of([*made, read, closed({**own, **more}, INLINE[:2], Pattern)])
+        options, texts = of_call(read_pattern, "", {})["properties"], explained(Pattern)
+        file = {"file": {"type": "string"}, **{key: options[key] for key in READING}, **more}
+        own = {key: described({}, texts.get(key)) for key in INLINE}
+        inline = closed({**own, **more}, INLINE[:2], Pattern)
+        return any_of([*made, closed(file, ["file"], read_pattern), inline])
 
 
 def checked_pattern(value: Any) -> dict[str, Any]:

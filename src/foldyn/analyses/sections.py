@@ -30,7 +30,7 @@ from foldyn.cases.directions import AXES, check_pairs
 from foldyn.cases.loads import LOAD
 from foldyn.cases.masses import MASS
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
-from foldyn.cases.selection import check_nodes
+from foldyn.cases.selection import Nodes, check_nodes
 from foldyn.cases.supports import SUPPORT
 from foldyn.errors import InputError, within
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
@@ -76,11 +76,6 @@ def whole_number(name: str, value: Any, *, least: int = 1, most: int = MOST) -> 
     """Return `value` when it is a whole number within bounds."""
     number(name, whole(name, value), least=least, most=most)
     return value
-
-
-def table(name: str, value: Any) -> dict[str, Any]:
-    """Return a table of any keys."""
-    return dict(check_table(name, value))
 
 
 def some_shapes(
@@ -179,13 +174,12 @@ def one_of(known: Iterable[str]) -> Check:
 
 Text = Annotated[str, Check(text)]
 Texts = Annotated[Sequence[str], ListOf(Check(text), "a list of texts")]
-Anything = Annotated[Mapping[str, Any], Check(table)]
+Anything = Annotated[Mapping[str, Any], Check(check_table)]
 Switch = Annotated[bool, Check(switch)]
 Positive = Annotated[float, Check(number, above=0.0)]
 Count = Annotated[int, Check(whole_number)]
 Whole = Annotated[int, Check(whole_number, least=-MOST)]
 Seed = Annotated[int, Check(whole_number, least=0)]
-Nodes = Annotated[int | str | Sequence[int] | None, Check(check_nodes)]
 Vector = Annotated[Sequence[float] | None, Check(vector)]
 HingeLaw = Annotated[Any, KindOf(law_from, HINGE_LAWS, named=True, laws=HINGE_LAWS)]
 BarLaw = Annotated[Any, KindOf(law_from, BAR_LAWS, named=True, laws=BAR_LAWS)]
@@ -267,7 +261,7 @@ class ShownSection(Section):
         Component that figures show; by default that of the largest motion.
     """
 
-    nodes: Nodes = None
+    nodes: Nodes | None = None
     axis: Annotated[str | None, one_of(AXES)] = None
 
 
