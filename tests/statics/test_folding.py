@@ -172,6 +172,22 @@ def square_twist(pleats="MV"):
     return fd.Pattern(np.vstack([inner, outer.reshape(-1, 2)]), faces, letters)
 
 
+@pytest.mark.parametrize("slip", [5e-8, 5e-7, 5e-6])
+def test_panels_bend_by_as_little_as_slips_of_drawing_need(slip):
+    """Panels of 40 mm turn by an angle of about slip/(40 mm) against each other."""
+    flat, rng = flat_miura((3, 3)), np.random.default_rng(3)
+    x = flat.vertices * 0.04 / flat.sides[0].max()
+    turn = rng.uniform(0.0, 2.0 * np.pi, len(x))
+    slips = slip * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    exact, drawn = (
+        fd.fold(flat.changed(vertices=place), fraction=0.6, steps=3) for place in (x, x + slips)
+    )
+    assert exact.kind == "rigid" and drawn.kind == "bent"
+    # 2 degrees, whatever the slip, where panels are left free to bend
+    assert drawn.path["bend"].values.max() < 2e-4 + 20.0 * slip / 0.04
+    np.testing.assert_allclose(drawn.angles, exact.angles, atol=0.01)
+
+
 def test_a_square_twist_folds_only_with_strain_and_says_so():
     folding = fd.fold(square_twist(), 60, steps=6)
     assert not folding.wrong

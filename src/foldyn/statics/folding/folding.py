@@ -24,6 +24,7 @@ from foldyn.statics.folding.ways import (
     BENDING,
     ISOMETRIC,
     PLANE,
+    SLIGHT,
     Bending,
     Way,
     WayInterrupted,
@@ -316,7 +317,7 @@ def _best_way(
         stiffest, *others = bending.folding
         best = from_pattern(energy, stiffest, targets, steps, tell)
         for softer in others:
-            if any(cost(best)[:3]) or _bend(energy, best) > PLANE:
+            if any(cost(best)[:3]) or _bend(energy, best) > SLIGHT:
                 best = min(best, from_pattern(energy, softer, targets, steps, tell), key=cost)
         if start == "pattern" or not any(cost(best)[:3]):
             return best

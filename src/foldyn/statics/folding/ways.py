@@ -29,6 +29,7 @@ HELD = 0.3  # of what creases have turned: change by which a state counts as kep
 TURNED = 1e-3  # rad, least turn that counts as one
 ISOMETRIC = 1e-9  # strain
 PLANE = 1e-6  # rad, bend of a panel
+SLIGHT = 0.01  # rad, bend of panels that would be plane but for slips of drawing
 CLOSES = 0.02  # of the size of the pattern: gap that a start from the folded state may have
 
 
@@ -126,7 +127,7 @@ def _followed(
             if lets_go or last:
                 kept = relaxed(energy, stiffness, shape, kept, aim, angles[0], plane or last)
             lets_go = kept is not None
-            plane = kept is not None and energy.bent(kept.turns).max(initial=0.0) <= PLANE
+            plane = kept is not None and energy.bent(kept.turns).max(initial=0.0) <= SLIGHT
             if last and kept is None:
                 kept = eased(energy, stiffness, shape, aim, angles[0])
             way.shapes.append(shape if kept is None else kept)
@@ -147,7 +148,8 @@ def relaxed(
     at the step `before` mostly leads to it with few steps of Newton's.
 
     First, if they may end `plane`, panels stay as stiff as they are, as in a pattern that can be
-    folded rigidly; failing that they bend as they like, as thin paper does.
+    folded rigidly, or but for slips of drawing: by these they bend slightly in the end. Failing
+    that they bend as they like, as thin paper does.
     """
     wrong = len(wrong_ways(energy, shape.turns, aim.angles))
     most = max(ISOMETRIC, LESS * largest_strain(shape))
@@ -157,8 +159,8 @@ def relaxed(
     for thin, start in product((False, True) if plane else (True,), (before, shape)):
         if start is None:
             continue
-        bends = stiffness.bends * np.array([WEAKER[-1], 0.0] if thin else [1.0, 1.0])
-        weak = stiffness._replace(bends=bends[0], creases=stiffness.creases * WEAKER[-1])
+        bends = stiffness.bends * (WEAKER[-1] if thin else 1.0)
+        weak = stiffness._replace(bends=bends, creases=stiffness.creases * WEAKER[-1])
         if start is not shape:
             kept = settled(energy, start, aim, weak, 1e-6)
         else:  # in stages: springs that are weak at once take many steps
@@ -170,8 +172,14 @@ def relaxed(
                 kept = minimum(energy, kept, aim, weak)
         if kept is None or largest_strain(kept) > most:
             continue  # strained by more than the springs
-        kept = settled(energy, kept, free, weak._replace(bends=bends[1], creases=0.0), 1e-10)
-        if kept is None or largest_strain(kept) > ISOMETRIC:
+        for held in (0.0,) if thin else (bends, 0.0):
+            let = settled(energy, kept, free, weak._replace(bends=held, creases=0.0), 1e-10)
+            if let is not None and largest_strain(let) <= ISOMETRIC:
+                break
+        else:
+            continue
+        kept = let
+        if not thin and energy.bent(kept.turns).max(initial=0.0) > SLIGHT:
             continue
         if np.abs(energy.creases(kept.turns - shape.turns)).sum() > HELD * turned:
             continue  # elsewhere
