@@ -20,7 +20,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +30,7 @@ from foldyn.algebra.extrapolation import extrapolated
 from foldyn.jit.eights import COUNT
 from foldyn.mechanics.quadratic_triangles import PRODUCTS, add_triangles, squares
 from foldyn.structures.graded import ROOM, Grading, graded
-from foldyn.structures.panel_plate import Outline, meshed
+from foldyn.structures.panel_plate import Outline, across_edges, meshed, sides_of
 from foldyn.structures.shared import shared
 
 COARSE, FINE = 4, 8  # pieces of each edge in the two meshes; twice as many in triangles
@@ -200,14 +199,13 @@ def _quadratic(points: NDArray, cut: Cut, radius: float | None = None) -> PanelM
 
 def _cut(points: int, triangles: NDArray, at: NDArray, edges: list[NDArray]) -> Cut:
     """Sides of triangles between so many points; `edges` with their ends."""
-    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
-    ends, side = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
-    middle = {pair: points + k for k, pair in enumerate(map(tuple, ends.tolist()))}
-    elements = np.concatenate([triangles, points + side.reshape(-1, 3)], axis=1)
-    along = []
-    for edge in (edge.tolist() for edge in edges):
-        halves = [(middle[min(pair), max(pair)], pair[1]) for pair in pairwise(edge)]
-        along.append(np.array([point for both in halves for point in both][:-1]))
+    side, _, ends = sides_of(triangles)
+    middles = across_edges(edges, ends, points)
+    along = [
+        np.stack([between, edge[1:]], axis=1).ravel()[:-1]
+        for edge, (between, _) in zip(edges, middles, strict=True)
+    ]
+    elements = np.concatenate([triangles, points + side], axis=1)
     return Cut(ends, elements, at, along)
 
 
@@ -294,13 +292,11 @@ def _plan(cut: Cut, bowing: bool, gives: bool) -> Plan:
     starts, size = unknowns.starts, unknowns.size
     # of all ordered pairs of points of a triangle; the lower half of the matrix is enough
     one, other = np.repeat(cut.elements, 6, axis=1).ravel(), np.tile(cut.elements, (1, 6)).ravel()
-    counts = np.diff(starts)[one], np.diff(starts)[other]
-    each = counts[0] * counts[1]
-    pair = np.repeat(np.arange(len(one)), each)
-    within = np.arange(len(pair)) - np.repeat(np.cumsum(each) - each, each)
-    row, column = np.divmod(within, counts[1][pair])
-    row = unknowns.number[starts[one][pair] + row]
-    column = unknowns.number[starts[other][pair] + column]
+    counts = np.diff(starts)
+    each = counts[one] * counts[other]
+    one, other, first = (np.repeat(k, each) for k in (one, other, np.cumsum(each) - each))
+    row, column = np.divmod(np.arange(len(one)) - first, counts[other])
+    row, column = unknowns.number[starts[one] + row], unknowns.number[starts[other] + column]
     lower = row >= column
     keys = [row[lower] * size + column[lower]]
     for own in unknowns.bows:

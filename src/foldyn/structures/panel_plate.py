@@ -93,7 +93,7 @@ class PanelPlate:
         self._ends = ends
         self.heights = [{node: 1.0} for node in at.tolist()]
         sides = across_edges(edges, ends, len(self.points))
-        self.slopes, self.bows, self.lines, self._turning = edge_functions(panel, edges, sides)
+        self.slopes, self.bows, self.lines, self._turning = _edge_functions(panel, edges, sides)
 
     def uneven(self, count: int) -> list[dict[int, float]]:
         """Parts P_1 to P_count (Legendre) of the slopes along each creased edge not clamped.
@@ -119,7 +119,7 @@ class PanelPlate:
         others = np.setdiff1d(np.arange(size), first)
         inner = sparse.csc_array(self.stiffness[others][:, others])
         factor = splu(inner, "MMD_AT_PLUS_A", 0.0, options={"SymmetricMode": True})
-        rows = rows_of([*held[count:], *self.lines], size)
+        rows = _rows_of([*held[count:], *self.lines], size)
         both = self.stiffness[others][:, first].toarray()
         given, multipliers = rows[:, first].toarray(), rows[:, others]
         loose = factor.solve(np.column_stack([both, multipliers.T.toarray()]))
@@ -154,47 +154,39 @@ class PanelPlate:
         return sparse.csr_array(sparse.coo_array(entries, shape=self.stiffness.shape))
 
 
-class EdgeFunctions(NamedTuple):
-    """Linear functions of the unknowns of a plate at the edges of its panel; see `PanelPlate`."""
-
-    slopes: list[dict[int, float]]
-    bows: list[dict[int, float]]
-    lines: list[dict[int, float]]
-    turning: list[dict[int, float]]  # the slopes of edges that are not clamped
-
-
-def edge_functions(
+def _edge_functions(
     panel: Outline, edges: Sequence[NDArray], sides: Sequence[tuple[NDArray, NDArray]]
-) -> EdgeFunctions:
-    """Functions of the unknowns along edges.
+) -> tuple[list[dict[int, float]], ...]:
+    """Slopes, bows and lines of `PanelPlate`; the slopes of edges that are not clamped.
 
     edges, sides : of each edge the numbers of the heights of its points (n + 1,), and those of the
         slopes across its sides with their signs (n,), 1 where they are outward.
     """
-    found, x = EdgeFunctions([], [], [], []), np.array(panel.corners)
+    slopes, bows, lines, turning = [], [], [], []
+    x = np.array(panel.corners)
     for k, (nodes, (across, sign)) in enumerate(zip(edges, sides, strict=True)):
         nodes, n = nodes.tolist(), len(sign)
         if panel.creased[k]:
             mean = dict(zip(across.tolist(), (sign / n).tolist(), strict=True))
-            found.slopes.append(mean)
+            slopes.append(mean)
             if not panel.clamped[k]:
-                found.turning.append(mean)
+                turning.append(mean)
             *others, (last, share) = mean.items()
             for side, part in others if panel.clamped[k] else ():
-                found.lines.append({side: n * part, last: -n * share})
+                lines.append({side: n * part, last: -n * share})
         if panel.bowed[k]:
             share = 1.0 / (n * float(np.linalg.norm(x[k] - x[(k + 1) % len(x)])))
             ends = 0.5 * (1 - n) * share  # the line between them takes them off
             inner = {node: share for node in nodes[1:-1]}
-            found.bows.append({nodes[0]: ends, nodes[-1]: ends, **inner})
+            bows.append({nodes[0]: ends, nodes[-1]: ends, **inner})
         if panel.straight[k]:
             for step in range(1, n):
                 part = step / n
-                found.lines.append({nodes[step]: 1.0, nodes[0]: part - 1.0, nodes[-1]: -part})
-    return found
+                lines.append({nodes[step]: 1.0, nodes[0]: part - 1.0, nodes[-1]: -part})
+    return slopes, bows, lines, turning
 
 
-def rows_of(functions: list[dict[int, float]], size: int) -> sparse.csr_array:
+def _rows_of(functions: list[dict[int, float]], size: int) -> sparse.csr_array:
     """Rows (k, size) of linear functions, given by their coefficients."""
     row = np.repeat(np.arange(len(functions)), [len(entries) for entries in functions])
     column = [place for entries in functions for place in entries]

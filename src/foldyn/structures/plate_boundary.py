@@ -1,18 +1,18 @@
 """Panels' plates, condensed to the corners and the center, turns of the edges, and their bows.
 
 `PanelPlate` cuts each facet of a panel evenly: all its triangles are the same, half of them turned
-by 180 degrees. So the stiffness of a panel's plate is a sum of that of its facets, each cut by
-nothing, with factors that all panels with as many corners share. A scale of 1/n makes the stiffness
-of heights n^2 times as large, and leaves that of slopes.
+by 180 degrees. So each entry of a panel's stiffness is a sum of entries for its facets, taken as
+single triangles, with factors that all panels with as many corners share. A scale of 1/n makes the
+stiffness of heights n^2 times as large, and leaves that of slopes.
 
 The unknowns at an edge of n pieces, whatever is held there:
 
     heights   w_i = (1 - i/n) w_0 + i/n w_n + n/(n - 1) L b + e_i - e_(i-1),    i = 1 ... n - 1
     slopes    s_i = s + d_i - d_(i-1),                                          i = 1 ... n
 
-with the bow b, the mean slope s, and e and d, which are 0 at both ends: all of them are where the
-edge is straight, and where it is clamped. What is 0 stands alone in the matrix, with the
-stiffness 1.
+with the bow b, the mean slope s, and e and d, which are 0 at both ends of the edge. Where it is
+straight, b and all e are 0, and where it is clamped all d. Such unknowns stand alone in the matrix,
+with the stiffness 1.
 """
 
 from __future__ import annotations
