@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import foldyn as fd
+from foldyn.errors import InputError
 from foldyn.structures.panel_membrane import Kind, grading_of, membrane_stiffness
 from foldyn.structures.panel_plate import Outline
 from foldyn.structures.shared import shared
@@ -58,3 +60,10 @@ def test_panels_of_one_kind_do_not_mix(gives):
         moved = kinds[k]._replace(poissons_ratio=kinds[k].poissons_ratio + 1e-14)  # not kept yet
         alone = membrane_stiffness(*moved)
         np.testing.assert_allclose(together[k], alone, atol=1e-10 * np.abs(alone).max())
+
+
+def test_a_panel_whose_stiffness_rounding_hides_is_refused():
+    x = np.array([[0, 0, 0], [1, 0, 0], [0.4, 1, 0], [0.6, -1e-6, 0]])
+    pattern = fd.Pattern(x, [(0, 1, 2), (0, 3, 1)])
+    with pytest.raises(InputError, match="panel 1: is so narrow that rounding hides its stiff"):
+        fd.discretize(pattern, fd.Sheet(1e9, 0.3, 1e-7, 700.0), preset="n5b8e")

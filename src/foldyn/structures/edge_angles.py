@@ -28,13 +28,14 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from foldyn import mechanics
+from foldyn.algebra.superlu import SingularTangentError
 from foldyn.materials import BarLaw, HingeLaw
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
 from foldyn.structures.clamps import opposite
 from foldyn.structures.condensed_panel import panel_moments, panel_stiffness
-from foldyn.structures.mesh import Mesh, hinge_angles, lengths
+from foldyn.structures.mesh import Mesh, hinge_angles, lengths, too_narrow
 from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
 
@@ -87,7 +88,10 @@ def edge_plates(
         return shared[k, what]
 
     bending = [(panel, kinds[kind[p]].poissons_ratio) for p, panel in enumerate(panels) if panel]
-    found = iter(panel_stiffness.each(bending))
+    try:
+        found = iter(panel_stiffness.each(bending))
+    except SingularTangentError as error:
+        raise too_narrow(pattern) from error
     angles: list[list[int]] = []
     matrices: list[NDArray] = []
     for p, face in enumerate(pattern.faces):

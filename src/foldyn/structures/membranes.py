@@ -28,12 +28,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.algebra.superlu import SingularTangentError
 from foldyn.mechanics.edge_gives import EdgeGives
 from foldyn.mechanics.following import Following, tensions
 from foldyn.mechanics.membranes import Membranes
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
-from foldyn.structures.mesh import Mesh, hinge_angles
+from foldyn.structures.mesh import Mesh, hinge_angles, too_narrow
 from foldyn.structures.panel_membrane import Kind, grading_of, membrane_stiffness
 from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
@@ -85,7 +86,10 @@ def membranes(
         for p, own in enumerate(sides)
         if own.convex
     }
-    found = dict(zip(known, membrane_stiffness.each([*known.values()]), strict=True))
+    try:
+        found = dict(zip(known, membrane_stiffness.each([*known.values()]), strict=True))
+    except SingularTangentError as error:
+        raise too_narrow(pattern) from error
     for p, (face, panel) in enumerate(zip(pattern.faces, sides, strict=True)):
         hub = mesh.centers[p]
         nodes = np.array([*face, hub] if hub >= 0 else face)

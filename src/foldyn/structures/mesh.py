@@ -82,6 +82,15 @@ def n5b8(pattern: Pattern, centers: Mapping[int, NDArray] | None = None) -> Mesh
     return _mesh(pattern, nodes, np.array(number), spokes, remedy)
 
 
+def too_narrow(pattern: Pattern) -> InputError:
+    """What to say where the stiffness of a panel is lost in rounding: the narrowest is told."""
+    widths = pattern.face_areas / np.array([sides.sum() for sides in pattern.sides]) ** 2
+    return InputError(
+        f"panel {int(widths.argmin())}: is so narrow that rounding hides its stiffness; cut it "
+        "into shorter panels"
+    )
+
+
 def n4b5(pattern: Pattern) -> Mesh:
     """Mesh of a pattern whose panels are cut by diagonals, without further nodes.
 
