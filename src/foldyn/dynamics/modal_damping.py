@@ -165,7 +165,19 @@ def rows_of(
     rows = ties.rows_on_dofs(rows)
     ratios, alike = _ratios(damping, values)
     rates = 2.0 * ratios * np.sqrt(values)
-    return ModalRows(rows * np.sqrt(rates)[:, None], float(rates.max(initial=0.0)), 0, alike)
+    rows = _canonical((rows * np.sqrt(rates)[:, None])[rates > 0.0])
+    return ModalRows(rows, float(rates.max(initial=0.0)), 0, alike)
+
+
+def _canonical(rows: NDArray) -> NDArray:
+    """Rows (r, m) with the same C that change with a design as smoothly as C, as gradients need.
+
+    Shapes have any sign, and those of one frequency are any sums. Orthogonal sums of rows keep C:
+    those whose products with r fixed vectors are an upper triangle with a positive diagonal.
+    """
+    fixed = np.random.default_rng(0).standard_normal(rows.shape[::-1])
+    sums, triangle = np.linalg.qr(rows @ fixed)
+    return (sums * np.where(np.diag(triangle) < 0.0, -1.0, 1.0)).T @ rows
 
 
 def _ratios(damping: ModalDamping, values: NDArray) -> tuple[NDArray, int]:
