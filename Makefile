@@ -30,7 +30,7 @@ help:  ## list what can be made
 	@echo '  PYTHON=python3.12        the interpreter that .venv is made with'
 	@echo '  DEMO_CASES="case1"       a part of the demo;  DEMO_FLAGS="..." more flags of foldyn run'
 	@echo '  PYTEST_FLAGS="-k mass"   more flags of pytest;  WORKERS="-n 0": one test at a time'
-	@echo '  DRAWS=50                 cases that test-all draws at random'
+	@echo '  DRAWS=50                 cases that test-all draws at random; fewer than 500: fewer products, too'
 
 # ------------------------------------------------------------------------------ set-up
 $(BIN)/python:

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import os
+from collections.abc import Collection, Sequence
 from itertools import combinations, product
 from typing import Any
 
 import pytest
+
+SHARE = 1 if int(os.environ.get("DRAWS", "500")) >= 500 else 8
+"""With fewer draws, one in so many of the rows beyond pairs is tried."""
+
+
+def beyond(rows: Sequence[tuple[Any, ...]]) -> list[Any]:
+    """Rows of the matrix."""
+    return [pytest.param(*row, marks=pytest.mark.matrix) for row in rows[::SHARE]]
 
 
 def in_pairs(*options: Collection[Any]) -> list[Any]:
@@ -19,5 +28,5 @@ def in_pairs(*options: Collection[Any]) -> list[Any]:
         most = max(range(len(rows)), key=lambda i: len(pairs[i] & left))
         few.add(most)
         left -= pairs[most]
-    beyond = pytest.mark.matrix
-    return [pytest.param(*row, marks=() if i in few else beyond) for i, row in enumerate(rows)]
+    rest = [row for i, row in enumerate(rows) if i not in few]
+    return [pytest.param(*rows[i]) for i in sorted(few)] + beyond(rest)

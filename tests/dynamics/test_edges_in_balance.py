@@ -14,7 +14,7 @@ import foldyn as fd
 from foldyn.dynamics.driver import prepare
 from foldyn.errors import FoldynWarning
 from foldyn.structures.mesh import hinge_angles
-from pairwise import in_pairs
+from pairwise import beyond, in_pairs
 
 FOLD = fd.patterns.simple_fold(dihedral=120)
 TURN = Rotation.from_rotvec([0.3, 0.5, -0.7]).as_matrix()
@@ -118,11 +118,8 @@ RESISTING = {
 
 @pytest.mark.parametrize(
     ("kind", "method"),
-    [
-        pytest.param(kind, method, marks=() if method == "rk4" else pytest.mark.matrix)
-        for kind in RESISTING
-        for method in EXPLICIT
-    ],
+    [(kind, "rk4") for kind in RESISTING]
+    + beyond([(kind, method) for kind in RESISTING for method in EXPLICIT if method != "rk4"]),
 )
 def test_creases_that_remember_or_are_damped_move_as_with_edge_angles_as_dofs(method, kind):
     """generalized_alpha is of order 1 where dofs without mass are damped: it is extrapolated."""
