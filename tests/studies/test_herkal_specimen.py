@@ -16,7 +16,7 @@ from foldyn.cli.main import main
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.experiment import ForceDisplacement, TimeHistory
 from foldyn.report.album import Album
-from foldyn.studies.herkal import calibration
+from foldyn.studies.herkal import calibration, vibration
 from foldyn.studies.herkal.calibration import DAMPING, FOLDS, FRONT, FULL, WATCHED
 from foldyn.studies.herkal.specimen import evaluation, measured, page, prepared, synthetic, tasks
 from foldyn.studies.herkal.specimen.evaluation import vibration_of
@@ -446,9 +446,16 @@ def test_a_table_of_weights_alone(tables, monkeypatch) -> None:
 
 # ---------------------------------------------------------------------- the whole chain
 @pytest.mark.matrix
-def test_from_photographs_and_a_film_to_a_calibrated_model(tmp_path) -> None:
+def test_from_photographs_and_a_film_to_a_calibrated_model(tmp_path, monkeypatch) -> None:
     """The model is wrong in mass, stiffness and memory; parameters come out near all the same."""
     pytest.importorskip("cv2")
+    specimen, few = vibration.specimen, {"first": 1, "last": 25, "count": 97}
+
+    def with_few(name, changes):
+        frequencies = {"analysis.frequencies": few} if name == "frf" else {}
+        return specimen(name, changes={**changes, **frequencies})
+
+    monkeypatch.setattr(vibration, "specimen", with_few)
     first, then = tasks.parts(synthetic.COARSE, Data())
     for one in (*first, *then):
         one.make(tmp_path)
