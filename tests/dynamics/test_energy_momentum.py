@@ -77,20 +77,21 @@ def test_a_free_sheet_with_springs_keeps_both_momenta_and_loses_what_creases_tak
 
 @pytest.mark.matrix
 @pytest.mark.parametrize("kind", [*MODELS, "mixed_voronoi", "consistent"])
-def test_nothing_adds_up_over_1e4_steps(kind):
+def test_nothing_adds_up_over_many_steps(kind):
     """Of paper steps are five times RK4's critical ones, and folds turn by degrees back and forth.
 
-    Found: 1e-12.
+    Found: 1e-12 after 10,000 steps.
     """
+    count = 3_000 if kind in MODELS else 10_000
     if kind in MODELS:
         case, dt = fd.Case(sheet(kind), AXIAL), 5e-3
         start = thrown(case, (0.03, 0.3, 0.05))
     else:
         (case, start), dt = paper(kind), 1e-4
         assert dt > 5.0 * fd.critical_step(case)
-    motion = fd.simulate(case, 1e4 * dt, METHOD, dt=dt, every=100, initial=start)
-    assert motion.attrs["steps"] == 10_000
-    assert drifts(case, motion) < 1e-9
+    motion = fd.simulate(case, count * dt, METHOD, dt=dt, every=100, initial=start)
+    assert motion.attrs["steps"] == count
+    assert drifts(case, motion) < 1e-13 * count
     if kind not in MODELS:
         folds = np.array([case.structure.dihedrals(u)[0] for u in motion.displacement.values])
         assert np.degrees(np.ptp(folds, axis=0).max()) > 5.0
