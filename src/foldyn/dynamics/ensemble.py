@@ -156,7 +156,7 @@ def simulate_many(
         "wall_seconds": time.perf_counter() - clock,
         "processor_seconds": time.process_time() - spent,
         "threads": threads, "device": _name(device),
-        "energy_error": _warn(motions, ended, out.energy),
+        "energy_error": _warn(motions, ended, out),
     }  # fmt: skip
     if reason:
         facts["device_reason"] = reason
@@ -286,7 +286,7 @@ def _cases(numbers: Iterable[int]) -> str:
     return listed([f"cases[{k}]" for k in numbers])
 
 
-def _warn(motions: Sequence[Motion], ended: Mapping[int, str], energy: NDArray) -> float:
+def _warn(motions: Sequence[Motion], ended: Mapping[int, str], out: Samples) -> float:
     """Warn of what went wrong, or is doubtful; the largest relative energy error."""
     if ended:
         warn(
@@ -301,9 +301,12 @@ def _warn(motions: Sequence[Motion], ended: Mapping[int, str], energy: NDArray) 
         worst = max(doubts, key=lambda k: off[k])
         rank = f" (the worst of {_cases(doubts)})" if len(doubts) > 1 else ""
         warn(f"cases[{worst}]{rank}: {doubts[worst]}", "integrators.md#accuracy")
-    first, pairs = motions[0].case, zip(motions, energy, strict=True)
+    first = motions[0].case
     names = audited(first.energy_groups, first.air is not None)
-    found = [stretch(m.case.structure, dict(zip(names, e.T, strict=True))) for m, e in pairs]
+    found = [
+        stretch(motion.case.structure, dict(zip(names, energy.T, strict=True)), displacement)
+        for motion, energy, displacement in zip(motions, out.energy, out.displacement, strict=True)
+    ]
     shares = [one.share if one else 0.0 for one in found]
     if any(shares):
         warn(

@@ -173,7 +173,8 @@ class Motion:
     def _stretch(self, result: xarray.Dataset) -> str:
         """Warning where panels that stretch hold much of the strain energy; empty otherwise."""
         names = audited(self.case.energy_groups, self.case.air is not None)
-        found = stretch(self.case.structure, {name: result[name].values for name in names})
+        energies = {name: result[name].values for name in names}
+        found = stretch(self.case.structure, energies, result["displacement"])
         if found is None:
             return ""
         at = float(result["time"][found.at])

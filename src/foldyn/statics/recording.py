@@ -250,7 +250,7 @@ def _dataset(
         at = int(crossings.first[0])
         when = f"point {at} (load factor {points[at].factor:.6g})"
         warn(crossings.text(when, len(points)), "results.md#panels-that-cross", CrossingWarning)
-    if message := _stretch_warning(problem, points, energies):
+    if message := _stretch_warning(problem, points, energies, displacement):
         warn(message, "models.md#where-panels-stretch", StretchWarning)
     own = "an adaptive load, a function of the user's own, acted on it"
     result = path_dataset(
@@ -287,11 +287,12 @@ def _dataset(
 
 
 def _stretch_warning(
-    problem: OrigamiProblem, points: Sequence[Point], energies: Sequence[NDArray]
-) -> str:
+    problem: OrigamiProblem, points: Sequence[Point], energies: Sequence[NDArray],
+    displacement: NDArray,
+) -> str:  # fmt: skip
     """Warning where panels that stretch hold much of the strain energy; empty otherwise."""
     by_group = dict(zip(problem.groups, np.transpose(energies), strict=True))
-    found = stretch(problem.structure, by_group)
+    found = stretch(problem.structure, by_group, displacement)
     if found is None:
         return ""
     return (
