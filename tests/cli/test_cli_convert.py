@@ -150,7 +150,9 @@ def test_slips_of_drawing_are_told_and_mended(files) -> None:
     off = flat.vertices + [(5e-5 * (k % 3), 0, 0) for k in range(len(flat.vertices))]
     fd.write_pattern("hand.fold", flat.changed(vertices=off))
     told = files.good("convert", "--check", "hand.fold")
-    assert "nearly flat-foldable" in told.out and "to be moved, to fold flat (um): " in told.out
+    assert "nearly flat-foldable" in told.out
+    moved = next(line for line in told.out.splitlines() if "to be moved, to fold flat" in line)
+    assert "; the 10 that move most (um): " in moved and moved.count(" by ") == 10
     told = files.call("convert", "hand.fold", "true.fold", "--flat-foldable", "--tolerance", "1e-4")
     assert told.status == 0 and "to where they fold flat" in told.err
     mended = diagnose("true.fold")

@@ -77,6 +77,17 @@ def test_frequencies_of_a_mended_sheet_are_those_without_slips(tmp_path):
     np.testing.assert_allclose(found[1], found[0], rtol=0.02)
 
 
+@pytest.mark.parametrize("digits", [5, 6, 7])
+def test_digits_of_a_file_are_no_slips(digits, tmp_path):
+    """Coordinates rounded to so many digits of a meter, in panels of 30 mm."""
+    rounded = SHEET.changed(vertices=np.round(SHEET.vertices, digits))
+    write_pattern(tmp_path / "x.fold", rounded)
+    doubted = any("nearly" in doubt for doubt in diagnose(tmp_path / "x.fold").diagnosis.doubts)
+    assert doubted == (digits == 5)
+    mended = diagnose(tmp_path / "x.fold", flat_foldable=True).pattern
+    assert flat_foldability(mended).alternating.max() < 1e-11
+
+
 def test_exact_and_other_patterns_are_not_doubted(tmp_path):
     for k, pattern in enumerate((SHEET, fd.patterns.miura(dihedral=100), fd.patterns.resch())):
         write_pattern(tmp_path / f"{k}.fold", pattern)

@@ -216,6 +216,8 @@ def test_the_default_fold_law_locks(model):
     (text,) = told(lambda: model(closed, sheet))
     stiffer = 1.0 / np.cos(0.5 * np.pi * (45.0 - 24.0) / 45.0) ** 2
     assert "crease 0 rests at 336 degrees" in text and f"{stiffer:.3g} times as stiff" in text
+    texts = told(lambda: model(fd.patterns.simple_fold(dihedral=1.0), sheet))
+    assert any("locks, which keeps it shut, so that its panels move as one:" in t for t in texts)
     assert told(lambda: model(open_, sheet)) == []
     for law in ("linear", "enhanced", fd.EnhancedLinear(theta1=30, theta2=330)):
         assert told(lambda law=law: model(closed, sheet, fold_law=law)) == []

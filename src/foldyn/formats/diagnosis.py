@@ -13,6 +13,9 @@ from foldyn.patterns.topology import Edge
 ROUNDING = np.radians(0.1)
 """Departure of angles (rad) that the digits of a file leave."""
 MOST_ROWS = 30
+MOST_MOVED = 10
+LISTED = 1e-9
+"""Least move of a vertex (m) that is told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,14 +58,14 @@ class Diagnosis:
         return "\n".join(lines + self._move_lines() + self._vertex_lines())
 
     def _move_lines(self) -> list[str]:
-        """How far vertices move to fold flat, those first that move farthest."""
-        order = np.argsort(-self.moves, kind="stable")
-        shown = [f"{v} by {1e6 * self.moves[v]:.3g}" for v in order[:MOST_ROWS].tolist()]
-        if not shown:
+        """How many vertices move to fold flat, and how far those do that move most."""
+        number = int((self.moves > LISTED).sum())
+        if not number:
             return []
-        left = len(order) - len(shown)
-        more = f", {left} more by less" if left else ""
-        return [f"vertices moved, or to be moved, to fold flat (um): {', '.join(shown)}{more}"]
+        order = np.argsort(-self.moves, kind="stable")[: min(number, MOST_MOVED)]
+        shown = ", ".join(f"{v} by {1e6 * self.moves[v]:.3g}" for v in order.tolist())
+        least = f"; the {MOST_MOVED} that move most" if number > MOST_MOVED else ""
+        return [f"vertices moved, or to be moved, to fold flat: {number}{least} (um): {shown}"]
 
     def _vertex_lines(self) -> list[str]:
         """Table of the vertices inside, those first that cannot fold flat."""

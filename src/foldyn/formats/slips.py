@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from foldyn.errors import ComputationError, InputError
+from foldyn.formats.diagnosis import LISTED
 from foldyn.formats.notes import count
 from foldyn.patterns.flat_foldability import flat_foldability
 from foldyn.patterns.flat_foldable import flat_foldable, slips
@@ -15,7 +16,9 @@ from foldyn.patterns.flat_foldable import flat_foldable, slips
 if TYPE_CHECKING:
     from foldyn.formats.building import Built
 
-_LISTED = 1e-9  # m, least move that is told
+# rad, least sum of Kawasaki's that is doubted: lengths with five digits, as drawing programs write
+# them, leave sums of that size, and panels bend by about as much when the pattern folds
+_DOUBTED = 1e-4
 
 
 def without_slips(made: Built, mend: bool, is_state: bool) -> Built:
@@ -27,8 +30,10 @@ def without_slips(made: Built, mend: bool, is_state: bool) -> Built:
     rows = slips(told.vertices)
     if rows.size < (1 if mend else 2):  # panels about one vertex stay plane
         return made
-    off = np.degrees(told.vertices.alternating[rows].max())
-    said = f"nearly flat-foldable: Kawasaki's sums are up to {off:.3g} degrees"
+    off = told.vertices.alternating[rows].max()
+    if off < _DOUBTED and not mend:
+        return made
+    said = f"nearly flat-foldable: Kawasaki's sums are up to {np.degrees(off):.3g} degrees"
     try:
         mended = flat_foldable(pattern)
     except (InputError, ComputationError) as error:
@@ -46,7 +51,7 @@ def without_slips(made: Built, mend: bool, is_state: bool) -> Built:
         text = f"{said}, by which panels bend when it folds; {remedy}"
         return made._replace(diagnosis=replace(told, doubts=(*told.doubts, text)))
     moves = np.linalg.norm(mended.vertices - pattern.vertices, axis=1)
-    number, most = int((moves > _LISTED).sum()), f"{1e3 * moves.max():.3g} mm"
+    number, most = int((moves > LISTED).sum()), f"{1e3 * moves.max():.3g} mm"
     if mend:
         text = (
             f"moved {count(number, 'vertex', 'vertices')} by up to {most} to where they fold flat"

@@ -29,7 +29,7 @@ NEARLY = np.radians(2.0)
 NEARLY_PLANE = 0.1
 """The same of the sum of logarithms about a panel that is to stay plane."""
 EXACT = 1e-6
-"""Kawasaki's sum (rad) from which panels bend visibly when the pattern folds."""
+"""Kawasaki's sum (rad) below which there is nothing to mend, and that mending may leave."""
 FARTHEST = 0.01
 """Most that a vertex is moved, over its shortest edge."""
 _STEPS = 20

@@ -27,6 +27,7 @@ SKEW = 33.0  # degrees, the smallest corner of a panel of four
 FOLDED = 0.05  # t/(L sin fold) of welds, above which they bow, which the model does not allow
 FLAT = 0.15  # the same of creases
 LOCKING = 1.1  # times the stiffness of a crease: 5 % in frequency
+SHUT = 100.0  # the same: panels beside such a crease move as one
 SMOOTH = 1e-3  # rad, of a fold that is none
 DIGITS = 6  # decimals of what is compared with these, so that rounding passes none
 SHELL = "take the shell, fd.shell"
@@ -52,10 +53,15 @@ def doubt_locking(structure: Discretized) -> None:
     stiffer = law.slope(rest, rest)
     k = int(stiffer.argmax())
     if stiffer[k] > LOCKING:
+        how = (
+            f"{stiffer[k]:.3g} times as stiff as between them"
+            if stiffer[k] < SHUT
+            else "which keeps it shut, so that its panels move as one"
+        )
         warn(
             f"crease {k} rests at {np.degrees(rest[k]):.3g} degrees, beyond the angles (45 and "
-            f"315) from which the default fold law locks, {stiffer[k]:.3g} times as stiff as "
-            'between them: take fold_law = "linear", or "enhanced" with other angles',
+            f'315) from which the default fold law locks, {how}: take fold_law = "linear", or '
+            '"enhanced" with other angles',
             "laws.md#hinges",
             ModelRangeWarning,
         )
