@@ -192,6 +192,7 @@ def test_transforms_about_an_origin():
         ("transform: translate(calc(1mm + 2px), 0)", "or apply it to the coordinates"),
         ("translate: 3px 4px", 'line 1.translate = "3px 4px": is not read from CSS'),
         ("rotate: 30deg", 'line 1.rotate = "30deg": is not read from CSS'),
+        ("zoom: 2", 'line 1.zoom = "2": is not read from CSS; write it as a "transform"'),
     ],
 )
 def test_css_that_moves_lines_in_other_ways_is_refused(style, message):
@@ -203,6 +204,7 @@ def test_css_that_shapes_lines_is_refused():
     with pytest.raises(InputError, match=r'circle 1\.r = "9px": is not read from CSS; write it'):
         drawn('<style>circle {r: 9px}</style><circle r="4" stroke="red"/>')
     assert drawn('<g style="width: 100%"/><line x2="4" stroke="blue"/>') == [("V", (0, 0), (4, 0))]
+    assert drawn('<line x2="4" stroke="blue" style="zoom: 100%"/>') == [("V", (0, 0), (4, 0))]
 
 
 @pytest.mark.parametrize("letter", "BMVFUC")

@@ -21,7 +21,8 @@ PROPERTIES = (
     "stroke", "stroke-opacity", "opacity", "display", "visibility", "color", "transform",
     "transform-origin", "transform-box",
 )  # fmt: skip
-_MOVING = ("translate", "rotate", "scale")
+_MOVING = ("translate", "rotate", "scale", "zoom")
+_UNMOVED = ("none", "auto", "normal", "1", "100%")
 _SHAPING = ("d", "x", "y", "width", "height", "cx", "cy", "r", "rx", "ry")
 """What CSS may say of elements, but is read from attributes alone."""
 ASSIGNMENT, ANGLE = "data-assignment", "data-foldangle"
@@ -175,9 +176,10 @@ def declared(element: Element, rules: Rules, place: str) -> Mapping[str, str]:
     css |= declarations(element.get("style", ""))
     shaped = _SHAPING if local(element) in (*SHAPES, "use") else ()
     for name in (*_MOVING, *shaped):
-        if css.get(name, "none") not in ("none", "auto"):
+        if css.get(name, "none") not in (_UNMOVED if name == "zoom" else _UNMOVED[:2]):
+            how = 'a "transform"' if name in _MOVING else "an attribute"
             raise InputError(
-                f" = {show(css[name])}: is not read from CSS; write it as an attribute",
+                f" = {show(css[name])}: is not read from CSS; write it as {how}",
                 f"{place}.{name}",
             )
     said = {key.lower(): value.strip() for key, value in element.attrib.items()}

@@ -20,6 +20,7 @@ from foldyn.plots.along import (
     check_path,
     critical_word,
     displacements,
+    is_loose,
     stretches,
 )
 from foldyn.plots.given import by_label, case_from_result
@@ -33,6 +34,7 @@ _MARKS: Mapping[str, dict[str, Any]] = {
     "limit": {"marker": "o", "markersize": 5.0},
     "bifurcation": {"marker": "D", "markersize": 5.0, "markerfacecolor": "white"},
 }
+_BAR = {"marker": "|", "markersize": 10.0}
 
 
 def plot_load_displacement(
@@ -44,7 +46,8 @@ def plot_load_displacement(
     """Draw the load factor over the displacement of chosen nodes.
 
     Solid lines are stable, dashed ones unstable (the tangent has negative eigenvalues, the supports
-    as they are); limit points are dots, bifurcations diamonds.
+    as they are); limit points are dots, bifurcations diamonds. Where one could not be located, a
+    bar spans the load factors between which it lies.
 
     Parameters
     ----------
@@ -76,7 +79,7 @@ def plot_load_displacement(
             parts = [label] if len(paths) > 1 else []
             parts += [f"node {node}"] if len(numbers) > 1 else []
             x, factor = along(path, [node], direction), path["load_factor"].values
-            curves.append(_Curve(", ".join(parts), x, factor, path))
+            curves.append(_Curve(", ".join(parts), x, factor, path, is_loose(path)))
     of = f" of node {numbers[0]}" if len(numbers) == 1 else ""
     return _draw(curves, title, f"displacement{of} along {direction} (m)", "load factor")
 
@@ -138,6 +141,7 @@ class _Curve(NamedTuple):
     x: NDArray[np.float64]
     y: NDArray[np.float64]
     path: xr.Dataset
+    loose: NDArray[np.bool_] | bool = False  # points whose interval of load factors is drawn
 
 
 def _draw(curves: list[_Curve], title: str, xlabel: str, ylabel: str) -> Figure:
@@ -161,6 +165,8 @@ def _draw(curves: list[_Curve], title: str, xlabel: str, ylabel: str) -> Figure:
     for kind, name in CRITICAL.items():
         if any((curve.path["point"].values == kind).any() for curve in curves):
             keys.append(style.key(name, color=style.GRAY, linestyle="none", **_MARKS[kind]))
+    if any(np.any(curve.loose) for curve in curves):
+        keys.append(style.key("where it lies", color=style.GRAY, linestyle="none", **_BAR))
     style.exponents(axes)
     axes.ticklabel_format(axis="x", scilimits=(-4, 4), useMathText=True)
     axes.xaxis.get_offset_text().set(fontsize=style.TICK, color=style.BLACK)
@@ -169,7 +175,7 @@ def _draw(curves: list[_Curve], title: str, xlabel: str, ylabel: str) -> Figure:
 
 def _draw_curve(axes: Axes, curve: _Curve, color: str, zorder: float) -> None:
     """Draw the stretches of a curve and its critical points."""
-    label, x, y, path = curve
+    label, x, y, path, loose = curve
     for number, (start, stop, stable) in enumerate(stretches(path)):
         part = slice(start, stop + 1)
         look: dict[str, Any] = {"color": color, "linewidth": 1.4, "zorder": zorder}
@@ -183,6 +189,11 @@ def _draw_curve(axes: Axes, curve: _Curve, color: str, zorder: float) -> None:
         if at.any():
             look = {"linestyle": "none", "color": color, "zorder": 3.0, **mark}
             axes.plot(x[at], y[at], label=f"_{kind}", **look)
+    if np.any(loose):
+        low, high = path["interval"].transpose("end", "step").values[:, loose]
+        ends = np.concatenate([low, high])
+        axes.vlines(x[loose], low, high, color=color, linewidth=1.4, zorder=3.0)
+        axes.plot(np.tile(x[loose], 2), ends, "_", color=color, markersize=8.0, label="_interval")
 
 
 @case_from_result
