@@ -62,13 +62,16 @@ class Check(Unit):
         For tables, and for messages of checks that take it.
     words : iterable of str, optional
         Texts that the check accepts, where `limits` do not say so.
+    given : type, optional
+        Type of what it accepts, where it keeps another.
     """
 
     def __init__(
-        self, check: Callable[..., Any], *, unit: str = "", words: Iterable[str] = (), **limits: Any
-    ) -> None:
+        self, check: Callable[..., Any], *, unit: str = "", words: Iterable[str] = (),
+        given: Any = None, **limits: Any,
+    ) -> None:  # fmt: skip
         super().__init__(unit)
-        self.check, self.limits, self.words = check, limits, words
+        self.check, self.limits, self.words, self.given = check, limits, words, given
         parameters = inspect.signature(check).parameters
         if unit and "unit" in parameters:
             self.limits["unit"] = unit
@@ -85,7 +88,7 @@ class Check(Unit):
     def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
         """JSON Schema of what it accepts of a type; tables of data classes become definitions."""
         words = {"known": [*self.words]} if self.words else {}
-        return of_checked(hint, self.check, {**self.limits, **words})
+        return of_checked(self.given or hint, self.check, {**self.limits, **words})
 
 
 class Placed(Check):

@@ -52,6 +52,7 @@ BROKEN = [
     (MODES_TEXT, "supports[0].stiffness = '1'"),
     (MODES_TEXT, "supports = 3"),
     (MODES_TEXT, "damping.alpha = -1"),
+    (MODES_TEXT, "damping.modal = { ratio = 0.1 }"),
     (MODES_TEXT, "output.axis = 'w'"),
     (MODES_TEXT, "drive = []"),
     (FRF_TEXT, "drive = []"),

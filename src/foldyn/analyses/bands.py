@@ -15,6 +15,7 @@ from foldyn.analyses.bands_page import bands_sections
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
 from foldyn.analyses.cell_states import CellState, cell_states, coordinate, one_key
+from foldyn.analyses.ranges import Varied
 from foldyn.analyses.sections import AnalysisSection, Count, Positive, Text, whole_number
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, bar_closed
 from foldyn.arguments import Check, Placed
@@ -69,7 +70,7 @@ class BandsSection(AnalysisSection):
     count: Count = 6
     zone: Annotated[int | None, Check(whole_number, least=2, most=MOST_ZONE)] = None
     attenuation: Annotated[int | None, Check(whole_number, most=MOST_LEVELS)] = None
-    vary: Annotated[Mapping[str, Any] | None, Placed(one_key)] = None
+    vary: Annotated[Varied | None, Placed(one_key, given=Mapping[str, Any])] = None
     state: About = "rest"
     stretch: Annotated[
         float | Sequence[float] | None, Check(number_or_list, what="period", above=0.0)

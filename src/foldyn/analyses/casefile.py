@@ -257,8 +257,9 @@ class CaseFile:
     def start_keys(self) -> dict[str, Any]:
         """What its table [initial] says; nothing where it has none."""
         section = getattr(self._schema, "initial", None)
-        given = {} if section is None else section.values()
-        return {key: value for key, value in given.items() if key in section.stated}
+        if section is None:
+            return {}
+        return {key: value for key, value in section.values().items() if key in section.stated}
 
     def case(self, mass: str | None = None) -> Case:
         """Case with one of the mass rules, by default the first that the file names."""

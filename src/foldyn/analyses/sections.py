@@ -11,20 +11,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any
 
 from foldyn.analyses.pattern_section import PatternOf
-from foldyn.analyses.ranges import SAMPLINGS, varied
-from foldyn.analyses.ties import ties_of
+from foldyn.analyses.ranges import SAMPLINGS, Varied, varied
+from foldyn.analyses.ties import Tie, ties_of
 from foldyn.arguments import Check, Placed, arguments
 from foldyn.cases.air import Air
 from foldyn.cases.contact import Contact
-from foldyn.cases.damping import (
-    CreaseDamping,
-    Damping,
-    ModalDamping,
-    Rayleigh,
-    StrainDamping,
-    dampings,
-    dampings_of,
-)
+from foldyn.cases.damping import DampingSection
 from foldyn.cases.decode import KindOf, law_from
 from foldyn.cases.directions import AXES, check_pairs
 from foldyn.cases.loads import LOAD
@@ -32,7 +24,7 @@ from foldyn.cases.masses import MASS
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import Nodes, check_nodes
 from foldyn.cases.supports import SUPPORT
-from foldyn.errors import InputError, within
+from foldyn.errors import InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.plots import ANIMATIONS
 from foldyn.shells import shell
@@ -47,7 +39,6 @@ from foldyn.values import (
     indices,
     number,
     number_or_list,
-    numbers,
     show,
     vector,
     whole,
@@ -152,17 +143,6 @@ def _edges(name: str, value: Any) -> Any:
     return check_nodes(name, value) if isinstance(value, str) else check_pairs(name, value)
 
 
-def _ratios(name: str, value: Any) -> list[list[float]]:
-    array = numbers(name, value)
-    if array.shape != (2, 2):
-        raise InputError(
-            f" = {show(value)}: must be two pairs of a frequency (Hz) and the damping ratio there, "
-            "as in [[9.3, 0.135], [16.7, 0.09]]",
-            name,
-        )
-    return array.tolist()
-
-
 def _vary(value: Any, beside: Mapping[str, Any]) -> Any:
     return varied(value, beside.get("samples") is not None)
 
@@ -265,49 +245,6 @@ class ShownSection(Section):
     axis: Annotated[str | None, one_of(AXES)] = None
 
 
-class DampingSection(Rayleigh, Section):
-    """[damping]: Rayleigh coefficients, or two damping ratios; modes, creases, strain rates.
-
-    Parameters
-    ----------
-    ratios : sequence of (float, float)
-        Instead of alpha and beta: two pairs of a frequency (Hz) and the damping ratio there.
-    modal : float, sequence of float, or table
-        Damping ratios of the lowest modes; see `ModalDamping`.
-    creases : float, table, or list of tables
-        Damping of creases (N m s/rad per m); see `CreaseDamping`.
-    strain : float
-        As beta (s), but for motions of any size; see `StrainDamping`.
-    """
-
-    ratios: Annotated[Sequence[Sequence[float]] | None, Check(_ratios)] = None
-    modal: Annotated[Any, Check(dampings_of, kind=ModalDamping)] = ()
-    creases: Annotated[Any, Check(dampings_of, kind=CreaseDamping)] = ()
-    strain: Annotated[Any, Check(dampings_of, kind=StrainDamping)] = ()
-
-    def agree(self) -> None:
-        """Ask for coefficients or ratios."""
-        if self.ratios is not None and self.stated & {"alpha", "beta"}:
-            raise InputError(
-                f" = {show(self.ratios)}: they give alpha and beta; leave those out, or ratios",
-                "ratios",
-            )
-
-    def made(self) -> Damping | tuple[Damping, ...]:
-        """The damping."""
-        others = [*self.modal, *self.creases, *self.strain]
-        if others and not self.stated & {"alpha", "beta", "ratios"}:
-            return dampings(others)
-        return dampings([self._rayleigh(), *others])
-
-    def _rayleigh(self) -> Rayleigh:
-        if self.ratios is None:
-            return Rayleigh(self.alpha, self.beta, self.state)
-        (f1, z1), (f2, z2) = self.ratios
-        with within(f".ratios = {show(self.ratios)}: "):
-            return Rayleigh.from_ratios(f1, z1, f2, z2, self.state)
-
-
 class SweepSection(Section):
     """[sweep]: arguments of `sweep`.
 
@@ -331,8 +268,8 @@ class SweepSection(Section):
     samples: Count | None = None
     method: Annotated[str, one_of(SAMPLINGS)] = SAMPLINGS[0]
     seed: Seed = 0
-    vary: Annotated[Mapping[str, Any], Placed(_vary)]
-    ties: Annotated[Mapping[str, str] | Sequence[Any], Placed(ties_of)] = ()
+    vary: Annotated[tuple[Varied, ...], Placed(_vary, given=Mapping[str, Any])]
+    ties: Annotated[tuple[Tie, ...], Placed(ties_of, given=Mapping[str, str])] = ()
     measures: Texts = ()
 
 

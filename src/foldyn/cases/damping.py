@@ -13,12 +13,13 @@ from typing import Annotated, Any, ClassVar, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.arguments import Check
+from foldyn.arguments import Check, arguments
 from foldyn.cases.decode import Part
 from foldyn.cases.selection import Creases, resolve_creases
-from foldyn.errors import InputError
-from foldyn.tables import ListOf, read
-from foldyn.values import choice, number, number_or_list, show, whole
+from foldyn.errors import InputError, within
+from foldyn.json_schema import Schema, any_of
+from foldyn.tables import ListOf, Section, read, schema_of
+from foldyn.values import choice, number, number_or_list, numbers, show, whole
 
 STATES = ("rest", "start")
 
@@ -241,29 +242,83 @@ def damping_table(parts: Sequence[Damping]) -> dict[str, Any]:
     return table
 
 
-def damping_from(table: Mapping[str, Any]) -> Damping | tuple[Damping, ...]:
-    """Damping from its stored table; without any it is Rayleigh's, of nothing."""
-    nested = {kind.key: kind for kind in DAMPINGS if kind.key}
-    own = {key: value for key, value in table.items() if key not in nested}
-    parts: list[Damping] = [read(Rayleigh, "", own)] if own else []
-    for key, kind in nested.items():
-        if key in table:
-            parts += dampings_of(f".{key}", table[key], kind)
-    return dampings(parts)
-
-
-def dampings_of(name: str, value: Any, kind: type[Damping]) -> tuple[Damping, ...]:
+class _DampingsOf(Check):
     """Dampings of a kind: from a table, from several, or from its first argument alone."""
-    if kind.several and isinstance(value, list) and value and isinstance(value[0], Mapping):
-        return ListOf(Check(_damping_of, kind=kind))(name, value)
-    return (_damping_of(name, value, kind),)
+
+    def __init__(self, kind: type[Damping]) -> None:
+        super().__init__(self._listed)
+        self.kind, self.first = kind, next(iter(kind.by_key()))
+
+    def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
+        """See `Check`."""
+        table = schema_of(self.kind, definitions)
+        several = [{"type": "array", "items": table}] if self.kind.several else []
+        return any_of([arguments(self.kind)[self.first].schema(definitions), table, *several])
+
+    def _listed(self, name: str, value: Any) -> Sequence[Damping]:
+        several = self.kind.several and isinstance(value, list) and value
+        if several and isinstance(value[0], Mapping):
+            return ListOf(Check(self._one))(name, value)
+        return [self._one(name, value)]
+
+    def _one(self, name: str, value: Any) -> Damping:
+        if isinstance(value, Mapping):
+            return read(self.kind, name, value)
+        try:
+            return read(self.kind, name, {self.first: value})
+        except InputError as error:  # the value stands in the place of its table
+            raise InputError(error.reason, error.field.replace(f".{self.first}", "", 1)) from None
 
 
-def _damping_of(name: str, value: Any, kind: type[Damping]) -> Damping:
-    if isinstance(value, Mapping):
-        return read(kind, name, value)
-    first = next(iter(kind.by_key()))
-    try:
-        return read(kind, name, {first: value})
-    except InputError as error:  # the value stands in the place of its table
-        raise InputError(error.reason, error.field.replace(f".{first}", "", 1)) from None
+def _ratios(name: str, value: Any) -> list[list[float]]:
+    array = numbers(name, value)
+    if array.shape != (2, 2):
+        raise InputError(
+            f" = {show(value)}: must be two pairs of a frequency (Hz) and the damping ratio there, "
+            "as in [[9.3, 0.135], [16.7, 0.09]]",
+            name,
+        )
+    return array.tolist()
+
+
+class DampingSection(Rayleigh, Section):
+    """[damping]: Rayleigh coefficients, or two damping ratios; modes, creases, strain rates.
+
+    Parameters
+    ----------
+    ratios : sequence of (float, float)
+        Instead of alpha and beta: two pairs of a frequency (Hz) and the damping ratio there.
+    modal : float, sequence of float, or table
+        Damping ratios of the lowest modes; see `ModalDamping`.
+    creases : float, table, or list of tables
+        Damping of creases (N m s/rad per m); see `CreaseDamping`.
+    strain : float
+        As beta (s), but for motions of any size; see `StrainDamping`.
+    """
+
+    ratios: Annotated[Sequence[Sequence[float]] | None, Check(_ratios)] = None
+    modal: Annotated[Sequence[Damping], _DampingsOf(ModalDamping)] = ()
+    creases: Annotated[Sequence[Damping], _DampingsOf(CreaseDamping)] = ()
+    strain: Annotated[Sequence[Damping], _DampingsOf(StrainDamping)] = ()
+
+    def agree(self) -> None:
+        """Ask for coefficients or ratios."""
+        if self.ratios is not None and self.stated & {"alpha", "beta"}:
+            raise InputError(
+                f" = {show(self.ratios)}: they give alpha and beta; leave those out, or ratios",
+                "ratios",
+            )
+
+    def made(self) -> Damping | tuple[Damping, ...]:
+        """The damping."""
+        others = [*self.modal, *self.creases, *self.strain]
+        if others and not self.stated & {"alpha", "beta", "ratios"}:
+            return dampings(others)
+        return dampings([self._rayleigh(), *others])
+
+    def _rayleigh(self) -> Rayleigh:
+        if self.ratios is None:
+            return Rayleigh(self.alpha, self.beta, self.state)
+        (f1, z1), (f2, z2) = self.ratios
+        with within(f".ratios = {show(self.ratios)}: "):
+            return Rayleigh.from_ratios(f1, z1, f2, z2, self.state)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from foldyn.cases.air import Air
 from foldyn.cases.case import Case
 from foldyn.cases.contact import Contact
-from foldyn.cases.damping import damping_from, damping_table
+from foldyn.cases.damping import DampingSection, damping_table
 from foldyn.cases.decode import law_from
 from foldyn.cases.histories import HISTORIES, History, Table
 from foldyn.cases.history import STEADY, as_history
@@ -323,7 +323,7 @@ def _read(sections: Mapping[str, Any]) -> Case:
     structure = _structure(sections)
     with warnings.catch_warnings():  # they were issued when the case was first made
         warnings.simplefilter("ignore", FoldynWarning)
-        damping = damping_from(sections["damping"])
+        damping = read(DampingSection, "", sections["damping"]).made()
         return Case(structure, supports, loads, damping, masses, contact, air)
 
 

@@ -15,6 +15,7 @@ from foldyn.analyses.ranges import SAMPLINGS, Varied, varied
 from foldyn.analyses.reading import case_of_document, read_document, validated
 from foldyn.analyses.sections import SweepSection
 from foldyn.analyses.ties import ties_of
+from foldyn.arguments import Placed
 from foldyn.dynamics.gpu.choice import DEVICES
 from foldyn.errors import Faults, InputError, within
 from foldyn.input_files import path_of
@@ -157,13 +158,8 @@ def _chosen(
         method=choice("method", method or SAMPLINGS[0], SAMPLINGS),
         seed=whole("seed", seed or 0, least=0, most=MOST),
         vary=keys,
-        ties=_ties({} if ties is None else ties),
+        ties=Placed(ties_of)("ties", {} if ties is None else ties),
     )
-
-
-def _ties(given: Mapping[str, str]) -> tuple[Any, ...]:
-    with within("ties"):
-        return ties_of(given)
 
 
 def _with_masses(
