@@ -14,9 +14,11 @@ from foldyn.cases.histories import HISTORIES
 from foldyn.cases.loads import LOADS
 from foldyn.cases.supports import SUPPORTS
 from foldyn.errors import InputError
+from foldyn.json_schema import Schema
 from foldyn.linear.frf import METHODS
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.statics import Settings
+from foldyn.tables import ListOf, Section, TableOf, read, schema_of, told
 from foldyn.values import number, whole
 
 KINDS = [*SUPPORTS, *LOADS, *DAMPINGS, *HISTORIES.values(), *BAR_LAWS.values()]
@@ -77,3 +79,48 @@ def test_bad_values_are_refused(given, message):
     with pytest.raises(InputError) as caught:
         Box(**given)
     assert str(caught.value) == message
+
+
+class Crate(Section):
+    """A table that only files have.
+
+    Parameters
+    ----------
+    boxes : table
+        What is in it.
+    """
+
+    box: Annotated[Box, TableOf(Box)]
+    boxes: Annotated[list[Box], ListOf(TableOf(Box))] = ()
+
+
+def test_tables_are_read_by_the_same_declarations():
+    crate = read(Crate, "", {"box": {"width": 2, "tall": 1}})
+    assert crate.box == Box(2.0, 1, 1.0) and crate.stated == {"box"} and crate.boxes == ()
+    assert read(Crate, "", {"box": {"width": 1}, "boxes": [{"width": 3}]}).boxes == [Box(3.0)]
+
+
+def test_all_mistakes_of_a_file_are_told_with_their_places():
+    bad = {"box": {"number": 0, "tall": -1}, "boxes": [{"width": 1, "tall": 2}, {"widht": 1}, 3]}
+    with pytest.raises(InputError) as caught:
+        read(Crate, "", bad)
+    assert str(told(caught.value, "crate.toml")).split("\n  also ") == [
+        "crate.toml: boxes[1].widht: unknown key; did you mean 'width'? known keys: width, number, "
+        "tall, tint",
+        "box.width: missing; give it (m)",
+        "box.number = 0: must be a whole number, at least 1",
+        "box.tall = -1: must be greater than 0 m",
+        "boxes[0].tall = 2: is more than the width",
+        "boxes[2] = 3: must be a table",
+    ]
+
+
+def test_the_schema_of_a_table_has_types_limits_and_texts():
+    definitions: dict[str, Schema] = {}
+    assert schema_of(Crate, definitions) == {"$ref": "#/definitions/Crate"}
+    box, crate = definitions["Box"], definitions["Crate"]
+    assert box["required"] == ["width"] and not box["additionalProperties"]
+    assert box["properties"]["number"] == {"type": "integer", "minimum": 1, "default": 1}
+    assert box["properties"]["tall"] == {"type": "number", "exclusiveMinimum": 0.0}
+    assert crate["properties"]["boxes"]["items"] == {"$ref": "#/definitions/Box"}
+    assert crate["properties"]["boxes"]["description"] == "What is in it."

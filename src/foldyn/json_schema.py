@@ -9,7 +9,7 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
-from foldyn.values import length, vector
+from foldyn.values import MOST, length, vector
 
 Schema = dict[str, Any]
 BOUNDS = {
@@ -44,7 +44,7 @@ def of_type(hint: Any, limits: Mapping[str, Any]) -> Schema:
     schema: Schema = {"type": TYPES[hint]} if hint in TYPES else {}
     if hint in (int, float):
         bounds = {word: limits.get(key) for key, word in BOUNDS.items()}
-        schema |= {word: bound for word, bound in bounds.items() if isinstance(bound, int | float)}
+        schema |= {word: one for word, one in bounds.items() if one is not None and abs(one) < MOST}
     if hint is str and "known" in limits:
         schema["enum"] = [*limits["known"]]
     return schema

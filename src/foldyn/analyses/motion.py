@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -101,7 +100,7 @@ class MotionSchema(CaseSchema):
         """Let the method move the model."""
         if self.model.kind == SHELL:
             if "method" not in self.analysis.stated:
-                self._set(analysis=replace(self.analysis, method=AUTO))
+                self.analysis._set(method=AUTO)
             check_massless(self, "method", (AUTO, *MASSLESS_METHODS))
 
 
