@@ -55,7 +55,7 @@ def main() -> None:
                 return list(pool.map(solve, pairs))
 
         tasks = {
-            "bands": lambda own=own, phases=phases: fd.bands(own, phases, COUNT),
+            "bands": lambda own=own, phases=phases: fd.bands(own, phases, count=COUNT),
             "eigh": lambda full=full, solve=dense: all_of(solve, full),
             "eigsh": lambda few=few, solve=lanczos: all_of(solve, few),
         }

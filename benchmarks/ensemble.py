@@ -46,7 +46,7 @@ def alone(case: fd.Case, dt: float, force: bool) -> float:
 
     def run(steps: int) -> float:
         begun = time.process_time()
-        fd.simulate(case, steps * dt, "central_difference", dt=dt, every=steps, force=force)
+        fd.simulate(case, steps * dt, method="central_difference", dt=dt, every=steps, force=force)
         return time.process_time() - begun
 
     run(8)

@@ -44,7 +44,7 @@ def uses() -> Mapping[str, Mapping[str, Callable[[], object]]]:
         return fd.Case(structure, [held, *supports], [push], **parts)
 
     def motion(method, *supports, **parts):
-        return lambda: fd.simulate(case(*supports, **parts), 0.01, method)
+        return lambda: fd.simulate(case(*supports, **parts), 0.01, method=method)
 
     return {
         "explicit": {

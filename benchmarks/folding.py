@@ -56,7 +56,9 @@ def zigzags(n: int) -> fd.Pattern:
 KINDS = {
     "miura": miura,
     "miura, uneven": lambda n: miura(n, 0.004),
-    "waterbomb": lambda n: fd.patterns.waterbomb((4, max(n * n // 4, 1)), 0.02, 0.02, 180),
+    "waterbomb": lambda n: fd.patterns.waterbomb(
+        (4, max(n * n // 4, 1)), 0.02, b=0.02, dihedral=180
+    ),
     "resch": lambda n: fd.patterns.resch((n, n), dihedral=180),
 }
 PRESETS = {"n5b8e": lambda n: miura(n, 0.01), "n5b8e, folded": zigzags}

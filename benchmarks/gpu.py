@@ -113,10 +113,10 @@ def agreement() -> None:
             dt = PART * fd.critical_step(case, method)
             given = {"dt": dt, "every": 100, "initial": shaken(case)}
             one, two = (
-                fd.simulate(case, 1000 * dt, method, device="gpu", **given) for _ in range(2)
+                fd.simulate(case, 1000 * dt, method=method, device="gpu", **given) for _ in range(2)
             )
             told(f"{method}, {case.fixed.size} dofs", one, two, fd.simulate(
-                case, 1000 * dt, method, **given
+                case, 1000 * dt, method=method, **given
             ))  # fmt: skip
         cases = [specimen("enhanced", k) for k in range(16)]
         dt = PART * fd.critical_step(cases[-1], method)
@@ -169,8 +169,10 @@ def alone(method: str) -> None:
     """Print the seconds of a step of a specimen."""
     case = specimen("enhanced", 0)
     dt = 0.2 * fd.critical_step(case, method)
-    fd.simulate(case, 100 * dt, method, dt=dt, every=100)
-    print(fd.simulate(case, 4e4 * dt, method, dt=dt, every=40_000).attrs["wall_seconds"] / 4e4)
+    fd.simulate(case, 100 * dt, method=method, dt=dt, every=100)
+    print(
+        fd.simulate(case, 4e4 * dt, method=method, dt=dt, every=40_000).attrs["wall_seconds"] / 4e4
+    )
 
 
 def throughput() -> list[str]:
@@ -204,7 +206,7 @@ def row(case: fd.Case, method: str, mine: float) -> str:
     steps = max(20, int(2e6 / case.fixed.size))
     dt = 0.2 * fd.critical_step(case_of((2, 2), "enhanced"), method)
     given = {"dt": dt, "every": steps, "initial": shaken(case), "force": True}
-    own = fd.simulate(case, steps * dt, method, **given).attrs
+    own = fd.simulate(case, steps * dt, method=method, **given).attrs
     return line(case, method, mine, own["wall_seconds"] / own["steps"], own["threads"])
 
 
@@ -257,7 +259,7 @@ def sweeps() -> None:
         for count in (POINTS, 4):
             clock = time.perf_counter()
             given = {"sheet.youngs_modulus": values[:count].tolist()}
-            out = fd.sweep(file, given, ["largest_displacement"])
+            out = fd.sweep(file, given, measures=["largest_displacement"])
             clock = time.perf_counter() - clock
             assert not out.attrs["failed"], out.failure.values
             found[count] = out.largest_displacement.values

@@ -49,7 +49,7 @@ def motion() -> None:
     compare(
         f"motion of {made.nodes.size} dofs",
         lambda: fd.simulate(case, **given),
-        lambda: fd.sensitivity(case, ARRAYS, "displacement[30,x]", analysis),
+        lambda: fd.sensitivity(case, ARRAYS, measures="displacement[30,x]", analysis=analysis),
     )
 
 
@@ -64,7 +64,7 @@ def modes(cells: int) -> None:
     compare(
         f"six modes of {made.nodes.size} dofs, {len(pattern.creases)} creases",
         lambda: fd.modes(case, count=6),
-        lambda: fd.sensitivity(case, ["fold_stiffness"], texts, analysis),
+        lambda: fd.sensitivity(case, ["fold_stiffness"], measures=texts, analysis=analysis),
     )
 
 

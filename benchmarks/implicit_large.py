@@ -67,7 +67,7 @@ def moving(case: fd.Case, steps: int, clock: Clock) -> tuple[float, str]:
     """Seconds of a step of a motion, and how many iterations and factorizations."""
     loaded = fd.Case(case.structure, case.supports, FALL)
     clock.taken.clear()
-    motion = fd.simulate(loaded, steps * DT, "generalized_alpha", dt=DT, every=steps * DT)
+    motion = fd.simulate(loaded, steps * DT, method="generalized_alpha", dt=DT, every=steps * DT)
     taken, a = clock.taken, motion.attrs
     first, *others = taken["factorize"]  # the first one with its order
     whole = sum(sum(taken[name]) for name in PARTS) - first + float(np.median(others))
@@ -99,7 +99,9 @@ def main() -> None:
     given = parser.parse_args()
     small, clock = sheet(6), Clock()
     moving_once = fd.Case(small.structure, small.supports, FALL)
-    fd.simulate(moving_once, DT, "generalized_alpha", dt=DT)  # compiled before the clock runs
+    fd.simulate(
+        moving_once, DT, method="generalized_alpha", dt=DT
+    )  # compiled before the clock runs
     fd.trace(moving_once, load_factors=[1e-3])
     fd.modes(small, 6, secant=1.0)
     for name in ("residual", "tangent"):

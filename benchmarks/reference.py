@@ -225,7 +225,7 @@ def resumed(case: fd.Case, start: fd.State | None, **options: Any) -> Any:
 def beside(case: fd.Case, start: fd.State | None) -> Any:
     """Ten motions side by side: of the case with more and more mass."""
     many = [case.altered(masses=[fd.PointMass("xmax", 1.0 + k)]) for k in range(10)]
-    return fd.simulate_many(many, STEPS * SHORT, SHORT, every=5, initial=start)
+    return fd.simulate_many(many, STEPS * SHORT, dt=SHORT, every=5, initial=start)
 
 
 def sampled(case: fd.Case, start: fd.State | None, **options: Any) -> Any:
@@ -250,7 +250,7 @@ def vibrating(case: fd.Case, _: fd.State | None) -> Any:
 
 def response(case: fd.Case, _: fd.State | None) -> Any:
     """A frequency response at rest."""
-    return fd.frf(case, fd.Force("xmax", (1.0, 0.0, 0.5)), [0.1, 0.3, 1.0, 4.0])
+    return fd.frf(case, fd.Force("xmax", (1.0, 0.0, 0.5)), frequencies=[0.1, 0.3, 1.0, 4.0])
 
 
 def jobs() -> Iterator[tuple[str, str, Callable[..., Any], dict[str, Any]]]:

@@ -41,9 +41,13 @@ def main() -> None:
     """Run both and print the comparison."""
     base = fd.BaseMotion("x", value=SHAKEN, history=fd.Harmonic(TIMED[0]))
     case = specimen(base)
-    fd.response_curve(case, (6.0, 6.01), 5, modes=6, longest_step=1.0, steps=32)  # compiles
+    fd.response_curve(
+        case, (6.0, 6.01), harmonics=5, modes=6, longest_step=1.0, steps=32
+    )  # compiles
     curve, own = seconds(
-        lambda: fd.response_curve(case, FREQUENCIES, 5, modes=6, longest_step=0.025, steps=32)
+        lambda: fd.response_curve(
+            case, FREQUENCIES, harmonics=5, modes=6, longest_step=0.025, steps=32
+        )
     )
     points = curve.sizes["point"]
     print(f"curve: {points} points in {own:.1f} s, {own / points:.3f} s a point", flush=True)
@@ -55,7 +59,9 @@ def main() -> None:
     if points < LEAST:
         print(f"fewer than {LEAST} points: take shorter steps")
     drive = fd.BaseMotion("x", value=SHAKEN)
-    timed, other = seconds(lambda: fd.frf(specimen(), drive, TIMED, method="stepped_sine"))
+    timed, other = seconds(
+        lambda: fd.frf(specimen(), drive, frequencies=TIMED, method="stepped_sine")
+    )
     each = other / len(TIMED)
     print(f"stepped sine: {each:.1f} s a frequency; {each / (own / points):.0f} times as long")
     moved = np.abs(timed.transmissibility.values[:, 3, 0]) * SHAKEN

@@ -48,7 +48,7 @@ def fitted(folder: Path):
         nodes=nodes, time=since[kept], values=along.sel(node=nodes).values[kept], axis="x",
         align=0.003, detrend="constant", sight=Sight.of(tracks),
     )  # fmt: skip
-    return fd.fit(path, [data], PARAMETERS)
+    return fd.fit(path, [data], parameters=PARAMETERS)
 
 
 if __name__ == "__main__":

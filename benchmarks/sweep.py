@@ -49,7 +49,7 @@ class Cost(NamedTuple):
 def swept(case: Path, processes: int) -> Cost:
     """What the sweep costs."""
     began, before = time.perf_counter(), sum(os.times()[:4])
-    found = fd.sweep(case, VARY, ["frequencies"], processes=processes)
+    found = fd.sweep(case, VARY, measures=["frequencies"], processes=processes)
     if found.attrs["failed"]:
         sys.exit(f"points failed: {found['failure'].values.ravel()[0]}")
     return Cost(time.perf_counter() - began, sum(os.times()[:4]) - before)

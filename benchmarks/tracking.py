@@ -70,7 +70,7 @@ def film_of_specimen(motion: xr.Dataset, kind: str) -> ex.SyntheticFilm:
     camera = ex.Camera.looking_at(
         middle, DISTANCE, SCALE, SIZE, k1=0.03, k2=-0.01, turned=(2.0, -1.5, 1.0)
     )
-    return ex.film_of(motion, camera, RATE, DURATION, sensor=SENSORS[kind], seed=1)
+    return ex.film_of(motion, camera, rate=RATE, duration=DURATION, sensor=SENSORS[kind], seed=1)
 
 
 def measure(folder: Path, kind: str) -> dict[str, float]:

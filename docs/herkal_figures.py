@@ -42,7 +42,9 @@ def draw(study: Study, found: variations.Variations) -> None:
     names = (REFERENCE, "panel", "circumcenter", "consistent")
     every = {label(m): study.result("case2", m, "motion") for m in names}
     motions = {name: motion for name, motion in every.items() if motion is not None}
-    plots.plot_history(motions, nodes, axis, 5.0).savefig(IMAGES / "herkal-case2.png", dpi=100)
+    plots.plot_history(motions, nodes, axes=axis, max_frequency=5.0).savefig(
+        IMAGES / "herkal-case2.png", dpi=100
+    )
     models = (*rules(), sensitivity_page.TURNED)
     sensitivity_page.plot_sensitivity(found, models, paper_table()).savefig(
         IMAGES / "herkal-sensitivity.png", dpi=100

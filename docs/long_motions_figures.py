@@ -43,7 +43,7 @@ def hardening() -> xr.Dataset:
     """A stepped sine over the bent resonance of a flat arch on a spring."""
     case = arch(linear=1.0, alpha=0.05, force=0.06)
     return fd.bifurcation_diagram(
-        case, X, np.arange(0.9, 1.56, 0.02) / TURN, settle=150, record=4, dt=TURN / 100
+        case, X, frequencies=np.arange(0.9, 1.56, 0.02) / TURN, settle=150, record=4, dt=TURN / 100
     )
 
 
@@ -112,7 +112,9 @@ if __name__ == "__main__":
     ueda = arch(alpha=0.05, force=7.5)
     motion = fd.simulate(ueda, 4000 * TURN, dt=TURN / 100, every=TURN)
     section = fd.poincare_section(motion, TURN, after=50 * TURN)
-    fd.plots.plot_poincare_section(section, 1, "z").savefig(folder / "long-motions-section.png")
+    fd.plots.plot_poincare_section(section, 1, axis="z").savefig(
+        folder / "long-motions-section.png"
+    )
     found = fd.lyapunov_exponent(ueda, 20_000 * TURN, settle=100 * TURN, dt=TURN / 100)
     print(f"exponent {float(found.exponent):.4f} +- {float(found.error):.4f}")
     doubled = tower_doublings()
@@ -127,7 +129,7 @@ if __name__ == "__main__":
     for state in fd.landscape(path).states:
         print(f"{1e3 * state.stroke:.2f} mm, {state.energy:.4f} J, stable: {state.stable}")
     grid = {"stroke": np.linspace(0.0, STROKE, 26), "speed": np.linspace(-SPEED, SPEED, 26)}
-    basins = fd.basins(case, starts(path), grid, 1.5, dt=2.5e-4)
+    basins = fd.basins(case, starts(path), grid=grid, duration=1.5, dt=2.5e-4)
     print("shares", basins.share.values, f"in {basins.attrs['wall_seconds']:.0f} s")
     figure = fd.plots.plot_basins(basins)
     figure.axes[0].set(xlabel="stroke (m)", ylabel="speed of the top, downward (m/s)")

@@ -74,7 +74,7 @@ def draw(results: dict, folder: Path) -> None:
     """One picture for each generator."""
     for name, states in results.items():
         patterns = list(states.values())
-        figure = fd.plots.draw_patterns(patterns, list(states), VIEWS.get(name, ()))
+        figure = fd.plots.draw_patterns(patterns, list(states), views=VIEWS.get(name, ()))
         figure.savefig(folder / f"pattern-{name.replace('_', '-')}.png", dpi=90)
 
 

@@ -50,7 +50,7 @@ def compute():
     near = 1.0 - (2.4 - END) * LAYERS * THICKNESS / (2.0 * case.contact.planes[0].motion[0])
     closing = fd.trace(case, "displacement", load_factors=np.linspace(0.0, near, 20).tolist())
     block = fd.trace(
-        case, "arc_length", [near, 1.0], steps=300, first_step=(1.0 - near) / 40,
+        case, "arc_length", load_factors=[near, 1.0], steps=300, first_step=(1.0 - near) / 40,
         initial=fd.initial_state(closing),
     )  # fmt: skip
     return case, (closing, block)

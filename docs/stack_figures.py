@@ -43,7 +43,7 @@ def compute() -> tuple[fd.Case, object]:
         damping=fd.Rayleigh(alpha=6.0),
         contact=fd.Contact(),
     )
-    return case, fd.simulate(case, DURATION, "dormand_prince", every=0.02)
+    return case, fd.simulate(case, DURATION, method="dormand_prince", every=0.02)
 
 
 def middles(case: fd.Case, u: np.ndarray) -> np.ndarray:
@@ -64,7 +64,9 @@ def check(motion) -> None:
 def draw(case: fd.Case, motion, folder: Path) -> None:
     """The boards as they stand, fall and lie."""
     states = [motion.displacement.sel(time=t, method="nearest").to_numpy() for t in SHOWN]
-    figure = fd.plots.draw_boards(case, states, [f"{t:g} s" for t in SHOWN], view=(8.0, -80.0))
+    figure = fd.plots.draw_boards(
+        case, states, captions=[f"{t:g} s" for t in SHOWN], view=(8.0, -80.0)
+    )
     figure.savefig(folder / "thick-contact.png", dpi=80)
 
 

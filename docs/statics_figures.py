@@ -102,9 +102,9 @@ def check(results: dict) -> None:
     assert (along_y[:, 1] > 0.55).all()  # never folding-dominated
 
     specimen, heavy, motion = (results[name] for name in ("specimen", "heavy", "motion"))
-    pressed = fd.plots.total_reaction(specimen, TOP, "x")
+    pressed = fd.plots.total_reaction(specimen, TOP, direction="x")
     assert abs(pressed[-1] - 0.438) < 5e-4
-    weight = pressed - fd.plots.total_reaction(heavy, TOP, "x")
+    weight = pressed - fd.plots.total_reaction(heavy, TOP, direction="x")
     np.testing.assert_allclose(weight, 0.0205, atol=5e-4)  # the top holds half of 0.041 N
     strain = sum(motion[f"strain_{name}"].values[0] for name in ("bars", "bends", "folds"))
     stored = sum(float(specimen[f"strain_{n}"][STATED]) for n in ("bars", "bends", "folds"))
@@ -146,11 +146,11 @@ def more_tables(results: dict) -> str:
 def draw(case, results: dict, folder: Path) -> None:
     """The specimen's forces and shape, and the snap-through of a Miura vertex."""
     paths = {"without weight": results["specimen"], "with its weight": results["heavy"]}
-    fd.plots.plot_reaction(paths, TOP, "x").savefig(folder / "specimen-force.png", dpi=90)
-    shapes = fd.plots.draw_shapes(case, results["specimen"], [0, -1])
+    fd.plots.plot_reaction(paths, TOP, direction="x").savefig(folder / "specimen-force.png", dpi=90)
+    shapes = fd.plots.draw_shapes(case, results["specimen"], points=[0, -1])
     shapes.savefig(folder / "specimen-shapes.png", dpi=80)
     _, path = shipped("gallery/miura-popthrough")
-    fd.plots.plot_load_displacement(path, [24], "-z").savefig(
+    fd.plots.plot_load_displacement(path, [24], direction="-z").savefig(
         folder / "popthrough-curve.png", dpi=90
     )
 

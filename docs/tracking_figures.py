@@ -23,7 +23,7 @@ def steps(tracks: xr.Dataset) -> dict:
     time = tracks["time"].values
     x = tracks["displacement"].sel(node=NODE, axis="x").values
     done = {"as measured": (time, x)}
-    time, x = signals.choose_window(time, x, START, START + 1.2)
+    time, x = signals.choose_window(time, x, start=START, stop=START + 1.2)
     x = signals.fill_gaps(x, longest=8)
     done["window of 1.2 s, short gaps filled"] = time, x
     turn = signals.first_turning_point(x)
@@ -50,7 +50,7 @@ def main(folder: Path) -> None:
     shown = blurred.sel(time=slice(0.0, 0.8))
     count = shown.sizes["time"]
     figure = plots.plot_tracks(
-        shown, nodes, "x", {n: np.asarray(t)[:count] for n, t in true.items()}
+        shown, nodes, axis="x", truth={n: np.asarray(t)[:count] for n, t in true.items()}
     )
     figure.savefig(IMAGES / "tracking-history.png", dpi=100)
     plots.plot_steps(steps(blurred)).savefig(IMAGES / "tracking-steps.png", dpi=100)

@@ -50,7 +50,7 @@ ROWS = (
 def shell_modes(pattern: Pattern, held: str, sheet: fd.Sheet, *mesh: Any) -> MeshModes:
     """Modes of a shell of some divisions and radius."""
     divisions, radius = mesh
-    made = fd.shell(pattern, sheet, divisions, "consistent", vertex_radius=radius)
+    made = fd.shell(pattern, sheet, divisions=divisions, mass="consistent", vertex_radius=radius)
     return mesh_modes(fd.Case(made, [fd.Fix(held, along=True)]), MODES)
 
 

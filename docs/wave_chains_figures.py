@@ -46,7 +46,7 @@ def main(folder: Path) -> None:
     held = Case(case.structure, [Fix(range(SIDES)), *case.supports[3:]], masses=case.masses)
     frequencies = np.linspace(36.0, 132.0, 193)
     cell = UnitCell(paired(1, 2))
-    passed = transmission(frf(held, BaseMotion("z"), frequencies), cell)
+    passed = transmission(frf(held, BaseMotion("z"), frequencies=frequencies), cell)
     figure = plots.plot_transmission(passed, attenuation(cell, frequencies))
     figure.savefig(IMAGES / "wave-chains-transmission.png", dpi=100)
 

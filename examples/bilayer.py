@@ -30,4 +30,4 @@ lift = path.displacement.values[-1, np.flatnonzero(x == x.max()), 2].mean()  # m
 curvature = 20.0 * layers.curvature
 arc = (1.0 - np.cos(curvature * panels * side)) / curvature
 print(f"20 K lift the arms by {1e3 * lift:.1f} mm, an arc of the free curvature {1e3 * arc:.1f} mm")
-fd.plots.draw_shapes(case, path, [0, 4, -1]).savefig("bilayer.png", dpi=80)
+fd.plots.draw_shapes(case, path, points=[0, 4, -1]).savefig("bilayer.png", dpi=80)

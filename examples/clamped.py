@@ -18,5 +18,5 @@ for name, structure in models.items():
     print(f"{name:8s}", *(f"{f:.4f}" for f in frequencies[name]), "Hz")
     upward = (modes["shape"].sel(node=tip, axis="y") > 0.0) * 2.0 - 1.0  # alike in both pictures
     modes["shape"] = modes["shape"] * upward
-    figure = fd.plots.draw_modes(case, modes, [1, 2], title=name)
+    figure = fd.plots.draw_modes(case, modes, which=[1, 2], title=name)
     figure.savefig(f"clamped-{name}.png", dpi=70)

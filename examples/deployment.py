@@ -14,4 +14,4 @@ end = (case.structure.nodes + motion.displacement[-1].values)[: len(goal.vertice
 error = np.abs(pdist(end) / pdist(goal.vertices) - 1.0).max()
 print(f"shape off by {error:.1e}, energy error {motion.attrs['energy_error']:.1e}")
 
-fd.plots.animate(case, motion, "deployment.gif", frames=45, fps=12)
+fd.plots.animate(case, motion, path="deployment.gif", frames=45, fps=12)

@@ -5,7 +5,7 @@ import foldyn as fd
 
 def build(height, twist, thickness):
     """Tower under 1 N on each corner of its top."""
-    pattern = fd.patterns.kresling(6, 0.04, height, twist)
+    pattern = fd.patterns.kresling(6, 0.04, height=height, twist=twist)
     paper = fd.Sheet(1.219e9, 0.2, thickness, 667.0, length_scale_ratio=2.7)
     tower = fd.discretize(pattern, paper, preset="merlin2")
     return fd.Case(tower, [fd.Fix("zmin")], [fd.Force("zmax", (0, 0, -1))])
@@ -33,4 +33,4 @@ case = build(**best["parameters"])
 arguments = {name: value for name, value in snap.items() if name != "kind"}
 path = fd.trace(case, **arguments)
 fd.plots.plot_landscape(fd.landscape(path)).savefig("design-kresling-landscape.png", dpi=90)
-fd.plots.draw_shapes(case, path, 3).savefig("design-kresling-shapes.png", dpi=80)
+fd.plots.draw_shapes(case, path, points=3).savefig("design-kresling-shapes.png", dpi=80)

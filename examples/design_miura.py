@@ -7,7 +7,7 @@ import foldyn as fd
 
 def build(panel_angle, dihedral, crease, bend):
     """Sheet held at one end; `bend` multiplies the stiffness of its panels."""
-    pattern = fd.patterns.miura((3, 3), 0.025, 0.025, panel_angle, dihedral)
+    pattern = fd.patterns.miura((3, 3), 0.025, b=0.025, panel_angle=panel_angle, dihedral=dihedral)
     paper = fd.Sheet(1.219e9, 0.2, 0.24e-3, 667.0)
     made = fd.discretize(
         pattern, paper, preset="merlin2", bend_law="linear", crease_stiffness=crease

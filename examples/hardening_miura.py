@@ -19,7 +19,9 @@ def case(dihedral):
 
 modes = np.array([fd.modes(case(one), count=2).frequency.values for one in dihedrals])  # Hz
 ends = (1e-3 * edge, 0.05 * edge)  # m
-spines = [fd.backbone(case(one), 1, ends, 5, longest_step=0.3) for one in dihedrals]
+spines = [
+    fd.backbone(case(one), 1, amplitudes=ends, harmonics=5, longest_step=0.3) for one in dihedrals
+]
 shifts = [float(one.frequency[-1] / one.frequency[0]) - 1.0 for one in spines]
 print("shift of the frequency (%):", 100 * np.round(shifts, 5))
 resonant = np.interp(2.0, modes[:, 1] / modes[:, 0], dihedrals)

@@ -27,13 +27,13 @@ def chain(cells, plates):
 
 cell, case = fd.UnitCell(chain(1, plates=1)), chain(CELLS, plates=CELLS + 1)
 waves = fd.linear.long_waves(cell)
-end = fd.linear.absorbing_end(case, f"z>{0.04 * CELLS - 1e-3}", waves)
+end = fd.linear.absorbing_end(case, f"z>{0.04 * CELLS - 1e-3}", waves=waves)
 struck = np.where(case.structure.nodes[:, 2:] < 1e-3, (0.0, 0.0, 0.8), 0.0)  # m/s
 case = fd.Case(case.structure, [*case.supports, *end], masses=case.masses)
 start = fd.State(velocity=struck)
 motion = fd.simulate(case, 1.6, method="rk4", dt=2e-4, every=2e-3, initial=start)
 strain = fd.linear.space_time(motion, cell)["strain"].values[:, :50]
 for name, sign in (("compression", -1), ("rarefaction", 1)):
-    speed = fd.signals.pulse(motion.time, strain, sign, share=0.85).speed
+    speed = fd.signals.pulse(motion.time, strain, sign=sign, share=0.85).speed
     print(f"{name}: {speed:.1f} cells/s; slow long waves: {waves.speeds[0]:.1f}")
 fd.plots.plot_space_time(motion, cell, quantity="strain").savefig("chain-impact.png", dpi=75)

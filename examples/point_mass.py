@@ -16,7 +16,7 @@ for part in added:
     weights = [fd.PointMass(tip, part * structure.total_mass / 3)] if part else []
     case = fd.Case(structure, [fd.Fix([0, 1, 2])], damping=fd.Rayleigh(0.01), masses=weights)
     first.append(float(fd.modes(case, count=1).frequency[0]))  # Hz
-    response = fd.frf(case, [push], np.linspace(0.0, 0.08, 401), method="direct")
+    response = fd.frf(case, [push], frequencies=np.linspace(0.0, 0.08, 401), method="direct")
     if part in labels:
         responses[labels[part]] = response
     if part == 1.0:
@@ -26,4 +26,4 @@ for part in added:
 slope, start = np.polyfit(added, 1.0 / np.square(first), 1)
 share = start / slope
 print("first frequencies", np.round(first, 4), f"Hz, share c of the sheet's mass {share:.3f}")
-fd.plots.plot_frf(responses, [13], "y").savefig("point-mass-response.png", dpi=75)
+fd.plots.plot_frf(responses, [13], axes="y").savefig("point-mass-response.png", dpi=75)

@@ -26,7 +26,7 @@ for name, structure in models.items():
     rows[0].plot(path.load_factor, 1e3 * length, label=name)
     rows[1].plot(path.load_factor, 1e3 * height, label=name)
     if name == "bars and hinges":
-        fd.plots.draw_shapes(case, path, [0, 6, -1]).savefig("pressure.png", dpi=80)
+        fd.plots.draw_shapes(case, path, points=[0, 6, -1]).savefig("pressure.png", dpi=80)
 rows[0].set(ylabel="length (mm)")
 rows[1].set(ylabel="height (mm)", xlabel="pressure (kPa)")
 rows[0].legend()

@@ -17,8 +17,8 @@ uncertain = {
 }
 
 if __name__ == "__main__":  # its processes import this file
-    grid = fd.sweep(case, soft, ["frequencies"])
-    design = fd.sweep(case, uncertain, ["frequency[1]"], samples=64, method="saltelli")
+    grid = fd.sweep(case, soft, measures=["frequencies"])
+    design = fd.sweep(case, uncertain, measures=["frequency[1]"], samples=64, method="saltelli")
     indices = fd.results.sobol_indices(design, "frequency_1")
     print(indices)
 

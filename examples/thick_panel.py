@@ -26,5 +26,7 @@ print(f"closed: {stack[2]:.3f} m high; hinges are off by {error:.0e} m")
 
 states = [0, 7, 14, 20]
 captions = [f"fold angles {180 * float(path.load_factor[k]):.0f}°" for k in states]
-figure = fd.plots.draw_boards(case, path.displacement.values[states], captions, view=(14, -75))
+figure = fd.plots.draw_boards(
+    case, path.displacement.values[states], captions=captions, view=(14, -75)
+)
 figure.savefig("thick-panel.png", dpi=80)

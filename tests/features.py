@@ -126,11 +126,11 @@ def tried(column: str, make: Make, setting: Setting) -> str:
         case = make(setting)
         if column in METHODS:
             given = {"dt": DURATION / 4} if METHODS[column].implicit else {}
-            fd.simulate(case, DURATION, column, **given)
+            fd.simulate(case, DURATION, method=column, **given)
         elif column == "modes":
             fd.modes(case, 1)
         elif column == "frf":
-            fd.frf(case, fd.Force([5], (0.0, 0.0, 1.0)), [1.0])
+            fd.frf(case, fd.Force([5], (0.0, 0.0, 1.0)), frequencies=[1.0])
         else:
             timed = {"duration": 1.0} if case.remembering and column == "newton" else {}
             fd.trace(case, column, steps=2, **timed)

@@ -164,7 +164,7 @@ def test_a_case_of_numpys_numbers_is_written_and_read(real, whole, kind, tmp_pat
     if kind == "bars":
         structure = fd.discretize(pattern(), material, **creases, fold_law=law)
     else:
-        structure = fd.shell(pattern(), material, whole(2), **creases)
+        structure = fd.shell(pattern(), material, divisions=whole(2), **creases)
     made = fd.Case(
         structure,
         [fd.Fix([whole(0), whole(1), 2, 3], np.str_("xyz")), fd.Spring(real(2.0), whole(4))],

@@ -187,7 +187,9 @@ def jumping_resonance(found):
 def kresling_chain(found):
     """The rarefaction is the faster one and leads at last; the end absorbs energy."""
     strain, motion = found["strain"], found["motion"]
-    pressed, pulled = (fd.signals.pulse(motion.time, strain, sign, 0.85) for sign in (-1, 1))
+    pressed, pulled = (
+        fd.signals.pulse(motion.time, strain, sign=sign, share=0.85) for sign in (-1, 1)
+    )
     assert pulled.speed > 1.1 * pressed.speed
     assert (pulled.arrival < pressed.arrival)[40:].mean() > 0.8
     assert motion.attrs["energy_error"] < 1e-3

@@ -31,7 +31,7 @@ def case():
 
 def records(case, count):
     unloaded = dataclasses.replace(case, loads=())
-    return fd.frf(unloaded, FORCE, [1.0, 2.0], method="burst_random", averages=count)
+    return fd.frf(unloaded, FORCE, frequencies=[1.0, 2.0], method="burst_random", averages=count)
 
 
 LARGE = {  # what is called with a case, and how the refusal begins
@@ -40,8 +40,11 @@ LARGE = {  # what is called with a case, and how the refusal begins
     "cells of any number": (lambda case: fd.patterns.miura((MOST, MOST)), "miura: cells = "),
     "sides": (lambda case: fd.patterns.kresling(sides=10**9), "kresling: sides = .* vertices"),
     "storeys": (lambda case: fd.patterns.kresling(storeys=10**9), "kresling: .*storeys = "),
-    "divisions": (lambda case: fd.shell(PATTERN, SHEET, 3000), "divisions = 3000: .* nodes"),
-    "more divisions": (lambda case: fd.shell(PATTERN, SHEET, 10**12), "divisions = "),
+    "divisions": (
+        lambda case: fd.shell(PATTERN, SHEET, divisions=3000),
+        "divisions = 3000: .* nodes",
+    ),
+    "more divisions": (lambda case: fd.shell(PATTERN, SHEET, divisions=10**12), "divisions = "),
     "steps": (lambda case: fd.trace(case, steps=10**9), "steps: a path of 1e\\+09 points"),
     "free steps": (lambda case: fd.trace(case, "arc_length", steps=MOST), "steps: .* points"),
     "modes": (lambda case: fd.modes(case, count=10**12), "count: 1e\\+12 modes"),
@@ -115,11 +118,11 @@ def test_estimates_are_right_within_a_factor_of_two():
 
     pattern = fd.patterns.miura((30, 30))
     tangent(fd.discretize(PATTERN, SHEET, bend_law="linear"))  # compiles
-    tangent(fd.shell(PATTERN, SHEET, 4))
+    tangent(fd.shell(PATTERN, SHEET, divisions=4))
     for make, per in (
         (lambda: fd.patterns.miura((30, 30)).vertices, PER_VERTEX),
         (lambda: tangent(fd.discretize(pattern, SHEET, bend_law="linear")), PER_NODE),
-        (lambda: tangent(fd.shell(PATTERN, SHEET, 40)), PER_SHELL_NODE),
+        (lambda: tangent(fd.shell(PATTERN, SHEET, divisions=40)), PER_SHELL_NODE),
     ):
         assert per / 2.0 < _peak(make) < per * 2.0
 

@@ -32,7 +32,7 @@ def _objects():
     t = np.linspace(0.0, 4.0, 401)
     ringing = np.exp(-t) * np.cos(2 * np.pi * 3 * t)
     table = fd.Table(t, ringing)
-    shell = fd.shell(fd.patterns.simple_fold(), SHEET, 3)
+    shell = fd.shell(fd.patterns.simple_fold(), SHEET, divisions=3)
     return {
         "pattern": pattern,
         "structure": s,
@@ -99,7 +99,7 @@ def test_the_table_has_what_the_line_has_and_units():
     assert [cell.text for cell in table.iter("td")] == [
         "'x > 0.5'", "(0.0, 0.0, -1.0) N", "HalfSine(duration=0.5)",
     ]  # fmt: skip
-    assert "<svg" in fd.Case(fd.shell(fd.patterns.simple_fold(), SHEET, 2))._repr_html_()
+    assert "<svg" in fd.Case(fd.shell(fd.patterns.simple_fold(), SHEET, divisions=2))._repr_html_()
 
 
 def test_a_unit_is_for_numbers():

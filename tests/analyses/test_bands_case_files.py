@@ -52,9 +52,9 @@ def test_states_have_the_bands_of_their_cells(found):
     assert found["state"].attrs["units"] == "degrees"
     for dihedral in (60, 100):
         cell, here = cell_at(dihedral), found.sel(state=dihedral)
-        own = fd.bands(cell, cell.path("G-X-M-Y-G", 17), 5)
+        own = fd.bands(cell, cell.path("G-X-M-Y-G", 17), count=5)
         np.testing.assert_array_equal(here["frequency"], own["frequency"])
-        zone = fd.bands(cell, cell.grid(6), 5, track=False)
+        zone = fd.bands(cell, cell.grid(6), count=5, track=False)
         noise = 1e-6 * float(zone["frequency"].max())
         np.testing.assert_allclose(here["zone_frequency"], zone["frequency"], rtol=0, atol=noise)
         np.testing.assert_array_equal(here["zone_wave_vector"], zone["wave_vector"])
@@ -193,7 +193,7 @@ def test_what_a_file_gets_wrong_is_named(tmp_path, analysis, message):
 def test_bands_have_no_derivatives(tmp_path):
     (tmp_path / "case.toml").write_text(BANDS_TEXT)
     with pytest.raises(InputError, match='= "bands": bands have no derivatives; sweep'):
-        fd.sensitivity(tmp_path / "case.toml", {"sheet.thickness": 0.01}, "band_gap[4]")
+        fd.sensitivity(tmp_path / "case.toml", {"sheet.thickness": 0.01}, measures="band_gap[4]")
 
 
 def test_the_viewer_shows_one_state(tmp_path):
@@ -219,7 +219,7 @@ def test_files_of_other_kinds_are_cells_without_supports_and_loads(tmp_path):
     with pytest.warns(FoldynWarning, match=r"leaves out \[\[supports\]\], \[\[loads\]\]"):
         read = read_as(tmp_path / "case.toml", "bands", {"count": 3, "points": 4, "path": "G-X"})
     cell = cell_at(60.0)
-    own = fd.bands(cell, cell.path("G-X", 4), 3)
+    own = fd.bands(cell, cell.path("G-X", 4), count=3)
     np.testing.assert_array_equal(read.run()["frequency"], own["frequency"])
 
 
@@ -232,7 +232,7 @@ def test_a_stored_state_that_does_not_repeat_is_named(tmp_path):
     text = BANDS_TEXT + '[initial]\nfile = "path.nc"\n'
     few = {"zone": None, "attenuation": None, "points": 5}
     found = case_file(tmp_path, text, vary={"initial.at": [0]}, **few).run()
-    own = fd.bands(cell, cell.path("G-X-M-Y-G", 5), 5)
+    own = fd.bands(cell, cell.path("G-X-M-Y-G", 5), count=5)
     np.testing.assert_allclose(found["frequency"][0], own["frequency"], rtol=1e-6, atol=1e-9)
     with pytest.raises(InputError, match=r"initial: does not repeat.*\(with initial\.at = 1\)"):
         case_file(tmp_path, text, vary={"initial.at": [0, 1]}, **few).run()

@@ -60,7 +60,7 @@ def written(folder, analysis, mass='"panel"'):
 def test_a_case_file_computes_what_the_function_does(tmp_path):
     file = read_case(written(tmp_path, CURVE))
     found = file.run()
-    own = fd.response_curve(file.case("panel"), (0.3, 0.4), 3, longest_step=0.5)
+    own = fd.response_curve(file.case("panel"), (0.3, 0.4), harmonics=3, longest_step=0.5)
     assert found.frequency.values == pytest.approx(own.frequency.values)
     assert found.amplitude.values == pytest.approx(own.amplitude.values)
 

@@ -62,7 +62,7 @@ def test_there_and_back(tmp_path):
     text = moved + '[analysis]\nkind = "statics"\nload_factors = [0, 0.5, 1, 0.5, 0]\n'
     path, page = write(tmp_path, text)
     assert (tmp_path / "energies.png").exists()
-    force = fd.plots.total_reaction(path, [0, 1], "-x")
+    force = fd.plots.total_reaction(path, [0, 1], direction="-x")
     np.testing.assert_allclose(force[3:], force[1::-1], atol=1e-9 * force.max())
     assert "moved along -x (m)" in page
     assert not (tmp_path / "landscape.png").exists()  # the force falls on the way back alone

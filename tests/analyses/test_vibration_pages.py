@@ -98,7 +98,7 @@ def test_a_drive_backward_is_read_backward(write):
     assert curve.axis == "-z" and (curve.values.real > 0.0).all()
     (curve,), _ = curves_of({"": found}, [13], "z", "mobility")
     assert (curve.values.real < 0.0).all()
-    assert peaks_of(found, 13, "-z") == peaks_of(found, 13, "z") != ()
+    assert peaks_of(found, 13, axis="-z") == peaks_of(found, 13, axis="z") != ()
 
 
 def test_what_the_picture_marks_is_in_the_table(write):
@@ -111,11 +111,11 @@ def test_what_the_picture_marks_is_in_the_table(write):
     response = found.isel(frequency=[0] * len(f)).assign_coords(frequency=f)
     response["receptance"][:] = 0.0
     response["receptance"].loc[{"node": 13, "axis": "z"}] = curve
-    peaks = peaks_of(response, 13, "z")
+    peaks = peaks_of(response, 13, axis="z")
     assert [round(peak.frequency, 1) for peak in peaks] == [3.0, 6.0]
     assert peaks[1].height < 0.02 * peaks[0].height
     assert peaks[1].damping_ratio == pytest.approx(0.01, rel=0.05)
-    figure = plots.plot_frf({"": response}, [13], "z")
+    figure = plots.plot_frf({"": response}, [13], axes="z")
     marked = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
     assert [round(x, 1) for line in marked for x in line.get_xdata()] == [3.0, 6.0]
 
@@ -127,7 +127,7 @@ def test_numbers_that_are_missing_are_explained(write):
     lines = [round(share * f0, 6) for share in (0.87, 0.96, 1.05)]
     text = f'[analysis]\nkind = "frf"\nfrequencies = {lines}\nsecant = 1\n[output]\nnodes = 13\n'
     response, page = write(PUSH + text)
-    (peak,) = peaks_of(response, 13, "z")
+    (peak,) = peaks_of(response, 13, axis="z")
     assert np.isnan(peak.damping_ratio) and "circle_fit" in peak.note
     assert "Why numbers are missing from the table:" in page
     assert f"Peak at {peak.frequency:.4g} Hz of node 13" in page

@@ -26,7 +26,12 @@ def cell():
 
 def basins(case: fd.Case, side: np.ndarray, **more):
     return fd.basins(
-        case, lambda x, v: at(case, x, v), {"x": side, "v": side}, 100.0, dt=0.05, **more
+        case,
+        lambda x, v: at(case, x, v),
+        grid={"x": side, "v": side},
+        duration=100.0,
+        dt=0.05,
+        **more,
     )
 
 
@@ -60,7 +65,11 @@ def test_the_boundary_is_the_stable_manifold_of_the_saddle(cell):
     sides = [points + across, points - across, -points - across, -points + across]
     starts = np.concatenate(sides)
     ends = fd.basins(
-        cell, lambda k: at(cell, *starts[int(k)]), {"k": np.arange(len(starts))}, 100.0, dt=0.02
+        cell,
+        lambda k: at(cell, *starts[int(k)]),
+        grid={"k": np.arange(len(starts))},
+        duration=100.0,
+        dt=0.02,
     ).basin.values.reshape(4, -1)
     assert (ends[:, 0] >= 0).all()
     np.testing.assert_array_equal(ends, np.repeat(ends[:, :1], len(t), axis=1))
@@ -82,7 +91,9 @@ def test_a_finer_grid_moves_the_boundary_by_less_than_a_cell(cell, found):
 def test_motions_of_a_drive_are_told_apart_by_their_orbits():
     """A small force: a vibration in each well, mirrored half a period later."""
     case = duffing(-1.0, ALPHA, 0.05, omega=1.1)
-    found = fd.basins(case, lambda x: at(case, x), {"x": [-1.2, -0.9, 0.9, 1.2]}, 50 * TURN / 1.1)
+    found = fd.basins(
+        case, lambda x: at(case, x), grid={"x": [-1.2, -0.9, 0.9, 1.2]}, duration=50 * TURN / 1.1
+    )
     assert found.basin.values.tolist() == [0, 0, 1, 1]
     assert found.periods.values.tolist() == [1, 1]
     assert found.attrs["period"] == pytest.approx(TURN / 1.1)
@@ -93,7 +104,9 @@ def test_motions_of_a_drive_are_told_apart_by_their_orbits():
 def test_chaos_is_no_attractor_that_repeats():
     case = duffing(0.0, 0.05, 7.5, phase=90.0)
     with pytest.warns(FoldynWarning, match="2 of 2 motions do not repeat"):
-        found = fd.basins(case, lambda x: at(case, x), {"x": [2.0, 2.5]}, 50 * TURN, dt=TURN / 400)
+        found = fd.basins(
+            case, lambda x: at(case, x), grid={"x": [2.0, 2.5]}, duration=50 * TURN, dt=TURN / 400
+        )
     assert found.basin.values.tolist() == [-1, -1] and found.sizes["attractor"] == 0
 
 
@@ -101,7 +114,9 @@ def test_starts_that_all_end_in_one_orbit_have_its_number():
     """Once a period they are in one place, which has no range by which to compare."""
     case = duffing(1.0, 1.0, 0.1, cubic=False)  # at resonance: x = -0.1 cos t
     for places in ([0.0], [0.0, 0.3]):
-        found = fd.basins(case, lambda x: at(case, x), {"x": places}, 8.0 * TURN, dt=TURN / 256)
+        found = fd.basins(
+            case, lambda x: at(case, x), grid={"x": places}, duration=8.0 * TURN, dt=TURN / 256
+        )
         assert found.basin.values.tolist() == [0] * len(places)
         np.testing.assert_allclose(place(case, found.displacement.values), -0.1, rtol=1e-3)
 
@@ -121,7 +136,8 @@ def test_a_kresling_tower_falls_to_either_side_of_its_barrier():
     path = script["pressed"](case)
     (saddle,) = (state for state in fd.landscape(path).states if not state.stable)
     found = fd.basins(
-        case, script["starts"](path), {"stroke": saddle.stroke + np.array([-5e-4, 5e-4])}, 1.5,
+        case, script["starts"](path), grid={"stroke": saddle.stroke + np.array([-5e-4, 5e-4])},
+        duration=1.5,
         dt=2.5e-4,
     )  # fmt: skip
     assert found.basin.values.tolist() == [0, 1]
@@ -130,7 +146,9 @@ def test_a_kresling_tower_falls_to_either_side_of_its_barrier():
 
 
 def test_a_grid_that_was_cut_off_goes_on(tmp_path, monkeypatch):
-    s = fd.discretize(fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.1, density=1.0))
+    s = fd.discretize(
+        fd.patterns.simple_fold(1.0, 1.0, dihedral=60), fd.Sheet(1e6, 0.25, 0.1, density=1.0)
+    )
     case = fd.Case(s, [fd.Fix([4, 5]), fd.Fix([0, 1], "yz")], damping=fd.Rayleigh(alpha=40.0))
     monkeypatch.setattr("foldyn.attractors.grid.AT_ONCE", 2)
 
@@ -140,7 +158,7 @@ def test_a_grid_that_was_cut_off_goes_on(tmp_path, monkeypatch):
         return fd.State(u)
 
     def run(lengths, **more):
-        return fd.basins(case, pulled, {"length": lengths}, 0.5, dt=5e-5, **more)
+        return fd.basins(case, pulled, grid={"length": lengths}, duration=0.5, dt=5e-5, **more)
 
     lengths, told = [-0.01, 0.0, 0.005, 0.01], []
 
@@ -162,7 +180,9 @@ def test_a_grid_that_was_cut_off_goes_on(tmp_path, monkeypatch):
     assert len(list(tmp_path.glob("*.npz"))) == 4
     arch = duffing(-1.0, ALPHA)
     with pytest.raises(InputError, match="folder: nothing of this case can be kept"):
-        fd.basins(arch, lambda x: at(arch, x), {"x": [1.0]}, 1.0, dt=0.05, folder=tmp_path)
+        fd.basins(
+            arch, lambda x: at(arch, x), grid={"x": [1.0]}, duration=1.0, dt=0.05, folder=tmp_path
+        )
 
 
 def test_a_start_that_fails_is_named(cell):
@@ -182,7 +202,7 @@ def test_a_start_that_fails_is_named(cell):
         ),
     }.items():
         with pytest.raises(InputError, match=message), warnings.catch_warnings():
-            fd.basins(cell, given[0], given[1], 10.0)
+            fd.basins(cell, given[0], grid=given[1], duration=10.0)
 
 
 def test_orbits_met_at_another_phase_are_the_same():

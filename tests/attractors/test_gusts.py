@@ -31,7 +31,7 @@ def swing(case, frequency):
 
 def test_steps_of_the_frequency_and_of_the_size_take_a_gust_along():
     options = {"sweep": "up", "settle": 2, "record": 4}
-    found = fd.bifurcation_diagram(gusty(2.0, push=0.2), RISE, [2.0, 3.0], **options)
+    found = fd.bifurcation_diagram(gusty(2.0, push=0.2), RISE, frequencies=[2.0, 3.0], **options)
     assert found.amplitude.values[0, 1] == pytest.approx(swing(gusty(3.0, 0.2), 3.0), rel=1e-2)
     assert (found.periods == 1).all()
     alone = fd.bifurcation_diagram(gusty(2.0), RISE, amplitudes=[1.0, 1.5], **options)
@@ -45,11 +45,11 @@ def test_steps_of_the_frequency_and_of_the_size_take_a_gust_along():
 
 def test_a_gust_glides_and_sets_the_period():
     case = gusty(2.0)
-    found = fd.swept_sine(case, RISE, (2.0, 2.2), 5.0, sweep="up", settle=2)
+    found = fd.swept_sine(case, RISE, frequencies=(2.0, 2.2), duration=5.0, sweep="up", settle=2)
     middle = float(found.frequency[0, 6])
     assert found.amplitude.values[0, 6] == pytest.approx(swing(gusty(middle), middle), rel=0.02)
     still = [fd.State(np.zeros_like(S.nodes))] * 2
-    ends = fd.basins(case, lambda k: still[int(k)], {"k": [0, 1]}, 1.5, record=4)
+    ends = fd.basins(case, lambda k: still[int(k)], grid={"k": [0, 1]}, duration=1.5, record=4)
     assert ends.basin.values.tolist() == [0, 0]
     assert ends.attrs["period"] == pytest.approx(0.5)
     section = fd.poincare_section(fd.simulate(case, 2.5, every=0.0125), after=1.5)

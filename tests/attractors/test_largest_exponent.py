@@ -78,7 +78,7 @@ def test_the_exponent_converges_to_the_published_value(ueda):
 
 def test_tied_nodes_stay_tied():
     """Two masses that are linked move as one of twice the mass."""
-    pattern = fd.patterns.simple_fold(1.0, 1.0, 60)
+    pattern = fd.patterns.simple_fold(1.0, 1.0, dihedral=60)
     s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.1, density=1.0))
     push = fd.Force([0, 1], (1.0, 0, 0), history=fd.Harmonic(5.0))
     held = [fd.Fix([4, 5]), fd.Fix([0, 1], "yz")]
@@ -90,7 +90,10 @@ def test_tied_nodes_stay_tied():
 def test_what_has_no_exponent_is_refused(ueda):
     with pytest.raises(InputError, match='method = "newmark": choose one of rk4'):
         fd.lyapunov_exponent(ueda, 100.0, method="newmark", dt=DT)
-    pattern, sheet = fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.01, density=1.0)
+    pattern, sheet = (
+        fd.patterns.simple_fold(1.0, 1.0, dihedral=60),
+        fd.Sheet(1e6, 0.25, 0.01, density=1.0),
+    )
     touching = fd.Case(fd.discretize(pattern, sheet), contact=fd.Contact(thickness=0.01))
     with pytest.raises(InputError, match="contact: the exponent takes smooth forces"):
         fd.lyapunov_exponent(touching, 1.0)

@@ -52,7 +52,7 @@ def test_the_cell_is_duffings_oscillator():
 
 def test_a_stepped_sine_jumps_at_the_folds(hardening):
     found = fd.bifurcation_diagram(
-        hardening, X, np.arange(1.04, 1.42, 0.06) / TURN, settle=120, record=4, dt=DT
+        hardening, X, frequencies=np.arange(1.04, 1.42, 0.06) / TURN, settle=120, record=4, dt=DT
     )
     assert found.jump_sweep.values.tolist() == ["up", "down"]
     (up, down), (low, high) = TURN * found.jump_between.values, folds()
@@ -77,7 +77,7 @@ def test_points_that_a_long_step_kicked_off_are_replaced(hardening):
     """The sweep down in steps of 0.02 rad/s falls at 1.12, where slow steps stay, barely."""
     omega = np.array([1.1, 1.12, 1.14, 1.2, 1.32])
     found = fd.bifurcation_diagram(
-        hardening, X, omega / TURN, sweep="down", settle=150, record=4, dt=DT
+        hardening, X, frequencies=omega / TURN, sweep="down", settle=150, record=4, dt=DT
     )
     (between,), (sizes,) = TURN * found.jump_between.values, found.jump_amplitude.values
     assert between[0] <= 1.12 + 1e-9
@@ -86,7 +86,9 @@ def test_points_that_a_long_step_kicked_off_are_replaced(hardening):
 
 
 def test_a_swept_sine_jumps_past_the_folds(hardening):
-    found = fd.swept_sine(hardening, X, np.array([1.0, 1.4]) / TURN, 1500 * TURN, dt=DT)
+    found = fd.swept_sine(
+        hardening, X, frequencies=np.array([1.0, 1.4]) / TURN, duration=1500 * TURN, dt=DT
+    )
     (low, high), between = folds(), TURN * found.jump_between.values
     assert found.jump_sweep.values.tolist() == ["up", "down"]
     np.testing.assert_allclose(between.mean(axis=1), [high, low], rtol=0.015)
@@ -107,7 +109,14 @@ def test_a_sharp_resonance_without_folds_has_no_jumps():
     case = duffing(1.0, 0.02, 0.01, cubic=False)
     omega = np.array([0.9, 0.96, 0.99, 1.0, 1.02, 1.1])
     found = fd.bifurcation_diagram(
-        case, X, omega / TURN, settle=200, record=4, dt=DT, initial=at(case, 0.4), sweep="down"
+        case,
+        X,
+        frequencies=omega / TURN,
+        settle=200,
+        record=4,
+        dt=DT,
+        initial=at(case, 0.4),
+        sweep="down",
     )
     exact = 0.01 / np.hypot(1.0 - omega**2, 0.02 * omega)
     np.testing.assert_allclose(found.amplitude.values[0], exact, rtol=1e-4)
@@ -129,7 +138,9 @@ def test_base_motions_and_multiples_of_the_drive_are_swept():
         supports=[*case.supports, fd.BaseMotion("z", fd.Harmonic(1.0 / TURN), 0.5 * SIZE)],
         loads=[fd.Force([1], (0, 0, 0.2 * SIZE), fd.Harmonic(3.0 / TURN))],
     )
-    found = fd.bifurcation_diagram(shaken, X, [0.9 / TURN], sweep="up", settle=200, record=8, dt=DT)
+    found = fd.bifurcation_diagram(
+        shaken, X, frequencies=[0.9 / TURN], sweep="up", settle=200, record=8, dt=DT
+    )
     same = shaken.altered(
         supports=[*case.supports, fd.BaseMotion("z", fd.Harmonic(0.9 / TURN), 0.5 * SIZE)],
         loads=[fd.Force([1], (0, 0, 0.2 * SIZE), fd.Harmonic(2.7 / TURN))],
@@ -192,7 +203,9 @@ def test_an_interrupt_before_the_first_point_keeps_nothing():
 
     measure = fd.Quantity("m", function=stop)
     with pytest.raises(MotionInterrupted, match="before the first point"):
-        fd.bifurcation_diagram(duffing(1.0, 0.3, 0.1), measure, [0.1], settle=2, record=4)
+        fd.bifurcation_diagram(
+            duffing(1.0, 0.3, 0.1), measure, frequencies=[0.1], settle=2, record=4
+        )
 
 
 @pytest.mark.filterwarnings("ignore:the energy balance")
@@ -242,32 +255,45 @@ def test_jumps_are_large_changes_within_the_width():
 
 def test_what_cannot_be_swept_is_refused(hardening):
     creases = fd.discretize(
-        fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.01, density=1.0)
+        fd.patterns.simple_fold(1.0, 1.0, dihedral=60), fd.Sheet(1e6, 0.25, 0.01, density=1.0)
     )
     swinging = fd.Case(
         creases, [fd.Fix([4, 5])], [fd.Actuate("all", angle=70, history=fd.Harmonic(1.0))]
     )
     ridge = fd.Quantity(function=lambda u, v, t: u[2, 2])
     for message, call in {
-        "nothing drives it": lambda: fd.bifurcation_diagram(duffing(1.0), X, [1.0]),
+        "nothing drives it": lambda: fd.bifurcation_diagram(duffing(1.0), X, frequencies=[1.0]),
         "frequencies: give frequencies": lambda: fd.bifurcation_diagram(hardening, X),
-        "frequencies: must be a list": lambda: fd.bifurcation_diagram(hardening, X, [2.0, 1.0]),
-        "measure: must have a function": lambda: fd.swept_sine(
-            hardening, fd.Quantity("m"), (0.1, 0.2), 100.0
+        "frequencies: must be a list": lambda: fd.bifurcation_diagram(
+            hardening, X, frequencies=[2.0, 1.0]
         ),
-        "duration = 1 s: holds fewer": lambda: fd.swept_sine(hardening, X, (1.0, 2.0), 1.0),
+        "measure: must have a function": lambda: fd.swept_sine(
+            hardening, fd.Quantity("m"), frequencies=(0.1, 0.2), duration=100.0
+        ),
+        "duration = 1 s: holds fewer": lambda: fd.swept_sine(
+            hardening, X, frequencies=(1.0, 2.0), duration=1.0
+        ),
         "duration: .* samples of 3 nodes needs about": lambda: fd.swept_sine(
-            hardening, X, (0.1, 0.2), 1e12
+            hardening, X, frequencies=(0.1, 0.2), duration=1e12
         ),
         "measure: raised IndexError": lambda: fd.swept_sine(
-            hardening, fd.Quantity(function=lambda u, v, t: u[99, 2]), (0.1, 0.2), 100.0
+            hardening,
+            fd.Quantity(function=lambda u, v, t: u[99, 2]),
+            frequencies=(0.1, 0.2),
+            duration=100.0,
         ),
-        "the lower one first": lambda: fd.swept_sine(hardening, X, (2.0, 1.0), 100.0),
+        "the lower one first": lambda: fd.swept_sine(
+            hardening, X, frequencies=(2.0, 1.0), duration=100.0
+        ),
         "amplitudes: Actuate has no size": lambda: fd.bifurcation_diagram(
             swinging, ridge, amplitudes=[1.0]
         ),
         "must give a finite number": lambda: fd.bifurcation_diagram(
-            hardening, fd.Quantity(function=lambda u, v, t: u[0]), [0.2], settle=1, record=4
+            hardening,
+            fd.Quantity(function=lambda u, v, t: u[0]),
+            frequencies=[0.2],
+            settle=1,
+            record=4,
         ),
     }.items():
         with pytest.raises(InputError, match=message):
@@ -281,7 +307,7 @@ def test_what_cannot_be_swept_is_refused(hardening):
 def test_a_swept_sine_has_no_jumps_where_curves_are_but_steep(cubic, alpha, force, ends):
     """The flank of a sharp resonance, and a curve that leans over and has not yet a fold."""
     case = duffing(1.0, alpha, force, cubic=cubic)
-    found = fd.swept_sine(case, X, np.array(ends) / TURN, 450 * TURN, dt=DT)
+    found = fd.swept_sine(case, X, frequencies=np.array(ends) / TURN, duration=450 * TURN, dt=DT)
     assert found.sizes["jump"] == 0
     step = max(1, int(0.01 / abs(np.diff(found.frequency[0])[0]) / TURN))
     change = found.amplitude.values[:, step:] / found.amplitude.values[:, :-step]
@@ -297,6 +323,15 @@ def test_steps_from_a_sweep_begin_with_what_creases_remember_there(monkeypatch):
     point = Steady.point
     monkeypatch.setattr(Steady, "point", lambda *a: held.append(a[1].state) or point(*a))
     lift = fd.Quantity("m", "lift", (), lambda u, v, t: u[WING, 2])
-    fd.swept_sine(case, lift, (0.4, 0.9), 25.0, sweep="up", resolution=0.2, settle=2, dt=0.01)
+    fd.swept_sine(
+        case,
+        lift,
+        frequencies=(0.4, 0.9),
+        duration=25.0,
+        sweep="up",
+        resolution=0.2,
+        settle=2,
+        dt=0.01,
+    )
     assert held
     assert np.abs(held[0].memory).max() > 0.01

@@ -137,10 +137,10 @@ def test_a_clamp_rides_on_a_moving_base(model, method):
     s = structure(model, SQUARE, HEAVY, clamped=[(0, 3)], mass=lumped)
     history, a, omega = fd.HalfSine(0.2), 1e-3, np.pi / 0.2
     base = fd.Case(s, [fd.Fix(ROOT), fd.BaseMotion("z", history, a)])
-    moving = fd.simulate(base, 0.19, method, every=0.01, tolerance=None)
+    moving = fd.simulate(base, 0.19, method=method, every=0.01, tolerance=None)
     pushed = fd.Case(s, [fd.Fix(ROOT)], [fd.Gravity((0, 0, a * omega**2), history)])
     start = fd.State(velocity=-a * omega * (~pushed.fixed) * np.array([0.0, 0.0, 1.0]))
-    still = fd.simulate(pushed, 0.19, method, every=0.01, initial=start).displacement.values
+    still = fd.simulate(pushed, 0.19, method=method, every=0.01, initial=start).displacement.values
     relative = moving.displacement.values - moving.displacement.values[:, :1]
     assert np.abs(relative - still).max() < 1e-3 * np.abs(relative).max()
     assert moving.attrs["energy_error"] < 1e-3
@@ -180,7 +180,7 @@ def test_a_panel_that_folds_back_at_its_clamp_is_refused():
     s = structure("bars and hinges", SQUARE, thin, clamped=[(0, 3)])
     spin = fd.State(velocity=s.nodes[:, :1] * [0.0, 0.0, 40.0])
     with pytest.raises(PenetrationError, match="the edge is clamped"):
-        fd.simulate(fd.Case(s, [fd.Fix(ROOT)]), 0.3, "rk4", initial=spin, force=True)
+        fd.simulate(fd.Case(s, [fd.Fix(ROOT)]), 0.3, method="rk4", initial=spin, force=True)
 
 
 # ------------------------------------------------------------------ points of a mesh

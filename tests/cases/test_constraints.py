@@ -118,9 +118,9 @@ BENT = fd.Pattern([[0, 0, 0], [1, 0, 0], [1, 1, 0.1], [0, 1, 0]], [[0, 1, 2, 3]]
             lambda: fd.discretize(FOLD, SHEET, rigid=[2]),
             r"\[2\]: panel 2 is out of range; .* 0 to 1",
         ),
-        (lambda: fd.shell(FOLD, SHEET, 2, rigid="none"), 'rigid = "none": must be "all"'),
+        (lambda: fd.shell(FOLD, SHEET, divisions=2, rigid="none"), 'rigid = "none": must be "all"'),
         (lambda: fd.discretize(BENT, SHEET, rigid="all"), r"panel 0 is not flat: node 0 lies 0.07"),
-        (lambda: fd.shell(BENT, SHEET, 2, rigid=[0]), "rigid: panel 0 is not flat"),
+        (lambda: fd.shell(BENT, SHEET, divisions=2, rigid=[0]), "rigid: panel 0 is not flat"),
     ],
 )
 def test_wrong_input(make, text) -> None:
@@ -139,7 +139,7 @@ def test_states_that_do_not_satisfy_links_are_refused() -> None:
     with pytest.raises(InputError, match=r"initial: velocity of node 1 does not satisfy supports"):
         fd.simulate(case, 1.0, initial=fd.State(0.0 * u, v))
     with pytest.raises(InputError, match=r"state: does not satisfy supports\[1\]"):
-        fd.modes(case, 1, fd.State(u))
+        fd.modes(case, 1, state=fd.State(u))
 
 
 def test_supports_of_a_direction_hold_nodes_where_a_state_puts_them() -> None:
@@ -151,5 +151,5 @@ def test_supports_of_a_direction_hold_nodes_where_a_state_puts_them() -> None:
     assert motion.energy_error < 1e-4
     held = motion.displacement.values[:, [0, 1]] @ (1.0, 0.0, 1.0)
     np.testing.assert_allclose(held, 1e-3, rtol=1e-12)
-    path = fd.trace(case, "newton", [0.0], initial=fd.State(u))
+    path = fd.trace(case, "newton", load_factors=[0.0], initial=fd.State(u))
     np.testing.assert_allclose(path.displacement.values[-1, :2] @ (1.0, 0.0, 1.0), 1e-3, rtol=1e-12)

@@ -40,7 +40,7 @@ def test_gravity_weighs_them_in_statics_and_motion(model):
     lifted = fd.trace(held).reaction.values[-1].reshape(-1, 3)[:, 2].sum()
     assert lifted == pytest.approx(weight, rel=1e-6)
     falling = fd.Case(s, (), [fd.Gravity("-z")], masses=masses)
-    drop = fd.simulate(falling, 0.2, "generalized_alpha", every=0.1).displacement.values[-1]
+    drop = fd.simulate(falling, 0.2, method="generalized_alpha", every=0.1).displacement.values[-1]
     assert drop == pytest.approx(np.tile([0, 0, -0.5 * 9.80665 * 0.2**2], (len(drop), 1)), rel=1e-6)
 
 
@@ -96,7 +96,7 @@ def test_the_base_drives_them_in_a_frequency_response(model):
     f = np.array([0.3, 0.8, 2.0])
     w = 2 * np.pi * f
     exact = k / (k - w**2 * m + 0.5j * w * m)
-    response = fd.frf(case, [fd.BaseMotion("z")], f, method="direct")
+    response = fd.frf(case, [fd.BaseMotion("z")], frequencies=f, method="direct")
     assert response.transmissibility.sel(axis="z").values[:, 2] == pytest.approx(exact, rel=1e-3)
 
 

@@ -21,12 +21,14 @@ CREASE, STRETCH = 0.02, 1e-8  # N m/rad per m, against some 1e7 N of the bars
 CLOSER = np.cos(np.radians(GAMMA))
 MODELS = {
     "bars": lambda pattern, **more: fd.discretize(pattern, STIFF, mass="consistent", **more),
-    "shell": lambda pattern, **more: fd.shell(pattern, STIFF, 2, mass="consistent", **more),
+    "shell": lambda pattern, **more: fd.shell(
+        pattern, STIFF, divisions=2, mass="consistent", **more
+    ),
 }
 
 
 def miura(dihedral=DIHEDRAL):
-    return fd.patterns.miura((1, 1), 1.0, 1.0, GAMMA, dihedral)
+    return fd.patterns.miura((1, 1), 1.0, b=1.0, panel_angle=GAMMA, dihedral=dihedral)
 
 
 def folding_cell(model, **more):
@@ -38,7 +40,7 @@ def folding_cell(model, **more):
 
 def swing(model, **more):
     """A panel that swings about the edge of another, which is held."""
-    s = MODELS[model](fd.patterns.simple_fold(1.0, 1.5, 70.0), fold_law="linear", **more)
+    s = MODELS[model](fd.patterns.simple_fold(1.0, 1.5, dihedral=70.0), fold_law="linear", **more)
     return s, fd.Case(s, [fd.Fix([2, 3, 4, 5])])
 
 
@@ -62,7 +64,7 @@ def test_a_pendulum_in_large_swings(model, method) -> None:
     """Energy: I w^2 / 2 + m g (height) is kept, and the dihedral follows the rigid body."""
     s, case = swing(model, rigid="all", crease_stiffness=0.0)
     case = fd.Case(s, case.supports, [fd.Gravity("-z")])
-    motion = fd.simulate(case, 0.4, method, dt=2e-4 if method != "rk4" else None, every=0.05)
+    motion = fd.simulate(case, 0.4, method=method, dt=2e-4 if method != "rk4" else None, every=0.05)
     # the equation of a compound pendulum about the ridge, by an integrator of SciPy's
     ridge, edge = s.nodes[[2, 0]]
     first = np.arctan2(edge[2] - ridge[2], edge[0] - ridge[0])
@@ -134,7 +136,7 @@ def test_both_models_fold_alike() -> None:
     motions, load = [], fd.Force([2, 8], (0.0, -2.0, 0.0), fd.HalfSine(0.5))
     for model in MODELS:
         case = fd.Case(*folding_cell(model), [load], fd.Rayleigh(0.5))
-        motions.append(fd.simulate(case, 1.0, "generalized_alpha", dt=2e-3, every=0.1))
+        motions.append(fd.simulate(case, 1.0, method="generalized_alpha", dt=2e-3, every=0.1))
         assert motions[-1].energy_error < 1e-4
     bars, shell = (motion.displacement.values[:, :9] for motion in motions)
     assert np.abs(bars).max() > 0.05
@@ -181,10 +183,10 @@ def test_a_result_holds_its_rigid_panels(model, kept) -> None:
     s, supports = folding_cell(model, rigid=[1, 2])
     supports = [*supports, fd.Fix([8], direction=(1.0, 1.0, 0.0)), fd.Link([3, 5], axes="z"),
                 fd.Impose([7], direction="z", value=1e-4)]  # fmt: skip
-    path = fd.trace(fd.Case(s, supports), "displacement", [0.0, 1.0])
+    path = fd.trace(fd.Case(s, supports), "displacement", load_factors=[0.0, 1.0])
     again = kept(path)
     assert again.structure.options.rigid == (1, 2) and again.supports == tuple(supports)
-    same = fd.trace(again, "displacement", [0.0, 1.0])
+    same = fd.trace(again, "displacement", load_factors=[0.0, 1.0])
     for name in ("displacement", "reaction"):
         np.testing.assert_array_equal(same[name], path[name])
     z = path.displacement.values[-1, :, 2]

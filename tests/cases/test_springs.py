@@ -56,7 +56,7 @@ def test_compiled_loops_see_the_same_forces_as_statics(model):
     s = structure(model, FOLD)
     case = fd.Case(s, SOME, masses=[fd.PointMass(everywhere(s), 1.0)])
     state = fd.State(displacement=moved(s, 0.05)[: s.nodes.size].reshape(-1, 3))
-    motion = fd.simulate(case, 1e-9, "generalized_alpha", dt=1e-9, initial=state)
+    motion = fd.simulate(case, 1e-9, method="generalized_alpha", dt=1e-9, initial=state)
     wanted = case.body.energies(case.body.dofs(state.displacement))
     found = [float(motion[name][0]) for name in case.body.energy_groups]
     assert found == pytest.approx(wanted, rel=1e-9, abs=1e-12)
@@ -177,7 +177,7 @@ def test_a_spring_stops_an_internal_mechanism():
 def test_the_energy_balance_closes_with_springs_and_damping(model, method, most):
     push = fd.Force([2], (3.0, 1.0, 2.0), fd.HalfSine(0.05))
     case = fd.Case(structure(model, FOLD, HEAVY), SLACK, [push], fd.Rayleigh(1.0, 1e-5))
-    motion = fd.simulate(case, 0.1, method, every=0.01)
+    motion = fd.simulate(case, 0.1, method=method, every=0.01)
     assert motion.attrs["energy_error"] < most
     assert float(motion.strain_springs.max()) > 0.01 * float(motion.work.max())
 
@@ -214,13 +214,13 @@ def test_a_mass_between_the_ground_and_a_moving_base(model):
     f = np.array([0.5, 2.0, 4.0])
     case = fd.Case(s, supports, (), fd.Rayleigh(a, 1e-3), masses)
     for method in ("direct", "modal"):
-        found = fd.frf(case, [fd.BaseMotion("z")], f, method=method).transmissibility
+        found = fd.frf(case, [fd.BaseMotion("z")], frequencies=f, method=method).transmissibility
         assert found.sel(axis="z").values[:, 2] == pytest.approx(exact(f, 1e-3), rel=1e-4)
     if model != "bars and hinges":
         return
     base = fd.BaseMotion("z", fd.Harmonic(2.0), 1e-3)
     moving = fd.Case(s, [*supports, base], (), fd.Rayleigh(a, 5e-2), masses)
-    motion = fd.simulate(moving, 6.0, "generalized_alpha", every=0.01)
+    motion = fd.simulate(moving, 6.0, method="generalized_alpha", every=0.01)
     late = motion.displacement[-100:, 2, 2].values
     assert 0.5 * np.ptp(late) == pytest.approx(1e-3 * abs(exact(2.0, 5e-2)), rel=1e-2)
     assert motion.attrs["energy_error"] < 1e-3

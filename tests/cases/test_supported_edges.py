@@ -30,7 +30,7 @@ def on_edges(shell, nodes):
 
 @pytest.fixture(params=[None, 1e-3])
 def shell(request):
-    return fd.shell(MIURA, SHEET, 4, vertex_radius=request.param)
+    return fd.shell(MIURA, SHEET, divisions=4, vertex_radius=request.param)
 
 
 def test_a_shell_is_held_on_the_whole_edge(shell):
@@ -52,7 +52,7 @@ def test_axes_and_directions_say_the_same(shell):
 
 @pytest.mark.parametrize("options", [{"direction": "z"}, {"axis": "z"}])
 def test_a_moved_edge_is_linear_between_its_ends(options):
-    s = fd.shell(FOLD, SHEET, 4, vertex_radius=1e-3)
+    s = fd.shell(FOLD, SHEET, divisions=4, vertex_radius=1e-3)
     low, high = sorted(np.flatnonzero(s.nodes[: len(FOLD.vertices), 0] < 1e-9).tolist())
     moved = fd.Impose([low, high], value=[0.0, 1e-4], along=True, **options)
     far = np.flatnonzero(np.isclose(s.nodes[: len(FOLD.vertices), 0], s.nodes[:, 0].max()))
@@ -95,7 +95,7 @@ def test_edges_of_bars_and_hinges_must_be_straight(name):
 
 
 def test_a_shell_and_bars_and_hinges_agree():
-    shell = fd.shell(MIURA, SHEET, 8, "consistent", vertex_radius=1e-3)
+    shell = fd.shell(MIURA, SHEET, divisions=8, mass="consistent", vertex_radius=1e-3)
     reduced = fd.discretize(MIURA, SHEET, **MODELS["both"], straight="xmin")
     assert frequencies(reduced, ALONG) == pytest.approx(frequencies(shell, ALONG), rel=0.05)
 
@@ -118,7 +118,7 @@ NONE = r"along: no edge .* nodes = \[0, 8\]; name them"
             CREASE,
             "the crease .* take a shell",
         ),
-        (lambda: fd.shell(MIURA, SHEET, 4), [0, 8], NONE),
+        (lambda: fd.shell(MIURA, SHEET, divisions=4), [0, 8], NONE),
         (bare, [0, 1], "along: this structure has no pattern with edges"),
     ],
 )
@@ -127,7 +127,7 @@ def test_refusals(make, nodes, text):
         fd.Case(make(), [fd.Fix(nodes, along=True)])
     with pytest.raises(InputError, match='along = "yes": must be True or False'):
         fd.Fix([0, 1], along="yes")  # pyright: ignore[reportArgumentType]
-    held = fd.Case(fd.shell(FOLD, SHEET, 4), [fd.Fix(CREASE, along=True)])
+    held = fd.Case(fd.shell(FOLD, SHEET, divisions=4), [fd.Fix(CREASE, along=True)])
     assert held.fixed.sum() == 15
 
 
@@ -183,7 +183,7 @@ kind = "statics"
 
 
 def test_stored_cases_keep_it(kept):
-    shell = fd.shell(FOLD, SHEET, 4, vertex_radius=1e-3)
+    shell = fd.shell(FOLD, SHEET, divisions=4, vertex_radius=1e-3)
     again = kept(fd.modes(fd.Case(shell, [ALONG]), 2))
     assert again.supports == (ALONG,) and again.structure.options.vertex_radius == 1e-3
 

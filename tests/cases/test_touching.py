@@ -26,7 +26,7 @@ MODELS = {
     "shell": lambda pattern: fd.shell(pattern, SHEET, divisions=2, fold_law="linear"),
 }
 ANALYSES = {
-    "motion": lambda case, initial: fd.simulate(case, 1e-3, "auto", initial=initial),
+    "motion": lambda case, initial: fd.simulate(case, 1e-3, method="auto", initial=initial),
     "path": lambda case, initial: fd.trace(case, "newton", steps=1, initial=initial),
 }
 

@@ -25,7 +25,7 @@ def files(workplace):
     """A flat sheet with letters, in a file without a unit."""
     folded = fd.patterns.miura()
     flat = fd.patterns.miura(dihedral=180).changed(assignments=folded.assignments)
-    fd.write_pattern("sheet.fold", flat, [fd.formats.Frame("folded", folded.vertices)])
+    fd.write_pattern("sheet.fold", flat, frames=[fd.formats.Frame("folded", folded.vertices)])
     text = written("sheet.fold")
     del text["frame_unit"]
     Path("sheet.fold").write_text(json.dumps(text))

@@ -69,7 +69,7 @@ def test_a_case_file_of_this_kind(workplace) -> None:
     case_file = fd.read_case("case.toml")
     again = case_file.run()
     np.testing.assert_allclose(again["error"], stored["error"], rtol=1e-9)
-    plain = fd.fidelity(case_file.case(), 2, (2, 4), ["plate"]).result
+    plain = fd.fidelity(case_file.case(), 2, divisions=(2, 4), models=["plate"]).result
     np.testing.assert_array_equal(plain["error"], again["error"].sel(model=["own", "plate"]))
     more = case_file.run(count=1, models=[])
     assert more["model"].values.tolist() == ["own", "own (consistent)"]

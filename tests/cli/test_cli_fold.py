@@ -20,7 +20,7 @@ FLAP = fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)], ["M"
 def flap(workplace):
     """A file with a square that folds on its diagonal, its second frame folded by 40 degrees."""
     folded = fd.fold(FLAP, 40, steps=2).pattern
-    fd.write_pattern("flap.fold", FLAP, [Frame("half", folded.vertices)])
+    fd.write_pattern("flap.fold", FLAP, frames=[Frame("half", folded.vertices)])
     return "flap.fold"
 
 

@@ -201,7 +201,7 @@ def test_figures_of_moved_supports(workplace) -> None:
     page = workplace.page(*PICTURES, "reaction.png", "landscape.png")  # the force falls
     assert "moved along -z (m)" in page
     path = fd.load("r/result.nc")
-    force = fd.plots.total_reaction(path, range(6, 12), "-z")
+    force = fd.plots.total_reaction(path, range(6, 12), direction="-z")
     assert force[0] == 0.0 and 0.0 < force[-1] < force.max()  # past the limit point
     assert all(f"{value:.4g}" in page for value in force)
     # nodes that move otherwise get their curve, too, in another folder

@@ -159,7 +159,7 @@ def test_the_bands_of_the_cell_of_a_motion_and_the_table_of_its_gaps(workplace, 
     assert "panel: 5 bands at 9 wave vectors, 0 full gaps" in done.out
     stored = fd.load("case-bands/result.nc")
     cell = fd.UnitCell(fd.case_of(stored))
-    own = fd.bands(cell, cell.path("X-M-G", 9), 5)
+    own = fd.bands(cell, cell.path("X-M-G", 9), count=5)
     np.testing.assert_allclose(stored["frequency"], own["frequency"], rtol=1e-9, atol=1e-9)
     workplace.good("convert", "case-bands/result.nc", "gaps.csv", "--rows", "gap")
     rows = Path("gaps.csv").read_text().splitlines()

@@ -37,7 +37,7 @@ def test_results_page_and_points_stand_in_one_folder(sweep, workplace):
     known = fd.sweep(
         workplace.folder / "case.toml",
         {"sheet.thickness": [0.01, 0.02], "pattern.dihedral": [60, 90, 120]},
-        ["frequencies"], processes=1,
+        measures=["frequencies"], processes=1,
     )  # fmt: skip
     np.testing.assert_array_equal(found["frequencies"], known["frequencies"])
     page = (workplace.folder / "case-sweep" / "report.html").read_text("utf-8")

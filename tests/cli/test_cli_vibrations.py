@@ -72,7 +72,7 @@ def test_a_response_becomes_a_result_that_is_that_of_python(workplace) -> None:
     assert "circumcenter: direct, 61 frequencies from 0 to 3 Hz, " in done.out
     stored = fd.load("case-results/result.nc")
     drive = [fd.Force([7], (0.01, 0, 0))]
-    again = frf(fd.case_of(stored), drive, np.linspace(0.0, 3.0, 61))
+    again = frf(fd.case_of(stored), drive, frequencies=np.linspace(0.0, 3.0, 61))
     np.testing.assert_allclose(again["receptance"], stored["receptance"], rtol=1e-12)
     assert stored.attrs["drive_force"] == pytest.approx(0.01)
 
@@ -109,7 +109,7 @@ def test_figures_of_modes(workplace) -> None:
         assert row[3] == str(told["name"].values[k])
     comparison = rows[4:9]
     assert comparison[0] == ["mode", "circumcenter (Hz)", "panel (Hz)", "MAC"]
-    mac = fd.linear.mac(one, two, fd.case_of(one).structure.mass)
+    mac = fd.linear.mac(one, two, mass=fd.case_of(one).structure.mass)
     pairs = fd.linear.pair_modes(mac)
     for k, row in enumerate(comparison[1:]):
         assert float(row[2]) == pytest.approx(float(two["frequency"][pairs.second[k]]), rel=1e-3)
@@ -128,7 +128,7 @@ def test_figures_of_a_response(workplace) -> None:
         (rule, str(node), peak)
         for rule in ("circumcenter", "panel")
         for node in (7, 8)
-        for peak in peaks_of(fd.load(f"r/result-{rule}.nc"), node, "x", "mobility")
+        for peak in peaks_of(fd.load(f"r/result-{rule}.nc"), node, axis="x", quantity="mobility")
     ]
     for row, (rule, node, peak) in zip(rows, expected, strict=False):
         assert row[:2] == [rule, node]

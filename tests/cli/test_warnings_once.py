@@ -78,7 +78,7 @@ def test_sweeps_say_once_what_points_are_warned_of(tmp_path, capsys, monkeypatch
     (tmp_path / "case.toml").write_text(MODES_TEXT, "utf-8")
     vary = {"sheet.thickness": [0.01, 0.25, 0.3]}
     with pytest.warns(UnitsWarning) as caught:
-        found = fd.sweep("case.toml", vary, ["mass"], processes=1)
+        found = fd.sweep("case.toml", vary, measures=["mass"], processes=1)
     (one,) = (one for one in caught if one.category is UnitsWarning)
     text = str(one.message)
     assert text.startswith("sheet: thickness = 0.25 m is") and one.filename == __file__

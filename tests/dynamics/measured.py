@@ -66,7 +66,9 @@ def decay(case: fd.Case, method: str, number: int = 0) -> tuple[float, float]:
     shape, period = mode["shape"].values, 1.0 / float(mode.frequency)
     start = fd.State(1e-6 * shape / np.abs(shape).max())
     numeric = steps_of(method, period / 200) | equal_steps(method)
-    motion = fd.simulate(case, 3 * period, method, initial=start, every=period / 40, **numeric)
+    motion = fd.simulate(
+        case, 3 * period, method=method, initial=start, every=period / 40, **numeric
+    )
     modal = np.einsum("tna,na->t", motion.displacement.values, case.structure.mass @ shape)
-    fit = matrix_pencil(modal, period / 40, 2)
+    fit = matrix_pencil(modal, period / 40, order=2)
     return fit.damping_ratio[np.argmax(fit.amplitude)], motion.attrs["energy_error"]

@@ -21,13 +21,13 @@ IMPLICIT = [name for name, method in METHODS.items() if method.implicit]
 
 def cell(cells=(1, 1), dihedral: float = 60, sheet: fd.Sheet = SHEET, **options) -> fd.Structure:
     """Miura cells of unit sides."""
-    pattern = fd.patterns.miura(cells, 1.0, 1.0, 60, dihedral)
+    pattern = fd.patterns.miura(cells, 1.0, b=1.0, panel_angle=60, dihedral=dihedral)
     return fd.discretize(pattern, sheet, **{"preset": "herkal"} | options)
 
 
 def fold(dihedral: float = 60, sheet: fd.Sheet = SHEET, **options) -> fd.Structure:
     """Two unit squares."""
-    pattern = fd.patterns.simple_fold(1.0, 1.0, dihedral)
+    pattern = fd.patterns.simple_fold(1.0, 1.0, dihedral=dihedral)
     return fd.discretize(pattern, sheet, **{"preset": "herkal"} | options)
 
 

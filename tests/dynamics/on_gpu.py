@@ -123,9 +123,9 @@ def test_many_are_those_of_the_cpu(method):
 def test_samples_do_not_depend_on_the_pieces(monkeypatch, method):
     each = case(1)
     given = {"initial": shaken(each), "device": "gpu", **STEPS}
-    whole = fd.simulate(each, END, method, **given)
+    whole = fd.simulate(each, END, method=method, **given)
     monkeypatch.setattr("foldyn.dynamics.gpu.launch.Launches.fits", lambda *_: np.array([3]))
-    agree(fd.simulate(each, END, method, **given), whole, 0.0)
+    agree(fd.simulate(each, END, method=method, **given), whole, 0.0)
     agree(fd.simulate_many([each], END, method=method, **given).isel(model=0), whole, 1e-12)
 
 
@@ -136,9 +136,9 @@ def test_motions_side_by_side_have_steps_of_their_own(monkeypatch, method):
     monkeypatch.setattr("foldyn.dynamics.gpu.launch.Launches.fits", lambda self: 2 * self._every)
     motions, alone = [], []
     for k, (dt, every) in enumerate(((1e-5, 2), (2.5e-5, 1), (5e-6, 3))):
-        given = method, dt, every, shaken(case(k), k)
-        motions.append(prepare(case(k), 5e-5, *given))
-        alone.append(fd.simulate(case(k), 5e-5, *given))
+        given = {"method": method, "dt": dt, "every": every, "initial": shaken(case(k), k)}
+        motions.append(prepare(case(k), 5e-5, **given))
+        alone.append(fd.simulate(case(k), 5e-5, **given))
     motions.append(prepare(case(), 5e-5, "dormand_prince"))
     assert integrate_prepared(motions) == {0, 1, 2}
     for motion, other in zip(motions[:3], alone, strict=True):
@@ -154,16 +154,16 @@ def test_a_sweep_on_a_gpu_is_that_of_the_cpu(tmp_path, monkeypatch):
     file.write_text(CASE_FILE)
     vary, given = {"sheet.youngs_modulus": [1e6, 2e6]}, {"processes": 1}
     vary["model.fold_law"] = ["enhanced", "linear"]  # a kernel for each kind
-    alone = fd.sweep(file, vary, ["largest_displacement"], device="cpu", **given)
+    alone = fd.sweep(file, vary, measures=["largest_displacement"], device="cpu", **given)
     monkeypatch.setattr(choice, "FEWEST", 4)
     monkeypatch.setattr(choice, "COMPILING", 0.0)
     monkeypatch.setattr(choice, "EVALUATION", 1.0)
-    mine = fd.sweep(file, vary, ["largest_displacement"], **given)
+    mine = fd.sweep(file, vary, measures=["largest_displacement"], **given)
     assert alone.attrs["device"] == "cpu" != mine.attrs["device"]
     assert "s on a GPU" in mine.attrs["device_reason"]
     assert not mine.attrs["failed"]
     np.testing.assert_allclose(mine.largest_displacement, alone.largest_displacement, rtol=1e-9)
-    few = fd.sweep(file, {"sheet.density": [1.0, 2.0]}, ["largest_displacement"], **given)
+    few = fd.sweep(file, {"sheet.density": [1.0, 2.0]}, measures=["largest_displacement"], **given)
     assert few.attrs["device"] == "cpu"
     assert few.attrs["device_reason"] == "a GPU pays from 4 models on"
     same = fd.simulate_many([case(), case(2)] * 2, END, method="rk4", **STEPS)

@@ -76,7 +76,9 @@ def about_the_limit(case: fd.Case, method: str, over: float) -> list[float]:
     limit, found = fd.critical_step(case, method) / MARGIN, []
     for dt in (0.98 * limit, over * limit):
         try:
-            motion = fd.simulate(case, 400 * dt, method, dt=dt, initial=released(0.1), force=True)
+            motion = fd.simulate(
+                case, 400 * dt, method=method, dt=dt, initial=released(0.1), force=True
+            )
             found.append(float(abs(motion.displacement[-50:]).max()))
         except fd.errors.InstabilityError:
             found.append(np.inf)
@@ -88,7 +90,7 @@ def decrement(case: fd.Case, method: str, omega: float):
     period = 2.0 * np.pi / omega
     radius = {"spectral_radius": 1.0} if method == "generalized_alpha" else {}
     motion = fd.simulate(
-        case, 6 * period, method, initial=released(1e-3), every=period / 40, dt=period / 400,
+        case, 6 * period, method=method, initial=released(1e-3), every=period / 40, dt=period / 400,
         **equal_steps(method), **radius,
     )  # fmt: skip
     return log_decrement(place(motion), period / 40, rest=0.0).decrement, motion

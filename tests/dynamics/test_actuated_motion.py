@@ -85,7 +85,7 @@ def test_a_shell_that_its_crease_folds(history):
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=150)
     s = fd.shell(pattern, SHEET, divisions=2)
     case = fd.Case(s, loads=[fd.Actuate([0], 170.0, history)], damping=fd.Rayleigh(alpha=8.0))
-    motion = fd.simulate(case, 4.0, "newmark", every=0.5)
+    motion = fd.simulate(case, 4.0, method="newmark", every=0.5)
     assert motion.attrs["energy_error"] < 2e-3
     corners = motion.displacement[-1].to_numpy()[: len(pattern.vertices)]
     folds, _ = fd.discretize(pattern, SHEET, scheme="n4b5", preset="herkal").dihedrals(corners)

@@ -15,7 +15,7 @@ SUPPORTS = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
 
 
 def fold(thickness=0.01, density=1.0, size=1.0):
-    pattern = fd.patterns.simple_fold(size, 1.2 * size, 60)
+    pattern = fd.patterns.simple_fold(size, 1.2 * size, dihedral=60)
     return fd.discretize(pattern, fd.Sheet(1e6, 0.25, thickness, density))
 
 
@@ -25,7 +25,7 @@ def motion(structure, load, method="rk4", duration=0.3, initial=None, history=No
     case = fd.Case(structure, SUPPORTS, [force], fd.Rayleigh(0.5))
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always", FoldynWarning)
-        found = fd.simulate(case, duration, method, every=0.1 * duration, initial=initial)
+        found = fd.simulate(case, duration, method=method, every=0.1 * duration, initial=initial)
     return found, [str(one.message) for one in told]
 
 
@@ -82,13 +82,15 @@ def test_a_motion_that_explodes_from_next_to_nothing_is_still_stopped():
     case = fd.Case(fold(), SUPPORTS, [fd.Force([0, 1], (-1e-9, 0.0, 0.0))])
     dt = 1.5 * fd.critical_step(case)
     with pytest.raises(ComputationError):
-        fd.simulate(case, 2000 * dt, "rk4", dt=dt, force=True)
+        fd.simulate(case, 2000 * dt, method="rk4", dt=dt, force=True)
 
 
 def swinging():
     """A fold that is let go, and the period of its slowest vibration (s)."""
     s = fd.discretize(
-        fd.patterns.simple_fold(1.0, 1.0, 60), fd.Sheet(1e6, 0.25, 0.01, 1.0), bend_law="linear"
+        fd.patterns.simple_fold(1.0, 1.0, dihedral=60),
+        fd.Sheet(1e6, 0.25, 0.01, 1.0),
+        bend_law="linear",
     )
     case = fd.Case(s, [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")])
     spine = fd.backbone(case, amplitudes=(1e-3, 2e-3), harmonics=3)
@@ -101,7 +103,7 @@ def test_samples_at_rest_instants_are_measured_by_the_motion_between_them():
     with warnings.catch_warnings():
         warnings.simplefilter("error", FoldynWarning)
         for method in ("rk4", "generalized_alpha"):
-            found = fd.simulate(case, 2.0 * period, method, every=period, **start)
+            found = fd.simulate(case, 2.0 * period, method=method, every=period, **start)
             assert found.kinetic.values.max() < 1e-4 * float(found.strain_folds[0])
             assert found.attrs["energy_error"] < 1e-3
         many = fd.simulate_many([case] * 2, 2.0 * period, every=period, **start)

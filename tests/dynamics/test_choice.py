@@ -46,12 +46,12 @@ DAMPED = fd.Rayleigh(0.1)
 def test_velocities_that_shake_the_bars_get_steps_that_resolve_them():
     """RK4 takes the energy out of vibrations near its critical step, whatever damps the sheet."""
     case = fd.Case(cell(), CELL_HELD, damping=DAMPED)
-    motion = fd.simulate(case, 0.2, "auto", initial=KICK, every=0.01)
+    motion = fd.simulate(case, 0.2, method="auto", initial=KICK, every=0.01)
     assert motion.attrs["method"] == "dormand_prince"
     assert motion.attrs["energy_error"] < 2e-3
     assert "% of the initial kinetic energy is in vibrations" in motion.attrs["method_reason"]
     with pytest.warns(FoldynWarning, match="the energy balance of the motion is off"):
-        damped = fd.simulate(case, 0.2, "rk4", initial=KICK, every=0.01)
+        damped = fd.simulate(case, 0.2, method="rk4", initial=KICK, every=0.01)
     assert damped.attrs["energy_error"] > 0.1
     thick = cell(preset="plate")
     slow = fd.modes(fd.Case(thick, CELL_HELD), 1).shape[0].values
@@ -104,7 +104,7 @@ def test_a_lasting_motion_is_computed_anew_with_shorter_steps():
     case = fd.Case(cell(), CELL_HELD)
     why = "anew with steps of .*: with steps of .*; dt = .* saves"
     with pytest.warns(FoldynWarning, match=why):
-        motion = fd.simulate(case, 40.0, "auto", initial=KICK, every=0.1)
+        motion = fd.simulate(case, 40.0, method="auto", initial=KICK, every=0.1)
     assert motion.attrs["method"] == "central_difference"
     assert motion.attrs["energy_error"] < 0.01
     assert motion.sizes["time"] == 401
@@ -125,7 +125,7 @@ def test_a_slow_load_is_implicit():
     slow = fd.Force(range(7), (0.01, 0.0, 0.0), fd.Ramp(10.0, smooth=True))
     case = fd.Case(case.structure, case.supports, [slow], fd.Rayleigh(15.8))
     assert chosen(case, 10.0)[0] == "generalized_alpha"
-    motion = fd.simulate(case, 10.0, "auto", tolerance=1e-4)
+    motion = fd.simulate(case, 10.0, method="auto", tolerance=1e-4)
     assert motion.attrs["method"] == "generalized_alpha"
     assert motion.attrs["method_reason"].startswith("implicit: about")
     assert motion.attrs["steps"] < 1000

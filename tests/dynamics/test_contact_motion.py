@@ -30,7 +30,9 @@ def thrown(method, duration=0.02, stiffness=None, friction=0.0, speed=(0.0, 0.0,
     case = fd.Case(s, contact=fd.Contact(stiffness=stiffness, friction=friction))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)  # few steps do not resolve an impact
-        return s, fd.simulate(case, duration, method, initial=start, **{"every": 1e-4} | options)
+        return s, fd.simulate(
+            case, duration, method=method, initial=start, **{"every": 1e-4} | options
+        )
 
 
 @pytest.mark.parametrize(
@@ -99,7 +101,7 @@ def test_a_strip_folded_from_both_ends_stops_where_it_touches(method, options):
     case = folded_from_both_ends(fd.Contact())
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)  # of the energy that the impact takes
-        run = fd.simulate(case, 0.35, method, every=2e-3, **options)
+        run = fd.simulate(case, 0.35, method=method, every=2e-3, **options)
     assert crossing(case.structure, run.displacement.values) == 0
     angles = np.degrees(case.structure.dihedrals(run.displacement.values[-1])[0])
     assert angles.max() > 25.0  # the panel that lies above rests on the other one
@@ -114,7 +116,7 @@ def test_a_conserving_strip_loses_no_energy_where_it_touches():
     contact = fd.Contact(friction=0.3, planes=[fd.Plane((0, 0, -0.2e-3), (0, 0, 1))])
     fold = fd.Actuate([0, 1], 8.0, fd.Ramp(0.05))
     case = fd.Case(strip(), [fd.Fix([2, 3])], [fold], fd.Rayleigh(alpha=20.0), contact=contact)
-    run = fd.simulate(case, 0.075, CONSERVING, dt=1e-4, every=1e-3)
+    run = fd.simulate(case, 0.075, method=CONSERVING, dt=1e-4, every=1e-3)
     assert crossing(case.structure, run.displacement.values) == 0
     assert float(run.contact.max()) > 0.0
     assert run.attrs["energy_error"] < 1e-9
@@ -161,7 +163,7 @@ def test_no_step_is_too_long_to_see_what_is_in_its_way(monkeypatch):
 def test_an_impact_too_violent_for_the_step_is_told():
     """A snap at some m/s, with a step that is far too long for it."""
     with pytest.raises(ComputationError, match=r"use a step below|no equilibrium was found"):
-        fd.simulate(tower(80.0, fd.Contact()), 0.03, ALPHA, dt=2e-5, every=1e-4)
+        fd.simulate(tower(80.0, fd.Contact()), 0.03, method=ALPHA, dt=2e-5, every=1e-4)
 
 
 @pytest.mark.parametrize("force", [38.0, 50.0, 80.0])
@@ -218,7 +220,7 @@ RUBBING = [
 def test_a_strip_slides_above_the_angle_of_friction(kind, method, duration, dt, near, lost, error):
     """A slope of 20 degrees; friction of 0.3 holds up to 16.7. On a panel it passes inner sides."""
     (case, strip), a = leaning(kind, 20.0), np.radians(20.0)
-    run = fd.simulate(case, duration, method, dt=dt, every=2e-3)
+    run = fd.simulate(case, duration, method=method, dt=dt, every=2e-3)
     way, mass = slid(case, strip, run)
     expected = 0.5 * G * (np.sin(a) - 0.3 * np.cos(a)) * duration**2
     assert way[-1] == pytest.approx(expected, rel=near)
@@ -243,7 +245,7 @@ def test_a_strip_slides_above_the_angle_of_friction(kind, method, duration, dt, 
 def test_a_strip_sticks_below_the_angle_of_friction(kind, method, duration, dt, still, most):
     """A slope of 15 degrees: where it has come to rest it stays, for good."""
     case, strip = leaning(kind, 15.0, alpha=200.0)
-    run = fd.simulate(case, duration, method, dt=dt, every=2e-3)
+    run = fd.simulate(case, duration, method=method, dt=dt, every=2e-3)
     way = slid(case, strip, run)[0]
     assert abs(way[-1] - way[int(0.6 * len(way))]) < still
     assert 0.0 < way[-1] < most and run.attrs["energy_error"] < 1e-2
@@ -262,7 +264,7 @@ def test_a_moving_plane_does_the_work_that_it_gives(method, dt, error):
     up = fd.Ramp(0.01, smooth=True)
     plane = fd.Plane((0, 0, -0.2e-3), (0, 0, 1), friction=0.2, motion=(0, 0, 2e-3), history=up)
     case = fd.Case(strip(2), contact=fd.Contact(planes=[plane]))
-    run = fd.simulate(case, 0.02, method, dt=dt, every=2e-4)
+    run = fd.simulate(case, 0.02, method=method, dt=dt, every=2e-4)
     assert float(run.work[-1]) > 0.0
     assert run.attrs["energy_error"] < error
     assert run.displacement.values[-1, :, 2].min() > 2e-3 - 0.2e-3  # it flies ahead of the plane
@@ -284,7 +286,7 @@ def test_supports_that_move_press_panels_together():
     close = fd.Impose([4, 5], "x", -0.995 * np.ptp(s.nodes[:, 0]), fd.Ramp(0.02, smooth=True))
     supports = [fd.Fix([0, 1]), close, fd.Fix([4, 5], "yz")]
     case = fd.Case(s, supports, damping=fd.Rayleigh(alpha=200.0), contact=fd.Contact())
-    run = fd.simulate(case, 0.03, ALPHA, dt=1e-4, every=1e-3)
+    run = fd.simulate(case, 0.03, method=ALPHA, dt=1e-4, every=1e-3)
     assert crossing(s, run.displacement.values) == 0
     assert float(run.contact[-1]) > 0.0
 
@@ -348,7 +350,7 @@ def test_a_plane_that_would_jump_is_refused_by_name(method, dt):
     plane = fd.Plane((0, 0, -5e-3), (0, 0, 1), **up)
     case = fd.Case(strip(2), contact=fd.Contact(planes=[plane]))
     with pytest.raises(InputError, match=r"contact: a plane with the history step jumps .* 0.004"):
-        fd.simulate(case, 0.01, method, dt=dt, every=1e-3)
+        fd.simulate(case, 0.01, method=method, dt=dt, every=1e-3)
 
 
 def test_steps_that_are_chosen_end_where_the_motion_of_a_plane_has_corners():

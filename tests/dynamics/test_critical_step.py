@@ -61,7 +61,7 @@ def test_growth_is_that_of_a_computed_step(damping, method):
         given = {"dt": dt, "force": True} | equal_steps(method)
         columns = []
         for state in (released(0.01), released(0.0, 0.01)):
-            motion = fd.simulate(case, dt, method, initial=state, **given)
+            motion = fd.simulate(case, dt, method=method, initial=state, **given)
             assert motion.attrs["steps"] == 1
             columns.append([float(motion[q][-1, 1, 0]) for q in ("displacement", "velocity")])
         found = np.abs(np.linalg.eigvals(np.array(columns).T / 0.01)).max()
@@ -114,7 +114,7 @@ def test_the_specimen_as_the_design_measured_it():
     """
     rise = 100.48e-3 / 8
     tilt = np.degrees(np.arccos(rise / np.sqrt(0.025**2 - rise**2) / np.tan(np.radians(60))))
-    pattern = fd.patterns.miura((4, 3), 0.025, 0.025, 60, 180 - 2 * tilt)
+    pattern = fd.patterns.miura((4, 3), 0.025, b=0.025, panel_angle=60, dihedral=180 - 2 * tilt)
     sheet = fd.Sheet(1219e6, 0.2, 0.24e-3, 667.0, length_scale_ratio=2.7)
     law = fd.EnhancedLinear(75, 285)
     s = fd.discretize(pattern, sheet, mass="circumcenter", fold_law=law, preset="herkal")

@@ -43,7 +43,7 @@ def moved(case: fd.Case, size: float, seed: int = 0) -> np.ndarray:
 
 def compare(many, k, case, duration, near, **options) -> None:
     """Hold one of many to the motion of it alone, each variable relative to its largest value."""
-    alone = fd.simulate(case, duration, "central_difference", **options)
+    alone = fd.simulate(case, duration, method="central_difference", **options)
     alone = alone.drop_vars("contact_force", errors="ignore")  # which motions alone tell
     np.testing.assert_allclose(many.time, alone.time, rtol=1e-14)
     assert len([name for name in alone.data_vars if "time" in alone[name].dims]) > 5
@@ -95,7 +95,7 @@ def test_a_start_in_a_stiffer_state_limits_the_step():
     """Bars that are pulled far are stiffer than at rest: the shared step is too long for them."""
     limit = fd.critical_step(FIRST, "central_difference")
     far = fd.State(0.5 * FIRST.structure.nodes * ~FIRST.fixed)
-    own = fd.critical_step(FIRST, "central_difference", far.displacement)
+    own = fd.critical_step(FIRST, "central_difference", u=far.displacement)
     assert own < 0.95 * limit
     dt = 0.5 * (own + limit)
     with pytest.raises(InputError, match=r"above the critical step of .* of cases\[1\]"):

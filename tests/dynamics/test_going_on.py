@@ -86,11 +86,13 @@ def test_motions_of_one_case_side_by_side_begin_each_with_its_own(damping, air):
     case = fd.Case(S, HELD, [PUSH], damping, air=air)
     starts = [fd.State(place) for place in (0.0 * BENT, BENT, DROPPED)]
     dt, options = 2.0**-12, {"every": 2.0**-7, "force": True}
-    many = fd.simulate_many([case] * 3, 2.0**-5, dt, initial=starts, **options)
+    many = fd.simulate_many([case] * 3, 2.0**-5, dt=dt, initial=starts, **options)
     ends = [fd.initial_state(many.isel(model=k)) for k in range(3)]
-    more = fd.simulate_many([case] * 3, 2.0**-5, dt, initial=ends, start=2.0**-5, **options)
+    more = fd.simulate_many([case] * 3, 2.0**-5, dt=dt, initial=ends, start=2.0**-5, **options)
     for k, start in enumerate(starts):
-        alone = fd.simulate(case, 2.0**-4, "central_difference", dt, initial=start, **options)
+        alone = fd.simulate(
+            case, 2.0**-4, method="central_difference", dt=dt, initial=start, **options
+        )
         swing = np.abs(alone.displacement.values - start.displacement).max()
         apart = many.displacement.values[k] - alone.displacement.values[:5]
         assert np.abs(apart).max() < 1e-10 * swing

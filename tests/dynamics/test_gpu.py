@@ -109,23 +109,27 @@ def test_the_device_is_named_in_a_case_file_and_on_the_command_line(tmp_path, mo
     with pytest.raises(InputError, match=r"analysis.device.*newmark has no GPU kernel"):
         fd.read_case(file).run()
     with pytest.raises(InputError, match="newmark has no GPU kernel"):
-        fd.sweep(file, {"sheet.density": [1.0, 2.0]}, ["largest_displacement"])
+        fd.sweep(file, {"sheet.density": [1.0, 2.0]}, measures=["largest_displacement"])
     found = fd.sweep(
-        file, {"sheet.density": [1.0, 2.0]}, ["largest_displacement"], device="cpu", processes=1
+        file,
+        {"sheet.density": [1.0, 2.0]},
+        measures=["largest_displacement"],
+        device="cpu",
+        processes=1,
     )
     assert found.attrs["device"] == "cpu"
     file.write_text(MOTION.replace('"dynamics"\nduration = 1e-3', '"modes"'))
     assert main([*command, "--device", "gpu"]) == 2
     assert "--device: is of motions" in capsys.readouterr().err
     with pytest.raises(InputError, match=r"device.*only motions"):
-        fd.sweep(file, {"sheet.density": [1.0, 2.0]}, ["frequency"], device="gpu")
+        fd.sweep(file, {"sheet.density": [1.0, 2.0]}, measures=["frequency"], device="gpu")
     with pytest.raises(InputError, match=r"device.*choose"):
-        fd.sweep(file, {"sheet.density": [1.0]}, ["frequency"], device="tpu")
+        fd.sweep(file, {"sheet.density": [1.0]}, measures=["frequency"], device="tpu")
     monkeypatch.setattr(checks, "no_card", lambda: "")
     file.write_text(MOTION)
     with pytest.raises(InputError, match="leave scheduler out"):
         fd.sweep(
-            file, {"sheet.density": [1.0]}, ["largest_displacement"], device="gpu",
+            file, {"sheet.density": [1.0]}, measures=["largest_displacement"], device="gpu",
             scheduler="tcp://x:1",
         )  # fmt: skip
 
@@ -149,7 +153,7 @@ def test_few_or_short_motions_stay_on_the_cpu(monkeypatch):
 
 def test_a_method_without_kernels_is_named():
     with pytest.raises(InputError, match="newmark has no GPU kernel; choose one of rk4"):
-        fd.simulate(sheet(), 1e-3, "newmark", device="gpu")
+        fd.simulate(sheet(), 1e-3, method="newmark", device="gpu")
     with pytest.raises(InputError, match=r"device.*choose"):
         fd.simulate(sheet(), 1e-3, device="tpu")
 

@@ -47,10 +47,12 @@ def test_a_step_a_thousand_times_the_critical_one(method):
     dt = 1000.0 * fd.critical_step(case, "rk4")
     slow = np.sqrt(K / (2.0 * MASS))
     assert 0.05 < slow * dt < 0.5
-    motion = fd.simulate(case, 100 * dt, method, dt=dt, initial=moved(0.1, 0.1))
+    motion = fd.simulate(case, 100 * dt, method=method, dt=dt, initial=moved(0.1, 0.1))
     exact = 0.1 * np.cos(slow * motion.time.values)
     assert np.abs(place(motion) - exact).max() < 0.1 * (slow * dt) ** 3 * 100 / 10
-    shaken = fd.simulate(case, 5000 * dt, method, dt=dt, every=10, initial=moved(1e-6, -1e-6))
+    shaken = fd.simulate(
+        case, 5000 * dt, method=method, dt=dt, every=10, initial=moved(1e-6, -1e-6)
+    )
     assert np.abs(shaken.displacement).max() < 2e-6
     energy = (shaken.kinetic + shaken.strain_bars).values
     if method == "generalized_alpha":  # its velocity overshoots at first
@@ -104,7 +106,8 @@ def test_steps_are_those_of_the_amplification_matrix(method, radius, wh, damping
     """Every state of a computed motion is the matrix times the last one."""
     dt = wh / OMEGA
     motion = fd.simulate(
-        spring(OMEGA, alpha=2.0 * damping * OMEGA), 30 * dt, method, dt=dt, initial=released(1e-4),
+        spring(OMEGA, alpha=2.0 * damping * OMEGA), 30 * dt, method=method, dt=dt,
+        initial=released(1e-4),
         **({} if radius is None else {"spectral_radius": radius}),
     )  # fmt: skip
     exact = states(radius, wh, damping, 30)
@@ -117,11 +120,11 @@ def test_steps_are_those_of_the_amplification_matrix(method, radius, wh, damping
 @pytest.mark.parametrize("method", ["newmark", "energy_momentum"])
 def test_a_linear_system_keeps_its_energy_and_closes_its_balance(method):
     """Whatever the step: free, and with damping and a load the balance closes to rounding."""
-    free = fd.simulate(spring(OMEGA), 50.0, method, dt=0.5, initial=released(0.1))
+    free = fd.simulate(spring(OMEGA), 50.0, method=method, dt=0.5, initial=released(0.1))
     energy = free.kinetic + free.strain_bars
     np.testing.assert_allclose(energy, float(energy[0]), rtol=1e-6)
     driven = pulled(spring(OMEGA, alpha=0.3, beta=0.02), 0.4, fd.Harmonic(frequency=0.3))
-    motion = fd.simulate(driven, 50.0, method, dt=0.5)
+    motion = fd.simulate(driven, 50.0, method=method, dt=0.5)
     assert float(motion.dissipated[-1]) > 0.01
     assert motion.attrs["energy_error"] < 1e-6
 
@@ -136,7 +139,7 @@ def test_a_node_without_mass_is_in_equilibrium(method, beta):
     omega = np.sqrt(0.5 * K / MASS)
     steps, errors = [40, 80, 160], []
     for n in steps:
-        motion = fd.simulate(case, 3.0, method, dt=3.0 / n, initial=moved(0.05, 0.1))
+        motion = fd.simulate(case, 3.0, method=method, dt=3.0 / n, initial=moved(0.05, 0.1))
         x = motion.displacement.values[:, :, 0]
         exact = 0.1 * damped(motion.time.values, omega, 0.5 * beta * omega)
         errors.append(np.abs(x[:, 2] - exact).max())

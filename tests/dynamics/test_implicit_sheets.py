@@ -29,11 +29,11 @@ def test_case_2_converges_to_the_motion_of_rk4(method):
     case = fd.read_case(find_case("herkal/case2")).case("circumcenter")
     reference = fd.simulate(case, 2.0, dt=2.0 / 16000, every=400)
     steps = [200, 400, 800]
-    motions = [fd.simulate(case, 2.0, method, dt=2.0 / n, every=n // 40) for n in steps]
+    motions = [fd.simulate(case, 2.0, method=method, dt=2.0 / n, every=n // 40) for n in steps]
     errors = [apart(motion, reference) for motion in motions]
     assert errors[0] < 0.01
     assert order(steps, errors) == pytest.approx(2.0, abs=0.1)
-    adaptive = fd.simulate(case, 2.0, method, every=0.05)
+    adaptive = fd.simulate(case, 2.0, method=method, every=0.05)
     assert apart(adaptive, reference) < 0.005
     assert adaptive.attrs["steps"] < 800
 
@@ -43,7 +43,7 @@ def test_case_2_converges_to_the_motion_of_rk4(method):
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_band_and_sparse_matrix_give_the_same_motion(method, mass, monkeypatch):
     case = case2(alpha=0.1, beta=1e-4, mass=mass)
-    band = fd.simulate(case, 0.5, method, dt=5e-3)
+    band = fd.simulate(case, 0.5, method=method, dt=5e-3)
     assert band.attrs["linear_solver"] == "banded"
     monkeypatch.setattr(solvers, "MOST_UNSYMMETRIC", 0.0)
     for name, backend in solvers.SOLVERS.items():
@@ -51,7 +51,7 @@ def test_band_and_sparse_matrix_give_the_same_motion(method, mass, monkeypatch):
             continue
         only = {name: backend._replace(band=0.0, worthwhile=0)}
         monkeypatch.setattr(solvers, "SOLVERS", only)
-        sparse = fd.simulate(case, 0.5, method, dt=5e-3)
+        sparse = fd.simulate(case, 0.5, method=method, dt=5e-3)
         symmetric = method != "energy_momentum"
         assert sparse.attrs["linear_solver"] == (name if symmetric else "superlu")
         assert apart(sparse, band) < 1e-6
@@ -61,7 +61,7 @@ PATTERNS = {"fold": fd.patterns.simple_fold(), "miura": fd.patterns.miura(dihedr
 
 
 def shell_of(name, divisions, mass="lumped", beta=0.0):
-    shell = fd.shell(PATTERNS[name], SHEET, divisions, mass=mass)
+    shell = fd.shell(PATTERNS[name], SHEET, divisions=divisions, mass=mass)
     return fd.Case(shell, [fd.Fix([0, 1], "xyz")], damping=fd.Rayleigh(0.0, beta))
 
 
@@ -129,7 +129,7 @@ def test_damping_by_the_stiffness_at_the_start(method):
     free, start = oscillator(duffing_law(cubic), stiffness), released(stretch + 1e-5)
     for state, damper in (("start", own), ("rest", stiffness)):
         case = pulled(free.altered(damping=fd.Rayleigh(beta=beta, state=state)), force)
-        motion = fd.simulate(case, 0.8, method, dt=5e-4, initial=start)
+        motion = fd.simulate(case, 0.8, method=method, dt=5e-4, initial=start)
         exact = damped(motion.time.values, omega, 0.5 * beta * damper / MASS / omega)
         np.testing.assert_allclose((place(motion) - stretch) / 1e-5, exact, atol=2e-3)
 
@@ -139,8 +139,8 @@ def test_damping_that_drives_is_told():
     damping = fd.Rayleigh(beta=1e-3, state="start")
     case = oscillator(duffing_law(-40.0), 8.0).altered(damping=damping)
     with pytest.warns(FoldynWarning, match="drives 1 motion instead of damping it"):
-        fd.simulate(case, 0.01, "newmark", dt=1e-3, initial=released(0.5))
+        fd.simulate(case, 0.01, method="newmark", dt=1e-3, initial=released(0.5))
     stable = fd.Case(cell(), CELL_HELD, [], fd.Rayleigh(beta=1e-5, state="start"))
     with warnings.catch_warnings():
         warnings.simplefilter("error", FoldynWarning)
-        fd.simulate(stable, 0.01, "newmark", dt=1e-3)
+        fd.simulate(stable, 0.01, method="newmark", dt=1e-3)

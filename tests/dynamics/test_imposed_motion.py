@@ -37,7 +37,7 @@ def test_oscillator_on_a_shaken_base(method):
     case = case.altered(supports=[*case.supports, shaken])
     steps, errors = [40, 80, 160, 320], []
     for n in steps:
-        motion = fd.simulate(case, 3.0, method, dt=3.0 / n, **equal_steps(method))
+        motion = fd.simulate(case, 3.0, method=method, dt=3.0 / n, **equal_steps(method))
         t, base = motion.time.values, motion.displacement.values[:, 0, 0]
         gain = OMEGA**2 / (OMEGA**2 - p**2)
         exact = B * gain * (np.sin(p * t) - p / OMEGA * np.sin(OMEGA * t))

@@ -34,18 +34,20 @@ def pushed(law="linear", push=3e-4, **more):
 
 
 def controlled(case, tolerance, duration=2.0, **options):
-    return fd.simulate(case, duration, DP, tolerance=tolerance, **options)
+    return fd.simulate(case, duration, method=DP, tolerance=tolerance, **options)
 
 
 @pytest.mark.parametrize("method", [*METHODS, DP])
 def test_relaxation_of_a_hinge_that_is_held(method):
     """The whole sheet at once in a new shape: any step is exact."""
     fresh = fd.State(turned(0.01), memory="fresh")
-    found = fd.simulate(one_hinge(PRONY), 1.0, method, dt=0.01, initial=fresh)
+    found = fd.simulate(one_hinge(PRONY), 1.0, method=method, dt=0.01, initial=fresh)
     wanted = STIFFNESS * 0.01 * PRONY.relaxation(found.time.values)
     np.testing.assert_allclose(moment(found), wanted, rtol=1e-12)
     assert found.attrs["energy_error"] < 1e-12
-    settled = fd.simulate(one_hinge(PRONY), 0.1, method, dt=0.01, initial=fd.State(turned(0.01)))
+    settled = fd.simulate(
+        one_hinge(PRONY), 0.1, method=method, dt=0.01, initial=fd.State(turned(0.01))
+    )
     np.testing.assert_allclose(moment(settled), STIFFNESS * 0.01, rtol=1e-12)
     assert float(settled.dissipated[-1]) == 0.0
 
@@ -65,7 +67,7 @@ def test_a_steady_sine_of_the_angle_sees_the_complex_modulus(method):
 
     def error(n):
         options = {"dt": 0.5 / n, "every": n // 20}
-        return modulus_error(1e-4, lambda case: fd.simulate(case, 6.0, method, **options))
+        return modulus_error(1e-4, lambda case: fd.simulate(case, 6.0, method=method, **options))
 
     assert error(1600) < 1e-6
     assert error(400) / error(1600) == pytest.approx(16.0, rel=0.05)
@@ -89,7 +91,7 @@ def test_creep_under_a_constant_moment():
     law, push = fd.Prony(0.7, 0.3, law="linear"), 1e-5
     start = fd.State(turned(push / STIFFNESS / 1.7), memory="fresh")
     options = {"dt": 1 / 400, "initial": start, "spectral_radius": 0.0}
-    found = fd.simulate(pushed(law, push, mass=1e-14), 1.0, ALPHA, **options)
+    found = fd.simulate(pushed(law, push, mass=1e-14), 1.0, method=ALPHA, **options)
     wanted = push / STIFFNESS * (1 - 0.7 / 1.7 * np.exp(-found.time.values / (1.7 * 0.3)))
     assert np.abs(opened(found) / wanted - 1.0).max() < 1e-6
 
@@ -97,7 +99,7 @@ def test_creep_under_a_constant_moment():
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", LAWS)
 def test_the_energy_balance_closes(name, method):
-    found = fd.simulate(pushed(LAWS[name]), 2.0, method, dt=2.0**-10, every=16)
+    found = fd.simulate(pushed(LAWS[name]), 2.0, method=method, dt=2.0**-10, every=16)
     assert float(found.dissipated[-1]) > 0.2 * float(found.work.max())
     assert (np.diff(found.dissipated) >= 0.0).all()
     assert found.attrs["energy_error"] < 1e-5
@@ -106,7 +108,7 @@ def test_the_energy_balance_closes(name, method):
 def end(case, method, n, duration=2.0, **more) -> float:
     """Where the wing is after so many equal steps."""
     steps = {"dt": duration / n, "every": n} | equal_steps(method)
-    return opened(fd.simulate(case, duration, method, **steps, **more))[-1]
+    return opened(fd.simulate(case, duration, method=method, **steps, **more))[-1]
 
 
 @pytest.mark.parametrize("method", [*METHODS, DP])
@@ -123,7 +125,7 @@ def test_creases_that_go_on_yielding_keep_the_order_of_the_method(method):
     v = np.zeros((5, 3))
     v[WING, 2] = 0.05  # m/s; after 0.2 s it has lost a part
     start, case = fd.State(turned(0.02), v), one_hinge(LAWS["plastic"], hold=False)
-    whole = fd.simulate(case, 0.2, "rk4", initial=start)
+    whole = fd.simulate(case, 0.2, method="rk4", initial=start)
     assert whole.memory.values[-1, 0, 1] > whole.memory.values[0, 0, 1] + 1e-3
     assert float(whole.velocity.sel(node=WING, axis="z")[-1]) > 0.0  # it yields to the end
     ends = np.array([end(case, method, n, 0.2, initial=start) for n in (4, 8, 16, 256)])
@@ -155,7 +157,7 @@ def test_motions_come_to_those_of_small_equal_steps(name):
     """As the tolerance goes down, with the balance of energy; states of branches too."""
     case = pushed(LAWS[name])
     for method, near in (("rk4", 1e-6), ("newmark", 2e-5)):
-        fine = fd.simulate(case, 2.0, method, dt=2.0**-13, every=2**10)
+        fine = fd.simulate(case, 2.0, method=method, dt=2.0**-13, every=2**10)
         scale = np.abs(opened(fine)).max()
         for tolerance, error in ((1e-4, 2e-3), (1e-6, 4e-5), (1e-8, 1e-6)):
             found = controlled(case, tolerance, every=0.125)
@@ -174,7 +176,7 @@ def test_steps_are_cut_where_a_crease_begins_to_yield_or_turns_back():
     steps = np.diff(found.time)
     for place in (begins, turns):
         assert steps[max(place - 3, 0) : place + 3].min() < 0.3 * np.median(steps)
-    fine = fd.simulate(pushed(law), 2.0, "rk4", dt=2.0**-14)
+    fine = fd.simulate(pushed(law), 2.0, method="rk4", dt=2.0**-14)
     assert opened(found).max() == pytest.approx(opened(fine).max(), rel=1e-6)
 
 
@@ -204,8 +206,8 @@ def test_refused_steps_leave_no_trace(name):
 
 def test_refused_steps_of_an_implicit_method_leave_no_trace():
     """Steps chosen by their error end near those of small equal ones."""
-    fine = fd.simulate(pushed(PRONY), 2.0, ALPHA, dt=2.0**-11, every=1.0)
-    chosen = fd.simulate(pushed(PRONY), 2.0, ALPHA, tolerance=1e-6, every=1.0)
+    fine = fd.simulate(pushed(PRONY), 2.0, method=ALPHA, dt=2.0**-11, every=1.0)
+    chosen = fd.simulate(pushed(PRONY), 2.0, method=ALPHA, tolerance=1e-6, every=1.0)
     assert chosen.attrs["refused_steps"] > 0
     assert opened(chosen)[-1] == pytest.approx(opened(fine)[-1], rel=1e-4)
 
@@ -215,7 +217,7 @@ def test_refused_steps_of_an_implicit_method_leave_no_trace():
 )
 def test_folds_and_bends_of_a_sheet(law):
     """Without a law its creases have dampers, in series with the panels."""
-    pattern = fd.patterns.miura((1, 1), 0.1, 0.1, dihedral=120)
+    pattern = fd.patterns.miura((1, 1), 0.1, b=0.1, dihedral=120)
     laws = {"fold_law": law, "bend_law": law} if law else {}
     structure = fd.discretize(pattern, fd.Sheet(1e9, 0.3, 1e-3, 1000.0), **laws)
     damping = fd.Rayleigh() if law else fd.CreaseDamping(1e-3)
@@ -226,7 +228,7 @@ def test_folds_and_bends_of_a_sheet(law):
     start = fd.State(velocity=v)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", fd.errors.FoldynWarning)
-        fine = fd.simulate(case, 0.025, "rk4", dt=0.025 / 2**14, every=2**14, initial=start)
+        fine = fd.simulate(case, 0.025, method="rk4", dt=0.025 / 2**14, every=2**14, initial=start)
     found = controlled(case, 1e-7, 0.025, every=0.025, initial=start)
     assert apart(found, fine) < 1e-4
     assert float(found.dissipated[-1]) == pytest.approx(float(fine.dissipated[-1]), rel=1e-3)
@@ -247,11 +249,11 @@ def assert_goes_on(again, whole, first):
 
 def continued(case, method, folder, duration, **steps):
     """Two motions of `duration`, the second from the stored end of the first; and both in one."""
-    whole = fd.simulate(case, 2 * duration, method, **steps)
-    part = fd.simulate(case, duration, method, **steps)
+    whole = fd.simulate(case, 2 * duration, method=method, **steps)
+    part = fd.simulate(case, duration, method=method, **steps)
     fd.save(part, folder / "part.nc")
     stored = fd.initial_state(fd.load(folder / "part.nc"))
-    again = fd.simulate(case, duration, method, initial=stored, start=duration, **steps)
+    again = fd.simulate(case, duration, method=method, initial=stored, start=duration, **steps)
     assert again.attrs["started_from"] == "end of a motion"
     assert_goes_on(again, whole, len(part.time) - 1)
     return part, again
@@ -275,20 +277,24 @@ def test_they_go_on_with_steps_that_are_chosen_by_their_error(law, tmp_path):
 def test_explicit_motions_go_on_from_anywhere_bit_by_bit(name, method, tmp_path):
     """Also from a file, and wherever the first part was computed in stretches."""
     case = pushed(LAWS[name])
-    whole = fd.simulate(case, 2.0, method, **EXACT)
+    whole = fd.simulate(case, 2.0, method=method, **EXACT)
     fd.save(whole, tmp_path / "whole.nc")
     stored = fd.initial_state(fd.load(tmp_path / "whole.nc"), 8)
-    assert_goes_on(fd.simulate(case, 1.0, method, initial=stored, start=1.0, **EXACT), whole, 8)
+    assert_goes_on(
+        fd.simulate(case, 1.0, method=method, initial=stored, start=1.0, **EXACT), whole, 8
+    )
 
 
 def test_an_implicit_motion_that_goes_on_from_amid_another_is_near():
     """At its ends it is exact; between them memory is what matters."""
-    whole = fd.simulate(pushed(PRONY), 2.0, ALPHA, **EXACT)
+    whole = fd.simulate(pushed(PRONY), 2.0, method=ALPHA, **EXACT)
     forgotten = fd.State(whole.displacement[8].values, whole.velocity[8].values)
     near, far = (
         np.abs(opened(again) - opened(whole)[8:]).max()
         for state in (fd.initial_state(whole, 8), forgotten)
-        for again in [fd.simulate(pushed(PRONY), 1.0, ALPHA, initial=state, start=1.0, **EXACT)]
+        for again in [
+            fd.simulate(pushed(PRONY), 1.0, method=ALPHA, initial=state, start=1.0, **EXACT)
+        ]
     )
     assert near < 2e-8 and far > 1e-4
 
@@ -316,7 +322,10 @@ def test_supports_loads_and_folds_that_move_go_on(method, tmp_path):
 @pytest.mark.parametrize("method", [ALPHA, "energy_momentum"])
 def test_rotations_of_a_shell_go_on(method, tmp_path):
     """They have no mass, and where they are is no part of a displacement; 2 minutes, compiling."""
-    shell, push = fd.shell(fd.patterns.simple_fold(), HEAVY, 2), fd.Force([4], (0.0, 0.0, 1.0))
+    shell, push = (
+        fd.shell(fd.patterns.simple_fold(), HEAVY, divisions=2),
+        fd.Force([4], (0.0, 0.0, 1.0)),
+    )
     case = fd.Case(shell, [fd.Fix([0, 1], "xyz")], [push], fd.Rayleigh(0.1, 1e-3))
     continued(case, method, tmp_path, 0.1, dt=1e-3, every=20)
 
@@ -324,13 +333,13 @@ def test_rotations_of_a_shell_go_on(method, tmp_path):
 def test_a_continued_motion_runs_again_from_itself(tmp_path):
     _, again = continued(pushed(), ALPHA, tmp_path, 0.6, **STEPS)
     state = fd.initial_state(again, at=0)
-    once_more = fd.simulate(pushed(), 0.6, ALPHA, initial=state, start=0.6, **STEPS)
+    once_more = fd.simulate(pushed(), 0.6, method=ALPHA, initial=state, start=0.6, **STEPS)
     np.testing.assert_array_equal(once_more.displacement, again.displacement)
 
 
 @pytest.fixture(scope="module")
 def whole():
-    return fd.simulate(pushed(), 0.6, ALPHA, **STEPS)
+    return fd.simulate(pushed(), 0.6, method=ALPHA, **STEPS)
 
 
 CHANGES = {
@@ -348,7 +357,7 @@ def test_what_has_changed_starts_as_from_any_state(change, whole):
     changed, case = CHANGES[change]
     state = changed(fd.initial_state(whole))
     one, other = (
-        fd.simulate(case, 0.15, ALPHA, initial=start, start=0.6, **STEPS)
+        fd.simulate(case, 0.15, method=ALPHA, initial=start, start=0.6, **STEPS)
         for start in (state, replace(state, continuation=None))
     )
     assert one.attrs["started_from"] == "state"
@@ -357,13 +366,13 @@ def test_what_has_changed_starts_as_from_any_state(change, whole):
 
 def test_only_the_ends_of_a_motion_and_the_same_method_go_on(whole):
     end = fd.initial_state(whole)
-    other = fd.simulate(pushed(), 0.15, "newmark", initial=end, **STEPS)
+    other = fd.simulate(pushed(), 0.15, method="newmark", initial=end, **STEPS)
     assert other.attrs["started_from"] == "state"
-    beyond = fd.simulate(pushed(), 0.61, ALPHA, **STEPS)  # ends beyond its last sample
+    beyond = fd.simulate(pushed(), 0.61, method=ALPHA, **STEPS)  # ends beyond its last sample
     states = [fd.initial_state(beyond), fd.initial_state(whole, at=1)]
     states.append(fd.initial_state(whole.isel(time=slice(0, 3))))
     assert [state.continuation for state in states] == [None] * 3
-    assert "continuation" not in fd.simulate(pushed(), 0.15, "rk4", **STEPS)
+    assert "continuation" not in fd.simulate(pushed(), 0.15, method="rk4", **STEPS)
 
 
 # ------------------------------------------------------------------ what laws are, and take
@@ -374,13 +383,13 @@ def test_a_structure_that_has_moved_does_the_same_work(name, method):
     s = fold(120, preset="plate", crease_stiffness=0.2, fold_law=LAWS[name])
     loads = fd.Force([4, 5], (0.0, 0.0, 0.01)), fd.CreaseMoment("all", 0.02, fd.Ramp(0.4))
     other, case = (fd.Case(s, [fd.Fix([0, 1, 2, 3])], [load]) for load in loads)
-    first, _, again = (fd.simulate(each, 0.2, method) for each in (case, other, case))
+    first, _, again = (fd.simulate(each, 0.2, method=method) for each in (case, other, case))
     np.testing.assert_array_equal(again.work, first.work)
 
 
 def test_a_law_without_branches_that_matter_is_its_elastic_part():
-    weak = fd.simulate(pushed(fd.Prony(1e-12, 1.0, law="linear")), 1.0, "rk4", dt=2.0**-9)
-    plain = fd.simulate(pushed("linear"), 1.0, "rk4", dt=2.0**-9)
+    weak = fd.simulate(pushed(fd.Prony(1e-12, 1.0, law="linear")), 1.0, method="rk4", dt=2.0**-9)
+    plain = fd.simulate(pushed("linear"), 1.0, method="rk4", dt=2.0**-9)
     np.testing.assert_allclose(opened(weak), opened(plain), rtol=0, atol=1e-11)
     assert "memory" not in plain
 
@@ -395,7 +404,7 @@ def test_the_critical_step_counts_what_resists_at_once():
 def test_states_of_other_cases_and_kinds_are_refused():
     state = fd.State(memory=np.zeros((3, 2)))
     with pytest.raises(InputError, match=r"memory of shape .*the case has \(2, 2\)"):
-        fd.simulate(one_hinge(PRONY), 0.1, "rk4", initial=state)
+        fd.simulate(one_hinge(PRONY), 0.1, method="rk4", initial=state)
     with pytest.raises(InputError, match='memory = "old": choose one of fresh'):
         fd.State(memory="old")
     with pytest.raises(InputError, match=r"continuation: got list; it comes from fd.initial_state"):

@@ -61,7 +61,7 @@ def test_strong_damping_converges_as_fast(method):
     for ratio in (0.0, 5.0):
         case = sheet("bars", damping=fd.ModalDamping(ratio, 4))
         start = fd.State(velocity=1e-4 * ~case.fixed * [0.0, 0.0, 1.0])
-        motion = fd.simulate(case, 1.0, method, dt=0.01, initial=start)
+        motion = fd.simulate(case, 1.0, method=method, dt=0.01, initial=start)
         iterations.append(motion.attrs["iterations"])
     assert iterations[1] < 1.3 * iterations[0]
 
@@ -73,7 +73,7 @@ def test_ratios_of_rayleigh(model, count):
     ratios = fd.modes(plain, count).damping_ratio.values.tolist()
     modal = plain.altered(damping=fd.ModalDamping(ratios))
     options = {"dt": 2e-3, "initial": shaken(plain, 1e-4), "every": 10}
-    one, other = (fd.simulate(case, 0.5, "newmark", **options) for case in (plain, modal))
+    one, other = (fd.simulate(case, 0.5, method="newmark", **options) for case in (plain, modal))
     assert apart(other, one) < 2e-3
     assert float(one.dissipated[-1]) == pytest.approx(float(other.dissipated[-1]), rel=2e-3)
 
@@ -112,8 +112,8 @@ def test_a_moving_base():
     case = sheet("bars", damping=fd.ModalDamping(0.1))
     f = 0.7 * float(fd.modes(case, 1).frequency[0])
     driven = case.altered(supports=[*case.supports, fd.BaseMotion("z", fd.Harmonic(f), 1e-5)])
-    motion = fd.simulate(driven, 25 / f, "newmark", dt=1 / (200 * f), every=20)
-    exact = complex(fd.frf(case, fd.BaseMotion("z"), [f]).transmissibility[0, 8, 2])
+    motion = fd.simulate(driven, 25 / f, method="newmark", dt=1 / (200 * f), every=20)
+    exact = complex(fd.frf(case, fd.BaseMotion("z"), frequencies=[f]).transmissibility[0, 8, 2])
     assert steady(motion, 8, 2, f, after=15 / f) / 1e-5 == pytest.approx(exact, rel=5e-3)
     assert motion.attrs["energy_error"] < 1e-3
 

@@ -30,7 +30,12 @@ def test_order_on_linear_and_duffing_oscillators(method, cubic):
     steps, errors = [80, 160, 320, 640], []
     for n in steps:
         motion = fd.simulate(
-            case, duration, method, dt=duration / n, initial=released(a), **equal_steps(method)
+            case,
+            duration,
+            method=method,
+            dt=duration / n,
+            initial=released(a),
+            **equal_steps(method),
         )
         m = c * a**2 / (2.0 * (1.0 + c * a**2))
         sn, cn, dn, _ = special.ellipj(fast * motion.time.values, m)
@@ -62,7 +67,7 @@ def test_damped_motion(alpha, beta, method):
         steps //= 6  # else rounding hides the order
     for n in steps:
         motion = fd.simulate(
-            case, 3.0, method, dt=3.0 / n, initial=released(0.1), **equal_steps(method)
+            case, 3.0, method=method, dt=3.0 / n, initial=released(0.1), **equal_steps(method)
         )
         ratio = alpha / (2.0 * OMEGA) + beta * OMEGA / 2.0
         exact = 0.1 * damped(motion.time.values, OMEGA, ratio)

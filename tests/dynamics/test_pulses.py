@@ -97,7 +97,7 @@ def test_random_pulses_on_a_moving_oscillator(method):
     """The same for pulses that arrive while it swings: superposition holds."""
     swing = fd.State(velocity=[[0, 0, 0], [0.3, 0, 0]])
     for history in random_pulses(6, seed=21):
-        motion = fd.simulate(pushed(history), 5.0, method, every=0.25, initial=swing)
+        motion = fd.simulate(pushed(history), 5.0, method=method, every=0.25, initial=swing)
         t = motion.time.values
         exact = duhamel(history, t) + 0.3 / OMEGA * np.sin(OMEGA * t)
         assert error(motion, exact) < 2.0 * GLOBAL, history
@@ -139,7 +139,7 @@ def test_supports_and_folds_that_move_for_a_moment(method):
     turned = fd.Case(s, [base], [fd.Actuate("all", angle=290.0, history=bump)])
     for case in (moved, based, turned):
         true, found = (
-            fd.simulate(case, 0.4, name, every=0.02, dt=dt).displacement.values[16:]
+            fd.simulate(case, 0.4, method=name, every=0.02, dt=dt).displacement.values[16:]
             for name, dt in (("rk4", 2.5e-5), (method, None))
         )
         assert apart(found, true) < 0.02
@@ -150,7 +150,7 @@ def test_steps_end_at_knots():
     tap = fd.Table([0.0, 0.31, 0.32, 0.33], [0, 0, 1, 0])
     case = pulled(pushed(tap), 0.5, fd.HalfSine(duration=0.57))
     for method in ADAPTIVE:
-        times = fd.simulate(case, 1.0, method, every=1).time.values
+        times = fd.simulate(case, 1.0, method=method, every=1).time.values
         for knot in (0.31, 0.32, 0.33, 0.57):
             assert np.abs(times - knot).min() < 1e-12, (method, knot)
     curve = np.linspace(0.0, 1.0, 401)
@@ -164,7 +164,7 @@ def test_steps_end_at_knots():
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_periods_that_fit_the_steps_are_not_lost(method):
     """A hum whose period divides every step that would be tried first, from rest."""
-    motion = fd.simulate(pushed(fd.Harmonic(frequency=50.0)), 2.0, method, every=0.5)
+    motion = fd.simulate(pushed(fd.Harmonic(frequency=50.0)), 2.0, method=method, every=0.5)
     t, fast = motion.time.values, 2.0 * np.pi * 50.0
     exact = np.sin(fast * t) - fast / OMEGA * np.sin(OMEGA * t)
     assert error(motion, exact / (MASS * (OMEGA**2 - fast**2))) < GLOBAL
@@ -173,7 +173,7 @@ def test_periods_that_fit_the_steps_are_not_lost(method):
 def test_slow_loads_still_take_few_steps():
     """What the load does within a step costs no steps where it is slow and smooth."""
     case = pulled(spring(OMEGA, alpha=4.0), 1.0, fd.Ramp(duration=400.0, smooth=True))
-    assert fd.simulate(case, 400.0, "newmark").attrs["steps"] < 600
+    assert fd.simulate(case, 400.0, method="newmark").attrs["steps"] < 600
 
 
 @pytest.mark.parametrize("method", ["rk4", "central_difference", *IMPLICIT])
@@ -188,12 +188,12 @@ def test_fixed_steps_that_miss_a_pulse_say_so(method):
         assert tried(pushed(history), 2.0, method, dt=0.01)[1]
     slow = (fd.HalfSine(0.5), fd.Pulse(0.777), fd.Ramp(1.0), fd.Harmonic(2.0), fd.Step(0.3))
     for history in slow:
-        fd.simulate(pushed(history), 2.0, method, dt=0.01)  # silent
+        fd.simulate(pushed(history), 2.0, method=method, dt=0.01)  # silent
 
 
 def test_a_half_sine_as_long_as_the_fixed_step_says_so():
     with pytest.warns(FoldynWarning, match="half_sine of a load"):
-        motion = fd.simulate(pushed(fd.HalfSine(0.01)), 1.0, "newmark", dt=0.01)
+        motion = fd.simulate(pushed(fd.HalfSine(0.01)), 1.0, method="newmark", dt=0.01)
     assert float(np.abs(motion.displacement).max()) == 0.0  # the fault that the warning names
 
 
@@ -212,8 +212,8 @@ def test_functions_are_looked_at_within_steps_and_warned_about():
     named = Function(tap, at=[0.92, 0.88, 0.9])
     assert named.knots() == (0.88, 0.9, 0.92)
     with pytest.warns(FoldynWarning, match=r"fd\.Function\(f, at="):
-        found = fd.simulate(pushed(tap), 2.0, "newmark", every=0.1)
-    again = fd.simulate(pushed(named), 2.0, "newmark", every=0.1)  # without a warning
+        found = fd.simulate(pushed(tap), 2.0, method="newmark", every=0.1)
+    again = fd.simulate(pushed(named), 2.0, method="newmark", every=0.1)  # without a warning
     exact = duhamel(fd.Table([0.88, 0.9, 0.92], [0, 1, 0]), found.time.values)
     assert max(error(motion, exact) for motion in (found, again)) < GLOBAL
     with pytest.raises(InputError, match="at"):
@@ -222,4 +222,4 @@ def test_functions_are_looked_at_within_steps_and_warned_about():
 
 def test_small_motions_say_that_their_errors_are_not_judged():
     with pytest.warns(FoldynWarning, match="the motion is small"):
-        fd.simulate(pushed(fd.HalfSine(0.5), 1e-9), 1.0, "newmark")
+        fd.simulate(pushed(fd.HalfSine(0.5), 1e-9), 1.0, method="newmark")

@@ -33,7 +33,7 @@ def test_order_and_energy_law(tableau):
     case = spring(OMEGA, alpha=0.3, beta=0.02)
     steps, errors, balances = np.array([100, 200, 400]), [], []
     for n in steps:
-        motion = fd.simulate(case, 3.0, tableau.name, dt=3.0 / n, initial=released(0.1))
+        motion = fd.simulate(case, 3.0, method=tableau.name, dt=3.0 / n, initial=released(0.1))
         exact = 0.1 * damped(motion.time.values, OMEGA, 0.15 / OMEGA + 0.01 * OMEGA)
         errors.append(np.abs(place(motion) - exact).max())
         energy = motion.kinetic + motion.strain_bars + motion.dissipated
@@ -68,7 +68,9 @@ def test_gradients_are_those_of_the_method_itself(tableau):
     dt = float(0.8 * fd.critical_step(case(own), tableau.name))
     options = {"duration": float(200 * dt), "method": tableau.name, "dt": dt, "every": 50}
     analysis = {"kind": "dynamics", **options}
-    found = fd.sensitivity(case(own), ["fold_stiffness"], "displacement[8,x]", analysis)
+    found = fd.sensitivity(
+        case(own), ["fold_stiffness"], measures="displacement[8,x]", analysis=analysis
+    )
     slope = found["gradient_fold_stiffness"].values[0] @ own
 
     def end(h):
@@ -87,7 +89,7 @@ def test_a_history_is_looked_at_where_the_tableau_says():
         seen.append(np.asarray(t, float).ravel())
         return np.zeros_like(t)
 
-    fd.simulate(pulled(spring(OMEGA), 1.0, history), 0.3, "heun3", dt=0.003)
+    fd.simulate(pulled(spring(OMEGA), 1.0, history), 0.3, method="heun3", dt=0.003)
     wanted = np.add.outer(0.003 * np.arange(100), 0.003 * np.array([0.0, 1 / 3, 2 / 3]))
     times = np.sort(np.concatenate(seen))
     assert (

@@ -117,9 +117,9 @@ def test_a_motion_goes_on_from_where_it_was_stored(method, mass):
     case, found = fd.Case(cell(sheet=HEAVY, mass=mass, **LINEAR), supports), []
     for n in [2000] if method == "rk4" else [200, 400]:
         options = {"dt": 0.02 / n, "every": n // 20}
-        whole = fd.simulate(case, 0.02, method, **options)
+        whole = fd.simulate(case, 0.02, method=method, **options)
         middle = fd.initial_state(whole, at=10)
-        rest = fd.simulate(case, 0.01, method, initial=middle, start=0.01, **options)
+        rest = fd.simulate(case, 0.01, method=method, initial=middle, start=0.01, **options)
         np.testing.assert_allclose(rest.time, whole.time[10:], rtol=1e-14)
         late = whole.isel(time=slice(10, None))
         found.append(max(apart(rest, late), apart(rest, late, "velocity")))
@@ -148,7 +148,7 @@ def test_a_result_can_be_run_again_from_itself():
 @pytest.mark.parametrize("method", ["rk4", "newmark"])
 def test_progress_is_told(method):
     seen = []
-    fd.simulate(case2(), 1.0, method, every=0.1, progress=seen.append)
+    fd.simulate(case2(), 1.0, method=method, every=0.1, progress=seen.append)
     times = [state.time for state in seen]
     assert times == sorted(times)
     assert times[-1] == pytest.approx(1.0) == seen[-1].duration
@@ -188,7 +188,7 @@ def test_panels_that_pass_through_each_other_stop_the_motion(method, options):
     v[[0, 1], 0], v[[4, 5], 0] = 10.0, -10.0
     start = fd.State(velocity=v)
     with pytest.raises(errors.PenetrationError, match="panel passed through panel") as caught:
-        fd.simulate(fd.Case(s), 2.0, method, initial=start, **options)
+        fd.simulate(fd.Case(s), 2.0, method=method, initial=start, **options)
     folds, _ = s.dihedrals(caught.value.partial.displacement[-1])
     assert folds[0] > np.radians(300)
 
@@ -198,7 +198,7 @@ def test_stiffening_is_noticed_or_followed():
     case, fast = oscillator(duffing_law(1e3), 8.0), released(0.0, speed=20.0)
     with pytest.raises(errors.InstabilityError):
         fd.simulate(case, 40.0, dt=0.99 * fd.critical_step(case), initial=fast)
-    motion = fd.simulate(case, 4.0, "energy_momentum", dt=0.01, initial=fast)
+    motion = fd.simulate(case, 4.0, method="energy_momentum", dt=0.01, initial=fast)
     assert motion.attrs["energy_error"] < 1e-9
     assert float(np.abs(motion.velocity).max()) < 20.5
 
@@ -214,7 +214,7 @@ def test_stiffening_is_noticed_or_followed():
 def test_what_goes_wrong_is_named_and_the_motion_until_then_kept(method, options):
     bad = case2(lambda t: np.where(t > 0.3, np.nan, 1.0))
     with pytest.raises(errors.InstabilityError, match="finite number at every time") as caught:
-        fd.simulate(bad, 1.0, method, **options)
+        fd.simulate(bad, 1.0, method=method, **options)
     assert 0.0 < float(caught.value.partial.time[-1]) <= 0.31
 
     def broken(t):
@@ -223,14 +223,14 @@ def test_what_goes_wrong_is_named_and_the_motion_until_then_kept(method, options
         return np.ones_like(t)
 
     with pytest.raises((errors.InstabilityError, ArithmeticError), match=r"beyond 0\.3 s"):
-        fd.simulate(case2(broken), 1.0, method, **options)
+        fd.simulate(case2(broken), 1.0, method=method, **options)
 
     def stop(state):
         if state.time > 0.2:
             raise KeyboardInterrupt
 
     with pytest.raises(errors.MotionInterrupted, match="interrupted at t =") as interrupted:
-        fd.simulate(case2(), 10.0, method, progress=stop, **options)
+        fd.simulate(case2(), 10.0, method=method, progress=stop, **options)
     kept = interrupted.value.partial
     assert 0.2 < float(kept.time[-1]) < 9.0
     assert np.isfinite(kept.displacement).all()
@@ -241,11 +241,11 @@ def test_nodes_without_mass_or_stiffness_are_refused():
     for method, mass in (("rk4", "mixed_voronoi"), ("newmark", "consistent")):
         s = fd.discretize(pattern, SHEET, mass=mass, preset="herkal")
         with pytest.raises(errors.InputError, match="node 4 is free but has no mass"):
-            fd.simulate(fd.Case(s), 0.1, method)
-        fd.simulate(fd.Case(s, [fd.Fix([4], "xyz")]), 0.1, method)
+            fd.simulate(fd.Case(s), 0.1, method=method)
+        fd.simulate(fd.Case(s, [fd.Fix([4], "xyz")]), 0.1, method=method)
     s = fd.discretize(pattern, SHEET, preset="herkal")
     with pytest.raises(errors.InstabilityError, match="a mass or a stiffness may be missing"):
-        fd.simulate(fd.Case(s, [], [fd.Force([4], (1.0, 0.0, 0.0))]), 0.1, "newmark")
+        fd.simulate(fd.Case(s, [], [fd.Force([4], (1.0, 0.0, 0.0))]), 0.1, method="newmark")
 
 
 @pytest.mark.parametrize(
@@ -264,7 +264,7 @@ def test_settles_in_the_static_equilibrium(method, bend_law, expected):
     s = fold(mass="circumcenter", bend_law=bend_law)
     slow, push = (fd.Force([0, 1], (-1e-3, 0.0, 0.0), h) for h in (fd.Ramp(5.0), None))
     case = fd.Case(s, FOLD_HELD, [slow], fd.Rayleigh(3.0))
-    end = fd.simulate(case, 25.0, method, every=5.0).displacement.values[-1]
+    end = fd.simulate(case, 25.0, method=method, every=5.0).displacement.values[-1]
     np.testing.assert_allclose(end[[0, 1], 0], -expected, atol=5e-5)
     path = fd.trace(fd.Case(s, FOLD_HELD, [push])).displacement.values[-1]
     assert apart(end, path) < 1e-4
@@ -277,7 +277,9 @@ def test_a_free_fold_comes_to_rest_at_its_new_angle(method):
         bend_law="linear", fold_law="linear" if method == "rk4" else fd.EnhancedLinear(90, 270)
     )
     go = fd.Actuate([0], 200.0, fd.Ramp(duration=3.0, smooth=True))
-    motion = fd.simulate(fd.Case(s, loads=[go], damping=fd.Rayleigh(alpha=6.0)), 12.0, method)
+    motion = fd.simulate(
+        fd.Case(s, loads=[go], damping=fd.Rayleigh(alpha=6.0)), 12.0, method=method
+    )
     folds, _ = s.dihedrals(motion.displacement[-1])
     assert np.degrees(folds[0]) == pytest.approx(200.0, abs=0.05)
     assert float(motion.strain_folds[-1]) < 1e-5 * float(motion.work[-1])
@@ -293,7 +295,9 @@ def test_small_vibrations_have_the_frequency_of_the_mode_without_a_secant():
     assert fd.critical_step(case) > 4e-4  # s
     shape, period = mode.shape.values[0], 1.0 / float(mode.frequency[0])
     start = fd.State(1e-4 * shape / np.abs(shape).max())
-    motion = fd.simulate(case, period, "newmark", dt=period / 400, every=period, initial=start)
+    motion = fd.simulate(
+        case, period, method="newmark", dt=period / 400, every=period, initial=start
+    )
     np.testing.assert_allclose(motion.displacement[-1], start.displacement, atol=2e-7)
 
 
@@ -343,7 +347,7 @@ def test_damping_that_costs_many_explicit_steps_is_told_with_a_remedy():
     said = "the damping of strain rates makes the critical step"
     with pytest.warns(errors.FoldynWarning, match=said):
         fd.simulate(follows, 1e-3)
-    motion = fd.simulate(follows, 1.0, "generalized_alpha", every=0.1)  # without a word
+    motion = fd.simulate(follows, 1.0, method="generalized_alpha", every=0.1)  # without a word
     assert motion.attrs["steps"] < 2000
 
 

@@ -20,7 +20,7 @@ DP = "dormand_prince"
 
 def swung(method: str, **options):
     """A motion of two and a half periods, and its error."""
-    motion = fd.simulate(SPRING, 4.0, method, initial=START, **options)
+    motion = fd.simulate(SPRING, 4.0, method=method, initial=START, **options)
     return motion, np.abs(place(motion) - 0.1 * np.cos(OMEGA * motion.time.values)).max()
 
 
@@ -48,7 +48,7 @@ def test_the_error_follows_the_tolerance(method, tolerance, power, near, error):
 def test_steps_grow_where_the_motion_is_smooth(method):
     """A vibration that has died out under a slow load: few steps for a long time."""
     case = pulled(spring(OMEGA, alpha=4.0), 1.0, fd.Ramp(duration=40.0, smooth=True))
-    motion = fd.simulate(case, 40.0, method, initial=START)
+    motion = fd.simulate(case, 40.0, method=method, initial=START)
     t = motion.time.values
     assert (t < 4.0).sum() > 2 * (t > 20.0).sum()
     assert len(t) < 0.4 * 40.0 * OMEGA / (2.0 * np.pi) * 130
@@ -112,7 +112,7 @@ def test_a_load_that_jumps_within_a_step(method):
     case = pulled(SPRING, 1.0, fd.Pulse(duration=0.777))
 
     def run(duration=2.0, **options):
-        motion = fd.simulate(case, duration, method, **options)
+        motion = fd.simulate(case, duration, method=method, **options)
         return motion, np.abs(place(motion) - after_pulse(motion.time.values, OMEGA, 0.777)).max()
 
     adaptive, error = run(**({"tolerance": 1e-9} if method == DP else {}))
@@ -135,14 +135,14 @@ def test_two_jumps_within_a_nanosecond_are_one(method):
     one = case2().altered(loads=[push, fd.Force([7], (0.001, 0, 0), fd.Step(jump))])
     halves = [fd.Force([7], (5e-4, 0, 0), fd.Step(jump - late)) for late in (0.0, 4e-11)]
     found = [
-        fd.simulate(case, 0.1, method, dt=0.01, every=10).displacement.values[-1]
+        fd.simulate(case, 0.1, method=method, dt=0.01, every=10).displacement.values[-1]
         for case in (one, one.altered(loads=[push, *halves]))
     ]
     np.testing.assert_allclose(*found, rtol=0, atol=1e-7 * np.abs(found[0]).max())
 
 
 def test_statistics_travel_with_the_result(tmp_path):
-    motion = fd.simulate(case2(), 0.5, "generalized_alpha", every=0.1, spectral_radius=0.5)
+    motion = fd.simulate(case2(), 0.5, method="generalized_alpha", every=0.1, spectral_radius=0.5)
     fd.save(motion, tmp_path / "run.nc")
     a = fd.load(tmp_path / "run.nc").attrs
     wanted = {"critical_step": np.inf, "spectral_radius": 0.5, "halved_steps": 0}
@@ -158,10 +158,10 @@ def test_statistics_travel_with_the_result(tmp_path):
 def test_steps_on_which_newton_fails_are_halved_and_counted():
     """A spinning soft sheet with a tenth of a radian a step: some steps are taken in parts."""
     paper = fd.Sheet(1.219e9, 0.2, 0.24e-3, 667.0, length_scale_ratio=2.7)
-    pattern = fd.patterns.miura((2, 1), 0.025, 0.025, dihedral=90)
+    pattern = fd.patterns.miura((2, 1), 0.025, b=0.025, dihedral=90)
     s = fd.discretize(pattern, paper, bend_law="linear", preset="herkal")
     start = spinning(s, (2.0, 80.0, 1.5))
-    motion = fd.simulate(fd.Case(s), 0.4, "energy_momentum", dt=4e-3, initial=start)
+    motion = fd.simulate(fd.Case(s), 0.4, method="energy_momentum", dt=4e-3, initial=start)
     assert 0 < motion.attrs["halved_steps"] <= 100
     np.testing.assert_allclose(motion.time, 4e-3 * np.arange(101), rtol=1e-12)
     assert motion.attrs["energy_error"] < 1e-9
@@ -187,11 +187,11 @@ def test_moments_that_jump_do_the_work_that_is_stored_and_lost(preset, law):
     made = fold(120, preset=preset, crease_stiffness=0.2, fold_law=law)
     jump = fd.CreaseMoment("all", 0.05, fd.Pulse(0.1))
     case = fd.Case(made, [fd.Fix([0, 1, 2, 3])], [jump], damping=fd.Rayleigh(0.1))
-    motion = fd.simulate(case, 0.2, DP, every=0.05, tolerance=1e-7)
+    motion = fd.simulate(case, 0.2, method=DP, every=0.05, tolerance=1e-7)
     assert motion.attrs["energy_error"] < 3e-6
 
 
 def test_the_work_of_an_angle_that_stops_turning_where_the_motion_ends():
     made = fd.discretize(fd.patterns.simple_fold(dihedral=120), SHEET, crease_stiffness=0.2)
     case = fd.Case(made, [fd.Fix([0, 1, 2, 3])], [fd.Actuate("all", 115.0, fd.Ramp(0.1))])
-    assert fd.simulate(case, 0.1, DP).attrs["energy_error"] < 1e-6
+    assert fd.simulate(case, 0.1, method=DP).attrs["energy_error"] < 1e-6

@@ -42,7 +42,7 @@ def case(structure=SHEET, loads=None, supports=()):
 
 def on(monkeypatch, threads, what, method, duration=0.02, **options):
     monkeypatch.setattr(methods, "threads_of", lambda packed: threads)
-    ds = fd.simulate(what, duration, method, **options)
+    ds = fd.simulate(what, duration, method=method, **options)
     assert ds.attrs["threads"] == threads
     return ds
 

@@ -39,4 +39,4 @@ def tracked(sharp):
     from foldyn.experiment import Placing, Tracking, track_film
 
     tracking = Tracking(placing=Placing(metres_per_pixel=SCALE, distance=DISTANCE))
-    return track_film(str(sharp.path), sharp.model, tracking)
+    return track_film(str(sharp.path), sharp.model, tracking=tracking)

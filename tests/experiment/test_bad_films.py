@@ -84,9 +84,9 @@ def test_a_model_that_is_not_there(tmp_path):
 def test_more_nodes_than_points(sharp):
     few = Tracking(corners=CornerSettings(most=8), nodes=tuple(range(20)))
     with pytest.raises(InputError, match="8 points are tracked, fewer than the 20 nodes"):
-        track_film(str(sharp.path), sharp.model, few)
+        track_film(str(sharp.path), sharp.model, tracking=few)
     with pytest.raises(InputError, match="99 is no vertex"):
-        track_film(str(sharp.path), sharp.model, Tracking(nodes=(99,)))
+        track_film(str(sharp.path), sharp.model, tracking=Tracking(nodes=(99,)))
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ def test_photographs_have_one_size(sharp, tmp_path):
 def test_a_reach_longer_than_the_picture(sharp):
     long = Tracking(corners=CornerSettings(reach=1e9))
     with pytest.raises(InputError, match=r"--reach 1e\+09: at most 145 pixels"):
-        track_film(str(sharp.path), sharp.model, long)
+        track_film(str(sharp.path), sharp.model, tracking=long)
 
 
 @pytest.mark.parametrize(

@@ -108,11 +108,11 @@ def test_scale_of_a_chessboard():
     photo = np.full((400, 500), 225, np.uint8)
     photo[60:240, 70:310] = board
     photo = cv2.GaussianBlur(photo, (0, 0), 0.8)
-    scale = scale_of_target(photo, 7, 5, 0.003)
+    scale = scale_of_target(photo, 7, rows=5, square=0.003)
     assert scale.metres_per_pixel == pytest.approx(1e-4, rel=1e-3)
     assert scale.spread < 0.01
     with pytest.raises(InputError, match="no chessboard"):
-        scale_of_target(np.full((400, 500), 128, np.uint8), 7, 5, 0.003)
+        scale_of_target(np.full((400, 500), 128, np.uint8), 7, rows=5, square=0.003)
 
 
 NODES = np.array([0, 3, 4])

@@ -42,7 +42,7 @@ def histories(path, nodes, noise=0.0, **known) -> TimeHistory:
 
 def test_exact_forces_give_the_parameters_exactly(pressed) -> None:
     theta = Parameter("model.fold_law.theta2", 280.0, 240.0, 299.0)
-    found = fd.fit(pressed, [forces(pressed)], [RATIO, theta])
+    found = fd.fit(pressed, [forces(pressed)], parameters=[RATIO, theta])
     assert found["sheet.length_scale_ratio"].value == pytest.approx(1.0, rel=1e-5)
     assert found["model.fold_law.theta2"].value == pytest.approx(290.0, rel=1e-5)
     assert found.descents[0].converged
@@ -51,7 +51,7 @@ def test_exact_forces_give_the_parameters_exactly(pressed) -> None:
 
 def test_a_tie_follows_its_parameter(pressed) -> None:
     ties = {"sheet.thickness": "0.01 * sheet.length_scale_ratio"}
-    found = fd.fit(pressed, [forces(pressed, 1e-5)], [RATIO], ties=ties)
+    found = fd.fit(pressed, [forces(pressed, 1e-5)], parameters=[RATIO], ties=ties)
     document = found.document()
     ratio = found["sheet.length_scale_ratio"].value
     assert document["sheet"]["thickness"] == pytest.approx(0.01 * ratio, rel=1e-12)
@@ -59,8 +59,8 @@ def test_a_tie_follows_its_parameter(pressed) -> None:
 
 
 def test_intervals_follow_the_noise(pressed) -> None:
-    small = fd.fit(pressed, [forces(pressed, 1e-5, sigma=1e-5)], [RATIO])
-    large = fd.fit(pressed, [forces(pressed, 1e-4, sigma=1e-4)], [RATIO])
+    small = fd.fit(pressed, [forces(pressed, 1e-5, sigma=1e-5)], parameters=[RATIO])
+    large = fd.fit(pressed, [forces(pressed, 1e-4, sigma=1e-4)], parameters=[RATIO])
     one, other = small.estimates[0], large.estimates[0]
     assert other.standard_error == pytest.approx(10.0 * one.standard_error, rel=0.05)
     assert one.lower < 1.0 < one.upper
@@ -70,7 +70,7 @@ def test_intervals_follow_the_noise(pressed) -> None:
 
 def test_what_the_data_cannot_tell_is_said(pressed) -> None:
     density = Parameter("sheet.density", 2.0)
-    found = fd.fit(pressed, [forces(pressed, 1e-5)], [RATIO, density])
+    found = fd.fit(pressed, [forces(pressed, 1e-5)], parameters=[RATIO, density])
     assert found["sheet.length_scale_ratio"].determined
     assert not found["sheet.density"].determined
     assert found["sheet.density"].standard_error == np.inf
@@ -86,18 +86,18 @@ def test_parameters_of_which_only_quotients_count(swung) -> None:
         Parameter("sheet.youngs_modulus", 1e6, 2e5, 5e6),
         Parameter("loads[0].force[0]", -1e-3, -5e-3, -2e-4),
     ]
-    found = fd.fit(swung, [data], [*three, ALPHA])
+    found = fd.fit(swung, [data], parameters=[*three, ALPHA])
     assert [one.determined for one in found.estimates] == [False, False, False, True]
     assert found.singular_values[3] < 1e-5 * found.singular_values[0]
     scaled = np.abs(found.directions[3]) / [*found.values.values()] * [1.0, 1e6, -1e-3, 1.0]
     np.testing.assert_allclose(scaled / scaled[0], [1, 1, 1, 0], atol=1e-3)
-    two = fd.fit(swung, [data], [*three[:2], ALPHA])
+    two = fd.fit(swung, [data], parameters=[*three[:2], ALPHA])
     assert all(one.determined for one in two.estimates)
     assert two["sheet.youngs_modulus"].value == pytest.approx(1e6, rel=0.01)
 
 
 def test_a_parameter_at_its_bound_is_said_to_be_there(pressed) -> None:
-    found = fd.fit(pressed, [forces(pressed)], [Parameter(RATIO.key, 2.0, 1.5, 5.0)])
+    found = fd.fit(pressed, [forces(pressed)], parameters=[Parameter(RATIO.key, 2.0, 1.5, 5.0)])
     assert found.estimates[0].at_bound
     assert found.estimates[0].value == pytest.approx(1.5, rel=1e-3)
     assert "at its bound" in found.estimates[0].note
@@ -106,7 +106,7 @@ def test_a_parameter_at_its_bound_is_said_to_be_there(pressed) -> None:
 def test_damping_from_a_history_scored_on_held_out_nodes(swung) -> None:
     fitted = histories(swung, [0], 1e-5, sigma=1e-5, name="edge")
     kept = histories(swung, [2, 3], 1e-5, sigma=1e-5, name="ridge", held_out=True)
-    found = fd.fit(swung, [fitted, kept], [ALPHA])
+    found = fd.fit(swung, [fitted, kept], parameters=[ALPHA])
     alpha = found["damping.alpha"]
     assert alpha.value == pytest.approx(0.4, abs=4.0 * alpha.standard_error)
     assert alpha.standard_error < 0.02
@@ -118,14 +118,14 @@ def test_damping_from_a_history_scored_on_held_out_nodes(swung) -> None:
 def test_held_out_data_do_not_move_the_fit(swung) -> None:
     fitted = histories(swung, [0], 1e-5)
     wrong = TimeHistory(nodes=[2], time=TIME, values=np.sin(9.0 * TIME), held_out=True)
-    alone, both = (fd.fit(swung, data, [ALPHA]) for data in ([fitted], [fitted, wrong]))
+    alone, both = (fd.fit(swung, data, parameters=[ALPHA]) for data in ([fitted], [fitted, wrong]))
     assert both.values == alone.values
     assert both.scores[1].rms > 0.1
 
 
 def test_a_case_of_statics_and_one_of_dynamics_together(pressed, swung) -> None:
     known = histories(swung, [0], 1e-5, sigma=1e-5, case=swung)
-    found = fd.fit(pressed, [forces(pressed, 1e-5, sigma=1e-5), known], [RATIO, ALPHA])
+    found = fd.fit(pressed, [forces(pressed, 1e-5, sigma=1e-5), known], parameters=[RATIO, ALPHA])
     for one, truth in zip(found.estimates, (1.0, 0.4), strict=True):
         assert one.value == pytest.approx(truth, abs=4.0 * one.standard_error)
     assert len(found.problem.runs) == 2
@@ -138,7 +138,7 @@ def test_each_measurement_may_change_the_case(pressed) -> None:
     one, other = problem(pressed, both, [RATIO], {}).predict([1.0])
     assert np.abs(other / one).min() > 4.0
     data = [replace(each, force=f) for each, f in zip(both, (one, other), strict=True)]
-    found = fd.fit(pressed, data, [RATIO])
+    found = fd.fit(pressed, data, parameters=[RATIO])
     assert found.estimates[0].value == pytest.approx(1.0, rel=1e-5)
 
 
@@ -149,12 +149,12 @@ def test_shapes_under_a_force_give_a_stiffness(tmp_path) -> None:
     state = fd.trace(fd.read_case(path).case(), load_factors=[0.5, 1.0])
     seen = state.displacement.sel(node=[0, 2], axis=["x", "z"]).values
     one = Shapes(nodes=[0, 2], load_factor=[0.5, 1.0], values=seen, axes="xz")
-    found = fd.fit(path, [one], [Parameter("sheet.youngs_modulus", 2e6, 1e5, 1e7)])
+    found = fd.fit(path, [one], parameters=[Parameter("sheet.youngs_modulus", 2e6, 1e5, 1e7)])
     assert found.estimates[0].value == pytest.approx(1e6, rel=1e-4)
 
 
 def test_searches_from_several_starts_agree(pressed) -> None:
-    found = fd.fit(pressed, [forces(pressed, 1e-5)], [RATIO], starts=4, seed=2)
+    found = fd.fit(pressed, [forces(pressed, 1e-5)], parameters=[RATIO], starts=4, seed=2)
     assert len(found.descents) == found.agreeing == 4
     assert len({one.start for one in found.descents}) == 4
     assert min(one.cost for one in found.descents) == pytest.approx(
@@ -172,23 +172,23 @@ def test_a_fit_goes_on_where_it_was_cut_off(pressed, tmp_path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        fd.fit(pressed, data, [RATIO], folder=tmp_path, progress=stop)
+        fd.fit(pressed, data, parameters=[RATIO], folder=tmp_path, progress=stop)
     again: list[tuple[int, int]] = []
     found = fd.fit(
-        pressed, data, [RATIO], folder=tmp_path,
+        pressed, data, parameters=[RATIO], folder=tmp_path,
         progress=lambda course: again.append((course.computed, course.found)),
     )  # fmt: skip
     assert again[2] == (0, 3)
     assert again[-1][0] > 0
-    whole = fd.fit(pressed, data, [RATIO])
+    whole = fd.fit(pressed, data, parameters=[RATIO])
     assert found.values == whole.values
-    third = fd.fit(pressed, data, [RATIO], folder=tmp_path)
+    third = fd.fit(pressed, data, parameters=[RATIO], folder=tmp_path)
     assert third.evaluations == found.evaluations
 
 
 def test_damaged_evaluations_are_computed_again(pressed, tmp_path) -> None:
     data = [forces(pressed)]
-    first = fd.fit(pressed, data, [RATIO], folder=tmp_path)
+    first = fd.fit(pressed, data, parameters=[RATIO], folder=tmp_path)
     for number, file in enumerate(sorted(tmp_path.glob("*.npz"))):
         sound = bytearray(file.read_bytes())
         if number % 4 == 0:
@@ -202,25 +202,25 @@ def test_damaged_evaluations_are_computed_again(pressed, tmp_path) -> None:
             continue
         file.write_bytes(sound)
     course = []
-    again = fd.fit(pressed, data, [RATIO], folder=tmp_path, progress=course.append)
+    again = fd.fit(pressed, data, parameters=[RATIO], folder=tmp_path, progress=course.append)
     assert again.values == first.values
     assert course[-1].found == 0
 
 
 def test_kept_evaluations_of_another_model_are_not_used(pressed, tmp_path) -> None:
     data = [forces(pressed)]
-    fd.fit(pressed, data, [RATIO], folder=tmp_path)
+    fd.fit(pressed, data, parameters=[RATIO], folder=tmp_path)
     thick = write(tmp_path, PRESSED.replace("thickness = 0.01", "thickness = 0.011"))
-    found = fd.fit(thick, data, [RATIO], folder=tmp_path)
-    assert found.values == fd.fit(thick, data, [RATIO]).values
+    found = fd.fit(thick, data, parameters=[RATIO], folder=tmp_path)
+    assert found.values == fd.fit(thick, data, parameters=[RATIO]).values
     assert found.estimates[0].value > 1.01
 
 
 @pytest.mark.matrix
 def test_processes_change_nothing(pressed) -> None:
     data = [forces(pressed, 1e-5)]
-    alone = fd.fit(pressed, data, [RATIO], starts=2)
-    beside = fd.fit(pressed, data, [RATIO], starts=2, processes=2)
+    alone = fd.fit(pressed, data, parameters=[RATIO], starts=2)
+    beside = fd.fit(pressed, data, parameters=[RATIO], starts=2, processes=2)
     assert beside.values == alone.values
     assert beside.descents == alone.descents
 
@@ -229,24 +229,26 @@ def test_a_search_steps_back_where_the_model_fails(pressed) -> None:
     """Beyond 180 degrees the law refuses theta1: the bounds let the search go there."""
     data = [forces(pressed, 1e-5)]
     theta = Parameter("model.fold_law.theta1", 170.0, 1.0, 400.0)
-    found = fd.fit(pressed, data, [theta])
+    found = fd.fit(pressed, data, parameters=[theta])
     assert np.isfinite(found.descents[0].cost)
 
 
 def test_a_start_at_which_nothing_can_be_computed(pressed) -> None:
     with pytest.raises(InputError, match=r"model\.fold_law.*theta1"):
-        fd.fit(pressed, [forces(pressed)], [Parameter("model.fold_law.theta1", 390.0)])
+        fd.fit(pressed, [forces(pressed)], parameters=[Parameter("model.fold_law.theta1", 390.0)])
 
 
 def test_a_model_that_fails_at_every_start(swung) -> None:
     """The load is so large that panel passes through panel."""
     bad = histories(swung, [0])
     with pytest.raises(ComputationError, match="no search converged: "):
-        fd.fit(swung, [bad], [Parameter("loads[0].force[0]", 50.0, 40.0, 60.0)])
+        fd.fit(swung, [bad], parameters=[Parameter("loads[0].force[0]", 50.0, 40.0, 60.0)])
 
 
 def test_results_as_files(pressed, tmp_path) -> None:
-    found = fd.fit(pressed, [forces(pressed, 1e-5)], [RATIO, Parameter("sheet.density", 2.0)])
+    found = fd.fit(
+        pressed, [forces(pressed, 1e-5)], parameters=[RATIO, Parameter("sheet.density", 2.0)]
+    )
     found.save(tmp_path / "fit.json")
     told = json.loads((tmp_path / "fit.json").read_text())
     assert told["parameters"][0]["value"] == found.estimates[0].value
@@ -274,7 +276,7 @@ def test_results_as_files(pressed, tmp_path) -> None:
 )
 def test_arguments_that_make_no_sense(pressed, changes, message) -> None:
     with pytest.raises(InputError, match=message):
-        fd.fit(pressed, [forces(pressed)], [RATIO], **changes)
+        fd.fit(pressed, [forces(pressed)], parameters=[RATIO], **changes)
 
 
 ELASTIC = 'fold_law = { kind = "enhanced", theta1 = 45, theta2 = 290 }'
@@ -293,11 +295,13 @@ def test_a_relaxation_is_found_in_a_motion(tmp_path):
     blank = TimeHistory(nodes=[0], time=time, values=np.sin(time)[:, None])
     (exact,) = problem(path, [blank], parameters, {}).predict([0.6, 0.15])
     exact = exact.reshape(-1, 1)
-    fit = fd.fit(path, [TimeHistory(nodes=[0], time=time, values=exact)], parameters)
+    fit = fd.fit(path, [TimeHistory(nodes=[0], time=time, values=exact)], parameters=parameters)
     assert fit["model.fold_law.ratios[0]"].value == pytest.approx(0.6, rel=1e-3)
     assert fit["model.fold_law.times[0]"].value == pytest.approx(0.15, rel=1e-3)
     noise = 1e-2 * np.ptp(exact) * np.random.default_rng(1).standard_normal(exact.shape)
-    fit = fd.fit(path, [TimeHistory(nodes=[0], time=time, values=exact + noise)], parameters)
+    fit = fd.fit(
+        path, [TimeHistory(nodes=[0], time=time, values=exact + noise)], parameters=parameters
+    )
     for one, truth in zip(fit.estimates, (0.6, 0.15), strict=True):
         assert one.value == pytest.approx(truth, abs=4.0 * one.standard_error)
 
@@ -319,7 +323,7 @@ def test_a_cyclic_test_gives_yield_moment_and_hardening(tmp_path):
     assert abs(test.force[4] - test.force[2]) > 0.1 * np.ptp(test.force)
     fit = fd.fit(
         path, [test],
-        [
+        parameters=[
             Parameter("model.fold_law.yield_moment", 4e-3, 1e-4, 2e-2),
             Parameter("model.fold_law.kinematic", 0.02, 1e-3, 0.2),
         ],
@@ -328,4 +332,8 @@ def test_a_cyclic_test_gives_yield_moment_and_hardening(tmp_path):
     assert fit["model.fold_law.kinematic"].value == pytest.approx(0.01, rel=1e-3)
     test, other = (replace(one, sigma=1e-6) for one in (test, cyclic(path, -way[:3])))
     with pytest.raises(ComputationError, match="creases that yield depend on the way"):
-        fd.fit(path, [test, other], [Parameter("model.fold_law.yield_moment", 4e-3, 1e-4, 2e-2)])
+        fd.fit(
+            path,
+            [test, other],
+            parameters=[Parameter("model.fold_law.yield_moment", 4e-3, 1e-4, 2e-2)],
+        )

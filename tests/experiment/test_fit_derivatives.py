@@ -151,10 +151,10 @@ def test_what_has_no_neighbors_is_run_again(tmp_path) -> None:
     of_forces, of_history = made.differentiate(np.array([1.0]))[1]
     assert np.isfinite(of_forces).all()
     assert np.isnan(of_history).all()
-    found = fd.fit(pressed, [forces, history], [ratio])
+    found = fd.fit(pressed, [forces, history], parameters=[ratio])
     assert found.quotients == ("swing",)
     aside = replace(history, held_out=True)
-    assert fd.fit(pressed, [forces, aside], [ratio]).quotients == ()
+    assert fd.fit(pressed, [forces, aside], parameters=[ratio]).quotients == ()
 
 
 def test_optimum_and_intervals_are_those_of_difference_quotients(tmp_path, monkeypatch) -> None:
@@ -164,9 +164,9 @@ def test_optimum_and_intervals_are_those_of_difference_quotients(tmp_path, monke
     (true,) = problem(path, data, keys, {}).predict([1e6, 60.0])
     noise = 1e-4 * np.random.default_rng(2).standard_normal(len(true))
     data = [replace(data[0], values=(true + noise).reshape(data[0].values.shape), sigma=1e-4)]
-    near = fd.fit(path, data, keys)
+    near = fd.fit(path, data, parameters=keys)
     monkeypatch.setattr(Problem, "_beside", refuse)
-    whole = fd.fit(path, data, keys)
+    whole = fd.fit(path, data, parameters=keys)
     assert near.quotients == ()
     assert whole.quotients == ("shapes",)
     assert near.evaluations < 0.6 * whole.evaluations

@@ -24,7 +24,7 @@ ALPHA = Parameter("damping.alpha", 1.0, 0.0, 10.0)
 @pytest.fixture(scope="module")
 def seen(swung):
     """What a camera with some noise sees of the motion of the true sheet, alpha = 0.4."""
-    true = fd.simulate(fd.read_case(swung).case(), 2.0, "newmark", dt=5e-4, every=5e-4)
+    true = fd.simulate(fd.read_case(swung).case(), 2.0, method="newmark", dt=5e-4, every=5e-4)
     along = CubicSpline(true.time.values, true.displacement.sel(node=[0, 2], axis="x").values)
     noise = NOISE * np.random.default_rng(1).standard_normal((60, 2))
     return TimeHistory(nodes=[0, 2], time=TIME, values=along(TIME) + noise, sigma=NOISE)
@@ -40,7 +40,7 @@ def refined(path, **changes):
 
 def test_an_interval_reaches_the_truth_though_the_step_is_coarse(swung, seen) -> None:
     with pytest.warns(FoldynWarning, match=r"damping\.alpha: the time step is too coarse") as told:
-        found = fd.fit(swung, [seen], [ALPHA])
+        found = fd.fit(swung, [seen], parameters=[ALPHA])
     assert "set analysis.dt below 0.02 s" in str(told[0].message)
     alpha = found.estimates[0]
     half = alpha.value - alpha.lower
@@ -91,7 +91,9 @@ def test_steps_too_coarse_for_their_order_widen_the_interval_further(tmp_path) -
     seen = TimeHistory(nodes=[node], axis="z", time=true.time.values, values=values, sigma=noise)
     stiffness = Parameter("model.crease_stiffness", 0.19, 0.05, 0.6)
     with pytest.warns(FoldynWarning, match=r"finer time step disagrees with that by .* miss"):
-        found = fd.fit(case_file.path, [seen], [stiffness, Parameter("damping.alpha", 0.2)])
+        found = fd.fit(
+            case_file.path, [seen], parameters=[stiffness, Parameter("damping.alpha", 0.2)]
+        )
     for one, truth in zip(found.estimates, (0.2, 0.25), strict=True):
         assert one.lower < truth < one.upper
     one = found.estimates[0]
@@ -102,7 +104,7 @@ def test_fine_steps_leave_the_interval_to_the_noise(swung, seen) -> None:
     fine = refined(swung, every="every = 0.004")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = fd.fit(fine, [seen], [replace(ALPHA, start=0.42)])
+        found = fd.fit(fine, [seen], parameters=[replace(ALPHA, start=0.42)])
     alpha = found.estimates[0]
     assert abs(alpha.discretization) < 0.5 * alpha.standard_error
     assert alpha.lower < 0.4 < alpha.upper
@@ -142,7 +144,7 @@ def test_an_interval_reaches_the_truth_though_the_mesh_is_coarse(tmp_path) -> No
     with pytest.warns(
         FoldynWarning, match=r"mesh is too coarse.*A finer mesh disagrees.*divisions = 8"
     ):
-        found = fd.fit(coarse, seen, [modulus])
+        found = fd.fit(coarse, seen, parameters=[modulus])
     (one,) = found.estimates
     noise = one.upper - one.value
     assert one.lower < 1e6 < one.value - noise
@@ -167,7 +169,7 @@ def test_a_model_that_fails_with_finer_steps_is_told_of(swung, seen, monkeypatch
 
     monkeypatch.setattr(fit, "evaluate", failing)
     with pytest.warns(FoldynWarning, match=r"finer time step \(no equilibrium\): the intervals"):
-        found = fd.fit(swung, [seen], [replace(ALPHA, start=0.41)])
+        found = fd.fit(swung, [seen], parameters=[replace(ALPHA, start=0.41)])
     alpha = found.estimates[0]
     assert np.isnan(alpha.discretization)
     assert alpha.lower < alpha.value < alpha.upper
@@ -178,7 +180,11 @@ def test_finer_evaluations_are_kept_too(swung, seen, tmp_path) -> None:
     for _ in range(2):
         with pytest.warns(FoldynWarning, match="too coarse"):
             found = fd.fit(
-                swung, [seen], [replace(ALPHA, start=0.41)], folder=tmp_path, progress=course.append
+                swung,
+                [seen],
+                parameters=[replace(ALPHA, start=0.41)],
+                folder=tmp_path,
+                progress=course.append,
             )
     assert course[-1].computed == 0
     assert course[-1].found == found.evaluations

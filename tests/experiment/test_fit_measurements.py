@@ -25,7 +25,7 @@ def history(**changes) -> TimeHistory:
 @pytest.fixture(scope="module")
 def motion(swung):
     case_file = fd.read_case(swung)
-    return fd.simulate(case_file.case(), 2.0, "newmark", dt=0.02)
+    return fd.simulate(case_file.case(), 2.0, method="newmark", dt=0.02)
 
 
 @pytest.mark.parametrize(

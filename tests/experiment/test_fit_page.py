@@ -54,7 +54,7 @@ def fitted(tmp_path_factory):
         else:
             data.append(replace(one, values=seen.reshape(2, -1).T + 0.7))
     data.append(replace(Spectrum.of(data[2], (0.5, 5.0)), held_out=True, name="lines"))
-    return fd.fit(pressed, data, parameters)
+    return fd.fit(pressed, data, parameters=parameters)
 
 
 @pytest.mark.matrix

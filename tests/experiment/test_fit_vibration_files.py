@@ -124,7 +124,7 @@ def test_a_fit_file_says_what_was_measured(folder, results) -> None:
 def test_from_the_fit_file_to_the_page(folder) -> None:
     edit(folder, 'file = "frf.csv"\nnodes = [8]', 'file = "frf.nc"\nnodes = [8]\nsigma = 0.05')
     plan = read_fit(folder / "fit.toml")
-    found = fd.fit(plan.case, plan.data, plan.parameters)
+    found = fd.fit(plan.case, plan.data, parameters=plan.parameters)
     assert found["sheet.youngs_modulus"].value == pytest.approx(1e6, rel=0.05)
     page = write_fit(found, folder, figures="png").read_text("utf-8")
     for text in ("modes: paired by their shapes (MAC)", "modes: paired in their order",

@@ -108,7 +108,7 @@ def test_noisy_data_give_the_parameters_and_intervals_that_contain_them(
     inside, misfits = [], []
     for seed in range(3):
         data, parameters = kinds(modes, response, seed)[kind]
-        found = fd.fit(case, data, parameters)
+        found = fd.fit(case, data, parameters=parameters)
         misfits.append(found.misfit)
         for one in found.estimates:
             truth = TRUTH[one.key]
@@ -126,7 +126,7 @@ def test_all_kinds_together(folder, modes, response) -> None:
         shapes(modes, noise=0.02, sigma=0.02),
         replace(receptances(response, 0.05, sigma=0.05), case=folder / "frf.toml"),
     ]
-    found = fd.fit(folder / "modes.toml", data, [NEAR, replace(RATIO, start=1.1), ALPHA])
+    found = fd.fit(folder / "modes.toml", data, parameters=[NEAR, replace(RATIO, start=1.1), ALPHA])
     for one in found.estimates:
         assert one.lower < TRUTH[one.key] < one.upper
     assert len(found.problem.runs) == 2
@@ -137,7 +137,7 @@ def test_sign_and_size_of_shapes_do_not_matter(folder, modes) -> None:
     one = shapes(modes, noise=0.02, sigma=0.02)
     scaled = one.values * np.array([-3.0, 0.1, 7.0, -1.0])[:, None, None]
     first, second = (
-        fd.fit(folder / "modes.toml", [data], [RATIO])
+        fd.fit(folder / "modes.toml", [data], parameters=[RATIO])
         for data in (one, replace(one, values=scaled))
     )
     assert second.values[RATIO.key] == pytest.approx(first.values[RATIO.key], rel=1e-5)
@@ -165,14 +165,16 @@ def test_shapes_find_modes_of_which_the_lowest_was_missed(folder) -> None:
     stiff = Parameter("sheet.length_scale_ratio", 2.5, 0.2, 50.0)
     paired = NaturalFrequencies(frequency=seen, shapes=shapes(true, (1, 2)), sigma=1e-3)
     for start in (ratio, stiff):
-        found = fd.fit(soft, [paired], [start])
+        found = fd.fit(soft, [paired], parameters=[start])
         assert found.values[ratio.key] == pytest.approx(10.0, rel=1e-4)
         assert "sigma is too large" in found.quality  # the data have no noise
-    in_order = fd.fit(soft, [NaturalFrequencies(frequency=seen, sigma=1e-3)], [ratio])
+    in_order = fd.fit(soft, [NaturalFrequencies(frequency=seen, sigma=1e-3)], parameters=[ratio])
     assert in_order.misfit > 10.0
     assert "more than noise explains" in in_order.quality
     numbered = NaturalFrequencies(frequency=seen, mode=[2, 3], sigma=1e-3)
-    assert fd.fit(soft, [numbered], [ratio]).values[ratio.key] == pytest.approx(10.0, rel=1e-4)
+    assert fd.fit(soft, [numbered], parameters=[ratio]).values[ratio.key] == pytest.approx(
+        10.0, rel=1e-4
+    )
 
 
 def test_components_that_were_not_measured_are_left_out(folder, modes, response) -> None:
@@ -204,7 +206,7 @@ def test_a_moving_base_gives_a_transmissibility(tmp_path) -> None:
     one = FrequencyResponse(
         nodes=[6], axis="z", frequency=LINES, values=seen, quantity="transmissibility"
     )
-    assert fd.fit(path, [one], [ALPHA]).values[ALPHA.key] == pytest.approx(0.4, rel=1e-6)
+    assert fd.fit(path, [one], parameters=[ALPHA]).values[ALPHA.key] == pytest.approx(0.4, rel=1e-6)
     with pytest.raises(InputError, match="the case is driven by a base, which gives transmiss"):
         problem(path, [replace(one, quantity="receptance")], [ALPHA], {})
 

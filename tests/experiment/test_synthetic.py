@@ -27,7 +27,7 @@ def test_corners_are_where_the_truth_says():
     film = make_film(1)
     true = film.truth()["position_px"].values[0, FRONT]
     picture = film.frame(0)
-    found = refine(picture, true + 0.4, 10.0, 5.0)
+    found = refine(picture, true + 0.4, reach=10.0, moved=5.0)
     error = np.hypot(*(found.position - true).T)
     assert np.isfinite(error).sum() >= 8
     assert np.sqrt(np.nanmean(error**2)) < 0.25
@@ -36,7 +36,9 @@ def test_corners_are_where_the_truth_says():
     usual = cv2.cornerSubPix(picture, start, (6, 6), (-1, -1), (3, 50, 1e-3))[:, 0]
     assert np.sqrt(np.mean((usual - true) ** 2)) > 2.0 * np.sqrt(np.nanmean(error**2) / 2.0)
     # where refining starts does not matter
-    ways = [refine(picture, true + shift, 10.0, 5.0).position for shift in (-0.8, 0.0, 0.8)]
+    ways = [
+        refine(picture, true + shift, reach=10.0, moved=5.0).position for shift in (-0.8, 0.0, 0.8)
+    ]
     assert np.nanmax(np.abs(ways[0] - ways[1])) < 0.3
     assert np.nanmedian(np.abs(ways[0] - ways[2])) < 0.03
 

@@ -78,7 +78,7 @@ def test_the_region_of_interest_shifts_nothing(sharp, tracked):
     from foldyn.experiment import open_film
 
     film = open_film(sharp.path, (20, 10, 540, 600))
-    ds = track_film(film, sharp.model, Tracking())
+    ds = track_film(film, sharp.model, tracking=Tracking())
     error = errors(ds, sharp.truth)[:, FRONT]
     assert np.sqrt(np.nanmean(error**2)) < 0.25
 
@@ -94,7 +94,7 @@ def test_a_covered_corner_is_lost_and_found_again():
     for k in range(8, 16):
         u, v = np.rint(truth[k, node]).astype(int)
         film_frames[k][v - 14 : v + 15, u - 14 : u + 15] = 60
-    steps = list(follow(((k / RATE, f) for k, f in enumerate(film_frames)), corners, 9.0))
+    steps = list(follow(((k / RATE, f) for k, f in enumerate(film_frames)), corners, reach=9.0))
     seen = np.array([step.position[point] for step in steps])
     error = np.hypot(*(seen - truth[:24, node]).T)
     assert np.isfinite(error[:8]).all()
@@ -119,7 +119,7 @@ def test_blur_and_noise_cost_little(tmp_path):
 
 @pytest.mark.matrix
 def test_a_model_may_be_recognized_in_the_last_frame(sharp):
-    ds = track_film(str(sharp.path), sharp.model, Tracking(match="last"))
+    ds = track_film(str(sharp.path), sharp.model, tracking=Tracking(match="last"))
     assert ds.attrs["match_frame"] == 79
     assert (ds["node_of_point"] >= 0).sum() >= 12
     error = errors(ds, sharp.truth)[:, FRONT]

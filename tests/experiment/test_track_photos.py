@@ -32,7 +32,7 @@ def test_every_node_is_recognized_in_every_photograph(photos):
     step = np.hypot(*(true[2] - true[0]).T).max()
     assert step > 25.0  # pixels: too far for a search around the last place
     tracking = Tracking(placing=Placing(metres_per_pixel=SCALE, distance=DISTANCE))
-    ds = track_photos(paths, model(), tracking, loads=[0.0, 0.1, 0.2])
+    ds = track_photos(paths, model(), tracking=tracking, loads=[0.0, 0.1, 0.2])
     error = np.hypot(*np.moveaxis(ds["position_px"].values - true, -1, 0))
     assert np.isfinite(error).mean() > 0.85
     assert np.nanmax(error) < 2.0

@@ -98,9 +98,11 @@ def filmed(tmp_path_factory):
     model = TrackedModel.of(case)
     motion = fd.simulate(case, **arguments)
     seen = camera(model.rest, k1=0.0)
-    film = film_of(motion, seen, RATE, 0.24, sensor=Sensor(samples=8), dropped=(DROPPED,))
+    film = film_of(
+        motion, seen, rate=RATE, duration=0.24, sensor=Sensor(samples=8), dropped=(DROPPED,)
+    )
     write_film(film, folder / "film.mkv")
-    tracks = track_film(str(folder / "film.mkv"), model, HOW)
+    tracks = track_film(str(folder / "film.mkv"), model, tracking=HOW)
     save_tracks(tracks, folder / "film.nc")
     write_csv(tracks, folder / "film.csv")
     return path
@@ -115,11 +117,11 @@ def photographed(tmp_path_factory):
     steps = [int(np.argmin(np.abs(bent["load_factor"].values - f))) for f in FACTORS]
     model = TrackedModel.of(bent)
     seen = camera(model.rest, k1=0.0)
-    pictures, _ = photos_of(bent, steps, seen, sensor=Sensor(samples=8))
+    pictures, _ = photos_of(bent, steps, camera=seen, sensor=Sensor(samples=8))
     files = [folder / f"load{k}.png" for k in range(len(FACTORS))]
     for file, picture in zip(files, pictures, strict=True):
         cv2.imwrite(str(file), picture)
-    tracks = track_photos(files, model, HOW)
+    tracks = track_photos(files, model, tracking=HOW)
     save_tracks(tracks, folder / "photos.nc")
     write_csv(tracks, folder / "photos.csv")
     return path
@@ -149,7 +151,7 @@ def test_both_files_of_a_film_hold_the_same_histories(filmed):
 @pytest.mark.matrix
 def test_damping_from_the_table_of_a_film(filmed):
     seen = history(filmed.with_name("film.csv"), [6, 8])
-    found = fd.fit(filmed, [seen], [Parameter("damping.alpha", 8.0, 1.0, 50.0)])
+    found = fd.fit(filmed, [seen], parameters=[Parameter("damping.alpha", 8.0, 1.0, 50.0)])
     # 0.5 % when this was written; 3e-5 m rms of tracking beside a swing of 3 mm
     assert found["damping.alpha"].value == pytest.approx(ALPHA, rel=0.02)
     assert found["damping.alpha"].determined
@@ -189,7 +191,7 @@ def test_stiffness_from_the_table_of_photographs(photographed):
     plan = photographed.with_name("fit.toml")
     plan.write_text(text, encoding="utf-8")
     told = read_fit(plan)
-    found = fd.fit(told.case, told.data, told.parameters)
+    found = fd.fit(told.case, told.data, parameters=told.parameters)
     # 0.2 % when this was written
     assert found["sheet.length_scale_ratio"].value == pytest.approx(RATIO, rel=0.02)
 

@@ -31,7 +31,9 @@ def modes():
 
 @cache
 def response():
-    return fd.frf(case().altered(loads=()), fd.Force(0, (-1e-3, 0, 0)), np.linspace(0.0, 2.0, 21))
+    return fd.frf(
+        case().altered(loads=()), fd.Force(0, (-1e-3, 0, 0)), frequencies=np.linspace(0.0, 2.0, 21)
+    )
 
 
 @cache

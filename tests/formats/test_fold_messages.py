@@ -146,7 +146,9 @@ def test_frames_are_written_with_their_angles(tmp_path):
     flat = miura(dihedral=180)
     states = [miura(dihedral=angle) for angle in (170, 120, 60)]
     frames = [Frame(f"state {k}", state.vertices) for k, state in enumerate(states)]
-    write_pattern(tmp_path / "x.fold", flat.changed(assignments=states[0].assignments), frames)
+    write_pattern(
+        tmp_path / "x.fold", flat.changed(assignments=states[0].assignments), frames=frames
+    )
     assert json.loads((tmp_path / "x.fold").read_text())["file_classes"] == ["animation"]
     for k, state in enumerate(states):
         found = read_pattern(tmp_path / "x.fold", frame=k + 1)
@@ -162,7 +164,7 @@ def test_frames_are_written_with_their_angles(tmp_path):
 def test_other_formats_have_no_frames(tmp_path):
     p = simple_fold()
     with pytest.raises(InputError, match=r"frames: OBJ files hold one state; write \.fold"):
-        write_pattern(tmp_path / "x.obj", p, [Frame("a", p.vertices)])
+        write_pattern(tmp_path / "x.obj", p, frames=[Frame("a", p.vertices)])
     write_pattern(tmp_path / "x.obj", p)
     with pytest.raises(InputError, match=r"x\.obj: frame: OBJ files have no frames"):
         read_pattern(tmp_path / "x.obj", frame=1)

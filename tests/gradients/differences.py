@@ -41,7 +41,7 @@ class Design:
 
     def gradient(self) -> dict[str, NDArray]:
         """Derivatives (measure,) or (measure, entry) by each parameter."""
-        found = sensitivity(self.build, self.values, self.measures, self.analysis)
+        found = sensitivity(self.build, self.values, measures=self.measures, analysis=self.analysis)
         return {name: found[f"gradient_{name}"].values for name in self.values}
 
     def along(self, direction: Mapping[str, Any]) -> NDArray:

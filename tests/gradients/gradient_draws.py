@@ -53,7 +53,11 @@ class Draw(NamedTuple):
         if not np.any(self.value):
             sizes = {self.name: np.full_like(self.value, 0.1)}
         found = fd.sensitivity(
-            self.source, parameters, self.measure, dict(self.analysis), sizes=sizes
+            self.source,
+            parameters,
+            measures=self.measure,
+            analysis=dict(self.analysis),
+            sizes=sizes,
         )
         return float(found["value"][0]), found[f"gradient_{self.name}"].values[0]
 

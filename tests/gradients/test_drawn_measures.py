@@ -147,7 +147,7 @@ def test_peaks_however_close_the_frequencies(tied: str, which: tuple[int, str | 
     drive, case = [fd.Force([8], (0.2, 0.3, 1.0))], build(**values)
     lowest = fd.modes(case, 3, state=state)["frequency"].values
     wide = np.linspace(0.6 * lowest[0], 1.2 * lowest[2], 150)
-    peaks = fd.linear.peaks_of(fd.frf(case, drive, wide, state=state), 8, "z")
+    peaks = fd.linear.peaks_of(fd.frf(case, drive, frequencies=wide, state=state), 8, axis="z")
     near = max(peaks, key=lambda peak: peak.height).frequency
     damped = 0.5 * case.rayleigh.rate(2.0 * np.pi * near) / (2.0 * np.pi * near)
     width = (4.0 if count < 100 else 2.5) * damped

@@ -27,10 +27,10 @@ def tower(stiffness: Any, thickness: float = 0.018, force: float = 0.04) -> fd.C
 @pytest.mark.parametrize("measure", ["largest_displacement", "strain"])
 def test_what_nodes_reach_at_once_has_a_derivative_where_they_stay_alike(measure: str) -> None:
     with pytest.raises(InputError, match=TOP):
-        fd.sensitivity(tower, {"stiffness": np.full(10, 0.15)}, measure, PRESSED)
+        fd.sensitivity(tower, {"stiffness": np.full(10, 0.15)}, measures=measure, analysis=PRESSED)
     twice = f"2 * {measure} + 0 * displacement[6,z]"
     with pytest.raises(InputError, match=TOP):
-        fd.sensitivity(tower, {"stiffness": np.full(10, 0.15)}, twice, PRESSED)
+        fd.sensitivity(tower, {"stiffness": np.full(10, 0.15)}, measures=twice, analysis=PRESSED)
     alike = Design(tower, {"stiffness": 0.15, "thickness": 0.018}, [measure], PRESSED)
     assert max(alike.errors().values()) < 1e-5
     uneven = np.linspace(0.1, 0.2, 10)
@@ -39,8 +39,10 @@ def test_what_nodes_reach_at_once_has_a_derivative_where_they_stay_alike(measure
 
 def test_what_counts_for_nothing_may_tie() -> None:
     both = "displacement[6,z] + 0 * strain"
-    found = fd.sensitivity(tower, {"stiffness": np.full(10, 0.15)}, both, PRESSED)
-    alone = fd.sensitivity(tower, {"stiffness": np.full(10, 0.15)}, "displacement[6,z]", PRESSED)
+    found = fd.sensitivity(tower, {"stiffness": np.full(10, 0.15)}, measures=both, analysis=PRESSED)
+    alone = fd.sensitivity(
+        tower, {"stiffness": np.full(10, 0.15)}, measures="displacement[6,z]", analysis=PRESSED
+    )
     assert found["gradient_stiffness"].values == pytest.approx(alone["gradient_stiffness"].values)
 
 
@@ -54,7 +56,7 @@ def test_a_sample_that_repeats_the_highest_displacement() -> None:
         return fd.Case(made, [fd.Fix([0, 1, 2, 3]), lift])
 
     motion = {"kind": "dynamics", "method": "rk4", "dt": 1e-3, "duration": 0.3, "every": 20}
-    found = fd.sensitivity(lifted, {"height": 0.01}, "maximum[4,z]", motion)
+    found = fd.sensitivity(lifted, {"height": 0.01}, measures="maximum[4,z]", analysis=motion)
     assert found["gradient_height"].item() == pytest.approx(1.0, rel=1e-9)
 
 
@@ -86,7 +88,8 @@ def near(gap: float, size: float = 1.0, tilt: float = 0.0) -> fd.Case:
 def test_panels_that_all_but_touch() -> None:
     """Differences of the distance itself would pass through 0."""
     found = fd.sensitivity(
-        near, {"gap": 1e-6, "size": 1.3}, "clearance", {"kind": "modes", "count": 3},
+        near, {"gap": 1e-6, "size": 1.3}, measures="clearance", analysis={"kind": "modes",
+        "count": 3},
         sizes={"gap": 1.0},
     )  # fmt: skip
     assert found["gradient_gap"].item() == pytest.approx(1.0, rel=1e-9)
@@ -95,10 +98,16 @@ def test_panels_that_all_but_touch() -> None:
 
 def test_panels_that_are_as_close_at_two_places() -> None:
     about = {"kind": "modes", "count": 3}
-    found = fd.sensitivity(near, {"gap": 0.2, "size": 1.3}, "clearance", about)
+    found = fd.sensitivity(near, {"gap": 0.2, "size": 1.3}, measures="clearance", analysis=about)
     assert found["gradient_gap"].item() == pytest.approx(1.0, rel=1e-9)
     with pytest.raises(InputError, match=TOP):
-        fd.sensitivity(near, {"gap": 0.2, "tilt": 0.0}, "clearance", about, sizes={"tilt": 1.0})
+        fd.sensitivity(
+            near,
+            {"gap": 0.2, "tilt": 0.0},
+            measures="clearance",
+            analysis=about,
+            sizes={"tilt": 1.0},
+        )
 
 
 def test_lengths_to_which_bars_are_cut_are_no_part_of_some_measures() -> None:
@@ -108,8 +117,10 @@ def test_lengths_to_which_bars_are_cut_are_no_part_of_some_measures() -> None:
     made = fd.Case(cut, case.supports, case.loads)
     for measure in ("strain", "strain_energy"):
         with pytest.raises(InputError, match=f"{measure}: has no derivative by bar_length"):
-            fd.sensitivity(made, ["bar_length"], measure, PRESSED)
-    fd.sensitivity(made, ["bar_length", "fold_stiffness"], "displacement[6,z]", PRESSED)
+            fd.sensitivity(made, ["bar_length"], measures=measure, analysis=PRESSED)
+    fd.sensitivity(
+        made, ["bar_length", "fold_stiffness"], measures="displacement[6,z]", analysis=PRESSED
+    )
 
 
 def test_strain_energy_of_edges_that_lag_behind() -> None:
@@ -125,4 +136,6 @@ def test_strain_energy_of_edges_that_lag_behind() -> None:
     still = Design(lambda force: build(force, 0.0), {"force": 0.3}, ["strain_energy"], motion)
     assert max(still.errors().values()) < 1e-6
     with pytest.raises(InputError, match=r"strain_energy: .*lag behind.*leave out beta"):
-        fd.sensitivity(build, {"force": 0.3, "beta": 3e-3}, "strain_energy", motion)
+        fd.sensitivity(
+            build, {"force": 0.3, "beta": 3e-3}, measures="strain_energy", analysis=motion
+        )

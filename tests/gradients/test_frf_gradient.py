@@ -94,10 +94,12 @@ def test_a_magnitude_of_all_axes_and_an_own_number() -> None:
         out[:, 4] = 2.0 * result["receptance"].values[:, 4].conj()
         return {"receptance": out}
 
-    found = fd.sensitivity(case, {"alpha": 4.1}, {"square": (square, derivative)}, PUSH)
+    found = fd.sensitivity(
+        case, {"alpha": 4.1}, measures={"square": (square, derivative)}, analysis=PUSH
+    )
     near, far = (
-        square(fd.frf(case(alpha=4.1 + h), PUSH["drive"], FREQUENCIES), case())
-        - square(fd.frf(case(alpha=4.1 - h), PUSH["drive"], FREQUENCIES), case())
+        square(fd.frf(case(alpha=4.1 + h), PUSH["drive"], frequencies=FREQUENCIES), case())
+        - square(fd.frf(case(alpha=4.1 - h), PUSH["drive"], frequencies=FREQUENCIES), case())
         for h in (2e-3, 4e-3)
     )
     expected = (8.0 * near - far) / (12.0 * 2e-3)
@@ -129,9 +131,13 @@ def with_a_rigid_panel(shift: float) -> fd.Case:
 def test_a_design_that_changes_what_constraints_tie_is_refused() -> None:
     drive = {"drive": fd.Force([4], (0.0, 0.0, 1.0))}
     with pytest.raises(InputError, match=r"constraints.*fd\.sweep"):
-        fd.sensitivity(with_a_rigid_panel, {"shift": 0.31}, "response[4,z,3]", PUSH | drive)
+        fd.sensitivity(
+            with_a_rigid_panel, {"shift": 0.31}, measures="response[4,z,3]", analysis=PUSH | drive
+        )
     made = with_a_rigid_panel(0.31)
-    found = fd.sensitivity(made, ["fold_stiffness"], "response[4,z,3]", PUSH | drive)
+    found = fd.sensitivity(
+        made, ["fold_stiffness"], measures="response[4,z,3]", analysis=PUSH | drive
+    )
     assert np.isfinite(found["gradient_fold_stiffness"]).all()
 
 
@@ -151,4 +157,4 @@ def test_what_has_no_gradient_names_a_remedy(name: str) -> None:
     build, changed, measure, remedy = WRONG[name]
     parameter = {"thickness": 0.0505} if name == "ratios" else {"alpha": 4.1}
     with pytest.raises(InputError, match=remedy):
-        fd.sensitivity(build, parameter, measure, PUSH | changed)
+        fd.sensitivity(build, parameter, measures=measure, analysis=PUSH | changed)

@@ -231,14 +231,14 @@ def test_what_has_no_gradient_names_a_remedy(name: str) -> None:
     build, changed, remedy = WRONG[name]
     analysis = MOTION | {"method": "newmark"} | changed
     with pytest.raises(InputError, match=remedy):
-        sensitivity(build, {"force": 2.9}, TIP[0], analysis)
+        sensitivity(build, {"force": 2.9}, measures=TIP[0], analysis=analysis)
 
 
 def test_a_motion_that_goes_on_with_what_another_knew_is_refused() -> None:
-    before = fd.simulate(case(), 0.03, "newmark", 0.003)
+    before = fd.simulate(case(), 0.03, method="newmark", dt=0.003)
     analysis = MOTION | {"method": "newmark", "initial": fd.initial_state(before), "start": 0.03}
     with pytest.raises(InputError, match=r"analysis\.initial.*fd\.State"):
-        sensitivity(case, {"force": 2.9}, TIP[0], analysis)
+        sensitivity(case, {"force": 2.9}, measures=TIP[0], analysis=analysis)
 
 
 # ------------------------------------------------------------------ motions beside one
@@ -299,4 +299,9 @@ def test_what_changes_a_constraint_has_no_gradient() -> None:
         return case(extra=(fd.Fix([5], direction=(tilt, 0.5, 1.0)),))
 
     with pytest.raises(InputError, match=r"changes numbers of the case \(constraints\)"):
-        sensitivity(tilted, {"tilt": 0.3}, "displacement[4,z]", MOTION | {"method": "newmark"})
+        sensitivity(
+            tilted,
+            {"tilt": 0.3},
+            measures="displacement[4,z]",
+            analysis=MOTION | {"method": "newmark"},
+        )

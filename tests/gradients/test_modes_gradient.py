@@ -61,7 +61,7 @@ def test_how_near_panels_are_at_rest():
     values = {"dihedral": 43.0, "panel_angle": 63.0}
     assert max(Design(folded, values, ["clearance"], MODES).errors().values()) < 1e-6
     with pytest.raises(InputError, match="has no finite value"):
-        fd.sensitivity(cell, {"density": 900.0}, "clearance", MODES)
+        fd.sensitivity(cell, {"density": 900.0}, measures="clearance", analysis=MODES)
 
     def crossed(height: float) -> fd.Case:
         square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
@@ -69,11 +69,11 @@ def test_how_near_panels_are_at_rest():
         pattern = fd.Pattern(points, [(0, 1, 2, 3), (4, 5, 6, 7)])
         return fd.Case(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0)), [fd.Fix([0, 1, 3])])
 
-    assert fd.sensitivity(crossed, {"height": 0.2}, "clearance", MODES)[
+    assert fd.sensitivity(crossed, {"height": 0.2}, measures="clearance", analysis=MODES)[
         "gradient_height"
     ].item() == pytest.approx(1.0)
     with pytest.raises(InputError, match="panels touch or cross"):
-        fd.sensitivity(crossed, {"height": -0.5}, "clearance", MODES)
+        fd.sensitivity(crossed, {"height": -0.5}, measures="clearance", analysis=MODES)
 
 
 @pytest.mark.parametrize("seed", [3, 4])
@@ -85,7 +85,9 @@ def test_the_remainder_falls_with_the_second_order(seed):
 
 def test_all_frequencies_scale_with_the_root_of_all_stiffness_over_mass():
     case = cell(mass="mixed_voronoi")
-    found = fd.sensitivity(case, ["node_mass", "fold_stiffness"], "frequency[2]", MODES)
+    found = fd.sensitivity(
+        case, ["node_mass", "fold_stiffness"], measures="frequency[2]", analysis=MODES
+    )
     own = found["value"].values[0]
     by_mass = found["gradient_node_mass"].values[0] @ case.mass.diagonal()
     assert by_mass == pytest.approx(-0.5 * own, rel=1e-9)
@@ -94,7 +96,7 @@ def test_all_frequencies_scale_with_the_root_of_all_stiffness_over_mass():
 def test_what_a_mass_does_at_a_node_is_what_its_shape_says():
     """d lambda = -lambda phi_i' phi_i for a mass at node i (Rayleigh's quotient)."""
     case = cell(mass="mixed_voronoi")
-    found = fd.sensitivity(case, ["node_mass"], "frequency[1]", MODES)
+    found = fd.sensitivity(case, ["node_mass"], measures="frequency[1]", analysis=MODES)
     modes = fd.modes(case, count=4)
     shape, frequency = modes["shape"].values[0], float(modes["frequency"][0])
     expected = -0.5 * frequency * (shape**2).sum(axis=1)
@@ -107,7 +109,9 @@ def test_rayleigh_damping_of_a_mode():
         return fd.Case(made.structure, made.supports, damping=[fd.Rayleigh(alpha, beta)])
 
     values = {"alpha": 0.3, "beta": 2e-4}
-    found = fd.sensitivity(damped, values, ["damping_ratio[1]", "frequency[1]"], MODES)
+    found = fd.sensitivity(
+        damped, values, measures=["damping_ratio[1]", "frequency[1]"], analysis=MODES
+    )
     omega = 2.0 * np.pi * found["value"].values[1]
     assert found["gradient_alpha"].values[0] == pytest.approx(0.5 / omega, rel=1e-9)
     assert found["gradient_beta"].values[0] == pytest.approx(0.5 * omega, rel=1e-9)
@@ -123,8 +127,10 @@ def test_modes_about_an_equilibrium_feel_its_change():
     about = {**MODES, "state": "equilibrium"}
     errors = Design(loaded, values, ["frequency[1]", "frequency[2]"], about).errors()
     assert max(errors.values()) < 1e-6, errors
-    unloaded = fd.sensitivity(cell(), ["fold_stiffness"], "frequency[1]", MODES)
-    changed = fd.sensitivity(loaded(**values), ["fold_stiffness"], "frequency[1]", about)
+    unloaded = fd.sensitivity(cell(), ["fold_stiffness"], measures="frequency[1]", analysis=MODES)
+    changed = fd.sensitivity(
+        loaded(**values), ["fold_stiffness"], measures="frequency[1]", analysis=about
+    )
     name = "gradient_fold_stiffness"
     assert not np.allclose(unloaded[name], changed[name], rtol=1e-2)
 
@@ -222,13 +228,15 @@ PAIR = {"kind": "modes", "count": 8}
 def test_one_of_two_modes_with_one_frequency_has_no_derivative():
     k = pair()
     with pytest.raises(InputError, match=r"have one frequency.*the sum of all.*along"):
-        fd.sensitivity(square, {"one": 0.02, "other": 0.02}, f"frequency[{k}]", PAIR)
+        fd.sensitivity(
+            square, {"one": 0.02, "other": 0.02}, measures=f"frequency[{k}]", analysis=PAIR
+        )
 
 
 def test_their_sum_has_one():
     k = pair()
     both = f"frequency[{k}] + frequency[{k + 1}]"
-    found = fd.sensitivity(square, {"one": 0.02}, both, PAIR)
+    found = fd.sensitivity(square, {"one": 0.02}, measures=both, analysis=PAIR)
 
     def total(one: float) -> float:
         frequency = fd.modes(square(one), count=8)["frequency"].values
@@ -244,7 +252,9 @@ def test_each_has_derivatives_in_one_direction(rates):
     k = pair()
     values = {"one": 0.02, "other": 0.02, "thickness": 0.02}
     names = [f"frequency[{k}]", f"frequency[{k + 1}]"]
-    found = fd.sensitivity(square, values, names, PAIR, along=rates)["derivative"].values
+    found = fd.sensitivity(square, values, measures=names, analysis=PAIR, along=rates)[
+        "derivative"
+    ].values
 
     def at(h: float) -> np.ndarray:
         moved = {name: value + h * rates.get(name, 0.0) for name, value in values.items()}
@@ -270,7 +280,9 @@ def test_so_they_have_where_dofs_without_mass_move_along():
         return fd.modes(build(0.02 + h), 4)["frequency"].values[1:3]
 
     names, rates, four = ["frequency[2]", "frequency[3]"], {"thickness": 1.0}, {**MODES, "count": 4}
-    found = fd.sensitivity(build, {"thickness": 0.02}, names, four, along=rates)["derivative"]
+    found = fd.sensitivity(build, {"thickness": 0.02}, measures=names, analysis=four, along=rates)[
+        "derivative"
+    ]
     h = 1e-5
     assert np.ptp(both(0.0)) < 1e-9
     assert found.values == pytest.approx((both(h) - both(-h)) / (2.0 * h), rel=1e-5)
@@ -289,13 +301,20 @@ def test_so_they_have_where_dofs_without_mass_move_along():
 )
 def test_refused(measures, analysis, told):
     with pytest.raises(InputError, match=told):
-        fd.sensitivity(cell(preset="n5b8e"), ["fold_stiffness"], measures, analysis)
+        fd.sensitivity(
+            cell(preset="n5b8e"), ["fold_stiffness"], measures=measures, analysis=analysis
+        )
 
 
 def test_rigid_modes_have_no_derivative():
     free = fd.Case(cell().structure)
     with pytest.raises(InputError, match=r"mode 1 is rigid or unstable.*hold the sheet"):
-        fd.sensitivity(free, ["fold_stiffness"], "frequency[1]", {"kind": "modes", "count": 8})
+        fd.sensitivity(
+            free,
+            ["fold_stiffness"],
+            measures="frequency[1]",
+            analysis={"kind": "modes", "count": 8},
+        )
 
 
 def test_soft_hinges_have_no_part():
@@ -303,7 +322,10 @@ def test_soft_hinges_have_no_part():
     made = cell(preset="herkal", supports=("xmin", "xmax"))
     with pytest.warns(fd.errors.FoldynWarning, match="superlinear"):
         found = fd.sensitivity(
-            made, ["bend_stiffness", "fold_stiffness"], "effective_mass[4,z]", MODES
+            made,
+            ["bend_stiffness", "fold_stiffness"],
+            measures="effective_mass[4,z]",
+            analysis=MODES,
         )
     assert not found["gradient_bend_stiffness"].values.any()
     assert found["gradient_fold_stiffness"].values.any()

@@ -64,7 +64,7 @@ def test_supports_that_move_and_damping_of_the_stiffness():
     build = built("merlin2", mass="mixed_voronoi")
     errors = Design(build, values, ["displacement[8,z]"], MOTION).errors()
     assert max(errors.values()) < 1e-6, errors
-    base = fd.sensitivity(build, values, "displacement[1,z]", MOTION)
+    base = fd.sensitivity(build, values, measures="displacement[1,z]", analysis=MOTION)
     assert base["gradient_lift"].values[0] == pytest.approx(1.0, rel=1e-9)
 
 
@@ -76,7 +76,9 @@ def test_the_remainder_falls_with_the_second_order(seed):
 
 
 def test_a_linear_motion_is_proportional_to_its_force():
-    found = fd.sensitivity(built("plate"), {"force": 1e-7}, "displacement[8,z]", MOTION)
+    found = fd.sensitivity(
+        built("plate"), {"force": 1e-7}, measures="displacement[8,z]", analysis=MOTION
+    )
     slope, value = found["gradient_force"].values[0], found["value"].values[0]
     assert slope == pytest.approx(value / 1e-7, rel=1e-5)
 
@@ -85,9 +87,9 @@ def test_few_kept_states_change_nothing(monkeypatch):
     """However steps are taken again, the gradient is the same to rounding."""
     values = {"force": 0.4, "stiffness": 0.5}
     once = {**MOTION, "every": 400}
-    whole = fd.sensitivity(built("plate"), values, "displacement[8,z]", once)
+    whole = fd.sensitivity(built("plate"), values, measures="displacement[8,z]", analysis=once)
     monkeypatch.setattr(runge_kutta_adjoint, "ROOM", (4 * 3 * 3 * 13 * 8 * 3.0, 3 * 2 * 8 * 39.0))
-    parts = fd.sensitivity(built("plate"), values, "displacement[8,z]", once)
+    parts = fd.sensitivity(built("plate"), values, measures="displacement[8,z]", analysis=once)
     for name in values:
         assert parts[f"gradient_{name}"].values == pytest.approx(
             whole[f"gradient_{name}"].values, rel=1e-12
@@ -97,7 +99,7 @@ def test_few_kept_states_change_nothing(monkeypatch):
 def test_all_arrays_of_a_structure_at_once():
     case = cell(preset="merlin2", mass="mixed_voronoi")
     names = ["fold_stiffness", "fold_rest", "bend_stiffness", "bend_rest", "bar_area", "node_mass"]
-    found = fd.sensitivity(case, names, "displacement[8,z]", MOTION)
+    found = fd.sensitivity(case, names, measures="displacement[8,z]", analysis=MOTION)
     chance = np.random.default_rng(2)
     for name in names:
         own = getattr(case.structure, name)
@@ -120,7 +122,7 @@ def test_all_arrays_of_a_structure_at_once():
 def test_the_length_to_which_a_bar_is_cut():
     """One that is cut longer pushes as one whose ends came nearer, per unit of the strain."""
     case = cell(preset="merlin2", force=1e-9)
-    found = fd.sensitivity(case, ["bar_length"], "displacement[8,z]", MOTION)
+    found = fd.sensitivity(case, ["bar_length"], measures="displacement[8,z]", analysis=MOTION)
     slope = found["gradient_bar_length"].values[0]
     h = 1e-6
     free = ~case.fixed[case.structure.bars].any(axis=(1, 2))
@@ -148,7 +150,9 @@ def test_the_length_to_which_a_bar_is_cut():
 )
 def test_methods_without_gradients(changes, told):
     with pytest.raises(InputError, match=told):
-        fd.sensitivity(cell(), ["fold_stiffness"], "displacement[8,z]", {**MOTION, **changes})
+        fd.sensitivity(
+            cell(), ["fold_stiffness"], measures="displacement[8,z]", analysis={**MOTION, **changes}
+        )
 
 
 @pytest.mark.parametrize(
@@ -165,10 +169,10 @@ def test_cases_without_gradients(more, told):
         key: value for key, value in more.items() if key != "loads"
     })  # fmt: skip
     with pytest.raises(InputError, match=rf"no gradients.*{told}.*leave (that|it) out"):
-        fd.sensitivity(other, ["fold_stiffness"], "displacement[8,z]", MOTION)
+        fd.sensitivity(other, ["fold_stiffness"], measures="displacement[8,z]", analysis=MOTION)
 
 
 def test_a_size_of_zero_has_no_derivative():
     still = fd.Case(cell().structure, [fd.Fix("xmin")])
     with pytest.raises(InputError, match="is 0, where a size has no derivative"):
-        fd.sensitivity(still, ["fold_stiffness"], "largest_displacement", MOTION)
+        fd.sensitivity(still, ["fold_stiffness"], measures="largest_displacement", analysis=MOTION)

@@ -25,7 +25,7 @@ def tower(
     stiffness: Any = 6e-3, drop: float = 0.0, preset: Any = "merlin2", spring: float = 0.0,
 ) -> fd.Case:  # fmt: skip
     """A Kresling tower, pressed from above by forces, or by a plate that moves down."""
-    pattern = fd.patterns.kresling(6, 0.04, height, twist)
+    pattern = fd.patterns.kresling(6, 0.04, height=height, twist=twist)
     sheet = fd.Sheet(1.2e9, 0.2, thickness, 700.0)
     made = fd.discretize(pattern, sheet, preset=preset, crease_stiffness=stiffness)
     supports: list[Any] = [fd.Fix("zmin")]
@@ -65,7 +65,9 @@ def test_equilibria_where_supports_move():
 
 def test_the_force_of_supports_is_the_slope_of_the_energy():
     """dE/d drop is the force on the plate (Castigliano)."""
-    found = fd.sensitivity(tower, {"drop": 0.01, "spring": 900.0}, "strain_energy", MOVED)
+    found = fd.sensitivity(
+        tower, {"drop": 0.01, "spring": 900.0}, measures="strain_energy", analysis=MOVED
+    )
     path = fd.trace(tower(drop=0.01, spring=900.0), "displacement", steps=4)
     chosen = path["support_axis"].values == "z"
     nodes = path["support_node"].values[chosen]
@@ -91,7 +93,7 @@ def test_the_remainder_falls_with_the_second_order(seed):
 
 
 def test_a_limit_load_falls_as_the_force_grows():
-    found = fd.sensitivity(tower, {"force": 1.0}, ["limit_load", "barrier"], SNAP)
+    found = fd.sensitivity(tower, {"force": 1.0}, measures=["limit_load", "barrier"], analysis=SNAP)
     value, slope = found["value"].values, found["gradient_force"].values
     assert slope[0] == pytest.approx(-value[0], rel=1e-10)
     assert slope[1] == 0.0  # a barrier is between states without force
@@ -111,7 +113,7 @@ def test_a_limit_load_falls_as_the_force_grows():
 )
 def test_refused(analysis, measure, told):
     with pytest.raises(InputError, match=told):
-        fd.sensitivity(tower, {"force": 1.0}, measure, analysis)
+        fd.sensitivity(tower, {"force": 1.0}, measures=measure, analysis=analysis)
 
 
 def test_displacements_at_a_limit_point_have_no_derivative():
@@ -137,7 +139,12 @@ def test_numbers_of_one_equilibrium_share_the_factors(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(equilibrium, "splu", factorized)
     measures = [f"displacement[{TIP},{axis}]" for axis in "xyz"]
-    fd.sensitivity(tower, {"height": 0.06}, measures, {"kind": "statics", "load_factors": [0.01]})
+    fd.sensitivity(
+        tower,
+        {"height": 0.06},
+        measures=measures,
+        analysis={"kind": "statics", "load_factors": [0.01]},
+    )
     assert len(count) == 1
 
 
@@ -150,7 +157,9 @@ def test_barriers_share_the_landscape(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for name in ("barrier", "barrier_back"):
         monkeypatch.setitem(MEASURES, name, replace(MEASURES[name], through=counted))
-    found = fd.sensitivity(tower, {"stiffness": 6e-3}, ["barrier", "barrier_back"], SNAP)
+    found = fd.sensitivity(
+        tower, {"stiffness": 6e-3}, measures=["barrier", "barrier_back"], analysis=SNAP
+    )
     assert len(count) == 1
     assert found["gradient_stiffness"].values.all()
 
@@ -162,7 +171,9 @@ def test_the_energy_of_bends_near_the_kink_of_their_law():
     made = fd.discretize(pattern, sheet, preset="herkal", crease_stiffness=0.05)
     case = fd.Case(made, [fd.Fix([0, 1, 2, 3])], [fd.Force([4, 5], (2e-4, 0.0, 3e-4))])
     given = {"method": "newton", "load_factors": [1.0]}
-    found = fd.sensitivity(case, ["bend_rest"], "strain_energy", {"kind": "statics", **given})
+    found = fd.sensitivity(
+        case, ["bend_rest"], measures="strain_energy", analysis={"kind": "statics", **given}
+    )
     way = np.random.default_rng(6).uniform(-1.0, 1.0, len(made.bend_rest))
 
     def energy(by: float) -> float:

@@ -47,7 +47,7 @@ def cell(
 
 def test_names_and_dimensions():
     values = {"panel_angle": 60.0, "stiffness": np.full(4, 0.02)}
-    found = fd.sensitivity(cell, values, ["frequency[1]", "mass"], MODES)
+    found = fd.sensitivity(cell, values, measures=["frequency[1]", "mass"], analysis=MODES)
     assert found["measure"].values.tolist() == ["frequency[1]", "mass"]
     assert found["gradient_panel_angle"].dims == ("measure",)
     assert found["gradient_stiffness"].dims == ("measure", "stiffness_entry")
@@ -58,7 +58,9 @@ def test_names_and_dimensions():
 def test_expressions_follow_the_chain_rule():
     values = {"panel_angle": 60.0}
     ratio = "-frequency[2] / frequency[1] + min(mass, 1e9) ** 2"
-    found = fd.sensitivity(cell, values, ["frequency[1]", "frequency[2]", "mass", ratio], MODES)
+    found = fd.sensitivity(
+        cell, values, measures=["frequency[1]", "frequency[2]", "mass", ratio], analysis=MODES
+    )
     (f1, f2, m, r), (d1, d2, dm, dr) = found["value"].values, found["gradient_panel_angle"].values
     assert r == pytest.approx(-f2 / f1 + m**2)
     assert dr == pytest.approx(-d2 / f1 + f2 * d1 / f1**2 + 2.0 * m * dm, rel=1e-12)
@@ -67,14 +69,16 @@ def test_expressions_follow_the_chain_rule():
 def test_a_case_file_is_changed_by_its_keys(tmp_path):
     (tmp_path / "cell.toml").write_text(CASE)
     values = {"pattern.panel_angle": 61.0, "sheet.thickness": 0.02}
-    found = fd.sensitivity(tmp_path / "cell.toml", values, "frequency[1]")
+    found = fd.sensitivity(tmp_path / "cell.toml", values, measures="frequency[1]")
 
     def own(panel_angle: float, thickness: float) -> fd.Case:
         pattern = fd.patterns.miura(panel_angle=panel_angle)
         made = fd.discretize(pattern, fd.Sheet(1e6, 0.25, thickness, 900.0))
         return fd.Case(made, [fd.Fix("xmin")])
 
-    other = fd.sensitivity(own, {"panel_angle": 61.0, "thickness": 0.02}, "frequency[1]", MODES)
+    other = fd.sensitivity(
+        own, {"panel_angle": 61.0, "thickness": 0.02}, measures="frequency[1]", analysis=MODES
+    )
     assert found["gradient_pattern.panel_angle"].values == pytest.approx(
         other["gradient_panel_angle"].values, rel=1e-6
     )
@@ -89,7 +93,7 @@ def test_a_case_file_that_starts_from_a_state_is_refused(tmp_path):
         own.replace('[[supports]]\nnodes = "xmin"', "") + "[initial]\nvelocity = [0.0, 0.0, 0.1]\n"
     )
     with pytest.raises(InputError, match=r"cell.toml: initial: there are no gradients"):
-        fd.sensitivity(tmp_path / "cell.toml", {"sheet.thickness": 0.02}, "mass")
+        fd.sensitivity(tmp_path / "cell.toml", {"sheet.thickness": 0.02}, measures="mass")
 
 
 def test_an_own_measure_with_its_derivative():
@@ -101,8 +105,8 @@ def test_an_own_measure_with_its_derivative():
         return {"frequency": np.array([-second / first**2, 1.0 / first, 0.0])}
 
     values = {"panel_angle": 60.0}
-    own = fd.sensitivity(cell, values, {"ratio": (ratio, slope)}, MODES)
-    text = fd.sensitivity(cell, values, "frequency[2] / frequency[1]", MODES)
+    own = fd.sensitivity(cell, values, measures={"ratio": (ratio, slope)}, analysis=MODES)
+    text = fd.sensitivity(cell, values, measures="frequency[2] / frequency[1]", analysis=MODES)
     for name in ("value", "gradient_panel_angle"):
         assert own[name].values == pytest.approx(text[name].values, rel=1e-12)
 
@@ -127,10 +131,10 @@ def test_thicknesses_of_panels_share_edges_and_are_changed_one_by_one():
     design = Parameters(cell, {"thickness": np.linspace(0.015, 0.02, 4)}, {})
     slope = design.slopes(numbers_of)["thickness"]
     assert isinstance(slope, Columns)
-    found = fd.sensitivity(cell, design.values, ["frequency[1]", "mass"], MODES)
+    found = fd.sensitivity(cell, design.values, measures=["frequency[1]", "mass"], analysis=MODES)
     assert found["gradient_thickness"].shape == (2, 4)
-    total = fd.sensitivity(cell, {"thickness": 0.02}, "mass", MODES)
-    each = fd.sensitivity(cell, {"thickness": np.full(4, 0.02)}, "mass", MODES)
+    total = fd.sensitivity(cell, {"thickness": 0.02}, measures="mass", analysis=MODES)
+    each = fd.sensitivity(cell, {"thickness": np.full(4, 0.02)}, measures="mass", analysis=MODES)
     assert each["gradient_thickness"].values.sum() == pytest.approx(
         total["gradient_thickness"].values[0], rel=1e-9
     )
@@ -177,7 +181,9 @@ def test_entries_are_told_apart_exactly(count):
 
 def test_stiffnesses_of_several_decades():
     values = {"stiffness": np.array([2e-5, 0.02, 5.0, 3e-3])}
-    found = fd.sensitivity(cell, values, "frequency[1]", MODES)["gradient_stiffness"].values[0]
+    found = fd.sensitivity(cell, values, measures="frequency[1]", analysis=MODES)[
+        "gradient_stiffness"
+    ].values[0]
 
     def own(k: int) -> float:
         """From a case in which that crease alone is a parameter."""
@@ -185,7 +191,9 @@ def test_stiffnesses_of_several_decades():
         def build(one: float) -> fd.Case:
             return cell(stiffness=np.where(np.arange(4) == k, one, values["stiffness"]))
 
-        one = fd.sensitivity(build, {"one": values["stiffness"][k]}, "frequency[1]", MODES)
+        one = fd.sensitivity(
+            build, {"one": values["stiffness"][k]}, measures="frequency[1]", analysis=MODES
+        )
         return float(one["gradient_one"].values[0])
 
     assert found == pytest.approx([own(k) for k in range(4)], rel=1e-8)
@@ -207,16 +215,22 @@ def test_a_kink_of_the_design_is_warned_of(preset):
         return fd.Case(made, [fd.Fix([0, 1, 2, 3])])
 
     with pytest.warns(FoldynWarning, match=r"shift: the numbers of the case .* have a kink here"):
-        fd.sensitivity(build, {"shift": 0.0}, "mass", MODES, sizes={"shift": 0.1})
-    fd.sensitivity(build, {"shift": 0.01}, "mass", MODES)  # beside it there is none
+        fd.sensitivity(build, {"shift": 0.0}, measures="mass", analysis=MODES, sizes={"shift": 0.1})
+    fd.sensitivity(
+        build, {"shift": 0.01}, measures="mass", analysis=MODES
+    )  # beside it there is none
 
 
 @pytest.mark.parametrize("size", [0.0, -0.01, 1e-12])
 def test_sizes_that_differences_cannot_take_are_refused(size):
     with pytest.raises(InputError, match=r"sizes\.thickness = .*above 0, and at least 2e-08"):
-        fd.sensitivity(cell, {"thickness": 0.02}, "mass", MODES, sizes={"thickness": size})
+        fd.sensitivity(
+            cell, {"thickness": 0.02}, measures="mass", analysis=MODES, sizes={"thickness": size}
+        )
     with pytest.raises(InputError, match=r"sizes\.force = .*give a size above 0: differences"):
-        fd.sensitivity(cell, {"force": 0.0}, "mass", MODES, sizes={"force": -abs(size)})
+        fd.sensitivity(
+            cell, {"force": 0.0}, measures="mass", analysis=MODES, sizes={"force": -abs(size)}
+        )
 
 
 def test_a_parameter_of_zero_needs_a_size():
@@ -227,8 +241,10 @@ def test_a_parameter_of_zero_needs_a_size():
         return fd.Case(made.structure, made.supports, [fd.Force("xmax", (force + 0.01, 0, 0))])
 
     with pytest.raises(InputError, match=r"force = 0: how far.*sizes="):
-        fd.sensitivity(build, {"force": 0.0}, "frequency[1]", state)
-    found = fd.sensitivity(build, {"force": 0.0}, "frequency[1]", state, sizes={"force": 0.01})
+        fd.sensitivity(build, {"force": 0.0}, measures="frequency[1]", analysis=state)
+    found = fd.sensitivity(
+        build, {"force": 0.0}, measures="frequency[1]", analysis=state, sizes={"force": 0.01}
+    )
     assert found["gradient_force"].values[0] != 0.0
 
 
@@ -236,7 +252,7 @@ def test_measures_of_an_expression_take_their_own_arguments():
     """Whichever comes first: the mass, which has none, or a frequency."""
     values, texts = {"panel_angle": 60.0, "thickness": 0.02}, ["mass", "frequency[1]"]
     pairs = "mass * frequency[1]", "frequency[1] * mass"
-    found = fd.sensitivity(cell, values, [*texts, *pairs], MODES)
+    found = fd.sensitivity(cell, values, measures=[*texts, *pairs], analysis=MODES)
     mass, frequency, *products = found["gradient_thickness"].values
     expected = mass * found["value"].values[1] + frequency * found["value"].values[0]
     np.testing.assert_allclose(products, expected, rtol=1e-12)
@@ -273,7 +289,7 @@ def test_measures_of_an_expression_take_their_own_arguments():
 )
 def test_bad_input(build, values, measures, analysis, told):
     with pytest.raises(InputError, match=told):
-        fd.sensitivity(build, values, measures, analysis)
+        fd.sensitivity(build, values, measures=measures, analysis=analysis)
 
 
 def test_what_changes_the_topology_is_named():
@@ -283,4 +299,4 @@ def test_what_changes_the_topology_is_named():
         return fd.Case(made.structure, [fd.Fix(one) for one in np.atleast_1d(held)])
 
     with pytest.raises(InputError, match=r"share: changes what is connected, held.*fd.sweep"):
-        fd.sensitivity(build, {"share": 0.5}, "frequency[1]", MODES)
+        fd.sensitivity(build, {"share": 0.5}, measures="frequency[1]", analysis=MODES)

@@ -38,7 +38,7 @@ def test_long_waves_have_the_slopes_of_the_bands_and_the_static_stiffness():
 
 def test_dashpots_add_up_to_the_impedance():
     case, waves = UNIT.chain(3), long_waves(cell())
-    found = absorbing_end(case, range(18, 24), waves)
+    found = absorbing_end(case, range(18, 24), waves=waves)
     total = np.zeros((2, 2))
     for dashpot in found:
         x, y, _ = case.structure.nodes[dashpot.nodes[0]]
@@ -57,7 +57,7 @@ def reflected():
     push = fd.Table(times, 0.5 * (1.0 - np.cos(2.0 * np.pi * times / period)))
     chain = UNIT.chain(CELLS)
     ends = {
-        "absorbing": absorbing_end(chain, END, waves),
+        "absorbing": absorbing_end(chain, END, waves=waves),
         "free": [],
     }
     found = {}
@@ -91,8 +91,8 @@ def test_an_absorbing_end_sends_hardly_anything_back(reflected):
         (lambda: LongWaves((0, 0, 0), [[1.0]], [[1.0]]), "axis"),
         (lambda: long_waves(cell(), along=1), "along = 1: the cell has 1 period, 0"),
         (lambda: long_waves("cell"), "cell"),
-        (lambda: absorbing_end(UNIT.chain(1), [0, 99], long_waves(cell())), "nodes"),
-        (lambda: absorbing_end(UNIT.chain(1), [0], "waves"), "waves"),
+        (lambda: absorbing_end(UNIT.chain(1), [0, 99], waves=long_waves(cell())), "nodes"),
+        (lambda: absorbing_end(UNIT.chain(1), [0], waves="waves"), "waves"),
     ],
 )
 def test_what_is_no_long_wave_is_refused(call, words):
@@ -103,7 +103,7 @@ def test_what_is_no_long_wave_is_refused(call, words):
 def test_nodes_on_the_axis_are_refused():
     waves = LongWaves((0, 0, 1), np.eye(2), np.eye(2), point=UNIT.structure(1).nodes[0])
     with pytest.raises(InputError, match="node 0 lies on the axis"):
-        absorbing_end(UNIT.chain(1), [0, 1], waves)
+        absorbing_end(UNIT.chain(1), [0, 1], waves=waves)
 
 
 @pytest.mark.parametrize(

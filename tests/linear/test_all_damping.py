@@ -86,7 +86,9 @@ def test_frequency_responses_modes_and_periodic_motions(kind, model):
     state = fd.State(modes.displacement.values)
     assert 0.02 < ratio < 0.2
     direct, modal, harmonic = (
-        fd.frf(case, TINY, [0.6 * f, f, 3.0 * f], state, method).receptance.values
+        fd.frf(
+            case, TINY, frequencies=[0.6 * f, f, 3.0 * f], state=state, method=method
+        ).receptance.values
         for method in ("direct", "modal", "harmonic")
     )
     for at in range(3):
@@ -129,10 +131,10 @@ def test_simulated_motions_decay_as_the_frequency_response_says(kind, model, met
     start = fd.State(modes.displacement.values, KICK * shape)
     if method in EXPLICIT and model == "shell":
         with pytest.raises(InputError, match="have no mass"):
-            fd.simulate(case, period, method, initial=start)
+            fd.simulate(case, period, method=method, initial=start)
         return
     dt = period / 200.0 if method in IMPLICIT else None
-    run = fd.simulate(case, 2.0 * period, method, dt, every=period, initial=start)
+    run = fd.simulate(case, 2.0 * period, method=method, dt=dt, every=period, initial=start)
     mass = case.nodal_mass[:, None]
     first, last = ((shape * mass * run.velocity.values[k]).sum() for k in (1, 2))
     assert -np.log(last / first) / (2.0 * np.pi) == pytest.approx(ratio, rel=0.05)
@@ -150,7 +152,7 @@ def test_damping_at_the_start_is_that_of_folds_and_pressure_there(load, kind):
     for k in range(2):
         start = fd.State(modes.displacement.values, 1e-3 * modes["shape"].values[k])
         dt = 1e-5 / float(modes.frequency[k])
-        run = fd.simulate(case, 10 * dt, "newmark", dt, every=10, initial=start)
+        run = fd.simulate(case, 10 * dt, method="newmark", dt=dt, every=10, initial=start)
         power = float(run.dissipated[-1]) / (10 * dt)
         rate = 4.0 * np.pi * float(modes.damping_ratio[k] * modes.frequency[k])
         assert power / 1e-6 == pytest.approx(rate, rel=2e-3)
@@ -181,8 +183,10 @@ def test_frequency_responses_from_motions_are_the_direct_ones(kind, model, metho
     options = TRANSIENTS[method] | {"integrator": "newmark", "dt": 1.0 / (60.0 * f)}
     if method != "stepped_sine":
         options["duration"] = 9.0 / (2.0 * np.pi * f * ratio)
-    found = fd.frf(case, TINY, at, state, method, **options).receptance.values
-    direct = fd.frf(case, TINY, at, state).receptance.values
+    found = fd.frf(
+        case, TINY, frequencies=at, state=state, method=method, **options
+    ).receptance.values
+    direct = fd.frf(case, TINY, frequencies=at, state=state).receptance.values
     wrong = np.abs(found - direct).max(axis=(1, 2)) / np.abs(direct).max(axis=(1, 2))
     assert wrong[0] < 0.02 and wrong[1] < 1.5e-3 / ratio + (
         0.04 if kind.endswith("creases") else 0.01
@@ -201,10 +205,13 @@ def test_steady_motions_of_diagrams_are_the_direct_responses(kind):
     height = fd.Quantity("m", "height", function=lambda u, v, t: u[0, 2])
     periods = round(6.0 / (2.0 * np.pi * ratio))
     found = fd.bifurcation_diagram(
-        driven, height, [f], sweep="up", settle=periods, record=4, initial=state,
+        driven, height, frequencies=[f], sweep="up", settle=periods, record=4, initial=state,
         method="newmark", dt=1.0 / (60.0 * f),
     )  # fmt: skip
-    direct = abs(fd.frf(case, TINY, [f], state).receptance.values[0, 0, 2]) * TINY.vector[2]
+    direct = (
+        abs(fd.frf(case, TINY, frequencies=[f], state=state).receptance.values[0, 0, 2])
+        * TINY.vector[2]
+    )
     assert float(found.amplitude[0, 0]) == pytest.approx(2.0 * direct, rel=0.03)
 
 
@@ -234,7 +241,9 @@ def test_gradients_have_the_damping_or_refuse_it(kind, measure, analysis):
         return fd.Case(s, [HELD, *supports], [PRELOAD], damping)
 
     def gradient(thickness: float) -> tuple[float, float]:
-        found = fd.sensitivity(case_at, {"thickness": thickness}, measure, analysis)
+        found = fd.sensitivity(
+            case_at, {"thickness": thickness}, measures=measure, analysis=analysis
+        )
         return float(found.value[0]), float(found.gradient_thickness[0])
 
     moves = analysis["kind"] == "dynamics"
@@ -298,7 +307,8 @@ def test_motions_of_basins_settle_at_that_rate(kind, model):
     case = swing(kind, model)
     rate, period, start = decay(case)
     found = fd.basins(
-        case, lambda kick: fd.State(None, kick * start.velocity), {"kick": [1.0]}, 3.0 * period,
+        case, lambda kick: fd.State(None, kick * start.velocity), grid={"kick": [1.0]},
+        duration=3.0 * period,
         record=4, same=0.9, method="rk4", dt=period / 120.0,
     )  # fmt: skip
     left = float((found.velocity[0, 0].values * start.velocity).sum() / (start.velocity**2).sum())
@@ -315,7 +325,9 @@ def test_damped_creases_of_plates_are_of_first_order_but_by_energy_momentum():
     _, period, start = decay(case)
 
     def end(method: str, steps: int) -> float:
-        run = fd.simulate(case, 2 * period, method, period / steps, every=2 * steps, initial=start)
+        run = fd.simulate(
+            case, 2 * period, method=method, dt=period / steps, every=2 * steps, initial=start
+        )
         return float(run.displacement[-1, 0, 2])
 
     exact = end("energy_momentum", 400)
@@ -337,7 +349,7 @@ def test_the_drag_of_a_wind_damps_as_it_blows():
         case, 30.0 * period, settle=30.0 * period, interval=0.5 * period, dt=period / 60.0
     )
     assert float(found.exponent) == pytest.approx(-rate, rel=0.05)
-    for refused in (fd.modes, lambda one: fd.frf(one, TINY, [1.0])):
+    for refused in (fd.modes, lambda one: fd.frf(one, TINY, frequencies=[1.0])):
         with pytest.raises(InputError, match=r"air\.velocity = .*: .* would leave wind out"):
             refused(case)
 
@@ -377,7 +389,7 @@ def test_damped_waves_of_a_side_are_the_poles_of_the_ring(kind, model):
             with pytest.raises(InputError, match=r"damping: modes of|fold_law = .*remembers"):
                 waves(cell, phases, 2)
         return
-    found = fd.linear.damped_bands(cell, phases, 2)
+    found = fd.linear.damped_bands(cell, phases, count=2)
     rates, whole = found.rate.values.ravel(), linearize(drum(kind, model, 6))
     k, c, m = (part.toarray() for part in (whole.stiffness, whole.damping, whole.mass))
     one, none = np.eye(len(k)), np.zeros_like(k)
@@ -398,9 +410,9 @@ def test_creases_that_yield_are_refused_by_all_that_would_leave_it_out():
     for asked in (
         lambda: fd.periodic_motion(driven, harmonics=2),
         lambda: fd.lyapunov_exponent(case, 1.0),
-        lambda: fd.basins(case, lambda x: fd.State(), {"x": [0.0]}, 1.0),
-        lambda: fd.linear.damped_bands(cell, [[0.0]], 1),
-        lambda: fd.sensitivity(case, ["fold_stiffness"], "frequency[1]", modes),
+        lambda: fd.basins(case, lambda x: fd.State(), grid={"x": [0.0]}, duration=1.0),
+        lambda: fd.linear.damped_bands(cell, [[0.0]], count=1),
+        lambda: fd.sensitivity(case, ["fold_stiffness"], measures="frequency[1]", analysis=modes),
     ):
         with pytest.raises(InputError, match=r"yield|remember"):
             asked()
@@ -409,4 +421,4 @@ def test_creases_that_yield_are_refused_by_all_that_would_leave_it_out():
 def test_basins_refuse_friction():
     case = made("drag", "plate").altered(contact=fd.Contact(thickness=0.02, friction=0.3))
     with pytest.raises(InputError, match=r"contact\.friction: .* without what friction"):
-        fd.basins(case, lambda x: fd.State(), {"x": [0.0]}, 1.0)
+        fd.basins(case, lambda x: fd.State(), grid={"x": [0.0]}, duration=1.0)

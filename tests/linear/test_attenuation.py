@@ -17,9 +17,9 @@ from foldyn.linear import attenuation, band_gaps, damped_bands
 )
 def test_waves_of_a_band_are_found_at_its_frequency(cell, phase, direction):
     """Of a square panel a polynomial of a higher degree, as creases reach beyond the next cell."""
-    b = fd.bands(cell(), [phase], 3)
+    b = fd.bands(cell(), [phase], count=3)
     other = sum(phase) - phase[direction]
-    found = attenuation(cell(), b.frequency.values[0], direction, other, count=40)
+    found = attenuation(cell(), b.frequency.values[0], along=direction, phase=other, count=40)
     off = np.nanmin(np.abs(found.phase.values - phase[direction]), axis=1)
     assert off.max() < 1e-9
     assert (found.attenuation.values == 0.0).all()
@@ -46,7 +46,7 @@ def test_chains_of_masses_and_springs_decay_as_their_formula_says():
 def test_attenuation_is_above_zero_in_gaps_alone():
     cell, phase = miura(), np.pi
     ky = np.full(81, phase)
-    b = fd.bands(cell, np.column_stack([np.linspace(-np.pi, np.pi, 81), ky]), 8)
+    b = fd.bands(cell, np.column_stack([np.linspace(-np.pi, np.pi, 81), ky]), count=8)
     gaps = band_gaps(b).where(lambda g: g.below > 0, drop=True)
     assert gaps.sizes["gap"] >= 1
     inside = gaps["middle"].values
@@ -61,8 +61,8 @@ def test_rayleigh_damping_has_its_closed_form():
     alpha, beta = 50.0, 1e-6
     case = fd.Case(miura().case.structure, damping=fd.Rayleigh(alpha, beta))
     phases = [[0.9, 0.4], [2.0, 1.0]]
-    found = damped_bands(fd.UnitCell(case), phases, 4)
-    omega = np.sqrt(fd.bands(miura(), phases, 4, track=False).eigenvalue.values)
+    found = damped_bands(fd.UnitCell(case), phases, count=4)
+    omega = np.sqrt(fd.bands(miura(), phases, count=4, track=False).eigenvalue.values)
     half = 0.5 * (alpha + beta * omega**2)
     assert found.rate.values == pytest.approx(-half + 1j * np.sqrt(omega**2 - half**2), rel=1e-8)
     assert found.damping_ratio.values == pytest.approx(half / omega, rel=1e-6)
@@ -73,13 +73,13 @@ def test_damped_creases_and_dashpots_damp_waves():
         miura().case.structure, [fd.Dashpot(0.1, nodes=[4])], damping=fd.CreaseDamping(1e-4)
     )
     cell = fd.UnitCell(case)
-    assert (damped_bands(cell, [[0.9, 0.4]], 4).damping_ratio.values > 1e-6).all()
+    assert (damped_bands(cell, [[0.9, 0.4]], count=4).damping_ratio.values > 1e-6).all()
     assert attenuation(cell, [600.0]).attenuation.values[0] > 0.0
 
 
 def test_gaps_are_listed():
     cell = miura()
-    b = fd.bands(cell, cell.path("G-X-M-G", 61), 10)
+    b = fd.bands(cell, cell.path("G-X-M-G", 61), count=10)
     table = band_gaps(b)
     frequency = np.sort(b.frequency.values, axis=1)
     for row in table.to_dataframe().itertuples():
@@ -90,7 +90,7 @@ def test_gaps_are_listed():
     assert set(table.direction.values) <= {"all", "G-X", "X-M", "M-G"}
     assert (band_gaps(b, least=0.3).relative_width.values >= 0.3).all()
     held = fd.Case(cell.case.structure, [fd.Spring(1e4, nodes=[4])])
-    grounded = band_gaps(fd.bands(fd.UnitCell(held), cell.grid(4), 3))
+    grounded = band_gaps(fd.bands(fd.UnitCell(held), cell.grid(4), count=3))
     assert grounded.below.values[0] == 0
     assert float(grounded.bottom[0]) == 0.0
     with pytest.raises(InputError, match=r"bands: got dict; give what foldyn\.bands returns"):
@@ -99,11 +99,11 @@ def test_gaps_are_listed():
 
 def test_damped_bands_are_as_many_as_there_are_motions():
     cell = fd.UnitCell(fd.Case(miura().case.structure, damping=fd.Rayleigh(alpha=50.0)))
-    found = damped_bands(cell, [[0.9, 0.4]], 24)
-    every = fd.bands(cell, [[0.9, 0.4]], 24).eigenvalue.values
+    found = damped_bands(cell, [[0.9, 0.4]], count=24)
+    every = fd.bands(cell, [[0.9, 0.4]], count=24).eigenvalue.values
     assert np.sort(np.abs(found.rate.values) ** 2) == pytest.approx(np.sort(every), rel=1e-6)
     with pytest.raises(InputError, match=r"count = 25: .* leave 24 motions at the phases"):
-        damped_bands(cell, [[0.9, 0.4]], 25)
+        damped_bands(cell, [[0.9, 0.4]], count=25)
     with pytest.raises(InputError, match="cell: got Case, give a UnitCell"):
         damped_bands(cell.case, [[0.9, 0.4]])
 

@@ -71,7 +71,7 @@ def test_supercells_do_so_on_bent_sheets():
         height = cell.case.structure.nodes[:, 2].mean()
         states.append({"state": fd.linear.relaxed(cell, bending(*cell.vectors, height, 5.0))})
     assert_alike(*cells, (2, 1), states)
-    b = fd.bands(cells[0], [[0.5, 0.5]], 1, **states[0])
+    b = fd.bands(cells[0], [[0.5, 0.5]], count=1, **states[0])
     assert b.angles.values == pytest.approx([np.degrees(5.0 * cells[0].vectors[0, 0]), 0.0])
 
 
@@ -206,10 +206,10 @@ def test_waves_run_both_ways_alike(cell, phase):
 )
 def test_group_velocities_are_the_derivatives_of_bands(cell, phase):
     step, count = 1e-4, 8
-    b = fd.bands(cell, [phase], count, group_velocity=True, track=False)
+    b = fd.bands(cell, [phase], count=count, group_velocity=True, track=False)
     for j, unit in enumerate(np.eye(cell.dimensions)):
         moved = [np.array(phase) + s * step * unit for s in (-2, -1, 1, 2)]
-        omega = np.sqrt(fd.bands(cell, moved, count, track=False).eigenvalue.values)
+        omega = np.sqrt(fd.bands(cell, moved, count=count, track=False).eigenvalue.values)
         exact = (omega[0] - 8.0 * omega[1] + 8.0 * omega[2] - omega[3]) / (12.0 * step)
         assert b.slope.values[0, :, j] == pytest.approx(exact, abs=1e-6 * abs(exact).max())
     speeds = np.einsum("bj,ja->ba", b.slope.values[0], cell.vectors)
@@ -218,17 +218,17 @@ def test_group_velocities_are_the_derivatives_of_bands(cell, phase):
 
 def test_shapes_move_partners_by_the_phase():
     cell, phase = miura(), np.array([0.7, 0.4])
-    shape = fd.bands(cell, [phase], 3, shape=True).shape.values[0]
+    shape = fd.bands(cell, [phase], count=3, shape=True).shape.values[0]
     for pairs, k in zip(cell.case.structure.pattern.periods, phase, strict=True):
         assert shape[:, pairs[:, 1]] == pytest.approx(np.exp(1j * k) * shape[:, pairs[:, 0]])
     cell = kresling()
-    shape = fd.bands(cell, [[0.7]], 3, shape=True).shape.values[0]
+    shape = fd.bands(cell, [[0.7]], count=3, shape=True).shape.values[0]
     turned = shape[:, :5] @ cell.motions[0].rotation().T
     assert shape[:, 5:] == pytest.approx(np.exp(0.7j) * turned)
 
 
 def test_polarizations_are_shares():
-    b = fd.bands(miura(), miura().path("G-X", 5), 6, polarization=True)
+    b = fd.bands(miura(), miura().path("G-X", 5), count=6, polarization=True)
     assert b.polarization.sum("axis").values == pytest.approx(1.0)
     assert b.polarization.values.min() >= 0.0
 
@@ -237,7 +237,7 @@ def test_polarizations_are_shares():
 def powers(cell, way, count):
     """Powers of the phase with which the frequencies of the lowest bands begin."""
     steps = np.array([0.02, 0.04])
-    b = fd.bands(cell, steps[:, None] * np.array(way), count, track=False)
+    b = fd.bands(cell, steps[:, None] * np.array(way), count=count, track=False)
     return np.log2(np.sqrt(b.eigenvalue[1].values / b.eigenvalue[0].values))
 
 
@@ -251,7 +251,9 @@ def test_branches_that_begin_at_zero():
     assert angle == pytest.approx(np.radians(30.0))
     zeros = [int((eigenvalues(tower, [[k]]) == 0.0).sum()) for k in (0.0, angle, -angle, 0.3)]
     assert zeros == [2, 1, 1, 0]
-    near = fd.bands(tower, [[angle + 0.01], [angle + 0.02]], 1, track=False).frequency.values[:, 0]
+    near = fd.bands(tower, [[angle + 0.01], [angle + 0.02]], count=1, track=False).frequency.values[
+        :, 0
+    ]
     assert near[1] / near[0] == pytest.approx(4.0, rel=0.02)
 
 
@@ -297,7 +299,7 @@ class Homogenized:
         found = []
         for number in (2.0, 4.0):  # rad/m
             phase = number * (self.cell.vectors @ np.array([*way, 0.0]))
-            omega = np.sqrt(fd.bands(self.cell, [phase], 3, track=False).eigenvalue.values[0])
+            omega = np.sqrt(fd.bands(self.cell, [phase], count=3, track=False).eigenvalue.values[0])
             found.append(np.append(omega[0] / number**2, omega[1:] / number))
         return (4.0 * found[0] - found[1]) / 3.0
 
@@ -332,7 +334,7 @@ def test_long_waves_are_those_of_the_homogenized_sheet():
 
 # ---------------------------------------------------------------------- sorting and refusals
 def test_bands_follow_shapes_through_crossings():
-    b = fd.bands(miura(), miura().path("G-X", 120), 8, shape=True, group_velocity=True)
+    b = fd.bands(miura(), miura().path("G-X", 120), count=8, shape=True, group_velocity=True)
     frequency = b.frequency.values
     order = np.argsort(frequency, axis=1)
     assert (order[2] != order[-10]).any()  # some cross
@@ -342,16 +344,16 @@ def test_bands_follow_shapes_through_crossings():
     )
     off = np.abs(frequency[1:] - ahead)[inside, :6]
     assert off.max() < 0.01 * frequency.max()
-    sorted_ones = fd.bands(miura(), miura().path("G-X", 120), 8, track=False).frequency.values
+    sorted_ones = fd.bands(miura(), miura().path("G-X", 120), count=8, track=False).frequency.values
     np.testing.assert_allclose(np.sort(frequency, axis=1), sorted_ones)
 
 
 def test_large_cells_are_solved_as_small_ones_are(monkeypatch):
     pattern = fd.patterns.miura(a=0.03, b=0.031)
     cell = fd.UnitCell(fd.Case(fd.shell(pattern, SHEET, divisions=2)))
-    full = fd.bands(cell, [[0.7, 0.4], [0.0, 0.0]], 8, track=False)
+    full = fd.bands(cell, [[0.7, 0.4], [0.0, 0.0]], count=8, track=False)
     monkeypatch.setattr("foldyn.linear.wave_solver.DENSE", 1)
-    few = fd.bands(cell, [[0.7, 0.4], [0.0, 0.0]], 8, track=False)
+    few = fd.bands(cell, [[0.7, 0.4], [0.0, 0.0]], count=8, track=False)
     top = float(full.eigenvalue.max())
     assert few.eigenvalue.values == pytest.approx(full.eigenvalue.values, abs=1e-9 * top)
 
@@ -359,18 +361,18 @@ def test_large_cells_are_solved_as_small_ones_are(monkeypatch):
 def test_states_that_are_no_equilibrium_are_told():
     moved = kresling().case.structure.nodes * [0.0, 0.0, 0.001]
     with pytest.warns(FoldynWarning, match="no equilibrium of the repeated sheet"):
-        b = fd.bands(kresling(), [[0.5]], 2, state=fd.State(moved))
+        b = fd.bands(kresling(), [[0.5]], count=2, state=fd.State(moved))
     assert b.vectors.values == pytest.approx(np.array([[0.0, 0.0, 0.03003]]))
 
 
 def test_bands_are_stored_with_their_case(tmp_path):
-    b = fd.bands(miura(), miura().path("G-X", 3), 2, shape=True)
+    b = fd.bands(miura(), miura().path("G-X", 3), count=2, shape=True)
     fd.save(b, tmp_path / "bands.nc")
     again = fd.load(tmp_path / "bands.nc")
     assert np.array_equal(again["shape"].values, b["shape"].values)
     assert again.attrs["tick_labels"] == "G-X"
     cell = fd.UnitCell(fd.case_of(again))
-    assert fd.bands(cell, again.wave_vector, 2).frequency.values == pytest.approx(
+    assert fd.bands(cell, again.wave_vector, count=2).frequency.values == pytest.approx(
         b.frequency.values, abs=1e-6
     )
 
@@ -379,6 +381,6 @@ def test_bands_refuse_what_they_cannot_do():
     with pytest.raises(InputError, match=r"phases: shape \(1, 3\): give \(n, 2\)"):
         fd.bands(miura(), [[0.0, 0.0, 0.0]])
     with pytest.raises(InputError, match=r"count = 100: .* leave 24 motions"):
-        fd.bands(miura(), [[0.5, 0.0]], 100)
+        fd.bands(miura(), [[0.5, 0.0]], count=100)
     with pytest.raises(InputError, match="cell: "):
         fd.bands(miura().case, [[0.5]])

@@ -31,7 +31,7 @@ def test_a_rigid_screw_motion_turns_and_moves_all_cells_alike():
     moved[..., 2] += rise[:, None]
     speed = np.cross((0.0, 0.0, 2.5), turned) + np.array([0.0, 0.0, 0.3])
     run = motion(nodes, moved, speed, TIME)
-    found, turn = space_time(run, cell()), space_time(run, cell(), "rotation")
+    found, turn = space_time(run, cell()), space_time(run, cell(), component="rotation")
     assert found.sizes["cell"] == 7
     np.testing.assert_allclose(found.displacement, rise[:, None] * np.ones(7), atol=1e-14)
     np.testing.assert_allclose(turn.displacement, angle[:, None] * np.ones(7), atol=1e-12)
@@ -124,7 +124,7 @@ def shaken():
     )
     low, high = np.sqrt(2.0 * branches()[1] / (HEAVIER, 1.0)) / (2.0 * np.pi)
     frequencies = np.linspace(0.6 * low, 1.1 * high, 61)
-    return fd.frf(held, fd.BaseMotion("z"), frequencies), (low, high)
+    return fd.frf(held, fd.BaseMotion("z"), frequencies=frequencies), (low, high)
 
 
 def test_transmission_is_least_inside_the_gap(shaken):
@@ -168,7 +168,7 @@ def test_rows_of_incomplete_cells_are_left_out():
 
 def test_cells_of_a_ring_are_found_and_do_not_advance():
     """A sixth of a storey, which a turn repeats; here the whole storey moves outward."""
-    storey = fd.patterns.kresling(6, 0.05, 0.05, 20.0)
+    storey = fd.patterns.kresling(6, 0.05, height=0.05, twist=20.0)
     faces = [face for face in storey.faces if set(face) <= {0, 1, 6, 7}]
     part = fd.Pattern(storey.vertices[[0, 1, 6, 7]], [[f % 6 + f // 6 * 2 for f in face]
                                                     for face in faces])  # fmt: skip
@@ -179,7 +179,7 @@ def test_cells_of_a_ring_are_found_and_do_not_advance():
     moved = np.zeros((4, *nodes.shape))
     moved[1:, :, :2] = 0.1 * nodes[:, :2]
     run = motion(nodes, moved, moved, np.arange(4.0))
-    found = space_time(run, one, "x")
+    found = space_time(run, one, component="x")
     assert found.sizes["cell"] == 6
     assert "strain" not in found
     np.testing.assert_allclose(found.displacement[1], float(found.displacement[1, 0]), rtol=1e-9)
@@ -190,11 +190,11 @@ def test_cells_of_a_ring_are_found_and_do_not_advance():
     [
         (lambda run: space_time(run, fd.UnitCell(miura((1, 1)))), "1 of these cells"),
         (lambda run: space_time(run, "cell"), "UnitCell"),
-        (lambda run: space_time(run, cell(), "radial"), "component"),
+        (lambda run: space_time(run, cell(), component="radial"), "component"),
         (lambda run: space_time(run, cell(), along=1), "along = 1: the cell has 1 period"),
         (lambda run: space_time(run.drop_vars("velocity"), cell()), "velocity"),
         (lambda run: space_time(5, cell()), "give a motion"),
-        (lambda run: wave_spectrum(run, cell(), "rotation"), "component"),
+        (lambda run: wave_spectrum(run, cell(), component="rotation"), "component"),
         (lambda run: transmission(run, cell()), "frequency response"),
     ],
 )
@@ -210,5 +210,7 @@ def test_sheets_do_not_rotate():
     still = np.zeros((5, *nodes.shape))
     with pytest.raises(InputError, match="without an axis"):
         space_time(
-            motion(nodes, still, still, np.arange(5.0)), fd.UnitCell(miura((1, 1))), "rotation"
+            motion(nodes, still, still, np.arange(5.0)),
+            fd.UnitCell(miura((1, 1))),
+            component="rotation",
         )

@@ -112,7 +112,7 @@ def test_the_wobbles_of_the_specimen_are_bending_in_its_plane(rest, state, mass)
     The sheet, 0.1 x 0.087 m, sways along y in its plane and its top edge turns about z, so that
     the corners move along x: what its FRF shows at a corner.
     """
-    found = modes(paper_specimen(mass, rest), 8, state, secant=0.5)
+    found = modes(paper_specimen(mass, rest), 8, state=state, secant=0.5)
     what = character(found)
     named = dict(zip(what.name.values.tolist(), found.frequency.values, strict=True))
     for name, frequency in (

@@ -75,7 +75,7 @@ def test_a_truss_along_its_path():
         expected = truss.eigenvalue(-float(state.displacement[2, 2]))
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            found = modes(truss.case(), 1, state)
+            found = modes(truss.case(), 1, state=state)
         text = " ".join(str(w.message) for w in caught)
         assert float(found.eigenvalue[0]) == pytest.approx(expected, rel=1e-9)
         assert ("unstable equilibrium: 1 of the 1 modes" in text) == (expected < 0)
@@ -84,7 +84,7 @@ def test_a_truss_along_its_path():
         seen.add(bool(expected < 0))
     assert seen == {True, False}
     load = truss.EA / np.hypot(truss.h, truss.b) ** 3 * 0.02 * 0.18 * 0.08  # at v = 0.02
-    found = modes(truss.case(-load), 1, "equilibrium")
+    found = modes(truss.case(-load), 1, state="equilibrium")
     assert float(found.displacement[2, 2]) == pytest.approx(-0.02, rel=1e-8)
     assert float(found.eigenvalue[0]) == pytest.approx(truss.eigenvalue(0.02), rel=1e-7)
 
@@ -104,7 +104,7 @@ def test_a_truss_that_sways_aside():
     assert z == pytest.approx(np.sqrt(truss.h**2 - 2 * truss.b**2), rel=1e-6)
     branch, counts = fd.switch_branch(path, crossing, steps=8, case=case), set()
     for one, step in [(path, 0), (path, crossing + 1), (path, 24), (branch, 3), (branch, 7)]:
-        found = modes(case, 2, fd.initial_state(one, step))
+        found = modes(case, 2, state=fd.initial_state(one, step))
         negative = int((found.eigenvalue < 0).sum())
         assert negative == int(one.negative_eigenvalues[step])
         assert found.attrs["residual"] < 1e-8
@@ -125,7 +125,7 @@ def test_a_pendulum():
         return s.internal_force(d * stretched)[1, 2] + m * gravity
 
     stretch = brentq(unbalanced, 0, 1e-4, xtol=1e-18)
-    found = modes(case, 2, fd.State(stretch * stretched))
+    found = modes(case, 2, state=fd.State(stretch * stretched))
     expected = np.sqrt(gravity / (length + stretch)) / 2 / np.pi
     np.testing.assert_allclose(found.frequency, expected, rtol=1e-9)
     np.testing.assert_allclose(found.rigid_share, 1.0, atol=1e-9)

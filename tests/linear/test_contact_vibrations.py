@@ -33,7 +33,9 @@ def test_sheets_apart_vibrate_as_without_contact():
         one = case.altered(damping=damping)
         other = one.altered(contact=None)
         np.testing.assert_array_equal(fd.modes(one, 5).frequency, fd.modes(other, 5).frequency)
-        a, b = (fd.frf(each, fd.Force([2], (0, 0, 1)), [3.0, 30.0]) for each in (one, other))
+        a, b = (
+            fd.frf(each, fd.Force([2], (0, 0, 1)), frequencies=[3.0, 30.0]) for each in (one, other)
+        )
         np.testing.assert_array_equal(a.receptance, b.receptance)
 
 
@@ -48,7 +50,7 @@ def test_a_small_motion_is_the_sum_of_the_modes(mass):
         v = np.zeros_like(u)
         v[2:4, 2] = speed
         motion = fd.simulate(
-            case, 0.5 / found.frequency.values[0], "dormand_prince", initial=fd.State(u, v),
+            case, 0.5 / found.frequency.values[0], method="dormand_prince", initial=fd.State(u, v),
             tolerance=1e-9, every=20,
         )  # fmt: skip
         share = np.einsum("kni,ni->k", shape, case.mass @ v)  # of unit modal mass

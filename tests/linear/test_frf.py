@@ -20,7 +20,7 @@ NO_LAWS = {"stiffness": (100.0,), "masses": (0.5,)}
 # ------------------------------------------------------------------------ closed forms
 @pytest.mark.parametrize("method", ["direct", "modal", "harmonic"])
 def test_a_chain_of_two_masses(method):
-    found = frf(chain(**DAMPING), PUSH, F, method=method)
+    found = frf(chain(**DAMPING), PUSH, frequencies=F, method=method)
     exact = chain_response(F, **DAMPING)[:, :, 0]
     assert largest_error(found.receptance.values[:, 1:, 0], exact) < 1e-12
     assert not found.receptance.values[:, 0].any()  # held
@@ -28,16 +28,16 @@ def test_a_chain_of_two_masses(method):
     with pytest.warns(
         FoldynWarning, match=r"drive\[0\].*in part"
     ):  # what supports take is left out
-        partly = frf(chain(**DAMPING), fd.Force([0, 1], (2.0, 0, 0)), F, method=method)
+        partly = frf(chain(**DAMPING), fd.Force([0, 1], (2.0, 0, 0)), frequencies=F, method=method)
     np.testing.assert_array_equal(partly.receptance, found.receptance)
 
 
 def test_peaks_recover_frequency_and_damping():
     """From the response through the estimators: poles known in closed form."""
-    found = frf(chain(**DAMPING), PUSH, np.arange(0.5, 5, 0.02))
+    found = frf(chain(**DAMPING), PUSH, frequencies=np.arange(0.5, 5, 0.02))
     frequency, ratio = chain_modes(**DAMPING)
     for node in (1, 2):
-        peaks = peaks_of(found, node, "x")
+        peaks = peaks_of(found, node, axis="x")
         np.testing.assert_allclose([p.natural_frequency for p in peaks], frequency, rtol=1e-6)
         np.testing.assert_allclose([p.damping_ratio for p in peaks], ratio, rtol=1e-6)
         assert max(p.misfit for p in peaks) < 1e-6
@@ -46,7 +46,7 @@ def test_peaks_recover_frequency_and_damping():
     for seed in range(8):
         noise = np.random.default_rng(seed).normal(size=(2, *found.receptance.shape))
         noisy = found.assign(receptance=found.receptance + size * (noise[0] + 1j * noise[1]))
-        peaks = peaks_of(noisy, 1, "x", prominence=0.2, count=2)
+        peaks = peaks_of(noisy, 1, axis="x", prominence=0.2, count=2)
         for peak, f, z in zip(peaks, frequency, ratio, strict=True):
             misses.append((peak.natural_frequency - f) / peak.frequency_error)
             misses.append((peak.damping_ratio - z) / peak.damping_error)
@@ -59,34 +59,34 @@ def test_peaks_of_a_single_mode():
     """Half-power points: exact for one mode; the textbook formula is high by about 2 z^2."""
     case = chain(**NO_LAWS, alpha=3.0)
     frequency, ratio = chain_modes(**NO_LAWS, alpha=3.0)
-    found = frf(case, PUSH, np.arange(0.5, 5, 0.05))
-    (peak,) = peaks_of(found, 1, "x")
+    found = frf(case, PUSH, frequencies=np.arange(0.5, 5, 0.05))
+    (peak,) = peaks_of(found, 1, axis="x")
     assert peak.half_power == pytest.approx(ratio[0], rel=1e-9)
     assert peak.textbook == pytest.approx(ratio[0] * (1 + 2 * ratio[0] ** 2), rel=1e-3)
     assert peak.frequency == pytest.approx(frequency[0] * np.sqrt(1 - 2 * ratio[0] ** 2), rel=1e-9)
-    (peak,) = peaks_of(found, 1, "x", quantity="mobility")
+    (peak,) = peaks_of(found, 1, axis="x", quantity="mobility")
     assert peak.frequency == pytest.approx(frequency[0], rel=1e-9)
     assert peak.half_power == peak.textbook * peak.frequency / frequency[0]
 
 
 def test_peaks_without_damping():
     """The response is real there, and negative beyond a resonance."""
-    found = frf(chain(), PUSH, np.arange(0.5, 5, 0.0201))
-    peaks = peaks_of(found, 1, "x")
+    found = frf(chain(), PUSH, frequencies=np.arange(0.5, 5, 0.0201))
+    peaks = peaks_of(found, 1, axis="x")
     assert [peak.frequency for peak in peaks] == pytest.approx(chain_modes()[0], abs=0.0201)
-    assert len(plot_frf(found, 1, "x").axes) == 2
+    assert len(plot_frf(found, 1, axes="x").axes) == 2
 
 
 def test_a_node_at_rest_has_no_peaks():
-    found = frf(chain(alpha=0.4), PUSH, F)
-    assert peaks_of(found, 0, "x") == ()
+    found = frf(chain(alpha=0.4), PUSH, frequencies=F)
+    assert peaks_of(found, 0, axis="x") == ()
     with pytest.raises(InputError, match="node = 3"):
-        peaks_of(found, 3, "x")
+        peaks_of(found, 3, axis="x")
 
 
 def test_the_static_limit_is_the_flexibility():
     case = miura_case()
-    found = frf(case, fd.Force([7], (0.01, 0, 0)), [0.0])
+    found = frf(case, fd.Force([7], (0.01, 0, 0)), frequencies=[0.0])
     free, static = case.free_dofs, np.zeros(case.structure.nodes.size)
     stiffness = case.structure.tangent(0.0 * case.structure.nodes).toarray()
     static[free] = np.linalg.solve(stiffness[np.ix_(free, free)], (free == 21).astype(float))
@@ -97,7 +97,7 @@ def test_reciprocity():
     case, places = miura_case(beta=2e-3), [(7, 0), (6, 1), (4, 2)]
     H = []
     for node, axis in places:
-        found = frf(case, fd.Force([node], 0.01 * np.eye(3)[axis]), F).receptance.values
+        found = frf(case, fd.Force([node], 0.01 * np.eye(3)[axis]), frequencies=F).receptance.values
         H.append([found[:, n, a] for n, a in places])
     scale = np.abs(H).max()
     np.testing.assert_allclose(H, np.transpose(H, (1, 0, 2)), atol=1e-11 * scale)
@@ -117,7 +117,8 @@ def test_reciprocity():
 def test_all_modes_give_the_direct_response(loads, state, beta):
     case, drive = miura_case(loads, beta=beta), fd.Force([7], (1e-3, 0, 0))
     direct, modal = (
-        frf(case, drive, F, state=state, method=m).receptance.values for m in ("direct", "modal")
+        frf(case, drive, frequencies=F, state=state, method=m).receptance.values
+        for m in ("direct", "modal")
     )
     assert largest_error(modal, direct) < 1e-9
 
@@ -132,31 +133,34 @@ def test_a_shell():
     """Its edges' rotations have no mass: they follow, and do not show."""
     case, drive = shell_case(0.5, 1e-3), fd.Force([7], (0.01, 0, 0))
     direct, modal, harmonic = (
-        frf(case, drive, F, method=m).receptance.values for m in ("direct", "modal", "harmonic")
+        frf(case, drive, frequencies=F, method=m).receptance.values
+        for m in ("direct", "modal", "harmonic")
     )
     assert direct.shape == (len(F), len(case.structure.nodes), 3)
     assert largest_error(modal, direct) < 1e-6
     assert largest_error(harmonic, direct) < 1e-8
     natural = fd.modes(case, 4).frequency.values
-    (peak, *_) = peaks_of(frf(case, drive, np.arange(0.2, 1.5, 0.02)), 7, "x")
+    (peak, *_) = peaks_of(frf(case, drive, frequencies=np.arange(0.2, 1.5, 0.02)), 7, axis="x")
     assert np.abs(peak.natural_frequency / natural - 1.0).min() < 1e-3
 
 
 def test_a_shell_struck():
     """By an implicit method, since explicit ones need mass everywhere."""
     drive, f = fd.Force([7], (1e-4, 0, 0)), np.arange(0.2, 2.01, 0.2)
-    struck, exact = (frf(shell_case(2.0, 1e-3), drive, f, method=m) for m in ("impulse", "direct"))
+    struck, exact = (
+        frf(shell_case(2.0, 1e-3), drive, frequencies=f, method=m) for m in ("impulse", "direct")
+    )
     assert struck.attrs["integrator"] == "generalized_alpha"
     assert largest_error(struck.receptance.values, exact.receptance.values) < 3e-3
 
 
 def test_static_correction_converges_faster():
     case, drive = miura_case(), fd.Force([7], (0.01, 0, 0))
-    direct = frf(case, drive, F).receptance.values
+    direct = frf(case, drive, frequencies=F).receptance.values
 
     def error(count, corrected):
         options = {"method": "modal", "count": count, "static_correction": corrected}
-        return largest_error(frf(case, drive, F, **options).receptance.values, direct)
+        return largest_error(frf(case, drive, frequencies=F, **options).receptance.values, direct)
 
     corrected, plain = ([error(n, how) for n in (4, 8, 16)] for how in (True, False))
     assert corrected[0] < 1e-3 and corrected[1] < 1e-6 and corrected[2] < 1e-8 < 1e-7 < plain[2]
@@ -169,16 +173,16 @@ def test_a_free_body():
     case, w = fd.Case(s), 2 * np.pi * F[:, None]
     masses = s.mass.diagonal()
     along = [fd.Force([node], (float(m), 0, 0)) for node, m in enumerate(masses)]
-    found = frf(case, along, F).receptance.values[:, :, 0]
+    found = frf(case, along, frequencies=F).receptance.values[:, :, 0]
     np.testing.assert_allclose(found * w**2 * masses.sum(), -1.0, rtol=1e-6)
 
     push, low = fd.Force([7], (1e-3, 0, 0)), [0.05, 0.2, 0.4]
-    kept = frf(case, push, low, method="modal", count=16).receptance.values
-    exact = frf(case, push, low).receptance.values
+    kept = frf(case, push, frequencies=low, method="modal", count=16).receptance.values
+    exact = frf(case, push, frequencies=low).receptance.values
     for k in range(3):
         assert largest_error(kept[k], exact[k]) < 1e-5
     with pytest.warns(FoldynWarning, match="no response at 0 Hz"):
-        found = frf(case, push, [0.0, 1.0])
+        found = frf(case, push, frequencies=[0.0, 1.0])
     assert np.isnan(found.receptance.values[0, :, 0]).all()
     assert np.isfinite(found.receptance.values[1]).all()
 
@@ -188,13 +192,15 @@ def test_a_resonance_without_damping(method):
     frequency, _ = chain_modes()
     near = np.sort([*frequency, 1.0, 2.0])
     with pytest.warns(FoldynWarning, match="no response at") as told:
-        found = frf(chain(), PUSH, near, method=method)
+        found = frf(chain(), PUSH, frequencies=near, method=method)
     assert f"{frequency[0]:.6g}, {frequency[1]:.6g} Hz" in str(told[0].message)
     lost = np.isnan(found.receptance.values[:, 1, 0])
     np.testing.assert_array_equal(lost, np.isin(near, frequency))
     exact = chain_response([1.0, 2.0])[:, :, 0]
     assert largest_error(found.receptance.sel(frequency=[1.0, 2.0])[:, 1:, 0], exact) < 1e-12
-    assert np.isfinite(frf(chain(), PUSH, 1.0001 * frequency, method=method).receptance).all()
+    assert np.isfinite(
+        frf(chain(), PUSH, frequencies=1.0001 * frequency, method=method).receptance
+    ).all()
 
 
 # ------------------------------------------------------------------------ base motion
@@ -205,10 +211,10 @@ def test_transmissibility_of_one_mass():
     k, m, w = 100.0, 0.5, 2 * np.pi * F
     exact = k * (1 + 1j * w * beta) / (k - w**2 * m + 1j * w * (alpha * m + beta * k))
     for method in ("direct", "modal"):
-        found = frf(case, fd.BaseMotion("x", value=1e-6), F, method=method)
+        found = frf(case, fd.BaseMotion("x", value=1e-6), frequencies=F, method=method)
         assert largest_error(found.transmissibility.values[:, 1, 0], exact) < 1e-12
         assert (found.transmissibility.values[:, 0, 0] == 1.0).all()
-    (peak,) = peaks_of(found, 1, "x")
+    (peak,) = peaks_of(found, 1, axis="x")
     frequency, ratio = chain_modes(**NO_LAWS, alpha=alpha, beta=beta)
     assert peak.natural_frequency == pytest.approx(frequency[0], rel=1e-6)
     assert peak.damping_ratio == pytest.approx(ratio[0], rel=1e-6)
@@ -217,7 +223,7 @@ def test_transmissibility_of_one_mass():
 @pytest.mark.parametrize("mass", ["circumcenter", "consistent"])
 def test_transmissibility_tends_to_one(mass):
     case = miura_case(mass=mass, alpha=0.0, beta=1e-3)
-    found = frf(case, fd.BaseMotion("z"), [0.0, 0.01, 0.02]).transmissibility.values
+    found = frf(case, fd.BaseMotion("z"), frequencies=[0.0, 0.01, 0.02]).transmissibility.values
     still, *errors = np.abs(found - np.array([0, 0, 1])).max(axis=(1, 2))
     assert still < 1e-9 and errors[1] < 0.01
     assert errors[1] / errors[0] == pytest.approx(4.0, rel=0.01)
@@ -225,7 +231,7 @@ def test_transmissibility_tends_to_one(mass):
 
 # ------------------------------------------------------------------------ quantities, files
 def test_mobility_and_accelerance():
-    found = frf(chain(alpha=0.4), PUSH, F)
+    found = frf(chain(alpha=0.4), PUSH, frequencies=F)
     w = 2 * np.pi * F[:, None, None]
     H = found.receptance.values
     np.testing.assert_allclose(convert(found, "mobility").mobility, 1j * w * H)
@@ -235,7 +241,7 @@ def test_mobility_and_accelerance():
     assert accelerance.accelerance.attrs["units"] == "m/(N s2)"
     assert "receptance" not in accelerance
     with pytest.raises(InputError, match="transmissibility"):
-        convert(frf(chain(alpha=0.4), fd.BaseMotion("x"), F), "mobility")
+        convert(frf(chain(alpha=0.4), fd.BaseMotion("x"), frequencies=F), "mobility")
 
 
 @pytest.mark.parametrize(
@@ -243,11 +249,11 @@ def test_mobility_and_accelerance():
 )
 def test_files_keep_complex_numbers(tmp_path, method, options):
     case, drive, f = miura_case(alpha=4.0), fd.Force([7], (1e-6, 0, 0)), [0.5, 1.0, 1.5]
-    found = frf(case, drive, f, method=method, **options)
+    found = frf(case, drive, frequencies=f, method=method, **options)
     fd.save(found, tmp_path / "frf.nc")
     loaded = fd.load(tmp_path / "frf.nc")
     assert loaded.identical(found) and loaded.receptance.dtype == complex
-    again = frf(fd.case_of(loaded), drive, f, method=method, **options)
+    again = frf(fd.case_of(loaded), drive, frequencies=f, method=method, **options)
     np.testing.assert_array_equal(again.receptance, found.receptance)
     for name, value in {"method": method, **options}.items():
         assert loaded.attrs[name] == value
@@ -304,4 +310,4 @@ def test_an_unstable_state_is_told():
     case = fd.Case(s, [fd.Fix([0, 2], "xyz"), fd.Fix([1], "y")], damping=fd.Rayleigh(1.0))
     flat = fd.State(nodes * [0, 0, -1])
     with pytest.warns(FoldynWarning, match="unstable equilibrium"):
-        frf(case, fd.Force([1], (0, 0, 1.0)), [1.0], state=flat)
+        frf(case, fd.Force([1], (0, 0, 1.0)), frequencies=[1.0], state=flat)

@@ -26,11 +26,16 @@ def backbone(amplitudes, span, method="harmonic", **options):
     for amplitude in amplitudes:
         guess = 0.65 * (amplitude / 5e-5) ** (1 / 7)
         response = frf(
-            flap(alpha=0.3), LIFT, guess * span, method=method, amplitude=amplitude, **options
+            flap(alpha=0.3),
+            LIFT,
+            frequencies=guess * span,
+            method=method,
+            amplitude=amplitude,
+            **options,
         )
         assert response.attrs["amplitude"] == amplitude
         assert response.attrs["drive_force"] == amplitude
-        (peak,) = peaks_of(response, 3, "z", count=1)
+        (peak,) = peaks_of(response, 3, axis="z", count=1)
         found.append((peak.frequency, amplitude * peak.height))
     return np.array(found).T
 
@@ -54,12 +59,14 @@ def test_simulated_motions_follow_the_same_law():
 
 def test_a_linear_fold_does_not_depend_on_the_amplitude():
     case, f = flap(alpha=1.0, law="linear"), np.arange(0.2, 2.0, 0.2)
-    exact = frf(case, LIFT, f).receptance
+    exact = frf(case, LIFT, frequencies=f).receptance
     for amplitude in (1e-6, 1.0):
-        found = frf(case, LIFT, f, method="harmonic", amplitude=amplitude)
+        found = frf(case, LIFT, frequencies=f, method="harmonic", amplitude=amplitude)
         np.testing.assert_allclose(found.receptance, exact, rtol=1e-12)
     base = fd.BaseMotion("x", value=0.01)  # of bars alone
-    found, direct = (frf(chain(alpha=0.4), base, f, method=m) for m in ("harmonic", "direct"))
+    found, direct = (
+        frf(chain(alpha=0.4), base, frequencies=f, method=m) for m in ("harmonic", "direct")
+    )
     np.testing.assert_allclose(found.transmissibility, direct.transmissibility, rtol=1e-12)
     assert (found.swing.values == 0.0).all()
 
@@ -67,10 +74,10 @@ def test_a_linear_fold_does_not_depend_on_the_amplitude():
 def test_one_hinge_balances_with_its_own_slope():
     """The response is the direct one with the secant slope of the swing that comes out."""
     case, f = flap(alpha=1.0), [0.4]
-    found = frf(case, LIFT, f, method="harmonic", amplitude=1e-4, tolerance=1e-10)
+    found = frf(case, LIFT, frequencies=f, method="harmonic", amplitude=1e-4, tolerance=1e-10)
     swing = float(found.swing[0])
     assert swing > 0.3
-    secant = frf(case, LIFT, f, secant=swing)
+    secant = frf(case, LIFT, frequencies=f, secant=swing)
     assert largest_error(found.receptance, secant.receptance.values) < 1e-8
 
 
@@ -80,27 +87,37 @@ def test_rising_and_falling_sweeps_differ_where_there_are_two_branches():
     case, f = flap(alpha=0.1), np.arange(0.44, 0.581, 0.02)
     options = {"amplitude": 5e-6, "method": "stepped_sine"}
     up, down = (
-        np.abs(frf(case, LIFT, f, sweep=way, **options).receptance.values[:, 3, 2])
+        np.abs(frf(case, LIFT, frequencies=f, sweep=way, **options).receptance.values[:, 3, 2])
         for way in ("up", "down")
     )
     upper = np.flatnonzero(up > 2 * down)
     assert 3 <= len(upper) < len(f) - 2 and (np.diff(upper) == 1).all()
     np.testing.assert_allclose(np.delete(up, upper), np.delete(down, upper), rtol=0.01)
-    balanced = frf(case, LIFT, np.r_[0.4, 0.42, f], method="harmonic", amplitude=5e-6)
+    balanced = frf(case, LIFT, frequencies=np.r_[0.4, 0.42, f], method="harmonic", amplitude=5e-6)
     np.testing.assert_allclose(np.abs(balanced.receptance.values[2:, 3, 2]), up, rtol=0.005)
 
 
 def test_soft_hinges_are_told():
     case = miura_case(bend_law="superlinear")
     with pytest.warns(FoldynWarning, match="secant = an amplitude"):
-        found = frf(case, fd.Force([7], (0.01, 0, 0)), [0.5, 1.0])
+        found = frf(case, fd.Force([7], (0.01, 0, 0)), frequencies=[0.5, 1.0])
     assert found.attrs["soft_hinges"] == 16
-    assert frf(case, fd.Force([7], (0.01, 0, 0)), [0.5], secant=1.0).attrs["soft_hinges"] == 0
+    assert (
+        frf(case, fd.Force([7], (0.01, 0, 0)), frequencies=[0.5], secant=1.0).attrs["soft_hinges"]
+        == 0
+    )
 
 
 def test_an_iteration_that_is_cut_short_is_told():
     with pytest.warns(FoldynWarning, match="does not converge at 0.4 Hz"):
-        found = frf(flap(alpha=1.0), LIFT, [0.4], method="harmonic", amplitude=1e-4, iterations=2)
+        found = frf(
+            flap(alpha=1.0),
+            LIFT,
+            frequencies=[0.4],
+            method="harmonic",
+            amplitude=1e-4,
+            iterations=2,
+        )
     assert np.isnan(found.receptance.values[0, 3]).all()
     assert np.isnan(found.swing.values).all()
 
@@ -126,9 +143,14 @@ def specimen(alpha, beta=0.0, **options):
     ],
 )
 def test_peaks_of_the_specimen(alpha, beta, mass, within):
-    found = frf(specimen(alpha, beta, mass=mass), DRIVE, np.arange(1, 25.1, 0.2), method="harmonic")
+    found = frf(
+        specimen(alpha, beta, mass=mass),
+        DRIVE,
+        frequencies=np.arange(1, 25.1, 0.2),
+        method="harmonic",
+    )
     assert found.attrs["drive_force"] == pytest.approx(7e-3)
-    peaks = peaks_of(found, 0, "x", prominence=0.02)
+    peaks = peaks_of(found, 0, axis="x", prominence=0.02)
     np.testing.assert_allclose([p.frequency for p in peaks], PAPER, rtol=within)
     if beta > 0.0:
         assert peaks[1].textbook == pytest.approx(0.135, abs=0.015)
@@ -139,11 +161,11 @@ def test_peaks_of_the_specimen(alpha, beta, mass, within):
 def test_a_simulated_motion_of_the_specimen_agrees():
     """At the drive of the paper the middle row moves by millimeters: one harmonic is enough."""
     case, f = specimen(15.8), [9.5]
-    balanced = frf(case, DRIVE, f, method="harmonic")
-    moved = frf(case, DRIVE, f, method="stepped_sine", settled=3e-3, dt=1.3e-5)
+    balanced = frf(case, DRIVE, frequencies=f, method="harmonic")
+    moved = frf(case, DRIVE, frequencies=f, method="stepped_sine", settled=3e-3, dt=1.3e-5)
     assert 7e-3 * np.abs(moved.receptance.values).max() > 3e-3
     assert largest_error(balanced.receptance, moved.receptance.values) < 0.02
-    weak = frf(case, DRIVE, f, method="harmonic", amplitude=0.1)
+    weak = frf(case, DRIVE, frequencies=f, method="harmonic", amplitude=0.1)
     assert largest_error(weak.receptance, moved.receptance.values) > 0.05
 
 
@@ -151,9 +173,10 @@ def test_the_specimen_as_published_about_its_relaxed_equilibrium():
     """Its bends are bent there: a small motion has slopes, and the peaks hardly move with it."""
     case, f = specimen(15.8, rest="as_published"), np.arange(2, 22.1, 0.25)
     found = [
-        frf(case, DRIVE, f, state="equilibrium", method="harmonic", amplitude=a) for a in (0.1, 1.0)
+        frf(case, DRIVE, frequencies=f, state="equilibrium", method="harmonic", amplitude=a)
+        for a in (0.1, 1.0)
     ]
-    weak, full = ([p.frequency for p in peaks_of(r, 0, "x", prominence=0.02)] for r in found)
+    weak, full = ([p.frequency for p in peaks_of(r, 0, axis="x", prominence=0.02)] for r in found)
     np.testing.assert_allclose(weak, full, rtol=0.02)
     np.testing.assert_allclose(full, PAPER, rtol=0.10)
     assert modes(case, 1, state="equilibrium").frequency.values[0] > 4.0

@@ -45,12 +45,12 @@ def test_two_masses(name, method):
     case, c = damped(name)
     w = 2 * np.pi * F[:, None]
     matrix = K - w[:, :, None] ** 2 * M + 1j * w[:, :, None] * c
-    found = fd.frf(case, fd.Force([1], (1, 0, 0)), F, method=method).receptance
+    found = fd.frf(case, fd.Force([1], (1, 0, 0)), frequencies=F, method=method).receptance
     assert largest_error(found.values[:, 1:, 0], np.linalg.inv(matrix)[:, :, 0]) < 1e-12
     ground = {"ground": np.array([C, 0.0]), "both": np.array([C, C])}.get(name, np.zeros(2))
     load = (w**2 - 1j * w * case.rayleigh.alpha) * np.diag(M) - 1j * w * ground
     exact = 1.0 + np.linalg.solve(matrix, load[:, :, None])[:, :, 0]
-    found = fd.frf(case, fd.BaseMotion("x"), F, method=method).transmissibility
+    found = fd.frf(case, fd.BaseMotion("x"), frequencies=F, method=method).transmissibility
     assert largest_error(found.values[:, 1:, 0], exact) < 1e-12
 
 
@@ -69,7 +69,7 @@ def test_at_a_resonance_that_only_modal_damping_limits():
     exact = (SHAPES[0] ** 2 / modal).sum(axis=1)
     for method in ("direct", "modal"):
         f = np.sqrt(VALUES) / (2 * np.pi)
-        found = fd.frf(case, fd.Force([1], (1, 0, 0)), f, method=method).receptance
+        found = fd.frf(case, fd.Force([1], (1, 0, 0)), frequencies=f, method=method).receptance
         np.testing.assert_allclose(found.values[:, 1, 0], exact, rtol=1e-9)
 
 
@@ -104,7 +104,9 @@ def test_ratios_of_rayleigh_give_its_response(model, method):
     modes = fd.modes(plain, len(plain.free_dofs))
     case = plain.altered(damping=fd.ModalDamping(modes.damping_ratio.values.tolist()))
     f, drive = np.linspace(0.5, 1.5, 7) * float(modes.frequency[1]), fd.Force([3], (0, 0, 1.0))
-    both = [fd.frf(one, drive, f, method=method).receptance.values for one in (plain, case)]
+    both = [
+        fd.frf(one, drive, frequencies=f, method=method).receptance.values for one in (plain, case)
+    ]
     assert largest_error(both[1], both[0]) < 1e-7
 
 
@@ -127,7 +129,7 @@ def test_creases_on_a_fold(model, method):
     normal = np.array([-arm[4, 2], 0.0, arm[4, 0]]) / reach
     w = np.linspace(0.5, 1.5, 9) * np.sqrt(k / inertia)
     exact = reach**2 / (k - w**2 * inertia + 1j * w * c)
-    found = fd.frf(case, fd.Force([4, 5], normal), w / (2 * np.pi), method=method)
+    found = fd.frf(case, fd.Force([4, 5], normal), frequencies=w / (2 * np.pi), method=method)
     assert largest_error(found.receptance.values[:, 4] @ normal, exact) < 3e-3
 
 
@@ -138,8 +140,8 @@ def test_in_time():
     plain = miura_case()
     case = plain.altered(supports=[*plain.supports, *dashpots], damping=damping)
     drive, f = fd.Force([7], (1e-5, 0, 0)), np.arange(0.2, 2.0, 0.2)
-    exact = fd.frf(case, drive, f).receptance.values
-    found = fd.frf(case, drive, f, method="impulse", integrator="newmark", dt=0.01)
+    exact = fd.frf(case, drive, frequencies=f).receptance.values
+    found = fd.frf(case, drive, frequencies=f, method="impulse", integrator="newmark", dt=0.01)
     assert largest_error(found.receptance.values, exact) < 5e-3
 
 
@@ -161,7 +163,7 @@ def test_modal_damping_fills_the_matrix_where_that_is_cheaper(count, method, mon
     monkeypatch.setattr(complex_symmetric, "factorize", factorize)
     f = fd.modes(case, 3).frequency.values
     drive = fd.Force([case.free_dofs[-1] // 3], (0, 0, 1))
-    found = fd.frf(case, drive, f, method=method)
+    found = fd.frf(case, drive, frequencies=f, method=method)
     assert set(sizes) == ({(there.shape, there.nnz)} if count else set())
     load = system.projected(np.eye(case.structure.nodes.size)[case.free_dofs[-1]])
     for k, omega in enumerate(2 * np.pi * f):

@@ -24,7 +24,7 @@ TIMED = {
 
 
 def error_of(method, case=None, **options) -> float:
-    found = frf(case or chain(**DAMPING), PUSH, F, method=method, **options)
+    found = frf(case or chain(**DAMPING), PUSH, frequencies=F, method=method, **options)
     exact = chain_response(F, **DAMPING)[:, :, 0]
     return largest_error(found.receptance.values[:, 1:, 0], exact)
 
@@ -41,7 +41,7 @@ def test_simulated_motions_write_no_document_and_discretize_nothing(monkeypatch)
     ):  # fmt: skip
         home = importlib.import_module(module)
         monkeypatch.setattr(home, name, spied(getattr(home, name), name))
-    found = frf(case, LIFT, [1.0, 2.0], method="stepped_sine", settled=0.5)
+    found = frf(case, LIFT, frequencies=[1.0, 2.0], method="stepped_sine", settled=0.5)
     assert calls == ["to_document"] and found.attrs["rerunnable"] == 1
 
 
@@ -86,13 +86,15 @@ LIFT = fd.Force([7], (1e-6, 0, 0))
 @pytest.mark.matrix
 def test_a_miura_cell():
     case, f = miura_case(alpha=2.0), np.arange(0.2, 4.01, 0.2)
-    exact = frf(case, LIFT, f).receptance.values
-    impulse = frf(case, LIFT, f, method="impulse")
+    exact = frf(case, LIFT, frequencies=f).receptance.values
+    impulse = frf(case, LIFT, frequencies=f, method="impulse")
     assert largest_error(impulse.receptance.values, exact) < 2e-4
     assert impulse.attrs["left_at_end"] < 1e-4
-    other = frf(case, fd.Force([6], (0, 1e-6, 0)), f, method="impulse").receptance[:, 7, 0]
+    other = frf(case, fd.Force([6], (0, 1e-6, 0)), frequencies=f, method="impulse").receptance[
+        :, 7, 0
+    ]
     assert largest_error(impulse.receptance[:, 6, 1], other) < 1e-5  # reciprocity
-    sines = frf(case, LIFT, f[::5], method="stepped_sine", settled=1e-4)
+    sines = frf(case, LIFT, frequencies=f[::5], method="stepped_sine", settled=1e-4)
     assert largest_error(sines.receptance.values, exact[::5]) < 1e-3
     assert (sines.unsteadiness <= 1e-4).all()
 
@@ -101,7 +103,7 @@ def test_bursts_are_coherent_and_repeatable():
     case, drive = chain(**DAMPING), PUSH
     options = {"averages": 3, "duration": 30.0, "estimator": "h2"}
     one, same, other = (
-        frf(case, drive, F, method="burst_random", seed=s, **options) for s in (1, 1, 2)
+        frf(case, drive, frequencies=F, method="burst_random", seed=s, **options) for s in (1, 1, 2)
     )
     np.testing.assert_array_equal(one.receptance, same.receptance)
     assert not np.array_equal(one.receptance, other.receptance)
@@ -116,14 +118,20 @@ def test_an_exponential_window_and_its_correction():
     """A lightly damped motion, cut off: the windowed response is that at s = i w + rate."""
     damping, rate, f = {"alpha": 0.1, "beta": 1e-3}, 1.0, np.arange(0.05, 4.501, 0.05)
     found = frf(
-        chain(**damping), PUSH, f, method="impulse", window_rate=rate, duration=20.0, dt=0.005
+        chain(**damping),
+        PUSH,
+        frequencies=f,
+        method="impulse",
+        window_rate=rate,
+        duration=20.0,
+        dt=0.005,
     )
     exact = chain_response(f, rate=rate, **damping)[:, :, 0]
     assert largest_error(found.receptance.values[:, 1:, 0], exact) < 1e-4
     assert found.attrs["window_rate"] == rate
     frequency, ratio = chain_modes(**damping)
     for node in (1, 2):
-        peaks = peaks_of(found, node, "x")
+        peaks = peaks_of(found, node, axis="x")
         np.testing.assert_allclose([p.natural_frequency for p in peaks], frequency, rtol=1e-4)
         np.testing.assert_allclose([p.damping_ratio for p in peaks], ratio, rtol=0.01)
 
@@ -131,18 +139,20 @@ def test_an_exponential_window_and_its_correction():
 def test_half_power_points_without_the_window():
     single = {"stiffness": (100.0,), "masses": (0.5,), "alpha": 0.4}
     options = {"method": "impulse", "window_rate": 1.0, "duration": 20.0, "dt": 0.01}
-    found = frf(chain(**single), PUSH, np.arange(0.05, 4.501, 0.05), **options)
-    (peak,) = peaks_of(found, 1, "x")
+    found = frf(chain(**single), PUSH, frequencies=np.arange(0.05, 4.501, 0.05), **options)
+    (peak,) = peaks_of(found, 1, axis="x")
     assert peak.half_power == pytest.approx(chain_modes(**single)[1][0], rel=1e-3)
     assert peak.textbook > 2 * peak.half_power
 
 
 def test_a_motion_that_has_not_died_away_or_settled_is_told():
     with pytest.warns(FoldynWarning, match=r"of the motion is left.*window_rate = \d"):
-        found = frf(chain(alpha=0.1), PUSH, F, method="impulse", duration=10.0)
+        found = frf(chain(alpha=0.1), PUSH, frequencies=F, method="impulse", duration=10.0)
     assert found.attrs["left_at_end"] > 0.3
     with pytest.warns(FoldynWarning, match="has not settled after 40 cycles at 1.4 Hz"):
-        found = frf(chain(alpha=0.02), PUSH, [1.4], method="stepped_sine", most_cycles=40)
+        found = frf(
+            chain(alpha=0.02), PUSH, frequencies=[1.4], method="stepped_sine", most_cycles=40
+        )
     assert found.unsteadiness.values[0] > 1e-3
 
 
@@ -151,8 +161,8 @@ def test_a_motion_that_has_not_died_away_or_settled_is_told():
 @pytest.mark.parametrize("method", TIMED)
 def test_transmissibility_from_motions(method):
     case, base = chain(**DAMPING), fd.BaseMotion("x", value=1e-6)
-    exact = frf(case, base, F).transmissibility.values
-    found = frf(case, base, F, method=method, dt=0.005, **TIMED[method])
+    exact = frf(case, base, frequencies=F).transmissibility.values
+    found = frf(case, base, frequencies=F, method=method, dt=0.005, **TIMED[method])
     assert largest_error(found.transmissibility.values, exact) < 3e-5
 
 
@@ -160,8 +170,8 @@ def test_transmissibility_from_motions(method):
 def test_transmissibility_of_a_miura_cell(mass):
     case, f = miura_case(mass=mass, alpha=2.0, beta=1e-3), np.arange(0.25, 3.01, 0.25)
     base = fd.BaseMotion("z", value=1e-6)
-    exact = frf(case, base, f).transmissibility.values
-    found = frf(case, base, f, method="impulse", duration=8.0)
+    exact = frf(case, base, frequencies=f).transmissibility.values
+    found = frf(case, base, frequencies=f, method="impulse", duration=8.0)
     assert largest_error(found.transmissibility.values, exact) < 2e-3
 
 
@@ -172,7 +182,9 @@ STATES = np.arange(0.5, 3.01, 0.5)  # Hz
 def struck(case, **given):
     """Response of the matrices about a state, which a struck structure has, too."""
     given = {"state": "equilibrium", **given}
-    direct, found = (frf(case, LIFT, STATES, method=m, **given) for m in ("direct", "impulse"))
+    direct, found = (
+        frf(case, LIFT, frequencies=STATES, method=m, **given) for m in ("direct", "impulse")
+    )
     assert largest_error(found.receptance, direct.receptance.values) < 5e-4
     np.testing.assert_array_equal(found.displacement, direct.displacement)
     return direct
@@ -182,7 +194,7 @@ def test_a_preloaded_state():
     """Loads hold the structure where it is; the drive moves it about there."""
     direct = struck(miura_case([fd.Gravity((0, 0, -1.0))], alpha=4.0))
     assert np.abs(direct.displacement).max() > 0.01
-    at_rest = frf(miura_case(alpha=4.0), LIFT, STATES)
+    at_rest = frf(miura_case(alpha=4.0), LIFT, frequencies=STATES)
     assert largest_error(at_rest.receptance, direct.receptance.values) > 0.02
 
 
@@ -199,9 +211,9 @@ def test_damping_of_the_state():
     case = loaded.altered(damping=fd.Rayleigh(2.0, 1e-3, state="start"))
     direct = struck(case)
     at_rest = loaded.altered(damping=fd.Rayleigh(2.0, 1e-3))
-    other = frf(at_rest, LIFT, STATES, state="equilibrium")
+    other = frf(at_rest, LIFT, frequencies=STATES, state="equilibrium")
     assert largest_error(other.receptance, direct.receptance.values) > 0.02
-    steps = frf(case, LIFT, STATES, state="equilibrium", method="stepped_sine")
+    steps = frf(case, LIFT, frequencies=STATES, state="equilibrium", method="stepped_sine")
     assert largest_error(steps.receptance, direct.receptance.values) < 3e-3
 
 
@@ -216,7 +228,14 @@ def test_imposed_nodes_stay_where_the_state_puts_them():
 @pytest.mark.parametrize("method", ["direct", *TIMED])
 def test_progress(method):
     told = []
-    frf(chain(**DAMPING), PUSH, F, method=method, progress=told.append, **TIMED.get(method, {}))
+    frf(
+        chain(**DAMPING),
+        PUSH,
+        frequencies=F,
+        method=method,
+        progress=told.append,
+        **TIMED.get(method, {}),
+    )
     parts = [now.time / now.duration for now in told]
     assert parts[-1] == pytest.approx(1.0, abs=0.7 if method == "stepped_sine" else 1e-6)
     assert max(parts) <= 1 + 1e-9
@@ -261,7 +280,9 @@ def test_refused_in_time(method, change, message):
 
 def test_steps_are_shortened_to_divide_the_sampling():
     options = {"duration": 30.0, "every": 0.0123}
-    found = frf(chain(**DAMPING), PUSH, F, method="impulse", dt=10.0, **options)
+    found = frf(chain(**DAMPING), PUSH, frequencies=F, method="impulse", dt=10.0, **options)
     assert found.attrs["every"] <= 0.0123
-    finer = frf(chain(**DAMPING), PUSH, F, method="impulse", dt=found.attrs["every"], **options)
+    finer = frf(
+        chain(**DAMPING), PUSH, frequencies=F, method="impulse", dt=found.attrs["every"], **options
+    )
     np.testing.assert_array_equal(found.receptance, finer.receptance)

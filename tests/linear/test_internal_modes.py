@@ -32,7 +32,7 @@ def miura(**case):
 
 def true(pattern, supports, count=5, **options):
     """The first frequencies of the shell, extrapolated."""
-    shells = (fd.shell(pattern, SHEET, n, mass="consistent", fold_law="linear", **options)
+    shells = (fd.shell(pattern, SHEET, divisions=n, mass="consistent", fold_law="linear", **options)
               for n in (2, 4, 8))  # fmt: skip
     return reference_modes([fd.Case(s, supports(s)) for s in shells], count).frequency
 
@@ -77,7 +77,7 @@ def test_a_panel_that_swings(supports, shell, plates, close, missing):
 
 def test_shapes_between_the_nodes():
     """As the shell's in the middles of edges and spokes, where modes may not move any node."""
-    shells = [fd.Case(fd.shell(SQUARE, SHEET, n, mass="consistent")) for n in (2, 4, 8)]
+    shells = [fd.Case(fd.shell(SQUARE, SHEET, divisions=n, mass="consistent")) for n in (2, 4, 8)]
     expected = reference_modes(shells, 6)
     case = fd.Case(edged(SQUARE))
     found = modes_at_rest(case, 16, internal=3)
@@ -222,7 +222,7 @@ def test_a_turned_state():
     case = miura()
     x, turn = case.structure.nodes, Rotation.from_euler("y", 1.0).as_matrix()
     moved = fd.State(displacement=x @ turn - x)
-    one, other = (fd.modes(case, 14, state, internal=3).frequency for state in (None, moved))
+    one, other = (fd.modes(case, 14, state=state, internal=3).frequency for state in (None, moved))
     np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9)
 
 
@@ -259,7 +259,10 @@ def test_creases_that_remember_turn_unevenly_too():
     force = fd.Force([8], (0.3, 0.1, 1.0))
     responses = [
         fd.frf(
-            fd.Case(case.structure, [fd.Fix("xmin")], damping=case.damping), force, f, internal=1
+            fd.Case(case.structure, [fd.Fix("xmin")], damping=case.damping),
+            force,
+            frequencies=f,
+            internal=1,
         )
         for case in (damped, relaxing)
     ]
@@ -297,7 +300,7 @@ def test_responses_are_sums_of_modes(damping):
     f = peak * np.array([0.5, 0.95, 1.0, 1.05, 4.0])
     force = fd.Force([8], (0.3, 0.1, 1.0))
     direct, modal = (
-        fd.frf(case, force, f, method=method, internal=3).receptance.values
+        fd.frf(case, force, frequencies=f, method=method, internal=3).receptance.values
         for method in ("direct", "modal")
     )
     np.testing.assert_allclose(direct, modal, atol=1e-7 * np.abs(direct).max())
@@ -308,7 +311,9 @@ def test_responses_are_sums_of_modes(damping):
 def test_a_base_moves_all_that_stands_on_it():
     """Slowly as a whole; and as forces of inertia say: x = t + H (w^2 M t)."""
     case = miura(supports=[fd.Fix("xmin")], damping=fd.Rayleigh(0.05))
-    still = fd.frf(case, fd.BaseMotion("z"), [0.0], internal=3).transmissibility.values[0]
+    still = fd.frf(case, fd.BaseMotion("z"), frequencies=[0.0], internal=3).transmissibility.values[
+        0
+    ]
     np.testing.assert_allclose(still[:, 2], 1.0, atol=1e-9)
     np.testing.assert_allclose(still[:, :2], 0.0, atol=1e-9)
     linear, omega = linearize(case, internal=3), 2 * np.pi * 0.3
@@ -316,7 +321,9 @@ def test_a_base_moves_all_that_stands_on_it():
     load = (omega**2 - 1j * omega * 0.05) * linear.inertia[:, 2]
     moved = linear.expanded(np.linalg.solve(impedance, load)[:, None]).reshape(-1, 3)
     moved[:, 2] += 1.0
-    found = fd.frf(case, fd.BaseMotion("z"), [0.3], internal=3).transmissibility.values[0]
+    found = fd.frf(case, fd.BaseMotion("z"), frequencies=[0.3], internal=3).transmissibility.values[
+        0
+    ]
     np.testing.assert_allclose(found, moved, atol=1e-8 * np.abs(moved).max())
 
 
@@ -342,7 +349,7 @@ BUBBLE = 'the mass is "bubble"; take mass = "condensed"'
         (edged(FOLD), 7, "internal = 7: must be at most 6"),
         (edged(FOLD), -1, "internal = -1: must be a whole number, at least 0"),
         (fd.discretize(FOLD, SHEET), 2, r'internal = 2: .* discretize with preset = "n5b8e"'),
-        (fd.shell(FOLD, SHEET, 4), 2, r"internal = 2: .*scheme n5b8e"),
+        (fd.shell(FOLD, SHEET, divisions=4), 2, r"internal = 2: .*scheme n5b8e"),
         (edged(FOLD, mass="bubble"), 2, BUBBLE),
         (replace(edged(FOLD), node_mass=np.ones(8)), 2, "the mass is given by nodes"),
     ],
@@ -351,7 +358,7 @@ def test_what_is_refused(structure, internal, message):
     with pytest.raises(InputError, match=message):
         fd.modes(fd.Case(structure), 4, internal=internal)
     with pytest.raises(InputError, match=r'internal = 3: .* method = "direct" or "modal"'):
-        fd.frf(miura(), fd.Force([8], (0, 0, 1)), [1.0], method="harmonic", internal=3)
+        fd.frf(miura(), fd.Force([8], (0, 0, 1)), frequencies=[1.0], method="harmonic", internal=3)
 
 
 def test_results_are_kept(tmp_path):

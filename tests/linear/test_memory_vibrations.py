@@ -21,7 +21,9 @@ def sprung(law, **given):
 @pytest.mark.parametrize("method", ["direct", "modal"])
 def test_the_response_has_the_complex_modulus(method):
     frequency = np.array([0.0, 0.1, 0.5, 0.9, 2.0, 10.0])
-    found = fd.frf(sprung(PRONY, damping=fd.Rayleigh(0.7)), LIFT, frequency, method=method)
+    found = fd.frf(
+        sprung(PRONY, damping=fd.Rayleigh(0.7)), LIFT, frequencies=frequency, method=method
+    )
     omega = 2.0 * np.pi * frequency
     dynamic = STIFFNESS * PRONY.modulus(frequency) - MASS * (omega**2 - 0.7j * omega)
     np.testing.assert_allclose(
@@ -33,9 +35,11 @@ def test_the_response_is_that_of_a_simulated_sine():
     """Of 0.5 degrees at most, over the last of many periods: 1e-3 asked for, 1e-6 found."""
     frequency, push = 0.5, 1e-4
     case = sprung(PRONY, damping=fd.Rayleigh(3.0))
-    wanted = fd.frf(case, LIFT, [frequency]).receptance.sel(node=WING, axis="z").values[0]
+    wanted = (
+        fd.frf(case, LIFT, frequencies=[frequency]).receptance.sel(node=WING, axis="z").values[0]
+    )
     sine = fd.Force([WING], (0, 0, push), fd.Harmonic(frequency))
-    found = fd.simulate(case.altered(loads=[sine]), 16.0, "rk4", dt=2.0**-9, every=32)
+    found = fd.simulate(case.altered(loads=[sine]), 16.0, method="rk4", dt=2.0**-9, every=32)
     last = slice(-32, None)
     phase = np.exp(-2j * np.pi * frequency * found.time.values[last])
     response = 2j * np.mean(found.displacement.sel(node=WING, axis="z").values[last] * phase)
@@ -63,7 +67,9 @@ def test_creep_is_a_dashpot_to_small_vibrations():
     """And to slow ones gives way: far below its rate, nothing but the mass resists."""
     law = fd.Eyring(1e-3, 0.2, law="linear")
     frequency = np.array([1e-4, 0.2, 3.0])
-    found = fd.frf(sprung(law), LIFT, frequency).receptance.sel(node=WING, axis="z").values
+    found = (
+        fd.frf(sprung(law), LIFT, frequencies=frequency).receptance.sel(node=WING, axis="z").values
+    )
     s = 2j * np.pi * frequency
     dynamic = STIFFNESS * s / (s + 2.0 * 0.2 * STIFFNESS / 1e-3) + MASS * s**2
     np.testing.assert_allclose(found, 1.0 / dynamic, rtol=1e-9)
@@ -72,7 +78,7 @@ def test_creep_is_a_dashpot_to_small_vibrations():
 def test_modes_of_a_sheet_solve_their_equation():
     """Every mode of a Miura sheet with a memory of its folds and its bends, to rounding."""
     pattern, sheet = (
-        fd.patterns.miura((2, 2), 0.05, 0.05, dihedral=120),
+        fd.patterns.miura((2, 2), 0.05, b=0.05, dihedral=120),
         fd.Sheet(1e9, 0.3, 5e-4, 1e3),
     )
     folds, bends = fd.Prony([0.5, 0.2], [0.02, 0.3]), fd.Prony(0.3, 0.01, "linear")

@@ -61,7 +61,7 @@ def miura():
 def quick():
     """A fold on a coarse mesh, all models."""
     case = held(fd.Force([4, 5], (0, 0, 1e-4)), bend_law="superlinear")
-    return case, fd.fidelity(case, 5, (3, 6))
+    return case, fd.fidelity(case, 5, divisions=(3, 6))
 
 
 @pytest.mark.matrix
@@ -120,7 +120,7 @@ def test_warnings_of_the_case_are_not_repeated(recwarn):
     partly = [fd.Fix([0, 1, 2, 3]), fd.Impose([4], "z", 0.1)]
     case = fd.Case(fold(**PLATE), partly, [fd.Force([4, 5], (0, 0, 1e-4))])
     assert len(recwarn) == 1  # the force acts in part where a node is moved
-    found = fd.fidelity(case, 2, (2, 4))
+    found = fd.fidelity(case, 2, divisions=(2, 4))
     assert len(recwarn) == 1
     assert "small loads" in str(found)
 
@@ -133,7 +133,7 @@ def test_numbers_stand_beside_their_units(quick):
 
 
 def test_a_case_with_the_right_model_keeps_it():
-    found = fd.fidelity(fd.Case(fold(**PLATE), [fd.Fix([0, 1, 2, 3])]), 2, (4, 8))
+    found = fd.fidelity(fd.Case(fold(**PLATE), [fd.Fix([0, 1, 2, 3])]), 2, divisions=(4, 8))
     assert found.models == ("own", "standard", "n5b8e")
     assert found.advice.startswith('The case\'s own model (calibration = "plate"')
     assert "use it" not in found.advice
@@ -143,7 +143,7 @@ def test_a_case_with_the_right_model_keeps_it():
 
 def test_a_free_sheet_has_no_displacement_under_its_weight():
     case = fd.Case(fold(**PLATE), [], [fd.Gravity((0, 0, -9.81))])
-    result = fd.fidelity(case, 2, (2, 4), models=[]).result
+    result = fd.fidelity(case, 2, divisions=(2, 4), models=[]).result
     assert result.attrs["rigid"] == 6
     assert "deflection" not in result
     assert (result["frequency"] > 0.0).all()
@@ -160,7 +160,7 @@ def test_superlinear_bends_have_no_stiffness(quick):
     assert "no stiffness at all (own)" in found.advice
     assert "soft" in str(found)
     assert "\nsoft: the model at rest has no stiffness against these loads\n" in str(found)
-    swung = fd.fidelity(case, 3, (2, 4), ["plate"], secant=5.0)
+    swung = fd.fidelity(case, 3, divisions=(2, 4), models=["plate"], secant=5.0)
     assert np.isfinite(swung.result["deflection_error"]).all()
     assert "no stiffness" not in swung.advice
 
@@ -169,7 +169,7 @@ def test_a_kresling_cell_vibrates_as_plates():
     """Triangles that are held at their base have no mode below the limit: take the shell."""
     pattern = fd.patterns.kresling(sides=6, radius=1.0, height=0.9, twist=30)
     case = fd.Case(fd.discretize(pattern, SHEET, **PLATE), [fd.Fix("zmin")])
-    found = fd.fidelity(case, 3, (2, 4), models=["standard"])
+    found = fd.fidelity(case, 3, divisions=(2, 4), models=["standard"])
     assert not any(mode.below for mode in found.table())
     assert found.table()[1].shell == pytest.approx(found.table()[2].shell, rel=1e-3)  # symmetry
     assert "Take the shell (--model shell" in found.advice
@@ -227,9 +227,9 @@ def test_what_is_no_force_is_left_out():
     case = held(fd.Actuate("all", 100), push, fd.CreaseMoment("all", 1e-3))
     alone, others = forces_alone(case)
     assert (alone.loads, others) == ((push,), [0, 2])
-    found = fd.fidelity(case, 1, (2, 4), models=[])
+    found = fd.fidelity(case, 1, divisions=(2, 4), models=[])
     assert found.result.attrs["not_forces"] == "loads[0], loads[2]"
-    expected = fd.fidelity(held(push), 1, (2, 4), models=[])
+    expected = fd.fidelity(held(push), 1, divisions=(2, 4), models=[])
     assert float(found.result["deflection"]) == float(expected.result["deflection"])
 
 
@@ -258,13 +258,15 @@ def test_triangles_are_counted():
     angle = np.arange(6) * np.pi / 3
     patterns.append(fd.Pattern(np.column_stack([np.cos(angle), np.sin(angle)]), [range(6)]))
     for pattern in patterns:
-        made = fd.shell(pattern, SHEET, 4)
+        made = fd.shell(pattern, SHEET, divisions=4)
         assert triangle_count(pattern, 4) == len(made.triangles)
 
 
 def test_models_of_ones_own(quick):
     case, _ = quick
-    found = fd.fidelity(case, 2, (2, 4), {"bubble": {**PLATE, "mass": "bubble"}, "same": {}})
+    found = fd.fidelity(
+        case, 2, divisions=(2, 4), models={"bubble": {**PLATE, "mass": "bubble"}, "same": {}}
+    )
     assert found.models == ("own", "bubble")
     assert found.result["options"].values.tolist() == [
         'calibration = "standard", mass = "mixed_voronoi", bend_law = "superlinear"',
@@ -286,7 +288,7 @@ def test_what_n5b8e_does_not_take_leaves_it_out():
 def test_a_rest_state_out_of_balance_is_told():
     case = held(crease_rest=80.0, **STANDARD)
     with pytest.warns(FoldynWarning, match="the rest state is no equilibrium"):
-        fd.fidelity(case, 1, (2, 4), models=[])
+        fd.fidelity(case, 1, divisions=(2, 4), models=[])
 
 
 def advised(frequency, errors, **more):
@@ -342,7 +344,7 @@ CENTER = r"nodes: node {} is the center of panel {}"
     [
         (lambda c: c.structure, r"case: got Structure, give a Case"),
         (
-            lambda c: fd.Case(fd.shell(c.structure.pattern, SHEET, 3)),
+            lambda c: fd.Case(fd.shell(c.structure.pattern, SHEET, divisions=3)),
             r"case: is a shell already, .*",
         ),
         (lambda c: fd.Case(heavier(c)), r"case: its structure is not as fd.discretize makes it"),
@@ -392,7 +394,7 @@ def test_a_model_that_cannot_move_is_refused():
     moving = fd.Case(fd.discretize(SQUARE.pattern, SHEET, bend_law="linear"), CORNERS)
     with pytest.raises(InputError, match=r"^models: cut: supports: hold every node"):
         fd.fidelity(moving, models={"cut": {"scheme": "n4b5"}})
-    rows = fd.fidelity(moving, 6, (3, 6), models=[]).table()
+    rows = fd.fidelity(moving, 6, divisions=(3, 6), models=[]).table()
     assert [row.shell for row in rows] == sorted(row.shell for row in rows)  # extrapolated, too
     assert rows[0].mac == 0.0  # nothing moves where both have nodes
 

@@ -122,5 +122,5 @@ def test_every_method_and_option_has_a_row():
 @pytest.mark.matrix
 def test_the_warning_that_the_page_speaks_of(names):
     with pytest.warns(FoldynWarning, match="secant"):
-        frf(names["soft"], names["drive"], [1.0])
+        frf(names["soft"], names["drive"], frequencies=[1.0])
     assert fd.case_of(names["response"]).damping == names["case"].damping

@@ -23,7 +23,7 @@ LIMIT = [0.625, 1.0445, 1.903]
 
 def miura(divisions, supports=None):
     held = [fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2, 6, 8], "z"), fd.Fix([1], "y")]
-    shell = fd.shell(fd.patterns.miura(), SHEET, divisions, fold_law="linear")
+    shell = fd.shell(fd.patterns.miura(), SHEET, divisions=divisions, fold_law="linear")
     return fd.Case(shell, supports or held, [fd.Force([7], (1.0, 0.0, 0.0))])
 
 
@@ -52,7 +52,9 @@ def test_where_coarser_meshes_lack_finer_ones_stand_in(divisions, meshes):
 def test_meshes_that_have_not_converged():
     """A tower that is ever stiffer: with 16 pieces it is beyond the limit by 4 and 8."""
     pattern = fd.patterns.kresling(sides=6, radius=1.0, height=0.9, twist=30)
-    tower, finer = (fd.Case(fd.shell(pattern, STEEL, n), [fd.Fix("zmin")]) for n in (8, 16))
+    tower, finer = (
+        fd.Case(fd.shell(pattern, STEEL, divisions=n), [fd.Fix("zmin")]) for n in (8, 16)
+    )
     found = refinement(tower)
     assert found is not None and np.isnan(found.error) and np.isnan(found.order).all()
     assert np.isnan(found.extrapolated).all()
@@ -80,7 +82,7 @@ def test_observed_orders(divisions):
 def test_modes_are_followed_where_meshes_change_their_order():
     """Shapes at common nodes tell which is which, and what a mesh does not have is nan."""
     pattern = fd.patterns.miura()
-    fine, coarse = (fd.shell(pattern, SHEET, n) for n in (4, 2))
+    fine, coarse = (fd.shell(pattern, SHEET, divisions=n) for n in (4, 2))
     shapes = np.zeros((2, len(fine.nodes), 3))
     shapes[0, :, 2], shapes[1, :, 0] = fine.nodes[:, 0], fine.nodes[:, 1]
     swapped = np.zeros((2, len(coarse.nodes), 3))
@@ -95,9 +97,9 @@ def test_modes_are_followed_where_meshes_change_their_order():
 def test_a_coarse_mesh_without_modes():
     """A plate that is held at its corners is rigid on the coarsest mesh."""
     square = fd.Pattern([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1, 2, 3]])
-    found = refinement(fd.Case(fd.shell(square, SHEET, 4), [fd.Fix([0, 1, 2, 3])]))
+    found = refinement(fd.Case(fd.shell(square, SHEET, divisions=4), [fd.Fix([0, 1, 2, 3])]))
     assert found is not None and np.isnan(found.error) and np.isnan(found.frequencies[0]).all()
-    told = fd.modes(fd.Case(fd.shell(square, replace(SHEET, density=1.0), 2)), 1)
+    told = fd.modes(fd.Case(fd.shell(square, replace(SHEET, density=1.0), divisions=2)), 1)
     said = mesh_error(told.assign_attrs(found.facts()))
     assert "cannot be judged: with 1 piece of every edge" in said
 
@@ -167,7 +169,7 @@ def test_a_panel_that_touches_a_clamp_has_no_limit(radius, divisions):
         ends = sorted({node for edge in edges for node in edge})
         structure = fd.discretize(cell, sheet, preset="n5b8e", clamped=edges)
         case = fd.Case(structure, [fd.Fix(ends, along=True)])
-        return fd.fidelity(case, 1, divisions, [], vertex_radius=radius)
+        return fd.fidelity(case, 1, divisions=divisions, models=[], vertex_radius=radius)
 
     touching, whole = told([(1, 2)]), told([(0, 1), (1, 2)])
     assert touching.result.attrs["touched_clamp"] == 1
@@ -175,7 +177,7 @@ def test_a_panel_that_touches_a_clamp_has_no_limit(radius, divisions):
     assert "touches a clamped edge at vertex 1 alone" in touching.advice
     assert "touched_clamp" not in whole.result.attrs
     assert np.isfinite(whole.result.mesh_error).all()
-    shell = fd.shell(cell, sheet, 4, clamped=[(1, 2)])
+    shell = fd.shell(cell, sheet, divisions=4, clamped=[(1, 2)])
     judged = refinement(fd.Case(shell, [fd.Fix([1, 2], along=True)]))
     said = Dataset(attrs=judged.facts())
     assert np.isnan(judged.error) and "no mesh converges" in mesh_error(said)

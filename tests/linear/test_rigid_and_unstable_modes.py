@@ -36,7 +36,7 @@ def test_rigid_modes_in_a_folded_state_of_a_free_body():
     """About another equilibrium than rest: rotations are about the state's own nodes."""
     case = fd.Case(body("miura", fold_law=fd.EnhancedLinear(70, 290, rest="as_published")))
     assert len(case.structure.nodes) == 41
-    found = modes(case, 8, "equilibrium", secant=1.0)
+    found = modes(case, 8, state="equilibrium", secant=1.0)
     assert float(abs(found.displacement).max()) > 1e-3
     assert found.rigid.values.tolist() == [True] * 6 + [False] * 2
 
@@ -112,7 +112,8 @@ def pressed_flat(shortening):
 def test_prestress_moves_frequencies():
     """Tension stiffens the bending of a flat sheet, pressure softens it, in proportion at first."""
     slack, pulled, pressed = (
-        modes(pressed_flat(d), 1, "equilibrium").eigenvalue.values[0] for d in (0.0, -1e-7, 1e-7)
+        modes(pressed_flat(d), 1, state="equilibrium").eigenvalue.values[0]
+        for d in (0.0, -1e-7, 1e-7)
     )
     assert pressed < slack < pulled
     assert pulled - slack == pytest.approx(slack - pressed, rel=0.02)
@@ -125,10 +126,10 @@ def test_unstable_modes_of_a_sheet_pressed_in_its_plane():
     unstable = int((values < 0).sum())
     assert unstable > 10
     with pytest.warns(FoldynWarning, match=f"unstable equilibrium: {unstable} of the"):
-        found = modes(case, unstable + 4, "equilibrium")
+        found = modes(case, unstable + 4, state="equilibrium")
     np.testing.assert_allclose(found.eigenvalue, values[: unstable + 4], rtol=1e-7)
     np.testing.assert_array_equal(np.isnan(found.frequency), np.arange(unstable + 4) < unstable)
     assert found.attrs["complete"] == unstable + 4
     with pytest.warns(FoldynWarning, match="3 of the 3"):
-        few = modes(case, 3, "equilibrium")
+        few = modes(case, 3, state="equilibrium")
     np.testing.assert_allclose(few.eigenvalue, values[:3], rtol=1e-7)

@@ -18,7 +18,7 @@ MODELS = {
     "bars": lambda pattern: fd.discretize(
         pattern, SHEET, mass="consistent", bend_law="linear", fold_law="linear", preset="herkal"
     ),
-    "shell": lambda pattern: fd.shell(pattern, SHEET, 3, fold_law="linear"),
+    "shell": lambda pattern: fd.shell(pattern, SHEET, divisions=3, fold_law="linear"),
 }
 
 
@@ -59,16 +59,18 @@ def test_responses_of_a_turned_structure(model) -> None:
     """To forces, and to a base that moves along the turned axis by its parts."""
     f, load = np.linspace(0.2, 6.0, 9), np.array([-1.0, 0.2, 0.0])
     plain, oblique = pair(model)
-    one = fd.frf(plain, fd.Force([0, 1], load), f).receptance.values @ TURN.T
-    other = fd.frf(oblique, fd.Force([0, 1], TURN @ load), f).receptance.values
+    one = fd.frf(plain, fd.Force([0, 1], load), frequencies=f).receptance.values @ TURN.T
+    other = fd.frf(oblique, fd.Force([0, 1], TURN @ load), frequencies=f).receptance.values
     ratio = float(np.abs(one).max() / np.abs(other).max())
     np.testing.assert_allclose(one, ratio * other, atol=1e-7 * np.abs(one).max())
     scale = np.abs(TURN @ load).sum() / np.abs(load).sum()  # they are per unit of these
     assert min(abs(ratio - 1.0), abs(ratio / scale - 1.0)) < 1e-7
     # absolute motions to a base along each old axis, summed to one along a new one
-    axes = [fd.frf(plain, fd.BaseMotion(axis), f).transmissibility.values for axis in "xyz"]
+    axes = [
+        fd.frf(plain, fd.BaseMotion(axis), frequencies=f).transmissibility.values for axis in "xyz"
+    ]
     moved = np.tensordot(TURN[2], axes, 1) @ TURN.T
-    found = fd.frf(oblique, fd.BaseMotion("z"), f).transmissibility.values
+    found = fd.frf(oblique, fd.BaseMotion("z"), frequencies=f).transmissibility.values
     np.testing.assert_allclose(found, moved, atol=1e-6 * np.abs(moved).max())
 
 
@@ -82,8 +84,8 @@ def test_methods_agree_with_links_and_directions(method) -> None:
     tied = fd.Case(case.structure, supports, damping=case.damping)
     frequencies = np.arange(0.5, 4.0, 0.5)
     drive = fd.Force([2], (1e-4, 0.0, 0.0))
-    exact = fd.frf(case, drive, frequencies).receptance.values
-    found = fd.frf(tied, drive, frequencies, method=method).receptance.values
+    exact = fd.frf(case, drive, frequencies=frequencies).receptance.values
+    found = fd.frf(tied, drive, frequencies=frequencies, method=method).receptance.values
     close = 1e-9 if method == "modal" else 1e-2
     np.testing.assert_allclose(found, exact, atol=close * np.abs(exact).max())
 
@@ -119,7 +121,7 @@ def test_bends_of_rigid_panels_are_not_soft() -> None:
     assert linearize(case("all")).soft == 0
     drive = fd.Force([0, 1], (1e-3, 0.0, 0.0))
     direct, balanced = (
-        fd.frf(case("all"), drive, [1.0], method=method).receptance
+        fd.frf(case("all"), drive, frequencies=[1.0], method=method).receptance
         for method in ("direct", "harmonic")
     )
     np.testing.assert_allclose(balanced, direct, rtol=1e-9, atol=1e-12)

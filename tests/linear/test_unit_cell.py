@@ -40,7 +40,7 @@ def test_generators_say_how_they_repeat(name):
         assert moved == pytest.approx(pattern.vertices[pairs[:, 1]], abs=1e-12)
         steps = cell.copies.offset[pairs[:, 1]] - cell.copies.offset[pairs[:, 0]]
         assert (steps == np.eye(cell.dimensions)[k]).all()
-    b = fd.bands(cell, [[0.3] * cell.dimensions], 3)
+    b = fd.bands(cell, [[0.3] * cell.dimensions], count=3)
     assert (b.frequency.values > 0.0).all()
 
 
@@ -93,7 +93,7 @@ def test_cells_that_meet_across_corners_are_one_lattice():
     cell = cell_of(pattern, vectors=vectors)
     assert cell.kinds == 3  # two corners and the middle
     assert "K" in fd.linear.zone.special_points(cell.vectors)
-    zeros = fd.bands(cell, [[0.0, 0.0]], 4).frequency.values[0] < 1e-3
+    zeros = fd.bands(cell, [[0.0, 0.0]], count=4).frequency.values[0] < 1e-3
     assert zeros.tolist() == [True, True, True, False]
 
 
@@ -263,7 +263,7 @@ def test_compressed_sheets_that_are_unstable_are_in_equilibrium(preset):
     cell = fd.UnitCell(fd.Case(fd.discretize(pattern, thin, preset=preset)))
     along, across = cell.vectors
     state = fd.linear.relaxed(cell, [0.8 * along, across])
-    assert fd.bands(cell, [[0.5, 0.5]], 2, state=state).attrs["residual"] == 0.0
+    assert fd.bands(cell, [[0.5, 0.5]], count=2, state=state).attrs["residual"] == 0.0
 
 
 @pytest.mark.filterwarnings("error", "ignore::foldyn.errors.ModelRangeWarning")
@@ -271,11 +271,11 @@ def test_small_changes_of_periods_count():
     """Below the tolerance at which vertices meet."""
     cell, tower = miura(), kresling()
     state = fd.linear.relaxed(cell, (1.0 + 1e-7) * cell.vectors)
-    b = fd.bands(cell, [[0.5, 0.5]], 2, state=state)
+    b = fd.bands(cell, [[0.5, 0.5]], count=2, state=state)
     assert b.vectors.values[0, 0] / cell.vectors[0, 0] - 1.0 == pytest.approx(1e-7, rel=1e-6)
     screw = tower.motions[0]
     state = fd.linear.relaxed(tower, [fd.Screw("z", screw.angle + 1e-6, screw.shift)])
-    b = fd.bands(tower, [[0.5]], 2, state=state)
+    b = fd.bands(tower, [[0.5]], count=2, state=state)
     assert float(b.angles[0]) - screw.angle == pytest.approx(1e-6, rel=1e-5)
 
 
@@ -287,5 +287,5 @@ def test_states_on_a_line_keep_a_given_screw():
     cell = cell_of(strip, screw=screw)
     moved = np.random.default_rng(0).normal(scale=1e-10, size=cell.case.structure.nodes.shape)
     with pytest.warns(FoldynWarning, match="no equilibrium"):
-        b = fd.bands(cell, [[0.5]], 2, state=fd.State(moved))
+        b = fd.bands(cell, [[0.5]], count=2, state=fd.State(moved))
     assert float(b.angles[0]) == pytest.approx(screw.angle, abs=1e-4)

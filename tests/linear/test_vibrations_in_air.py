@@ -129,7 +129,7 @@ def test_responses_have_the_whole_mass(sheet):
     load = np.zeros(case.structure.nodes.shape)
     load[case.structure.nodes[:, 0] > case.structure.nodes[:, 0].max() - 1e-9, 2] = 1e-4
     for method in ("direct", "modal", "harmonic"):
-        found = fd.frf(case, push, frequencies, method=method)
+        found = fd.frf(case, push, frequencies=frequencies, method=method)
         for k, f in enumerate(frequencies):
             omega = 2 * np.pi * f
             matrix = stiffness - omega**2 * mass + 0.5j * omega * own  # alpha drags the sheet alone
@@ -143,8 +143,8 @@ def test_a_simulated_impulse_has_the_same_response(sheet):
     """Small motions, whose added mass is that of the state."""
     case = sheet.altered(damping=fd.Rayleigh(alpha=3.0), air=fd.Air(drag=False, resolution=2))
     push, frequencies = fd.Force("xmax", (0.0, 0.0, 1e-6)), np.arange(0.5, 3.0, 0.5)
-    direct = fd.frf(case, push, frequencies).receptance.values
-    found = fd.frf(case, push, frequencies, method="impulse").receptance.values
+    direct = fd.frf(case, push, frequencies=frequencies).receptance.values
+    found = fd.frf(case, push, frequencies=frequencies, method="impulse").receptance.values
     np.testing.assert_allclose(found, direct, rtol=0, atol=3e-3 * np.abs(direct).max())
 
 
@@ -152,7 +152,7 @@ def test_a_base_moves_the_sheet_against_the_air(sheet):
     """Relative to the base: (K - w^2 M + i w alpha M_s) x = (w^2 M - i w alpha M_s) r."""
     case = sheet.altered(damping=fd.Rayleigh(alpha=0.5))
     omega = 2 * np.pi * 0.8 * float(fd.modes(case, 1).frequency[0])
-    found = fd.frf(case, fd.BaseMotion("z"), [omega / (2 * np.pi)])
+    found = fd.frf(case, fd.BaseMotion("z"), frequencies=[omega / (2 * np.pi)])
     free = case.free_dofs
     own = np.kron(case.mass.toarray(), np.eye(3))[free]
     whole = own + case.added_mass().todense()[free]
@@ -183,8 +183,8 @@ def test_large_sheets_keep_the_mass_as_rows(monkeypatch):
     def computed():
         return (
             fd.modes(held, 5), fd.modes(loose, 9),
-            fd.frf(held, push, [1.0, 9.0], method="modal", count=12),
-            fd.frf(held, fd.BaseMotion("z"), [1.0, 9.0], method="modal", count=12),
+            fd.frf(held, push, frequencies=[1.0, 9.0], method="modal", count=12),
+            fd.frf(held, fd.BaseMotion("z"), frequencies=[1.0, 9.0], method="modal", count=12),
         )  # fmt: skip
 
     full = computed()
@@ -195,7 +195,7 @@ def test_large_sheets_keep_the_mass_as_rows(monkeypatch):
             np.testing.assert_allclose(b, a, rtol=0, atol=1e-8 * np.abs(a).max())
         assert one.attrs.get("complete") == other.attrs.get("complete")
     with pytest.raises(InputError, match=r"method: the fluid couples too many dofs"):
-        fd.frf(held, push, [1.0])
+        fd.frf(held, push, frequencies=[1.0])
     with pytest.raises(InputError, match="which modal damping takes"):
         fd.modes(held.altered(damping=fd.ModalDamping(0.02, 2)), 2)
 
@@ -217,7 +217,12 @@ def test_what_does_not_take_air_refuses_it(sheet):
     with pytest.raises(InputError, match="air"):
         fd.backbone(sheet)
     with pytest.raises(InputError, match=r"modes.* air"):
-        fd.sensitivity(_thick, {"thickness": 1e-4}, "frequency[1]", {"kind": "modes", "count": 1})
+        fd.sensitivity(
+            _thick,
+            {"thickness": 1e-4},
+            measures="frequency[1]",
+            analysis={"kind": "modes", "count": 1},
+        )
     windy = sheet.altered(air=fd.Air(velocity=(0, 0, 3)), loads=[fd.Force("xmax", (0, 0, 1e-3))])
     for call, name in ((fd.modes, "small vibrations"), (fd.trace, "statics")):
         with pytest.raises(InputError, match=f"air.velocity = .*: {name} would leave wind out"):

@@ -128,7 +128,7 @@ def test_refused():
     with pytest.raises(InputError, match=r"fold_law.*onset"):
         structure(fold_law="plate_superlinear")
     with pytest.raises(InputError, match=r"fold_law.*onset"):
-        fd.shell(fd.patterns.miura(), SHEET, 2, fold_law=PlateSuperlinear())
+        fd.shell(fd.patterns.miura(), SHEET, divisions=2, fold_law=PlateSuperlinear())
     for onset in (0.0, -1.0, 400.0, float("nan"), "2"):
         with pytest.raises(InputError, match="onset"):
             PlateSuperlinear(onset=onset)

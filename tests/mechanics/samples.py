@@ -34,7 +34,7 @@ ENHANCED = fd.EnhancedLinear(75, 285)
 PUBLISHED = fd.EnhancedLinear(75, 285, rest="as_published")
 
 MODELS = {
-    "simple fold": (lambda: fd.patterns.simple_fold(1.0, 1.3, 60), {}),
+    "simple fold": (lambda: fd.patterns.simple_fold(1.0, 1.3, dihedral=60), {}),
     "miura n5b8": (lambda: fd.patterns.miura(dihedral=60), {"fold_law": ENHANCED}),
     "miura n5b8 merlin2": (
         lambda: fd.patterns.miura(a=1.0, b=1.4, dihedral=60),

@@ -124,7 +124,10 @@ def test_boards_hinged_in_their_middles_meet_as_sheets_do():
     begin = 180.0 - np.degrees(2.0 * T)
     for angle, meet in ((begin - 0.1, False), (begin + 0.1, True)):
         energies = []
-        for pattern in (strip(2, fold_angle=angle), fd.thicken(strip(2, fold_angle=angle), T, 0.0)):
+        for pattern in (
+            strip(2, fold_angle=angle),
+            fd.thicken(strip(2, fold_angle=angle), T, offsets=0.0),
+        ):
             energies.append(nearest(case_of(pattern))[0])
         assert energies[0] == pytest.approx(energies[1], rel=1e-6)
         assert (energies[0] > 0.0) is meet

@@ -58,7 +58,7 @@ NO_POWERS = np.zeros(2)
 
 def structure(model: str, **options: Any) -> Any:
     if model == "shell":
-        return fd.shell(FOLD, SHEET, 1, **options)
+        return fd.shell(FOLD, SHEET, divisions=1, **options)
     if model in OTHER_LAWS:
         return fd.discretize(FOLD, SHEET, preset="herkal", **OTHER_LAWS[model])
     return fd.discretize(FOLD, SHEET, preset=model, **options)
@@ -283,7 +283,7 @@ def thrown(kind: type[Net]) -> Any:
     case, v = fd.Case(net, [fd.Fix(range(1, 7))]), np.zeros((7, 3))
     v[0] = 8.0, 3.0, -5.0
     start = fd.State(velocity=v)
-    return fd.simulate(case, 20.0, "energy_momentum", dt=0.02, every=50, initial=start)
+    return fd.simulate(case, 20.0, method="energy_momentum", dt=0.02, every=50, initial=start)
 
 
 def test_a_sheet_of_ones_own_keeps_its_energy():

@@ -56,13 +56,15 @@ def shell(**options: Any) -> Assembly:
 
 def supported(*supports: fd.Spring, **options: Any) -> Assembly:
     """A fold of bars and hinges, with springs."""
-    made = fd.discretize(fd.patterns.simple_fold(1.0, 1.3, 60), THICK, preset="herkal", **options)
+    made = fd.discretize(
+        fd.patterns.simple_fold(1.0, 1.3, dihedral=60), THICK, preset="herkal", **options
+    )
     return fd.Case(made, supports).body
 
 
 def damped(model: Any, damping: Any, *dashpots: fd.Dashpot, **options: Any) -> Assembly:
     """A fold with damping in the place of its other terms."""
-    fold = fd.patterns.simple_fold(1.0, 1.3, 60)
+    fold = fd.patterns.simple_fold(1.0, 1.3, dihedral=60)
     if model == "shell":
         made = fd.shell(fold, THICK, divisions=2)
     else:

@@ -46,7 +46,9 @@ def test_motions(method):
     omega = np.sqrt(2.0 * K / MASS - 0.25 * alpha**2)
     u, v = np.zeros((7, 3)), np.zeros((7, 3))
     u[0, 0], v[0, 0] = amplitude, -0.5 * alpha * amplitude
-    motion = fd.simulate(star(alpha=alpha), 1.0, method, dt=1e-3, every=0.1, initial=fd.State(u, v))
+    motion = fd.simulate(
+        star(alpha=alpha), 1.0, method=method, dt=1e-3, every=0.1, initial=fd.State(u, v)
+    )
     t = motion.time.values
     wanted = amplitude * np.exp(-0.5 * alpha * t) * np.cos(omega * t)
     np.testing.assert_allclose(motion.displacement[:, 0, 0], wanted, atol=3e-3 * amplitude)
@@ -62,7 +64,7 @@ def test_modes():
 
 
 def test_frequency_response():
-    response = fd.frf(star(alpha=1.0), fd.Force([0], (1.0, 0.0, 0.0)), [0.0, 1.0])
+    response = fd.frf(star(alpha=1.0), fd.Force([0], (1.0, 0.0, 0.0)), frequencies=[0.0, 1.0])
     w = 2.0 * np.pi
     wanted = 1.0 / (2.0 * K - w**2 * MASS + 1j * w * MASS)
     assert complex(response.receptance[1, 0, 0]) == pytest.approx(wanted, rel=1e-9)

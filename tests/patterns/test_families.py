@@ -10,7 +10,7 @@ from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.patterns.crease_data import crease_rows
 
-MIURA = fd.patterns.miura((2, 2), 0.03, 0.03, 60, 80)
+MIURA = fd.patterns.miura((2, 2), 0.03, b=0.03, panel_angle=60, dihedral=80)
 ZIGZAG, STRAIGHT = MIURA.families["zigzag"], MIURA.families["straight"]
 LETTERS = np.array(MIURA.assignments)
 SHEET = fd.Sheet(1e9, 0.3, 2e-4, 700.0)
@@ -170,7 +170,7 @@ KNOWN = '"all", "mountain", "valley", "flat", "unassigned", "zigzag", "straight"
         (lambda: bars(crease_stiffness={"zigzag": 1.0, "valley": 2.0}), "a value by another name"),
         (lambda: bars(crease_rest={"sides": 90}), "crease_rest.sides: this pattern knows"),
         (lambda: bars(crease_rest={3: 90}), "crease_rest: 3 is no assignment or family"),
-        (lambda: fd.thicken(MIURA, 1e-4, {"rim": 0.0}), "offsets.rim: this pattern knows"),
+        (lambda: fd.thicken(MIURA, 1e-4, offsets={"rim": 0.0}), "offsets.rim: this pattern knows"),
         (lambda: fd.Actuate(" ", 90), 'creases = " ": give crease numbers'),
         (lambda: wrong({"rim": "V"}), 'rim: is no family; this pattern has "zigzag"'),
         (lambda: wrong({"valley": "V"}), "assignments.valley: is no family; this pattern has"),

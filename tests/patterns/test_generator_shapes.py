@@ -44,7 +44,7 @@ def test_an_arc_is_a_circle(line):
 
 @pytest.mark.parametrize(("a", "b"), [(1.0, 1.0), (1.0, 1.4), (1.3, 1.0)])
 def test_a_waterbomb_rolls_up_to_a_cylinder(a, b):
-    bomb = fd.patterns.waterbomb((2, 3), a, b, 125)
+    bomb = fd.patterns.waterbomb((2, 3), a, b=b, dihedral=125)
     line, rows = 5, 4
     grid, centers = bomb.vertices[: rows * line].reshape(rows, line, 3), bomb.vertices[20:]
     axis, radius = circle(*bomb.vertices[: rows * line, ::2].T)
@@ -62,29 +62,29 @@ def test_a_waterbomb_rolls_up_to_a_cylinder(a, b):
 
 def test_a_waterbomb_of_wide_bases_closes_before_its_sides_do():
     closed = 2 * np.degrees(np.arccos(1 / 1.5))
-    shut = fd.patterns.waterbomb((1, 1), 1.0, 1.5, closed + 1e-6)
+    shut = fd.patterns.waterbomb((1, 1), 1.0, b=1.5, dihedral=closed + 1e-6)
     assert np.ptp(shut.vertices[:, 1]) == pytest.approx(1.0, abs=1e-4)
     with pytest.raises(InputError, match=r"dihedral = 90: must be between 96\.3794 and 180"):
-        fd.patterns.waterbomb((1, 1), 1.0, 1.5, 90)
+        fd.patterns.waterbomb((1, 1), 1.0, b=1.5, dihedral=90)
 
 
 def test_a_full_turn_of_yoshimura_is_a_tower_of_antiprisms():
     sides, a, b = 8, 0.3, 0.8
     half = np.arccos(np.tan(np.pi / (2 * sides)) * b / (2 * a))
-    rolled = fd.patterns.yoshimura((sides, 2), a, b, 2 * np.degrees(half))
+    rolled = fd.patterns.yoshimura((sides, 2), a, b=b, dihedral=2 * np.degrees(half))
     ring = rolled.vertices[: sides + 1]
     np.testing.assert_allclose(ring[0], ring[-1], atol=1e-12)
     radius, height = b / (2 * np.sin(np.pi / sides)), a * np.sin(half)
-    tower = fd.patterns.kresling(sides, radius, height, -180 / sides, storeys=2)
+    tower = fd.patterns.kresling(sides, radius, height=height, twist=-180 / sides, storeys=2)
     found = np.unique(np.minimum(rolled.dihedrals, 2 * np.pi - rolled.dihedrals).round(9))
     wanted = np.unique(np.minimum(tower.dihedrals, 2 * np.pi - tower.dihedrals).round(9))
     np.testing.assert_allclose(found, wanted, atol=2e-9)
 
 
 def test_storeys_of_both_hands():
-    plain = fd.patterns.kresling(6, 0.1, 0.08, 25, storeys=4)
-    tower = fd.patterns.kresling(6, 0.1, 0.08, 25, storeys=4, alternating=True)
-    one = fd.patterns.kresling(6, 0.1, 0.08, 25)
+    plain = fd.patterns.kresling(6, 0.1, height=0.08, twist=25, storeys=4)
+    tower = fd.patterns.kresling(6, 0.1, height=0.08, twist=25, storeys=4, alternating=True)
+    one = fd.patterns.kresling(6, 0.1, height=0.08, twist=25)
     np.testing.assert_array_equal(tower.vertices[:12], plain.vertices[:12])
     np.testing.assert_allclose(tower.vertices[24:, :2], tower.vertices[:6, :2], atol=1e-15)
     # each storey is congruent to a single one, every second one its mirror image
@@ -131,7 +131,7 @@ def test_tubes_fold_rigidly_and_have_equal_panels(options):
 def test_walls_of_zipper_tubes_stay_in_one_another(panel_angle):
     weights = []
     for dihedral in (30, 90, 150):
-        zipper = fd.patterns.zipper_tubes(2, 1.0, 0.9, panel_angle, dihedral)
+        zipper = fd.patterns.zipper_tubes(2, 1.0, b=0.9, panel_angle=panel_angle, dihedral=dihedral)
         half = len(zipper.vertices) // 2
         ties = zipper.custom["foldyn:ties"]
         assert len(ties) == half // 2
@@ -163,8 +163,8 @@ def test_layers_of_a_flasher_stand_on_its_hub():
 
 
 def test_tiles_of_resch_close_up():
-    flat = fd.patterns.resch((3, 2), 0.5, 180)
-    closed = fd.patterns.resch((3, 2), 0.5, 0)
+    flat = fd.patterns.resch((3, 2), 0.5, dihedral=180)
+    closed = fd.patterns.resch((3, 2), 0.5, dihedral=0)
     np.testing.assert_allclose(spans(closed), spans(flat), atol=1e-15)
     tiles = [f for f in range(len(flat.faces)) if flat.face_areas[f] > 0.3 * 0.5**2]
     assert len(tiles) == 2 * 6
@@ -177,12 +177,12 @@ def test_tiles_of_resch_close_up():
     assert np.abs(closed.face_normals[others, 2]).max() < 1e-14
     np.testing.assert_allclose(np.pi - closed.dihedrals, flat.fold_angles, atol=1e-12)
     # and the states before the last come to it
-    nearly = fd.patterns.resch((3, 2), 0.5, 0.01)
+    nearly = fd.patterns.resch((3, 2), 0.5, dihedral=0.01)
     np.testing.assert_allclose(nearly.vertices, closed.vertices, atol=2e-3)
 
 
 def test_columns_of_resch_turn_alike_about_one_axis():
-    folded = fd.patterns.resch((4, 2), 1.0, 100)
+    folded = fd.patterns.resch((4, 2), 1.0, dihedral=100)
     star = folded.creases[folded.families["star"]]
     centers = np.flatnonzero(np.bincount(star.ravel()) == 3)
     assert len(centers) == 8

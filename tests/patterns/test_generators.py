@@ -157,7 +157,7 @@ TALL = 180 - 2 * np.degrees(np.arccos(TILT / np.tan(np.radians(60))))
     ("name", "pattern", "rows"),
     [
         ("miura11_L1", miura(a=1, b=1, panel_angle=60, dihedral=60), slice(None)),
-        ("specimen_mm", miura((4, 3), 25, 25, 60, TALL), slice(None)),
+        ("specimen_mm", miura((4, 3), 25, b=25, panel_angle=60, dihedral=TALL), slice(None)),
         ("kresling6", kresling(sides=6, radius=1, height=0.9, twist=30), slice(None)),
         # its ridge comes first, and its far edge stands in the origin
         ("fold_dih60", simple_fold(dihedral=60).moved((-1, 0, 0)), [4, 5, 0, 1, 2, 3]),

@@ -52,7 +52,7 @@ def test_what_is_made_of_a_pattern_shows_it():
     structure = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0))
     case = fd.Case(structure, [fd.Fix([0, 1])])
     own = pattern._repr_html_().partition("<path")[2].partition("</svg>")[0]
-    for each in (structure, case, fd.shell(pattern, structure.sheet, 2)):
+    for each in (structure, case, fd.shell(pattern, structure.sheet, divisions=2)):
         assert own in each._repr_html_()
     assert "&lt;Structure n5b8" in structure._repr_html_()
     folding = fd.fold(fd.patterns.simple_fold(dihedral=170), 90.0, steps=2)

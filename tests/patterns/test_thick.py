@@ -100,7 +100,7 @@ def test_offsets_for_all_and_for_each_crease():
 
 def test_creases_at_one_height_may_meet():
     """All hinges in the front faces: hinge lines meet as those of the thin Miura do."""
-    miura = fd.patterns.miura((2, 2), 0.1, 0.1, dihedral=100)
+    miura = fd.patterns.miura((2, 2), 0.1, b=0.1, dihedral=100)
     thick = fd.thicken(miura, 0.01, offsets=0.005)
     first = miura.vertices + 0.005 * miura.face_normals[0]
     np.testing.assert_allclose(
@@ -150,8 +150,11 @@ TOUCH = fd.Pattern(
         (lambda: fd.thicken(TOUCH, T), "would part at vertex 2, where they meet in a corner alone"),
         (lambda: fd.thicken(strip(2), 0.0), "thickness = 0.0: must be greater than 0"),
         (lambda: fd.thicken(strip(2), [1, 2, 3]), "thickness: 3 values for 2 panels"),
-        (lambda: fd.thicken(strip(2), T, 0.06), "offsets: crease 0 has 0.06 m: must be at most h"),
-        (lambda: fd.thicken(strip(2), T, [0, 0]), "offsets: 2 values for 1 creases"),
+        (
+            lambda: fd.thicken(strip(2), T, offsets=0.06),
+            "offsets: crease 0 has 0.06 m: must be at most h",
+        ),
+        (lambda: fd.thicken(strip(2), T, offsets=[0, 0]), "offsets: 2 values for 1 creases"),
         (
             lambda: fd.thicken(fd.Pattern(strip(2).vertices, strip(2).faces, "U"), T),
             "offsets: crease 0 is unassigned",

@@ -213,8 +213,8 @@ def test_parts_that_do_not_touch_are_joined_aloud():
         (lambda p: p.repeated((2, 2), tolerance=0), "tolerance = 0"),
         (lambda p: p.repeated((10**5, 10**5)), "counts.*vertices"),
         (lambda p: p.joined(5), "other = 5: give a Pattern"),
-        (lambda p: thicken(p, 0.01, 0.0).joined(p), "pattern: its panels are thick"),
-        (lambda p: thicken(p, 0.01, 0.0).repeated((2, 2)), "pattern: its panels are thick"),
+        (lambda p: thicken(p, 0.01, offsets=0.0).joined(p), "pattern: its panels are thick"),
+        (lambda p: thicken(p, 0.01, offsets=0.0).repeated((2, 2)), "pattern: its panels are thick"),
     ],
 )
 def test_wrong_arguments(call, message):

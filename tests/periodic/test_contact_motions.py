@@ -73,7 +73,9 @@ def test_a_plane_that_swings_drives():
     )
     assert drive_frequency(at_frequency(swinging, 0.1)) == 0.1
     z = fd.Quantity("m", "height", function=lambda u, v, t: u[NODE, 2])
-    steady = fd.bifurcation_diagram(swinging, z, [F, 1.1 * F], sweep="up", settle=15, record=4)
+    steady = fd.bifurcation_diagram(
+        swinging, z, frequencies=[F, 1.1 * F], sweep="up", settle=15, record=4
+    )
     other = fd.periodic_motion(swinging, 1.1 * F, harmonics=12)
     swings = [0.5 * np.ptp(height(motion)) for motion in (one, other)]
     assert steady.amplitude.values[0] == pytest.approx(swings, rel=1e-3)

@@ -35,7 +35,7 @@ def test_small_motions_about_a_loaded_state_are_the_linear_response(name):
     case = shaken(name)
     one = fd.periodic_motion(case, harmonics=2)
     still = case.altered(loads=[PRELOAD])
-    linear = fd.frf(still, fd.Force([0, 1], (TINY, 0, 0)), [F1], "equilibrium")
+    linear = fd.frf(still, fd.Force([0, 1], (TINY, 0, 0)), frequencies=[F1], state="equilibrium")
     expected = -1j * linear.receptance.values[0] * linear.attrs["drive_force"]
     found = one.coefficient.values[1]
     assert np.abs(found - expected).max() < 1e-3 * np.abs(expected).max()
@@ -69,7 +69,7 @@ def test_curves_and_damped_backbones_have_it_and_say_about_which_state():
         assert np.abs(found.origin.values - equilibrium).max() < 1e-6
     linear = fd.frf(
         case.altered(loads=[PRELOAD]), fd.Force([0, 1], (1e-5, 0, 0)),
-        np.linspace(0.95, 1.05, 41) * F1, "equilibrium",
+        frequencies=np.linspace(0.95, 1.05, 41) * F1, state="equilibrium",
     )  # fmt: skip
     peak = np.abs(linear.receptance.values).max() * linear.attrs["drive_force"]
     assert np.abs(curve.coefficient.values[:, 1]).max() == pytest.approx(peak, rel=5e-3)

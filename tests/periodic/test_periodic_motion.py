@@ -72,7 +72,7 @@ def test_small_motions_are_the_linear_response_and_decay_as_the_damping_says():
     case = oscillator(force=1e-6, frequency=0.2)
     one = fd.periodic_motion(case, harmonics=3)
     still = fd.Case(case.structure, case.supports, damping=case.damping)
-    linear = fd.frf(still, fd.Force([NODE], (0, 0, 1e-6)), [0.2])
+    linear = fd.frf(still, fd.Force([NODE], (0, 0, 1e-6)), frequencies=[0.2])
     expected = -1j * linear.receptance.values[0, NODE, 2] * linear.attrs["drive_force"]
     assert one.coefficient.values[1, NODE, 2] == pytest.approx(expected, rel=1e-9)
     omega = np.sqrt(3.0 / mass() - 0.05**2)  # of the damped vibration

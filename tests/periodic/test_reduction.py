@@ -73,9 +73,9 @@ def test_curves_and_backbones_take_few_modes():
     bent = np.interp(0.01, whole.amplitude, whole.frequency)
     assert np.interp(0.01, few.amplitude, few.frequency) == pytest.approx(bent, rel=1e-3)
     assert few.reduction.values.max() < 0.01
-    curve = fd.response_curve(cell(5e-5), (0.59, 0.63), 5, modes=3, steps=24)
+    curve = fd.response_curve(cell(5e-5), (0.59, 0.63), harmonics=5, modes=3, steps=24)
     here = np.abs(curve.frequency.values - 0.61).argmin()
-    exact = fd.periodic_motion(cell(5e-5), float(curve.frequency[here]), 5)
+    exact = fd.periodic_motion(cell(5e-5), float(curve.frequency[here]), harmonics=5)
     amplitude = np.ptp(exact.displacement.values, axis=0).max() / 2.0
     assert curve.amplitude.values[here] == pytest.approx(amplitude, rel=5e-3)
 

@@ -101,7 +101,7 @@ def test_curve_of_small_motions_is_the_linear_response():
     assert found.frequency.values[[0, -1]] == pytest.approx([0.4, 0.1], rel=1e-9)
     still = fd.Case(case.structure, case.supports, damping=case.damping)
     inner = np.sort(found.frequency.values)
-    linear = fd.frf(still, fd.Force([NODE], (0, 0, 1.0)), inner)
+    linear = fd.frf(still, fd.Force([NODE], (0, 0, 1.0)), frequencies=inner)
     expected = 1e-5 * np.abs(linear.receptance.values[:, NODE, 2])
     assert found.amplitude.values[::-1] == pytest.approx(expected, rel=1e-5)
     assert found.stable.values.all()
@@ -184,7 +184,7 @@ def test_period_doubles_and_simulation_follows():
     steady = branch.isel(point=np.flatnonzero(branch.stable.values))
     middle = steady.isel(point=steady.sizes["point"] // 2)
     here = float(middle.frequency)
-    one = fd.periodic_motion(case, here, 16, start=middle, periods=2)
+    one = fd.periodic_motion(case, here, harmonics=16, start=middle, periods=2)
     assert one.time.values[1] == pytest.approx(2.0 / here / 128)
     load = fd.Force([NODE], case.loads[0].vector, history=fd.Harmonic(here))
     run = fd.simulate(
@@ -198,20 +198,20 @@ def test_period_doubles_and_simulation_follows():
 
 def test_measure_shows_what_it_says(curve):
     height = fd.Quantity("mm", "height", function=lambda u, v, t: 1e3 * u[NODE, 2])
-    found = fd.response_curve(oscillator(), (0.1, 0.15), 5, measure=height)
-    plain = fd.response_curve(oscillator(), (0.1, 0.15), 5)
+    found = fd.response_curve(oscillator(), (0.1, 0.15), harmonics=5, measure=height)
+    plain = fd.response_curve(oscillator(), (0.1, 0.15), harmonics=5)
     assert found.amplitude.values == pytest.approx(1e3 * plain.amplitude.values, rel=1e-12)
     assert found.amplitude.attrs["units"] == "mm"
     speed = fd.Quantity("m/s", "speed", function=lambda u, v, t: v[NODE, 2])
-    slow = fd.response_curve(oscillator(force=1e-6), (0.1, 0.15), 3, measure=speed)
-    still = fd.response_curve(oscillator(force=1e-6), (0.1, 0.15), 3)
+    slow = fd.response_curve(oscillator(force=1e-6), (0.1, 0.15), harmonics=3, measure=speed)
+    still = fd.response_curve(oscillator(force=1e-6), (0.1, 0.15), harmonics=3)
     expected = 2.0 * np.pi * still.frequency.values * still.amplitude.values
     assert slow.amplitude.values == pytest.approx(expected, rel=1e-6)
 
 
 def test_points_found_are_kept_with_a_warning():
     with pytest.warns(FoldynWarning, match="more than 5 points, which are kept"):
-        found = fd.response_curve(oscillator(), (0.1, 0.6), 3, most_points=5)
+        found = fd.response_curve(oscillator(), (0.1, 0.6), harmonics=3, most_points=5)
     assert found.attrs["complete"] == 0
     assert found.sizes["point"] == 6
 
@@ -219,7 +219,7 @@ def test_points_found_are_kept_with_a_warning():
 def test_what_nothing_damps_is_told_where_its_curve_does_not_end():
     undamped = oscillator(alpha=0.0)
     with pytest.warns(FoldynWarning, match="point") as told:
-        fd.response_curve(undamped, (0.1, 0.6), 3, most_points=5)
+        fd.response_curve(undamped, (0.1, 0.6), harmonics=3, most_points=5)
     assert "give more most_points. Nothing damps the sheet" in str(told[0].message)
 
 
@@ -229,8 +229,8 @@ def test_points_found_are_kept_when_it_is_interrupted():
             raise KeyboardInterrupt
 
     with pytest.raises(MotionInterrupted, match="interrupted after 13 points") as stopped:
-        fd.response_curve(oscillator(), (0.1, 0.6), 3, progress=stop)
-    kept, whole = stopped.value.partial, fd.response_curve(oscillator(), (0.1, 0.6), 3)
+        fd.response_curve(oscillator(), (0.1, 0.6), harmonics=3, progress=stop)
+    kept, whole = stopped.value.partial, fd.response_curve(oscillator(), (0.1, 0.6), harmonics=3)
     assert kept.attrs["complete"] == 0
     np.testing.assert_array_equal(kept.amplitude, whole.amplitude[:13])
 

@@ -22,7 +22,7 @@ from foldyn.plots.scene import Sheet3D, View
 
 def test_asked_frames_and_rate(case, trajectory, tmp_path):
     swing = trajectory.isel(time=slice(0, 40))
-    path = animate(case, swing, tmp_path / "motion.gif", frames=9, fps=20, scale=5.0)
+    path = animate(case, swing, path=tmp_path / "motion.gif", frames=9, fps=20, scale=5.0)
     with Image.open(path) as gif:
         assert gif.n_frames == 9
         assert gif.info["duration"] == 50
@@ -36,14 +36,14 @@ def test_asked_frames_and_rate(case, trajectory, tmp_path):
 def test_the_rate_of_a_gif_is_the_one_told(case, trajectory, tmp_path, monkeypatch):
     told = []
     monkeypatch.setattr("foldyn.plots.animation.pace", lambda s: told.append(s) or "")
-    with Image.open(animate(case, trajectory, tmp_path / "a.gif", frames=4, fps=14)) as gif:
+    with Image.open(animate(case, trajectory, path=tmp_path / "a.gif", frames=4, fps=14)) as gif:
         shown = gif.info["duration"] / 1000  # s a picture; 1/14 s is rounded to 0.07 s
     assert told == [pytest.approx(9.99 / 3 / shown)]
 
 
 def test_a_sheet_at_rest_keeps_all_frames(case, trajectory, tmp_path):
     still = trajectory.assign(displacement=0.0 * trajectory["displacement"])
-    with Image.open(animate(case, still, tmp_path / "rest.gif", frames=5)) as gif:
+    with Image.open(animate(case, still, path=tmp_path / "rest.gif", frames=5)) as gif:
         assert gif.n_frames == 5
 
 
@@ -73,18 +73,18 @@ def test_frames_are_evenly_spread_and_interpolated(structure, trajectory):
 def test_bad_input(case, trajectory, tmp_path, change, words):
     path = tmp_path / change.pop("path", "motion.gif")
     with pytest.raises(InputError, match=words):
-        animate(case, trajectory, path, **change)
+        animate(case, trajectory, path=path, **change)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_foreign_or_broken_trajectory(case, trajectory, tmp_path):
     with pytest.raises(InputError, match="9 nodes, the structure 13"):
-        animate(case, trajectory.isel(node=slice(9)), tmp_path / "a.gif")
+        animate(case, trajectory.isel(node=slice(9)), path=tmp_path / "a.gif")
     broken = trajectory.where(trajectory["time"] < 5.0)
     with pytest.raises(InputError, match="NaN"):
-        animate(case, broken, tmp_path / "a.gif")
+        animate(case, broken, path=tmp_path / "a.gif")
     with pytest.raises(InputError, match="single sample"):
-        animate(case, trajectory.isel(time=[0]), tmp_path / "a.gif")
+        animate(case, trajectory.isel(time=[0]), path=tmp_path / "a.gif")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -110,7 +110,7 @@ def count(picture: np.ndarray, color: str) -> int:
 
 def test_the_frame_holds_a_free_flight(flight, tmp_path):
     case, motion = flight
-    drawn = frames(animate(case, motion, tmp_path / "flight.gif", frames=7))
+    drawn = frames(animate(case, motion, path=tmp_path / "flight.gif", frames=7))
     creases = [count(frame, style.CREASES["M"]) for frame in drawn]
     assert min(creases) > 20
     # the same number of pixels everywhere: nothing is cut off
@@ -121,20 +121,20 @@ def test_the_frame_holds_a_free_flight(flight, tmp_path):
 
 def test_a_free_flight_leaves_the_path_of_its_center(flight, case, trajectory, tmp_path):
     free, motion = flight
-    drawn = frames(animate(free, motion, tmp_path / "a.gif", frames=3))
+    drawn = frames(animate(free, motion, path=tmp_path / "a.gif", frames=3))
     assert all(count(frame, style.GREEN) > 100 for frame in drawn)
-    held = frames(animate(case, motion, tmp_path / "b.gif", frames=3))
+    held = frames(animate(case, motion, path=tmp_path / "b.gif", frames=3))
     assert all(count(frame, style.GREEN) == 0 for frame in held)
-    staying = frames(animate(free, trajectory, tmp_path / "c.gif", frames=3))
+    staying = frames(animate(free, trajectory, path=tmp_path / "c.gif", frames=3))
     assert all(count(frame, style.GREEN) == 0 for frame in staying)
 
 
 def test_creases_glow_unless_all_are_actuated(structure, trajectory, tmp_path):
     some = cases.Case(structure, loads=[cases.Actuate([0], 90.0)])
-    glowing = frames(animate(some, trajectory, tmp_path / "some.gif", frames=2))
+    glowing = frames(animate(some, trajectory, path=tmp_path / "some.gif", frames=2))
     assert all(count(frame, style.ACTUATED) > 50 for frame in glowing)
     everything = cases.Case(structure, loads=[cases.Actuate("all", 90.0)])
-    plain = frames(animate(everything, trajectory, tmp_path / "all.gif", frames=2))
+    plain = frames(animate(everything, trajectory, path=tmp_path / "all.gif", frames=2))
     assert all(count(frame, style.ACTUATED) == 0 for frame in plain)
 
 
@@ -179,7 +179,7 @@ def ffmpeg() -> str:
 
 
 def test_a_film_has_the_asked_frames_and_rate(ffmpeg, case, trajectory, tmp_path):
-    film = animate(case, trajectory, tmp_path / "motion.mp4", frames=12, fps=6)
+    film = animate(case, trajectory, path=tmp_path / "motion.mp4", frames=12, fps=6)
     assert film.read_bytes()[4:8] == b"ftyp"
     told = subprocess.run(
         [ffmpeg, "-i", str(film), "-f", "null", "-"], capture_output=True, text=True, check=True
@@ -219,7 +219,7 @@ def fake(tmp_path, monkeypatch):
 
 def test_ffmpeg_gets_every_frame(fake, case, trajectory, tmp_path):
     fake(fail=False)
-    film = animate(case, trajectory, tmp_path / "motion.mp4", frames=5, fps=30)
+    film = animate(case, trajectory, path=tmp_path / "motion.mp4", frames=5, fps=30)
     size, *arguments = film.read_text().split()
     width, height = map(int, arguments[arguments.index("-s") + 1].split("x"))
     assert (width % 2, height % 2) == (0, 0)
@@ -231,12 +231,12 @@ def test_ffmpeg_gets_every_frame(fake, case, trajectory, tmp_path):
 def test_an_ffmpeg_that_fails_is_quoted(fake, case, trajectory, tmp_path):
     fake(fail=True)
     with pytest.raises(ComputationError, match=r"Unknown encoder 'h264'.*imageio-ffmpeg"):
-        animate(case, trajectory, tmp_path / "motion.mp4", frames=3)
+        animate(case, trajectory, path=tmp_path / "motion.mp4", frames=3)
 
 
 def test_without_ffmpeg_a_film_is_refused(case, trajectory, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(InputError, match=r"MP4 needs ffmpeg.*pip install imageio-ffmpeg"):
-        animate(case, trajectory, tmp_path / "motion.mp4")
+        animate(case, trajectory, path=tmp_path / "motion.mp4")
     assert list(tmp_path.iterdir()) == []

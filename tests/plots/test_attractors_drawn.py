@@ -71,11 +71,11 @@ def test_a_section_shows_velocity_over_displacement():
         {"displacement": (place, states), "velocity": (place, 10.0 * states)},
         {"time": [0.0, 1.0], "node": [0, 1], "axis": ["x", "y", "z"]},
     )
-    line = plot_poincare_section(section, 1, "y").axes[0].get_lines()[0]
+    line = plot_poincare_section(section, 1, axis="y").axes[0].get_lines()[0]
     np.testing.assert_array_equal(line.get_xdata(), [4.0, 10.0])
     np.testing.assert_array_equal(line.get_ydata(), [40.0, 100.0])
     with pytest.raises(InputError, match="axis"):
-        plot_poincare_section(section, 1, "w")
+        plot_poincare_section(section, 1, axis="w")
 
 
 def test_basins_have_a_color_each():

@@ -18,7 +18,7 @@ def cell():
 
 
 def test_bands_are_lines_over_a_path(cell):
-    b = fd.bands(cell, cell.path("G-X-M", 9), 4)
+    b = fd.bands(cell, cell.path("G-X-M", 9), count=4)
     axes = fd.plots.plot_bands(b).axes[0]
     lines = [line for line in axes.get_lines() if len(line.get_xdata()) == 9]
     assert len(lines) == 4
@@ -35,7 +35,7 @@ def test_bands_are_lines_over_a_path(cell):
 
 
 def test_polarized_bands_are_colored(cell):
-    b = fd.bands(cell, cell.path("G-X", 5), 3, polarization=True)
+    b = fd.bands(cell, cell.path("G-X", 5), count=3, polarization=True)
     figure = fd.plots.plot_bands(b)
     pieces = figure.axes[0].collections[0]
     assert len(pieces.get_segments()) == 4 * 3
@@ -44,7 +44,7 @@ def test_polarized_bands_are_colored(cell):
 
 
 def test_lines_of_one_frequency_fill_the_zone(cell):
-    b = fd.bands(cell, cell.grid(6), 2, track=False)
+    b = fd.bands(cell, cell.grid(6), count=2, track=False)
     axes = fd.plots.plot_iso_frequency(b, 2).axes[0]
     lines = axes.collections[0]
     inside = b.frequency.values[:, 1]
@@ -54,8 +54,8 @@ def test_lines_of_one_frequency_fill_the_zone(cell):
 
 
 def test_figures_of_bands_refuse_other_phases(cell):
-    grid = fd.bands(cell, cell.grid(3), 1)
-    path = fd.bands(cell, cell.path("G-X", 3), 1)
+    grid = fd.bands(cell, cell.grid(3), count=1)
+    path = fd.bands(cell, cell.path("G-X", 3), count=1)
     with pytest.raises(InputError, match="its phases lie on no path"):
         fd.plots.plot_bands(grid)
     with pytest.raises(InputError, match="need phases of cell"):

@@ -46,7 +46,9 @@ def test_one_state_or_several(model):
     u = np.zeros_like(s.nodes)
     assert len(fd.plots.draw_boards(fd.Case(s)).axes) == 1
     assert len(fd.plots.draw_boards(s, u).axes) == 1
-    figure = fd.plots.draw_boards(s, np.stack([u, u + 0.1]), ["one", "two"], title="boards")
+    figure = fd.plots.draw_boards(
+        s, np.stack([u, u + 0.1]), captions=["one", "two"], title="boards"
+    )
     assert len(figure.axes) == 2
     assert {"one", "two"} <= {text.get_text() for text in figure.texts}
     assert len(fd.plots.draw_boards(THICK).axes) == 1

@@ -36,7 +36,7 @@ def colored(figure):
 
 def test_creases_and_panels_have_the_colors_of_their_values():
     values = np.linspace(-1.0, 1.0, len(PATTERN.creases))
-    figure = fd.plots.draw_sensitivity(PATTERN, values, "label")
+    figure = fd.plots.draw_sensitivity(PATTERN, values, label="label")
     assert figure.axes[1].get_xlabel() == "label"
     assert len({color[:3] for color in colored(figure)}) == len(values)
     sheet = fd.discretize(PATTERN, fd.Sheet(1e6, 0.25, 0.01))

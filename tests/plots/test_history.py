@@ -56,9 +56,11 @@ def test_frequencies_are_shown_as_far_as_there_is_content(two_rules):
         "release": release,
         "at rest": release.assign(displacement=release["displacement"] * 0.0 + noise),
     }
-    assert plot_history(both, [6], "x", window="hann").axes[1].get_xlim()[1] == top
+    assert plot_history(both, [6], axes="x", window="hann").axes[1].get_xlim()[1] == top
     still = release.assign(displacement=0.0 * release["displacement"])
-    assert plot_history({"still": still}, [6], "x").axes[1].get_xlim()[1] == pytest.approx(500.0)
+    assert plot_history({"still": still}, [6], axes="x").axes[1].get_xlim()[1] == pytest.approx(
+        500.0
+    )
 
 
 def test_legend_holds_the_labels_once_outside_the_axes(two_rules):
@@ -134,6 +136,8 @@ def test_a_motion_alone_has_no_label(trajectory):
         np.testing.assert_array_equal(*(a.get_lines()[0].get_xydata() for a in (one, other)))
     assert not figures[0].legends and len(figures[1].legends) == 1
     assert len(plot_history(trajectory, 6).axes) == 2  # one number
-    assert len(plot_history(trajectory, [6, 6], ["x", "z"]).axes) == 4  # one node, two directions
+    assert (
+        len(plot_history(trajectory, [6, 6], axes=["x", "z"]).axes) == 4
+    )  # one node, two directions
     named = plot_history(trajectory, "xmax").axes[::2]
     assert [axes.get_title() for axes in named] == [f"node {k}" for k in (6, 7, 8)]

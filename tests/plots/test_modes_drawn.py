@@ -65,7 +65,7 @@ def texts(figure):
 
 
 def test_a_picture_shows_the_shape_over_the_sheet_at_rest(case, modes):
-    figure = draw_modes(case, modes, [5, 1], amplitude=0.1, names={5: "node 7 goes down"})
+    figure = draw_modes(case, modes, which=[5, 1], amplitude=0.1, names={5: "node 7 goes down"})
     rest = case.structure.nodes
     assert texts(figure) == ["mode 5: 12.00 Hz\nnode 7 goes down", "mode 1: rigid motion"]
     for axes, way in zip(figure.axes, ([0, 0, -0.1], [0.1, 0, 0]), strict=True):
@@ -79,7 +79,7 @@ def test_a_picture_shows_the_shape_over_the_sheet_at_rest(case, modes):
 def test_modes_about_a_state_are_drawn_over_it(case):
     state = np.zeros((len(case.structure.nodes), 3))
     state[8] = [0.0, 0.2, 0.0]
-    figure = draw_modes(case, made(case, state), [5], amplitude=0.1)
+    figure = draw_modes(case, made(case, state), which=[5], amplitude=0.1)
     front, gray = drawn(figure.axes[0])
     moved = tuple(np.round(case.structure.nodes[8] + state[8], 9).tolist())
     assert moved in gray and moved in front
@@ -91,7 +91,7 @@ def test_the_scale_is_one_at_which_shapes_can_be_read(case):
     large = structures.discretize(patterns.miura(cells=(4, 4)), case.structure.sheet)
     modes = made(cases.Case(large))
     modes["shape"][3] = [0.0, 0.5, 0.0]
-    figure = draw_modes(large, modes, [4, 5])
+    figure = draw_modes(large, modes, which=[4, 5])
     whole, alone = (drawn(axes)[0] for axes in figure.axes)
     rest, size = large.nodes, Sheet3D.of(large).size
     assert tuple(np.round(rest[7] + [0.0, 0.12 * size, 0.0], 9).tolist()) in whole
@@ -116,7 +116,7 @@ def test_rigid_modes_are_left_out_unless_asked_for(case, modes):
 @pytest.mark.parametrize("count", [1, 2, 4, 5])
 def test_captions_of_two_lines_have_room(case, modes, count):
     names = {k: "first bending along y (93 %)" for k in range(1, 6)}
-    figure = draw_modes(case, modes, list(range(1, count + 1)), names=names, title="Modes")
+    figure = draw_modes(case, modes, which=list(range(1, count + 1)), names=names, title="Modes")
     assert_white_rim(figure)
     boxes = [text.get_window_extent() for text in figure.texts]
     boxes.append(figure.legends[0].get_window_extent())
@@ -155,7 +155,9 @@ def test_what_modes_do_is_told_with_its_share(cantilever):
 def test_a_film_is_a_period_without_a_seam(case, modes, tmp_path, monkeypatch):
     positions = []
     monkeypatch.setattr(DrawnSheet, "move", lambda _, points: positions.append(points))
-    file = animate_modes(case, modes, tmp_path / "modes.gif", [4, 5], amplitude=0.1, frames=8)
+    file = animate_modes(
+        case, modes, path=tmp_path / "modes.gif", which=[4, 5], amplitude=0.1, frames=8
+    )
     assert file.exists()
     rest = case.structure.nodes
     first, second = positions[::2], positions[1::2]
@@ -167,7 +169,7 @@ def test_a_film_is_a_period_without_a_seam(case, modes, tmp_path, monkeypatch):
 
 
 def test_a_film_shows_both_extremes_within_its_frame(case, modes, tmp_path):
-    file = animate_modes(case, modes, tmp_path / "modes.gif", [4, 5], frames=4, fps=10)
+    file = animate_modes(case, modes, path=tmp_path / "modes.gif", which=[4, 5], frames=4, fps=10)
     pictures = frames(file)
     for picture in pictures:
         assert picture.shape[1] == 600
@@ -177,7 +179,14 @@ def test_a_film_shows_both_extremes_within_its_frame(case, modes, tmp_path):
 
 def test_a_mac_matrix_has_its_values_and_labels():
     values = np.array([[1.0, 0.004, 0.25], [0.0, 0.997, 0.5]])
-    figure = plot_mac(values, ["4 Hz", "9 Hz"], ["a", "b", "c"], "shell", "bars", "MAC")
+    figure = plot_mac(
+        values,
+        ["4 Hz", "9 Hz"],
+        columns=["a", "b", "c"],
+        row_title="shell",
+        column_title="bars",
+        title="MAC",
+    )
     axes, bar = figure.axes
     np.testing.assert_array_equal(axes.images[0].get_array(), values)
     assert [t.get_text() for t in axes.get_yticklabels()] == ["4 Hz", "9 Hz"]
@@ -200,10 +209,19 @@ def test_a_large_mac_matrix_has_no_numbers():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda case, modes: draw_modes(case, modes, []), "which: empty"),
-        (lambda case, modes: draw_modes(case, modes, [6]), "which: 6; there are modes 1 to 5"),
-        (lambda case, modes: draw_modes(case, modes, [0]), "which: 0; there are modes 1 to 5"),
-        (lambda case, modes: draw_modes(case, modes, [1] * 13), "13 modes; one figure shows at"),
+        (lambda case, modes: draw_modes(case, modes, which=[]), "which: empty"),
+        (
+            lambda case, modes: draw_modes(case, modes, which=[6]),
+            "which: 6; there are modes 1 to 5",
+        ),
+        (
+            lambda case, modes: draw_modes(case, modes, which=[0]),
+            "which: 0; there are modes 1 to 5",
+        ),
+        (
+            lambda case, modes: draw_modes(case, modes, which=[1] * 13),
+            "13 modes; one figure shows at",
+        ),
         (lambda case, modes: draw_modes(case, modes, amplitude=0.0), "amplitude = 0.0: must be"),
         (lambda case, modes: draw_modes(case, modes.isel(node=slice(9)), names={}), "9 nodes, the"),
         (lambda case, modes: draw_modes(case, modes.drop_vars("shape")), "has no shape"),
@@ -219,27 +237,27 @@ def test_bad_input(case, modes, call, words):
 
 def test_bad_films(case, modes, tmp_path):
     with pytest.raises(InputError, match=r"\.gif or \.mp4"):
-        animate_modes(case, modes, tmp_path / "modes.avi")
+        animate_modes(case, modes, path=tmp_path / "modes.avi")
     with pytest.raises(InputError, match="frames = 1"):
-        animate_modes(case, modes, tmp_path / "modes.gif", frames=1)
+        animate_modes(case, modes, path=tmp_path / "modes.gif", frames=1)
     assert not list(tmp_path.iterdir())
 
 
 def test_modes_bring_their_case(case, modes, tmp_path):
     """By its place or its name, with the other arguments behind it as they are."""
-    expected = draw_modes(case, modes, [5, 1], 0.1)
+    expected = draw_modes(case, modes, which=[5, 1], amplitude=0.1)
     for figure in (
-        draw_modes(modes, [5, 1], 0.1),
+        draw_modes(modes, [5, 1], which=0.1),
         draw_modes(modes=modes, which=[5, 1], amplitude=0.1),
         draw_modes(modes=modes, case_or_structure=case, which=[5, 1], amplitude=0.1),
     ):
         assert texts(figure) == texts(expected)
         for axes, own in zip(figure.axes, expected.axes, strict=True):
             assert drawn(axes) == drawn(own)
-    film = animate_modes(modes, tmp_path / "m.gif", [5], frames=2)
+    film = animate_modes(modes, tmp_path / "m.gif", path=[5], frames=2)
     assert (
         film.read_bytes()
-        == animate_modes(case, modes, tmp_path / "n.gif", [5], frames=2).read_bytes()
+        == animate_modes(case, modes, path=tmp_path / "n.gif", which=[5], frames=2).read_bytes()
     )
     with pytest.raises(InputError, match="case_or_structure = 3: give a case, a structure"):
         draw_modes(3, modes)

@@ -84,7 +84,7 @@ def marks(figure, kind):
 
 
 def test_stability_is_the_style_of_the_line(path):
-    figure = plot_load_displacement({"one": path}, [7], "-z")
+    figure = plot_load_displacement({"one": path}, [7], direction="-z")
     first, second, third = curves(figure)
     assert [line.get_linestyle() for line in (first, second, third)] == ["-", "--", "-"]
     parts = (slice(0, 3), slice(2, 7), slice(6, 8))  # they meet in the points between them
@@ -99,7 +99,7 @@ def test_stability_is_the_style_of_the_line(path):
 
 
 def test_critical_points_are_marked(path):
-    figure = plot_load_displacement({"one": path}, [7], "-z")
+    figure = plot_load_displacement({"one": path}, [7], direction="-z")
     (limit,), (bifurcation,) = marks(figure, "limit"), marks(figure, "bifurcation")
     assert (limit.get_xdata()[0], limit.get_ydata()[0]) == (0.2, 1.0)
     assert (bifurcation.get_xdata()[0], bifurcation.get_ydata()[0]) == (0.6, -0.1)
@@ -108,7 +108,7 @@ def test_critical_points_are_marked(path):
 
 def test_a_stable_path_has_no_legend_to_explain(case):
     calm = made(case, negative=np.zeros(8, int), kinds=["regular"] * 8)
-    figure = plot_load_displacement({"one": calm}, [7], "-z")
+    figure = plot_load_displacement({"one": calm}, [7], direction="-z")
     (line,) = curves(figure)
     assert line.get_linestyle() == "-" and len(line.get_xdata()) == 8
     assert figure.legends == []
@@ -122,7 +122,7 @@ def test_eigenvalues_that_were_not_counted_draw_one_solid_line(case):
 
 def test_a_curve_for_each_path_and_node(case, path):
     other = made(case, factors=2 * FACTORS)
-    figure = plot_load_displacement({"one": path, "two": other}, [7, 6], "z")
+    figure = plot_load_displacement({"one": path, "two": other}, [7, 6], direction="z")
     assert keys(figure)[:4] == ["one, node 7", "one, node 6", "two, node 7", "two, node 6"]
     drawn = {line.get_label(): line for line in curves(figure)}
     np.testing.assert_array_equal(drawn["two, node 7"].get_xdata(), -DOWN[:3])
@@ -152,8 +152,8 @@ def test_a_single_point_is_a_dot(case):
 
 def test_the_force_of_moved_supports(held):
     path = made(held)
-    np.testing.assert_allclose(total_reaction(path, [6, 8], "y"), 5.0 * FACTORS)
-    np.testing.assert_allclose(total_reaction(path, [8], "-y"), -3.0 * FACTORS)
+    np.testing.assert_allclose(total_reaction(path, [6, 8], direction="y"), 5.0 * FACTORS)
+    np.testing.assert_allclose(total_reaction(path, [8], direction="-y"), -3.0 * FACTORS)
     figure = plot_reaction({"one": path}, [6, 8])
     (axes,) = figure.axes
     assert axes.get_xlabel() == "imposed displacement along y (m)"
@@ -162,7 +162,7 @@ def test_the_force_of_moved_supports(held):
     y = np.concatenate([line.get_ydata()[:-1] for line in curves(figure)])
     np.testing.assert_allclose(x, 0.1 * FACTORS[:-1])
     np.testing.assert_allclose(y, 5.0 * FACTORS[:-1])
-    backwards = plot_reaction({"one": path}, [6, 8], "-y")
+    backwards = plot_reaction({"one": path}, [6, 8], direction="-y")
     np.testing.assert_allclose(curves(backwards)[0].get_ydata(), -5.0 * FACTORS[:3])
 
 
@@ -235,7 +235,7 @@ def sheets(figure):
 
 
 def test_shapes_are_the_chosen_points(case, path):
-    figure = draw_shapes(case, path, [0, 2, -1], scale=2.0, view=(90.0, -90.0))
+    figure = draw_shapes(case, path, points=[0, 2, -1], scale=2.0, view=(90.0, -90.0))
     assert [text.get_text() for text in figure.texts] == [
         "point 0: load factor 0",
         "point 2: load factor 1, limit point",
@@ -252,12 +252,12 @@ def test_shapes_are_the_chosen_points(case, path):
 
 
 def test_shapes_tell_what_is_unstable(case, path):
-    figure = draw_shapes(case, path, [3, 5])
+    figure = draw_shapes(case, path, points=[3, 5])
     assert [text.get_text() for text in figure.texts] == [
         "point 3: load factor 0.7, unstable",
         "point 5: load factor -0.1, bifurcation",
     ]
-    spread = draw_shapes(case, path, 3)
+    spread = draw_shapes(case, path, points=3)
     assert [text.get_text().split(":")[0] for text in spread.texts] == [
         f"point {k}" for k in evenly(path, 3)
     ]
@@ -265,7 +265,7 @@ def test_shapes_tell_what_is_unstable(case, path):
 
 @pytest.mark.parametrize("count", [1, 2, 4, 5, 8])
 def test_shapes_lie_in_the_figure_and_apart(case, path, count):
-    figure = draw_shapes(case, path, list(range(count)), title="Shapes")
+    figure = draw_shapes(case, path, points=list(range(count)), title="Shapes")
     assert len(figure.axes) == count
     assert_white_rim(figure)
     boxes = [text.get_window_extent() for text in figure.texts]
@@ -314,7 +314,7 @@ def test_an_animation_of_a_path_tells_load_factors(case, path, tmp_path, monkeyp
     told = []
     factors = animation._factors
     monkeypatch.setattr(animation, "_factors", lambda *a: told.extend(factors(*a)) or told)
-    file = animate(case, path, tmp_path / "path.gif", frames=9)
+    file = animate(case, path, path=tmp_path / "path.gif", frames=9)
     with Image.open(file) as gif:
         assert gif.n_frames == 9
     assert told[0] == "load factor 0.0"
@@ -348,14 +348,17 @@ def test_pictures_of_a_path_are_spread_over_its_way(case, path):
         (lambda case, path: plot_load_displacement({"a": path}, []), "nodes = ..: give nodes"),
         (lambda case, path: plot_load_displacement(path, "x > 99"), "selects no vertex"),
         (lambda case, path: plot_load_displacement({"a": path}, [13]), "13 is not in 'a'"),
-        (lambda case, path: plot_load_displacement({"a": path}, [7], "w"), 'direction = "w"'),
         (
-            lambda case, path: plot_reaction({"a": path}, [7], "z"),
+            lambda case, path: plot_load_displacement({"a": path}, [7], direction="w"),
+            'direction = "w"',
+        ),
+        (
+            lambda case, path: plot_reaction({"a": path}, [7], direction="z"),
             "no support holds node 7 along z",
         ),
-        (lambda case, path: draw_shapes(case, path, [8]), "8; there are points 0 to 7"),
-        (lambda case, path: draw_shapes(case, path, []), "points: empty"),
-        (lambda case, path: draw_shapes(case, path, 0), "points: 0; give at least one"),
+        (lambda case, path: draw_shapes(case, path, points=[8]), "8; there are points 0 to 7"),
+        (lambda case, path: draw_shapes(case, path, points=[]), "points: empty"),
+        (lambda case, path: draw_shapes(case, path, points=0), "points: 0; give at least one"),
         (lambda case, path: draw_shapes(case, path.isel(node=slice(9))), "9 nodes, the structure"),
         (lambda case, path: plot_path_energies(path.drop_vars("point")), "path: is not a path"),
         (lambda case, path: energy_shares(path.where(path.step < 3)), "NaN"),
@@ -382,10 +385,10 @@ def test_a_path_alone_needs_no_label_and_brings_its_case(held):
         ]
         for one, other in zip(*lines, strict=True):
             np.testing.assert_array_equal(one, other)
-    by_place = plot_load_displacement(path, "xmax", "-z")
-    by_number = plot_load_displacement(path, nodes[nodes < 9].tolist(), "-z")
+    by_place = plot_load_displacement(path, "xmax", direction="-z")
+    by_number = plot_load_displacement(path, nodes[nodes < 9].tolist(), direction="-z")
     assert keys(by_place) == keys(by_number) and keys(by_place)[0] == f"node {nodes[0]}"
-    figures = draw_shapes(path, [0, 7]), draw_shapes(held, path, [0, 7])
+    figures = draw_shapes(path, [0, 7]), draw_shapes(held, path, points=[0, 7])
     for one, other in zip(*(figure.axes for figure in figures), strict=True):
         for a, b in zip(one.collections, other.collections, strict=True):
             if hasattr(a, "_segments3d"):

@@ -20,7 +20,7 @@ def seen(figure, axes, points):
 
 
 def test_each_has_its_place_and_view():
-    figure = fd.plots.draw_patterns(STATES, ["a", "b", "c"], [None, (50, -30)], width=9.0)
+    figure = fd.plots.draw_patterns(STATES, ["a", "b", "c"], views=[None, (50, -30)], width=9.0)
     assert len(figure.axes) == 3
     looks = [(axes.elev, axes.azim) for axes in figure.axes]
     assert looks == [(90, -90), (50, -30), (28, -60)]  # the flat one from above

@@ -46,7 +46,7 @@ def _figures(case, trajectory):
     yield plots.draw_modes(shaken, modes)
     yield plots.plot_mac(fd.mac(modes, modes), ["a", "b"])
     drive = [fd.Force([7], (0.01, 0, 0))]
-    response = fd.frf(shaken, drive, np.linspace(0.1, 2.0, 60), secant=1.0)
+    response = fd.frf(shaken, drive, frequencies=np.linspace(0.1, 2.0, 60), secant=1.0)
     yield plots.plot_frf({"one": response}, [6, 7])
     yield plots.plot_nyquist(response, 7)
 

@@ -57,7 +57,7 @@ def peak_dots(axes, label="response"):
 
 
 def test_magnitude_and_phase_are_those_of_the_response(response):
-    figure = plot_frf({"one": response}, [7], "x")
+    figure = plot_frf({"one": response}, [7], axes="x")
     magnitude, phase = figure.axes
     curve = receptance(F)
     np.testing.assert_allclose(line(magnitude, "response").get_ydata(), np.abs(curve))
@@ -73,22 +73,22 @@ def test_magnitude_and_phase_are_those_of_the_response(response):
 
 
 def test_peaks_are_marked_where_they_are_and_named(response):
-    figure = plot_frf({"one": response}, [7], "x", prominence=0.01)
+    figure = plot_frf({"one": response}, [7], axes="x", prominence=0.01)
     dots = peak_dots(figure.axes[0])
     expected = [f0 * np.sqrt(1 - 2 * z**2) for f0, z, _ in POLES]
     np.testing.assert_allclose(dots[:, 0], expected, rtol=0.01)
-    table = peaks_of(response, 7, "x", prominence=0.01)
+    table = peaks_of(response, 7, axis="x", prominence=0.01)
     np.testing.assert_allclose(dots[:, 0], [peak.frequency for peak in table], rtol=1e-12)
     np.testing.assert_allclose(dots[:, 1], [peak.height for peak in table], rtol=1e-12)
     told = [text.get_text() for text in figure.axes[0].texts]
     assert told == [f"{f:#.4g} Hz" for f in dots[np.argsort(-dots[:, 1]), 0]]
-    few = plot_frf({"one": response}, [7], "x", prominence=0.5)
+    few = plot_frf({"one": response}, [7], axes="x", prominence=0.5)
     assert len(peak_dots(few.axes[0])) == 1
 
 
 def test_labels_of_peaks_do_not_meet(case):
     near = made(case, poles=((4.0, 0.02, 1.0), (4.2, 0.02, 0.9), (9.0, 0.02, 1.0)))
-    figure = plot_frf({"one": near}, [7], "x", prominence=0.01)
+    figure = plot_frf({"one": near}, [7], axes="x", prominence=0.01)
     assert len(peak_dots(figure.axes[0])) == 3
     assert len(figure.axes[0].texts) == 2  # of 4.0 and 4.2 Hz the higher one
     figure.canvas.draw()
@@ -106,7 +106,7 @@ def test_labels_of_peaks_do_not_meet(case):
     ],
 )
 def test_other_quantities(response, quantity, factor, unit):
-    figure = plot_frf({"one": response}, [7], "x", quantity)
+    figure = plot_frf({"one": response}, [7], axes="x", quantity=quantity)
     shown = line(figure.axes[0], "response").get_ydata()
     np.testing.assert_allclose(shown[1:], np.abs(factor * receptance(F))[1:])
     assert np.isnan(shown[0])  # nothing at 0 Hz, which has no place on a logarithmic axis
@@ -115,14 +115,14 @@ def test_other_quantities(response, quantity, factor, unit):
 
 def test_a_moving_base_gives_a_transmissibility(case):
     moved = made(case, quantity="transmissibility")
-    figure = plot_frf({"one": moved}, [7], "x")
+    figure = plot_frf({"one": moved}, [7], axes="x")
     assert figure.axes[0].get_ylabel() == "transmissibility along x"
     np.testing.assert_allclose(line(figure.axes[0], "response").get_ydata(), np.abs(receptance(F)))
 
 
 def test_coherence_is_drawn_where_there_is_one(case, response):
     noisy = made(case, coherence=0.9)
-    figure = plot_frf({"noisy": noisy, "exact": response}, [7], "x")
+    figure = plot_frf({"noisy": noisy, "exact": response}, [7], axes="x")
     magnitude, _, coherence = figure.axes
     assert coherence.get_ylabel() == "coherence"
     assert [curve.get_label() for curve in coherence.get_lines()] == ["noisy"]
@@ -151,7 +151,7 @@ def test_models_and_nodes_are_told_apart(case, response):
 
 def test_responses_at_other_frequencies_share_the_frame(case, response):
     few = made(case, f=np.array([2.0, 4.0, 20.0]))
-    figure = plot_frf({"fine": response, "stepped": few}, [7], "x")
+    figure = plot_frf({"fine": response, "stepped": few}, [7], axes="x")
     assert figure.axes[1].get_xlim() == (0.0, 20.0)
     stepped, fine = line(figure.axes[0], "stepped"), line(figure.axes[0], "fine")
     assert stepped.get_marker() == "."  # few frequencies are seen as such
@@ -181,9 +181,9 @@ def test_frequencies_without_a_response_are_left_out(case):
 def test_a_node_that_does_not_move_and_few_frequencies(case, response):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        still = plot_frf({"one": response}, [7, 3], "x")
+        still = plot_frf({"one": response}, [7, 3], axes="x")
         still.canvas.draw()
-        two = plot_frf({"one": made(case, f=np.array([4.0]))}, [7], "x")
+        two = plot_frf({"one": made(case, f=np.array([4.0]))}, [7], axes="x")
         two.canvas.draw()
     assert np.isnan(line(still.axes[0], "node 3").get_ydata()).all()
     assert not len(peak_dots(two.axes[0]))
@@ -193,13 +193,15 @@ def test_nothing_is_cut_off(case):
     noisy = made(case, coherence=0.5)
     for figure in (
         plot_frf({"a": noisy, "b": noisy}, [6, 7], title="Responses"),
-        plot_nyquist(noisy, 7, "x", title="Circles"),
+        plot_nyquist(noisy, 7, axis="x", title="Circles"),
     ):
         assert_white_rim(figure)
 
 
 def test_circles_go_through_the_mobility(response):
-    figure = plot_nyquist(response, 7, "x", peaks_of(response, 7, "x", prominence=0.01))
+    figure = plot_nyquist(
+        response, 7, axis="x", peaks=peaks_of(response, 7, axis="x", prominence=0.01)
+    )
     assert len(figure.axes) == 2
     for frame, (f0, z, a) in zip(figure.axes, POLES, strict=True):
         assert frame.get_aspect() == 1.0
@@ -224,7 +226,7 @@ def test_a_circle_of_a_windowed_response_has_the_damping_of_the_window():
     dt, rate, w0, z = 0.005, 3.0, 2 * np.pi * 4.0, 0.02
     t = np.arange(4000) * dt
     pulse = np.exp(-z * w0 * t) * np.sin(w0 * np.sqrt(1 - z**2) * t)
-    windowed = pulse * exponential_window(len(t), dt, rate)
+    windowed = pulse * exponential_window(len(t), dt, rate=rate)
     f = np.fft.rfftfreq(len(t), dt)
     Y = 2j * np.pi * f * np.fft.rfft(windowed) * dt
     band = (f > 2.0) & (f < 6.0)
@@ -260,11 +262,14 @@ def test_without_a_circle_the_whole_curve_is_drawn(case):
         (lambda r: plot_frf({"a": r}, []), "nodes = ..: give nodes"),
         (lambda r: plot_frf(r, [7.5]), "nodes = 7.5: must be a whole number"),
         (lambda r: plot_frf({"a": r}, [13]), "13 is not in 'a', whose nodes are 0..12"),
-        (lambda r: plot_frf({"a": r}, [7, 6], ["x", "y", "z"]), "3 directions for 2 nodes"),
-        (lambda r: plot_frf({"a": r}, [7], "x", "speed"), "quantity: 'speed'; the response has"),
+        (lambda r: plot_frf({"a": r}, [7, 6], axes=["x", "y", "z"]), "3 directions for 2 nodes"),
+        (
+            lambda r: plot_frf({"a": r}, [7], axes="x", quantity="speed"),
+            "quantity: 'speed'; the response has",
+        ),
         (lambda r: plot_frf({"a": r}, [7], prominence=1.0), "prominence = 1.0: must be"),
         (lambda r: plot_nyquist(r, 13), "13 is not in"),
-        (lambda r: plot_nyquist(r, 7, "w"), '"w": choose one of x, y, z'),
+        (lambda r: plot_nyquist(r, 7, axis="w"), '"w": choose one of x, y, z'),
     ],
 )
 def test_bad_input(response, call, words):

@@ -49,7 +49,7 @@ def path(case):
 @pytest.fixture(scope="module")
 def motion(case):
     pulled = fd.Case(case.structure, case.supports, case.loads[:1])
-    return fd.simulate(pulled, 0.2, "generalized_alpha", every=0.02)
+    return fd.simulate(pulled, 0.2, method="generalized_alpha", every=0.02)
 
 
 def lines(figure, label: str) -> list[np.ndarray]:
@@ -167,8 +167,8 @@ def test_energies_of_a_path(path):
 
 
 def test_shapes_and_films(case, path, motion, tmp_path):
-    assert len(draw_shapes(case, path, [0, -1]).axes) == 2
-    with Image.open(animate(case, motion, tmp_path / "m.gif", frames=3)) as film:
+    assert len(draw_shapes(case, path, points=[0, -1]).axes) == 2
+    with Image.open(animate(case, motion, path=tmp_path / "m.gif", frames=3)) as film:
         assert film.n_frames == 3
     modes = fd.modes(fd.Case(case.structure, case.supports), count=2)
     figure = draw_modes(fd.Case(case.structure, case.supports), modes)

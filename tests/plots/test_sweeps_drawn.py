@@ -78,9 +78,9 @@ def test_main_effects_of_a_plane_are_its_slopes(plane):
     np.testing.assert_allclose(a.mean[:4], 2.0 * a.values[:4] - 3.0 * 37.0)
     assert a.mean[4] == pytest.approx(2.0 - 3.0 * 5.5)  # of the points that have a value
     np.testing.assert_allclose(b.mean[:2], 1.0 - 3.0 * b.values[:2])
-    (second, _) = main_effects(plane, "value", {"mode": 2})
+    (second, _) = main_effects(plane, "value", at={"mode": 2})
     np.testing.assert_allclose(second.mean, 2.0 * a.mean)
-    (alone,) = main_effects(plane, "value", {"b": 10.0})
+    (alone,) = main_effects(plane, "value", at={"b": 10.0})
     np.testing.assert_allclose(alone.mean, 2.0 * a.values - 30.0)
     np.testing.assert_allclose(alone.deviation, 0.0, atol=1e-12)
 
@@ -145,13 +145,13 @@ def test_lines_go_through_the_points(plane):
     (axes,) = figure.axes
     assert len(axes.lines) == 3
     np.testing.assert_array_equal(axes.lines[1].get_ydata(), plane["value"][:, 1, 0])
-    modes = plot_sweep_lines(plane, "value", "a", "mode", {"b": 10.0})
+    modes = plot_sweep_lines(plane, "value", x="a", by="mode", at={"b": 10.0})
     np.testing.assert_array_equal(modes.axes[0].lines[1].get_ydata(), plane["value"][:, 1, 1])
     assert modes.axes[0].get_ylabel() == "value, b 10 (Hz)"
 
 
 def test_samples_are_dots_and_texts_have_their_words(case, design):
-    figure = plot_sweep_map(design, "value", "x1", "x3")
+    figure = plot_sweep_map(design, "value", x="x1", y="x3")
     offsets = figure.axes[0].collections[0].get_offsets()
     assert len(offsets) == design.sizes["point"]
     words = sweep_of(case, {"rule": np.array(["panel", "centroid"])}, np.array([2.0, 1.0]))

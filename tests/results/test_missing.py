@@ -56,11 +56,11 @@ def test_rigid_modes_have_no_damping_ratio(tmp_path):
 def test_responses_without_damping_or_motion():
     force, held = fd.Force([0, 1], (1e-3, 0, 0)), [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
     fold = fd.Case(FOLD, held, damping=fd.Rayleigh(alpha=2.0))
-    still = fd.frf(fd.Case(FOLD), force, [0.0, 1.0])
+    still = fd.frf(fd.Case(FOLD), force, frequencies=[0.0, 1.0])
     assert np.isnan(still.receptance.values[0]).all()
     assert still.receptance.attrs["missing"] == REASONS["receptance"]
     random = fd.frf(
-        fold, force, [1.0, 2.0, 3.0], method="burst_random", averages=2, duration=4.0,
+        fold, force, frequencies=[1.0, 2.0, 3.0], method="burst_random", averages=2, duration=4.0,
         integrator="newmark", dt=0.01,
     )  # fmt: skip
     assert np.isnan(random.coherence.values).any()  # of what is held

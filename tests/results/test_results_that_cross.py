@@ -138,7 +138,7 @@ def pushed(method: str, **options):
     push = fd.Force(list(range(6, 12)), (0, 0, -80.0), fd.HalfSine(0.02))
     held = fd.Fix(list(range(6)))
     case = fd.Case(fd.discretize(pattern, PAPER), [held], [push], fd.Rayleigh(alpha=20.0))
-    return fd.simulate(case, 0.01, method, **options)
+    return fd.simulate(case, 0.01, method=method, **options)
 
 
 @pytest.mark.parametrize("options", [{"every": 1e-4}, {"dt": 1e-6, "every": 100}])

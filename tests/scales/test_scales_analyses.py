@@ -29,13 +29,13 @@ def simulated(make, by, method, dt=None, **damped):
     half = fd.HalfSine(0.3 * by.time)
     case = fd.Case(make(by), FOLD_SUPPORTS, [push(by, half)], damping(by, **damped))
     dt = None if dt is None else dt * by.time
-    return fd.simulate(case, 0.5 * by.time, method, dt, every=0.1 * by.time)
+    return fd.simulate(case, 0.5 * by.time, method=method, dt=dt, every=0.1 * by.time)
 
 
 def simulated_miura(by, loads=(), supports=(), method="generalized_alpha", mass="mixed_voronoi"):
     structure = miura(by, mass=mass)
     case = fd.Case(structure, [*MIURA_SUPPORTS, *supports], loads, damping(by))
-    return fd.simulate(case, 0.5 * by.time, method, every=0.1 * by.time)
+    return fd.simulate(case, 0.5 * by.time, method=method, every=0.1 * by.time)
 
 
 def ramp(by):
@@ -91,7 +91,7 @@ def strut(by):
 
 
 def kresling(by):
-    pattern = fd.patterns.kresling(6, by.length, 0.9 * by.length, 30)
+    pattern = fd.patterns.kresling(6, by.length, height=0.9 * by.length, twist=30)
     structure = fd.discretize(
         pattern, sheet(by, thickness=1e-3), crease_stiffness=1e-4 * by.force,
         fold_law="linear", bend_law="linear",
@@ -143,11 +143,11 @@ PATHS = {
 def modes(make, by, count=6, state=None, supports=FOLD_SUPPORTS, secant=1.0, **damped):
     loads = [push(by)] if state else []
     case = fd.Case(make(by), supports, loads, damping(by, **damped))
-    return fd.modes(case, count, state, None if make is shell else secant)
+    return fd.modes(case, count, state=state, secant=None if make is shell else secant)
 
 
 def sheet_of_panels(by):
-    pattern = fd.patterns.miura((3, 3), by.length, 1.1 * by.length, 60, 60)
+    pattern = fd.patterns.miura((3, 3), by.length, b=1.1 * by.length, panel_angle=60, dihedral=60)
     return fd.discretize(pattern, sheet(by))
 
 
@@ -167,7 +167,7 @@ def response(by, method="direct", make=fold, base=False, frequencies=(0.5, 1.0, 
     drive = fd.Force([0, 1], (1e-4 * by.force, 0, 0))
     if base:
         drive = fd.BaseMotion("x", value=1e-4 * by.length)
-    return fd.frf(case, drive, np.array(frequencies) / by.time, method=method, **more)
+    return fd.frf(case, drive, frequencies=np.array(frequencies) / by.time, method=method, **more)
 
 
 RESPONSES = {
@@ -215,11 +215,11 @@ def test_a_micrometer_is_as_long_as_a_meter():
     """A Miura cell of 10 um, which one length hidden in the error's floor once made 9 % wrong."""
 
     def motion(size):
-        pattern = fd.patterns.miura((1, 1), size, size, 60, 60)
+        pattern = fd.patterns.miura((1, 1), size, b=size, panel_angle=60, dihedral=60)
         s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01 * size, 1.0))
         load = fd.Force([7], (1e-3 * size**2, 0, 0), fd.HalfSine(0.5 * size))
         case = fd.Case(s, MIURA_SUPPORTS, [load], fd.Rayleigh(0.1 / size))
-        return fd.simulate(case, 2.0 * size, "generalized_alpha", every=0.25 * size)
+        return fd.simulate(case, 2.0 * size, method="generalized_alpha", every=0.25 * size)
 
     one, small = motion(1.0).displacement.values, motion(1e-5).displacement.values
     assert np.abs(small / 1e-5 - one).max() < 1e-6 * np.abs(one).max()

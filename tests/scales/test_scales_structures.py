@@ -17,10 +17,10 @@ from foldyn.structures.mass import MASS_RULES
 
 SCALES = [drawn(seed, base) for seed, base in itertools.product(range(3), (4.0, 10.0))]
 PATTERNS = {
-    "fold": lambda a: fd.patterns.simple_fold(a, 1.2 * a, 60),
-    "miura": lambda a: fd.patterns.miura((2, 1), a, 1.1 * a, 60, 50),
-    "eggbox": lambda a: fd.patterns.eggbox((1, 2), a, 1.3 * a, 75, 60),
-    "kresling": lambda a: fd.patterns.kresling(5, a, 0.9 * a, 30, 2),
+    "fold": lambda a: fd.patterns.simple_fold(a, 1.2 * a, dihedral=60),
+    "miura": lambda a: fd.patterns.miura((2, 1), a, b=1.1 * a, panel_angle=60, dihedral=50),
+    "eggbox": lambda a: fd.patterns.eggbox((1, 2), a, b=1.3 * a, panel_angle=75, dihedral=60),
+    "kresling": lambda a: fd.patterns.kresling(5, a, height=0.9 * a, twist=30, storeys=2),
     "polygons": lambda a: fd.Pattern(
         a * np.array([[0, 0, 0], [1, 0, 0], [1.4, 0.9, 0], [0.5, 1.5, 0], [-0.4, 0.9, 0],
                       [2.2, 0.1, 0.5], [2.5, 0.8, 0.4]]),

@@ -71,20 +71,20 @@ def sheet(by: Units, thickness: float = 0.01, density: float = 1.0) -> fd.Sheet:
 
 def miura(by: Units, **model) -> fd.Structure:
     """A Miura unit cell."""
-    pattern = fd.patterns.miura((1, 1), by.length, 1.1 * by.length, 60, 60)
+    pattern = fd.patterns.miura((1, 1), by.length, b=1.1 * by.length, panel_angle=60, dihedral=60)
     return fd.discretize(pattern, sheet(by), **model)
 
 
 def fold(by: Units, **model) -> fd.Structure:
     """Two panels."""
-    pattern = fd.patterns.simple_fold(by.length, 1.2 * by.length, 60)
+    pattern = fd.patterns.simple_fold(by.length, 1.2 * by.length, dihedral=60)
     return fd.discretize(pattern, sheet(by), **model)
 
 
 def shell(by: Units, divisions: int = 3, **model) -> fd.Shell:
     """The same two panels as a shell."""
-    pattern = fd.patterns.simple_fold(by.length, 1.2 * by.length, 60)
-    return fd.shell(pattern, sheet(by, thickness=0.02), divisions, **model)
+    pattern = fd.patterns.simple_fold(by.length, 1.2 * by.length, dihedral=60)
+    return fd.shell(pattern, sheet(by, thickness=0.02), divisions=divisions, **model)
 
 
 MIURA_SUPPORTS = (fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2, 6, 8], "z"), fd.Fix([1], "y"))

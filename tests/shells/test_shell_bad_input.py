@@ -10,7 +10,7 @@ from foldyn.errors import InputError
 from foldyn.shells import shell
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01)
-FOLD = fd.patterns.simple_fold(1.0, 1.0, 60)
+FOLD = fd.patterns.simple_fold(1.0, 1.0, dihedral=60)
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ def twisted() -> fd.Pattern:
 
 
 MODELS = {
-    "simple fold": (lambda: fd.patterns.simple_fold(1.0, 1.3, 60), {"clamped": [(0, 1)]}),
+    "simple fold": (lambda: fd.patterns.simple_fold(1.0, 1.3, dihedral=60), {"clamped": [(0, 1)]}),
     "miura": (
         lambda: fd.patterns.miura(dihedral=60),
         {"fold_law": fd.EnhancedLinear(75, 285), "crease_rest": 100},

@@ -12,7 +12,7 @@ from foldyn.shells import shell
 
 SHEET = fd.Sheet(1e6, 0.25, 0.05, density=1.0)
 MODELS = {
-    "simple fold": lambda: fd.patterns.simple_fold(1.0, 1.3, 60),
+    "simple fold": lambda: fd.patterns.simple_fold(1.0, 1.3, dihedral=60),
     "miura": lambda: fd.patterns.miura(dihedral=60),
     "kresling": fd.patterns.kresling,
     "twisted quad": lambda: fd.Pattern(

@@ -51,7 +51,7 @@ def test_slender_panels_are_too_stiff_in_their_own_plane():
         points = [(s, y) for y in (0.0, width) for s in x]
         faces = [(i, i + 1, panels + 2 + i, panels + 1 + i) for i in range(panels)]
         pattern = fd.welded(fd.Pattern(points, faces), join=False)
-        shell = fd.shell(pattern, sheet, divisions, mass="consistent")
+        shell = fd.shell(pattern, sheet, divisions=divisions, mass="consistent")
         held = [fd.Fix([0, panels + 1], along=True), fd.Fix(range(len(shell.nodes)), "z")]
         return 100.0 * (fd.modes(fd.Case(shell, held), count=1).frequency.values[0] / beam - 1.0)
 

@@ -86,14 +86,14 @@ def test_without_a_radius_nothing_changes():
 
 @pytest.mark.parametrize("mass", ["lumped", "consistent"])
 def test_mass_and_its_first_moments_are_exact(flat, mass):
-    graded = shell(flat, SHEET, 4, mass, vertex_radius=RADIUS)
-    even = shell(flat, SHEET, 4, mass)
+    graded = shell(flat, SHEET, divisions=4, mass=mass, vertex_radius=RADIUS)
+    even = shell(flat, SHEET, divisions=4, mass=mass)
     assert graded.total_mass == pytest.approx(even.total_mass, rel=1e-13)
     assert graded.center_of_mass == pytest.approx(even.center_of_mass, abs=1e-13)
 
 
 def test_uniform_strain_needs_no_force_but_at_corners():
-    s = shell(SQUARE, SHEET, 8, vertex_radius=RADIUS)
+    s = shell(SQUARE, SHEET, divisions=8, vertex_radius=RADIUS)
     strain = np.array([[1e-4, 3e-5, 0], [3e-5, -2e-4, 0], [0, 0, 0]])
     force = s.forces(s.nodes @ strain, np.zeros(s.rotations))[0]
     corner = at_vertices(s, SQUARE)
@@ -105,7 +105,7 @@ def test_uniform_strain_needs_no_force_but_at_corners():
 
 def test_corners_hardly_stretch():
     """A square that is pulled: its corners, stiffer by STIFF, take that much less strain."""
-    s = shell(SQUARE, SHEET, 8, vertex_radius=RADIUS)
+    s = shell(SQUARE, SHEET, divisions=8, vertex_radius=RADIUS)
     west, east = (np.abs(s.nodes[:, 0] - x) < 1e-9 for x in (0.0, 1.0))
     held = [fd.Fix(np.flatnonzero(west).tolist(), "xy"), fd.Fix(range(len(s.nodes)), "z")]
     pull = fd.Impose(np.flatnonzero(east).tolist(), "x", 1e-5)
@@ -121,7 +121,9 @@ def test_bending_is_as_without():
     sheet = STEEL[1e-3]
     square = fd.Pattern(0.1 * SQUARE.vertices, [[0, 1, 2, 3]])
     found = [
-        fd.modes(fd.Case(shell(square, sheet, 16, "consistent", vertex_radius=radius)), 9)
+        fd.modes(
+            fd.Case(shell(square, sheet, divisions=16, mass="consistent", vertex_radius=radius)), 9
+        )
         for radius in (None, 1e-3)
     ]
     even, graded = (each.frequency.values[6:] for each in found)
@@ -130,7 +132,7 @@ def test_bending_is_as_without():
 
 @pytest.mark.parametrize("name", sorted({*PATTERNS} - {"polygons"}))
 def test_rigid_motions_are_free_and_alone(name):
-    s = shell(PATTERNS[name](), SHEET, 4, crease_stiffness=5.0, vertex_radius=0.05)
+    s = shell(PATTERNS[name](), SHEET, divisions=4, crease_stiffness=5.0, vertex_radius=0.05)
     u = s.nodes @ rotation_matrix(3).T - s.nodes + [0.3, -0.2, 0.1]
     scale = SHEET.youngs_modulus * SHEET.thickness
     force, couple = s.forces(u, np.zeros(s.rotations))
@@ -142,7 +144,7 @@ def test_rigid_motions_are_free_and_alone(name):
 def test_a_vertex_of_four_creases_folds_without_strain():
     """Between two folded states of one pattern nothing stretches and nothing bends."""
     before, after = (fd.patterns.miura(cells=(1, 1), dihedral=angle) for angle in (110, 60))
-    s, other = (shell(each, SHEET, 4, vertex_radius=RADIUS) for each in (before, after))
+    s, other = (shell(each, SHEET, divisions=4, vertex_radius=RADIUS) for each in (before, after))
     assert np.array_equal(s.triangles, other.triangles)
     energies = s.energies(other.nodes - s.nodes, np.zeros(s.rotations))
     assert energies["strain_folds"] > 0.0
@@ -157,7 +159,9 @@ def test_a_vertex_of_four_creases_folds_without_strain():
 def tower(divisions, radius, thickness=1e-3):
     """First frequency of a tower of triangles, held along its bottom edges."""
     pattern = fd.patterns.kresling(sides=4, radius=0.04, height=0.03, twist=30, storeys=3)
-    s = shell(pattern, STEEL[thickness], divisions, "consistent", vertex_radius=radius)
+    s = shell(
+        pattern, STEEL[thickness], divisions=divisions, mass="consistent", vertex_radius=radius
+    )
     held = [fd.Fix(range(4), along=True)]
     return fd.modes(fd.Case(s, held), 3).frequency.values
 
@@ -186,12 +190,12 @@ def test_frequencies_of_a_tower_converge():
 @pytest.mark.matrix
 def test_statics_motions_and_clamps():
     pattern = fd.patterns.simple_fold(a=0.05, b=0.05, dihedral=120)
-    s = shell(pattern, STEEL[1e-3], 4, vertex_radius=1e-3, clamped="xmin")
+    s = shell(pattern, STEEL[1e-3], divisions=4, vertex_radius=1e-3, clamped="xmin")
     supports = [fd.Fix("xmin", "xyz")]
     case = fd.Case(s, supports, [fd.Force("xmax", (0.0, 0.0, 0.1))])
     path = fd.trace(case)
     tip = np.abs(path.displacement.values[-1]).max()
-    even = shell(pattern, STEEL[1e-3], 8, clamped="xmin")
+    even = shell(pattern, STEEL[1e-3], divisions=8, clamped="xmin")
     usual = np.abs(fd.trace(fd.Case(even, supports, case.loads)).displacement.values[-1]).max()
     assert tip == pytest.approx(usual, rel=0.1)
     motion = fd.simulate(case, 1e-3, dt=5e-5, every=4, method="generalized_alpha")
@@ -200,7 +204,7 @@ def test_statics_motions_and_clamps():
 
 def test_a_clamped_edge_that_is_moved_stays_straight():
     pattern = fd.patterns.simple_fold(a=0.05, b=0.05, dihedral=120)
-    s = shell(pattern, STEEL[1e-3], 4, vertex_radius=1e-3, clamped="xmin")
+    s = shell(pattern, STEEL[1e-3], divisions=4, vertex_radius=1e-3, clamped="xmin")
     low, high = s.options.clamped[0]
     case = fd.Case(s, [fd.Fix([low, high], "xy"), fd.Impose([low, high], "z", [0.0, 1e-3])])
     ((moved, _),) = case.imposed_terms
@@ -227,13 +231,13 @@ def test_a_panel_too_narrow_for_the_radius_is_refused():
     c, s = np.cos(np.radians(10)), np.sin(np.radians(10))
     skew = fd.Pattern([[0, 0], [1, 0], [1 + c, s], [c, s]], [[0, 1, 2, 3]])
     with pytest.raises(InputError, match=r"more than half of the 0.0872 m .* at most 0.0436"):
-        shell(skew, SHEET, 4, vertex_radius=0.06)
-    assert len(shell(skew, SHEET, 4, vertex_radius=0.04).triangles) > 50
+        shell(skew, SHEET, divisions=4, vertex_radius=0.06)
+    assert len(shell(skew, SHEET, divisions=4, vertex_radius=0.04).triangles) > 50
 
 
 def test_decks_have_no_stiff_corners():
     from foldyn.exports.creased_shell import creased_shell
 
-    s = shell(SQUARE, SHEET, 4, vertex_radius=RADIUS)
+    s = shell(SQUARE, SHEET, divisions=4, vertex_radius=RADIUS)
     with pytest.raises(InputError, match="vertex_radius: panels do not stretch about vertices"):
         creased_shell(fd.Case(s))

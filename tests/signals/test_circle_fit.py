@@ -32,7 +32,7 @@ def test_all_quantities_tell_the_same():
     f = np.linspace(7.0, 12.0, 30)
     H = receptance(f, Mode(9.3, 0.135, 2.0))
     for quantity in ("receptance", "mobility", "accelerance"):
-        response = convert_response(f, H, "receptance", quantity)
+        response = convert_response(f, H, source="receptance", target=quantity)
         fit = circle_fit(f, response, quantity=quantity)
         assert fit.damping_ratio == pytest.approx(0.135, rel=1e-11)
         assert fit.modal_constant == pytest.approx(2.0, rel=1e-10)
@@ -62,7 +62,7 @@ def test_known_poles_of_several_modes():
     """The specimen's three modes with damping of 5, 13.5 and 9 %: to 1e-6 and far better."""
     f = np.linspace(0.0, 30.0, 601)
     H = receptance(f, *SPECIMEN)
-    fits = circle_fits(f, H, BANDS)
+    fits = circle_fits(f, H, bands=BANDS)
     hold(fits, SPECIMEN, 1e-10, 1e-9)
     assert [fit.modal_constant for fit in fits] == pytest.approx([1.0, 2.0, -1.5], rel=1e-9)
     # one at a time, the neighbors' slope within the band is an error that the misfit shows
@@ -71,7 +71,7 @@ def test_known_poles_of_several_modes():
     assert alone.misfit > 1e-3
     # a mode out of the bands is a residual, and the constant is not all of it
     f = np.linspace(0.5, 14.0, 400)
-    fits = circle_fits(f, receptance(f, *SPECIMEN), BANDS[:2])
+    fits = circle_fits(f, receptance(f, *SPECIMEN), bands=BANDS[:2])
     hold(fits, SPECIMEN[:2], 1e-2, 0.1)
     assert fits[1].misfit > 1e-3
 
@@ -79,7 +79,7 @@ def test_known_poles_of_several_modes():
 def test_modes_as_close_as_their_width():
     pair = (Mode(9.3, 0.05), Mode(9.3 * (1 + 2 * 0.05), 0.05))
     f = np.linspace(3.0, 20.0, 600)
-    hold(circle_fits(f, receptance(f, *pair), [(8.6, 9.75), (9.8, 10.9)]), pair, 1e-8, 1e-7)
+    hold(circle_fits(f, receptance(f, *pair), bands=[(8.6, 9.75), (9.8, 10.9)]), pair, 1e-8, 1e-7)
 
 
 def test_scatter_over_seeds_is_stated_and_the_least_possible():
@@ -150,4 +150,4 @@ def test_what_cannot_be_fitted(function, arguments, words):
 
 
 def test_holes_outside_the_band_do_not_matter():
-    assert circle_fit(F, HOLE, (9.1, 12.0)).damping_ratio == pytest.approx(0.1, rel=1e-9)
+    assert circle_fit(F, HOLE, band=(9.1, 12.0)).damping_ratio == pytest.approx(0.1, rel=1e-9)

@@ -16,27 +16,31 @@ KINDS = ("receptance", "mobility", "accelerance")
 
 
 def test_derivatives():
-    np.testing.assert_allclose(convert_response(F, H, "receptance", "mobility"), 1j * W * H)
-    np.testing.assert_allclose(convert_response(F, H, "receptance", "accelerance"), -(W**2) * H)
+    np.testing.assert_allclose(
+        convert_response(F, H, source="receptance", target="mobility"), 1j * W * H
+    )
+    np.testing.assert_allclose(
+        convert_response(F, H, source="receptance", target="accelerance"), -(W**2) * H
+    )
     # the imaginary part of a receptance is negative, the real part of a mobility positive
     assert (H.imag[1:] < 0).all()
-    assert (convert_response(F, H, "receptance", "mobility").real[1:] > 0).all()
+    assert (convert_response(F, H, source="receptance", target="mobility").real[1:] > 0).all()
 
 
 @pytest.mark.parametrize("source", KINDS)
 @pytest.mark.parametrize("target", KINDS)
 def test_there_and_back(source, target):
     channels = np.stack([H, 2 * H], axis=1)
-    there = convert_response(F[1:], channels[1:], source, target)
-    back = convert_response(F[1:], there, target, source)
+    there = convert_response(F[1:], channels[1:], source=source, target=target)
+    back = convert_response(F[1:], there, source=target, target=source)
     np.testing.assert_allclose(back, channels[1:], rtol=1e-13)
 
 
 def test_dividing_at_0_hz_gives_nan():
-    back = convert_response(F, 1j * W * H, "mobility", "receptance")
+    back = convert_response(F, 1j * W * H, source="mobility", target="receptance")
     assert np.isnan(back[0])
     np.testing.assert_allclose(back[1:], H[1:], rtol=1e-13)
-    assert convert_response(F, H, "mobility", "accelerance")[0] == 0
+    assert convert_response(F, H, source="mobility", target="accelerance")[0] == 0
 
 
 def test_base_transmissibility_of_an_oscillator():

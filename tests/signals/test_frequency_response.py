@@ -38,7 +38,7 @@ EXCITATIONS = {
 @pytest.mark.parametrize("kind", EXCITATIONS)
 def test_exact_without_noise(kind, estimator):
     force = EXCITATIONS[kind]
-    estimate = frequency_response(force, response(force, DT, *SPECIMEN), DT, estimator)
+    estimate = frequency_response(force, response(force, DT, *SPECIMEN), dt=DT, estimator=estimator)
     exact = sampled_receptance(estimate.frequency, DT, *SPECIMEN)
     band = estimate.frequency < 25.0
     error = np.abs(estimate.response - exact)[band].max() / np.abs(exact).max()
@@ -52,7 +52,7 @@ def test_records_tell_the_poles():
     """At 2000 samples per second the record's own error, (pi f dt)^2 / 3, is small enough."""
     dt, mode = 1 / 2000, Mode(9.3, 0.135, 2.0)
     force = half_sine(8000, dt, 0.03)
-    estimate = frequency_response(force, response(force, dt, mode), dt)
+    estimate = frequency_response(force, response(force, dt, mode), dt=dt)
     f = estimate.frequency
     held = sampled_receptance(f, dt, mode) / receptance(f, mode)  # with that error taken off
     for taken, near, damping in ((1.0, 1e-7, 2e-5), (held, 1e-10, 1e-9)):
@@ -66,17 +66,17 @@ def test_an_exponential_window_serves_records_that_have_not_died_away():
     force = half_sine(n, dt, 0.03)
     x = response(force, dt, mode)
     assert np.abs(x[-200:]).max() > 0.5 * np.abs(x).max()
-    plain = frequency_response(force, x, dt)
-    damped = frequency_response(force, x, dt, window=exponential_window(n, dt, rate=rate))
+    plain = frequency_response(force, x, dt=dt)
+    damped = frequency_response(force, x, dt=dt, window=exponential_window(n, dt, rate=rate))
     f = damped.frequency
     w = 2j * np.pi * f + rate
     exact = 2.0 / ((w - mode.pole) * (w - np.conj(mode.pole)))
     band, size = (f > 3) & (f < 25), np.abs(exact).max()
     assert np.abs(damped.response - exact)[band].max() < 2e-3 * size
     assert np.abs(plain.response - receptance(f, mode))[band].max() > 0.1 * size
-    assert without_window(9.3, 0.01, rate)[1] < 0  # what a window takes off, it adds before
+    assert without_window(9.3, 0.01, rate=rate)[1] < 0  # what a window takes off, it adds before
     fit = circle_fit(f, damped.response, band=(5.0, 15.0))
-    frequency, damping = without_window(fit.natural_frequency, fit.damping_ratio, rate)
+    frequency, damping = without_window(fit.natural_frequency, fit.damping_ratio, rate=rate)
     assert frequency == pytest.approx(9.3, rel=1e-4)
     assert damping == pytest.approx(0.01, abs=2e-4)
 
@@ -84,7 +84,7 @@ def test_an_exponential_window_serves_records_that_have_not_died_away():
 def test_a_window_and_its_correction_cancel():
     """exp(-rate t) moves the pole by -rate, exactly."""
     pole = Mode(9.3, 0.05).pole - 2.5
-    frequency, damping = without_window(abs(pole) / (2 * np.pi), -pole.real / abs(pole), 2.5)
+    frequency, damping = without_window(abs(pole) / (2 * np.pi), -pole.real / abs(pole), rate=2.5)
     assert frequency == pytest.approx(9.3, rel=1e-14)
     assert damping == pytest.approx(0.05, rel=1e-13)
 
@@ -95,7 +95,7 @@ def test_welch_averages_are_those_of_scipy():
     x = signal.lfilter([0.3, 0.2], [1, -0.7], force) + 0.1 * rng.normal(size=5000)
     settings = {"fs": 50.0, "window": "hann", "nperseg": 256, "noverlap": 128}
     given = {"segment": 256, "overlap": 0.5, "window": "hann", "detrend": "constant"}
-    estimate = frequency_response(force, x, 1 / 50, **given)
+    estimate = frequency_response(force, x, dt=1 / 50, **given)
     f, ff = signal.welch(force, **settings)
     fx = signal.csd(force, x, **settings)[1]
     assert estimate.segments == 38
@@ -109,7 +109,7 @@ def test_welch_averages_are_those_of_scipy():
 @pytest.mark.parametrize("n", [400, 401])
 def test_the_density_of_the_force_holds_its_mean_square(n):
     force = np.random.default_rng(2).normal(size=n)
-    estimate = frequency_response(force, force, 0.01)
+    estimate = frequency_response(force, force, dt=0.01)
     width = estimate.frequency[1]
     assert estimate.force_density.sum() * width == pytest.approx(np.mean(force**2), rel=1e-12)
 
@@ -129,7 +129,7 @@ def noisy(seed: int, records: int, in_force: float, in_response: float):
 def mean_ratio(estimator: str, in_force: float, in_response: float) -> float:
     """Mean of estimate over truth in the lines around the resonance."""
     force, x, exact = noisy(1, 400, in_force, in_response)
-    estimate = frequency_response(force, x, DT, estimator)
+    estimate = frequency_response(force, x, dt=DT, estimator=estimator)
     band = (estimate.frequency > 8.5) & (estimate.frequency < 10.0)
     return float(np.mean((estimate.response / exact)[band]).real)
 
@@ -148,7 +148,7 @@ def test_noise_in_the_force_leaves_h2_deflates_h1_and_lowers_the_coherence_by_it
     assert mean_ratio("h2", 0.5, 0.0) == pytest.approx(1.0, abs=0.02)
     assert mean_ratio("h1", 0.5, 0.0) == pytest.approx(1 / 1.5, rel=0.02)
     force, x, _ = noisy(4, 400, 0.5, 0.0)
-    h1, h2 = (frequency_response(force, x, DT, kind) for kind in ("h1", "h2"))
+    h1, h2 = (frequency_response(force, x, dt=DT, estimator=kind) for kind in ("h1", "h2"))
     assert h1.coherence[50:150].mean() == pytest.approx(1 / 1.5, rel=0.02)
     assert h1.coherence[50:150].max() < 0.8
     np.testing.assert_allclose((h1.response / h2.response)[1:], h1.coherence[1:], rtol=1e-10)
@@ -156,7 +156,7 @@ def test_noise_in_the_force_leaves_h2_deflates_h1_and_lowers_the_coherence_by_it
 
 def test_coherence_of_unrelated_records_is_one_over_their_number():
     rng = np.random.default_rng(6)
-    estimate = frequency_response(rng.normal(size=(20, 512)), rng.normal(size=(20, 512)), DT)
+    estimate = frequency_response(rng.normal(size=(20, 512)), rng.normal(size=(20, 512)), dt=DT)
     assert estimate.coherence.mean() == pytest.approx(1 / 20, rel=0.15)
     one = frequency_response(*rng.normal(size=(2, 100)), DT)  # tells none
     assert one.segments == 1 and np.isnan(one.coherence).all()
@@ -168,7 +168,7 @@ def test_scatter_over_seeds_is_the_stated_random_error():
     ratios, stated = [], []
     for seed in range(200):
         force, x, exact = noisy(seed, 16, 0.0, 0.05)
-        estimate = frequency_response(force, x, DT)
+        estimate = frequency_response(force, x, dt=DT)
         ratios.append((estimate.response / exact)[lines])
         stated.append(estimate.random_error[lines])
     ratios = np.array(ratios)
@@ -187,7 +187,7 @@ def test_noisy_records_tell_frequency_and_damping_within_their_errors():
     found, stated = [], []
     for seed in range(60):
         force, x, _ = noisy(seed, 20, 0.0, 0.01)
-        estimate = frequency_response(force, x, DT)
+        estimate = frequency_response(force, x, dt=DT)
         fit = circle_fit(estimate.frequency, estimate.response, band=(7.0, 12.0))
         found.append((fit.natural_frequency / 9.3 - 1, fit.damping_ratio / 0.135 - 1))
         stated.append((fit.frequency_error / 9.3, fit.damping_error / 0.135))
@@ -202,17 +202,17 @@ def test_channels_and_records_keep_their_places():
     force = rng.normal(size=(3, 64))
     gains = np.array([[1.0, -2.0], [3.0, 0.5], [0.0, 4.0]])
     x = force[:, :, np.newaxis, np.newaxis] * gains
-    estimate = frequency_response(force, x, 0.1)
+    estimate = frequency_response(force, x, dt=0.1)
     assert estimate.response.shape == estimate.coherence.shape == (33, 3, 2)
     np.testing.assert_allclose(estimate.response, np.broadcast_to(gains, (33, 3, 2)), atol=1e-13)
-    one = frequency_response(force[1], x[1], 0.1)
+    one = frequency_response(force[1], x[1], dt=0.1)
     np.testing.assert_allclose(one.response, estimate.response, atol=1e-12)
 
 
 def test_lines_without_force_are_nan():
     t = np.arange(200) / 200
     force = np.sin(2 * np.pi * 10 * t)
-    estimate = frequency_response(force, 2 * force, 1 / 200)
+    estimate = frequency_response(force, 2 * force, dt=1 / 200)
     assert estimate.response[10] == pytest.approx(2.0)
     assert np.isnan(np.delete(estimate.response, 10)).all()
 
@@ -220,7 +220,7 @@ def test_lines_without_force_are_nan():
 def test_what_is_left_at_the_end_is_unused():
     force = np.random.default_rng(8).normal(size=130)
     kept, whole, more = (
-        frequency_response(each, each, 0.1, segment=32, overlap=overlap)
+        frequency_response(each, each, dt=0.1, segment=32, overlap=overlap)
         for each, overlap in ((force[:128], 0.0), (force, 0.0), (force, 0.75))
     )
     np.testing.assert_array_equal(whole.force_density, kept.force_density)

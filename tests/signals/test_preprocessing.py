@@ -31,11 +31,11 @@ def test_what_was_not_measured_is_not_invented(where):
 
 
 def test_a_window_has_both_its_ends():
-    time, x = signals.choose_window(T, X, 0.5, 1.0)
+    time, x = signals.choose_window(T, X, start=0.5, stop=1.0)
     assert time[0] == 0.5 and time[-1] == 1.0
     np.testing.assert_array_equal(x, X[120:241])
     with pytest.raises(InputError, match="holds 0 samples"):
-        signals.choose_window(T, X, 3.0, 4.0)
+        signals.choose_window(T, X, start=3.0, stop=4.0)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])

@@ -25,7 +25,7 @@ def peak(found):
 @pytest.mark.parametrize("window", ["hann", None])
 @pytest.mark.parametrize("way", [1, -1])
 def test_a_wave_peaks_at_its_phase_and_frequency(window, way):
-    found = wavenumber_spectrum(wave(5 * way, 11, 0.3), DT, window)
+    found = wavenumber_spectrum(wave(5 * way, 11, 0.3), DT, window=window)
     expected = way * 5 * 2.0 * np.pi / CELLS, 11 / (TIMES * DT), 0.3
     np.testing.assert_allclose(peak(found), expected, rtol=1e-12)
     assert found.amplitude.shape == (CELLS, TIMES // 2 + 1)
@@ -33,7 +33,7 @@ def test_a_wave_peaks_at_its_phase_and_frequency(window, way):
 
 
 def test_a_standing_wave_is_two_traveling_ones():
-    found = wavenumber_spectrum(wave(4, 7) + wave(-4, 7), DT, None)
+    found = wavenumber_spectrum(wave(4, 7) + wave(-4, 7), DT, window=None)
     strong = np.argwhere(found.amplitude > 0.5)
     assert (
         found.phase[strong[:, 0]].round(9).tolist()
@@ -53,7 +53,7 @@ def test_a_pulse_has_its_arrival_height_width_and_speed(sign):
     center, size = 0.6 + 0.125 * cell, 1.0 / (1.0 + 0.05 * cell)
     first = np.exp(-(((time[:, None] - center) / 0.1) ** 2))
     later = 0.9 * np.exp(-(((time[:, None] - center - 0.8) / 0.1) ** 2))  # as an echo
-    found = pulse(time, sign * size * (first + later), sign)
+    found = pulse(time, sign * size * (first + later), sign=sign)
     np.testing.assert_allclose(found.arrival, center, atol=1e-5)
     np.testing.assert_allclose(found.peak, sign * size, rtol=1e-5)
     np.testing.assert_allclose(found.width, 0.2 * np.sqrt(np.log(2.0)), rtol=1e-3)
@@ -67,7 +67,7 @@ def test_cells_that_no_pulse_reaches_have_none():
     found = pulse(time, values)
     assert np.isnan(found.arrival).tolist() == [False, True, True, True]
     assert np.isnan(found.speed)
-    assert np.isnan(pulse(time, values, -1).arrival).all()
+    assert np.isnan(pulse(time, values, sign=-1).arrival).all()
 
 
 @pytest.mark.parametrize(
@@ -77,10 +77,10 @@ def test_cells_that_no_pulse_reaches_have_none():
         (lambda: wavenumber_spectrum(np.zeros((9, 3)), 0.1), "at least 4"),
         (lambda: wavenumber_spectrum(np.full((9, 9), np.nan), 0.1), "NaN"),
         (lambda: wavenumber_spectrum(np.zeros((9, 9)), -1.0), "dt"),
-        (lambda: wavenumber_spectrum(np.zeros((9, 9)), 0.1, "square"), "window"),
+        (lambda: wavenumber_spectrum(np.zeros((9, 9)), 0.1, window="square"), "window"),
         (lambda: pulse(np.arange(9.0), np.zeros((8, 2))), "9 times"),
         (lambda: pulse(np.zeros(9), np.zeros((9, 2))), "increase"),
-        (lambda: pulse(np.arange(9.0), np.zeros((9, 2)), 0), "1 or -1"),
+        (lambda: pulse(np.arange(9.0), np.zeros((9, 2)), sign=0), "1 or -1"),
         (lambda: pulse(np.arange(9.0), np.zeros((9, 2)), share=2.0), "share"),
     ],
 )

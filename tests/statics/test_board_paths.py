@@ -97,7 +97,7 @@ def test_boards_hinged_at_one_height_close_before_their_hinge_planes_do():
 
 def test_panels_that_pass_through_each_other_are_refused():
     """A mountain that is hinged in the front face has no room for its boards."""
-    pattern = fd.thicken(strip(2, fold_angle=60.0, letters="M"), T, T / 2)
+    pattern = fd.thicken(strip(2, fold_angle=60.0, letters="M"), T, offsets=T / 2)
     case = fd.Case(
         fd.discretize(pattern, SHEET),
         [fd.Fix([0, 1, 3])],

@@ -57,9 +57,9 @@ def pressed():
     case, layers = press()
     end, way = 0.7, case.contact.planes[0].motion[0]
     near = 1.0 - 0.5 * (2.4 - end) * layers * T / way
-    closing = fd.trace(case, "newton", np.linspace(0.0, near, 12))
+    closing = fd.trace(case, "newton", load_factors=np.linspace(0.0, near, 12))
     block = fd.trace(
-        case, "arc_length", [near, 1.0], steps=100, first_step=(1.0 - near) / 40,
+        case, "arc_length", load_factors=[near, 1.0], steps=100, first_step=(1.0 - near) / 40,
         initial=fd.initial_state(closing),
     )  # fmt: skip
     return case, layers, closing, block
@@ -86,7 +86,7 @@ def test_steps_are_cut_anew_from_each_point():
     """A press needs steps far below the first one: few halvings in a row, many in all."""
     case, layers = press()
     few = Settings(cuts=6)
-    path = fd.trace(case, "arc_length", [0.0, 1.0], first_step=0.05, settings=few)
+    path = fd.trace(case, "arc_length", load_factors=[0.0, 1.0], first_step=0.05, settings=few)
     length = plates(case, path)[1]
     assert length[-1] < 0.9 * layers * T
     assert np.diff(path.load_factor.values).min() < 0.05 / 2**8

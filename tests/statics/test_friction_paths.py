@@ -44,7 +44,7 @@ def dragged(factors, surface="plane"):
     """The strip, two nodes of which are dragged along a surface; with the force on them."""
     make, ends, _ = SURFACES[surface]
     case = make([fd.Impose(ends, "x", WAY), fd.Fix(ends, "y")])
-    path = fd.trace(case, "displacement", factors, constant=[0])
+    path = fd.trace(case, "displacement", load_factors=factors, constant=[0])
     mine = (case.reaction_dofs % 3 == 0) & np.isin(case.reaction_dofs // 3, ends)
     return path, path.reaction.values[:, mine].sum(axis=1)
 
@@ -82,7 +82,7 @@ def tilted(factors, surface="plane"):
     """The strip under a force along the surface that reaches twice mu N; nothing else holds it."""
     nodes = range(8) if surface == "plane" else on_a_panel()[1]
     aside = fd.Force(nodes, (2.0 * MU * WEIGHT / len(nodes), 0, 0))
-    return fd.trace(SURFACES[surface][0]([], [aside]), "newton", factors, constant=[0])
+    return fd.trace(SURFACES[surface][0]([], [aside]), "newton", load_factors=factors, constant=[0])
 
 
 @pytest.mark.parametrize("surface", SURFACES)
@@ -111,7 +111,7 @@ def test_stability_is_not_counted_where_nodes_slip():
 def test_a_plane_takes_the_strip_along():
     """Friction acts on what moves against the plane, whichever of them moves."""
     case = strip([fd.Fix([0, 1], "xy")], motion=(WAY, 0.0, 0.0))
-    path = fd.trace(case, "displacement", [0.0, 0.5, 1.0, 0.5], constant=[0])
+    path = fd.trace(case, "displacement", load_factors=[0.0, 0.5, 1.0, 0.5], constant=[0])
     pull = path.plane_friction.values[:, 0, 0] / (MU * WEIGHT)
     np.testing.assert_allclose(pull, [0.0, 1.0, 1.0, -1.0], atol=1e-6)
 
@@ -163,7 +163,9 @@ def cycles():
     """The sheet is pressed and released, without and with friction."""
     way = np.linspace(0.0, 0.3, 9)
     factors = [*way, *way[-2::-1]]
-    return {mu: (rough(mu), fd.trace(rough(mu), "newton", factors)) for mu in (0.0, 0.3)}
+    return {
+        mu: (rough(mu), fd.trace(rough(mu), "newton", load_factors=factors)) for mu in (0.0, 0.3)
+    }
 
 
 def test_a_rough_press_meets_more_force_on_the_way_in_and_less_on_the_way_out(cycles):
@@ -186,15 +188,15 @@ def test_the_energy_of_a_rough_press_closes(cycles):
 def test_friction_converges_with_the_steps_of_a_path():
     ends = []
     for steps in (8, 16, 32):
-        path = fd.trace(case := rough(0.3), "newton", np.linspace(0.0, 0.3, steps + 1))
+        path = fd.trace(case := rough(0.3), "newton", load_factors=np.linspace(0.0, 0.3, steps + 1))
         ends.append(plates(case, path)[0][-1])
     coarse, fine = np.abs(np.diff(ends))
     assert 0.7 < np.log2(coarse / fine) < 1.5  # first order: backward Euler
     assert fine < 1e-4 * ends[-1]
-    free = fd.trace(case, "arc_length", [0.0, 0.3], first_step=0.02)
+    free = fd.trace(case, "arc_length", load_factors=[0.0, 0.3], first_step=0.02)
     assert plates(case, free)[0][-1] == pytest.approx(ends[-1], rel=2e-3)
     # nothing of a path is left in its case
-    again = fd.trace(case, "newton", np.linspace(0.0, 0.3, 33))
+    again = fd.trace(case, "newton", load_factors=np.linspace(0.0, 0.3, 33))
     np.testing.assert_array_equal(again.displacement, path.displacement)
 
 
@@ -209,7 +211,7 @@ def test_a_press_whose_creases_yield():
         ("weak", fd.Plastic(0.02, kinematic=0.005, law="linear"), [*way, *way[-2::-1]]),
     ):
         s = fd.discretize(case.structure.pattern, SHEET, fold_law=law)
-        paths[name] = fd.trace(replace(case, structure=s), "newton", factors)
+        paths[name] = fd.trace(replace(case, structure=s), "newton", load_factors=factors)
     elastic, strong, weak = (plates(case, path)[0] for path in paths.values())
     np.testing.assert_allclose(strong, elastic, rtol=1e-9, atol=1e-12)
     top = len(way) - 1
@@ -251,9 +253,9 @@ def test_layers_that_rub_make_a_stiffer_block():
     for mu in (0.0, 0.3):
         planes = [replace(plane, friction=0.0) for plane in case.contact.planes]
         rough = case.altered(contact=replace(case.contact, friction=mu, planes=planes))
-        closing = fd.trace(rough, "newton", np.linspace(0.0, near, 20))
+        closing = fd.trace(rough, "newton", load_factors=np.linspace(0.0, near, 20))
         path = fd.trace(
-            rough, "arc_length", [near, 1.0], steps=300, first_step=(1.0 - near) / 40,
+            rough, "arc_length", load_factors=[near, 1.0], steps=300, first_step=(1.0 - near) / 40,
             initial=fd.initial_state(closing),
         )  # fmt: skip
         force, length = plates(rough, path)

@@ -17,7 +17,9 @@ KINEMATIC = fd.Plastic(LIMIT, kinematic=HARD, law="linear")
 def cycled(law, factors, turn=0.3):
     """Path of the hinge, turned by an imposed motion of its wing."""
     moved = fd.Impose([WING], "z", np.tan(turn))
-    return fd.statics.trace(one_hinge(law, [moved], hold=False), "displacement", factors)
+    return fd.statics.trace(
+        one_hinge(law, [moved], hold=False), "displacement", load_factors=factors
+    )
 
 
 def test_paths_have_the_long_time_stiffness():
@@ -30,7 +32,7 @@ def test_paths_have_the_long_time_stiffness():
     assert not path.memory.any()
     start = fd.initial_state(path)
     held = one_hinge(path_law := fd.Prony([0.5, 0.2], [0.1, 1.0], law="linear"))
-    found = fd.simulate(held, 0.1, "rk4", dt=0.01, initial=start)
+    found = fd.simulate(held, 0.1, method="rk4", dt=0.01, initial=start)
     assert path_law.relaxes
     np.testing.assert_allclose(moment(found), STIFFNESS * opened(path)[-1], rtol=1e-12)
 
@@ -73,7 +75,7 @@ def test_a_path_that_begins_after_yielding_knows_what_was_lost():
 def test_methods_with_a_free_factor_follow_the_law(method):
     """The moment at each point is that of the formula, and so is the end."""
     case = one_hinge(KINEMATIC, [fd.Impose([WING], "z", np.tan(0.3))], hold=False)
-    path = fd.statics.trace(case, method, [0.0, 1.0], first_step=0.02)
+    path = fd.statics.trace(case, method, load_factors=[0.0, 1.0], first_step=0.02)
     theta, found = opened(path), moment(path)
     np.testing.assert_allclose(found, yielding(theta), rtol=1e-7, atol=1e-12)
     plastic = theta[-1] - found[-1] / STIFFNESS
@@ -85,10 +87,10 @@ def test_a_path_goes_on_from_a_stored_point():
     case = one_hinge(KINEMATIC, [fd.Impose([WING], "z", np.tan(0.3))], hold=False)
     at = int(np.flatnonzero(opened(whole) > 0.3 - 1e-9)[0])
     state = fd.initial_state(whole, at)
-    again = fd.statics.trace(case, "displacement", [1.0, 0.0], initial=state)
+    again = fd.statics.trace(case, "displacement", load_factors=[1.0, 0.0], initial=state)
     assert moment(again)[-1] == pytest.approx(moment(whole)[-1], rel=1e-9)
     fresh = fd.State(state.displacement)
-    forgotten = fd.statics.trace(case, "displacement", [1.0, 0.0], initial=fresh)
+    forgotten = fd.statics.trace(case, "displacement", load_factors=[1.0, 0.0], initial=fresh)
     assert moment(forgotten)[-1] == pytest.approx(moment(whole)[-1], rel=1e-6)
 
 
@@ -98,7 +100,7 @@ def test_a_sheet_yields_and_springs_back():
     structure = fd.discretize(pattern, sheet, fold_law=fd.Plastic(1e-3, kinematic=0.002))
     push = fd.Force([0, 1], (5.2e-3, 0, 0))
     case = fd.Case(structure, [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")], [push])
-    path = fd.statics.trace(case, "newton", [0.5, 1.0, 0.5, 0.0])
+    path = fd.statics.trace(case, "newton", load_factors=[0.5, 1.0, 0.5, 0.0])
     fold = [structure.dihedrals(u)[0][0] for u in path.displacement.values]
     rest = structure.fold_rest[0]
     assert abs(fold[-1] - rest) > 0.02
@@ -115,7 +117,7 @@ def test_a_sheet_yields_and_springs_back():
 def test_tangents_of_bodies_with_memory_are_exact(law, options):
     """Where hinges yield and flow within the step, dofs without mass included."""
     build = fd.shell if "divisions" in options else fd.discretize
-    pattern = fd.patterns.miura((1, 1), 0.1, 0.1, dihedral=120)
+    pattern = fd.patterns.miura((1, 1), 0.1, b=0.1, dihedral=120)
     structure = build(pattern, fd.Sheet(1e6, 0.3, 1e-3, 1.0), fold_law=law, **options)
     body = structure.body
     branches = memory(fd.Case(structure).remembering, body)

@@ -27,7 +27,7 @@ def reactions(path, nodes) -> np.ndarray:
 
 MODELS = {
     "bars": lambda pattern: fd.discretize(pattern, SHEET, mass="consistent"),
-    "shell": lambda pattern: fd.shell(pattern, SHEET, 4),
+    "shell": lambda pattern: fd.shell(pattern, SHEET, divisions=4),
 }
 
 

@@ -28,7 +28,7 @@ def pressed(law, push):
 def test_relaxation_at_a_held_angle(method):
     """After a turn in no time: the series of the law, whatever the steps."""
     steps = [0.0, 0.01, 0.3, 0.002, 1.0]
-    path = fd.trace(moved(PRONY, 0.3), method, [0.0] + [1.0] * 5, duration=steps)
+    path = fd.trace(moved(PRONY, 0.3), method, load_factors=[0.0] + [1.0] * 5, duration=steps)
     np.testing.assert_allclose(path.elapsed, np.cumsum([0.0, *steps]), rtol=1e-15)
     wanted = STIFFNESS * 0.3 * PRONY.relaxation(path.elapsed.values[1:])
     np.testing.assert_allclose(moment(path)[1:], wanted, rtol=1e-12)
@@ -39,7 +39,7 @@ def test_logarithmic_relaxation():
     barrier, rate, turn = 4e-4, 1e-6, 0.3
     law = fd.Eyring(barrier, rate, law="linear")
     steps = [0.0, *np.logspace(-3, 3, 13)]
-    path = fd.trace(moved(law, turn), "newton", [0.0] + [1.0] * 14, duration=steps)
+    path = fd.trace(moved(law, turn), "newton", load_factors=[0.0] + [1.0] * 14, duration=steps)
     t = path.elapsed.values[1:]
     first = np.tanh(0.5 * STIFFNESS * turn / barrier)
     wanted = 2 * barrier * np.arctanh(first * np.exp(-2 * STIFFNESS * rate * t / barrier))
@@ -55,7 +55,7 @@ def test_creep_under_a_constant_moment(ratio):
     whole = 3.0 * (1.0 + ratio) * tau
     for n in (20, 40, 80):
         steps = [0.0] + [whole / n] * n
-        path = fd.trace(case, "newton", [0.0] + [1.0] * (n + 1), duration=steps)
+        path = fd.trace(case, "newton", load_factors=[0.0] + [1.0] * (n + 1), duration=steps)
         left = ratio / (1 + ratio) * np.exp(-path.elapsed.values[1:] / ((1 + ratio) * tau))
         errors.append(np.abs(opened(path)[1:] / (push / STIFFNESS * (1 - left)) - 1.0).max())
     assert errors[-1] < 3e-3
@@ -133,7 +133,12 @@ def test_a_sheet_moves_as_in_a_slow_motion(part, laws, damping):
         cases.append(fd.Case(structure, supports, loads, damping or fd.Rayleigh()))
     path = fd.trace(cases[0], "newton", steps=n, duration=duration / n)
     motion = fd.simulate(
-        cases[1], duration, "generalized_alpha", dt=duration / n, every=n, spectral_radius=0.0
+        cases[1],
+        duration,
+        method="generalized_alpha",
+        dt=duration / n,
+        every=n,
+        spectral_radius=0.0,
     )
     elastic = fd.trace(cases[0], "newton", load_factors=[0.0, 1.0])
     end, moved, still = (r.displacement.values[-1] for r in (path, motion, elastic))

@@ -176,8 +176,8 @@ def test_modes_above_the_range():
 def test_responses_and_bands_above_the_range():
     structure, limit = fd.discretize(MIURA, CARD), 0.6 * plate_frequency(MIURA, CARD)
     held, push = fd.Case(structure, [fd.Fix("xmin")]), fd.Force([6], (0.0, 0.0, 1.0))
-    assert told(lambda: fd.frf(held, push, np.linspace(0.2, 0.99, 5) * limit)) == []
-    (text,) = told(lambda: fd.frf(held, push, np.linspace(0.2, 1.01, 5) * limit))
+    assert told(lambda: fd.frf(held, push, frequencies=np.linspace(0.2, 0.99, 5) * limit)) == []
+    (text,) = told(lambda: fd.frf(held, push, frequencies=np.linspace(0.2, 1.01, 5) * limit))
     assert text.startswith(f"frequencies up to {1.01 * limit:.4g} Hz lie above {limit:.4g} Hz")
     cell, long = fd.UnitCell(fd.Case(structure)), [[0.06, 0.02], [0.05, 0.03]]
     tops = fd.bands(cell, long, count=9).frequency.values.max(axis=0)
@@ -208,7 +208,9 @@ def test_what_stretches():
     assert most(fd.shell(tube, sheet, divisions=2)) == np.inf
 
 
-@pytest.mark.parametrize("model", [fd.discretize, lambda p, s, **k: fd.shell(p, s, 2, **k)])
+@pytest.mark.parametrize(
+    "model", [fd.discretize, lambda p, s, **k: fd.shell(p, s, divisions=2, **k)]
+)
 def test_the_default_fold_law_locks(model):
     """Its slope is 1/cos^2 of how far a crease rests into the range from 45 degrees to closed."""
     sheet = fd.Sheet(4e9, 0.3, 0.005)

@@ -33,7 +33,7 @@ RECTANGLE = [[0, 0], [2, 0], [2, 1], [0, 1]]
 
 def test_fold_of_case_one():
     """1/kf = 1/G + 1/(0.55 G 100^(1/3)): 0.06387 N m/rad, printed as 0.0639 in the paper."""
-    (found,) = discretize(fd.patterns.simple_fold(1.0, 1.0, 60), SHEET).fold_stiffness
+    (found,) = discretize(fd.patterns.simple_fold(1.0, 1.0, dihedral=60), SHEET).fold_stiffness
     assert pytest.approx(0.0888889, rel=1e-6) == G
     assert found == pytest.approx(1 / (1 / G + 1 / (0.55 * G * 100 ** (1 / 3))), rel=1e-14)
     assert found == pytest.approx(0.06387, abs=5e-6) and round(found, 4) == 0.0639
@@ -42,7 +42,7 @@ def test_fold_of_case_one():
 @pytest.mark.parametrize("unit", [1.0, 1e-3], ids=["mm", "m"])
 def test_fold_of_the_specimen(unit):
     """kf = 0.4739 N mm/rad (paper, section 6) in millimeters and in meters."""
-    pattern = fd.patterns.miura((1, 1), 25.0 * unit, 25.0 * unit, panel_angle=60, dihedral=39.2)
+    pattern = fd.patterns.miura((1, 1), 25.0 * unit, b=25.0 * unit, panel_angle=60, dihedral=39.2)
     sheet = fd.Sheet(1219.0 / unit**2, 0.2, 0.24 * unit, length_scale_ratio=2.7)
     found = discretize(pattern, sheet).fold_stiffness
     np.testing.assert_allclose(found, 0.4739 * unit, atol=5e-5 * unit)

@@ -54,7 +54,9 @@ def test_a_clamped_panel_bends_as_the_shell(form):
         path = fd.trace(fd.Case(s, [fd.Fix(list(edge))], load))
         return path.displacement.values[-1][tips, 2].mean()
 
-    shell = extrapolated(lambda n: deflection(fd.shell(pattern, SHEET, n, clamped=[edge])))
+    shell = extrapolated(
+        lambda n: deflection(fd.shell(pattern, SHEET, divisions=n, clamped=[edge]))
+    )
     assert deflection(clamped(pattern, [edge])) == pytest.approx(float(shell), rel=3e-3)
 
 
@@ -68,7 +70,7 @@ def test_a_clamped_miura_sheet_vibrates_as_the_shell(dihedral, thickness):
 
     def frequencies(n):
         shell = fd.shell(
-            pattern, sheet, n, mass="consistent", clamped="xmin", vertex_radius=thickness
+            pattern, sheet, divisions=n, mass="consistent", clamped="xmin", vertex_radius=thickness
         )
         return fd.modes(fd.Case(shell, held), 4).frequency.values
 
@@ -122,7 +124,7 @@ def test_explicit_and_implicit_motions_are_alike():
     case = fd.Case(clamped(), [fd.Fix("xmin")], [load], fd.Rayleigh(0.1))
     ends = []
     for method in ("central_difference", "generalized_alpha", "energy_momentum"):
-        motion = fd.simulate(case, 0.5, method, every=0.05)
+        motion = fd.simulate(case, 0.5, method=method, every=0.05)
         stored = sum(motion[k] for k in motion if k == "kinetic" or k.startswith("strain"))
         gap = stored + motion.dissipated - motion.work
         assert float(np.abs(gap).max()) < 2e-3 * float(np.abs(motion.work).max())

@@ -11,7 +11,7 @@ import foldyn as fd
 from foldyn.errors import InputError
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
-MIURA = fd.patterns.miura((2, 1), 1.0, 0.7, 65, 80)
+MIURA = fd.patterns.miura((2, 1), 1.0, b=0.7, panel_angle=65, dihedral=80)
 LETTERS = np.array(MIURA.assignments)
 LENGTH = np.linalg.norm(np.diff(MIURA.vertices[MIURA.creases], axis=1)[:, 0], axis=1)
 discretize = partial(fd.discretize, preset="herkal")  # folds of the creases alone

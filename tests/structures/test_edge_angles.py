@@ -155,7 +155,9 @@ def test_rigid_panels_are_those_of_n5b8():
 
 def test_modes_beside_the_shell():
     """A Miura cell on an edge: the plate calibration is off by 2 to 6 %."""
-    coarse, fine = (fd.shell(MIURA, SHEET, n, mass="consistent", fold_law="linear") for n in (4, 8))
+    coarse, fine = (
+        fd.shell(MIURA, SHEET, divisions=n, mass="consistent", fold_law="linear") for n in (4, 8)
+    )
     coarse, fine, found, straight = (
         fd.modes(fd.Case(s, [fd.Fix([0, 1, 2], "xyz")]), 3).frequency.values
         for s in (coarse, fine, miura(), miura(straight=[(0, 1), (1, 2)]))

@@ -168,7 +168,7 @@ def test_mass_center_and_inertia_of_a_structure():
             np.testing.assert_allclose(plate.inertia, 2.4 * exact, atol=1e-13)
         with pytest.raises(ValueError, match="read-only"):
             plate.inertia[0, 0] = 0.0
-    shell = fd.shell(pattern, sheet, 8, mass="consistent")
+    shell = fd.shell(pattern, sheet, divisions=8, mass="consistent")
     np.testing.assert_allclose(shell.inertia, exact, atol=1e-13)
 
 

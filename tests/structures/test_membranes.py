@@ -231,7 +231,7 @@ def test_all_methods_find_the_same_motion(options):
     ends = {}
     for method in METHODS:
         step = {} if method == "dormand_prince" else {"dt": 2e-5, "every": 1000}
-        motion = fd.simulate(case, 0.02, method, **step)
+        motion = fd.simulate(case, 0.02, method=method, **step)
         ends[method] = motion.displacement.values[-1]
     assert abs(motion.attrs["energy_error"]) < 1e-10  # the last one conserves it
     for method, end in ends.items():
@@ -248,7 +248,9 @@ def test_a_turning_sheet_takes_few_iterations():
         )
         arm = structure.nodes - structure.nodes.mean(axis=0)
         start = fd.State(velocity=np.cross([0.0, 0.0, 5.0], arm))
-        motion = fd.simulate(fd.Case(structure), 0.2, "energy_momentum", dt=0.01, initial=start)
+        motion = fd.simulate(
+            fd.Case(structure), 0.2, method="energy_momentum", dt=0.01, initial=start
+        )
         iterations.append(motion.attrs["iterations"])
         assert motion.attrs["halved_steps"] == 0
     assert iterations[1] < 2 * iterations[0]
@@ -264,7 +266,7 @@ def test_extrapolated_stress_saves_iterations(preset, monkeypatch):
     def fallen():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StretchWarning)
-            return fd.simulate(case, 0.1, "energy_momentum", dt=4e-3)
+            return fd.simulate(case, 0.1, method="energy_momentum", dt=4e-3)
 
     quick, mean = fallen(), MembranesTerm.mean_entries
     monkeypatch.setattr(
@@ -290,7 +292,7 @@ def test_threads_share_panels(monkeypatch):
     for count in (1, 2, 3):
         monkeypatch.setattr(threads.config, "NUMBA_NUM_THREADS", count)
         assert case.body.renumbered()[0].threads == count
-        motions.append(fd.simulate(case, 2e-3, "rk4", dt=1e-4).displacement.values)
+        motions.append(fd.simulate(case, 2e-3, method="rk4", dt=1e-4).displacement.values)
     size = np.abs(motions[0]).max()
     for motion in motions[1:]:
         np.testing.assert_allclose(motion, motions[0], atol=1e-12 * size)

@@ -21,7 +21,7 @@ ALONE = fd.Sheet(7e9, 0.2, 2e-3, 2700.0, length_scale_ratio=2.0)  # what panel 1
 MIXED = replace(SHEET, panels=[OTHER])
 PAIR = fd.Pattern([(0, 0), (1, 0), (2.2, 0), (0, 0.8), (1, 0.8), (2.2, 0.8)],
                   [(0, 1, 4, 3), (1, 2, 5, 4)])  # fmt: skip
-MIURA = fd.patterns.miura((2, 1), 0.03, 0.02, 65, 80)
+MIURA = fd.patterns.miura((2, 1), 0.03, b=0.02, panel_angle=65, dihedral=80)
 
 
 def make(model, pattern, sheet, **options):
@@ -286,7 +286,7 @@ def test_energy_of_a_motion_with_panels_that_differ(model, method):
     s = make(model, PAIR, boards)
     case = fd.Case(s, [fd.Fix([0, 3])], [fd.Gravity((0, 0, -0.05), fd.Ramp(0.2, smooth=True))],
                    fd.Rayleigh(alpha=1.0))  # fmt: skip
-    motion = fd.simulate(case, 0.5, method, every=0.1)
+    motion = fd.simulate(case, 0.5, method=method, every=0.1)
     assert float(motion.kinetic[-1]) > 0.0
     assert motion.attrs["energy_error"] < (1e-6 if method == "rk4" else 3e-3)
 

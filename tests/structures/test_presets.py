@@ -98,7 +98,16 @@ def test_resolved_options_mean_themselves(name):
 
 
 def test_positions_of_arguments_stay():
-    found = fd.discretize(MIURA, SHEET, "n4b5", "panel", "linear", "linear", "linear", "standard")
+    found = fd.discretize(
+        MIURA,
+        SHEET,
+        scheme="n4b5",
+        mass="panel",
+        bar_law="linear",
+        fold_law="linear",
+        bend_law="linear",
+        calibration="standard",
+    )
     assert told(found.options) == {
         "scheme": "n4b5", "mass": "panel", "bar_law": "linear", "fold_law": "linear",
         "bend_law": "linear", "calibration": "standard",

@@ -65,10 +65,10 @@ def test_frequency_responses():
     first = fd.modes(held(MIURA, FOLDING), 1).frequency.values[0]
     f = first * np.linspace(0.5, 1.5, 41)
     push = fd.Force([7], (1.0, 0, 0))
-    assert told(lambda: fd.frf(held(MIURA, FOLDING), push, f)) == []
+    assert told(lambda: fd.frf(held(MIURA, FOLDING), push, frequencies=f)) == []
     tower = held(TOWER, BASE)
     f = fd.modes(tower, 1).frequency.values[0] * np.linspace(0.9, 1.1, 41)
-    (text,) = told(lambda: fd.frf(tower, fd.Force([6], (0, 0, 1.0)), f))
+    (text,) = told(lambda: fd.frf(tower, fd.Force([6], (0, 0, 1.0)), frequencies=f))
     assert text.startswith("panels that stretch hold more than 5% of the strain energy of the resp")
     assert float(text.split(" at ")[1].split()[0]) == pytest.approx(f[20], rel=0.02)
 
@@ -76,13 +76,13 @@ def test_frequency_responses():
 def test_paths_and_motions():
     push = [fd.Force([7], (0.01, 0, 0), fd.HalfSine(0.5))]
     case = held(MIURA, FOLDING, loads=push)
-    assert told(lambda: fd.trace(case, "newton", [0.0, 1.0])) == []
-    assert told(lambda: fd.simulate(case, 0.5, "rk4")) == []
+    assert told(lambda: fd.trace(case, "newton", load_factors=[0.0, 1.0])) == []
+    assert told(lambda: fd.simulate(case, 0.5, method="rk4")) == []
     load = [fd.Force(list(range(6, 12)), (0, 0, -1e-3))]
     tower = held(TOWER, BASE, loads=load)
-    (text,) = told(lambda: fd.trace(tower, "newton", [0.0, 1.0]))
+    (text,) = told(lambda: fd.trace(tower, "newton", load_factors=[0.0, 1.0]))
     assert text.startswith("panels that stretch hold 100% of the strain energy where that is la")
-    (text,) = told(lambda: fd.simulate(tower, 0.05, "rk4"))
+    (text,) = told(lambda: fd.simulate(tower, 0.05, method="rk4"))
     assert "of the strain energy where that is largest, at t = 0.0" in text
 
 
@@ -113,7 +113,7 @@ def test_membranes():
     assert "closed and welded" in text and "membrane =" not in text and "preset" not in text
     load = [fd.Force(list(range(12, 18)), (0, 0, -1.0))]
     pressed = fd.Case(case.structure, BASE, load)
-    assert len(told(lambda: fd.trace(pressed, "newton", [0.0, 1.0]))) == 1
+    assert len(told(lambda: fd.trace(pressed, "newton", load_factors=[0.0, 1.0]))) == 1
 
 
 def test_panels_that_bend_in_their_plane_are_right():
@@ -165,4 +165,4 @@ def test_what_is_not_told():
     assert stretch(by_hand, of, still) is None
     turning = fd.State(0.0 * s.nodes, np.cross([0.0, 0.0, 1.0], s.nodes - s.nodes.mean(axis=0)))
     free = fd.Case(s)
-    assert told(lambda: fd.simulate(free, 0.2, "rk4", initial=turning)) == []
+    assert told(lambda: fd.simulate(free, 0.2, method="rk4", initial=turning)) == []

@@ -204,7 +204,7 @@ def test_plate_frequency():
     """A free square plate, nu 0.3 (Leissa 1973): 13.47; the shell's first is 0.5 % off."""
     square = fd.Pattern([[0, 0], [2, 0], [2, 2], [0, 2]], [[0, 1, 2, 3]])
     sheet = fd.Sheet(1e9, 0.3, 0.01, density=500.0)
-    plate = fd.shell(square, sheet, 16, mass="consistent")
+    plate = fd.shell(square, sheet, divisions=16, mass="consistent")
     found = fd.modes(fd.Case(plate), 7).frequency.values[-1]
     assert plate_frequency(square, sheet) == pytest.approx(found, rel=1e-2)
 
@@ -228,7 +228,7 @@ def test_modes_that_turned_into_each_other_are_one_space():
 def test_an_edge_is_held_along_its_length_in_the_shell():
     sheet = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
     case = FidelityCase("miura", {"cells": [1, 1]}, "edge", sheet)
-    shell = case.case(fd.shell(case.pattern(), sheet, 4))
+    shell = case.case(fd.shell(case.pattern(), sheet, divisions=4))
     reduced = case.case(fd.discretize(case.pattern(), sheet))
     assert shell.fixed.all(axis=1).sum() == 2 * 4 + 1
     assert np.flatnonzero(reduced.fixed.all(axis=1)).tolist() == [0, 1, 2]

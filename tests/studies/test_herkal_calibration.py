@@ -36,7 +36,7 @@ def test_the_weights_are_those_of_the_paper(static_data) -> None:
 def test_folds_from_forces_and_shapes(static_data) -> None:
     """The issue asks for 3 % and 2 degrees."""
     data = calibration.noisy(static_data, np.random.default_rng(7))
-    found = fd.fit(CASE, data, calibration.FOLD_RANGES, ties=calibration.MIRRORED)
+    found = fd.fit(CASE, data, parameters=calibration.FOLD_RANGES, ties=calibration.MIRRORED)
     ratio, theta = found.estimates
     assert ratio.value == pytest.approx(2.7, rel=0.03)
     assert theta.value == pytest.approx(75.0, abs=2.0)
@@ -53,7 +53,7 @@ def test_folds_from_forces_and_shapes(static_data) -> None:
 def test_damping_from_node_8_alone(released, release_data) -> None:
     """The issue asks for 10 %; all other front nodes are held out, and follow."""
     data = calibration.noisy(release_data, np.random.default_rng(7))
-    found = fd.fit(released, data, calibration.DAMPING_RANGES)
+    found = fd.fit(released, data, parameters=calibration.DAMPING_RANGES)
     for one, truth in zip(found.estimates, (14.4, 4.1e-4), strict=True):
         assert one.value == pytest.approx(truth, rel=0.1)
         assert one.value == pytest.approx(truth, abs=4.0 * one.standard_error)

@@ -199,7 +199,7 @@ def test_the_specimen_is_that_of_the_design(traced):
     top = path.displacement.sel(node=range(7), axis="x").values
     np.testing.assert_allclose(top[-1], 0.056, rtol=1e-12)
     np.testing.assert_allclose(np.diff(top[:, 0]), 0.002, rtol=1e-9)
-    force = fd.plots.total_reaction(path, range(7), "x")
+    force = fd.plots.total_reaction(path, range(7), direction="x")
     assert force[-1] == pytest.approx(0.438, abs=5e-4)  # tests/statics/test_specimen.py
 
 
@@ -208,9 +208,9 @@ def test_the_specimen_carries_its_weight(traced):
     _, light = traced("herkal/specimen")
     weight = 9.81 * float(case.structure.mass.sum())
     assert weight == pytest.approx(0.041, abs=0.004)
-    top, bottom = (fd.plots.total_reaction(path, range(k, k + 7), "x") for k in (0, 56))
+    top, bottom = (fd.plots.total_reaction(path, range(k, k + 7), direction="x") for k in (0, 56))
     np.testing.assert_allclose(top + bottom, -weight, rtol=1e-9)
-    relief = fd.plots.total_reaction(light, range(7), "x") - top
+    relief = fd.plots.total_reaction(light, range(7), direction="x") - top
     np.testing.assert_allclose(relief, 0.5 * weight, rtol=0.1)  # half of it hangs from the top
 
 
@@ -237,7 +237,7 @@ def test_the_tower_has_the_second_state_of_its_geometry(traced):
 def test_force_and_displacement_control_meet_on_one_curve(traced):
     _, loaded = traced("gallery/kresling")
     _, moved = traced("gallery/kresling-displacement")
-    force = fd.plots.total_reaction(moved, range(6, 12), "-z")
+    force = fd.plots.total_reaction(moved, range(6, 12), direction="-z")
     down = -moved.displacement.sel(node=6, axis="z").values
     limits = loaded.isel(step=loaded.point.values == "limit")
     assert limits.sizes["step"] == 2

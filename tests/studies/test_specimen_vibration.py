@@ -103,8 +103,8 @@ def test_modes_are_wobble_axial_wobble(published):
 def test_the_first_wobble_is_driven_at_a_corner_not_in_the_middle():
     """In the first wobble the top turns about its middle, which stays where it is."""
     found = vibration.specimen("frf", vibration.ALONE).run(frequencies=COARSE)
-    corner = [p.frequency for p in peaks_of(found, vibration.CORNER, "x", prominence=0.02)]
-    middle = [p.frequency for p in peaks_of(found, vibration.TOP, "x", prominence=0.02)]
+    corner = [p.frequency for p in peaks_of(found, vibration.CORNER, axis="x", prominence=0.02)]
+    middle = [p.frequency for p in peaks_of(found, vibration.TOP, axis="x", prominence=0.02)]
     assert min(corner) < 4.5
     assert min(middle) > 8.0
 

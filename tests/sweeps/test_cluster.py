@@ -24,7 +24,7 @@ def sweep(tmp_path):
     (tmp_path / "case.toml").write_text(MODES)
 
     def swept(measures=("frequencies",), **how):
-        return fd.sweep(tmp_path / "case.toml", VARY, list(measures), **how)
+        return fd.sweep(tmp_path / "case.toml", VARY, measures=list(measures), **how)
 
     return swept
 

@@ -120,7 +120,8 @@ def test_gaps_along_stretched_states_are_kept(tmp_path):
     found = []
     for _ in range(2):
         swept = fd.sweep(
-            tmp_path / "case.toml", {"analysis.stretch": [1.0, 1.002]}, ["band_gap[4,X-M]"],
+            tmp_path / "case.toml", {"analysis.stretch": [1.0, 1.002]},
+            measures=["band_gap[4,X-M]"],
             processes=1, folder=tmp_path / "points", progress=found.append,
         )  # fmt: skip
     assert (found[1].found, found[3].found) == (0, 2)
@@ -192,7 +193,7 @@ def test_the_barriers_of_a_tower_that_snaps(tmp_path):
     names = ["stable_states", "barrier", "barrier_back", "state_strokes", "state_energies"]
     case_file = fd.read_case(case)
     as_it_is = {"sheet.thickness": [case_file.sheet.thickness]}
-    found = fd.sweep(case, as_it_is, [*names, "limit_load"], processes=1).isel(thickness=0)
+    found = fd.sweep(case, as_it_is, measures=[*names, "limit_load"], processes=1).isel(thickness=0)
     assert str(found["failure"].values) == ""
     known = fd.landscape(case_file.run(), case_file.case())
     assert int(found["stable_states"]) == len(known.stable) == 2

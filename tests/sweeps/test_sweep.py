@@ -28,7 +28,7 @@ def case(tmp_path) -> Path:
 
 
 def of(case: Path, measures=("frequencies",), vary=None, **how):
-    return fd.sweep(case, vary or VARY, list(measures), **{"processes": 1, **how})
+    return fd.sweep(case, vary or VARY, measures=list(measures), **{"processes": 1, **how})
 
 
 def frequency(result, case):
@@ -164,7 +164,7 @@ def test_a_measure_cannot_change_the_result_for_others(case):
 
     own = {"relative": relative, "taking": taking}
     own["height"] = lambda result, case: float(abs(result.receptance).max())
-    found = fd.sweep(case, ONE, own, processes=1)
+    found = fd.sweep(case, ONE, measures=own, processes=1)
     assert "relative: ValueError" in str(found["failure"].values[0])
     assert found["taking"] == 1.0 and np.isfinite(found["height"]).all()
 
@@ -177,7 +177,7 @@ def test_a_measure_gives_real_numbers(case):
         "nothing": lambda result, case: None,
         "several": lambda result, case: {1},
     }
-    failure = str(fd.sweep(case, ONE, own, processes=1)["failure"].values[0])
+    failure = str(fd.sweep(case, ONE, measures=own, processes=1)["failure"].values[0])
     assert "complex: gave complex numbers; take their abs, real or imag" in failure
     assert "nothing: gave nothing; let it return a number or an array" in failure
     assert "no number or array" in failure
@@ -211,11 +211,11 @@ def test_ones_own_measures(case):
         return result["shape"].values[0]
 
     mine = Measure("lowest", ("modes",), frequency, "Hz", "lowest frequency")
-    found = fd.sweep(case, ONE, [mine, shape], processes=1)
+    found = fd.sweep(case, ONE, measures=[mine, shape], processes=1)
     assert found["lowest"].attrs["units"] == "Hz"
     assert found["shape"].dims == ("thickness", "shape_0", "shape_1")
     with pytest.raises(InputError, match=r"shape cannot be sent to other proc.* top of a mod"):
-        fd.sweep(case, {"sheet.thickness": [0.01, 0.02]}, [shape], processes=2)
+        fd.sweep(case, {"sheet.thickness": [0.01, 0.02]}, measures=[shape], processes=2)
 
 
 def kept(folder: Path) -> dict[str, tuple[int, int]]:
@@ -352,7 +352,7 @@ def test_what_a_path_had_before_it_stopped_is_measured(tmp_path):
     path.write_text(TOWER)
     names = ["limit_load", "largest_load", "stiffness", "displacement[5,z]"]
     vary = {"sheet.thickness": [0.01]}
-    found = fd.sweep(path, vary, names, processes=1).isel(thickness=0)
+    found = fd.sweep(path, vary, measures=names, processes=1).isel(thickness=0)
     with pytest.raises(ComputationError, match="closed") as caught:
         fd.read_case(path).run()
     partial = caught.value.partial

@@ -315,7 +315,7 @@ def check_settled(seed: int, model: str) -> None:
         loads = [replace(load, history=ramp) for load in case.loads]
         case = case.altered(loads=loads, damping=damping)
         options = {"dt": duration / 300.0, "every": duration}
-        return case, path, fd.simulate(case, duration, "generalized_alpha", **options)
+        return case, path, fd.simulate(case, duration, method="generalized_alpha", **options)
 
     case, path, motion = first(seed, model, True, make)
     there, settled = path.displacement.values[-1], motion.displacement.values[-1]

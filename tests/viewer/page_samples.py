@@ -42,7 +42,7 @@ SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
 
 
 def case(loaded=True, **options):
-    pattern = fd.patterns.simple_fold(1.0, 1.0, 90)
+    pattern = fd.patterns.simple_fold(1.0, 1.0, dihedral=90)
     laws = {"fold_law": "linear", "bend_law": "linear"}
     structure = fd.discretize(pattern, SHEET, preset="herkal", **{**laws, **options})
     supports = [fd.Fix([4, 5]), fd.Fix([0, 1], axes="z")]
@@ -78,12 +78,14 @@ def results(kind):
         return {"sheet": bands_file().run()}
     if kind == "periodic":
         driven, f = in_a_well()
-        return {"cell": fd.response_curve(driven, (1.2 * f, 0.8 * f), 5, longest_step=0.3)}
+        return {
+            "cell": fd.response_curve(driven, (1.2 * f, 0.8 * f), harmonics=5, longest_step=0.3)
+        }
     if kind == "modes":
         return {rule: fd.modes(case(loaded=False, mass=rule), 4) for rule in rules}
     drive = [fd.Force([0, 1], (-1.0, 0.0, 0.0))]
     frequencies = [0.2 * k for k in range(1, 40)]
-    return {"fold": fd.frf(case(loaded=False), drive, frequencies)}
+    return {"fold": fd.frf(case(loaded=False), drive, frequencies=frequencies)}
 
 
 def page(kind, folder):

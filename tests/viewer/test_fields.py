@@ -14,7 +14,9 @@ SUPPORTS = [fd.Fix([0, 1, 2], axes="xyz")]
 
 
 def structure(**options):
-    return fd.discretize(fd.patterns.miura((2, 2), 0.1, 0.1, 60, 90), SHEET, **options)
+    return fd.discretize(
+        fd.patterns.miura((2, 2), 0.1, b=0.1, panel_angle=60, dihedral=90), SHEET, **options
+    )
 
 
 @pytest.mark.parametrize(
@@ -78,7 +80,7 @@ MODELS = {
 @pytest.mark.parametrize("model", MODELS)
 def test_all_models_have_energies_that_add_up_also_where_loads_fold(model):
     """Unknowns without mass stand where actuation has put them."""
-    pattern = fd.patterns.miura((1, 1), 0.1, 0.08, 60, 90)
+    pattern = fd.patterns.miura((1, 1), 0.1, b=0.08, panel_angle=60, dihedral=90)
     s = MODELS[model](pattern, SHEET, crease_stiffness=0.3)
     loads = [
         fd.Actuate([0, 2], angle=140.0),
@@ -115,7 +117,9 @@ def test_a_crease_bears_the_moment_of_its_flap_and_turns_by_it_alone(model, clam
 @pytest.mark.parametrize("model", ["plate", "n5b8e"])
 def test_turns_that_displacements_do_not_tell_are_left_out(model):
     """A damper beside a crease whose panels give way bears a part of the moment."""
-    s = MODELS[model](fd.patterns.miura((1, 1), 0.1, 0.1, 60, 90), SHEET, fold_law="linear")
+    s = MODELS[model](
+        fd.patterns.miura((1, 1), 0.1, b=0.1, panel_angle=60, dihedral=90), SHEET, fold_law="linear"
+    )
     supports = [fd.Fix(s.pattern.faces[0])]
     damped = fd.Case(s, supports, [], fd.CreaseDamping(1e-4))
     still = np.zeros((1, *s.nodes.shape))
@@ -126,7 +130,7 @@ def test_turns_that_displacements_do_not_tell_are_left_out(model):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_warm_panels_store_what_they_may_not_do(model):
-    pattern = fd.patterns.miura((1, 1), 0.1, 0.08, 60, 90)
+    pattern = fd.patterns.miura((1, 1), 0.1, b=0.08, panel_angle=60, dihedral=90)
     s = MODELS[model](pattern, SHEET, fold_law="linear")
     loads = [
         fd.Temperature(2.0, expansion=1e-6, panels=[0, 3]),
@@ -138,7 +142,7 @@ def test_warm_panels_store_what_they_may_not_do(model):
 
 
 def test_creases_of_rigid_shells_have_all_of_their_energy():
-    pattern = fd.patterns.miura((1, 1), 0.1, 0.08, 60, 90)
+    pattern = fd.patterns.miura((1, 1), 0.1, b=0.08, panel_angle=60, dihedral=90)
     s = fd.shell(pattern, SHEET, divisions=2, rigid="all", fold_law="linear")
     case = fd.Case(s, [fd.Fix(pattern.faces[0])], [fd.Force([8], (0.0, 0.0, 1e-3))])
     check(s, fd.trace(case, load_factors=[0.5, 1.0]))

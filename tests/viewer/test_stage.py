@@ -125,7 +125,7 @@ def test_welds_are_not_drawn():
 
 def test_where_supports_move_their_force_is_charted():
     """The load factor is their displacement; at every point their force is minus the springs'."""
-    strip = fd.patterns.simple_fold(0.1, 0.1, 150)
+    strip = fd.patterns.simple_fold(0.1, 0.1, dihedral=150)
     made = fd.discretize(strip, fd.Sheet(1e9, 0.3, 1e-3), crease_stiffness=0.2)
     supports = [fd.Fix([4, 5]), fd.Fix([0, 1], "z"), fd.Impose([0, 1], "x", -0.02)]
     path = fd.trace(fd.Case(made, supports), method="displacement", steps=3)

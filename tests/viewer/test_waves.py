@@ -92,15 +92,18 @@ def test_bands_without_a_case_file_have_a_page_if_they_have_shapes():
     structure = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0, length_scale_ratio=10.0))
     cell = fd.UnitCell(fd.Case(structure))
     path = cell.path("G-X-M-G", 13)
-    found = fd.bands(cell, path, 5, shape=True)
+    found = fd.bands(cell, path, count=5, shape=True)
     (about,) = stage({"": found}, {"": cell.case}, "title", [0]).about["results"]
     ((state, below, bottom, top),) = about["gaps"]
     values = np.sort(found["frequency"].values, axis=1)
     assert (state, below) == (0, 4)
     np.testing.assert_allclose([bottom, top], [values[:, 3].max(), values[:, 4].min()], rtol=1e-5)
     for bad, message in (
-        (fd.bands(cell, path, 2), "without shape have no page; compute them with shape=True"),
-        (fd.bands(cell, cell.grid(3), 2, shape=True), "without distance .*; take phases of cell.p"),
+        (fd.bands(cell, path, count=2), "without shape have no page; compute them with shape=True"),
+        (
+            fd.bands(cell, cell.grid(3), count=2, shape=True),
+            "without distance .*; take phases of cell.p",
+        ),
     ):
         with pytest.raises(InputError, match=message):
             stage({"": bad}, {"": cell.case}, "title", [0])

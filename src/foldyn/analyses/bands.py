@@ -160,7 +160,9 @@ def _path(cell: UnitCell, points: str | None, count: int) -> xarray.DataArray:
 def _bands(state: CellState, path: xarray.DataArray, given: Mapping[str, Any]) -> xarray.Dataset:
     """What the file asks for in one state."""
     began, cell, count, own = time.perf_counter(), state.cell, given["count"], state.arguments()
-    found = bands(cell, path, count, group_velocity=True, shape=True, polarization=True, **own)
+    found = bands(
+        cell, path, count=count, group_velocity=True, shape=True, polarization=True, **own
+    )
     gaps = band_gaps(found)
     if given["zone"]:
         zone = cell.grid(given["zone"]).values
@@ -173,7 +175,7 @@ def _bands(state: CellState, path: xarray.DataArray, given: Mapping[str, Any]) -
     if given["attenuation"]:
         _attenuate(found, cell, given["attenuation"], own)
     if cell.case.damped:
-        damped = damped_bands(cell, path, count, **own)
+        damped = damped_bands(cell, path, count=count, **own)
         found["damped_frequency"] = ("phase", "band"), damped["frequency"].values
         found["damped_ratio"] = ("phase", "band"), damped["damping_ratio"].values
     found["position"] = found["rest_position"] + found["displacement"]
@@ -190,7 +192,7 @@ def _in_zone(
     opposite = np.ravel_multi_index(tuple(-places % side), shape)  # of -k
     half = np.flatnonzero(np.arange(len(opposite)) <= opposite)
     values = np.empty((len(phases), count))
-    found = bands(cell, phases[half], count, track=False, **own)["frequency"].values
+    found = bands(cell, phases[half], count=count, track=False, **own)["frequency"].values
     values[half] = values[opposite[half]] = found
     return values
 
@@ -205,7 +207,7 @@ def _attenuate(found: xarray.Dataset, cell: Any, count: int, own: Mapping[str, A
         along = np.flatnonzero(a != b)
         if len(along) == 1:
             other = {"phase": float(a[1 - along[0]])} if len(a) > 1 else {}
-            spectrum = attenuation(cell, levels, int(along[0]), **other, **own)
+            spectrum = attenuation(cell, levels, along=int(along[0]), **other, **own)
             legs.setdefault(f"{names[k]}-{names[k + 1]}", spectrum["attenuation"].values)
     if not legs:
         raise InputError(

@@ -95,7 +95,7 @@ class CellState:
             )
             for motion, factor in zip(cell.motions, factors, strict=True)
         ]  # fmt: skip
-        return relaxed(cell, motions, state)
+        return relaxed(cell, motions, state=state)
 
     @contextmanager
     def placed(self) -> Iterator[None]:

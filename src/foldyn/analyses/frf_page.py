@@ -44,11 +44,11 @@ def frf_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator
         "response",
         f"{parts} of the {quantity} of {listed('node', nodes)}{some} along {axis}, "
         f"{rules(results)}: {_meaning(quantity, axis, response)}. Dots mark peaks.",
-        lambda: plots.plot_frf(results, nodes, axis, shown),
+        lambda: plots.plot_frf(results, nodes, axes=axis, quantity=shown),
         *_coherence(results, nodes, axis),
     )
     peaks = {
-        (rule, node): peaks_of(result, node, axis, shown)
+        (rule, node): peaks_of(result, node, axis=axis, quantity=shown)
         for rule, result in results.items()
         for node in nodes
     }
@@ -59,7 +59,7 @@ def frf_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator
             f"Mobility of node {nodes[0]} along {axis}{rule} around its peaks, in the complex "
             "plane: a mode makes a circle, from which its natural frequency and damping are "
             "found. Points that leave the circle show what other modes or nonlinearity add.",
-            lambda: plots.plot_nyquist(response, nodes[0], axis, peaks[first, nodes[0]]),
+            lambda: plots.plot_nyquist(response, nodes[0], axis=axis, peaks=peaks[first, nodes[0]]),
         )
     yield Heading("The numbers")
     yield _peaks(peaks, quantity, axis, len(results) > 1)

@@ -124,16 +124,18 @@ class ModesAnalysis(Analysis):
             "modes",
             f"Mode shapes{rule}, over {_about(modes)} in gray. A mode has no "
             "amplitude of its own: each is drawn so that it can be read.",
-            lambda: plots.draw_modes(case, modes, shown, names=names),
+            lambda: plots.draw_modes(case, modes, which=shown, names=names),
         )
         if case_file.output.animation:
             together = max(1, MOST_TRIANGLES // len(case.structure.triangles))
             filmed = shown[: min(MOST_FILMED, together)]
             film = album.folder / f"modes.{case_file.output.animation}"
-            plots.animate_modes(case, modes, film, filmed, names=names, frames=FRAMES, fps=FPS)
+            plots.animate_modes(
+                case, modes, path=film, which=filmed, names=names, frames=FRAMES, fps=FPS
+            )
             some = f" (the first {len(filmed)})" if len(filmed) < len(shown) else ""
             yield Picture(film, f"The same modes{some} in motion, all at one pace.")
-        same = {rule: mac(modes, other, case.mass) for rule, other in others}
+        same = {rule: mac(modes, other, mass=case.mass) for rule, other in others}
         if same:
             yield from album.figure(
                 "mac",
@@ -167,7 +169,7 @@ def _about(modes: xarray.Dataset) -> str:
 def _character(case_file: CaseFile, modes: xarray.Dataset, case: Case) -> xarray.Dataset:
     """What the modes do along the axis that the file names, or the main one."""
     chosen = case_file.output
-    return character(modes, chosen.axis, chosen.nodes if chosen.named else None, case=case)
+    return character(modes, chosen.axis, nodes=chosen.nodes if chosen.named else None, case=case)
 
 
 def _judged(case_file: CaseFile, names: xarray.Dataset) -> str:
@@ -183,7 +185,7 @@ def _draw_mac(first: str, same: Mapping[str, NDArray[np.float64]]) -> Any:
     if len(same) == 1:
         return plots.plot_mac(whole, row_title=first, column_title=next(iter(same)))
     columns = [f"{rule} {k + 1}" for rule, matrix in same.items() for k in range(matrix.shape[1])]
-    return plots.plot_mac(whole, None, columns, first, "")
+    return plots.plot_mac(whole, None, columns=columns, row_title=first, column_title="")
 
 
 def _compared(results: ByRule, same: Mapping[str, NDArray]) -> Table:

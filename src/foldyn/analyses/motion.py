@@ -205,7 +205,7 @@ class MotionAnalysis(Analysis):
         if shown.animation:
             film = album.folder / f"motion.{shown.animation}"
             yield Picture(
-                plots.animate(case, trajectory, film, scale=scale),
+                plots.animate(case, trajectory, path=film, scale=scale),
                 f"The motion with mass rule {first}{enlarged}; at rest in gray.",
             )
         yield from album.figure(

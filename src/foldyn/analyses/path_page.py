@@ -48,7 +48,7 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
             "reaction",
             f"Total force of the supports at {listed('node', moved[0])}, which are moved along "
             f"{moved[1]}, over their displacement.",
-            lambda: plots.plot_reaction(path, *moved),
+            lambda: plots.plot_reaction(path, moved[0], direction=moved[1]),
             _reaction(path, *moved),
         )
     if moved is None or not set(nodes) <= set(moved[0]):
@@ -56,7 +56,7 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
             "curve",
             f"Load factor over the displacement of {listed('node', nodes)}{some} along "
             f"{direction}.",
-            lambda: plots.plot_load_displacement(path, nodes, direction),
+            lambda: plots.plot_load_displacement(path, nodes, direction=direction),
         )
     if path.sizes["step"] > 1:
         over: tuple[list[int], str] | tuple[None, None] = None, None
@@ -66,7 +66,7 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
             "energies",
             f"Strain energies of {', '.join(plots.energy_shares(path))}, stacked, with the work "
             "done on the structure; below, their shares.",
-            lambda: plots.plot_path_energies(path, *over),
+            lambda: plots.plot_path_energies(path, over[0], direction=over[1]),
         )
     found = _landscape(case, path, moved)
     if found is not None:
@@ -81,11 +81,11 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
     yield from album.figure(
         "shapes",
         f"The deformed sheet{enlarged}; the undeformed one in gray.",
-        lambda: plots.draw_shapes(case, path, case_file.output.shapes or 4, scale),
+        lambda: plots.draw_shapes(case, path, points=case_file.output.shapes or 4, scale=scale),
     )
     if path.sizes["step"] > 1 and case_file.output.animation:
         film = album.folder / f"path.{case_file.output.animation}"
-        plots.animate(case, path, film, frames=FRAMES, fps=FPS, scale=scale)
+        plots.animate(case, path, path=film, frames=FRAMES, fps=FPS, scale=scale)
         yield Picture(film, f"Along the path{enlarged}; at rest in gray.")
     yield Heading("The numbers")
     yield _points(case_file, path, nodes[:MOST_COLUMNS], direction, moved)
@@ -106,7 +106,7 @@ def _reaction(path: xarray.Dataset, nodes: list[int], direction: str) -> Charts:
     """The force of moved supports over their displacement, for a page without figures."""
     curve = Curve(
         listed("node", nodes), along(path, nodes, direction),
-        plots.total_reaction(path, nodes, direction),
+        plots.total_reaction(path, nodes, direction=direction),
     )  # fmt: skip
     chart = Chart(f"displacement along {direction} (m)", "force (N)", [curve])
     return Charts([chart], f"Total force of the supports that are moved along {direction}.")
@@ -116,7 +116,11 @@ def _landscape(
     case: Case, path: xarray.Dataset, moved: tuple[list[int], str] | None
 ) -> Landscape | None:
     """The energy landscape of a path along which what drives it falls; None of others."""
-    driven = path["load_factor"].values if moved is None else plots.total_reaction(path, *moved)
+    driven = (
+        path["load_factor"].values
+        if moved is None
+        else plots.total_reaction(path, moved[0], direction=moved[1])
+    )
     if not (np.diff(driven) < 0.0).any():
         return None
     try:
@@ -173,7 +177,7 @@ def _points(
     columns = {"load factor": path["load_factor"].values}
     if moved is not None:
         columns[f"moved along {moved[1]} (m)"] = along(path, *moved)
-        columns["force (N)"] = plots.total_reaction(path, *moved)
+        columns["force (N)"] = plots.total_reaction(path, moved[0], direction=moved[1])
     for node in nodes:
         if moved is None or node not in moved[0]:
             columns[f"node {node} along {direction} (m)"] = along(path, [node], direction)

@@ -34,7 +34,7 @@ MOST_MIB = 2
 
 
 def read_case(
-    path: str | os.PathLike[str], model: str | None = None, divisions: int | None = None
+    path: str | os.PathLike[str], model: str | None = None, *, divisions: int | None = None
 ) -> CaseFile:
     """Read a case file and check it whole.
 
@@ -285,7 +285,7 @@ def _thick(pattern: Pattern, sheet: Sheet, offset: Any) -> Pattern:
     """The pattern with panels of the sheet's thickness, hinged at some height."""
     thickness = sheet.values("thickness", len(pattern.faces))
     try:
-        return thicken(pattern, thickness.tolist(), None if offset == FACES else offset)
+        return thicken(pattern, thickness.tolist(), offsets=None if offset == FACES else offset)
     except InputError as error:
         own = {"offsets": f"pattern.{HINGES}", "thickness": "sheet.thickness"}
         raise InputError(error.reason, own.get(error.key, "pattern")) from None

@@ -41,8 +41,8 @@ LEVEL = Quantity("1", "factor on the drive")
 def bifurcation_diagram(
     case: Case,
     measure: Quantity,
-    frequencies: ArrayLike | None = None,
     *,
+    frequencies: ArrayLike | None = None,
     amplitudes: ArrayLike | None = None,
     sweep: str = "both",
     settle: int = 200,

@@ -46,9 +46,9 @@ UNDRIVEN = 0.02  # of the duration: between the states of a motion without a dri
 def basins(
     case: Case,
     initial: Callable[..., State],
+    *,
     grid: Mapping[str, ArrayLike],
     duration: float,
-    *,
     record: int = 8,
     same: float = 0.01,
     method: str = "central_difference",

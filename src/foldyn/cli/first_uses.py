@@ -66,7 +66,7 @@ def case(
     if law is not None:  # made here, as that compiles something
         options["fold_law"] = law()
     if model == "shell":
-        structure: Any = fd.shell(pattern, SHEET, 2, **options)
+        structure: Any = fd.shell(pattern, SHEET, divisions=2, **options)
     else:
         options["preset"] = model
         structure = fd.discretize(pattern, SHEET, **options)
@@ -84,51 +84,51 @@ def moved(
     for name in methods:
         dt = LONG if METHODS[name].implicit else SHORT
         given: dict[str, Any] = {} if METHODS[name].adaptive else {"dt": dt}
-        fd.simulate(made, steps * dt, name, initial=initial, **given)
+        fd.simulate(made, steps * dt, method=name, initial=initial, **given)
 
 
 def adapted() -> None:
     """An implicit motion whose steps follow the error."""
-    fd.simulate(case(), STEPS * LONG, IMPLICIT[-1], tolerance=1e-3)
+    fd.simulate(case(), STEPS * LONG, method=IMPLICIT[-1], tolerance=1e-3)
 
 
 def jumped() -> None:
     """An implicit motion in which a force jumps while the rest angles move."""
     jump = fd.Force("xmax", (1.0, 0.0, 0.0), fd.Step(1.5 * LONG))
-    fd.simulate(case(loads=[jump, *TURNING]), STEPS * LONG, IMPLICIT[0], dt=LONG)
+    fd.simulate(case(loads=[jump, *TURNING]), STEPS * LONG, method=IMPLICIT[0], dt=LONG)
 
 
 def folded() -> None:
     """A pattern that is folded, the curve of its law, and a corner in a photograph."""
     fd.fold(fd.patterns.simple_fold(dihedral=170), 90.0, steps=2)
     in_series(fd.EnhancedLinear(), 1.0, 3.0, 0.5)
-    refine(np.zeros((40, 40), np.uint8), [[20.0, 20.0]], 8.0, 2.0)
+    refine(np.zeros((40, 40), np.uint8), [[20.0, 20.0]], reach=8.0, moved=2.0)
 
 
 def moved_at_once() -> None:
     """Motions of several cases at once."""
     made = case(model="herkal", mass="circumcenter")
     many = [made.altered(masses=[fd.PointMass("xmax", 1.0 + k)]) for k in range(8)]
-    fd.simulate_many(many, STEPS * SHORT, SHORT)
+    fd.simulate_many(many, STEPS * SHORT, dt=SHORT)
 
 
 def traced(factor: float, **parts: Any) -> None:
     """Paths of a few equilibria."""
     made = case(**parts)
-    fd.trace(made, "newton", [factor])
+    fd.trace(made, "newton", load_factors=[factor])
     fd.trace(made, "arc_length", first_step=0.5 * factor, steps=2)
 
 
 def waited() -> None:
     """A path whose step takes time, in which creases relax."""
-    fd.trace(case(law=PRONY), "newton", [1e-3, 1e-3], duration=0.1)
+    fd.trace(case(law=PRONY), "newton", load_factors=[1e-3, 1e-3], duration=0.1)
 
 
 def vibrating(**parts: Any) -> None:
     """Modes and a frequency response."""
     made = case(**parts)
     fd.modes(made, 2)
-    fd.frf(made, fd.Force("xmax", (1.0, 0.0, 0.5)), [0.1, 0.3])
+    fd.frf(made, fd.Force("xmax", (1.0, 0.0, 0.5)), frequencies=[0.1, 0.3])
 
 
 Uses = Mapping[str, Sequence[Callable[[], None]]]
@@ -138,10 +138,12 @@ TOUCHING: dict[str, Any] = {"pattern": sheets(), "start": (-0.6, 0.2, -1.0)}
 def differentiated(*methods: str, **parts: Any) -> None:
     """Gradients of motions, and of a frequency, by the stiffness of the creases."""
     made, given = case(**parts), {"duration": STEPS * SHORT, "dt": SHORT}
-    fd.sensitivity(made, ["fold_stiffness"], "frequency[2]", {"kind": "modes", "count": 2})
+    fd.sensitivity(
+        made, ["fold_stiffness"], measures="frequency[2]", analysis={"kind": "modes", "count": 2}
+    )
     for method in methods:
         motion = {"kind": "dynamics", "method": method, **given}
-        fd.sensitivity(made, ["fold_stiffness"], "displacement[8,z]", motion)
+        fd.sensitivity(made, ["fold_stiffness"], measures="displacement[8,z]", analysis=motion)
 
 
 def accompanied() -> None:

@@ -130,7 +130,7 @@ def _fit(plan: FitFile, results: Results, quiet: bool) -> Fit:
             bar.refresh()
 
         return fit(
-            plan.case, plan.data, plan.parameters, ties=plan.ties, folder=kept,
+            plan.case, plan.data, parameters=plan.parameters, ties=plan.ties, folder=kept,
             progress=tell, **plan.solver,
         )  # fmt: skip
 

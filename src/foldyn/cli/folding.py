@@ -133,7 +133,7 @@ def _folded(pattern: Pattern, source: Path, given: Namespace) -> Folding:
             bar.update()
 
         return fold(
-            pattern, angles, given.to, steps=given.steps, start=given.start,
+            pattern, angles, fraction=given.to, steps=given.steps, start=given.start,
             panels=given.panels, progress=tell,
         )  # fmt: skip
 
@@ -150,7 +150,7 @@ def _writer(out: Path) -> Callable[[Folding], None]:
         able = ", ".join(end for end, each in FORMATS.items() if each.write is not None)
         raise InputError(f"--out {out}: name a file that ends in one of {able}, or in {RESULT}")
     return lambda folding: write_pattern(
-        out, folding.pattern, frames_of(folding.path).frames if fmt.frames else ()
+        out, folding.pattern, frames=frames_of(folding.path).frames if fmt.frames else ()
     )
 
 

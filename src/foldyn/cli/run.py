@@ -143,9 +143,8 @@ def _read(path: Path, given: Namespace) -> CaseFile:
         names = ("frequencies", "amplitudes", "harmonics", "modes", "branches")
         keys = {key: getattr(given, key) for key in names}
         return read_as(path, given.command, keys)
-    model = given.model, given.divisions
     if given.command == "run":
-        return read_case(path, *model)
+        return read_case(path, model=given.model, divisions=given.divisions)
     names = ("count", "method", "state", "secant", "internal", "path", "points", "zone")
     names += ("attenuation",)
     keys = {key: getattr(given, key, None) for key in names}
@@ -153,7 +152,7 @@ def _read(path: Path, given: Namespace) -> CaseFile:
         first, last, count = given.frequencies
         whole = int(count) if count.is_integer() else count
         keys["frequencies"] = {"first": first, "last": last, "count": whole}
-    return read_as(path, given.command, keys, *model)
+    return read_as(path, given.command, keys, given.model, given.divisions)
 
 
 def _computed(

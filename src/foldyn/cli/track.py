@@ -97,7 +97,7 @@ def track(given: Namespace) -> Path:
     loads = numbers(given, "loads")
     if loads is not None and not photos:
         raise InputError("--loads: a film has times; loads belong to photographs")
-    film = None if photos else experiment.open_film(given.inputs[0], roi, rate)  # type: ignore
+    film = None if photos else experiment.open_film(given.inputs[0], roi, rate=rate)  # type: ignore
     thing = None if given.model is None else modeled(given.model)
     model = None if thing is None else experiment.TrackedModel.of(thing)
     if photos and model is None:
@@ -113,9 +113,11 @@ def track(given: Namespace) -> Path:
             bar.update()
 
         if film is None:
-            ds = experiment.track_photos(given.inputs, model, settings, loads, roi, tell)  # type: ignore
+            ds = experiment.track_photos(
+                given.inputs, model, tracking=settings, loads=loads, roi=roi, tell=tell
+            )  # type: ignore
         else:
-            ds = experiment.track_film(film, model, settings, tell)
+            ds = experiment.track_film(film, model, tracking=settings, tell=tell)
     out.parent.mkdir(parents=True, exist_ok=True)
     _save(ds, out)
     say(summary(ds))
@@ -270,10 +272,10 @@ def _figures(
 
     if film is not None:
         at = int(ds.attrs["match_frame"]) if "displacement" in ds else 0
-        save("overlay", plots.draw_overlay(film.picture(at), ds, at))
+        save("overlay", plots.draw_overlay(film.picture(at), ds, at=at))
     else:
         for k, name in enumerate(inputs):
-            save(f"overlay-{k}", plots.draw_overlay(read_photo(name), ds, k))
+            save(f"overlay-{k}", plots.draw_overlay(read_photo(name), ds, at=k))
     if "displacement" in ds:
         save("history", plots.plot_tracks(ds, most_moved(ds)))
     return written

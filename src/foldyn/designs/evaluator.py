@@ -82,7 +82,9 @@ class Measured:
         zeros = {name: width[name] for name, value in values.items() if not np.any(value)}
         sizes = {n: size if self.space.shapes[n] else float(size[0]) for n, size in zeros.items()}
         texts = [one.text for one in self.measures]
-        found = sensitivity(self.build, dict(values), texts, self.analysis, sizes=sizes)
+        found = sensitivity(
+            self.build, dict(values), measures=texts, analysis=self.analysis, sizes=sizes
+        )
         parts = [found[f"gradient_{name}"].values.reshape(len(texts), -1) for name in values]
         return found["value"].values, np.concatenate(parts, axis=1)
 

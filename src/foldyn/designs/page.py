@@ -170,7 +170,9 @@ def _slopes(
     for name, one in slopes.items():
         if np.ndim(one) and len(found.gradient[name]) in counts:
             on = "crease" if len(found.gradient[name]) == counts[0] else "panel"
-            drawn = plots.draw_sensitivity(case, found.gradient[name], f"d({text}) / d {name}")
+            drawn = plots.draw_sensitivity(
+                case, found.gradient[name], label=f"d({text}) / d {name}"
+            )
             if figures is not None:
                 with whole(folder / f"sensitivity-{name}.{figures}") as part:
                     drawn.savefig(part)

@@ -51,6 +51,7 @@ FINER = 4  # times shorter steps where those of central differences were too lon
 def simulate(
     case: Case,
     duration: float,
+    *,
     method: str = "rk4",
     dt: float | None = None,
     every: int | float = 1,

@@ -41,6 +41,7 @@ COMMON = ("duration", "dt", "every", "start", "method", "device")
 def simulate_many(
     cases: Sequence[Case],
     duration: float,
+    *,
     dt: float | None = None,
     every: int | float = 1,
     initial: State | Sequence[State | None] | None = None,

@@ -295,7 +295,7 @@ def compiled(name: str) -> bool:
     return ready(method_of(name).loop)
 
 
-def critical_step(case: Case, method: str = "rk4", u: ArrayLike | None = None) -> float:
+def critical_step(case: Case, method: str = "rk4", *, u: ArrayLike | None = None) -> float:
     """Critical time step (s) of an explicit method for a case: 0.9 of its stability limit.
 
     Parameters

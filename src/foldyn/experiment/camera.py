@@ -289,7 +289,7 @@ def scale_of_lengths(references: Sequence[Sequence[float]]) -> Scale:
 
 
 def scale_of_target(
-    photo: NDArray[np.uint8], columns: int, rows: int, square: float, place: str = "the photo"
+    photo: NDArray[np.uint8], columns: int, *, rows: int, square: float, place: str = "the photo"
 ) -> Scale:
     """Scale from a chessboard, held square to the camera in the plane of the motion.
 

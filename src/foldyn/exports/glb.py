@@ -76,7 +76,7 @@ def write(
     kind = result.attrs["foldyn_result"]
     if every is None and frames is None and kind != "modes":
         frames = MOST_KEYS
-    shapes = shapes_of(result, every, frames, scale)
+    shapes = shapes_of(result, every, frames=frames, scale=scale)
     if seconds is not None:
         seconds = number("seconds", seconds, least=SHORTEST, most=LONGEST, unit="s")
     if kind == "modes":

@@ -45,11 +45,11 @@ def write(
         raise InputError(": one sample or several: leave out every and frames", "frame")
     holds_frames = FORMATS[path.suffix.lower()].frames
     if frame is not None or not (several or holds_frames):
-        write_pattern(path, state_of(result, frame, scale))
+        write_pattern(path, state_of(result, frame, scale=scale))
         return [path]
-    pattern, states = frames_of(result, every, frames, scale)
+    pattern, states = frames_of(result, every, frames=frames, scale=scale)
     if holds_frames:
-        write_pattern(path, pattern, states)
+        write_pattern(path, pattern, frames=states)
         return [path]
     files = [_numbered(path, k) for k in range(len(states))]
     left = _numbered(path, len(states))

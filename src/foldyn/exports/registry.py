@@ -108,6 +108,7 @@ BY_SUFFIX: dict[str, Export] = {end: each for each in _EXPORTS for end in each.s
 def export(
     result: xr.Dataset | Case | str | os.PathLike[str],
     path: str | os.PathLike[str],
+    *,
     format: str | None = None,
     **options: Any,
 ) -> list[Path]:

@@ -79,7 +79,7 @@ def write(
         Take every such sample and the last one, or so many, spread evenly; all by default.
     """
     warn_of_boards(case.structure.pattern)
-    shapes = shapes_of(result, every, frames)
+    shapes = shapes_of(result, every, frames=frames)
     dimension = ALONG[result.attrs["foldyn_result"]]
     some = result.isel({dimension: shapes.samples})
     moments = some[dimension].values if dimension in some.coords else shapes.samples

@@ -83,6 +83,7 @@ FORMATS: dict[str, Format] = {end: fmt for fmt in _FORMATS for end in fmt.extens
 def read_pattern(
     path: str | os.PathLike[str],
     scale: float | None = None,
+    *,
     unit: str | None = None,
     frame: int | str | None = None,
     facets: Literal["weld", "line", "hinge"] | None = None,
@@ -131,7 +132,15 @@ def read_pattern(
     FoldynWarning
         What was assumed, with the pattern's size, what was repaired, and what may not be meant.
     """
-    pattern, diagnosis = diagnose(path, scale, unit, frame, facets, tolerance, flat_foldable)
+    pattern, diagnosis = diagnose(
+        path,
+        scale,
+        unit=unit,
+        frame=frame,
+        facets=facets,
+        tolerance=tolerance,
+        flat_foldable=flat_foldable,
+    )
     size = " x ".join(f"{length:.4g}" for length in diagnosis.size)
     for told in (
         diagnosis.assumptions and f"{'; '.join(diagnosis.assumptions)}; the sheet is {size} m",
@@ -146,6 +155,7 @@ def read_pattern(
 def diagnose(
     path: str | os.PathLike[str],
     scale: float | None = None,
+    *,
     unit: str | None = None,
     frame: int | str | None = None,
     facets: Literal["weld", "line", "hinge"] | None = None,
@@ -206,7 +216,7 @@ def _with_families(made: Built, drawing: Drawing) -> Built:
 
 
 def write_pattern(
-    path: str | os.PathLike[str], pattern: Pattern, frames: Sequence[Frame] = ()
+    path: str | os.PathLike[str], pattern: Pattern, *, frames: Sequence[Frame] = ()
 ) -> None:
     """Write a pattern to a file; its extension determines the format.
 

@@ -63,8 +63,8 @@ class FrfGradient:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)  # all was said by `frf`
             self._linear = linearize(
-                case, state, given.get("secant"), given.get("load_factor", 1.0),
-                given.get("internal", 0),
+                case, state, secant=given.get("secant"), load_factor=given.get("load_factor", 1.0),
+                internal=given.get("internal", 0),
             )  # fmt: skip
             self._drive = drive_of(case, given["drive"], given.get("amplitude", 1.0))
         refuse(self._linear, "frequency responses")

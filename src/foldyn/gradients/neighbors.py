@@ -235,7 +235,13 @@ def _linear(one: Asked) -> Linearized:
     given = one.arguments
     if given.get("state") is not None:
         raise InputError(f"{NONE} what is linearized about a state that loads have made")
-    linear = linearize(one.case, None, given.get("secant"), 1.0, given.get("internal", 0))
+    linear = linearize(
+        one.case,
+        None,
+        secant=given.get("secant"),
+        load_factor=1.0,
+        internal=given.get("internal", 0),
+    )
     if linear.responding is not None:
         raise InputError(f"{NONE} vibrations with laws that remember")
     return linear

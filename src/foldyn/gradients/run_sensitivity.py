@@ -65,9 +65,9 @@ Own = tuple[Callable[..., float], Callable[..., Seeds]]
 def sensitivity(
     build: Source,
     parameters: Values | Sequence[str],
+    *,
     measures: str | Sequence[str] | Mapping[str, Own],
     analysis: Mapping[str, Any] | None = None,
-    *,
     sizes: Values | None = None,
     along: Values | None = None,
 ) -> xr.Dataset:

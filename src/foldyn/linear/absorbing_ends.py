@@ -96,7 +96,7 @@ class LongWaves(Checked):
         return (momenta * self.speeds) @ momenta.T
 
 
-def long_waves(cell: UnitCell, state: State | None = None, along: int = 0) -> LongWaves:
+def long_waves(cell: UnitCell, state: State | None = None, *, along: int = 0) -> LongWaves:
     """Long waves of a chain, from its bands near the origin of the Brillouin zone.
 
     Parameters
@@ -163,7 +163,7 @@ def long_waves(cell: UnitCell, state: State | None = None, along: int = 0) -> Lo
     return LongWaves(tuple(motion.unit), stiffness, mass, motion.point)
 
 
-def absorbing_end(case: Case, nodes: Nodes, waves: LongWaves) -> list[Dashpot]:
+def absorbing_end(case: Case, nodes: Nodes, *, waves: LongWaves) -> list[Dashpot]:
     """Dashpots that absorb long waves at an end of a chain.
 
     Parameters

@@ -29,9 +29,9 @@ TURN = 2.0 * np.pi
 def bands(
     cell: UnitCell,
     phases: Any,
+    *,
     count: int = 6,
     state: State | None = None,
-    *,
     group_velocity: bool = False,
     shape: bool = False,
     polarization: bool = False,

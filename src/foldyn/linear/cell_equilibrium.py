@@ -26,6 +26,7 @@ NULL = 1e-11  # of the largest stiffness: motions that nothing resists
 def relaxed(
     cell: UnitCell,
     motions: Sequence[Any] | None = None,
+    *,
     state: State | None = None,
     load_factor: float = 1.0,
     steps: int = 4,

@@ -87,7 +87,7 @@ def cells_of(positions: NDArray, cell: UnitCell, along: int = 0) -> Cells:
 
 
 def space_time(
-    trajectory: xarray.Dataset, cell: UnitCell, component: str = "z", along: int = 0
+    trajectory: xarray.Dataset, cell: UnitCell, *, component: str = "z", along: int = 0
 ) -> xarray.Dataset:
     """Motion of each cell of a chain over time.
 
@@ -168,6 +168,7 @@ def space_time(
 def wave_spectrum(
     trajectory: xarray.Dataset,
     cell: UnitCell,
+    *,
     component: str | None = None,
     along: int = 0,
     window: Window = "hann",
@@ -207,7 +208,7 @@ def wave_spectrum(
     velocity = cells.turned(trajectory["velocity"].transpose("time", "node", "axis").values)
     if component is not None:
         velocity = velocity[..., AXES.index(component)]
-    found = wavenumber_spectrum(velocity, sampling_interval(time), window)
+    found = wavenumber_spectrum(velocity, sampling_interval(time), window=window)
     return xr.Dataset(
         {"amplitude": (("phase", "frequency"), found.amplitude, {"units": "m/s"})},
         {
@@ -222,7 +223,7 @@ def wave_spectrum(
     )
 
 
-def transmission(response: xarray.Dataset, cell: UnitCell, along: int = 0) -> xarray.Dataset:
+def transmission(response: xarray.Dataset, cell: UnitCell, *, along: int = 0) -> xarray.Dataset:
     """How far a vibration reaches along a chain, from its frequency response.
 
     Parameters

@@ -41,8 +41,8 @@ ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "
 def character(
     modes: xarray.Dataset,
     axis: str | None = None,
-    nodes: Any = None,
     *,
+    nodes: Any = None,
     stations: int | None = None,
     case: Case | None = None,
 ) -> xarray.Dataset:

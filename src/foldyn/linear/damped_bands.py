@@ -37,9 +37,9 @@ TURN = 2.0 * np.pi
 def damped_bands(
     cell: UnitCell,
     phases: Any,
+    *,
     count: int = 6,
     state: State | None = None,
-    *,
     secant: float | None = None,
     load_factor: float = 1.0,
 ) -> xarray.Dataset:

@@ -47,11 +47,11 @@ class Reach(NamedTuple):
 def attenuation(
     cell: UnitCell,
     frequencies: Any,
+    *,
     along: int = 0,
     phase: float = 0.0,
     count: int = 6,
     state: State | None = None,
-    *,
     secant: float | None = None,
     load_factor: float = 1.0,
 ) -> xarray.Dataset:

@@ -69,10 +69,10 @@ RUNS, SECONDS = 5, 3.0  # how often a modal analysis is timed, unless that takes
 def fidelity(
     case: Case,
     count: int = 6,
+    *,
     divisions: Sequence[int] | None = None,
     models: Sequence[str] | Mapping[str, Mapping[str, Any]] | None = None,
     secant: float | None = None,
-    *,
     vertex_radius: float | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Fidelity:

@@ -72,10 +72,10 @@ PER_FORCE = tuple(name for name in RESPONSES if name != "transmissibility")
 def frf(
     case: Case,
     drive: Force | BaseMotion | Sequence[Force | BaseMotion],
+    *,
     frequencies: ArrayLike,
     state: State | str | None = None,
     method: str = "direct",
-    *,
     secant: float | None = None,
     amplitude: float = 1.0,
     load_factor: float = 1.0,
@@ -187,7 +187,9 @@ def frf(
     began = time.perf_counter()
     try:
         if way.linear:
-            system = linearize(case, state, way.secant or secant, load_factor, internal)
+            system = linearize(
+                case, state, secant=way.secant or secant, load_factor=load_factor, internal=internal
+            )
             _warn_of_instability(system)
             answer = way.compute(system, driven, frequency, chosen, report)
             _warn_of_stretch(system, frequency, answer.response)
@@ -323,7 +325,9 @@ def convert(response: xarray.Dataset, quantity: str) -> xarray.Dataset:
             "response: a transmissibility is a motion per motion: the same for displacements, "
             "velocities and accelerations"
         )
-    values = convert_response(response["frequency"].values, response[held].values, held, quantity)
+    values = convert_response(
+        response["frequency"].values, response[held].values, source=held, target=quantity
+    )
     other = RESPONSES[quantity]
     named = variable(tuple(map(str, response[held].dims)), values, other.units, other.text)
     return response.drop_vars(held).assign({quantity: named})

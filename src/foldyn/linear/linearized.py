@@ -167,6 +167,7 @@ class Linearized:
 def linearize(
     case: Case,
     state: State | str | None = None,
+    *,
     secant: float | None = None,
     load_factor: float = 1.0,
     internal: int = 0,

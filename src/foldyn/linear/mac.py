@@ -17,7 +17,7 @@ from foldyn.errors import InputError
 from foldyn.values import numbers
 
 
-def mac(a: Any, b: Any, mass: Any = None, nodes: Any = None) -> NDArray[np.float64]:
+def mac(a: Any, b: Any, *, mass: Any = None, nodes: Any = None) -> NDArray[np.float64]:
     """Modal assurance criteria between two sets of shapes.
 
     Parameters

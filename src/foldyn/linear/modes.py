@@ -45,9 +45,9 @@ INDEPENDENT = 1e-6  # of a motion's size that must be left of it after those bef
 def modes(
     case: Case,
     count: int = 6,
+    *,
     state: State | str | None = None,
     secant: float | None = None,
-    *,
     load_factor: float = 1.0,
     internal: int = 0,
     verify: bool = True,
@@ -151,7 +151,7 @@ def spectrum_of(
         "take fewer",
     )  # fmt: skip
     began = time.perf_counter()
-    linear = linearize(case, state, secant, load_factor, internal)
+    linear = linearize(case, state, secant=secant, load_factor=load_factor, internal=internal)
     pencil = Pencil(linear.stiffness, linear.mass, solver)
     space, along = rigid_space(linear), unit_translations(linear)
     spectrum = lowest(pencil, count, unresisted(linear, space), verify)

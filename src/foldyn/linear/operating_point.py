@@ -99,7 +99,7 @@ def _equilibrium(case: Case) -> NDArray:
     with warnings.catch_warnings():  # the linearization itself warns of these
         for told in ("the path loses stability", NO_POTENTIAL[:20]):
             warnings.filterwarnings("ignore", told, FoldynWarning)
-        path = trace(case, "newton", factors, inertia_relief=free)
+        path = trace(case, "newton", load_factors=factors, inertia_relief=free)
     found = path["displacement"].values[-1]
     if len(body.sheet.soft_hinges(body.dofs(found)).offset):
         problem = OrigamiProblem(case, inertia_relief=free)

@@ -34,7 +34,9 @@ def clusters(frequency: NDArray) -> NDArray:
 
 def likeness(fa: NDArray, a: NDArray, fb: NDArray, b: NDArray, mass: NDArray) -> NDArray:
     """MAC (ka, kb) of shapes (ka, n, 3) and (kb, n, 3), of whole clusters where there are any."""
-    values = np.nan_to_num(mac(a, b, mass))  # shapes that do not move these nodes are like none
+    values = np.nan_to_num(
+        mac(a, b, mass=mass)
+    )  # shapes that do not move these nodes are like none
     found = values.copy()
     left, right = clusters(fa), clusters(fb)
     for i in np.unique(left):

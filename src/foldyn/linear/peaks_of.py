@@ -71,6 +71,7 @@ class Peak:
 def peaks_of(
     response: xarray.Dataset,
     node: int,
+    *,
     axis: str,
     quantity: str | None = None,
     prominence: float | None = None,
@@ -148,8 +149,15 @@ def resonances(
     """
     kind, size = kind_of(shown), np.abs(curve)  # without damping a response is real, of either sign
     if prominence is not None:
-        return find_peaks(f, size, prominence, count, kind)
-    return find_peaks(f, size, PROMINENT, count, kind, rise=None if scatters else HALF_POWER)
+        return find_peaks(f, size, prominence=prominence, count=count, quantity=kind)
+    return find_peaks(
+        f,
+        size,
+        prominence=PROMINENT,
+        count=count,
+        quantity=kind,
+        rise=None if scatters else HALF_POWER,
+    )
 
 
 def kind_of(shown: str) -> str:
@@ -164,12 +172,12 @@ def _with_half_power(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)  # the asymmetry is stored
         try:
-            points = half_power(f, np.abs(curve), peak.frequency, kind)
+            points = half_power(f, np.abs(curve), near=peak.frequency, quantity=kind)
         except InputError as error:
             return replace(peak, note=f"half power: {error}"), math.inf
     ratio = points.damping_ratio
     if rate > 0.0:
-        ratio = float(without_window(points.natural_frequency, ratio, rate)[1])
+        ratio = float(without_window(points.natural_frequency, ratio, rate=rate)[1])
     textbook, asymmetry = points.textbook_damping_ratio, points.asymmetry
     damped = replace(peak, half_power=ratio, textbook=textbook, asymmetry=asymmetry)
     return damped, points.upper - points.lower
@@ -213,13 +221,13 @@ def _with_circles(
 ) -> list[Peak]:  # fmt: skip
     """The peaks with their circle fits: of all together, or else of each alone."""
     try:
-        fits = circle_fits(f, curve, bands, kind)
+        fits = circle_fits(f, curve, bands=bands, quantity=kind)
         return [_with_circle(peak, fit, rate) for peak, fit in zip(peaks, fits, strict=True)]
     except (InputError, ComputationError):
         alone = []
     for peak, band in zip(peaks, bands, strict=True):
         try:
-            alone.append(_with_circle(peak, circle_fit(f, curve, band, kind), rate))
+            alone.append(_with_circle(peak, circle_fit(f, curve, band=band, quantity=kind), rate))
         except (InputError, ComputationError) as error:
             alone.append(replace(peak, note="; ".join(filter(None, (peak.note, str(error))))))
     return alone
@@ -229,7 +237,7 @@ def _with_circle(peak: Peak, fit: CircleFit, rate: float) -> Peak:
     """The peak with its circle fit, without the damping of the window."""
     natural, ratio = fit.natural_frequency, fit.damping_ratio
     if rate > 0.0:
-        natural, ratio = (float(value) for value in without_window(natural, ratio, rate))
+        natural, ratio = (float(value) for value in without_window(natural, ratio, rate=rate))
     return replace(
         peak, natural_frequency=natural, damping_ratio=ratio, misfit=fit.misfit,
         frequency_error=fit.frequency_error, damping_error=fit.damping_error,

@@ -116,7 +116,9 @@ class _Motion:
         )
         drive = self.rig.drive.value * self.history(time)
         # the last sample is the first one of the next block
-        response = response_per_drive(time[:-1], drive[:-1], motion[:-1], self.frequency)
+        response = response_per_drive(
+            time[:-1], drive[:-1], response=motion[:-1], frequency=self.frequency
+        )
         if self.blocks:
             largest = max(np.abs(response).max(), 1e-300)
             change = float(np.abs(response - self.response).max() / largest)

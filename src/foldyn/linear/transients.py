@@ -295,7 +295,7 @@ def respond(
         drive[k, : len(factor)] = rig.drive.value * factor
         responses[k, : record.samples] = motion[: record.samples]
     if rate > 0.0:
-        window = exponential_window(record.length, record.every, rate)
+        window = exponential_window(record.length, record.every, rate=rate)
         drive = drive * window
         responses *= window[:, None, None]
     size = np.abs(responses).max(axis=(2, 3))
@@ -310,7 +310,7 @@ def respond(
             f"window_rate = {decay:.2g} (1/s)",
             "frequency-response.md#responses-from-simulated-motions",
         )
-    estimate = frequency_response(drive, responses, record.every, estimator)
+    estimate = frequency_response(drive, responses, dt=record.every, estimator=estimator)
     return Answer(
         estimate.response[record.lines],
         {"coherence": estimate.coherence[record.lines]},

@@ -78,7 +78,7 @@ class View:
         )
 
 
-def view(what: Any, title: str = "", height: int = HEIGHT) -> View:
+def view(what: Any, title: str = "", *, height: int = HEIGHT) -> View:
     """Show something in three dimensions: in a notebook, as the last line of a cell.
 
     Parameters

@@ -27,7 +27,7 @@ STRAIGHT = np.radians(15.0)  # corners that turn by less divide an edge
 
 
 def welded(
-    pattern: Pattern, facets: Iterable[tuple[int, int]] | str | None = None, join: bool = True
+    pattern: Pattern, facets: Iterable[tuple[int, int]] | str | None = None, *, join: bool = True
 ) -> Pattern:
     """Pattern whose facets are no creases.
 

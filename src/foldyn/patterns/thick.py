@@ -43,6 +43,7 @@ CONDITIONS = (
 def thicken(
     pattern: Pattern,
     thickness: float | Sequence[float],
+    *,
     offsets: float | Sequence[float] | Mapping[str, float] | None = None,
 ) -> Pattern:
     """Give the panels of a pattern a thickness, and put each crease at its own height in it.

@@ -40,9 +40,9 @@ TURN = 2.0 * math.pi
 def periodic_motion(
     case: Case,
     frequency: float | None = None,
+    *,
     harmonics: int = 9,
     method: str = "harmonic_balance",
-    *,
     start: State | xarray.Dataset | None = None,
     periods: int = 1,
     modes: int | None = None,

@@ -52,9 +52,9 @@ LOOSE = 1e-2  # change of the energy above which to warn
 def backbone(
     case: Case,
     mode: int = 1,
+    *,
     amplitudes: Sequence[float] = (1e-6, 1e-3),
     harmonics: int = 9,
-    *,
     damped: bool = False,
     state: State | None = None,
     modes: int | None = None,

@@ -67,9 +67,9 @@ class _Found:
 def response_curve(
     case: Case,
     frequencies: Sequence[float] | None = None,
+    *,
     harmonics: int = 9,
     measure: Quantity | None = None,
-    *,
     amplitudes: Sequence[float] | None = None,
     start: State | xarray.Dataset | None = None,
     periods: int = 1,

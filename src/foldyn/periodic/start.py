@@ -58,7 +58,7 @@ def equilibrium(case: Case) -> NDArray:
     still = still_case(case)
     if not drives(still, ()):
         return np.zeros_like(case.structure.nodes)
-    return trace(still, "newton", [0.0, 1.0])["displacement"].values[-1]
+    return trace(still, "newton", load_factors=[0.0, 1.0])["displacement"].values[-1]
 
 
 def origin_of(case: Case, start: Any) -> Origin | None:

@@ -32,6 +32,7 @@ _PATH: dict[str, Any] = {"color": style.GREEN, "linewidth": 1.0, "linestyle": (0
 def animate(
     case_or_structure: Case | Structure,
     result: xr.Dataset,
+    *,
     path: str | PathLike[str],
     frames: int = 120,
     fps: int = 25,
@@ -194,6 +195,7 @@ def frame_displacements(
 def animate_modes(
     case_or_structure: Case | Structure,
     modes: xr.Dataset,
+    *,
     path: str | PathLike[str],
     which: Sequence[int] | None = None,
     amplitude: float | None = None,

@@ -109,7 +109,7 @@ def plot_bifurcation_diagram(diagram: xr.Dataset, title: str = "") -> Figure:
 
 
 def plot_poincare_section(
-    section: xr.Dataset, node: int | str, axis: str, title: str = ""
+    section: xr.Dataset, node: int | str, *, axis: str, title: str = ""
 ) -> Figure:
     """Draw velocity over displacement of a node at the points of a section.
 
@@ -151,7 +151,7 @@ def plot_poincare_section(
 
 
 def plot_basins(
-    basins: xr.Dataset, x: str | None = None, y: str | None = None, title: str = ""
+    basins: xr.Dataset, x: str | None = None, *, y: str | None = None, title: str = ""
 ) -> Figure:
     """Draw the basins of attraction over two parameters of a grid.
 

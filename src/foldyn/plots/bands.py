@@ -17,7 +17,7 @@ from foldyn.values import flag, whole
 GAP = "0.88"  # gray of full gaps
 
 
-def plot_bands(bands: xr.Dataset, gaps: bool = True, title: str = "") -> Figure:
+def plot_bands(bands: xr.Dataset, gaps: bool = True, *, title: str = "") -> Figure:
     """Draw bands along a path of the Brillouin zone.
 
     Parameters
@@ -71,7 +71,7 @@ def plot_bands(bands: xr.Dataset, gaps: bool = True, title: str = "") -> Figure:
 
 
 def plot_iso_frequency(
-    bands: xr.Dataset, band: int = 1, levels: int = 12, title: str = ""
+    bands: xr.Dataset, band: int = 1, *, levels: int = 12, title: str = ""
 ) -> Figure:
     """Draw lines of one frequency over the Brillouin zone of a sheet.
 

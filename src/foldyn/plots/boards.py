@@ -24,6 +24,7 @@ from foldyn.structures import Structure
 def draw_boards(
     case_or_structure: Case | Structure | Pattern | xr.Dataset,
     displacement: ArrayLike | None = None,
+    *,
     captions: Sequence[str] = (),
     view: tuple[float, float] = (28.0, -60.0),
     title: str = "",

@@ -42,6 +42,7 @@ def plot_convergence(history: xr.Dataset) -> Figure:
 def draw_sensitivity(
     case_or_structure: Any,
     values: ArrayLike,
+    *,
     label: str = "",
     on: str | None = None,
     view: tuple[float, float] = (28.0, -60.0),

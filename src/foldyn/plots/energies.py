@@ -110,6 +110,7 @@ def _table(trajectory: xr.Dataset) -> NDArray[np.float64]:
 def plot_path_energies(
     path: xr.Dataset,
     nodes: int | str | Sequence[int] | None = None,
+    *,
     direction: str | None = None,
     title: str = "",
 ) -> Figure:

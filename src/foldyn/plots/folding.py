@@ -26,6 +26,7 @@ _WIDTH = 6.0  # inches
 def draw_folding(
     folding: Folding,
     states: int | Sequence[int] = 3,
+    *,
     view: tuple[float, float] = (28.0, -60.0),
     title: str = "",
 ) -> Figure:
@@ -69,6 +70,7 @@ def draw_folding(
 def animate_folding(
     folding: Folding,
     path: str | PathLike[str],
+    *,
     frames: int = 60,
     fps: int = 20,
     view: tuple[float, float] = (28.0, -60.0),

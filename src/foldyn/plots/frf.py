@@ -32,6 +32,7 @@ _DECADES = 5.0  # below the highest value that the magnitude shows at least
 def plot_frf(
     responses: xr.Dataset | Mapping[str, xr.Dataset],
     nodes: int | str | Sequence[int],
+    *,
     axes: str | Sequence[str] | None = None,
     quantity: str | None = None,
     prominence: float | None = None,

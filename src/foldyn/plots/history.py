@@ -25,6 +25,7 @@ ROUND = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 def plot_history(
     trajectories: xr.Dataset | Mapping[str, xr.Dataset],
     nodes: int | str | Sequence[int],
+    *,
     axes: str | Sequence[str] | None = None,
     max_frequency: float | None = None,
     title: str = "",

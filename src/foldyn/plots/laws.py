@@ -20,6 +20,7 @@ from foldyn.structures import Structure
 def plot_laws(
     structure: Structure | Shell | Case | xr.Dataset,
     stretch: tuple[float, float] = (0.8, 1.2),
+    *,
     title: str = "",
 ) -> Figure:
     """Draw moment against dihedral of folds and bends, and stress against stretch of bars.

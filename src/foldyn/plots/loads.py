@@ -16,7 +16,7 @@ from foldyn.values import number
 
 
 def plot_load_history(
-    case: Case | xr.Dataset, duration: float, title: str = "", start: float = 0.0
+    case: Case | xr.Dataset, duration: float, *, title: str = "", start: float = 0.0
 ) -> Figure:
     """Draw the loads of a case and the motions it imposes over time.
 

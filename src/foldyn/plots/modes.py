@@ -35,6 +35,7 @@ _CELL, _MARGIN, _BAR = 0.42, 1.1, 0.9  # inches
 def draw_modes(
     case_or_structure: Case | Structure,
     modes: xr.Dataset,
+    *,
     which: Sequence[int] | None = None,
     amplitude: float | None = None,
     names: Mapping[int, str] | xr.Dataset | None = None,
@@ -186,6 +187,7 @@ def _readable(sheet: Sheet3D, shape: Points, amplitude: float | None) -> Points:
 def plot_mac(
     mac: ArrayLike,
     rows: Sequence[str] | None = None,
+    *,
     columns: Sequence[str] | None = None,
     row_title: str = "mode",
     column_title: str = "mode",

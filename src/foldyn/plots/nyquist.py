@@ -54,6 +54,7 @@ class Circle(NamedTuple):
 def plot_nyquist(
     response: xr.Dataset,
     node: int,
+    *,
     axis: str | None = None,
     peaks: Sequence[Peak] | None = None,
     title: str = "",
@@ -95,7 +96,7 @@ def plot_nyquist(
     f, Y = curve.frequency[usable], curve.values[usable]
     if not f.size:
         raise InputError(f"response: node {node} has no finite mobility along {curve.axis}")
-    known = peaks_of(response, node, curve.axis) if peaks is None else peaks
+    known = peaks_of(response, node, axis=curve.axis) if peaks is None else peaks
     rate = float(response.attrs.get("window_rate", 0.0))
     fitted = [peak for peak in known if np.isfinite(peak.natural_frequency * peak.damping_ratio)]
     circles = circles_of(f, Y, fitted[:MOST_CIRCLES], rate)

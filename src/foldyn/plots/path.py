@@ -40,6 +40,7 @@ _BAR = {"marker": "|", "markersize": 10.0}
 def plot_load_displacement(
     paths: xr.Dataset | Mapping[str, xr.Dataset],
     nodes: int | str | Sequence[int],
+    *,
     direction: str | None = None,
     title: str = "",
 ) -> Figure:
@@ -87,6 +88,7 @@ def plot_load_displacement(
 def plot_reaction(
     paths: xr.Dataset | Mapping[str, xr.Dataset],
     nodes: int | str | Sequence[int],
+    *,
     direction: str | None = None,
     title: str = "",
 ) -> Figure:
@@ -125,7 +127,7 @@ def plot_reaction(
         _Curve(
             label if len(paths) > 1 else "",
             along(path, numbers, direction),
-            total_reaction(path, numbers, direction),
+            total_reaction(path, numbers, direction=direction),
             path,
         )
         for label, path in paths.items()
@@ -200,6 +202,7 @@ def _draw_curve(axes: Axes, curve: _Curve, color: str, zorder: float) -> None:
 def draw_shapes(
     case_or_structure: Case | Structure,
     path: xr.Dataset,
+    *,
     points: int | Sequence[int] = 4,
     scale: float = 1.0,
     view: tuple[float, float] = (28.0, -60.0),

@@ -21,6 +21,7 @@ _MARGIN, _CAPTION, _LEGEND = 0.15, 0.3, 0.35  # inches
 def draw_patterns(
     patterns: Pattern | Sequence[Pattern],
     captions: Sequence[str] = (),
+    *,
     views: Sequence[tuple[float, float] | None] = (),
     tallest: float = 2.6,
     width: float = 7.0,

@@ -47,7 +47,9 @@ def moved_supports(case: Case) -> tuple[list[int], str] | None:
     return np.flatnonzero(together).tolist(), direction
 
 
-def total_reaction(path: xr.Dataset, nodes: Sequence[int], direction: str) -> NDArray[np.float64]:
+def total_reaction(
+    path: xr.Dataset, nodes: Sequence[int], *, direction: str
+) -> NDArray[np.float64]:
     """Sum of the forces of supports on nodes in a direction.
 
     Parameters

@@ -23,6 +23,7 @@ SIZE = (6.4, 3.8)
 def plot_response_curve(
     curves: xr.Dataset | Mapping[str, xr.Dataset],
     backbone: xr.Dataset | None = None,
+    *,
     title: str = "",
 ) -> Figure:
     """Draw response curves: stable motions solid, unstable ones dashed, bifurcations marked.

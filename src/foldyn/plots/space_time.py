@@ -31,6 +31,7 @@ DECADES = 3.0  # of amplitudes that a spectrum shows
 def plot_space_time(
     trajectory: xr.Dataset,
     cell: UnitCell,
+    *,
     component: str = "z",
     quantity: str = "displacement",
     along: int = 0,
@@ -67,7 +68,7 @@ def plot_space_time(
         As of `foldyn.linear.space_time`; strains of cells that do not advance.
     """
     choice("quantity", quantity, QUANTITIES)
-    found = space_time(trajectory, cell, component, along)
+    found = space_time(trajectory, cell, component=component, along=along)
     if quantity not in found:
         raise InputError(' = "strain": the cells do not advance along the chain', "quantity")
     if limit is not None:
@@ -98,6 +99,7 @@ def drawn_cells(found: xr.Dataset, quantity: str, limit: float | None, title: st
 def plot_wave_spectrum(
     spectrum: xr.Dataset,
     bands: xr.Dataset | None = None,
+    *,
     max_frequency: float | None = None,
     title: str = "",
 ) -> Figure:
@@ -160,6 +162,7 @@ def plot_wave_spectrum(
 def plot_transmission(
     transmissions: xr.Dataset | Mapping[str, xr.Dataset],
     attenuation: xr.Dataset | None = None,
+    *,
     title: str = "",
 ) -> Figure:
     """Draw what reaches the end of a chain, and its decay from cell to cell beside the bands'.

@@ -29,6 +29,7 @@ _LEGEND_COLUMNS = 3
 def draw_structure(
     case_or_structure: Case | Structure | Pattern | xr.Dataset,
     displacement: ArrayLike | None = None,
+    *,
     numbers: bool | Literal["all"] = True,
     supports: bool = True,
     loads: bool = True,

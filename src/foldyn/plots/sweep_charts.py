@@ -73,7 +73,7 @@ def effect_charts(
     """Main effects on a measure, a chart for each parameter, with the points if asked."""
     found, charts = measured(sweep, measure, at), []
     check_some(found.values, measure)
-    for effect in main_effects(sweep, measure, at):
+    for effect in main_effects(sweep, measure, at=at):
         one = sweep[effect.name]
         across, words = places(effect.values)
         curves = [Curve("mean over everything else", across, effect.mean, spread=effect.deviation)]

@@ -41,6 +41,7 @@ _FAILED: dict[str, Any] = {"marker": "x", "color": style.VERMILLION, "linestyle"
 def plot_sweep_map(
     sweep: xr.Dataset,
     measure: str,
+    *,
     x: str | None = None,
     y: str | None = None,
     at: Mapping[str, Any] | None = None,
@@ -112,6 +113,7 @@ def plot_sweep_map(
 def plot_sweep_lines(
     sweep: xr.Dataset,
     measure: str,
+    *,
     x: str | None = None,
     by: str | None = None,
     at: Mapping[str, Any] | None = None,
@@ -151,7 +153,7 @@ def plot_sweep_lines(
 
 
 def plot_main_effects(
-    sweep: xr.Dataset, measure: str, at: Mapping[str, Any] | None = None, title: str = ""
+    sweep: xr.Dataset, measure: str, *, at: Mapping[str, Any] | None = None, title: str = ""
 ) -> Figure:
     """Draw the mean of a measure over the values of each parameter of a sweep.
 

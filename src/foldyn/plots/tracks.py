@@ -26,6 +26,7 @@ _WIDTH = 8.0  # inches
 def plot_tracks(
     tracks: xr.Dataset,
     nodes: int | Sequence[int],
+    *,
     axis: str | None = None,
     truth: Mapping[int, ArrayLike] | None = None,
     title: str = "",
@@ -65,7 +66,7 @@ def plot_tracks(
 
 
 def plot_steps(
-    steps: Mapping[str, tuple[ArrayLike, ArrayLike]], unit: str = "m", title: str = ""
+    steps: Mapping[str, tuple[ArrayLike, ArrayLike]], unit: str = "m", *, title: str = ""
 ) -> Figure:
     """Draw a history after each step of its preparation, one row each.
 
@@ -96,7 +97,7 @@ def plot_steps(
 
 
 def draw_overlay(
-    picture: NDArray[np.uint8], tracks: xr.Dataset, at: int | None = None, title: str = ""
+    picture: NDArray[np.uint8], tracks: xr.Dataset, *, at: int | None = None, title: str = ""
 ) -> Figure:
     """Draw the projected model, the tracked nodes and their numbers over a picture.
 

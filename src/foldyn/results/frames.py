@@ -53,7 +53,7 @@ class Shapes(NamedTuple):
 
 
 def shapes_of(
-    result: xr.Dataset, every: int | None = None, frames: int | None = None, scale: float = 1.0
+    result: xr.Dataset, every: int | None = None, *, frames: int | None = None, scale: float = 1.0
 ) -> Shapes:
     """Shapes of all nodes that a motion, a path or modes go through.
 
@@ -140,7 +140,7 @@ class States(NamedTuple):
 
 
 def frames_of(
-    result: xr.Dataset, every: int | None = None, frames: int | None = None, scale: float = 1.0
+    result: xr.Dataset, every: int | None = None, *, frames: int | None = None, scale: float = 1.0
 ) -> States:
     """States of a motion, a path, modes or a folding, for `write_pattern`.
 
@@ -165,7 +165,7 @@ def frames_of(
     >>> pattern, frames = frames_of(trajectory, every=10)  # doctest: +SKIP
     >>> fd.write_pattern("run.fold", pattern, frames)  # doctest: +SKIP
     """
-    return _states(result, shapes_of(result, every, frames, scale))
+    return _states(result, shapes_of(result, every, frames=frames, scale=scale))
 
 
 def _states(result: xr.Dataset, shapes: Shapes) -> States:
@@ -174,7 +174,7 @@ def _states(result: xr.Dataset, shapes: Shapes) -> States:
     return States(pattern, list(map(Frame, shapes.titles, vertices)))
 
 
-def state_of(result: xr.Dataset, frame: int | None = None, scale: float = 1.0) -> Pattern:
+def state_of(result: xr.Dataset, frame: int | None = None, *, scale: float = 1.0) -> Pattern:
     """Pattern in one state of a motion, a path, modes or a folding.
 
     Parameters

@@ -148,7 +148,7 @@ class MainEffect:
 
 
 def main_effects(
-    ds: xr.Dataset, measure: str, at: Mapping[str, Any] | None = None
+    ds: xr.Dataset, measure: str, *, at: Mapping[str, Any] | None = None
 ) -> tuple[MainEffect, ...]:
     """Main effects of all parameters of a sweep on a measure; points that failed are left out.
 
@@ -223,6 +223,7 @@ class SobolIndices:
 def sobol_indices(
     ds: xr.Dataset,
     measure: str,
+    *,
     at: Mapping[str, Any] | None = None,
     confidence: float = 0.95,
     resamples: int = 999,

@@ -330,6 +330,7 @@ class Shell(Discretized):
 def shell(
     pattern: Pattern | Patterned,
     sheet: Sheet,
+    *,
     divisions: int = 16,
     mass: str = "lumped",
     fold_law: str | HingeLaw = EnhancedLinear(),

@@ -65,6 +65,7 @@ class CircleFit:
 def circle_fit(
     frequency: ArrayLike,
     response: ArrayLike,
+    *,
     band: tuple[float, float] | None = None,
     quantity: str = "receptance",
 ) -> CircleFit:
@@ -121,6 +122,7 @@ def circle_fit(
 def circle_fits(
     frequency: ArrayLike,
     response: ArrayLike,
+    *,
     bands: Sequence[tuple[float, float]],
     quantity: str = "receptance",
 ) -> tuple[CircleFit, ...]:
@@ -183,7 +185,7 @@ def _mobility(
         )
     if not np.iscomplexobj(Y):
         raise InputError("response: real; a circle fit needs the complex response, not its modulus")
-    Y = convert_response(f, Y, quantity, "mobility")
+    Y = convert_response(f, Y, source=quantity, target="mobility")
     return f[f > 0.0], Y[f > 0.0]
 
 

@@ -11,7 +11,7 @@ from foldyn.values import choice
 
 
 def convert_response(
-    frequency: ArrayLike, response: ArrayLike, source: str, target: str
+    frequency: ArrayLike, response: ArrayLike, *, source: str, target: str
 ) -> NDArray[np.complex128]:
     """Convert a frequency response between receptance, mobility and accelerance.
 

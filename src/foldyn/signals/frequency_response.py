@@ -65,6 +65,7 @@ class FrequencyResponse:
 def frequency_response(
     force: ArrayLike,
     response: ArrayLike,
+    *,
     dt: float,
     estimator: str = "h1",
     segment: int | None = None,
@@ -207,7 +208,7 @@ def _transform(
     return scipy.fft.rfft(records.detrended(x, detrend) * records.beside(weights, x), axis=0)
 
 
-def exponential_window(n: int, dt: float, rate: float) -> NDArray[np.float64]:
+def exponential_window(n: int, dt: float, *, rate: float) -> NDArray[np.float64]:
     """Window exp(-rate t) for records that have not died away at their end.
 
     On force and response alike it moves every pole by -rate along the real axis, exactly: what
@@ -232,7 +233,7 @@ def exponential_window(n: int, dt: float, rate: float) -> NDArray[np.float64]:
 
 
 def without_window(
-    frequency: ArrayLike, damping_ratio: ArrayLike, rate: float
+    frequency: ArrayLike, damping_ratio: ArrayLike, *, rate: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Natural frequencies and damping ratios without the damping of an exponential window.
 

@@ -54,6 +54,7 @@ class LogDecrement:
 def log_decrement(
     x: ArrayLike,
     dt: float,
+    *,
     rest: float | None = None,
     floor: float = 0.1,
     frequency: float | None = None,

@@ -65,6 +65,7 @@ class DecayingModes:
 def matrix_pencil(
     x: ArrayLike,
     dt: float,
+    *,
     order: int | None = None,
     threshold: float | None = None,
     width: int | None = None,

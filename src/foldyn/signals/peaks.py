@@ -44,6 +44,7 @@ class Peaks:
 def find_peaks(
     frequency: ArrayLike,
     magnitude: ArrayLike,
+    *,
     prominence: float = 0.05,
     count: int | None = None,
     quantity: str = "receptance",
@@ -250,6 +251,7 @@ class HalfPower:
 def half_power(
     frequency: ArrayLike,
     magnitude: ArrayLike,
+    *,
     near: float | None = None,
     quantity: str = "receptance",
     ripple: float = 0.05,

@@ -61,7 +61,7 @@ def fill_gaps(x: ArrayLike, longest: int = 5) -> NDArray[np.float64]:
 
 
 def choose_window(
-    time: ArrayLike, x: ArrayLike, start: float, stop: float
+    time: ArrayLike, x: ArrayLike, *, start: float, stop: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Samples from `start` to `stop` (s), both included.
 

@@ -15,6 +15,7 @@ MINIMUM_SAMPLES = 4
 def spectrum(
     x: ArrayLike,
     dt: float,
+    *,
     axis: int = 0,
     window: records.Window = None,
     detrend: str | None = None,

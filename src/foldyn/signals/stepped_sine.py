@@ -51,6 +51,7 @@ class SineFit:
 def fit_sine(
     time: ArrayLike,
     x: ArrayLike,
+    *,
     frequency: float,
     cycles: int | None = None,
     harmonics: int = 1,
@@ -135,6 +136,7 @@ def fit_sine(
 def stepped_sine(
     time: ArrayLike,
     force: ArrayLike,
+    *,
     response: ArrayLike,
     frequency: float,
     cycles: int | None = None,
@@ -168,10 +170,17 @@ def stepped_sine(
     """
     if np.ndim(force) != 1:
         raise InputError(f"force: shape {np.shape(force)}; give one record, shape (n,)")
-    push = fit_sine(time, force, frequency, cycles, harmonics).amplitude[0]
+    push = fit_sine(time, force, frequency=frequency, cycles=cycles, harmonics=harmonics).amplitude[
+        0
+    ]
     if not np.abs(push) > 1e-12 * np.abs(real_array("force", force)).max():
         raise InputError(f"force: no content at {frequency:g} Hz; a response per force needs one")
-    return fit_sine(time, response, frequency, cycles, harmonics).amplitude[0] / push
+    return (
+        fit_sine(time, response, frequency=frequency, cycles=cycles, harmonics=harmonics).amplitude[
+            0
+        ]
+        / push
+    )
 
 
 def _steady_part(

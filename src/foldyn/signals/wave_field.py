@@ -34,7 +34,7 @@ class WavenumberSpectrum(NamedTuple):
 
 
 def wavenumber_spectrum(
-    values: ArrayLike, dt: float, window: records.Window = "hann"
+    values: ArrayLike, dt: float, *, window: records.Window = "hann"
 ) -> WavenumberSpectrum:
     """Two-dimensional spectrum of what moves in a chain of cells.
 
@@ -113,7 +113,7 @@ class Pulse(NamedTuple):
     speed: float
 
 
-def pulse(time: ArrayLike, values: ArrayLike, sign: int = 1, share: float = 0.5) -> Pulse:
+def pulse(time: ArrayLike, values: ArrayLike, *, sign: int = 1, share: float = 0.5) -> Pulse:
     """Follow the first pulse of one sign along a chain of cells.
 
     It arrives in a cell with the first maximum that has at least a share of the largest value of

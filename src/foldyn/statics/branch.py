@@ -39,8 +39,8 @@ FAR = 10.0  # times the amplitude: farther away is not beside the bifurcation
 def switch_branch(
     path: xarray.Dataset,
     at: int | None = None,
-    direction: int = 1,
     *,
+    direction: int = 1,
     case: Case | None = None,
     mode: int = 0,
     method: str = "arc_length",

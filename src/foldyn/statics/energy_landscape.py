@@ -120,6 +120,7 @@ class Landscape:
 def landscape(
     path: xarray.Dataset,
     case: Case | None = None,
+    *,
     settings: Settings | Mapping[str, Any] | None = None,
 ) -> Landscape:
     """Energy landscape along a path that leads through the states of a bistable structure.

@@ -36,9 +36,9 @@ COPIES = 8  # of a point's dofs, while forces, work and the dataset are made of 
 def trace(
     case: Case,
     method: str = "newton",
+    *,
     load_factors: Sequence[float] | None = None,
     steps: int | None = None,
-    *,
     duration: float | Sequence[float] | None = None,
     constant: str | Sequence[int] = (),
     initial: State | None = None,

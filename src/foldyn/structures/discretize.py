@@ -36,6 +36,7 @@ PER_NODE = 7000.0
 def discretize(
     pattern: Pattern | Patterned,
     sheet: Sheet,
+    *,
     scheme: Literal["n5b8", "n4b5", "n5b8e"] | None = None,
     mass: str | None = None,
     bar_law: str | BarLaw | None = None,

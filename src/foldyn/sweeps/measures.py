@@ -119,7 +119,7 @@ def curve_of(
         interval = sampling_interval(result["time"].values)
         f, amplitude = spectrum(motion, interval, detrend="constant")
         size = np.linalg.norm(amplitude, axis=1)
-        return f, size, find_peaks(f, size, PROMINENT), "receptance"
+        return f, size, find_peaks(f, size, prominence=PROMINENT), "receptance"
     shown = quantity_of(result)
     response = result[shown].transpose("frequency", ...).sel(node=node, axis=along).values
     size = np.linalg.norm(np.abs(response), axis=1)
@@ -180,7 +180,7 @@ def _peak_damping(result: xr.Dataset, case: Case, node: int, axis: str | None = 
     k = highest(peaks)
     if k is None:
         return np.nan
-    return half_power(f, size, float(peaks.frequency[k]), kind).damping_ratio
+    return half_power(f, size, near=float(peaks.frequency[k]), quantity=kind).damping_ratio
 
 
 @_measure(MOTION, doc="damping ratio by logarithmic decrement")

@@ -117,7 +117,7 @@ def _indices(
     sweep: xr.Dataset, name: str, at: dict[str, Any], album: Album, text: str
 ) -> Iterator[Section]:  # fmt: skip
     try:
-        found = sobol_indices(sweep, name, at)
+        found = sobol_indices(sweep, name, at=at)
     except InputError as error:
         yield Text(f"No Sobol indices: {error}")
         return

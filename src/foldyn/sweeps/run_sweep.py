@@ -60,8 +60,8 @@ class Course:
 def sweep(
     case: str | os.PathLike[str],
     vary: Mapping[str, Any] | None = None,
-    measures: Measures | None = None,
     *,
+    measures: Measures | None = None,
     samples: int | None = None,
     method: str | None = None,
     seed: int | None = None,

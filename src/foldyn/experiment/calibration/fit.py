@@ -78,8 +78,8 @@ class Course:
 def fit(
     case: str | os.PathLike[str],
     data: Sequence[Measurement],
-    parameters: Sequence[Parameter],
     *,
+    parameters: Sequence[Parameter],
     ties: Mapping[str, str] | None = None,
     starts: int = 1,
     seed: int = 0,

@@ -104,6 +104,7 @@ class SyntheticFilm:
 def film_of(
     motion: xr.Dataset,
     camera: Camera,
+    *,
     rate: float = 240.0,
     duration: float | None = None,
     start: float = 0.0,
@@ -164,6 +165,7 @@ def film_of(
 def photos_of(
     path: xr.Dataset,
     steps: Sequence[int],
+    *,
     camera: Camera,
     look: Look | None = None,
     sensor: Sensor | None = None,

@@ -70,7 +70,7 @@ class CornerSettings:
 
 
 def find_corners(
-    image: NDArray[np.uint8], settings: CornerSettings | None = None, place: str = "the picture"
+    image: NDArray[np.uint8], settings: CornerSettings | None = None, *, place: str = "the picture"
 ) -> NDArray[np.float64]:
     """Find the corners of a picture.
 
@@ -110,7 +110,7 @@ def find_corners(
         raise InputError(
             f"{place}: no corners found in it; take a sharp, well lit one, or another --roi"
         )
-    junctions = refine(image, candidates.reshape(-1, 2), reach, 0.6 * reach)
+    junctions = refine(image, candidates.reshape(-1, 2), reach=reach, moved=0.6 * reach)
     # where more edges meet it is more likely a corner of the pattern than the end of a stain
     order = np.lexsort([junctions.error, -np.minimum(junctions.edges, 4)])
     order = order[np.isfinite(junctions.position[order, 0])]
@@ -154,7 +154,7 @@ class Junctions:
     edges: NDArray[np.int64]
 
 
-def refine(image: NDArray[np.uint8], points: ArrayLike, reach: float, moved: float) -> Junctions:
+def refine(image: NDArray[np.uint8], points: ArrayLike, *, reach: float, moved: float) -> Junctions:
     """Find the corner next to each point.
 
     Parameters

@@ -90,7 +90,7 @@ def _capture(path: Path) -> Iterator[Any]:
 
 
 def open_film(
-    path: str | os.PathLike[str], roi: Box | None = None, rate: float | None = None
+    path: str | os.PathLike[str], roi: Box | None = None, *, rate: float | None = None
 ) -> Film:
     """Open a film, and read its first frame to be sure that it can be.
 

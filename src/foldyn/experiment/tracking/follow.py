@@ -97,6 +97,7 @@ class Step:
 def follow(
     frames: Iterable[tuple[float, NDArray[np.uint8]]],
     points: Array,
+    *,
     reach: float,
     settings: FollowSettings | None = None,
     unseen: NDArray[np.bool_] | None = None,
@@ -138,7 +139,7 @@ def follow(
             yield Step(time, unknown, unknown[:, 0], np.zeros(count, np.int8), True)
             continue
         if last is None:
-            first = refine(frame, points, reach, 0.5 * reach)
+            first = refine(frame, points, reach=reach, moved=0.5 * reach)
             kept = np.isfinite(first.position[:, 0])
             kept &= True if unseen is None else ~unseen
             state = _State.begun(np.where(kept[:, np.newaxis], first.position, points), kept)
@@ -200,7 +201,7 @@ def _advance(
     led = state.misses == 0
     flown, there = _flow(last, frame, state.here, state.here + state.step, led, reach, settings)
     # a junction near the place to which the flow leads
-    junction = refine(frame, _only(there, flown), reach, 0.5 * reach)
+    junction = refine(frame, _only(there, flown), reach=reach, moved=0.5 * reach)
     good = there & np.isfinite(junction.position[:, 0]) & (junction.error < settings.error)
     place = np.where(good[:, np.newaxis], junction.position, flown)
     expected, distance = _by_neighbors(state, place, good)
@@ -221,7 +222,7 @@ def _advance(
         barred = ~(np.isfinite(guided[:, 0]) & (usual < _SURE * reach))
         expected = np.where(barred[:, np.newaxis], expected, guided)
     guess = np.where(np.isfinite(expected), expected, state.here)
-    again = refine(frame, _only(~(good | barred), guess), reach, 0.35 * reach)
+    again = refine(frame, _only(~(good | barred), guess), reach=reach, moved=0.35 * reach)
     # where fewer edges meet, the end of a stain on an edge may be taken for the corner
     allowed = settings.error * np.where(again.edges >= 4, 1.0, _CLEAR)
     found = ~good & np.isfinite(again.position[:, 0]) & (again.error < allowed)

@@ -97,6 +97,7 @@ class Match:
 def match_nodes(
     image: NDArray[np.uint8],
     corners: Array,
+    *,
     states: Array,
     triangles: NDArray[np.int64],
     nodes: NDArray[np.int64],
@@ -291,7 +292,7 @@ def _looked_up(
     kept = _without_strays(place, flat, asked)
     expected = by_model(kept, flat, asked)
     missing = np.where(np.isfinite(kept), np.nan, expected)
-    junctions = refine(image, missing, reach, 0.6 * reach)
+    junctions = refine(image, missing, reach=reach, moved=0.6 * reach)
     sure = np.isfinite(junctions.position[:, 0]) & (junctions.error < 0.5)
     for node in np.flatnonzero(sure):
         apart = np.hypot(*(kept - junctions.position[node]).T)

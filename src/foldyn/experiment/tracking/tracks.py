@@ -70,6 +70,7 @@ class Tracking:
 def track_film(
     film: Film | str,
     model: TrackedModel | None = None,
+    *,
     tracking: Tracking | None = None,
     tell: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
@@ -117,7 +118,7 @@ def track_film(
         corners[match.node] = match.uv
         unseen = ~np.isin(nodes, match.node)
     else:
-        corners = find_corners(first, tracking.corners, f"{film.path}, first frame")
+        corners = find_corners(first, tracking.corners, place=f"{film.path}, first frame")
         nodes = np.full(len(corners), -1)
 
     def frames() -> Iterator[tuple[float, NDArray[np.uint8]]]:
@@ -127,7 +128,9 @@ def track_film(
             yield time, frame
 
     steps: list[Step] = []
-    for step in follow(frames(), corners, reach, tracking.following, unseen, guide):
+    for step in follow(
+        frames(), corners, reach=reach, settings=tracking.following, unseen=unseen, guide=guide
+    ):
         steps.append(step)
         if tell is not None:
             tell(len(steps))
@@ -144,6 +147,7 @@ def track_film(
 def track_photos(
     paths: Sequence[Any],
     model: TrackedModel,
+    *,
     tracking: Tracking | None = None,
     loads: ArrayLike | None = None,
     roi: tuple[int, int, int, int] | None = None,
@@ -258,7 +262,7 @@ def _matched(
     image: NDArray[np.uint8], model: TrackedModel, tracking: Tracking, place: str
 ) -> Match:
     """Find the corners of a picture, and the model's nodes among them."""
-    corners = find_corners(image, tracking.corners, place)
+    corners = find_corners(image, tracking.corners, place=place)
     asked = tracking.nodes or ()
     wrong = [node for node in asked if not 0 <= node < model.vertices]
     if wrong:
@@ -271,8 +275,9 @@ def _matched(
             "for: take a sharper picture, a larger --roi, or fewer --nodes"
         )
     return match_nodes(
-        image, corners, model.states, model.triangles, np.arange(model.vertices), tracking.placing,
-        tracking.corners.reach_in(image.shape), place,
+        image, corners, states=model.states, triangles=model.triangles,
+        nodes=np.arange(model.vertices), placing=tracking.placing,
+        reach=tracking.corners.reach_in(image.shape), place=place,
     )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from foldyn.patterns.pattern import Pattern
 def arc_miura(
     cells: Sequence[int] = (2, 4),
     a: float = 1.0,
+    *,
     b: float = 1.0,
     panel_angle: float = 60.0,
     second_angle: float = 75.0,

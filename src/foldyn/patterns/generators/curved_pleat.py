@@ -16,6 +16,7 @@ from foldyn.values import length, whole
 def curved_pleat(
     pleats: int = 4,
     segments: int = 9,
+    *,
     a: float = 0.4,
     radius: float = 1.0,
     arc: float = 90.0,
@@ -82,7 +83,9 @@ def curved_pleat(
     z = a * math.sin(tilt) * (j % 2)
     letters = None
     if flat:
-        letters = curved_pleat(pleats, segments, a, radius, arc, (180 + steepest) / 2).assignments
+        letters = curved_pleat(
+            pleats, segments, a=a, radius=radius, arc=arc, dihedral=(180 + steepest) / 2
+        ).assignments
     places = [x, y + a * math.cos(tilt) * j, z]
     periods = opposite(segments, pleats)[1:] if pleats % 2 == 0 else ()
     return sheet("curved pleat", places, ("curve", "ruling"), letters, periods)

@@ -14,6 +14,7 @@ from foldyn.patterns.pattern import Pattern
 def eggbox(
     cells: Sequence[int] = (1, 1),
     a: float = 1.0,
+    *,
     b: float = 1.0,
     panel_angle: float = 75.0,
     dihedral: float = 60.0,

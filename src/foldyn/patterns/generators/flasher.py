@@ -16,7 +16,7 @@ from foldyn.values import flag, length, whole
 LETTERS = {"hub": "V", "ray": "V", "ridge": "M", "inner_bend": "V", "outer_bend": "M"}
 
 
-def flasher(sides: int = 6, a: float = 1.0, rings: int = 3, folded: bool = False) -> Pattern:
+def flasher(sides: int = 6, a: float = 1.0, *, rings: int = 3, folded: bool = False) -> Pattern:
     """Flasher: a flat sheet that wraps around a polygonal hub, of zero thickness.
 
     Each side of the hub is prolonged by a ray; the wedge of 360/sides degrees between two rays is

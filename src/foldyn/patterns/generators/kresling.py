@@ -14,6 +14,7 @@ from foldyn.values import flag, length, whole
 def kresling(
     sides: int = 6,
     radius: float = 1.0,
+    *,
     height: float = 0.9,
     twist: float = 30.0,
     storeys: int = 1,

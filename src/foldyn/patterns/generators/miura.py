@@ -15,6 +15,7 @@ from foldyn.patterns.topology import Edge
 def miura(
     cells: Sequence[int] = (1, 1),
     a: float = 1.0,
+    *,
     b: float = 1.0,
     panel_angle: float = 60.0,
     dihedral: float = 60.0,

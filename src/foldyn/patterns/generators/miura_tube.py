@@ -19,6 +19,7 @@ CLOSED = "at both of which the tube is flat"
 def miura_tube(
     cells: int = 3,
     a: float = 1.0,
+    *,
     b: float = 1.0,
     panel_angle: float = 60.0,
     dihedral: float = 90.0,
@@ -71,7 +72,9 @@ def tube(cells: int, a: float, b: float, panel_angle: float, dihedral: float) ->
     sizes(a, b)
     acute("panel_angle", panel_angle)
     dihedral = fold_dihedral(dihedral, flat_allowed=False, otherwise=CLOSED)
-    strip = miura((cells, 1), a, b, panel_angle, dihedral).vertices.reshape(-1, 3, 3)
+    strip = miura((cells, 1), a, b=b, panel_angle=panel_angle, dihedral=dihedral).vertices.reshape(
+        -1, 3, 3
+    )
     mirrored = strip[:, 1:2] * [1.0, 1.0, -1.0]
     return np.concatenate([strip, mirrored], axis=1).reshape(-1, 3)
 

@@ -25,7 +25,7 @@ CLOSED = {"tile": -math.pi / 2, "tuck": math.pi, "star": -math.pi / 3}
 """Fold angles (rad) of the closed state."""
 
 
-def resch(cells: Sequence[int] = (3, 3), a: float = 1.0, dihedral: float = 120.0) -> Pattern:
+def resch(cells: Sequence[int] = (3, 3), a: float = 1.0, *, dihedral: float = 120.0) -> Pattern:
     """Resch's triangular tessellation: tiles that close up over tucked stars.
 
     The flat pattern has equilateral triangles of two sizes: tiles with sides a, and stars with

@@ -11,7 +11,7 @@ from foldyn.patterns.generators.arguments import fold_dihedral, sizes
 from foldyn.patterns.pattern import Pattern
 
 
-def simple_fold(a: float = 1.0, b: float = 1.0, dihedral: float = 60.0) -> Pattern:
+def simple_fold(a: float = 1.0, b: float = 1.0, *, dihedral: float = 60.0) -> Pattern:
     r"""Two rectangles that meet in one crease: an inverted V on the ground, a mountain.
 
     Vertices 0, 1 are at x = 0, vertices 2, 3 on the ridge (x = w, z = h), vertices 4, 5 at

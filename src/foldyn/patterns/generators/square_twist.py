@@ -17,6 +17,7 @@ from foldyn.values import flag
 def square_twist(
     a: float = 1.0,
     b: float = 1.0,
+    *,
     panel_angle: float = 45.0,
     dihedral: float = 100.0,
     symmetric: bool = False,

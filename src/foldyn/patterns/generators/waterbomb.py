@@ -18,6 +18,7 @@ LETTERS = {"diagonal": "V", "middle": "M", "side": "M", "row": "M"}
 def waterbomb(
     cells: Sequence[int] = (4, 5),
     a: float = 1.0,
+    *,
     b: float = 1.0,
     dihedral: float = 120.0,
 ) -> Pattern:

@@ -17,6 +17,7 @@ from foldyn.patterns.topology import Edge
 def yoshimura(
     cells: Sequence[int] = (6, 4),
     a: float = 0.5,
+    *,
     b: float = 1.0,
     dihedral: float = 160.0,
 ) -> Pattern:

@@ -18,6 +18,7 @@ TIES = "foldyn:ties"
 def zipper_tubes(
     cells: int = 3,
     a: float = 1.0,
+    *,
     b: float = 1.0,
     panel_angle: float = 60.0,
     dihedral: float = 90.0,

@@ -187,8 +187,8 @@ class Folding:
 def fold(
     pattern: Pattern,
     angles: Any = None,
-    fraction: float | str | None = None,
     *,
+    fraction: float | str | None = None,
     steps: int = 20,
     start: Literal["auto", "pattern", "folded"] = "auto",
     panels: Literal["whole", "subdivided"] = "whole",

@@ -46,7 +46,7 @@ def under_loads(name: str, factors: Sequence[float] = LOADS) -> dict[str, NDArra
         force = np.sum([p for p, _ in case.load_terms], axis=0)
         return np.einsum("sna,na->s", _paths(case, factors).displacement.values, force)
 
-    true = moved(shell(pattern, sheet, DIVISIONS["study"]))
+    true = moved(shell(pattern, sheet, divisions=DIVISIONS["study"]))
     return {law: moved(discretize(pattern, sheet, **o)) / true - 1.0 for law, o in LAWS.items()}
 
 
@@ -72,7 +72,7 @@ def twisted(angle: float, b: float, turns: Sequence[float] = TURNS) -> dict[str,
         path = _paths(case, [turn / turns[-1] for turn in turns])
         return path.reaction.values[:, path.support_node.values == 2][:, -1]
 
-    true = force(shell(panel, SHEET, DIVISIONS["panel"]))
+    true = force(shell(panel, SHEET, divisions=DIVISIONS["panel"]))
     return {law: force(discretize(panel, SHEET, **o)) / true - 1.0 for law, o in LAWS.items()}
 
 

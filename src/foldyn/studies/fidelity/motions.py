@@ -139,7 +139,7 @@ def _at(motion: Motion, times: NDArray) -> NDArray:
 def _alike(true: NDArray, own: NDArray, weight: NDArray) -> NDArray:
     """MAC (k,) of the shapes at the same extremes."""
     pairs = zip(true, own, strict=False)
-    return np.array([mac(a[None], b[None], weight)[0, 0] for a, b in pairs])
+    return np.array([mac(a[None], b[None], mass=weight)[0, 0] for a, b in pairs])
 
 
 def structures(
@@ -149,7 +149,7 @@ def structures(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
         made: dict[str, Any] = {
-            SHELL: shell(pattern, sheet, divisions, mass="consistent", **creases)
+            SHELL: shell(pattern, sheet, divisions=divisions, mass="consistent", **creases)
         }
         for law, own in LAWS.items():
             given: dict[str, Any] = {**own, **creases}
@@ -203,7 +203,7 @@ def pulsed(name: str, divisions: int = DIVISIONS[0]) -> Started:
     pattern, sheet = given.structure.pattern, given.structure.sheet
     made = structures(pattern, sheet, divisions, fold_law=given.structure.options.fold_law)
     force = np.sum([p for p, _ in given.load_terms], axis=0)[: len(pattern.vertices)]
-    meshes = (made[SHELL], shell(pattern, sheet, DIVISIONS[1], mass="consistent"))
+    meshes = (made[SHELL], shell(pattern, sheet, divisions=DIVISIONS[1], mass="consistent"))
     free = replace(given, loads=())
     coarse, fine = (modes(replace(free, structure=s), 1).frequency.values[0] for s in meshes)
     limit = extrapolated(coarse, fine, DIVISIONS[1] / divisions)
@@ -230,11 +230,11 @@ def _motion(case: Case, duration: float, dt: float, start: State | None = None) 
         warnings.simplefilter("ignore", FoldynWarning)
         for halving in range(HALVINGS):
             try:
-                return simulate(case, duration, METHOD, dt=dt / 2**halving, initial=start)
+                return simulate(case, duration, method=METHOD, dt=dt / 2**halving, initial=start)
             except (InstabilityError, PenetrationError):
                 continue
         try:
-            return simulate(case, duration, METHOD, dt=dt / 2**HALVINGS, initial=start)
+            return simulate(case, duration, method=METHOD, dt=dt / 2**HALVINGS, initial=start)
         except PenetrationError as error:
             return error.partial
 

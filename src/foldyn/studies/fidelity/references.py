@@ -109,7 +109,14 @@ def computed(case: MixedCase, divisions: tuple[int, int, int]) -> dict[str, Any]
         warnings.simplefilter("ignore", FoldynWarning)
         meshes = [
             case.case(
-                shell(pattern, case.sheet, n, "consistent", vertex_radius=radius, **case.options)
+                shell(
+                    pattern,
+                    case.sheet,
+                    divisions=n,
+                    mass="consistent",
+                    vertex_radius=radius,
+                    **case.options,
+                )
             )
             for n in divisions
         ]

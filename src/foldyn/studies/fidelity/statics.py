@@ -55,7 +55,7 @@ def study(name: str) -> Softness:
     def of(structure: Discretized) -> float:
         return small_loads(replace(given, structure=structure)).displacement
 
-    true = float(_extrapolated(lambda n: of(shell(pattern, sheet, n)), MESHES["studies"]))
+    true = float(_extrapolated(lambda n: of(shell(pattern, sheet, divisions=n)), MESHES["studies"]))
     bars = {m: of(discretize(pattern, sheet, **o)) for m, o in MODELS.items()}
     return Softness(name, true, {model: found / true - 1.0 for model, found in bars.items()})
 
@@ -84,7 +84,9 @@ def steel() -> tuple[Softness, NDArray, Mapping[str, NDArray]]:
             small_loads(case).displacement, modes(replace(case, loads=()), 3)["frequency"]
         )
 
-    fine = _extrapolated(lambda n: of(shell(pattern, STEEL, n, mass="consistent")), MESHES["steel"])
+    fine = _extrapolated(
+        lambda n: of(shell(pattern, STEEL, divisions=n, mass="consistent")), MESHES["steel"]
+    )
     bars = {m: of(discretize(pattern, STEEL, **o)) for m, o in MODELS.items()}
     error = {model: float(found[0] / fine[0] - 1.0) for model, found in bars.items()}
     frequency = {model: found[1:] for model, found in bars.items()}

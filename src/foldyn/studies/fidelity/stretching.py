@@ -89,7 +89,9 @@ def _errors(held: Held, measure: Callable[[Discretized], NDArray]) -> dict[str, 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
         coarse, fine = (
-            measure(shell(held.pattern, held.sheet, n, vertex_radius=held.sheet.thickness))
+            measure(
+                shell(held.pattern, held.sheet, divisions=n, vertex_radius=held.sheet.thickness)
+            )
             for n in held.meshes
         )
         true = extrapolated(coarse, fine, held.meshes[1] / held.meshes[0])

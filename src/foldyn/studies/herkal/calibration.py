@@ -223,7 +223,7 @@ def calibrate(folder: Path) -> tuple[experiment.Fit, experiment.Fit]:
 def fit_folds(static: Sequence[experiment.Measurement], **options: Any) -> experiment.Fit:
     """Fit the length-scale ratio and theta1 = 360 - theta2 to a static test."""
     return experiment.fit(
-        find_case("herkal/specimen"), static, FOLD_RANGES, ties=MIRRORED, **options
+        find_case("herkal/specimen"), static, parameters=FOLD_RANGES, ties=MIRRORED, **options
     )
 
 
@@ -236,7 +236,7 @@ def fit_damping(
     case: Path, film: Sequence[experiment.Measurement], **options: Any
 ) -> experiment.Fit:
     """Fit alpha and beta to a release."""
-    return experiment.fit(case, film, DAMPING_RANGES, **options)
+    return experiment.fit(case, film, parameters=DAMPING_RANGES, **options)
 
 
 def spectra_of(film: Sequence[experiment.Measurement]) -> list[experiment.Spectrum]:

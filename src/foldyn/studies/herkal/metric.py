@@ -64,7 +64,7 @@ def strongest_peak(
     prominence: float,
 ) -> float:
     """Frequency (Hz) of the highest peak within a band; nan where there is none."""
-    peaks = find_peaks(frequency, amplitude, prominence)
+    peaks = find_peaks(frequency, amplitude, prominence=prominence)
     inside = (peaks.frequency > band[0]) & (peaks.frequency < band[1])
     if not inside.any():
         return float("nan")

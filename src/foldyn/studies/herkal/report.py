@@ -307,7 +307,9 @@ def _case(study: Study, case: str, album: Album, shown: Stage | None) -> list[Se
                 f"{case}-{name}",
                 f"Displacement of the reported nodes along {axis} (left) and its frequency "
                 f"content (right): shell and {what}.",
-                lambda moved=moved: plots.plot_history(moved, nodes, axis, up_to),
+                lambda moved=moved: plots.plot_history(
+                    moved, nodes, axes=axis, max_frequency=up_to
+                ),
             )
     return [*sections, _errors(study, case, nodes), _modes(study, case)]
 

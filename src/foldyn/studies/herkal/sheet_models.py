@@ -112,7 +112,7 @@ def _shell(case_file: CaseFile, options: Mapping[str, Any], divisions: int) -> A
     """Shell with the creases of the case file; it has no use for `options`."""
     given = vars(case_file.case().structure.options)
     creases = {name: given[name] for name in ("fold_law", "crease_stiffness", "crease_rest")}
-    return shell(case_file.pattern, case_file.sheet, divisions, **creases)
+    return shell(case_file.pattern, case_file.sheet, divisions=divisions, **creases)
 
 
 def _rule(name: str, label: str, paper: bool = False) -> SheetModel:

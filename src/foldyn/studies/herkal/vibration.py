@@ -47,7 +47,7 @@ class Response:
     @classmethod
     def of(cls, found: xarray.Dataset) -> Response:
         """Peaks of a result of `foldyn.frf`."""
-        every = peaks_of(found, CORNER, "x", prominence=0.02)
+        every = peaks_of(found, CORNER, axis="x", prominence=0.02)
         peaks = [one for one in every if one.frequency < HIGHEST]
         return cls(tuple(p.frequency for p in peaks), tuple(p.textbook for p in peaks))
 

@@ -69,7 +69,7 @@ class Unit:
 
     def structure(self, cells: int) -> Structure:
         """Bars and hinges of a tower of cells."""
-        pattern = kresling(SIDES, self.radius, self.height, self.twist, storeys=cells)
+        pattern = kresling(SIDES, self.radius, height=self.height, twist=self.twist, storeys=cells)
         sheet = Sheet(self.youngs_modulus, 0.3, self.thickness, self.density)
         creases: Any = {"mountain": self.crease, "valley": 0.0} if self.crease else 0.0
         return discretize(
@@ -182,7 +182,7 @@ def impact(unit: Unit, cells: int, velocity: float, duration: float) -> xarray.D
         )  # fmt: skip
     cell = unit.cell
     found = space_time(motion, cell)
-    turned = space_time(motion, cell, "rotation")["displacement"]
+    turned = space_time(motion, cell, component="rotation")["displacement"]
     found["rotation"] = (("time", "cell"), turned.values, {"units": "rad"})
     momentum = motion["velocity"].sel(axis="z").values @ np.asarray(case.mass.sum(axis=0)).ravel()
     found["momentum"] = ("time", momentum, {"units": "kg m/s"})
@@ -225,7 +225,7 @@ def overtaking(found: xarray.Dataset) -> Overtaking:
     last = int(UNTIL * found.sizes["gap"])
     strain = found["strain"].values[:, :last]
     time = found["time"].values
-    pressed, pulled = (pulse(time, strain, sign, SHARE) for sign in (-1, 1))
+    pressed, pulled = (pulse(time, strain, sign=sign, share=SHARE) for sign in (-1, 1))
     ahead = pulled.arrival < pressed.arrival
     wrong = [int(ahead[:k].sum() + (~ahead[k:]).sum()) for k in range(last + 1)]
     cell = int(np.argmin(wrong))

@@ -134,7 +134,7 @@ def _plot_spectrum(small: xarray.Dataset, lines: xarray.Dataset) -> Figure:
         {"frequency": (("phase", "band"), lines["bands"].values)},
         {"wave_vector": (("phase", "period"), lines["phase"].values[:, None])},
     )
-    return plot_wave_spectrum(spectrum, shown, 1.15 * float(lines["bands"].max()))
+    return plot_wave_spectrum(spectrum, shown, max_frequency=1.15 * float(lines["bands"].max()))
 
 
 def _impact(album: Album, hit: xarray.Dataset, small: xarray.Dataset | None) -> list[Any]:

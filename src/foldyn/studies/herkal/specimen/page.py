@@ -304,7 +304,7 @@ def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
             "Modes of the model with the fitted folds. "
             + "; ".join(f"{k}: {named['name'].values[k - 1]}" for k in shown)
             + ".",
-            lambda: plots.draw_modes(case_of(modes), modes, shown, title=note),
+            lambda: plots.draw_modes(case_of(modes), modes, which=shown, title=note),
         ),
         _air_table(modes, load(folder / tasks.IN_AIR), named["name"].values.tolist()),
     ]

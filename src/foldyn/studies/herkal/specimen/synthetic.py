@@ -98,7 +98,7 @@ def photograph(folder: Path, shot: Shot) -> list[Path]:
     """
     path = calibration.pressed([0.0, *calibration.weighed(SOFTER)], SOFTER)
     photos, _ = experiment.photos_of(
-        path, range(4), shot.camera(path["rest_position"].values),
+        path, range(4), camera=shot.camera(path["rest_position"].values),
         sensor=shot.sensor(0.0), seed=shot.seed,
     )  # fmt: skip
     files = [folder / f"load{k}.png" for k in range(len(photos))]
@@ -117,7 +117,7 @@ def film(
     """
     moved = released(folder, shot, changes)
     return experiment.film_of(
-        moved, shot.camera(moved["rest_position"].values), shot.rate,
+        moved, shot.camera(moved["rest_position"].values), rate=shot.rate,
         sensor=shot.sensor(EXPOSURE), seed=shot.seed,
     )  # fmt: skip
 

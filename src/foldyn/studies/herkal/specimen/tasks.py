@@ -143,7 +143,7 @@ def _photographs(part: Part, folder: Path) -> None:
         tracks = experiment.track_photos(files, _model(), loads=loads)
         picture = experiment.read_photo(files[-1])
     last = len(loads) - 1
-    _draw(plots.draw_overlay(picture, tracks, last, part.note), folder / "photograph.png")
+    _draw(plots.draw_overlay(picture, tracks, at=last, title=part.note), folder / "photograph.png")
     experiment.save_tracks(tracks, folder / PHOTOS)
 
 
@@ -163,7 +163,7 @@ def _tracked(part: Part, file: Path, folder: Path) -> None:
     film = experiment.open_film(str(file))
     tracks = experiment.track_film(film, _model())
     at = int(tracks.attrs["match_frame"])
-    _draw(plots.draw_overlay(film.picture(at), tracks, at, part.note), folder / "film.png")
+    _draw(plots.draw_overlay(film.picture(at), tracks, at=at, title=part.note), folder / "film.png")
     experiment.save_tracks(tracks, folder / FILM)
 
 
