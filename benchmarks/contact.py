@@ -44,7 +44,7 @@ def step_times(structure: fd.Structure, method: str, steps: int) -> tuple[float,
         for k, contact in enumerate((None, fd.Contact())):
             case = fd.Case(structure, contact=contact)
             run = fd.simulate(
-                case, steps * dt, method=method, dt=dt, every=steps,
+                case, steps * dt, method=method, dt=dt, every_steps=steps,
                 initial=fd.State(velocity=start),
             )  # fmt: skip
             best[k] = min(best[k], float(run.attrs["wall_seconds"]) / steps)

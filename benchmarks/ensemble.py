@@ -46,7 +46,9 @@ def alone(case: fd.Case, dt: float, force: bool) -> float:
 
     def run(steps: int) -> float:
         begun = time.process_time()
-        fd.simulate(case, steps * dt, method="central_difference", dt=dt, every=steps, force=force)
+        fd.simulate(
+            case, steps * dt, method="central_difference", dt=dt, every_steps=steps, force=force
+        )
         return time.process_time() - begun
 
     run(8)
@@ -65,7 +67,7 @@ def main() -> None:
     steps = options.steps
 
     def beside(threads: int) -> dict[str, float]:
-        return fd.simulate_many(cases, steps * dt, dt=dt, every=steps, threads=threads).attrs
+        return fd.simulate_many(cases, steps * dt, dt=dt, every_steps=steps, threads=threads).attrs
 
     fd.simulate_many(cases[:8], 8 * dt, dt=dt)  # compiled now
     single, bare = alone(cases[0], dt, force=False), alone(cases[0], dt, force=True)

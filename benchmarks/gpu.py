@@ -77,7 +77,7 @@ kind = "dynamics"
 method = "rk4"
 duration = {duration}
 [output]
-every = 0.05
+interval = 0.05
 """
 
 
@@ -111,7 +111,7 @@ def agreement() -> None:
         for cells in ((4, 3), (30, 30)):
             case = case_of(cells, "enhanced")
             dt = PART * fd.critical_step(case, method)
-            given = {"dt": dt, "every": 100, "initial": shaken(case)}
+            given = {"dt": dt, "every_steps": 100, "initial": shaken(case)}
             one, two = (
                 fd.simulate(case, 1000 * dt, method=method, device="gpu", **given) for _ in range(2)
             )
@@ -120,7 +120,7 @@ def agreement() -> None:
             ))  # fmt: skip
         cases = [specimen("enhanced", k) for k in range(16)]
         dt = PART * fd.critical_step(cases[-1], method)
-        given = {"dt": dt, "every": 100, "method": method, "initial": shaken(cases[0])}
+        given = {"dt": dt, "every_steps": 100, "method": method, "initial": shaken(cases[0])}
         one, two = (fd.simulate_many(cases, 1000 * dt, device="gpu", **given) for _ in range(2))
         alone = fd.simulate_many(cases, 1000 * dt, device="cpu", **given)
         told(f"{method}, {len(cases)} specimens", one, two, alone)
@@ -169,9 +169,10 @@ def alone(method: str) -> None:
     """Print the seconds of a step of a specimen."""
     case = specimen("enhanced", 0)
     dt = 0.2 * fd.critical_step(case, method)
-    fd.simulate(case, 100 * dt, method=method, dt=dt, every=100)
+    fd.simulate(case, 100 * dt, method=method, dt=dt, every_steps=100)
     print(
-        fd.simulate(case, 4e4 * dt, method=method, dt=dt, every=40_000).attrs["wall_seconds"] / 4e4
+        fd.simulate(case, 4e4 * dt, method=method, dt=dt, every_steps=40_000).attrs["wall_seconds"]
+        / 4e4
     )
 
 
@@ -205,7 +206,7 @@ def row(case: fd.Case, method: str, mine: float) -> str:
     """The line of a sheet, whose steps the processor takes, too."""
     steps = max(20, int(2e6 / case.fixed.size))
     dt = 0.2 * fd.critical_step(case_of((2, 2), "enhanced"), method)
-    given = {"dt": dt, "every": steps, "initial": shaken(case), "force": True}
+    given = {"dt": dt, "every_steps": steps, "initial": shaken(case), "force": True}
     own = fd.simulate(case, steps * dt, method=method, **given).attrs
     return line(case, method, mine, own["wall_seconds"] / own["steps"], own["threads"])
 
@@ -239,7 +240,7 @@ def largest() -> list[str]:
     )
     motion.make_room()
     mine = seconds(launches_of([motion], wide=True), 1, 200)
-    motion.device, motion.plan = "cpu", motion.plan._replace(end=20 * dt, steps=20, every=20)
+    motion.device, motion.plan = "cpu", motion.plan._replace(end=20 * dt, steps=20, every_steps=20)
     motion.integrate()
     return [line(case, "rk4", mine, motion.seconds / 20, CORES)]
 
@@ -252,7 +253,7 @@ def sweeps() -> None:
         values, found = np.linspace(1e6, 2e6, POINTS), {}
         many = [specimen("enhanced", k) for k in range(POINTS)]
         dt = 0.2 * fd.critical_step(many[-1])
-        given = {"dt": dt, "every": 10_000, "method": "rk4"}
+        given = {"dt": dt, "every_steps": 10_000, "method": "rk4"}
         attributes = fd.simulate_many(many, 20_000 * dt, **given).attrs
         why = f"{attributes['device']} ({attributes['device_reason']})"
         print(f"simulate_many of {POINTS}: on {why}; {attributes['wall_seconds']:.1f} s")

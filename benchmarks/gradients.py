@@ -44,7 +44,7 @@ def motion() -> None:
     made = fd.discretize(pattern, PAPER, preset="herkal", fold_law=law)
     push = fd.Force("xmin", (-1e-3, 0, 2e-4), fd.HalfSine(0.005))
     case = fd.Case(made, [fd.Fix("xmax")], [push], [fd.Rayleigh(2.0)])
-    given = {"duration": STEPS * DT, "method": "rk4", "dt": DT, "every": STEPS // 10}
+    given = {"duration": STEPS * DT, "method": "rk4", "dt": DT, "every_steps": STEPS // 10}
     analysis = {"kind": "dynamics", **given}
     compare(
         f"motion of {made.nodes.size} dofs",

@@ -54,7 +54,7 @@ def reference(case: fd.Case, start: fd.State, keep: Path | None) -> xarray.Datas
     if keep is not None and keep.exists():
         motion = fd.load(keep)
         return motion.isel(time=slice(None, None, round(EVERY / float(motion.time[1]))))
-    motion = fd.simulate(case, 1.0, method="rk4", every=EVERY, initial=start)
+    motion = fd.simulate(case, 1.0, method="rk4", interval=EVERY, initial=start)
     if keep is not None:
         fd.save(motion, keep)
     return motion
@@ -82,7 +82,7 @@ def compare(case: fd.Case, start: fd.State, rounds: int, keep: Path | None) -> N
     times: dict[tuple[str, float], list[float]] = {run: [] for run in runs}
     for number in range(rounds):
         for method, tolerance in runs:
-            options = {"tolerance": tolerance, "every": EVERY, "initial": start}
+            options = {"tolerance": tolerance, "interval": EVERY, "initial": start}
             if number == 0:
                 fd.simulate(case, EVERY, method=method, **options)  # compiles
             motion = fd.simulate(case, 1.0, method=method, **options)

@@ -67,7 +67,7 @@ def moving(case: fd.Case, steps: int, clock: Clock) -> tuple[float, str]:
     """Seconds of a step of a motion, and how many iterations and factorizations."""
     loaded = fd.Case(case.structure, case.supports, FALL)
     clock.taken.clear()
-    motion = fd.simulate(loaded, steps * DT, method="generalized_alpha", dt=DT, every=steps * DT)
+    motion = fd.simulate(loaded, steps * DT, method="generalized_alpha", dt=DT, interval=steps * DT)
     taken, a = clock.taken, motion.attrs
     first, *others = taken["factorize"]  # the first one with its order
     whole = sum(sum(taken[name]) for name in PARTS) - first + float(np.median(others))

@@ -190,8 +190,13 @@ def options_of(method: str, steps: int = STEPS) -> dict[str, Any]:
     """Arguments of a motion of so many steps."""
     dt = LONG if METHODS[method].implicit else SHORT
     if METHODS[method].adaptive:
-        return {"method": method, "duration": steps * dt, "every": 5 * dt}
-    return {"method": method, "duration": steps * dt, "dt": dt, "every": 5 if steps > 5 else 1}
+        return {"method": method, "duration": steps * dt, "interval": 5 * dt}
+    return {
+        "method": method,
+        "duration": steps * dt,
+        "dt": dt,
+        "every_steps": 5 if steps > 5 else 1,
+    }
 
 
 def moved(case: fd.Case, start: fd.State | None, **options: Any) -> Any:
@@ -225,7 +230,7 @@ def resumed(case: fd.Case, start: fd.State | None, **options: Any) -> Any:
 def beside(case: fd.Case, start: fd.State | None) -> Any:
     """Ten motions side by side: of the case with more and more mass."""
     many = [case.altered(masses=[fd.PointMass("xmax", 1.0 + k)]) for k in range(10)]
-    return fd.simulate_many(many, STEPS * SHORT, dt=SHORT, every=5, initial=start)
+    return fd.simulate_many(many, STEPS * SHORT, dt=SHORT, every_steps=5, initial=start)
 
 
 def sampled(case: fd.Case, start: fd.State | None, **options: Any) -> Any:
@@ -272,7 +277,7 @@ def jobs() -> Iterator[tuple[str, str, Callable[..., Any], dict[str, Any]]]:
         yield names, "adaptive", moved, chosen
         for method in ("rk4", "central_difference", "generalized_alpha", "energy_momentum"):
             yield names, f"continued_{method}", continued, options_of(method)
-            fine = {"dt": STEPS * SHORT / 4000, "every": 100}  # of 1000 steps to a checkpoint
+            fine = {"dt": STEPS * SHORT / 4000, "every_steps": 100}  # of 1000 steps to a checkpoint
             more = {} if METHODS[method].implicit else fine
             yield names, f"resumed_{method}", resumed, options_of(method) | more
     for names in ("start", "start+lumped", "force+lumped+alpha", "start+tower+lumped"):

@@ -65,7 +65,13 @@ def stepping(problem: Problem, method: str, seconds: float) -> Callable[[], floa
 
     def run(steps: int) -> float:
         motion = fd.simulate(
-            problem.case, steps * dt, method=method, dt=dt, every=steps, initial=start, force=True
+            problem.case,
+            steps * dt,
+            method=method,
+            dt=dt,
+            every_steps=steps,
+            initial=start,
+            force=True,
         )
         return motion.attrs["wall_seconds"] / motion.attrs["steps"]
 

@@ -52,7 +52,7 @@ def prepare(folder: Path) -> None:
             duration=DURATION + 0.1,
             method="generalized_alpha",
             initial=fd.initial_state(path, at=pressed),
-            every=0.001,
+            interval=0.001,
         )
         fd.save(motion, folder / "motion.nc")
     for kind in SENSORS:

@@ -43,7 +43,7 @@ def compute() -> tuple[fd.Case, object]:
         damping=fd.Rayleigh(alpha=6.0),
         contact=fd.Contact(),
     )
-    return case, fd.simulate(case, DURATION, method="dormand_prince", every=0.02)
+    return case, fd.simulate(case, DURATION, method="dormand_prince", interval=0.02)
 
 
 def middles(case: fd.Case, u: np.ndarray) -> np.ndarray:

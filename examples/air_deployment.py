@@ -19,7 +19,7 @@ motions = {}
 figure, axes = plt.subplots(figsize=(6.5, 4.0), layout="constrained")
 for name, fluid in fluids.items():
     case = fd.Case(structure, loads=[unfold], air=fluid)
-    motions[name] = motion = fd.simulate(case, 0.4, method="central_difference", every=0.005)
+    motions[name] = motion = fd.simulate(case, 0.4, method="central_difference", interval=0.005)
     length = np.ptp(structure.nodes[:, 0] + motion.displacement.values[:, :, 0], axis=1)
     when = np.interp(0.8, length[: length.argmax()], motion.time[: length.argmax()])
     taken = 0.0 if fluid is None else float(motion.air[-1])

@@ -15,7 +15,7 @@ for dihedral in (180, 120, 90):
     stiff = {"fold_law": "linear", "bend_law": "linear", "crease_stiffness": 10.0}
     structure = fd.discretize(pattern, foam, **stiff)
     case = fd.Case(structure, loads=[fd.Gravity((0, 0, -G))], air=AIR)
-    motion = fd.simulate(case, 1.0, method="central_difference", every=0.02)
+    motion = fd.simulate(case, 1.0, method="central_difference", interval=0.02)
     weights = structure.nodal_mass / structure.nodal_mass.sum()
     speeds[dihedral] = -motion.velocity.values[:, :, 2] @ weights  # m/s
     # each panel: 1/2 rho Cd A (v cos)^2 along its normal, which leans by the angle

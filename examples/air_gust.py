@@ -15,7 +15,7 @@ structure = fd.discretize(pattern, foam, **laws)
 gust = fd.Air(velocity=(0, 0, 4.0), history=fd.HalfSine(0.1), drag_coefficient=1.2)
 held = [fd.Fix([0, 1, 2, 3])]
 motion = fd.simulate(
-    fd.Case(structure, held, air=gust), 1.5, method="central_difference", every=0.002
+    fd.Case(structure, held, air=gust), 1.5, method="central_difference", interval=0.002
 )
 x, _, z = (structure.nodes[4] + motion.displacement.values[:, 4]).T
 angle = np.arctan2(z, x - A)  # rad

@@ -20,7 +20,7 @@ for force in (38.0, 50.0, 80.0):  # N on each node of the top, for 20 ms
         damping=fd.Rayleigh(alpha=200.0),
         contact=fd.Contact(),
     )
-    motion = motions[force] = fd.simulate(case, 0.2, method="auto", every=2e-4)
+    motion = motions[force] = fd.simulate(case, 0.2, method="auto", interval=2e-4)
     z = motion.displacement.sel(node=top, axis="z").mean("node").values
     heights[force] = 1e3 * (0.06 + z)  # mm
     axes.plot(1e3 * motion.time, heights[force], label=f"{force:g} N")

@@ -31,7 +31,7 @@ end = fd.linear.absorbing_end(case, f"z>{0.04 * CELLS - 1e-3}", waves=waves)
 struck = np.where(case.structure.nodes[:, 2:] < 1e-3, (0.0, 0.0, 0.8), 0.0)  # m/s
 case = fd.Case(case.structure, [*case.supports, *end], masses=case.masses)
 start = fd.State(velocity=struck)
-motion = fd.simulate(case, 1.6, method="rk4", dt=2e-4, every=2e-3, initial=start)
+motion = fd.simulate(case, 1.6, method="rk4", dt=2e-4, interval=2e-3, initial=start)
 strain = fd.linear.space_time(motion, cell)["strain"].values[:, :50]
 for name, sign in (("compression", -1), ("rarefaction", 1)):
     speed = fd.signals.pulse(motion.time, strain, sign=sign, share=0.85).speed

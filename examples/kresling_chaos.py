@@ -19,7 +19,7 @@ heights, exponents = {}, {}
 for force, (above, below) in zip((4.0, 7.0, 8.0), axes.T, strict=True):  # N, on each corner
     push = fd.Force(top, (0, 0, force), history=fd.Harmonic(1.0 / period))
     shaken = case.altered(loads=[push])
-    motion = fd.simulate(shaken, 160 * period, method="rk4", every=period / 32)
+    motion = fd.simulate(shaken, 160 * period, method="rk4", interval=period / 32)
     steady = motion.isel(time=slice(32 * 40, None))  # transients have died away
     z = 60.0 + 1e3 * steady.displacement.sel(node=6, axis="z").values  # mm
     speed = steady.velocity.sel(node=6, axis="z").values  # m/s

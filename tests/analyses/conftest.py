@@ -49,7 +49,7 @@ duration = 20.0
 # dt = 1e-3
 [output]
 nodes = [6, 7]
-every = 0.01
+interval = 0.01
 """
 
 SHORT = (

@@ -63,7 +63,7 @@ BROKEN = [
     (MOTION_TEXT, "loads[0].history.kind = 'puls'"),
     (MOTION_TEXT, "loads[0].history.duration = '1 s'"),
     (MOTION_TEXT, "analysis.duration ="),
-    (MOTION_TEXT, "output.every = true"),
+    (MOTION_TEXT, "output.interval = true"),
 ]
 
 

@@ -35,7 +35,7 @@ def test_the_example_of_the_design(read, example, tmp_path) -> None:
     assert forces[7, 0] == 0.01
     assert history == Pulse(1.0)
     assert found.analysis.kind == "dynamics"
-    given = {"method": "rk4", "duration": 20.0, "dt": None, "every": 0.01, "force": False}
+    given = {"method": "rk4", "duration": 20.0, "dt": None, "interval": 0.01, "force": False}
     given |= {"tolerance": None, "start": 0.0, "spectral_radius": None, "device": "cpu"}
     assert found.analysis.arguments == given
     np.testing.assert_array_equal(found.output.nodes, [6, 7])
@@ -50,14 +50,14 @@ def test_what_is_left_out_has_its_default(read, short) -> None:
     assert case.damping == Rayleigh()
     assert case.load_terms[0][1] == Constant()
     np.testing.assert_array_equal(found.output.nodes, [6, 7])  # the loaded ones
-    assert found.analysis.arguments["every"] == 10.0 / 2000
+    assert found.analysis.arguments["interval"] == 10.0 / 2000
     assert found.analysis.arguments["method"] == "rk4"
 
 
-def test_every_counts_steps_when_it_is_whole(read, short) -> None:
-    found = read(short + "[output]\nevery = 5\nnodes = 'zmax'")
-    assert found.analysis.arguments["every"] == 5
-    assert isinstance(found.analysis.arguments["every"], int)
+def test_sampling_by_steps(read, short) -> None:
+    found = read(short + "[output]\nevery_steps = 5\nnodes = 'zmax'")
+    assert found.analysis.arguments["every_steps"] == 5
+    assert "interval" not in found.analysis.arguments
     height = found.pattern.vertices[:, 2]
     np.testing.assert_array_equal(found.output.nodes, np.flatnonzero(height > 0.1))
 

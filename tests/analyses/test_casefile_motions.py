@@ -109,7 +109,7 @@ def test_a_start_from_a_result(read, short, tmp_path) -> None:
         found.initial()
     (tmp_path / "runs").mkdir()
     first = tmp_path / "runs/first.nc"
-    motion = read(short).run(duration=0.01, every=1)
+    motion = read(short).run(duration=0.01, every_steps=1)
     fd.save(motion, first)
     state = found.initial()
     np.testing.assert_array_equal(state.displacement, motion.displacement.values[-2])

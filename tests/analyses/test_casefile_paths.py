@@ -109,7 +109,7 @@ analysis.method = "rk4": choose one of newton, displacement, mgdcm, arc_length
 analysis.load_factor = [1] | analysis.load_factor: unknown key; did you mean 'load_factors'? known
     keys: kind, method
 analysis.dt = 1.0 | analysis.dt: only for analysis.kind = "dynamics" or "frf"; leave it out
-output = { every = 0.1 } | output.every: only for analysis.kind = "dynamics"; leave it out
+output = { interval = 0.1 } | output.interval: only for analysis.kind = "dynamics"; leave it out
 initial = { velocity = [0, 0, 1] } | initial.velocity: only for analysis.kind = "dynamics"; leave
     it out
 initial = {} | initial.file: missing

@@ -40,7 +40,7 @@ ANALYSES = {
         "[[loads]]\nnodes = [5]\nforce = [0, 0, 1e-3]\n"
         'history = { kind = "pulse", duration = 0.1 }\n'
         '[analysis]\nkind = "dynamics"\nmethod = "newmark"\nduration = 0.5\ndt = 0.01\n'
-        "[output]\nevery = 0.01\n"
+        "[output]\ninterval = 0.01\n"
     ),
     "modes": '[analysis]\nkind = "modes"\ncount = 2\n',
     "frf": (

@@ -41,14 +41,15 @@ tolerance = 1e-4
 start = 0.0
 [output]
 nodes = [7]
-every = 0.01
+interval = 0.01
 max_frequency = 5.0
 """
 VIBRATION = """pattern = { kind = "kresling", sides = 6, storeys = 1 }; damping =; initial =;
 loads =; output = { nodes = [7] }; supports = [{ nodes = [0, 1, 2, 3] }];
 drive = [{ nodes = [7], force = [0.01, 0, 0] }]; model.crease_stiffness = 0.1;
 analysis = { kind = "frf", method = "burst_random", averages = 4, seed = 1, burst = 0.5,
-frequencies = { first = 1, last = 5, count = 41 }, amplitude = 1.0, duration = 10.0, every = 0.01,
+frequencies = { first = 1, last = 5, count = 41 }, amplitude = 1.0, duration = 10.0,
+interval = 0.01,
 window_rate = 0.0 }"""
 SLOW = """pattern = { vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.5]],
 faces = [[0, 1, 2], [0, 2, 3]] }; model.fold_law = { kind = "enhanced", theta1 = 45, theta2 = 315 };
@@ -92,9 +93,10 @@ def test_every_number_of_a_case_file_is_checked(text, word, tmp_path):
          f"supports[0].nodes[1] = {2**70}: must be a whole number of at most 64 bits"),
         ("nodes = [7]\nforce", "nodes = 0x" + "f" * 5000 + "\nforce",
          "loads[0].nodes = a number of about 6021 digits: must be a whole number of at most 64"),
-        ("nodes = [7]\nevery", f"nodes = [{2**63}]\nevery", "output.nodes[0] = 9223372036854"),
-        ("every = 0.01", "every = " + "9" * 30, f"output.every = {'9' * 30}: must be a whole"),
-        ("every = 0.01", "every = " + "9" * 4400, "is not valid TOML: "),
+        ("nodes = [7]\ninterval", f"nodes = [{2**63}]\ninterval",
+        "output.nodes[0] = 9223372036854"),
+        ("interval = 0.01", "every_steps = " + "9" * 30, "output.every_steps = 9999"),
+        ("interval = 0.01", "every_steps = " + "9" * 4400, "is not valid TOML: "),
         ("thickness = 0.01", "thickness = 1e103",
          "sheet.thickness = 1e+103: must be in size at most 1e+50"),
         ("thickness = 0.01", "thickness = 1e31", "sheet.thickness = 1e+31: must be in size"),

@@ -57,7 +57,7 @@ def test_a_case_file_has_the_law_and_its_result_keeps_it(tmp_path, name):
     assert stored.memory[-1].values.any()
     again = fd.simulate(
         case, float(stored.duration), method=stored.method, dt=float(stored.dt),
-        every=int(stored.every),
+        every_steps=int(stored.every_steps),
         initial=fd.initial_state(stored, 0),
     )  # fmt: skip
     np.testing.assert_array_equal(again.displacement, stored.displacement)

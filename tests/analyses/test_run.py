@@ -42,7 +42,9 @@ def test_each_mass_rule_and_other_arguments(read) -> None:
     np.testing.assert_array_equal(first.displacement, motions["panel"].displacement)
     assert not np.array_equal(first.displacement[-1], motions["centroid"].displacement[-1])
     assert float(first.time[-1]) == pytest.approx(0.01)
-    direct = fd.simulate(case_file.case("panel"), 0.01, every=case_file.analysis.arguments["every"])
+    direct = fd.simulate(
+        case_file.case("panel"), 0.01, interval=case_file.analysis.arguments["interval"]
+    )
     np.testing.assert_array_equal(first.displacement, direct.displacement)
 
 
@@ -59,10 +61,10 @@ def test_what_cannot_be_run(read) -> None:
     for changes, message in (
         ({"nonsense": 1}, 'run: argument = "nonsense": choose one of duration, method'),
         ({"dt": -1}, r"case2\.toml: analysis\.dt = -1: must be greater than 0"),
-        ({"every": 3.0}, r"case2\.toml: output\.every = 3 s: longer than the duration"),
+        ({"interval": 3.0}, r"case2\.toml: output\.interval = 3 s: longer than the duration"),
     ):
         with pytest.raises(InputError, match=message) as caught:
             case_file.run(**changes)
-    assert (caught.value.field, caught.value.file) == ("output.every", case_file.path)
+    assert (caught.value.field, caught.value.file) == ("output.interval", case_file.path)
     with pytest.raises(InputError, match='mass = "pannel": did you mean'):
         case_file.run("pannel")

@@ -137,10 +137,12 @@ def test_a_clamp_rides_on_a_moving_base(model, method):
     s = structure(model, SQUARE, HEAVY, clamped=[(0, 3)], mass=lumped)
     history, a, omega = fd.HalfSine(0.2), 1e-3, np.pi / 0.2
     base = fd.Case(s, [fd.Fix(ROOT), fd.BaseMotion("z", history, a)])
-    moving = fd.simulate(base, 0.19, method=method, every=0.01, tolerance=None)
+    moving = fd.simulate(base, 0.19, method=method, interval=0.01, tolerance=None)
     pushed = fd.Case(s, [fd.Fix(ROOT)], [fd.Gravity((0, 0, a * omega**2), history)])
     start = fd.State(velocity=-a * omega * (~pushed.fixed) * np.array([0.0, 0.0, 1.0]))
-    still = fd.simulate(pushed, 0.19, method=method, every=0.01, initial=start).displacement.values
+    still = fd.simulate(
+        pushed, 0.19, method=method, interval=0.01, initial=start
+    ).displacement.values
     relative = moving.displacement.values - moving.displacement.values[:, :1]
     assert np.abs(relative - still).max() < 1e-3 * np.abs(relative).max()
     assert moving.attrs["energy_error"] < 1e-3
@@ -151,7 +153,7 @@ def test_explicit_steps_watch_the_dihedrals_of_all_hinges(preset, clamped):
     """Else panels that pass through each other are not seen, or are where none do."""
     s = fd.discretize(FOLD, HEAVY, preset=preset, fold_law="linear", clamped=clamped)
     case = fd.Case(s, [fd.Fix([0, 1]), fd.Spring(1.0, nodes=[3])], [fd.Force([2], (0, 0, 1.0))])
-    motion = prepare(case, 0.1, method="rk4", every=0.01)
+    motion = prepare(case, 0.1, method="rk4", interval=0.01)
     motion.run()
     body, u = motion.packed.body, motion.course.u
     found = body.angles(u.ravel())

@@ -40,7 +40,9 @@ def test_gravity_weighs_them_in_statics_and_motion(model):
     lifted = fd.trace(held).reaction.values[-1].reshape(-1, 3)[:, 2].sum()
     assert lifted == pytest.approx(weight, rel=1e-6)
     falling = fd.Case(s, (), [fd.Gravity("-z")], masses=masses)
-    drop = fd.simulate(falling, 0.2, method="generalized_alpha", every=0.1).displacement.values[-1]
+    drop = fd.simulate(falling, 0.2, method="generalized_alpha", interval=0.1).displacement.values[
+        -1
+    ]
     assert drop == pytest.approx(np.tile([0, 0, -0.5 * 9.80665 * 0.2**2], (len(drop), 1)), rel=1e-6)
 
 

@@ -64,7 +64,9 @@ def test_a_pendulum_in_large_swings(model, method) -> None:
     """Energy: I w^2 / 2 + m g (height) is kept, and the dihedral follows the rigid body."""
     s, case = swing(model, rigid="all", crease_stiffness=0.0)
     case = fd.Case(s, case.supports, [fd.Gravity("-z")])
-    motion = fd.simulate(case, 0.4, method=method, dt=2e-4 if method != "rk4" else None, every=0.05)
+    motion = fd.simulate(
+        case, 0.4, method=method, dt=2e-4 if method != "rk4" else None, interval=0.05
+    )
     # the equation of a compound pendulum about the ridge, by an integrator of SciPy's
     ridge, edge = s.nodes[[2, 0]]
     first = np.arctan2(edge[2] - ridge[2], edge[0] - ridge[0])
@@ -136,7 +138,7 @@ def test_both_models_fold_alike() -> None:
     motions, load = [], fd.Force([2, 8], (0.0, -2.0, 0.0), fd.HalfSine(0.5))
     for model in MODELS:
         case = fd.Case(*folding_cell(model), [load], fd.Rayleigh(0.5))
-        motions.append(fd.simulate(case, 1.0, method="generalized_alpha", dt=2e-3, every=0.1))
+        motions.append(fd.simulate(case, 1.0, method="generalized_alpha", dt=2e-3, interval=0.1))
         assert motions[-1].energy_error < 1e-4
     bars, shell = (motion.displacement.values[:, :9] for motion in motions)
     assert np.abs(bars).max() > 0.05

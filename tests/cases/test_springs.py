@@ -177,7 +177,7 @@ def test_a_spring_stops_an_internal_mechanism():
 def test_the_energy_balance_closes_with_springs_and_damping(model, method, most):
     push = fd.Force([2], (3.0, 1.0, 2.0), fd.HalfSine(0.05))
     case = fd.Case(structure(model, FOLD, HEAVY), SLACK, [push], fd.Rayleigh(1.0, 1e-5))
-    motion = fd.simulate(case, 0.1, method=method, every=0.01)
+    motion = fd.simulate(case, 0.1, method=method, interval=0.01)
     assert motion.attrs["energy_error"] < most
     assert float(motion.strain_springs.max()) > 0.01 * float(motion.work.max())
 
@@ -220,7 +220,7 @@ def test_a_mass_between_the_ground_and_a_moving_base(model):
         return
     base = fd.BaseMotion("z", fd.Harmonic(2.0), 1e-3)
     moving = fd.Case(s, [*supports, base], (), fd.Rayleigh(a, 5e-2), masses)
-    motion = fd.simulate(moving, 6.0, method="generalized_alpha", every=0.01)
+    motion = fd.simulate(moving, 6.0, method="generalized_alpha", interval=0.01)
     late = motion.displacement[-100:, 2, 2].values
     assert 0.5 * np.ptp(late) == pytest.approx(1e-3 * abs(exact(2.0, 5e-2)), rel=1e-2)
     assert motion.attrs["energy_error"] < 1e-3

@@ -226,7 +226,7 @@ def test_motion_by_heat_ends_where_statics_ends_and_audits(model: int, method: s
     structure = [*models(strip(1 if model == 2 else 2))][model]
     load = fd.Temperature(20.0, 1e-5, 2e-3, history=fd.Ramp(0.02))
     case = fd.Case(structure, HELD, [load], fd.Rayleigh(alpha=60.0))
-    motion = fd.simulate(case, 0.4, method=method, every=0.02)
+    motion = fd.simulate(case, 0.4, method=method, interval=0.02)
     end = fd.trace(case, "newton", load_factors=[0.0, 1.0]).displacement.values[-1]
     np.testing.assert_allclose(motion.displacement[-1], end, atol=1e-3 * np.abs(end).max())
     assert abs(motion.attrs["energy_error"]) < 1e-4
@@ -245,7 +245,9 @@ def test_a_motion_in_the_heat_does_no_work() -> None:
     aside = end + 1e-6 * np.sin(np.arange(end.size)).reshape(end.shape)
     aside[[0, 1, 2]] = end[[0, 1, 2]]
     start = fd.State(displacement=aside)
-    motion = fd.simulate(case, 1e-3, method="energy_momentum", dt=1e-5, every=1e-4, initial=start)
+    motion = fd.simulate(
+        case, 1e-3, method="energy_momentum", dt=1e-5, interval=1e-4, initial=start
+    )
     energy = stored(motion, structure) + motion.kinetic.values
     assert energy[0] > 0.0
     np.testing.assert_allclose(energy, energy[0], rtol=1e-3)

@@ -32,7 +32,7 @@ history = {{ kind = "half_sine", duration = 0.05 }}
 kind = "dynamics"
 duration = 0.1
 [output]
-every = 0.01
+interval = 0.01
 """
 
 

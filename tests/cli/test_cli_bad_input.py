@@ -23,14 +23,15 @@ supports[0].nodes = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]; loads = | suppor
 analysis.dt = 1e-3 | analysis.dt = 0.001 s is above the critical step of 0.00087 ... take a
     smaller one or leave dt out (force = true
 analysis.dt = 0.2; analysis.force = true | analysis.dt = 0.2 s: longer than the duration of 0.1 s
-analysis.duration = 1e30; output.every = 1e30 | analysis.duration = 1e+30 s: takes 2.29e+33 steps
+analysis.duration = 1e30; output.interval = 1e30 | analysis.duration = 1e+30 s: takes 2.29e+33 steps
     ... shorten it
-output.every = 0.2 | output.every = 0.2 s: longer than the duration of 0.1 s
-output.every = 1000: longer than the motion of 230 steps
-analysis.dt = 3e-4 | output.every = 0.01 s is not a whole number of steps of dt = 0.0003 s; use
+output.interval = 0.2 | output.interval = 0.2 s: longer than the duration of 0.1 s
+output.interval =; output.every_steps = 1000 | output.every_steps = 1000: longer than the
+    motion of 230 steps
+analysis.dt = 3e-4 | output.interval = 0.01 s is not a whole number of steps of dt = 0.0003 s; use
     dt = 0.000294
-analysis.duration = 1e6; output.every = 1 | output.every: 2.29e+09 samples of 13 nodes needs about
-    1.59e+03 GiB ... raise it
+analysis.duration = 1e6; output.interval =; output.every_steps = 1 | output.interval: 2.29e+09
+    samples of 13 nodes needs about 1.59e+03 GiB ... keep fewer samples
 loads[0].nodes = [0, 7]; analysis.dt = 1 | analysis.dt = 1 s: longer than the duration
 model.mass = ["panel", "consistent"]; analysis.dt = 6.25e-4 | mass = "consistent": analysis.dt =
     0.000625 s is above the critical step
@@ -64,10 +65,12 @@ def test_every_problem_has_its_line(workplace, miura) -> None:
 
 def test_the_memory_of_all_mass_rules_together(workplace, miura, monkeypatch) -> None:
     monkeypatch.setattr(ram_limit, "memory", lambda: 200e3)  # one motion needs 75 kB
-    assert workplace.run(changed(miura, "output.every = 0.001")).status == 0
-    workplace.write(changed(miura, 'output.every = 0.001; model.mass = ["panel", "centroid"]'), "b")
+    assert workplace.run(changed(miura, "output.interval = 0.001")).status == 0
+    workplace.write(
+        changed(miura, 'output.interval = 0.001; model.mass = ["panel", "centroid"]'), "b"
+    )
     line = workplace.refused("run", "b", "--out", "other")  # with its page: all in memory
-    told = "b: output.every: 202 samples of 13 nodes of 2 mass rules needs about ... --force"
+    told = "b: output.interval: 202 samples of 13 nodes of 2 mass rules needs about ... --force"
     assert begins(line, told), line
 
 
@@ -115,8 +118,8 @@ def test_a_folder_that_is_read_only(workplace, miura) -> None:
 
 
 def test_too_few_samples_for_figures(workplace, miura) -> None:
-    workplace.write(changed(miura, "output.every = 0.05"))
+    workplace.write(changed(miura, "output.interval = 0.05"))
     line = workplace.refused("run", "case.toml", "--figures", "png")
     told = "gives 3 samples, spectra need 4: lower it, lengthen analysis.duration, or"
-    assert line.startswith(f"case.toml: output.every: {told}")
+    assert line.startswith(f"case.toml: output.interval: {told}")
     workplace.good("run", "case.toml", "--no-figures")

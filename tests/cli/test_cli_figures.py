@@ -21,12 +21,12 @@ from foldyn.errors import InputError
 from foldyn.plots.writers import find_ffmpeg
 from foldyn.report import album
 
-FEW = "output.every = 0.02"
+FEW = "output.interval = 0.02"
 PICTURES = ("structure.png", "laws.png", "load.png", "motion.png", "energies.png")
 
 
 def test_figures_of_a_tiny_case(workplace, edited) -> None:
-    output = 'output = { every = 0.02, nodes = [7], axis = "x", max_frequency = 20.0 }'
+    output = 'output = { interval = 0.02, nodes = [7], axis = "x", max_frequency = 20.0 }'
     rules = 'model.mass = ["panel", "circumcenter"]'
     workplace.write(edited(f'{rules}; title = "Miura & <co>"; {output}'))
     results = ("result-panel.nc", "result-circumcenter.nc")
@@ -94,7 +94,7 @@ def test_figures_of_many_nodes_and_no_load(workplace, monkeypatch) -> None:
 
     monkeypatch.setattr(motion.plots, "plot_history", drawn)
     large = HELD_MIURA_TEXT.replace('"miura"', '"miura"\ncells = [6, 6]')
-    brief = '[analysis]\nkind = "dynamics"\nduration = 0.01\n[output]\nevery = 0.001\n'
+    brief = '[analysis]\nkind = "dynamics"\nduration = 0.01\n[output]\ninterval = 0.001\n'
     workplace.write(large + brief)
     workplace.good("run", "case.toml", "--out", "r", "--figures", "png")
     assert len(shown) == album.MOST_NODES

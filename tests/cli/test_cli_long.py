@@ -25,7 +25,7 @@ history = {{ kind = "half_sine", duration = 0.1 }}
 kind = "dynamics"
 duration = 0.1
 [output]
-every = 5e-4
+interval = 5e-4
 """
 FILES = ["result-centroid.nc", "result-panel.nc"]
 

@@ -90,7 +90,7 @@ def test_a_kill_between_rules_leaves_no_old_result(workplace, tmp_path, edited) 
 
 @pytest.mark.matrix
 def test_ctrl_c_and_a_full_disk_while_figures_are_drawn(workplace, tmp_path, edited) -> None:
-    workplace.run(edited("output.every = 0.001"), "--out", "before")  # compiles
+    workplace.run(edited("output.interval = 0.001"), "--out", "before")  # compiles
     stopped = start(tmp_path, "run", "case.toml", "--out", "stopped", "--figures", "png")
     full = start(
         tmp_path, "run", "case.toml", "--out", "full", "--figures", "png",

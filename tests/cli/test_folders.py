@@ -166,7 +166,7 @@ def test_a_full_disk_is_got_around(workplace, edited, monkeypatch, tmp_path_fact
 
 def test_figures_that_cannot_be_drawn_do_not_hide_the_result(workplace, edited) -> None:
     Path("r/structure.png").mkdir(parents=True)
-    workplace.write(edited("output.every = 0.02"))
+    workplace.write(edited("output.interval = 0.02"))
     failed = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
     assert "wrote r/result.nc" in failed.out
     reason = failed.failure("r/result.nc")

@@ -16,7 +16,7 @@ import foldyn as fd
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="streams and names of POSIX")
 ODD = b"f\xffall"
-ODD_TITLE = 'output.every = 0.02; title = "F\u00e4lle \u6298 $x^{$"'
+ODD_TITLE = 'output.interval = 0.02; title = "F\u00e4lle \u6298 $x^{$"'
 
 
 def result_of(folder: bytes) -> int:

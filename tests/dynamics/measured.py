@@ -67,7 +67,7 @@ def decay(case: fd.Case, method: str, number: int = 0) -> tuple[float, float]:
     start = fd.State(1e-6 * shape / np.abs(shape).max())
     numeric = steps_of(method, period / 200) | equal_steps(method)
     motion = fd.simulate(
-        case, 3 * period, method=method, initial=start, every=period / 40, **numeric
+        case, 3 * period, method=method, initial=start, interval=period / 40, **numeric
     )
     modal = np.einsum("tna,na->t", motion.displacement.values, case.structure.mass @ shape)
     fit = matrix_pencil(modal, period / 40, order=2)

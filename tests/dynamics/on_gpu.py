@@ -18,7 +18,7 @@ from foldyn.dynamics.gpu import choice
 from foldyn.dynamics.gpu.checks import METHODS, lacking
 from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
 
-STEPS, END = {"dt": 1e-5, "every": 2}, 4e-5
+STEPS, END = {"dt": 1e-5, "every_steps": 2}, 4e-5
 LAWS = {
     "enhanced": (fd.EnhancedLinear(), fd.EnhancedLinear()),
     "locking": (fd.EnhancedLinear(120, 240, rest="as_published"), "superlinear"),
@@ -50,7 +50,7 @@ kind = "dynamics"
 method = "central_difference"
 duration = 2e-3
 [output]
-every = 2e-4
+interval = 2e-4
 """
 
 
@@ -136,7 +136,7 @@ def test_motions_side_by_side_have_steps_of_their_own(monkeypatch, method):
     monkeypatch.setattr("foldyn.dynamics.gpu.launch.Launches.fits", lambda self: 2 * self._every)
     motions, alone = [], []
     for k, (dt, every) in enumerate(((1e-5, 2), (2.5e-5, 1), (5e-6, 3))):
-        given = {"method": method, "dt": dt, "every": every, "initial": shaken(case(k), k)}
+        given = {"method": method, "dt": dt, "every_steps": every, "initial": shaken(case(k), k)}
         motions.append(prepare(case(k), 5e-5, **given))
         alone.append(fd.simulate(case(k), 5e-5, **given))
     motions.append(prepare(case(), 5e-5, "dormand_prince"))
@@ -173,7 +173,7 @@ def test_a_sweep_on_a_gpu_is_that_of_the_cpu(tmp_path, monkeypatch):
 def test_what_goes_wrong_is_told_as_by_the_cpu():
     each = case()
     each = replace(each, loads=[])
-    given = {"dt": 1e-3, "every": 5, "force": True, "initial": shaken(each)}
+    given = {"dt": 1e-3, "every_steps": 5, "force": True, "initial": shaken(each)}
     given["method"] = "central_difference"
     with pytest.raises(ComputationError) as mine:
         fd.simulate(each, 0.03, device="gpu", **given)

@@ -90,7 +90,8 @@ def decrement(case: fd.Case, method: str, omega: float):
     period = 2.0 * np.pi / omega
     radius = {"spectral_radius": 1.0} if method == "generalized_alpha" else {}
     motion = fd.simulate(
-        case, 6 * period, method=method, initial=released(1e-3), every=period / 40, dt=period / 400,
+        case, 6 * period, method=method, initial=released(1e-3), interval=period / 40,
+        dt=period / 400,
         **equal_steps(method), **radius,
     )  # fmt: skip
     return log_decrement(place(motion), period / 40, rest=0.0).decrement, motion

@@ -31,7 +31,7 @@ def test_energy_of_a_fold_that_opens_itself(law):
     open_up = fd.Actuate("all", 240.0, fd.Ramp(duration=0.5, smooth=True))
     case = fd.Case(fold(law), loads=[open_up], damping=fd.Rayleigh(alpha=1.0))
     steps = [2000, 4000, 8000]
-    motions = [fd.simulate(case, 0.6, dt=0.6 / n, every=n // 20) for n in steps]
+    motions = [fd.simulate(case, 0.6, dt=0.6 / n, every_steps=n // 20) for n in steps]
     motion, errors = motions[-1], [one.attrs["energy_error"] for one in motions]
     folds, _ = case.structure.dihedrals(motion.displacement[-1])
     assert np.degrees(folds[0]) < 285.0  # it does open, from 300
@@ -44,7 +44,7 @@ def test_a_constant_actuation_is_another_rest_angle(law):
     """The same motion as of a structure made with these rest angles."""
     actuated = fd.Case(fold(law), loads=[fd.Actuate("all", 250.0)])
     made = fd.Case(fold(law, crease_rest=250.0))
-    one, two = (fd.simulate(case, 0.2, dt=1e-4, every=100) for case in (actuated, made))
+    one, two = (fd.simulate(case, 0.2, dt=1e-4, every_steps=100) for case in (actuated, made))
     assert float(np.abs(two.displacement).max()) > 1e-4
     assert apart(one, two) < 1e-10
     np.testing.assert_allclose(one.strain_folds, two.strain_folds, rtol=1e-10)
@@ -70,10 +70,10 @@ def test_only_the_chosen_creases_turn_and_the_structure_stays_as_it_was():
 def test_a_rest_angle_beyond_closing_is_named():
     swing = fd.Actuate([0], 350.0, fd.Harmonic(frequency=1.0, phase=0.0))
     big = fd.Actuate([0], 350.0, lambda t: 3.0 * t)
-    assert fd.simulate(fd.Case(fold(), loads=[swing]), 0.3, every=0.1).sizes["time"] == 4
+    assert fd.simulate(fd.Case(fold(), loads=[swing]), 0.3, interval=0.1).sizes["time"] == 4
     named = "rest dihedral of the crease between"
     with pytest.raises(fd.errors.InstabilityError, match=named) as e:
-        fd.simulate(fd.Case(fold(), loads=[big]), 1.0, every=0.1)
+        fd.simulate(fd.Case(fold(), loads=[big]), 1.0, interval=0.1)
     assert 0.3 < float(e.value.partial.time[-1]) < 0.42
     with pytest.raises(fd.errors.InputError, match="actuation with the history step jumps"):
         fd.simulate(fd.Case(fold(), loads=[fd.Actuate([0], 240.0, fd.Step(0.5))]), 1.0)
@@ -85,7 +85,7 @@ def test_a_shell_that_its_crease_folds(history):
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=150)
     s = fd.shell(pattern, SHEET, divisions=2)
     case = fd.Case(s, loads=[fd.Actuate([0], 170.0, history)], damping=fd.Rayleigh(alpha=8.0))
-    motion = fd.simulate(case, 4.0, method="newmark", every=0.5)
+    motion = fd.simulate(case, 4.0, method="newmark", interval=0.5)
     assert motion.attrs["energy_error"] < 2e-3
     corners = motion.displacement[-1].to_numpy()[: len(pattern.vertices)]
     folds, _ = fd.discretize(pattern, SHEET, scheme="n4b5", preset="herkal").dihedrals(corners)

@@ -59,7 +59,7 @@ def last_place(turned=None, shift=0.0, first=0, held=None):
     sheet = fd.discretize(placed, fd.Sheet(5e6, 0.3, 1e-3, density=300.0))
     push = fd.Force([6, 8], turned @ (0.01, 0.02, 0.05))
     case = fd.Case(sheet, [held or fd.Fix([0, 1, 2])], [push], air=fd.Air(**FLUID, resolution=2))
-    motion = fd.simulate(case, 0.05, method="rk4", every=0.05)
+    motion = fd.simulate(case, 0.05, method="rk4", interval=0.05)
     assert motion.attrs["flows"] > 1
     return motion.displacement.values[-1] @ turned
 
@@ -87,7 +87,7 @@ def test_a_body_keeps_its_momenta_and_its_energy(method):
     case = fd.Case(plate(), air=fd.Air(**FLUID))
     spin = np.cross((3.0, 5.0, -2.0), case.structure.nodes - case.center_of_mass)
     start = fd.State(velocity=spin + np.array([0.2, 0.1, 0.3]))
-    motion = fd.simulate(case, 0.1, method=method, every=0.05, initial=start)
+    motion = fd.simulate(case, 0.1, method=method, interval=0.05, initial=start)
     before, after = momenta(case, motion, 0), momenta(case, motion, -1)
     assert motion.attrs["flows"] == 1
     assert_allclose(after[:3], before[:3], atol=1e-5 * np.linalg.norm(before[:3]))
@@ -103,7 +103,7 @@ def test_a_pressed_plate_accelerates_with_the_added_mass(method):
     force, span = 0.02, 0.05
     case = fd.Case(plate(), loads=[fd.Pressure(force / SIDE**2)], air=fd.Air(**FLUID))
     mass = case.total_mass + case.added_mass().todense()[2::3, 2::3].sum()
-    motion = fd.simulate(case, span, method=method, every=span)
+    motion = fd.simulate(case, span, method=method, interval=span)
     moved = case.mass.sum(axis=1) @ motion.displacement.values[-1, :, 2] / case.total_mass
     assert mass > 4.0 * case.total_mass
     assert_allclose(moved, 0.5 * force / mass * span**2, rtol=1e-4)
@@ -121,7 +121,7 @@ def test_small_vibrations_have_the_frequencies_of_modes_in_the_fluid():
     whole = np.kron(case.mass.toarray(), np.eye(3)) + case.added_mass().todense()
     along = whole @ shape.ravel()
     motion = fd.simulate(
-        case, 1.25 * period, method="dormand_prince", every=0.05 * period, initial=start
+        case, 1.25 * period, method="dormand_prince", interval=0.05 * period, initial=start
     )
     amplitude = motion.displacement.values.reshape(len(motion.time), -1) @ along
     exact = np.cos(2.0 * np.pi * motion.time.values / period)
@@ -135,7 +135,7 @@ def test_a_sheet_that_folds_gets_new_flows_whose_energies_are_audited(method):
         loads=[fd.Actuate("all", fraction=0.7, history=fd.Ramp(duration=0.1)), fd.Gravity("-z")],
         air=fd.Air(density=20.0, velocity=(1.0, 0.0, 0.5)),
     )
-    motion = fd.simulate(case, 0.1, method=method, every=0.01)
+    motion = fd.simulate(case, 0.1, method=method, interval=0.01)
     assert motion.attrs["flows"] > 5
     assert motion.attrs["energy_error"] < (4e-3 if method == "central_difference" else 1e-4)
     assert motion.attrs["flow_energy"] < 1e-3 * float(motion.work[-1])
@@ -151,7 +151,7 @@ def test_new_flows_converge(monkeypatch):
     for turn in (4.0, 2.0, 0.5, None):
         monkeypatch.setattr("foldyn.dynamics.added_mass.TURN", np.radians(turn or 1.0))
         air = fd.Air(density=20.0, drag=False) if turn else None
-        x = fd.simulate(fd.Case(structure, air=air), 0.04, every=0.04).displacement.values[-1]
+        x = fd.simulate(fd.Case(structure, air=air), 0.04, interval=0.04).displacement.values[-1]
         moved[turn] = x[0, 0] - x[4, 0]
     assert abs(moved[None] / moved[0.5] - 1.0) > 0.2
     assert_allclose(moved[4.0], moved[0.5], rtol=5e-4)
@@ -163,7 +163,7 @@ def test_reactions_carry_the_fluid():
     held = [fd.Fix(nodes=[0, 3], axes="xyz")]
     gravity, alpha = fd.Gravity((0, 0, -9.81)), 20.0
     case = fd.Case(plate(), held, [gravity], fd.Rayleigh(alpha), air=fd.Air(**FLUID))
-    motion = fd.simulate(case, 0.01, method="rk4", every=1)
+    motion = fd.simulate(case, 0.01, method="rk4", every_steps=1)
     up = motion.reaction.values[:, motion.support_axis.values == "z"].sum(axis=1)
     moved = fluid_at(case, 0.0 * case.structure.nodes).on(case.structure.nodes)
     v = motion.velocity.values.reshape(len(motion.time), -1)
@@ -180,7 +180,7 @@ def test_alpha_damps_the_mass_of_the_sheet_alone(method):
     case = fd.Case(plate(1e9), damping=fd.Rayleigh(alpha), air=fd.Air(**FLUID))
     mass = case.total_mass + case.added_mass().todense()[2::3, 2::3].sum()
     start = fd.State(velocity=np.tile([0.0, 0.0, 1.0], (5, 1)))
-    motion = fd.simulate(case, span, method=method, every=span, initial=start)
+    motion = fd.simulate(case, span, method=method, interval=span, initial=start)
     left = np.exp(-2.0 * alpha * case.total_mass / mass * span)
     assert_allclose(motion.kinetic, 0.5 * mass * np.array([1.0, left]), rtol=2e-3)
     assert_allclose(motion.dissipated[-1], 0.5 * mass * (1.0 - left), rtol=2e-3)
@@ -196,7 +196,7 @@ def test_what_does_not_take_added_mass_says_so():
         fd.simulate(fd.Case(plate(), moving, air=fd.Air(**FLUID)), 0.01)
     with pytest.raises(InputError, match="resolution = 80: the flow has 6241 unknowns"):
         fd.simulate(fd.Case(plate(), air=fd.Air(**FLUID, resolution=80)), 0.01)
-    assert fd.simulate(case, 1e-3, method="auto", every=1e-3).attrs["method"] == "dormand_prince"
+    assert fd.simulate(case, 1e-3, method="auto", interval=1e-3).attrs["method"] == "dormand_prince"
     with pytest.raises(InputError, match=r"air\.added_mass: the exponent takes a mass that stays"):
         fd.lyapunov_exponent(case, 1.0)
     voronoi = fd.discretize(case.structure.pattern, case.structure.sheet, mass="mixed_voronoi")
@@ -206,7 +206,7 @@ def test_what_does_not_take_added_mass_says_so():
         fd.patterns.simple_fold(), fd.Sheet(1e7, 0.3, 0.02, density=300.0), divisions=2
     )
     with pytest.raises(InputError, match="only explicit methods take the added mass"):
-        fd.simulate(fd.Case(shell, air=fd.Air()), 0.01, method="auto", every=0.01)
+        fd.simulate(fd.Case(shell, air=fd.Air()), 0.01, method="auto", interval=0.01)
 
 
 def test_panels_that_close_on_each_other_end_the_motion():
@@ -215,4 +215,4 @@ def test_panels_that_close_on_each_other_end_the_motion():
     fluid = fd.Air(density=20.0, drag=False)
     case = fd.Case(fd.discretize(pattern, sheet, crease_rest=358.0, **crease), air=fluid)
     with pytest.raises(ComputationError, match="the flow about the sheet is lost: air: panels 0"):
-        fd.simulate(case, 0.1, method="central_difference", every=0.002)
+        fd.simulate(case, 0.1, method="central_difference", interval=0.002)

@@ -39,7 +39,7 @@ def steps(method):
 def test_a_falling_sheet_reaches_the_terminal_velocity(method):
     """v = V tanh(g t / V) with V = sqrt(2 m g / (rho Cd A)), exact for a quadratic drag."""
     case = fd.Case(plate(), loads=[fd.Gravity((0, 0, -G))], air=fd.Air(**FLUID))
-    motion = fd.simulate(case, 0.3, method=method, every=0.02, **steps(method))
+    motion = fd.simulate(case, 0.3, method=method, interval=0.02, **steps(method))
     speed = -motion.velocity.values[:, :, 2]
     exact = TERMINAL * np.tanh(G * motion.time.values / TERMINAL)
     assert np.abs(speed - exact[:, None]).max() < 1e-3 * TERMINAL
@@ -53,7 +53,7 @@ def test_wind_blows_a_sheet_away(method):
     """m v' = k (w - v)^2 from rest: v = w (1 - 1 / (1 + k w t / m)); the air gives the energy."""
     wind = 0.5
     case = fd.Case(plate(), air=fd.Air(**FLUID, velocity=(0.3, -0.2, wind)))
-    motion = fd.simulate(case, 0.2, method=method, every=0.02, **steps(method))
+    motion = fd.simulate(case, 0.2, method=method, interval=0.02, **steps(method))
     exact = wind * (1.0 - 1.0 / (1.0 + PRESSING * wind * motion.time.values / MASS))
     assert_allclose(motion.velocity.values[:, 0, 2], exact, rtol=1e-3)
     assert np.abs(motion.velocity.values[:, :, :2]).max() < 1e-9 * wind
@@ -70,13 +70,13 @@ def hinged():
 
 @pytest.fixture(scope="module")
 def blown(hinged):
-    motion = fd.simulate(hinged, 0.25, method="dormand_prince", every=0.05, tolerance=1e-8)
+    motion = fd.simulate(hinged, 0.25, method="dormand_prince", interval=0.05, tolerance=1e-8)
     return motion.displacement.values[:, 2]
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_gusts_move_a_sheet_alike_by_all_methods(hinged, blown, method):
-    motion = fd.simulate(hinged, 0.25, method=method, every=0.05, **steps(method))
+    motion = fd.simulate(hinged, 0.25, method=method, interval=0.05, **steps(method))
     assert np.abs(blown).max() > 0.3 * SIDE
     assert_allclose(motion.displacement.values[:, 2], blown, atol=2e-3 * SIDE)
     assert motion.attrs["energy_error"] < 100.0 * BALANCED[method]
@@ -92,7 +92,7 @@ def test_drag_turns_with_the_sheet_and_the_wind():
         case = fd.Case(plate(turned), loads=[gravity], air=air)
         spin = np.cross(turned @ (3.0, 1.0, 2.0), plate(turned).nodes)
         start = fd.State(velocity=spin + turned @ (0.3, 0.1, 0.2))
-        motion = fd.simulate(case, 0.02, every=0.02, initial=start)
+        motion = fd.simulate(case, 0.02, interval=0.02, initial=start)
         moves.append(motion.displacement.values[-1] @ turned)
         taken.append(float(motion.air[-1]))
     assert abs(taken[0]) > 1e-8
@@ -103,7 +103,7 @@ def test_drag_turns_with_the_sheet_and_the_wind():
 def test_panels_that_move_along_themselves_meet_no_drag():
     case = fd.Case(plate(), air=fd.Air(**FLUID))
     start = fd.State(velocity=np.tile([0.7, -0.4, 0.0], (5, 1)))
-    motion = fd.simulate(case, 0.05, every=0.05, initial=start)
+    motion = fd.simulate(case, 0.05, interval=0.05, initial=start)
     assert_allclose(motion.velocity[-1], start.velocity, rtol=1e-12)
     assert np.abs(motion.air).max() < 1e-20
 
@@ -142,10 +142,10 @@ def test_many_motions_in_air_are_those_of_each():
     cases = [
         fd.Case(plate(), loads=[fd.Gravity((0, 0, -g))], air=fd.Air(**FLUID)) for g in (5.0, 9.0)
     ]
-    many = fd.simulate_many(cases, 0.01, every=0.01)
+    many = fd.simulate_many(cases, 0.01, interval=0.01)
     for k, case in enumerate(cases):
         one = fd.simulate(
-            case, 0.01, method="central_difference", dt=float(many.attrs["dt"]), every=0.01
+            case, 0.01, method="central_difference", dt=float(many.attrs["dt"]), interval=0.01
         )
         assert_allclose(many.displacement[k], one.displacement, rtol=1e-12)
         assert_allclose(many.air[k], one.air, rtol=1e-12)

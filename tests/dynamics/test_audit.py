@@ -25,7 +25,7 @@ def motion(structure, load, method="rk4", duration=0.3, initial=None, history=No
     case = fd.Case(structure, SUPPORTS, [force], fd.Rayleigh(0.5))
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always", FoldynWarning)
-        found = fd.simulate(case, duration, method=method, every=0.1 * duration, initial=initial)
+        found = fd.simulate(case, duration, method=method, interval=0.1 * duration, initial=initial)
     return found, [str(one.message) for one in told]
 
 
@@ -103,10 +103,10 @@ def test_samples_at_rest_instants_are_measured_by_the_motion_between_them():
     with warnings.catch_warnings():
         warnings.simplefilter("error", FoldynWarning)
         for method in ("rk4", "generalized_alpha"):
-            found = fd.simulate(case, 2.0 * period, method=method, every=period, **start)
+            found = fd.simulate(case, 2.0 * period, method=method, interval=period, **start)
             assert found.kinetic.values.max() < 1e-4 * float(found.strain_folds[0])
             assert found.attrs["energy_error"] < 1e-3
-        many = fd.simulate_many([case] * 2, 2.0 * period, every=period, **start)
+        many = fd.simulate_many([case] * 2, 2.0 * period, interval=period, **start)
         assert many.attrs["energy_error"] < 1e-3
 
 
@@ -116,4 +116,4 @@ def test_of_many_motions_the_same_is_said_as_of_one():
     u = np.zeros((len(case.structure.nodes), 3))
     u[[2, 3], 2] = 1e-13
     with pytest.warns(FoldynWarning, match=r"^cases\[0\]: nothing moves far"):
-        fd.simulate_many([case], 0.3, every=0.03, initial=fd.State(u))
+        fd.simulate_many([case], 0.3, interval=0.03, initial=fd.State(u))

@@ -56,7 +56,7 @@ def deepest(case: fd.Case, motion) -> float:
 )
 def test_boards_rebound_and_keep_energy_and_momenta(method, dt, balance, turn):
     case, initial = slammed()
-    motion = fd.simulate(case, 0.4, method=method, dt=dt, every=0.01, initial=initial)
+    motion = fd.simulate(case, 0.4, method=method, dt=dt, interval=0.01, initial=initial)
     assert float(motion.contact.max()) > 0.0
     assert 0.9 < nearest(case, motion) < 1.0
     assert deepest(case, motion) < 0.06 * T
@@ -72,7 +72,9 @@ def test_nothing_is_lost_but_by_friction_while_a_plane_lifts_boards():
     case, initial = slammed()
     up = fd.Plane((0, 0, -1.1 * T), (0, 0, 1), motion=(0, 0, 0.2 * T), history=fd.Ramp(0.2))
     case = case.altered(contact=fd.Contact(friction=0.3, planes=[up]))
-    motion = fd.simulate(case, 0.36, method="energy_momentum", dt=1e-3, every=0.01, initial=initial)
+    motion = fd.simulate(
+        case, 0.36, method="energy_momentum", dt=1e-3, interval=0.01, initial=initial
+    )
     assert float(motion.dissipated[-1]) > 0.0
     assert float(motion.work[-1]) > 0.0
     assert motion.attrs["energy_error"] < 1e-10
@@ -81,7 +83,7 @@ def test_nothing_is_lost_but_by_friction_while_a_plane_lifts_boards():
 def test_without_contact_boards_pass_through_each_other():
     case, initial = slammed()
     case = case.altered(contact=None)
-    motion = fd.simulate(case, 0.4, method="dormand_prince", every=0.01, initial=initial)
+    motion = fd.simulate(case, 0.4, method="dormand_prince", interval=0.01, initial=initial)
     assert deepest(case, motion) > 0.3 * T
 
 
@@ -94,7 +96,7 @@ def test_a_thick_miura_bounces_between_planes():
     lid = fd.Plane((0, 0, z.max() + 0.03), (0, 0, -1))
     case = fd.Case(s, contact=fd.Contact(planes=[floor, lid]))
     down = fd.State(velocity=np.full(s.nodes.shape, (0.0, 0.0, -2.0)))
-    motion = fd.simulate(case, 0.1, method="dormand_prince", every=1e-3, initial=down)
+    motion = fd.simulate(case, 0.1, method="dormand_prince", interval=1e-3, initial=down)
     assert np.abs(motion.plane_force.to_numpy()[:, :, 2]).max(axis=0).min() > 0.0
     assert motion.attrs["energy_error"] < 2e-5
 
@@ -106,7 +108,7 @@ def test_boards_come_to_rest_on_the_floor(method):
     floor = fd.Plane((0, 0, -0.52 * T), (0, 0, 1))
     contact = fd.Contact(planes=[floor])
     case = fd.Case(s, [], [fd.Gravity((0, 0, -G))], fd.Rayleigh(alpha=30.0), contact=contact)
-    motion = fd.simulate(case, 1.0, method=method, every=0.1)
+    motion = fd.simulate(case, 1.0, method=method, interval=0.1)
     force = motion.plane_force.to_numpy()[-1, 0]
     np.testing.assert_allclose(force, [0.0, 0.0, case.total_mass * G], rtol=1e-3, atol=1e-6)
     term = case.contact_term
@@ -124,7 +126,7 @@ def test_a_board_slides_on_a_slope_and_sticks_on_a_gentle_one(angle, alpha):
     contact = fd.Contact(friction=0.3, planes=[fd.Plane((0, 0, -0.4965 * T), (0, 0, 1))])
     pull = fd.Gravity((G * np.sin(a), 0.0, -G * np.cos(a)))
     case = fd.Case(board, [], [pull], fd.Rayleigh(alpha), contact=contact)
-    motion = fd.simulate(case, 0.3, method="newmark", dt=1e-3, every=0.1)
+    motion = fd.simulate(case, 0.3, method="newmark", dt=1e-3, interval=0.1)
     way = motion.displacement.values[:, :, 0].mean(axis=1)
     if angle > 16.7:
         wanted = 0.5 * G * (np.sin(a) - 0.3 * np.cos(a)) * 0.3**2

@@ -22,7 +22,7 @@ def chosen(case: fd.Case, duration: float, **options) -> tuple[str, str]:
 def test_a_small_sheet_in_a_short_motion_is_explicit():
     """Case study 2: 26,000 steps of a few microseconds each."""
     case = fd.read_case(find_case("herkal/case2")).case("circumcenter")
-    name, reason = chosen(case, 10.0, every=0.01)
+    name, reason = chosen(case, 10.0, interval=0.01)
     assert name == "rk4"
     assert reason.startswith("explicit: about 26,000 explicit steps (critical step 0.00076 s)")
 
@@ -46,12 +46,12 @@ DAMPED = fd.Rayleigh(0.1)
 def test_velocities_that_shake_the_bars_get_steps_that_resolve_them():
     """RK4 takes the energy out of vibrations near its critical step, whatever damps the sheet."""
     case = fd.Case(cell(), CELL_HELD, damping=DAMPED)
-    motion = fd.simulate(case, 0.2, method="auto", initial=KICK, every=0.01)
+    motion = fd.simulate(case, 0.2, method="auto", initial=KICK, interval=0.01)
     assert motion.attrs["method"] == "dormand_prince"
     assert motion.attrs["energy_error"] < 2e-3
     assert "% of the initial kinetic energy is in vibrations" in motion.attrs["method_reason"]
     with pytest.warns(FoldynWarning, match="the energy balance of the motion is off"):
-        damped = fd.simulate(case, 0.2, method="rk4", initial=KICK, every=0.01)
+        damped = fd.simulate(case, 0.2, method="rk4", initial=KICK, interval=0.01)
     assert damped.attrs["energy_error"] > 0.1
     thick = cell(preset="plate")
     slow = fd.modes(fd.Case(thick, CELL_HELD), 1).shape[0].values
@@ -62,7 +62,7 @@ def test_velocities_that_shake_the_bars_get_steps_that_resolve_them():
 @pytest.fixture
 def given(tmp_path) -> dict:
     """A motion that is kept, and starts as the choice does not see: with stretched bars."""
-    start = {"initial": fd.State(0.01 * KICK.velocity), "every": 0.01}
+    start = {"initial": fd.State(0.01 * KICK.velocity), "interval": 0.01}
     case = fd.Case(cell(), CELL_HELD, damping=DAMPED)
     return {"case": case, "duration": 0.2, "store": tmp_path / "run.nc", "checkpoint": 1e-9} | start
 
@@ -70,7 +70,7 @@ def given(tmp_path) -> dict:
 def anew(motion, given) -> None:
     """Hold a motion to one that was computed by the method of the second attempt."""
     assert motion.attrs["method"] == "dormand_prince"
-    plain = {name: given[name] for name in ("case", "duration", "initial", "every")}
+    plain = {name: given[name] for name in ("case", "duration", "initial", "interval")}
     alone = fd.simulate(**plain, method="dormand_prince")
     assert np.array_equal(motion.displacement, alone.displacement)
 
@@ -104,7 +104,7 @@ def test_a_lasting_motion_is_computed_anew_with_shorter_steps():
     case = fd.Case(cell(), CELL_HELD)
     why = "anew with steps of .*: with steps of .*; dt = .* saves"
     with pytest.warns(FoldynWarning, match=why):
-        motion = fd.simulate(case, 40.0, method="auto", initial=KICK, every=0.1)
+        motion = fd.simulate(case, 40.0, method="auto", initial=KICK, interval=0.1)
     assert motion.attrs["method"] == "central_difference"
     assert motion.attrs["energy_error"] < 0.01
     assert motion.sizes["time"] == 401
@@ -114,7 +114,7 @@ def test_stiff_damping_is_implicit():
     """With beta the specimen's critical step is below a microsecond."""
     case = fd.read_case(find_case("herkal/specimen-release")).case()
     damped = fd.Case(case.structure, case.supports, case.loads, fd.Rayleigh(14.4, 4.1e-4))
-    name, reason = chosen(damped, 1.0, every=0.01)
+    name, reason = chosen(damped, 1.0, interval=0.01)
     assert name == "generalized_alpha"
     assert "critical step 1.8e-07 s" in reason
 

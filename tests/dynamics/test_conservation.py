@@ -29,7 +29,7 @@ def test_linear_momentum_over_many_steps(method, mass):
     dt = (4.0 if implicit else 0.4) * fd.critical_step(case, "rk4" if implicit else method)
     motion = fd.simulate(
         case, (500 if implicit else 100_000) * dt, method=method, dt=dt,
-        every=100 if implicit else 2000,
+        interval=100 if implicit else 2000,
         initial=tumbling(case), **equal_steps(method),
     )  # fmt: skip
     p, _ = momenta(s, motion)
@@ -43,7 +43,7 @@ def test_central_differences_keep_energy_and_angular_momentum_over_1e5_steps():
     dt = 0.5 * fd.critical_step(case, "central_difference")
     initial = tumbling(case, shake=0.005)
     motion = fd.simulate(
-        case, 1e5 * dt, method="central_difference", dt=dt, every=500, initial=initial
+        case, 1e5 * dt, method="central_difference", dt=dt, every_steps=500, initial=initial
     )
     assert drift(momenta(case.structure, motion)[1]) < 1e-11
     error = np.abs(energy(motion) / energy(motion)[0] - 1.0)
@@ -60,7 +60,7 @@ def test_angular_momentum_drifts_with_the_order_or_faster(method):
     lost = []
     for n in steps.tolist():
         motion = fd.simulate(
-            case, 0.05, method=method, dt=0.05 / n, every=n,
+            case, 0.05, method=method, dt=0.05 / n, every_steps=n,
             initial=tumbling(case, spin=60.0, shake=0.0), **equal_steps(method),
         )  # fmt: skip
         lost.append(drift(momenta(case.structure, motion)[1]))
@@ -74,7 +74,7 @@ def test_implicit_methods_drift_with_the_square_of_the_step(method):
     case = fd.Case(fd.discretize(pattern, paper, preset="herkal", **LINEAR))
     start, steps, lost = spinning(case.structure, (2.0, 50.0, 1.5), (0.4, 0.0, 2.0)), [], []
     for n in (100, 200, 400):
-        motion = fd.simulate(case, 0.02, method=method, dt=0.02 / n, every=n, initial=start)
+        motion = fd.simulate(case, 0.02, method=method, dt=0.02 / n, every_steps=n, initial=start)
         steps.append(n)
         lost.append(np.linalg.norm(np.diff(momenta(case.structure, motion)[1], axis=0)))
     assert order(steps, lost) == pytest.approx(2.0, abs=0.3)
@@ -98,7 +98,7 @@ def test_methods_converge_to_one_motion_with_their_orders(method, mass):
     case = fd.Case(cell(**LINEAR, mass=mass), CELL_HELD, [load], fd.Rayleigh(0.5, beta))
 
     def end(method, n):
-        given = {"dt": duration / n, "every": n} | equal_steps(method)
+        given = {"dt": duration / n, "every_steps": n} | equal_steps(method)
         return fd.simulate(case, duration, method=method, **given).displacement.values[-1]
 
     reference = end("rk4", 64_000)
@@ -113,7 +113,7 @@ def test_energies_balance_in_the_default_model_and_methods_agree(method):
     s = fd.discretize(fd.patterns.miura(dihedral=60), SHEET)
     case = fd.Case(s, CELL_HELD, [push], fd.Rayleigh(alpha=0.5))
     motion, true = (
-        fd.simulate(case, 0.3, method=name, every=0.01, **steps_of(name, 1e-4))
+        fd.simulate(case, 0.3, method=name, interval=0.01, **steps_of(name, 1e-4))
         for name in (method, "rk4")
     )
     assert motion.attrs["energy_error"] < 1e-4

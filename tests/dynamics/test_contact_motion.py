@@ -31,7 +31,7 @@ def thrown(method, duration=0.02, stiffness=None, friction=0.0, speed=(0.0, 0.0,
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)  # few steps do not resolve an impact
         return s, fd.simulate(
-            case, duration, method=method, initial=start, **{"every": 1e-4} | options
+            case, duration, method=method, initial=start, **{"interval": 1e-4} | options
         )
 
 
@@ -57,7 +57,7 @@ def test_colliding_sheets_keep_momentum_and_energy(method, turning, error):
 
 
 @pytest.mark.matrix
-@pytest.mark.parametrize("options", [{"dt": 1e-4, "every": 1}, {"tolerance": 1e-3}])
+@pytest.mark.parametrize("options", [{"dt": 1e-4, "every_steps": 1}, {"tolerance": 1e-3}])
 def test_the_conserving_method_keeps_all_in_a_collision(options):
     """With steps that do not resolve what bars do, fixed or not: energy and both momenta."""
     pytest.importorskip("ipctk")
@@ -85,7 +85,7 @@ def test_a_rebound_converges_with_the_order_of_the_method(method, counts, fine, 
     explicit = method in EXPLICIT
 
     def rebound(n, method=method):
-        run = thrown(method, 2e-3, 300.0, dt=2e-3 / n, every=n)[1]
+        run = thrown(method, 2e-3, 300.0, dt=2e-3 / n, every_steps=n)[1]
         return run, run["velocity" if explicit else "displacement"].values[-1]
 
     run, best = rebound(fine, "rk4" if explicit else method)
@@ -101,7 +101,7 @@ def test_a_strip_folded_from_both_ends_stops_where_it_touches(method, options):
     case = folded_from_both_ends(fd.Contact())
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)  # of the energy that the impact takes
-        run = fd.simulate(case, 0.35, method=method, every=2e-3, **options)
+        run = fd.simulate(case, 0.35, method=method, interval=2e-3, **options)
     assert crossing(case.structure, run.displacement.values) == 0
     angles = np.degrees(case.structure.dihedrals(run.displacement.values[-1])[0])
     assert angles.max() > 25.0  # the panel that lies above rests on the other one
@@ -116,7 +116,7 @@ def test_a_conserving_strip_loses_no_energy_where_it_touches():
     contact = fd.Contact(friction=0.3, planes=[fd.Plane((0, 0, -0.2e-3), (0, 0, 1))])
     fold = fd.Actuate([0, 1], 8.0, fd.Ramp(0.05))
     case = fd.Case(strip(), [fd.Fix([2, 3])], [fold], fd.Rayleigh(alpha=20.0), contact=contact)
-    run = fd.simulate(case, 0.075, method=CONSERVING, dt=1e-4, every=1e-3)
+    run = fd.simulate(case, 0.075, method=CONSERVING, dt=1e-4, interval=1e-3)
     assert crossing(case.structure, run.displacement.values) == 0
     assert float(run.contact.max()) > 0.0
     assert run.attrs["energy_error"] < 1e-9
@@ -126,7 +126,7 @@ def test_it_crosses_itself_without_contact_or_without_the_limit_of_steps(monkeyp
     pytest.importorskip("ipctk")
     case = folded_from_both_ends(None)
     with pytest.raises(PenetrationError) as passed:
-        fd.simulate(case, 0.35, every=2e-3)
+        fd.simulate(case, 0.35, interval=2e-3)
     assert crossing(case.structure, passed.value.partial.displacement.values) > 0
 
     # the tower is where it matters: impacts at some m/s
@@ -137,7 +137,7 @@ def test_it_crosses_itself_without_contact_or_without_the_limit_of_steps(monkeyp
     with monkeypatch.context() as patch:
         patch.setattr(driver, "pack", unlimited)
         hit = tower(80.0, fd.Contact())
-        motion = driver.prepare(hit, 0.03, method="central_difference", every=1e-4)
+        motion = driver.prepare(hit, 0.03, method="central_difference", interval=1e-4)
     with pytest.raises(ComputationError):
         motion.run()
 
@@ -148,7 +148,7 @@ def test_no_step_is_too_long_to_see_what_is_in_its_way(monkeypatch):
 
     def met():
         thrown.cache_clear()
-        run = thrown("newmark", 0.012, dt=2e-3, every=1)[1]
+        run = thrown("newmark", 0.012, dt=2e-3, every_steps=1)[1]
         return run.attrs, np.abs(run.velocity.values[-1, lower, 2]).max()
 
     facts, speed = met()
@@ -163,14 +163,16 @@ def test_no_step_is_too_long_to_see_what_is_in_its_way(monkeypatch):
 def test_an_impact_too_violent_for_the_step_is_told():
     """A snap at some m/s, with a step that is far too long for it."""
     with pytest.raises(ComputationError, match=r"use a step below|no equilibrium was found"):
-        fd.simulate(tower(80.0, fd.Contact()), 0.03, method=ALPHA, dt=2e-5, every=1e-4)
+        fd.simulate(tower(80.0, fd.Contact()), 0.03, method=ALPHA, dt=2e-5, interval=1e-4)
 
 
 @pytest.mark.parametrize("force", [38.0, 50.0, 80.0])
 def test_the_tower_snaps_bounces_and_rests(force):
     pytest.importorskip("ipctk")
     case = tower(force, fd.Contact())
-    run = fd.simulate(case, 0.25, method="auto", every=2e-4)  # fewer samples may miss its closing
+    run = fd.simulate(
+        case, 0.25, method="auto", interval=2e-4
+    )  # fewer samples may miss its closing
     assert run.attrs["method"] == "dormand_prince"
     height = 0.06 + run.displacement.values[:, 6:12, 2].mean(axis=1)
     assert height.min() < 0.01  # it nearly closes
@@ -220,7 +222,7 @@ RUBBING = [
 def test_a_strip_slides_above_the_angle_of_friction(kind, method, duration, dt, near, lost, error):
     """A slope of 20 degrees; friction of 0.3 holds up to 16.7. On a panel it passes inner sides."""
     (case, strip), a = leaning(kind, 20.0), np.radians(20.0)
-    run = fd.simulate(case, duration, method=method, dt=dt, every=2e-3)
+    run = fd.simulate(case, duration, method=method, dt=dt, interval=2e-3)
     way, mass = slid(case, strip, run)
     expected = 0.5 * G * (np.sin(a) - 0.3 * np.cos(a)) * duration**2
     assert way[-1] == pytest.approx(expected, rel=near)
@@ -245,14 +247,14 @@ def test_a_strip_slides_above_the_angle_of_friction(kind, method, duration, dt, 
 def test_a_strip_sticks_below_the_angle_of_friction(kind, method, duration, dt, still, most):
     """A slope of 15 degrees: where it has come to rest it stays, for good."""
     case, strip = leaning(kind, 15.0, alpha=200.0)
-    run = fd.simulate(case, duration, method=method, dt=dt, every=2e-3)
+    run = fd.simulate(case, duration, method=method, dt=dt, interval=2e-3)
     way = slid(case, strip, run)[0]
     assert abs(way[-1] - way[int(0.6 * len(way))]) < still
     assert 0.0 < way[-1] < most and run.attrs["energy_error"] < 1e-2
 
 
 def test_without_friction_a_sheet_slides_as_it_falls():
-    run = fd.simulate(on_slope(20.0, 0.0), 0.1, every=2e-3)
+    run = fd.simulate(on_slope(20.0, 0.0), 0.1, interval=2e-3)
     distance = run.displacement.values[-1, :, 0].mean()
     assert distance == pytest.approx(0.5 * G * np.sin(np.radians(20.0)) * 0.01, rel=1e-9)
 
@@ -264,7 +266,7 @@ def test_a_moving_plane_does_the_work_that_it_gives(method, dt, error):
     up = fd.Ramp(0.01, smooth=True)
     plane = fd.Plane((0, 0, -0.2e-3), (0, 0, 1), friction=0.2, motion=(0, 0, 2e-3), history=up)
     case = fd.Case(strip(2), contact=fd.Contact(planes=[plane]))
-    run = fd.simulate(case, 0.02, method=method, dt=dt, every=2e-4)
+    run = fd.simulate(case, 0.02, method=method, dt=dt, interval=2e-4)
     assert float(run.work[-1]) > 0.0
     assert run.attrs["energy_error"] < error
     assert run.displacement.values[-1, :, 2].min() > 2e-3 - 0.2e-3  # it flies ahead of the plane
@@ -275,7 +277,7 @@ def test_nodes_make_way_for_a_plane_that_hits_them():
     plane = fd.Plane((0, 0, -2e-3), (0, 0, 1), motion=(0, 0, 6e-3), history=fd.Ramp(2e-3))
     case = fd.Case(strip(2), contact=fd.Contact(planes=[plane]))
     with pytest.warns(FoldynWarning, match="energy balance"):  # an impact in very few steps
-        run = fd.simulate(case, 4e-3, method="newmark", dt=2e-4, every=1)
+        run = fd.simulate(case, 4e-3, method="newmark", dt=2e-4, every_steps=1)
     height = (case.structure.nodes + run.displacement.values)[:, :, 2].min(axis=1)
     assert (height > -2e-3 + 6e-3 * np.minimum(run.time.values / 2e-3, 1.0)).all()
 
@@ -286,7 +288,7 @@ def test_supports_that_move_press_panels_together():
     close = fd.Impose([4, 5], "x", -0.995 * np.ptp(s.nodes[:, 0]), fd.Ramp(0.02, smooth=True))
     supports = [fd.Fix([0, 1]), close, fd.Fix([4, 5], "yz")]
     case = fd.Case(s, supports, damping=fd.Rayleigh(alpha=200.0), contact=fd.Contact())
-    run = fd.simulate(case, 0.03, method=ALPHA, dt=1e-4, every=1e-3)
+    run = fd.simulate(case, 0.03, method=ALPHA, dt=1e-4, interval=1e-3)
     assert crossing(s, run.displacement.values) == 0
     assert float(run.contact[-1]) > 0.0
 
@@ -320,13 +322,13 @@ def test_a_relaxing_fold_falls_on_a_plane_and_its_energies_balance():
     s = fd.discretize(pattern, fd.Sheet(1e9, 0.25, 1e-3, 800.0), fold_law=law)
     weight, contact = fd.Gravity((0, 0, -G)), fd.Contact(planes=[ground])
     case = fd.Case(s, [], [weight], fd.Rayleigh(alpha=3.0), contact=contact)
-    fallen = fd.simulate(case, 0.3, method="auto", every=0.005)
+    fallen = fd.simulate(case, 0.3, method="auto", interval=0.005)
     assert fallen.attrs["method"] == "dormand_prince"
     assert fallen.attrs["energy_error"] < 1e-4
     assert float(fallen.contact.max()) > 1e-7
     height = (fallen.rest_position + fallen.displacement).sel(axis="z").values - ground.point[2]
     assert 0.0 < height.min() < 0.5e-3  # within half the thickness, and not through
-    without = fd.simulate(case.altered(contact=None), 0.005, method="rk4", every=0.005)
+    without = fd.simulate(case.altered(contact=None), 0.005, method="rk4", interval=0.005)
     assert fallen.displacement.values[1] == pytest.approx(without.displacement.values[-1], abs=1e-9)
 
 
@@ -350,7 +352,7 @@ def test_a_plane_that_would_jump_is_refused_by_name(method, dt):
     plane = fd.Plane((0, 0, -5e-3), (0, 0, 1), **up)
     case = fd.Case(strip(2), contact=fd.Contact(planes=[plane]))
     with pytest.raises(InputError, match=r"contact: a plane with the history step jumps .* 0.004"):
-        fd.simulate(case, 0.01, method=method, dt=dt, every=1e-3)
+        fd.simulate(case, 0.01, method=method, dt=dt, interval=1e-3)
 
 
 def test_steps_that_are_chosen_end_where_the_motion_of_a_plane_has_corners():

@@ -110,7 +110,7 @@ def crumpled(seed: int):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)  # what impacts take from implicit methods
         warnings.simplefilter("error", fd.errors.CrossingWarning)
-        return case, fd.simulate(case, DURATION, every=1e-3, **options)
+        return case, fd.simulate(case, DURATION, interval=1e-3, **options)
 
 
 def check(seed: int) -> bool:

@@ -68,7 +68,7 @@ def test_a_tumbling_pair_keeps_its_momenta(method):
     """The axial dashpot follows the line between the masses: it damps the stretch, not the turn."""
     case, start = pair(0.5), fd.State(velocity=[[0.1, -1.0, 0.3], [0.3, 0.5, -0.2]])
     motion = fd.simulate(
-        case, 6.0, method=method, dt=0.002, initial=start, every=0.1, **equal_steps(method)
+        case, 6.0, method=method, dt=0.002, initial=start, interval=0.1, **equal_steps(method)
     )
     momentum, spin = momenta(case.structure, motion)
     assert drift(momentum) < 1e-12 and drift(spin) < 1e-5
@@ -86,7 +86,7 @@ def test_a_pair_that_only_turns_loses_nothing():
     spin = np.sqrt(2.0 * stretch / (reduced * (LENGTH + stretch)))  # k e = mu w^2 l
     arm = (LENGTH + stretch) * np.array([-2 / 3, 1 / 3])
     start = fd.State([[0, 0, 0], [stretch, 0, 0]], spin * np.outer(arm, [0.0, 1.0, 0.0]))
-    motion = fd.simulate(case, 20.0, dt=0.02, initial=start, every=0.5)
+    motion = fd.simulate(case, 20.0, dt=0.02, initial=start, interval=0.5)
     assert float(motion.dissipated[-1]) < 1e-9 * float(motion.kinetic[0])
 
 
@@ -101,7 +101,7 @@ def test_a_moving_base(ground, method):
     w, k = 3.0, MASS * OMEGA**2
     shaken = fd.BaseMotion("x", fd.Harmonic(w / (2 * np.pi)), 1e-3)
     driven = case.altered(supports=[*case.supports, shaken])
-    motion = fd.simulate(driven, 60.0, method=method, dt=0.01, every=0.05)
+    motion = fd.simulate(driven, 60.0, method=method, dt=0.01, interval=0.05)
     exact = (k + (0 if ground else 1j * w * C)) / (k - w**2 * MASS + 1j * w * C)
     found = steady(motion, 1, 0, w / (2 * np.pi), after=45.0) / 1e-3
     assert found == pytest.approx(exact, rel=2e-3)
@@ -135,7 +135,7 @@ def test_a_sheet_with_strong_dampers_stays_stable(method):
     assert step < fd.critical_step(plain, method)
     v = 1e-3 * np.random.default_rng(1).standard_normal(s.nodes.shape) * ~case.fixed
     start = fd.State(velocity=v)
-    motion = fd.simulate(case, 3000 * step, method=method, dt=step, initial=start, every=50)
+    motion = fd.simulate(case, 3000 * step, method=method, dt=step, initial=start, every_steps=50)
     kinetic = motion.kinetic.values
     assert kinetic[-1] < 0.1 * kinetic[0] and kinetic.max() <= kinetic[0] * (1 + 1e-9)
 
@@ -196,7 +196,7 @@ def test_a_folded_sheet_that_spins_loses_nothing(method):
     s = fold(100, fd.Sheet(1e7, 0.25, 0.01, 1.0), fold_law="linear")
     case, start = fd.Case(s, damping=fd.CreaseDamping(1.0)), spinning(s, [0.0, 0.3, 0.0])
     motion = fd.simulate(
-        case, 1.0, method=method, initial=start, every=0.1, **steps_of(method, 1e-3)
+        case, 1.0, method=method, initial=start, interval=0.1, **steps_of(method, 1e-3)
     )
     # what the centrifugal forces stretch and fold is of the order of the spin to the fourth power
     assert float(motion.dissipated[-1]) < 1e-4 * float(motion.kinetic[0])
@@ -214,7 +214,7 @@ def test_a_large_folding(model, method, modulus):
     """
     go = fd.Actuate("all", 300.0, fd.Ramp(1.5, smooth=True))
     case = flap(model, modulus, 170.0, damping=fd.CreaseDamping(0.02)).altered(loads=[go])
-    motion = fd.simulate(case, 3.0, method=method, every=0.01, **steps_of(method, 0.005))
+    motion = fd.simulate(case, 3.0, method=method, interval=0.01, **steps_of(method, 0.005))
     hinge = case.structure.folds[0]
     x = (case.structure.nodes + motion.displacement.values)[:, hinge]
     one, two = (np.cross(x[:, 1] - x[:, 0], x[:, k] - x[:, 0]) for k in (2, 3))
@@ -296,8 +296,8 @@ def test_a_response_is_that_of_beta():
 def spun(damping, method: str = "newmark", duration: float = 1.0, dt: float | None = 5e-3):
     """A free folded sheet that spins at 3 rad/s."""
     case = fd.Case(cell(preset="plate"), damping=damping)
-    start, every = spinning(case.structure, [0.0, 0.0, 3.0]), duration / 50
-    return fd.simulate(case, duration, method=method, initial=start, every=every, dt=dt)
+    start, interval = spinning(case.structure, [0.0, 0.0, 3.0]), duration / 50
+    return fd.simulate(case, duration, method=method, initial=start, interval=interval, dt=dt)
 
 
 @pytest.mark.parametrize(

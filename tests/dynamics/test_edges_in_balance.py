@@ -57,14 +57,14 @@ def differences(one, other):
 
 def by_edges(made, duration, steps=(1e-4, 5e-5), method=ALPHA):
     """The motion with edge angles as dofs."""
-    return [fd.simulate(made, duration, method=method, dt=dt, every=0.05) for dt in steps]
+    return [fd.simulate(made, duration, method=method, dt=dt, interval=0.05) for dt in steps]
 
 
 @pytest.mark.parametrize("law", ["linear", CURVED])
 @pytest.mark.parametrize("load", [moment, heat])
 def test_a_damped_motion_ends_where_statics_ends(load, law):
     made = case([load(fd.Ramp(0.1))], law, alpha=8.0)
-    end = fd.simulate(made, 8.0, method="rk4", every=8.0).displacement.values[-1]
+    end = fd.simulate(made, 8.0, method="rk4", interval=8.0).displacement.values[-1]
     path = fd.trace(case([load()], law), load_factors=[0.0, 1.0]).displacement.values[-1]
     assert apart(end, path) < 1e-6
 
@@ -77,7 +77,7 @@ def test_motions_are_those_with_edge_angles_as_dofs(method, law, loads):
     """By generalized_alpha, whose error of order 2 is all that is left; energies too."""
     made, central = case(loads, law), method == "central_difference"
     close = {"tolerance": 1e-8} if method == DP else {}
-    found = fd.simulate(made, 0.3, method=method, every=0.05, **close)
+    found = fd.simulate(made, 0.3, method=method, interval=0.05, **close)
     errors = [differences(other, found) for other in by_edges(made, 0.3, (2e-4, 1e-4))]
     assert errors[1] < (2e-5 if central else 2e-6)
     assert central or errors[0] / errors[1] > 3.0
@@ -97,8 +97,8 @@ def test_runge_kutta_keeps_its_order():
 def test_work_of_forces_that_jump():
     """Edge angles jump with them, and take the mean of both forces along."""
     made = case([moment(fd.Pulse(0.2))])
-    found = fd.simulate(made, 0.4, method=DP, every=0.1, tolerance=1e-8)
-    other = fd.simulate(made, 0.4, method=ALPHA, dt=1e-4, every=0.1)
+    found = fd.simulate(made, 0.4, method=DP, interval=0.1, tolerance=1e-8)
+    other = fd.simulate(made, 0.4, method=ALPHA, dt=1e-4, interval=0.1)
     assert balance(found) < 1e-8
     assert differences(other, found) < 1e-5
 
@@ -125,7 +125,7 @@ def test_creases_that_remember_or_are_damped_move_as_with_edge_angles_as_dofs(me
     """generalized_alpha is of order 1 where dofs without mass are damped: it is extrapolated."""
     law, damping = RESISTING[kind]
     made = case([moment(SMOOTH), heat(SMOOTH)], law, damping=damping)
-    found = fd.simulate(made, 0.3, method=method, every=0.05)
+    found = fd.simulate(made, 0.3, method=method, interval=0.05)
     one, other = by_edges(made, 0.3)
     for name in ("displacement", "dissipated", "work"):
         wanted = other[name].values
@@ -151,9 +151,9 @@ def test_damped_creases_are_of_order_two(damping):
 def test_a_state_holds_what_damped_creases_remember(method, kind):
     law, damping = RESISTING[kind]
     made = case([moment(SMOOTH)], law, damping=damping)
-    whole = fd.simulate(made, 0.2, method=method, every=0.1)
-    half = fd.initial_state(fd.simulate(made, 0.1, method=method, every=0.1))
-    rest = fd.simulate(made, 0.1, method=method, every=0.1, initial=half, start=0.1)
+    whole = fd.simulate(made, 0.2, method=method, interval=0.1)
+    half = fd.initial_state(fd.simulate(made, 0.1, method=method, interval=0.1))
+    rest = fd.simulate(made, 0.1, method=method, interval=0.1, initial=half, start=0.1)
     assert balance(rest) < 1e-5
     assert apart(rest.displacement.values[-1], whole.displacement.values[-1]) < 1e-6
 
@@ -162,7 +162,7 @@ def test_a_state_holds_what_damped_creases_remember(method, kind):
 def test_dampers_take_what_jumps():
     """The moment of a damped crease that jumps turns it at a finite rate."""
     made = case([moment(fd.Pulse(0.1))], damping=fd.CreaseDamping(0.5))
-    found = fd.simulate(made, 0.2, method=DP, every=0.05)
+    found = fd.simulate(made, 0.2, method=DP, interval=0.05)
     one, other = by_edges(made, 0.2)
     wanted = 2.0 * other.displacement.values - one.displacement.values
     assert apart(found.displacement.values, wanted) < 1e-4
@@ -183,8 +183,8 @@ def test_edge_angles_jump_beside_damped_creases(method, error, jump):
     """But for the turn of these; if they did not, they would ring from step to step."""
     held, damping = fd.Fix(list(MIURA.faces[0])), fd.CreaseDamping(0.5, [2, 3])
     made = fd.Case(model(pattern=MIURA), [held], [jump], damping=damping)
-    found = fd.simulate(made, 0.2, method=method, dt=2e-4, every=0.05)
-    other = fd.simulate(made, 0.2, method=DP, every=0.05, tolerance=1e-7)
+    found = fd.simulate(made, 0.2, method=method, dt=2e-4, interval=0.05)
+    other = fd.simulate(made, 0.2, method=DP, interval=0.05, tolerance=1e-7)
     assert differences(other, found) < error
     assert balance(found) < 1e-3
 
@@ -212,8 +212,8 @@ def test_edges_without_balance_are_told_of():
     pushed = fd.CreaseMoment(creases=[1], moment=2.0, history=fd.HalfSine(0.2))
     made = fd.Case(s, [fd.Fix([0, 1, 2])], [pushed])
     with pytest.raises(fd.errors.InstabilityError, match=r'no balance.*take method = "newmark"'):
-        fd.simulate(made, 0.3, method="rk4", every=0.02)
-    assert fd.simulate(made, 0.3, method="newmark", every=0.02).dissipated[-1] > 0.0
+        fd.simulate(made, 0.3, method="rk4", interval=0.02)
+    assert fd.simulate(made, 0.3, method="newmark", interval=0.02).dissipated[-1] > 0.0
 
 
 # ------------------------------------------------------------------ the turn of a crease alone
@@ -278,7 +278,7 @@ def test_work_of_moments_on_damped_creases(law, history):
     """By two methods: the same motion, and a balance that closes, at jumps too."""
     made = fd.Case(model("plate", law=law), HELD, [moment(history)], fd.CreaseDamping(0.05))
     one, other = (
-        fd.simulate(made, 0.8, method=method, dt=dt, every=0.05)
+        fd.simulate(made, 0.8, method=method, dt=dt, interval=0.05)
         for method, dt in (("rk4", None), (ALPHA, 1e-3))
     )
     assert apart(other, one) < 2e-3
@@ -290,7 +290,7 @@ def test_a_crease_that_is_damped_far_beyond_swinging_creeps_back():
     """With c the damping and k the stiffness of the crease, as exp(-k t / c) after a ramp."""
     s = model("plate", k=2.0, sheet=replace(SHEET, density=1e-4))
     made = fd.Case(s, HELD, [moment(fd.Ramp(1.0))], fd.CreaseDamping(2.0))
-    motion = fd.simulate(made, 6.0, method=ALPHA, dt=0.01, every=0.5)
+    motion = fd.simulate(made, 6.0, method=ALPHA, dt=0.01, interval=0.5)
     late = motion.time.values >= 1.0
     wanted = 0.01 * (1.0 - (np.e - 1.0) * np.exp(-motion.time.values[late]))
     assert abs(opened(s, motion))[late] == pytest.approx(wanted, rel=0.01)
@@ -307,7 +307,7 @@ def test_turns_of_one_hinge_by_two_histories_add_up(kind):
                 for p, h in enumerate((first, second))]  # fmt: skip
         loads = [*warm, fd.Actuate("all", angle=230.0, history=other)]
         made = fd.Case(s, HELD, loads, fd.Rayleigh(alpha=5.0))
-        return fd.simulate(made, duration=0.4, every=0.1, **options)
+        return fd.simulate(made, duration=0.4, interval=0.1, **options)
 
     same, late = fd.Ramp(0.3), fd.Ramp(0.3 + 1e-9)
     together = run(same, same, same)

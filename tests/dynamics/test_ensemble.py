@@ -10,7 +10,7 @@ import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.lanes import WIDTH
 
-STEPS = {"dt": 2e-5, "every": 10}
+STEPS = {"dt": 2e-5, "every_steps": 10}
 
 
 def sheet(k: int = 0, cells=(1, 1), **options) -> fd.Case:
@@ -33,7 +33,7 @@ FIRST = CASES[0]
 
 @pytest.fixture(scope="module")
 def many():
-    return fd.simulate_many(CASES, 0.1, every=0.005)
+    return fd.simulate_many(CASES, 0.1, interval=0.005)
 
 
 def moved(case: fd.Case, size: float, seed: int = 0) -> np.ndarray:
@@ -52,7 +52,7 @@ def compare(many, k, case, duration, near, **options) -> None:
 
 @pytest.mark.parametrize("k", [0, 1, WIDTH - 1, WIDTH, WIDTH + 2])
 def test_each_is_the_motion_of_the_model_alone(many, k):
-    compare(many, k, CASES[k], 0.1, 1e-11, dt=float(many.dt), every=0.005)
+    compare(many, k, CASES[k], 0.1, 1e-11, dt=float(many.dt), interval=0.005)
     assert str(many.outcome[k].values) == "done"
 
 
@@ -64,7 +64,7 @@ def test_the_step_is_that_of_the_stiffest(many):
 
 
 def test_threads_do_not_change_a_bit(many):
-    again = fd.simulate_many(CASES, 0.1, every=0.005, threads=1)
+    again = fd.simulate_many(CASES, 0.1, interval=0.005, threads=1)
     for name in ("displacement", "velocity", "reaction", "work"):
         np.testing.assert_array_equal(again[name], many[name])
 
@@ -104,7 +104,7 @@ def test_a_start_in_a_stiffer_state_limits_the_step():
 
 def test_without_loads():
     case = FIRST.altered(loads=[])
-    given = {"every": 10, "initial": fd.State(velocity=1e-3 * ~case.fixed), "start": 3.0}
+    given = {"every_steps": 10, "initial": fd.State(velocity=1e-3 * ~case.fixed), "start": 3.0}
     many = fd.simulate_many([case], 0.01, **given)
     assert float(many.time[0]) == 3.0
     assert not many.work.any()
@@ -115,10 +115,10 @@ def test_one_that_fails_does_not_stop_the_others():
     """It is nan from there on; the others are what they are without it."""
     wild = [None, fd.State(velocity=moved(CASES[1], 1e3, 1))]
     with pytest.warns(FoldynWarning, match=r"1 of 2 motions .*: cases\[1\], the first with: "):
-        many = fd.simulate_many(CASES[:2], 0.02, every=10, initial=wild)
+        many = fd.simulate_many(CASES[:2], 0.02, every_steps=10, initial=wild)
     assert many.outcome.values[0] == "done" != many.outcome.values[1]
     assert np.isnan(many.displacement.values[1, -1]).all()
-    without = fd.simulate_many(CASES[:1], 0.02, dt=float(many.dt), every=10)
+    without = fd.simulate_many(CASES[:1], 0.02, dt=float(many.dt), every_steps=10)
     np.testing.assert_array_equal(without.displacement[0], many.displacement[0])
 
 
@@ -136,10 +136,10 @@ def test_what_lanes_do_not_take_is_computed_alone():
         fd.Case(consistent, [held], gravity),
     ]
     given = [FIRST, *alone, *(sheet(k, bend_law="linear") for k in range(2)), CASES[1]]
-    many = fd.simulate_many(given, 0.01, dt=2e-5, every=50)
+    many = fd.simulate_many(given, 0.01, dt=2e-5, every_steps=50)
     assert (many.outcome == "done").all()
     for k, case in enumerate(given):
-        compare(many, k, case, 0.01, 0.0 if case in alone else 1e-11, dt=2e-5, every=50)
+        compare(many, k, case, 0.01, 0.0 if case in alone else 1e-11, dt=2e-5, every_steps=50)
 
 
 def test_contact_is_computed_alone():
@@ -167,7 +167,7 @@ FAST = fd.State(velocity=np.ones(FIRST.fixed.shape))
         ({"cases": [FIRST, 3]}, r"cases\[1\].*got int, give a Case"),
         ({"cases": []}, "give a list of cases"),
         ({"dt": 6e-4}, r"^dt = 0.0006 s is above the critical step of .* s of cases\[10\]"),
-        ({"every": 0}, "^every = 0: must be"),
+        ({"every_steps": 0}, "^every_steps = 0: must be"),
         ({"initial": [None]}, "give one State, or a list of 11"),
         ({"initial": [None] * 10 + [FAST]}, r"cases\[10\]: initial: velocity of node"),
         ({"threads": 0}, "threads"),
@@ -181,7 +181,7 @@ def test_what_does_not_fit_is_refused_by_name(given, text):
 def test_a_step_that_is_too_long_is_told():
     state = fd.State(moved(FIRST, 1e-4))
     with pytest.warns(FoldynWarning, match=r"\(the worst of cases\[0\], cases\[1\]\): the energy"):
-        fd.simulate_many(CASES[:2], 0.02, every=10, initial=state)
+        fd.simulate_many(CASES[:2], 0.02, every_steps=10, initial=state)
 
 
 def test_it_is_a_result(many, tmp_path):

@@ -61,7 +61,7 @@ def test_a_spinning_panel_is_pushed_along_its_normal(make, method) -> None:
     s = make(SQUARE)
     case, start = fd.Case(s, [], [fd.Pressure(P)]), spinning(s, [0.0, SPIN, 0.0])
     found = fd.simulate(
-        case, 1.0, method=method, every=0.1, initial=start, **steps_of(method, 4e-3)
+        case, 1.0, method=method, interval=0.1, initial=start, **steps_of(method, 4e-3)
     )
     center = np.einsum("n,tnc->tc", s.nodal_mass, found.displacement.values) / MASS
     t, a = found.time.values, P / MASS
@@ -78,7 +78,7 @@ def test_a_hinged_panel_turns_under_a_constant_moment(method) -> None:
     """p b a^2 / 2 about its axis in any position: angle = moment t^2 / (2 I)."""
     s, p = bars(SQUARE), 0.05
     case = fd.Case(s, [fd.Fix([0, 3], "xyz")], [fd.Pressure(p)])
-    found = fd.simulate(case, 1.0, method=method, every=0.1, **steps_of(method, 2e-3))
+    found = fd.simulate(case, 1.0, method=method, interval=0.1, **steps_of(method, 2e-3))
     inertia = float(s.nodal_mass @ s.nodes[:, 0] ** 2)
     x = s.nodes[1] + found.displacement.values[:, 1]
     angle = np.unwrap(np.arctan2(x[:, 2], x[:, 0]))
@@ -93,7 +93,7 @@ def test_reactions_carry_the_pressure(method) -> None:
     """They are what changes the momentum, less the resultant of the pressure."""
     s = bars(SQUARE)
     case = fd.Case(s, [fd.Fix([0, 3], "xyz")], [fd.Pressure(P)])
-    found = fd.simulate(case, 0.3, method=method, dt=2e-4, every=1)
+    found = fd.simulate(case, 0.3, method=method, dt=2e-4, every_steps=1)
     momentum = np.einsum("n,tnc->tc", s.nodal_mass, found.velocity.values)
     change = np.gradient(momentum, found.time.values, axis=0)
     x = (s.nodes + found.displacement.values)[:, s.triangles]
@@ -115,7 +115,7 @@ def test_the_energy_balance_closes(make, method) -> None:
         fd.Pressure(-0.02, [1]),
     ]
     case = fd.Case(s, FOLD_HELD, loads, fd.Rayleigh(0.2, 1e-4) if make is bars else ())
-    found = fd.simulate(case, 0.3, method=method, every=0.02, **steps_of(method, 5e-4))
+    found = fd.simulate(case, 0.3, method=method, interval=0.02, **steps_of(method, 5e-4))
     assert abs(float(found.work[-1])) > 1e-5
     usual = 1e-5 if make is bars else 1e-3
     bound = {"energy_momentum": 1e-10, "central_difference": 2e-4}.get(method, usual)
@@ -126,7 +126,7 @@ def test_a_motion_starts_with_a_shells_rotations_in_balance_with_the_moment() ->
     """Held where its moment and its fold balance, it stays: nothing rings."""
     case = turned_fold(0.3)
     rest = fd.initial_state(fd.trace(case, load_factors=[0, 1]))
-    found = fd.simulate(case, 0.2, method="generalized_alpha", dt=0.01, every=1, initial=rest)
+    found = fd.simulate(case, 0.2, method="generalized_alpha", dt=0.01, every_steps=1, initial=rest)
     assert np.abs(rest.displacement).max() > 0.05
     assert np.abs(found.displacement.values - rest.displacement).max() < 1e-8
 
@@ -138,7 +138,7 @@ def test_rotations_of_a_shell_follow_a_moment_that_jumps() -> None:
     one, other = (
         fd.simulate(
             fd.Case(s, loads=[fd.CreaseMoment([0], 0.1 * p, fd.Pulse(end)) for p, end in parts]),
-            0.2, method="newmark", dt=0.004, every=10,
+            0.2, method="newmark", dt=0.004, every_steps=10,
         )
         for parts in pulses
     )  # fmt: skip
@@ -150,7 +150,9 @@ def test_rotations_of_a_shell_follow_a_moment_that_jumps() -> None:
 def test_work_of_pressure_on_a_closed_body_is_pressure_times_volume(make) -> None:
     s, p = make(BOX, SOFT), 20.0
     method, dt = ("rk4", 2e-4) if make is bars else ("newmark", 5e-4)
-    found = fd.simulate(fd.Case(s, [], [fd.Pressure(p)]), 0.05, method=method, dt=dt, every=10)
+    found = fd.simulate(
+        fd.Case(s, [], [fd.Pressure(p)]), 0.05, method=method, dt=dt, every_steps=10
+    )
     x = (s.nodes + found.displacement.values)[:, s.triangles]
     volume = np.einsum("stc,stc->s", x[:, :, 0], np.cross(x[:, :, 1], x[:, :, 2])) / 6.0
     assert volume.max() > 1.2
@@ -163,7 +165,7 @@ def test_work_of_pressure_on_a_closed_body_is_pressure_times_volume(make) -> Non
 def test_a_step_matrix_takes_few_iterations(make) -> None:
     """With the symmetric part of the stiffness alone: the rest is small against M / h^2."""
     case = fd.Case(make(SQUARE), [fd.Fix([0, 3], "xyz")], [fd.Pressure(1.0)])
-    found = fd.simulate(case, 0.2, method="generalized_alpha", dt=4e-3, every=1)
+    found = fd.simulate(case, 0.2, method="generalized_alpha", dt=4e-3, every_steps=1)
     assert found.attrs["iterations"] < 8 * found.attrs["steps"]
 
 

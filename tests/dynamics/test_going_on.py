@@ -39,18 +39,18 @@ def end(motion):
     ],
 )
 def test_identical_bits_from_the_last_sample(damping, air, method, dt, tmp_path):
-    case, every = fd.Case(S, HELD, [PUSH], damping, air=air), 96 * dt
-    options = {"method": method, "dt": dt, "every": every, "force": True}
+    case, interval = fd.Case(S, HELD, [PUSH], damping, air=air), 96 * dt
+    options = {"method": method, "dt": dt, "interval": interval, "force": True}
     begin = fd.State(BENT)
-    whole = fd.simulate(case, 16 * every, initial=begin, **options)
-    first = fd.simulate(case, 7 * every, initial=begin, **options)
+    whole = fd.simulate(case, 16 * interval, initial=begin, **options)
+    first = fd.simulate(case, 7 * interval, initial=begin, **options)
     fd.save(first, tmp_path / "first.nc")
     first = fd.load(tmp_path / "first.nc")
     middle = fd.simulate(
-        case, 4 * every, initial=fd.initial_state(first), start=7 * every, **options
+        case, 4 * interval, initial=fd.initial_state(first), start=7 * interval, **options
     )
     last = fd.simulate(
-        case, 5 * every, initial=fd.initial_state(middle), start=11 * every, **options
+        case, 5 * interval, initial=fd.initial_state(middle), start=11 * interval, **options
     )
     if air is not None:
         assert whole.attrs["flows"] > 4
@@ -60,14 +60,14 @@ def test_identical_bits_from_the_last_sample(damping, air, method, dt, tmp_path)
 
 def test_damping_is_about_the_first_start_from_any_sample():
     case = fd.Case(S, HELD, [PUSH], MODAL)
-    whole = fd.simulate(case, 0.25, initial=fd.State(BENT), dt=2.0**-12, every=64)
+    whole = fd.simulate(case, 0.25, initial=fd.State(BENT), dt=2.0**-12, every_steps=64)
     start = fd.initial_state(whole, 3)
     assert np.array_equal(start.origin_of(BENT.shape).displacement, BENT)
     rest = 0.25 - float(whole.time[3])
-    again = fd.simulate(case, rest, initial=start, dt=2.0**-12, every=64)
+    again = fd.simulate(case, rest, initial=start, dt=2.0**-12, every_steps=64)
     assert np.array_equal(end(again)["displacement"], end(whole)["displacement"])
     plain = fd.State(start.displacement, start.velocity)
-    anew = fd.simulate(case, rest, initial=plain, dt=2.0**-12, every=64)
+    anew = fd.simulate(case, rest, initial=plain, dt=2.0**-12, every_steps=64)
     swing = np.abs(end(whole)["displacement"] - BENT).max()
     assert np.abs(end(anew)["displacement"] - end(whole)["displacement"]).max() > 1e-3 * swing
 
@@ -85,7 +85,7 @@ def test_an_origin_of_other_nodes_is_refused():
 def test_motions_of_one_case_side_by_side_begin_each_with_its_own(damping, air):
     case = fd.Case(S, HELD, [PUSH], damping, air=air)
     starts = [fd.State(place) for place in (0.0 * BENT, BENT, DROPPED)]
-    dt, options = 2.0**-12, {"every": 2.0**-7, "force": True}
+    dt, options = 2.0**-12, {"interval": 2.0**-7, "force": True}
     many = fd.simulate_many([case] * 3, 2.0**-5, dt=dt, initial=starts, **options)
     ends = [fd.initial_state(many.isel(model=k)) for k in range(3)]
     more = fd.simulate_many([case] * 3, 2.0**-5, dt=dt, initial=ends, start=2.0**-5, **options)
@@ -115,7 +115,7 @@ def test_stepped_sines_keep_the_state_about_which_they_are_damped(damping):
 def test_rest_angles_of_the_damping_stay_those_of_the_first_start():
     turn = fd.Actuate("all", fold_angle=50.0, history=fd.Ramp(1.0))
     case, dt = fd.Case(S, HELD, [turn], STIFF), 2.0**-6
-    options = {"method": "newmark", "dt": dt, "every": 4}
+    options = {"method": "newmark", "dt": dt, "every_steps": 4}
     whole = fd.simulate(case, 32 * dt, initial=fd.State(BENT), start=0.25, **options)
     first = fd.simulate(case, 16 * dt, initial=fd.State(BENT), start=0.25, **options)
     assert fd.initial_state(first).origin_of(BENT.shape).time == 0.25
@@ -127,7 +127,7 @@ def test_rest_angles_of_the_damping_stay_those_of_the_first_start():
 
 def test_each_motion_of_many_goes_on_from_where_it_began_itself():
     case, dt = fd.Case(S, HELD, [PUSH], MODAL, air=WATER), 2.0**-12
-    options = {"method": "rk4", "dt": dt, "every": 24 * dt}
+    options = {"method": "rk4", "dt": dt, "interval": 24 * dt}
     first = fd.simulate(case, 72 * dt, initial=fd.State(BENT), **options)
     starts = [fd.initial_state(first), fd.State(DROPPED)]
     many = fd.simulate_many([case] * 2, 48 * dt, initial=starts, start=72 * dt, **options)

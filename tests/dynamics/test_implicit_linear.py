@@ -51,7 +51,7 @@ def test_a_step_a_thousand_times_the_critical_one(method):
     exact = 0.1 * np.cos(slow * motion.time.values)
     assert np.abs(place(motion) - exact).max() < 0.1 * (slow * dt) ** 3 * 100 / 10
     shaken = fd.simulate(
-        case, 5000 * dt, method=method, dt=dt, every=10, initial=moved(1e-6, -1e-6)
+        case, 5000 * dt, method=method, dt=dt, every_steps=10, initial=moved(1e-6, -1e-6)
     )
     assert np.abs(shaken.displacement).max() < 2e-6
     energy = (shaken.kinetic + shaken.strain_bars).values

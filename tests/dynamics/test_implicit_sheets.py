@@ -27,13 +27,15 @@ def test_case_2_converges_to_the_motion_of_rk4(method):
     order 2 errs by anyway: the observed order is 2.0.
     """
     case = fd.read_case(find_case("herkal/case2")).case("circumcenter")
-    reference = fd.simulate(case, 2.0, dt=2.0 / 16000, every=400)
+    reference = fd.simulate(case, 2.0, dt=2.0 / 16000, every_steps=400)
     steps = [200, 400, 800]
-    motions = [fd.simulate(case, 2.0, method=method, dt=2.0 / n, every=n // 40) for n in steps]
+    motions = [
+        fd.simulate(case, 2.0, method=method, dt=2.0 / n, every_steps=n // 40) for n in steps
+    ]
     errors = [apart(motion, reference) for motion in motions]
     assert errors[0] < 0.01
     assert order(steps, errors) == pytest.approx(2.0, abs=0.1)
-    adaptive = fd.simulate(case, 2.0, method=method, every=0.05)
+    adaptive = fd.simulate(case, 2.0, method=method, interval=0.05)
     assert apart(adaptive, reference) < 0.005
     assert adaptive.attrs["steps"] < 800
 

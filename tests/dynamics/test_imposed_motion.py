@@ -62,7 +62,7 @@ def test_base_motion_is_gravity_in_the_moving_frame(mass):
     steps = [400, 800, 1600]
     for n in steps:
         one, other = (
-            fd.simulate(case, 0.04, dt=0.04 / n, every=n // 8) for case in (shaken, still)
+            fd.simulate(case, 0.04, dt=0.04 / n, every_steps=n // 8) for case in (shaken, still)
         )
         base = value * np.multiply.outer(SMOOTH(one.time.values), [[1.0, 0.0, 0.0]])
         differences.append(apart(one.displacement.values - base, other.displacement.values))
@@ -99,7 +99,7 @@ def test_reactions_change_the_momentum(mass):
 def test_a_function_is_differentiated():
     """Velocities and reactions of a function of time are those of the same formula built in."""
     one, other = (
-        fd.simulate(moved(miura(), pull(history)), 0.01, dt=1e-4, every=10)
+        fd.simulate(moved(miura(), pull(history)), 0.01, dt=1e-4, every_steps=10)
         for history in (fd.Harmonic(frequency=20.0), lambda t: np.sin(40.0 * np.pi * t))
     )
     for name in ("displacement", "velocity", "reaction"):
@@ -110,7 +110,7 @@ def test_a_slow_pull_ends_in_equilibrium():
     """After a slow pull with strong damping, reactions balance and forces vanish elsewhere."""
     slow = pull(fd.Ramp(duration=5.0, smooth=True), 0.05)
     case = moved(miura(sheet=SHEET), slow, damping=fd.Rayleigh(alpha=6.0))
-    end = fd.simulate(case, 12.0, every=1.0).isel(time=-1)
+    end = fd.simulate(case, 12.0, interval=1.0).isel(time=-1)
     u = end.displacement.values
     np.testing.assert_allclose(u[[6, 7, 8], 0], 0.05)
     force = case.structure.internal_force(u)

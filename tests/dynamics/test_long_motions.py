@@ -23,7 +23,7 @@ from foldyn.errors import ComputationError, InputError, MotionInterrupted
 from foldyn.results import columns, netcdf
 
 OFTEN = 1e-9  # seconds: a checkpoint whenever there is an opportunity
-SECOND = {"duration": 1.0, "every": 0.01}
+SECOND = {"duration": 1.0, "interval": 0.01}
 pytestmark = pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 
 
@@ -76,13 +76,13 @@ def begun(kept) -> dict:
 
 KINDS = {  # name of the case, its arguments, and what of the methods
     "sheet": (METHODS, SECOND),
-    "steps": (["dormand_prince"], {"duration": 1.0, "every": 3}),
-    "fixed": (["newmark"], {"duration": 1.0, "every": 0.02, "dt": 0.005}),
-    "actuated": (["rk4", "generalized_alpha"], {"duration": 0.6, "every": 0.01}),
-    "blown": (["rk4", "dormand_prince"], {"duration": 1.2, "every": 0.02}),
+    "steps": (["dormand_prince"], {"duration": 1.0, "every_steps": 3}),
+    "fixed": (["newmark"], {"duration": 1.0, "interval": 0.02, "dt": 0.005}),
+    "actuated": (["rk4", "generalized_alpha"], {"duration": 0.6, "interval": 0.01}),
+    "blown": (["rk4", "dormand_prince"], {"duration": 1.2, "interval": 0.02}),
     "creeping": (["dormand_prince", "generalized_alpha"], {**SECOND, "dt": 0.002}),
-    "warmed": (["rk4"], {"duration": 0.5, "every": 0.01}),
-    "sliding": (["energy_momentum"], {"duration": 0.02, "every": 0.001}),
+    "warmed": (["rk4"], {"duration": 0.5, "interval": 0.01}),
+    "sliding": (["energy_momentum"], {"duration": 0.02, "interval": 0.001}),
 }
 RUNS = [(kind, method) for kind, (methods, _) in KINDS.items() for method in methods]
 
@@ -109,10 +109,10 @@ def test_what_the_user_samples_goes_on_too(tmp_path):
 
 
 @pytest.mark.parametrize("method", ["rk4", "dormand_prince", "newmark"])
-@pytest.mark.parametrize("every", [0.004, 1])
-def test_samples_that_memory_does_not_hold_are_the_same(tmp_path, monkeypatch, method, every):
+@pytest.mark.parametrize("kept", [{"interval": 0.004}, {"every_steps": 1}])
+def test_samples_that_memory_does_not_hold_are_the_same(tmp_path, monkeypatch, method, kept):
     """Room for some sixteen; the file is written and read in pieces as well."""
-    options = {"duration": 0.8, "every": every, "method": method}
+    options = {"duration": 0.8, **kept, "method": method}
     whole = simulated("sheet", **options)
     for module in (columns, output, netcdf):
         monkeypatch.setattr(module, "PIECE", 4000)
@@ -134,7 +134,7 @@ def test_a_motion_goes_on_only_as_it_was_begun(begun, monkeypatch):
         ({"changes": {"force": 0.06}}, r"loads\[0\]\.force = \[0\.05, 0\.0, 0\.0\]"),
         ({"method": "central_difference"}, 'method = "rk4"'),
         ({"duration": 2.0}, r"duration = 1\.0, which is 2\.0 now"),
-        ({"every": 4}, "every"),
+        ({"interval": 0.02}, r"interval = 0\.01, which is 0\.02 now"),
         ({"sample": {"own": lambda u, v, t: 0.0}}, r"sample = \[\]"),
         ({"initial": THROWN}, "initial"),
     ]:
@@ -171,7 +171,7 @@ def test_ctrl_c_says_what_is_kept(kept):
 
 
 def test_a_motion_that_fails_is_stored_until_then(kept, tmp_path):
-    wild = {"duration": 4.0, "every": 1, "dt": 0.0175, "force": True}
+    wild = {"duration": 4.0, "every_steps": 1, "dt": 0.0175, "force": True}
     failed = []
     for given in (kept | wild, wild):
         with pytest.raises(ComputationError) as error:
@@ -197,7 +197,7 @@ def test_a_motion_that_fails_is_stored_until_then(kept, tmp_path):
 def test_bad_arguments_are_refused_before_anything_is_computed(given, text, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match=text):
-        fd.simulate(sheet(), 0.2, every=0.01, **given)
+        fd.simulate(sheet(), 0.2, interval=0.01, **given)
 
 
 @pytest.mark.parametrize(
@@ -229,7 +229,7 @@ def test_samples_that_change_while_it_runs_do_not_become_a_result(kept, tmp_path
 
 # ------------------------------------------------------------------ processes
 TESTS = Path(__file__).resolve().parents[1]
-LONG = {"name": "sheet", "duration": 200.0, "every": 0.05, "checkpoint": 0.02}
+LONG = {"name": "sheet", "duration": 200.0, "interval": 0.05, "checkpoint": 0.02}
 
 
 def started(options, limit=None):
@@ -283,7 +283,7 @@ def test_sigkill_at_random_moments_with_a_second_process(tmp_path):
     assert all(np.diff(reached) > 0.0)
     process = started(options)
     assert process.wait() == 0, process.stderr.read()
-    whole = simulated("sheet", duration=LONG["duration"], every=LONG["every"])
+    whole = simulated("sheet", duration=LONG["duration"], interval=LONG["interval"])
     same(fd.load(file), whole)
 
 
@@ -300,7 +300,7 @@ def test_a_full_disk_keeps_the_last_checkpoint_and_says_so(tmp_path):
     ):
         assert words in said
     found = simulated(**{**options, "resume": True})
-    same(found, simulated("sheet", duration=50.0, every=LONG["every"]))
+    same(found, simulated("sheet", duration=50.0, interval=LONG["interval"]))
 
 
 def test_a_disk_that_is_full_from_the_beginning(kept, monkeypatch):
@@ -317,7 +317,7 @@ def test_memory_does_not_grow_with_the_length(tmp_path):
     """A run 20 times longer takes at most 5 % more memory at its peak."""
     peaks = []
     for k, duration in enumerate((20.0, 400.0)):
-        options = {**LONG, "checkpoint": 5.0, "every": 0.005, "duration": duration}
+        options = {**LONG, "checkpoint": 5.0, "interval": 0.005, "duration": duration}
         process = started({**options, "store": str(tmp_path / f"{k}.nc")})
         _, status, used = os.wait4(process.pid, 0)
         assert status == 0

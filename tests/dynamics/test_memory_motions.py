@@ -66,7 +66,7 @@ def test_a_steady_sine_of_the_angle_sees_the_complex_modulus(method):
     """Of order 2: 1,600 steps in a period err by 5.3e-7."""
 
     def error(n):
-        options = {"dt": 0.5 / n, "every": n // 20}
+        options = {"dt": 0.5 / n, "every_steps": n // 20}
         return modulus_error(1e-4, lambda case: fd.simulate(case, 6.0, method=method, **options))
 
     assert error(1600) < 1e-6
@@ -79,7 +79,7 @@ def test_errors_of_memory_alone_are_seen():
     found = []
 
     def run(case):
-        found.append(controlled(case, 1e-4, 6.0, every=0.025))
+        found.append(controlled(case, 1e-4, 6.0, interval=0.025))
         return found[0]
 
     assert modulus_error(1e-2, run) < 1e-3
@@ -99,7 +99,7 @@ def test_creep_under_a_constant_moment():
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", LAWS)
 def test_the_energy_balance_closes(name, method):
-    found = fd.simulate(pushed(LAWS[name]), 2.0, method=method, dt=2.0**-10, every=16)
+    found = fd.simulate(pushed(LAWS[name]), 2.0, method=method, dt=2.0**-10, every_steps=16)
     assert float(found.dissipated[-1]) > 0.2 * float(found.work.max())
     assert (np.diff(found.dissipated) >= 0.0).all()
     assert found.attrs["energy_error"] < 1e-5
@@ -107,7 +107,7 @@ def test_the_energy_balance_closes(name, method):
 
 def end(case, method, n, duration=2.0, **more) -> float:
     """Where the wing is after so many equal steps."""
-    steps = {"dt": duration / n, "every": n} | equal_steps(method)
+    steps = {"dt": duration / n, "every_steps": n} | equal_steps(method)
     return opened(fd.simulate(case, duration, method=method, **steps, **more))[-1]
 
 
@@ -157,10 +157,10 @@ def test_motions_come_to_those_of_small_equal_steps(name):
     """As the tolerance goes down, with the balance of energy; states of branches too."""
     case = pushed(LAWS[name])
     for method, near in (("rk4", 1e-6), ("newmark", 2e-5)):
-        fine = fd.simulate(case, 2.0, method=method, dt=2.0**-13, every=2**10)
+        fine = fd.simulate(case, 2.0, method=method, dt=2.0**-13, interval=2**10)
         scale = np.abs(opened(fine)).max()
         for tolerance, error in ((1e-4, 2e-3), (1e-6, 4e-5), (1e-8, 1e-6)):
-            found = controlled(case, tolerance, every=0.125)
+            found = controlled(case, tolerance, interval=0.125)
             assert apart(opened(found), opened(fine)) < error + near
             assert np.abs(found.memory - fine.memory).max() < (error + near) * scale
             assert found.attrs["energy_error"] < error
@@ -169,7 +169,7 @@ def test_motions_come_to_those_of_small_equal_steps(name):
 
 def test_steps_are_cut_where_a_crease_begins_to_yield_or_turns_back():
     law = LAWS["plastic"]
-    found, elastic = (controlled(pushed(one), 1e-8, every=1) for one in (law, "linear"))
+    found, elastic = (controlled(pushed(one), 1e-8, every_steps=1) for one in (law, "linear"))
     assert found.attrs["refused_steps"] > elastic.attrs["refused_steps"] + 5
     begins = int(np.argmax(found.memory.values[:, 0, 1] > 0.0))
     turns = int(np.argmax(np.diff(opened(found)) < 0.0))
@@ -183,7 +183,7 @@ def test_steps_are_cut_where_a_crease_begins_to_yield_or_turns_back():
 @pytest.mark.parametrize("name", LAWS)
 def test_refused_steps_leave_no_trace(name):
     """A step that is taken after others were refused has the bits of one that is taken at once."""
-    motion = prepare(pushed(LAWS[name]), 2.0, DP, tolerance=1e-7, every=10**6)
+    motion = prepare(pushed(LAWS[name]), 2.0, DP, tolerance=1e-7, interval=10**6)
     motion.run()  # to where everything has flowed
     plan = motion.plan._replace(end=4.0, dt=1.0)
     engine = motion.method.engine(motion.case, motion.packed, motion.course, plan)
@@ -206,8 +206,8 @@ def test_refused_steps_leave_no_trace(name):
 
 def test_refused_steps_of_an_implicit_method_leave_no_trace():
     """Steps chosen by their error end near those of small equal ones."""
-    fine = fd.simulate(pushed(PRONY), 2.0, method=ALPHA, dt=2.0**-11, every=1.0)
-    chosen = fd.simulate(pushed(PRONY), 2.0, method=ALPHA, tolerance=1e-6, every=1.0)
+    fine = fd.simulate(pushed(PRONY), 2.0, method=ALPHA, dt=2.0**-11, interval=1.0)
+    chosen = fd.simulate(pushed(PRONY), 2.0, method=ALPHA, tolerance=1e-6, interval=1.0)
     assert chosen.attrs["refused_steps"] > 0
     assert opened(chosen)[-1] == pytest.approx(opened(fine)[-1], rel=1e-4)
 
@@ -228,8 +228,10 @@ def test_folds_and_bends_of_a_sheet(law):
     start = fd.State(velocity=v)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", fd.errors.FoldynWarning)
-        fine = fd.simulate(case, 0.025, method="rk4", dt=0.025 / 2**14, every=2**14, initial=start)
-    found = controlled(case, 1e-7, 0.025, every=0.025, initial=start)
+        fine = fd.simulate(
+            case, 0.025, method="rk4", dt=0.025 / 2**14, interval=2**14, initial=start
+        )
+    found = controlled(case, 1e-7, 0.025, interval=0.025, initial=start)
     assert apart(found, fine) < 1e-4
     assert float(found.dissipated[-1]) == pytest.approx(float(fine.dissipated[-1]), rel=1e-3)
     assert float(found.dissipated[-1]) > 0.0
@@ -237,8 +239,8 @@ def test_folds_and_bends_of_a_sheet(law):
 
 
 # ------------------------------------------------------------------ motions that go on
-STEPS = {"dt": 0.003, "every": 50}  # s: times that are not exact
-EXACT = {"dt": 2.0**-9, "every": 64}
+STEPS = {"dt": 0.003, "every_steps": 50}  # s: times that are not exact
+EXACT = {"dt": 2.0**-9, "every_steps": 64}
 
 
 def assert_goes_on(again, whole, first):
@@ -267,7 +269,7 @@ def test_implicit_motions_go_on_from_their_ends_bit_by_bit(law, method, tmp_path
 
 @pytest.mark.parametrize("law", ["linear", PRONY], ids=["linear", "prony"])
 def test_they_go_on_with_steps_that_are_chosen_by_their_error(law, tmp_path):
-    steps = {"tolerance": 1e-5, "dt": 0.05, "every": 0.125}
+    steps = {"tolerance": 1e-5, "dt": 0.05, "interval": 0.125}
     part, _ = continued(pushed(law), ALPHA, tmp_path, 0.5, **steps)
     assert part.attrs["smallest_step"] < 0.5 * part.attrs["largest_step"]
 
@@ -313,7 +315,7 @@ def driven() -> fd.Case:
 @pytest.mark.parametrize("method", [ALPHA, "energy_momentum"])
 def test_supports_loads_and_folds_that_move_go_on(method, tmp_path):
     """With exact times, as histories depend on them; 2 minutes, compiling."""
-    part, again = continued(driven(), method, tmp_path, 0.25, dt=2.0**-9, every=64)
+    part, again = continued(driven(), method, tmp_path, 0.25, dt=2.0**-9, every_steps=64)
     assert 1 < again.attrs["factorizations"] < again.attrs["iterations"]
     assert "continued_from" in again and "continued_from" not in part
 
@@ -327,7 +329,7 @@ def test_rotations_of_a_shell_go_on(method, tmp_path):
         fd.Force([4], (0.0, 0.0, 1.0)),
     )
     case = fd.Case(shell, [fd.Fix([0, 1], "xyz")], [push], fd.Rayleigh(0.1, 1e-3))
-    continued(case, method, tmp_path, 0.1, dt=1e-3, every=20)
+    continued(case, method, tmp_path, 0.1, dt=1e-3, every_steps=20)
 
 
 def test_a_continued_motion_runs_again_from_itself(tmp_path):

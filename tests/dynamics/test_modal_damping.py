@@ -72,7 +72,7 @@ def test_ratios_of_rayleigh(model, count):
     plain = sheet(model, damping=fd.Rayleigh(0.3, 0.01))
     ratios = fd.modes(plain, count).damping_ratio.values.tolist()
     modal = plain.altered(damping=fd.ModalDamping(ratios))
-    options = {"dt": 2e-3, "initial": shaken(plain, 1e-4), "every": 10}
+    options = {"dt": 2e-3, "initial": shaken(plain, 1e-4), "every_steps": 10}
     one, other = (fd.simulate(case, 0.5, method="newmark", **options) for case in (plain, modal))
     assert apart(other, one) < 2e-3
     assert float(one.dissipated[-1]) == pytest.approx(float(other.dissipated[-1]), rel=2e-3)
@@ -112,7 +112,7 @@ def test_a_moving_base():
     case = sheet("bars", damping=fd.ModalDamping(0.1))
     f = 0.7 * float(fd.modes(case, 1).frequency[0])
     driven = case.altered(supports=[*case.supports, fd.BaseMotion("z", fd.Harmonic(f), 1e-5)])
-    motion = fd.simulate(driven, 25 / f, method="newmark", dt=1 / (200 * f), every=20)
+    motion = fd.simulate(driven, 25 / f, method="newmark", dt=1 / (200 * f), every_steps=20)
     exact = complex(fd.frf(case, fd.BaseMotion("z"), frequencies=[f]).transmissibility[0, 8, 2])
     assert steady(motion, 8, 2, f, after=15 / f) / 1e-5 == pytest.approx(exact, rel=5e-3)
     assert motion.attrs["energy_error"] < 1e-3
@@ -121,7 +121,7 @@ def test_a_moving_base():
 def test_free_bodies_keep_their_momenta():
     """Rigid modes are not damped, and what is damped has no momentum."""
     case = fd.Case(sheet("bars").structure, damping=fd.ModalDamping(0.2, 5))
-    motion = fd.simulate(case, 0.5, dt=1e-4, initial=shaken(case, 1e-3, 5), every=0.05)
+    motion = fd.simulate(case, 0.5, dt=1e-4, initial=shaken(case, 1e-3, 5), interval=0.05)
     assert drift(momenta(case.structure, motion)[0]) < 1e-9
     assert float(motion.dissipated[-1]) > 0.0
 
@@ -145,5 +145,7 @@ def test_modes_are_computed_once(method, monkeypatch):
         return rows_of(*arguments)
 
     monkeypatch.setattr(modal_damping, "rows_of", counted)
-    prepare(sheet("bars", damping=fd.ModalDamping(RATIOS, state="start")), 0.1, method, every=0.01)
+    prepare(
+        sheet("bars", damping=fd.ModalDamping(RATIOS, state="start")), 0.1, method, interval=0.01
+    )
     assert len(seen) == 1

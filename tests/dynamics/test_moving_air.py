@@ -42,7 +42,7 @@ def folded(added_mass, wind, drift, history=None, loads=()):
     spin = np.cross((2.0, -1.0, 3.0), structure.nodes)
     case = fd.Case(structure, loads=loads, air=air)
     return fd.simulate(
-        case, 0.06, method="rk4", every=0.02, initial=fd.State(velocity=spin + drift)
+        case, 0.06, method="rk4", interval=0.02, initial=fd.State(velocity=spin + drift)
     )
 
 
@@ -96,7 +96,7 @@ def test_a_gust_takes_a_plate_along_by_its_added_mass(method):
     ramp, span = fd.Ramp(0.04, smooth=True), 0.06
     case = fd.Case(plate(), air=fluid(velocity=(0.0, 0.0, 2.0), history=ramp))
     added, mass = normal_mass(case), case.total_mass
-    motion = fd.simulate(case, span, method=method, every=0.01)
+    motion = fd.simulate(case, span, method=method, interval=0.01)
     moves = added / (added + mass) * 2.0 * ramp(motion.time.values)
     mean = np.einsum("tia,i->ta", motion.velocity.values, case.nodal_mass) / mass
     assert added > 2.0 * mass
@@ -117,7 +117,7 @@ def test_supports_of_a_plate_in_wind_bear_munks_moment_and_the_push_of_its_chang
     for history in (fd.Table([0.0, 1.0], [1.0, 1.0]), fd.Harmonic(2.0, phase=30.0)):
         air = fluid(added_mass=added_mass, velocity=WIND, history=history)
         case = fd.Case(plate(scheme="n4b5"), held, air=air)
-        motion = fd.simulate(case, 1e-5, method="rk4", dt=1e-5, every=1)
+        motion = fd.simulate(case, 1e-5, method="rk4", dt=1e-5, every_steps=1)
         force = np.zeros(case.structure.nodes.shape)
         axis = ["xyz".index(name) for name in motion.support_axis.values]
         force[motion.support_node.values, axis] = motion.reaction.values[0]
@@ -144,7 +144,7 @@ def test_drag_takes_a_wind_that_jumps(method):
     air = fd.Air(20.0, (0.2, 0.1, wind), False, True, 1.2, history=fd.Step(when))
     case = fd.Case(plate(), air=air)
     steps = {"dt": 2e-3} if METHODS[method].implicit else {}
-    motion = fd.simulate(case, 0.2, method=method, every=0.02, **steps)
+    motion = fd.simulate(case, 0.2, method=method, interval=0.02, **steps)
     since = np.maximum(motion.time.values - when, 0.0)
     exact = wind * (1.0 - 1.0 / (1.0 + PRESSING * wind * since / case.total_mass))
     assert_allclose(motion.velocity[:, 0, 2], exact, atol=2e-3 * wind)

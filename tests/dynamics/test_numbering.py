@@ -38,7 +38,7 @@ def test_a_motion_in_another_order(mass, method, monkeypatch):
     case = everything(mass)
     u = 1e-3 * np.random.default_rng(1).standard_normal(case.structure.nodes.shape)
     u[case.fixed] = 0.0
-    options = {"method": method, "every": 0.01, "initial": fd.State(displacement=u)}
+    options = {"method": method, "interval": 0.01, "initial": fd.State(displacement=u)}
     one = fd.simulate(case, 0.05, **options)
 
     def shuffled(model):

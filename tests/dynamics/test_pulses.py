@@ -85,7 +85,7 @@ def random_pulses(count: int, seed: int):
 def test_random_pulses_on_an_oscillator_at_rest(method):
     """The response is Duhamel's integral to the tolerance, or the method says that it is not."""
     for history in random_pulses(6, seed=20):
-        motion, told = tried(pushed(history), 5.0, method, every=0.25)
+        motion, told = tried(pushed(history), 5.0, method, interval=0.25)
         assert not (told and method in ADAPTIVE)  # they need no excuse
         if not told:
             exact = duhamel(history, motion.time.values)
@@ -97,7 +97,7 @@ def test_random_pulses_on_a_moving_oscillator(method):
     """The same for pulses that arrive while it swings: superposition holds."""
     swing = fd.State(velocity=[[0, 0, 0], [0.3, 0, 0]])
     for history in random_pulses(6, seed=21):
-        motion = fd.simulate(pushed(history), 5.0, method=method, every=0.25, initial=swing)
+        motion = fd.simulate(pushed(history), 5.0, method=method, interval=0.25, initial=swing)
         t = motion.time.values
         exact = duhamel(history, t) + 0.3 / OMEGA * np.sin(OMEGA * t)
         assert error(motion, exact) < 2.0 * GLOBAL, history
@@ -119,7 +119,7 @@ def test_the_impulse_arrives_on_a_free_sheet(kind, method):
         length = 0.5 * 10.0 ** rng.uniform(-4, -1)
         history = pulse(shape, float(rng.uniform(0.05, 0.2)), length)
         case = fd.Case(s, [], [fd.Force([0, 1, 2], (1e-4, 0.0, 2e-4), history)])
-        motion, told = tried(case, 0.5, method, every=0.5, tolerance=tolerance)
+        motion, told = tried(case, 0.5, method, interval=0.5, tolerance=tolerance)
         assert not (told and method in ADAPTIVE)
         if not told:
             momentum = (s.mass @ motion.velocity.values[-1]).sum(axis=0)
@@ -139,7 +139,7 @@ def test_supports_and_folds_that_move_for_a_moment(method):
     turned = fd.Case(s, [base], [fd.Actuate("all", angle=290.0, history=bump)])
     for case in (moved, based, turned):
         true, found = (
-            fd.simulate(case, 0.4, method=name, every=0.02, dt=dt).displacement.values[16:]
+            fd.simulate(case, 0.4, method=name, interval=0.02, dt=dt).displacement.values[16:]
             for name, dt in (("rk4", 2.5e-5), (method, None))
         )
         assert apart(found, true) < 0.02
@@ -150,7 +150,7 @@ def test_steps_end_at_knots():
     tap = fd.Table([0.0, 0.31, 0.32, 0.33], [0, 0, 1, 0])
     case = pulled(pushed(tap), 0.5, fd.HalfSine(duration=0.57))
     for method in ADAPTIVE:
-        times = fd.simulate(case, 1.0, method=method, every=1).time.values
+        times = fd.simulate(case, 1.0, method=method, every_steps=1).time.values
         for knot in (0.31, 0.32, 0.33, 0.57):
             assert np.abs(times - knot).min() < 1e-12, (method, knot)
     curve = np.linspace(0.0, 1.0, 401)
@@ -164,7 +164,7 @@ def test_steps_end_at_knots():
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_periods_that_fit_the_steps_are_not_lost(method):
     """A hum whose period divides every step that would be tried first, from rest."""
-    motion = fd.simulate(pushed(fd.Harmonic(frequency=50.0)), 2.0, method=method, every=0.5)
+    motion = fd.simulate(pushed(fd.Harmonic(frequency=50.0)), 2.0, method=method, interval=0.5)
     t, fast = motion.time.values, 2.0 * np.pi * 50.0
     exact = np.sin(fast * t) - fast / OMEGA * np.sin(OMEGA * t)
     assert error(motion, exact / (MASS * (OMEGA**2 - fast**2))) < GLOBAL
@@ -200,7 +200,7 @@ def test_a_half_sine_as_long_as_the_fixed_step_says_so():
 def test_long_motions_are_looked_at_about_their_knots():
     """Too many steps to look at each: a pulse in the middle is found all the same."""
     tap = fd.Table([0.0, 100.0, 100.00005, 100.0001], [0, 0, 1, 0])
-    assert tried(pushed(tap), 200.0, "central_difference", dt=1e-3, every=10_000)[1]
+    assert tried(pushed(tap), 200.0, "central_difference", dt=1e-3, every_steps=10_000)[1]
 
 
 def test_functions_are_looked_at_within_steps_and_warned_about():
@@ -212,8 +212,8 @@ def test_functions_are_looked_at_within_steps_and_warned_about():
     named = Function(tap, at=[0.92, 0.88, 0.9])
     assert named.knots() == (0.88, 0.9, 0.92)
     with pytest.warns(FoldynWarning, match=r"fd\.Function\(f, at="):
-        found = fd.simulate(pushed(tap), 2.0, method="newmark", every=0.1)
-    again = fd.simulate(pushed(named), 2.0, method="newmark", every=0.1)  # without a warning
+        found = fd.simulate(pushed(tap), 2.0, method="newmark", interval=0.1)
+    again = fd.simulate(pushed(named), 2.0, method="newmark", interval=0.1)  # without a warning
     exact = duhamel(fd.Table([0.88, 0.9, 0.92], [0, 1, 0]), found.time.values)
     assert max(error(motion, exact) for motion in (found, again)) < GLOBAL
     with pytest.raises(InputError, match="at"):

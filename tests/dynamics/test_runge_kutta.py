@@ -66,7 +66,7 @@ def test_gradients_are_those_of_the_method_itself(tableau):
 
     own = structure.fold_stiffness
     dt = float(0.8 * fd.critical_step(case(own), tableau.name))
-    options = {"duration": float(200 * dt), "method": tableau.name, "dt": dt, "every": 50}
+    options = {"duration": float(200 * dt), "method": tableau.name, "dt": dt, "every_steps": 50}
     analysis = {"kind": "dynamics", **options}
     found = fd.sensitivity(
         case(own), ["fold_stiffness"], measures="displacement[8,x]", analysis=analysis

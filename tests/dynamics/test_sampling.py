@@ -13,7 +13,7 @@ from foldyn.errors import ComputationError, InputError
 def run(sample, method="rk4", **given):
     case = oscillator(linear_law(), 8.0)
     return fd.simulate(
-        case, 1.0, method=method, every=0.1, initial=released(0.1), sample=sample, **given
+        case, 1.0, method=method, interval=0.1, initial=released(0.1), sample=sample, **given
     )
 
 

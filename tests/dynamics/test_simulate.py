@@ -34,7 +34,7 @@ def test_motion_of_the_golden_miura():
     loads = [fd.Force([int(n)], tuple(forces[n]), pulse) for n in pushed]
     case = fd.Case(s, supports, loads, fd.Rayleigh(float(golden["alpha"])))
     dt, steps, every = float(golden["dt"]), int(golden["n_steps"]), int(golden["store_every"])
-    motion = fd.simulate(case, steps * dt, dt=dt, every=every)
+    motion = fd.simulate(case, steps * dt, dt=dt, every_steps=every)
     for name, stored in (("displacement", "Uhis"), ("velocity", "Vhis")):
         ours = motion[name].values[1:].reshape(steps // every, -1)  # theirs starts at sample 1
         theirs = golden[stored].T
@@ -43,7 +43,7 @@ def test_motion_of_the_golden_miura():
 
 def test_energy_of_case_2():
     """Balance below 1e-6 of the energies over 10 s at half the critical step (found: 2e-8)."""
-    motion = fd.simulate(case2(mass="circumcenter"), 10.0, every=0.01)
+    motion = fd.simulate(case2(mass="circumcenter"), 10.0, interval=0.01)
     assert motion.attrs["dt"] == pytest.approx(0.01 / 27)
     assert motion.attrs["dt"] < 0.5 * motion.attrs["critical_step"]
     assert motion.attrs["energy_error"] < 1e-6
@@ -71,7 +71,7 @@ def test_consistent_mass_against_a_dense_solution():
 
     given = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-18}
     wanted = integrate.solve_ivp(rate, (0.0, 5e-3), np.zeros(2 * len(free)), **given).y[:, -1]
-    end = fd.simulate(case, 5e-3, dt=2.5e-5, every=200).isel(time=-1)
+    end = fd.simulate(case, 5e-3, dt=2.5e-5, every_steps=200).isel(time=-1)
     found = [end[name].values.ravel()[free] for name in ("displacement", "velocity")]
     assert apart(found, np.split(wanted, 2)) < 1e-6
 
@@ -98,7 +98,7 @@ def test_runs_are_bit_identical_whatever_is_sampled(method):
     dense, again = (fd.simulate(case, 0.5, **options) for _ in range(2))
     np.testing.assert_array_equal(again.displacement, dense.displacement)
     for every in (7, 100, 2000) if method == "rk4" else (7,):
-        thin = fd.simulate(case, 0.5, every=every, **options)
+        thin = fd.simulate(case, 0.5, every_steps=every, **options)
         np.testing.assert_array_equal(thin.displacement, dense.displacement[::every])
         np.testing.assert_array_equal(thin.work, dense.work[::every])
         np.testing.assert_allclose(thin.time, dense.time[::every], rtol=1e-14)
@@ -116,7 +116,7 @@ def test_a_motion_goes_on_from_where_it_was_stored(method, mass):
     supports = [*CELL_HELD, pull, fd.BaseMotion("z", fd.Harmonic(40.0), 1e-4)]
     case, found = fd.Case(cell(sheet=HEAVY, mass=mass, **LINEAR), supports), []
     for n in [2000] if method == "rk4" else [200, 400]:
-        options = {"dt": 0.02 / n, "every": n // 20}
+        options = {"dt": 0.02 / n, "every_steps": n // 20}
         whole = fd.simulate(case, 0.02, method=method, **options)
         middle = fd.initial_state(whole, at=10)
         rest = fd.simulate(case, 0.01, method=method, initial=middle, start=0.01, **options)
@@ -136,11 +136,11 @@ def test_a_result_can_be_run_again_from_itself():
     v = np.zeros((13, 3))
     v[7, 0] = 0.01
     case = case2(lambda t: np.cos(3.0 * t))
-    first = fd.simulate(case, 0.1, every=5, initial=fd.State(velocity=v))
+    first = fd.simulate(case, 0.1, every_steps=5, initial=fd.State(velocity=v))
     assert first.attrs["started_from"] == "state"
     again = fd.simulate(
         fd.case_of(first), float(first.duration), method=first.method, dt=float(first.dt),
-        every=int(first.every), initial=fd.initial_state(first, at=0),
+        every_steps=int(first.every_steps), initial=fd.initial_state(first, at=0),
     )  # fmt: skip
     np.testing.assert_allclose(again.displacement, first.displacement, rtol=0, atol=1e-16)
 
@@ -148,14 +148,14 @@ def test_a_result_can_be_run_again_from_itself():
 @pytest.mark.parametrize("method", ["rk4", "newmark"])
 def test_progress_is_told(method):
     seen = []
-    fd.simulate(case2(), 1.0, method=method, every=0.1, progress=seen.append)
+    fd.simulate(case2(), 1.0, method=method, interval=0.1, progress=seen.append)
     times = [state.time for state in seen]
     assert times == sorted(times)
     assert times[-1] == pytest.approx(1.0) == seen[-1].duration
 
 
 def test_the_progress_bar_tells_pace_and_energy_error(capsys):
-    fd.simulate(case2(), 1.0, every=0.01, progress=True)
+    fd.simulate(case2(), 1.0, interval=0.01, progress=True)
     told = capsys.readouterr().err
     assert all(words in told for words in ("steps/s", "energy error", "/1 s"))
 
@@ -176,7 +176,7 @@ def test_step_above_the_critical_one_is_refused_and_explodes_when_forced():
 @pytest.mark.parametrize(
     ("method", "options"),
     [
-        ("rk4", {"every": 10}),
+        ("rk4", {"every_steps": 10}),
         *((method, {"dt": 2e-3}) for method in IMPLICIT),
         *((method, {"tolerance": 1e-4}) for method in IMPLICIT),
     ],
@@ -207,7 +207,7 @@ def test_stiffening_is_noticed_or_followed():
 @pytest.mark.parametrize(
     ("method", "options"),
     [
-        *((method, {"every": 0.01}) for method in ("rk4", *IMPLICIT)),
+        *((method, {"interval": 0.01}) for method in ("rk4", *IMPLICIT)),
         *((method, {"dt": 0.01}) for method in IMPLICIT),
     ],
 )
@@ -264,7 +264,7 @@ def test_settles_in_the_static_equilibrium(method, bend_law, expected):
     s = fold(mass="circumcenter", bend_law=bend_law)
     slow, push = (fd.Force([0, 1], (-1e-3, 0.0, 0.0), h) for h in (fd.Ramp(5.0), None))
     case = fd.Case(s, FOLD_HELD, [slow], fd.Rayleigh(3.0))
-    end = fd.simulate(case, 25.0, method=method, every=5.0).displacement.values[-1]
+    end = fd.simulate(case, 25.0, method=method, interval=5.0).displacement.values[-1]
     np.testing.assert_allclose(end[[0, 1], 0], -expected, atol=5e-5)
     path = fd.trace(fd.Case(s, FOLD_HELD, [push])).displacement.values[-1]
     assert apart(end, path) < 1e-4
@@ -296,7 +296,7 @@ def test_small_vibrations_have_the_frequency_of_the_mode_without_a_secant():
     shape, period = mode.shape.values[0], 1.0 / float(mode.frequency[0])
     start = fd.State(1e-4 * shape / np.abs(shape).max())
     motion = fd.simulate(
-        case, period, method="newmark", dt=period / 400, every=period, initial=start
+        case, period, method="newmark", dt=period / 400, interval=period, initial=start
     )
     np.testing.assert_allclose(motion.displacement[-1], start.displacement, atol=2e-7)
 
@@ -308,11 +308,13 @@ def test_small_vibrations_have_the_frequency_of_the_mode_without_a_secant():
         *(({"duration": given}, "duration") for given in (0.0, -1.0, float("nan"), "10")),
         ({"dt": 0.0}, "dt"),
         ({"dt": 2.0, "force": True}, "longer than the duration"),
-        *(({"every": given}, "every") for given in (0, 2.0, True)),
-        ({"dt": 1e-4, "every": 1.5e-4}, "whole number of steps"),
+        *(({"interval": given}, "interval") for given in (0.0, 2.0, True)),
+        *(({"every_steps": given}, "every_steps") for given in (0, 0.5, True, 10**6)),
+        ({"every_steps": 2, "interval": 0.1}, "either every_steps or interval"),
+        ({"dt": 1e-4, "interval": 1.5e-4}, "whole number of steps"),
         ({"method": "euler"}, "rk4"),
         ({"method": ["rk4"]}, "method"),
-        ({"duration": 1e7, "every": 1}, "GiB"),
+        ({"duration": 1e7, "every_steps": 1}, "GiB"),
         ({"force": "no"}, "force"),
         ({"progress": "yes"}, "progress"),
         ({"start": float("nan")}, "start = nan"),
@@ -325,8 +327,8 @@ def test_small_vibrations_have_the_frequency_of_the_mode_without_a_secant():
         ({"method": "dormand_prince", "tolerance": 0.0}, "tolerance = 0.0"),
         ({"method": "dormand_prince", "tolerance": "fine"}, "tolerance"),
         ({"method": "dormand_prince", "dt": 10.0}, "longer than the duration"),
-        ({"method": "dormand_prince", "every": 9.0}, "longer than the duration"),
-        ({"method": "dormand_prince", "every": 0}, "at least 1"),
+        ({"method": "dormand_prince", "interval": 9.0}, "longer than the duration"),
+        ({"method": "dormand_prince", "every_steps": 0}, "at least 1"),
         ({"method": "newmark", "tolerance": -1.0}, "tolerance = -1"),
         ({"method": "generalized_alpha", "spectral_radius": 1.2}, "at most 1"),
         ({"method": "generalized_alpha", "spectral_radius": "half"}, "must be a number"),
@@ -347,7 +349,7 @@ def test_damping_that_costs_many_explicit_steps_is_told_with_a_remedy():
     said = "the damping of strain rates makes the critical step"
     with pytest.warns(errors.FoldynWarning, match=said):
         fd.simulate(follows, 1e-3)
-    motion = fd.simulate(follows, 1.0, method="generalized_alpha", every=0.1)  # without a word
+    motion = fd.simulate(follows, 1.0, method="generalized_alpha", interval=0.1)  # without a word
     assert motion.attrs["steps"] < 2000
 
 

@@ -95,7 +95,7 @@ def test_a_tower_that_is_pressed_flat_takes_few_steps():
     """
     pytest.importorskip("ipctk")
     case = tower(38.0, fd.Contact(), fd.Ramp(0.02, smooth=True), alpha=1000.0)
-    run = fd.simulate(case, 0.1, method="auto", every=1e-3)
+    run = fd.simulate(case, 0.1, method="auto", interval=1e-3)
     u = run.displacement.values
     assert run.attrs["method"] == "dormand_prince"
     assert run.attrs["steps"] < 284_675 / 10
@@ -118,7 +118,7 @@ def test_a_tower_that_rattles_takes_few_steps_that_conserve():
     """
     pytest.importorskip("ipctk")
     case = tower(38.0, fd.Contact(), fd.Ramp(0.005, smooth=True), alpha=400.0)
-    run = fd.simulate(case, 0.04, method="energy_momentum", every=1e-3)
+    run = fd.simulate(case, 0.04, method="energy_momentum", interval=1e-3)
     u = run.displacement.values
     assert run.attrs["steps"] < 118_226 / 10
     assert run.attrs["energy_error"] < 1e-9
@@ -151,7 +151,7 @@ def test_steps_overrun_no_gap_where_they_resolve_no_contact():
 def test_a_motion_with_slow_contacts_that_is_killed_goes_on_to_the_same_bits(monkeypatch, tmp_path):
     look_often(monkeypatch, 256)
     case = tower(38.0, fd.Contact(), fd.Ramp(0.005, smooth=True), alpha=2000.0)
-    given = {"duration": 0.04, "method": "dormand_prince", "every": 1e-3}
+    given = {"duration": 0.04, "method": "dormand_prince", "interval": 1e-3}
     once = prepare(case, **given)
     whole = once.run()
     assert once._engine._equations[0]._slow.value.added.count[0] > 0

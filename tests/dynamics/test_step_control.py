@@ -56,19 +56,19 @@ def test_steps_grow_where_the_motion_is_smooth(method):
 
 
 @pytest.mark.parametrize(
-    ("method", "every", "options", "near"),
+    ("method", "interval", "options", "near"),
     [
-        *((DP, every, {"tolerance": 1e-8}, 2e-8) for every in (0.01, 0.037, 0.4)),
+        *((DP, interval, {"tolerance": 1e-8}, 2e-8) for interval in (0.01, 0.037, 0.4)),
         ("newmark", 0.01, {}, 4e-4),
         ("newmark", 0.37, {}, 4e-4),
     ],
 )
-def test_samples_in_seconds(method, every, options, near):
+def test_samples_in_seconds(method, interval, options, near):
     """At the times asked for, as accurate as the steps: by dense output, or steps end there."""
-    motion, error = swung(method, every=every, **options)
+    motion, error = swung(method, interval=interval, **options)
     t = motion.time.values
-    np.testing.assert_allclose(t, np.arange(len(t)) * every, rtol=1e-12)
-    assert t[-1] > 4.0 - every - 1e-9 and motion.attrs["every"] == every
+    np.testing.assert_allclose(t, np.arange(len(t)) * interval, rtol=1e-12)
+    assert t[-1] > 4.0 - interval - 1e-9 and motion.attrs["interval"] == interval
     assert error < near
     v = motion.velocity.values[:, 1, 0]
     assert np.abs(v + 0.1 * OMEGA * np.sin(OMEGA * t)).max() < 10 * near
@@ -83,7 +83,7 @@ def test_samples_in_seconds(method, every, options, near):
 @pytest.mark.parametrize("options", [{"method": DP}, {"method": "newmark", "tolerance": 1e-7}])
 def test_samples_by_steps(options):
     """Each so many accepted steps, the room for them growing as needed."""
-    whole, third = (swung(every=every, **options)[0] for every in (1, 3))
+    whole, third = (swung(every_steps=steps, **options)[0] for steps in (1, 3))
     assert float(whole.time[-1]) == 4.0
     assert whole.sizes["time"] == whole.attrs["steps"] + 1
     np.testing.assert_array_equal(third.time, whole.time[::3])
@@ -102,7 +102,7 @@ def test_order_of_the_interpolant():
     """Between equal steps the interpolant errs with h^5 a step: order 4 over the motion or more."""
     steps = [20, 40, 80, 160]
     equal = {"tolerance": 1e6, "force": True}
-    errors = [swung(DP, dt=4.0 / n, every=4.0 / n / 3.0, **equal)[1] for n in steps]
+    errors = [swung(DP, dt=4.0 / n, interval=4.0 / n / 3.0, **equal)[1] for n in steps]
     assert order(steps, errors) > 3.9
 
 
@@ -135,14 +135,16 @@ def test_two_jumps_within_a_nanosecond_are_one(method):
     one = case2().altered(loads=[push, fd.Force([7], (0.001, 0, 0), fd.Step(jump))])
     halves = [fd.Force([7], (5e-4, 0, 0), fd.Step(jump - late)) for late in (0.0, 4e-11)]
     found = [
-        fd.simulate(case, 0.1, method=method, dt=0.01, every=10).displacement.values[-1]
+        fd.simulate(case, 0.1, method=method, dt=0.01, every_steps=10).displacement.values[-1]
         for case in (one, one.altered(loads=[push, *halves]))
     ]
     np.testing.assert_allclose(*found, rtol=0, atol=1e-7 * np.abs(found[0]).max())
 
 
 def test_statistics_travel_with_the_result(tmp_path):
-    motion = fd.simulate(case2(), 0.5, method="generalized_alpha", every=0.1, spectral_radius=0.5)
+    motion = fd.simulate(
+        case2(), 0.5, method="generalized_alpha", interval=0.1, spectral_radius=0.5
+    )
     fd.save(motion, tmp_path / "run.nc")
     a = fd.load(tmp_path / "run.nc").attrs
     wanted = {"critical_step": np.inf, "spectral_radius": 0.5, "halved_steps": 0}
@@ -150,7 +152,7 @@ def test_statistics_travel_with_the_result(tmp_path):
     assert a["linear_solver"] == "banded"
     assert 0 < a["factorizations"] <= a["iterations"] >= a["steps"]
     same = {name: a[name] for name in ("method", "spectral_radius", "tolerance")}
-    again = fd.simulate(fd.case_of(motion), 0.5, every=0.1, **same)
+    again = fd.simulate(fd.case_of(motion), 0.5, interval=0.1, **same)
     np.testing.assert_allclose(again.displacement, motion.displacement, rtol=0, atol=1e-12)
 
 
@@ -187,7 +189,7 @@ def test_moments_that_jump_do_the_work_that_is_stored_and_lost(preset, law):
     made = fold(120, preset=preset, crease_stiffness=0.2, fold_law=law)
     jump = fd.CreaseMoment("all", 0.05, fd.Pulse(0.1))
     case = fd.Case(made, [fd.Fix([0, 1, 2, 3])], [jump], damping=fd.Rayleigh(0.1))
-    motion = fd.simulate(case, 0.2, method=DP, every=0.05, tolerance=1e-7)
+    motion = fd.simulate(case, 0.2, method=DP, interval=0.05, tolerance=1e-7)
     assert motion.attrs["energy_error"] < 3e-6
 
 

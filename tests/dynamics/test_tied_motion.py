@@ -25,7 +25,7 @@ NORMAL, DOWN = (np.array([np.sin(a), 0.0, np.cos(a)]) for a in (SLOPE, SLOPE + n
 
 
 def simulated(case, duration, method):
-    return fd.simulate(case, duration, method=method, every=0.1, **steps_of(method, 0.01))
+    return fd.simulate(case, duration, method=method, interval=0.1, **steps_of(method, 0.01))
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_links_conserve_momentum(method) -> None:
     v[0], v[4] = (0.1, 0.2, 1.0), (0.3, 0.0, -0.5)
     start = fd.State(velocity=v)
     case = fd.Case(s, [fd.Link([1, 3])])
-    motion = fd.simulate(case, 0.5, method=method, dt=1e-4, every=0.1, initial=start)
+    motion = fd.simulate(case, 0.5, method=method, dt=1e-4, interval=0.1, initial=start)
     before = np.tile(s.mass @ v, (6, 1, 1)).sum(axis=1)
     np.testing.assert_allclose(momenta(s, motion)[0], before, atol=1e-14)
     assert motion.sizes["support"] == 0
@@ -134,8 +134,8 @@ def test_a_node_without_mass_may_ride() -> None:
         fd.simulate(fd.Case(bare, held), 0.1)
     load = [fd.Force([0, 1], (-1e-3, 0.0, 0.0), fd.HalfSine(0.1))]
     case = fd.Case(bare, [*held, fd.Link([6], to=[0, 1, 2])], load)
-    motion = fd.simulate(case, 0.2, every=0.1)
-    implicit = fd.simulate(case, 0.2, method="newmark", dt=1e-4, every=0.1)
+    motion = fd.simulate(case, 0.2, interval=0.1)
+    implicit = fd.simulate(case, 0.2, method="newmark", dt=1e-4, interval=0.1)
     np.testing.assert_allclose(implicit.displacement, motion.displacement, atol=3e-7)
     assert motion.energy_error < 1e-4
 
@@ -146,5 +146,7 @@ def test_a_rigid_shell_drifts_in_any_direction() -> None:
     shell = fd.shell(pattern, SHEET, divisions=2, rigid="all")
     drift = np.array([0.3, -0.7, 0.2])
     start = fd.State(velocity=np.tile(drift, (len(shell.nodes), 1)))
-    motion = fd.simulate(fd.Case(shell), 0.1, method="newmark", dt=0.05, every=1, initial=start)
+    motion = fd.simulate(
+        fd.Case(shell), 0.1, method="newmark", dt=0.05, every_steps=1, initial=start
+    )
     np.testing.assert_allclose(motion.displacement[-1] - 0.1 * drift, 0.0, atol=1e-11)

@@ -68,7 +68,7 @@ def shared(monkeypatch, threads, alone, what, method, **given):
 
 def half_steps(what, method, steps, every):
     dt = 0.5 * fd.critical_step(what, method)
-    return {"duration": steps * dt, "dt": dt, "every": every}
+    return {"duration": steps * dt, "dt": dt, "every_steps": every}
 
 
 @pytest.mark.matrix

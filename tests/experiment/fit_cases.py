@@ -50,7 +50,7 @@ kind = "dynamics"
 method = "newmark"
 duration = 2.0
 [output]
-every = 0.02
+interval = 0.02
 """
 )
 

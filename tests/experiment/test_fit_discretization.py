@@ -24,7 +24,7 @@ ALPHA = Parameter("damping.alpha", 1.0, 0.0, 10.0)
 @pytest.fixture(scope="module")
 def seen(swung):
     """What a camera with some noise sees of the motion of the true sheet, alpha = 0.4."""
-    true = fd.simulate(fd.read_case(swung).case(), 2.0, method="newmark", dt=5e-4, every=5e-4)
+    true = fd.simulate(fd.read_case(swung).case(), 2.0, method="newmark", dt=5e-4, interval=5e-4)
     along = CubicSpline(true.time.values, true.displacement.sel(node=[0, 2], axis="x").values)
     noise = NOISE * np.random.default_rng(1).standard_normal((60, 2))
     return TimeHistory(nodes=[0, 2], time=TIME, values=along(TIME) + noise, sigma=NOISE)
@@ -76,7 +76,7 @@ kind = "dynamics"
 method = "newmark"
 duration = 20.64
 [output]
-every = 0.129
+interval = 0.129
 """
 
 
@@ -101,7 +101,7 @@ def test_steps_too_coarse_for_their_order_widen_the_interval_further(tmp_path) -
 
 
 def test_fine_steps_leave_the_interval_to_the_noise(swung, seen) -> None:
-    fine = refined(swung, every="every = 0.004")
+    fine = refined(swung, interval="interval = 0.004")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         found = fd.fit(fine, [seen], parameters=[replace(ALPHA, start=0.42)])
@@ -111,22 +111,22 @@ def test_fine_steps_leave_the_interval_to_the_noise(swung, seen) -> None:
 
 
 @pytest.mark.parametrize(
-    ("every", "step", "sampling"),
+    ("sampling", "step", "interval"),
     [
-        ("every = 0.02", 0.01, 0.01),
-        ("every = 0.04", 0.02, 0.02),
-        ("every = 2", 0.005, 0.01),
+        ("interval = 0.02", 0.01, 0.01),
+        ("interval = 0.04", 0.02, 0.02),
+        ("every_steps = 2", 0.005, 0.01),
     ],
 )
-def test_step_and_sampling_are_halved(swung, seen, every, step, sampling) -> None:
-    path = refined(swung, every=every)
-    if every == "every = 2":
+def test_step_and_sampling_are_halved(swung, seen, sampling, step, interval) -> None:
+    path = refined(swung, interval=sampling)
+    if sampling == "every_steps = 2":
         path.write_text(path.read_text().replace('"newmark"', '"newmark"\ndt = 0.01'))
     (finer,) = problem(path, [seen], [ALPHA], {}).finer([0.4])
     said = finer.problem.runs[0].document
     assert (finer.what, finer.order) == ("time step", 2)
     assert said["analysis"]["dt"] == pytest.approx(step)
-    assert said["output"]["every"] == pytest.approx(sampling)
+    assert said["output"]["interval"] == pytest.approx(interval)
 
 
 def test_an_interval_reaches_the_truth_though_the_mesh_is_coarse(tmp_path) -> None:

@@ -92,7 +92,7 @@ def test_films_of_simulations_and_photos_of_paths(tmp_path):
     structure = folded(70.0)
     held, pull = fd.Fix([20, 22, 24]), fd.Force([1, 3], (0.01, 0, 0))
     case = fd.Case(structure, [held], [pull], damping=fd.Rayleigh(alpha=10.0))
-    motion = fd.simulate(case, duration=0.02, method="rk4", every=0.001)
+    motion = fd.simulate(case, duration=0.02, method="rk4", interval=0.001)
     film = film_of(motion, camera(), rate=200.0, start=0.005, duration=0.01)
     np.testing.assert_allclose(film.time, [0.0, 0.005, 0.01])
     true = film.truth()["position"].values[0]

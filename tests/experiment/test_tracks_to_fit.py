@@ -74,7 +74,7 @@ method = "newmark"
 dt = 5e-4
 duration = 0.25
 [output]
-every = 2
+every_steps = 2
 """  # fmt: skip
 HANGS = SHEET + """
 [analysis]

@@ -23,7 +23,7 @@ WORDS = (
     "axes", "axis", "displacement", "base", "history", "table", "times", "values", "smooth",
     "loads", "force", "gravity", "creases", "angle", "analysis", "dynamics", "statics", "modes",
     "frf", "duration", "method", "dt", "steps", "load_factors", "until", "count", "frequencies",
-    "secant", "seed", "output", "every", "shapes", "initial", "velocity", "drive", "equilibrium",
+    "secant", "seed", "output", "interval", "shapes", "initial", "velocity", "drive", "equilibrium",
     "newmark", "generalized_alpha", "dormand_prince", "auto", "arc_length", "burst_random",
     "[[supports]]", "[[loads]]", "[[drive]]", "[analysis]", "1e50", "1e-50", "1e30", "1e-30",
     "2.5", "1e-3", "7", "60", "inf", "nan", "-inf", "0x10", "0b1", "1979-05-27", "'''",

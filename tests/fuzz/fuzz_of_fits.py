@@ -38,7 +38,7 @@ FILES = {
     '[analysis]\nkind = "statics"\n',
     "swung.toml": FOLD + "[[loads]]\nnodes = [0, 1]\nforce = [-0.001, 0, 0]\n"
     'history = { kind = "half_sine", duration = 0.5 }\n[analysis]\nkind = "dynamics"\n'
-    'method = "newmark"\nduration = 2.0\n[output]\nevery = 0.02\n',
+    'method = "newmark"\nduration = 2.0\n[output]\ninterval = 0.02\n',
     "forces.csv": "displacement [mm],force [mN]\n-100,-8\n-200,-17\n-300,-27\n",
     "shapes.csv": "load_factor,node,x [mm],z [mm]\n0.5,0,10,1\n1,0,20,2\n1,2,11,3\n",
     "sway.csv": "time [ms];node 0 x [mm];node 2 x [mm]\n0;0;0\n100;1;2\n200;0;1\n300;-1;-1\n"

@@ -211,8 +211,8 @@ def _analysis(rng: Any, kind: str, case: fd.Case) -> dict[str, Any]:
     implicit = method in METHODS[2:]
     duration = (300.0 if implicit else 10.0) * sound
     dt = duration / STEPS if implicit else _stable(case, method, duration)
-    every = 1 if rng.random() < 0.5 else 10
-    return {"kind": kind, "method": method, "duration": duration, "dt": dt, "every": every}
+    steps = 1 if rng.random() < 0.5 else 10
+    return {"kind": kind, "method": method, "duration": duration, "dt": dt, "every_steps": steps}
 
 
 def _stable(case: fd.Case, method: str, duration: float) -> float:

@@ -128,8 +128,14 @@ def test_equilibria(tied: str, preset: str) -> None:
 @pytest.mark.parametrize(("tied", "method"), few(("newmark", "rk4"), EXACT[:2]))
 def test_motions(tied: str, method: str) -> None:
     build, values = drawn(tied, "merlin2" if method == "rk4" else "plate", 33)
-    step, every = (1e-3, 40) if method == "rk4" else (1e-2, 4)
-    analysis = {"kind": "dynamics", "method": method, "dt": step, "duration": 0.4, "every": every}
+    step, steps = (1e-3, 40) if method == "rk4" else (1e-2, 4)
+    analysis = {
+        "kind": "dynamics",
+        "method": method,
+        "dt": step,
+        "duration": 0.4,
+        "every_steps": steps,
+    }
     soft = lambda **own: build(youngs=1e5, **own)  # noqa: E731
     design = Design(soft, values | {"force": 0.9, "alpha": 0.05}, MOVING, analysis)
     design.step = 1e-3

@@ -55,7 +55,7 @@ def test_a_sample_that_repeats_the_highest_displacement() -> None:
         lift = fd.Impose([4, 5], "z", height, fd.Ramp(0.1))
         return fd.Case(made, [fd.Fix([0, 1, 2, 3]), lift])
 
-    motion = {"kind": "dynamics", "method": "rk4", "dt": 1e-3, "duration": 0.3, "every": 20}
+    motion = {"kind": "dynamics", "method": "rk4", "dt": 1e-3, "duration": 0.3, "every_steps": 20}
     found = fd.sensitivity(lifted, {"height": 0.01}, measures="maximum[4,z]", analysis=motion)
     assert found["gradient_height"].item() == pytest.approx(1.0, rel=1e-9)
 

@@ -23,7 +23,7 @@ FOLD = {"a": 1.0, "b": 1.3}
 TIP = ["displacement[4,z]", "velocity[5,x]", "mean_square[4,z]"]
 PULSE = fd.HalfSine(0.05)
 METHODS = ("newmark", "generalized_alpha")
-MOTION = {"kind": "dynamics", "duration": 0.06, "dt": 0.003, "every": 2}
+MOTION = {"kind": "dynamics", "duration": 0.06, "dt": 0.003, "every_steps": 2}
 
 
 @pytest.fixture(autouse=True)
@@ -148,7 +148,7 @@ def test_central_differences(name: str, monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(central_difference_adjoint, "ROOM", 5e4)  # segments of some hundred steps
     build, values = CASES[name]
     motion = {"kind": "dynamics", "duration": 0.05, "method": "central_difference", "dt": 1e-4}
-    errors = Design(build, values, TIP, motion | {"every": 10}).errors()
+    errors = Design(build, values, TIP, motion | {"every_steps": 10}).errors()
     assert max(errors.values()) < 1e-6, errors
 
 

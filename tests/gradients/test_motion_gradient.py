@@ -13,7 +13,7 @@ import foldyn as fd
 from foldyn.dynamics import runge_kutta_adjoint
 from foldyn.errors import InputError
 
-MOTION = {"kind": "dynamics", "method": "rk4", "dt": 1e-3, "duration": 0.4, "every": 20}
+MOTION = {"kind": "dynamics", "method": "rk4", "dt": 1e-3, "duration": 0.4, "every_steps": 20}
 PRESETS = ("merlin2", "plate", "n5b8e")
 MEASURES = (
     "displacement[8,z]", "displacement_at[8,x,0.2]", "velocity[7,z]", "maximum[8,z]",
@@ -86,7 +86,7 @@ def test_a_linear_motion_is_proportional_to_its_force():
 def test_few_kept_states_change_nothing(monkeypatch):
     """However steps are taken again, the gradient is the same to rounding."""
     values = {"force": 0.4, "stiffness": 0.5}
-    once = {**MOTION, "every": 400}
+    once = {**MOTION, "every_steps": 400}
     whole = fd.sensitivity(built("plate"), values, measures="displacement[8,z]", analysis=once)
     monkeypatch.setattr(runge_kutta_adjoint, "ROOM", (4 * 3 * 3 * 13 * 8 * 3.0, 3 * 2 * 8 * 39.0))
     parts = fd.sensitivity(built("plate"), values, measures="displacement[8,z]", analysis=once)

@@ -66,7 +66,7 @@ def reflected():
             chain.structure, [*chain.supports, *end], [fd.Force(range(6), (0, 0, 1e-5), push)],
             masses=chain.masses,
         )  # fmt: skip
-        run = fd.simulate(case, period + 1.9 * CELLS / slow, method="rk4", dt=2e-4, every=0.01)
+        run = fd.simulate(case, period + 1.9 * CELLS / slow, method="rk4", dt=2e-4, interval=0.01)
         energy = sum(run[each] for each in run if each == "kinetic" or each.startswith("strain_"))
         found[name] = float(energy[-1] / energy.max())
         assert run.attrs["energy_error"] < 1e-3

@@ -134,7 +134,7 @@ def test_simulated_motions_decay_as_the_frequency_response_says(kind, model, met
             fd.simulate(case, period, method=method, initial=start)
         return
     dt = period / 200.0 if method in IMPLICIT else None
-    run = fd.simulate(case, 2.0 * period, method=method, dt=dt, every=period, initial=start)
+    run = fd.simulate(case, 2.0 * period, method=method, dt=dt, interval=period, initial=start)
     mass = case.nodal_mass[:, None]
     first, last = ((shape * mass * run.velocity.values[k]).sum() for k in (1, 2))
     assert -np.log(last / first) / (2.0 * np.pi) == pytest.approx(ratio, rel=0.05)
@@ -152,7 +152,7 @@ def test_damping_at_the_start_is_that_of_folds_and_pressure_there(load, kind):
     for k in range(2):
         start = fd.State(modes.displacement.values, 1e-3 * modes["shape"].values[k])
         dt = 1e-5 / float(modes.frequency[k])
-        run = fd.simulate(case, 10 * dt, method="newmark", dt=dt, every=10, initial=start)
+        run = fd.simulate(case, 10 * dt, method="newmark", dt=dt, every_steps=10, initial=start)
         power = float(run.dissipated[-1]) / (10 * dt)
         rate = 4.0 * np.pi * float(modes.damping_ratio[k] * modes.frequency[k])
         assert power / 1e-6 == pytest.approx(rate, rel=2e-3)
@@ -326,7 +326,7 @@ def test_damped_creases_of_plates_are_of_first_order_but_by_energy_momentum():
 
     def end(method: str, steps: int) -> float:
         run = fd.simulate(
-            case, 2 * period, method=method, dt=period / steps, every=2 * steps, initial=start
+            case, 2 * period, method=method, dt=period / steps, interval=2 * steps, initial=start
         )
         return float(run.displacement[-1, 0, 2])
 

@@ -81,7 +81,7 @@ def tapped():
     push = np.zeros_like(case.structure.nodes)
     push[:6, 2] = 1e-3
     return fd.simulate(
-        case, 1.5, method="rk4", dt=2e-4, every=2e-3, initial=fd.State(velocity=push)
+        case, 1.5, method="rk4", dt=2e-4, interval=2e-3, initial=fd.State(velocity=push)
     )
 
 

@@ -51,7 +51,7 @@ def test_a_small_motion_is_the_sum_of_the_modes(mass):
         v[2:4, 2] = speed
         motion = fd.simulate(
             case, 0.5 / found.frequency.values[0], method="dormand_prince", initial=fd.State(u, v),
-            tolerance=1e-9, every=20,
+            tolerance=1e-9, every_steps=20,
         )  # fmt: skip
         share = np.einsum("kni,ni->k", shape, case.mass @ v)  # of unit modal mass
         t = float(motion.time.values[-1] - motion.time.values[0])

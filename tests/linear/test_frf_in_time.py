@@ -62,7 +62,7 @@ def test_the_error_falls_with_the_sampling(method):
     """With the fourth power: the drive is the cubic spline through its samples."""
     intervals = np.array([1 / 20, 1 / 40, 1 / 80])
     options = TIMED[method] | ({"pulse": 0.25} if method == "impulse" else {})
-    errors = [error_of(method, every=h, dt=0.002, **options) for h in intervals]
+    errors = [error_of(method, interval=h, dt=0.002, **options) for h in intervals]
     assert errors[0] < 3e-3
     assert observed_order(intervals, errors) == pytest.approx(4.0, abs=0.5)
 
@@ -245,21 +245,21 @@ def test_progress(method):
 @pytest.mark.parametrize(
     ("method", "change", "message"),
     [
-        ("impulse", {"every": 0.1}, "every = 0.1 s: 4 Hz has only 2.5 samples"),
-        ("burst_random", {"every": 0.1}, "every = 0.1 s: 4 Hz has only 2.5 samples"),
+        ("impulse", {"interval": 0.1}, "interval = 0.1 s: 4 Hz has only 2.5 samples"),
+        ("burst_random", {"interval": 0.1}, "interval = 0.1 s: 4 Hz has only 2.5 samples"),
         ("impulse", {"frequencies": [0.5, 0.5 + 0.5 / np.pi]}, "multiples of one spacing"),
         ("impulse", {"frequencies": [0.0]}, "0 Hz alone"),
         ("stepped_sine", {"frequencies": [0.0, 1.0]}, "cannot give 0 Hz"),
         ("burst_random", {"frequencies": [0.0, 1.0]}, "cannot give 0 Hz"),
         ("impulse", {"pulse": 1.0}, "pulse = 1 s: has no strength left at 4 Hz"),
         ("impulse", {"pulse": 0.3, "duration": 0.2}, "does not end within"),
-        ("impulse", {"pulse": 0.01, "every": 0.01}, "has only 1 samples"),
+        ("impulse", {"pulse": 0.01, "interval": 0.01}, "has only 1 samples"),
         ("impulse", {"secant": 1.0}, "takes the laws as they are"),
         ("impulse", {"integrator": "euler"}, "integrator"),
         ("impulse", {"dt": -1.0}, "dt"),
         (
             "impulse",
-            {"frequencies": [0.1, 0.2], "dt": 0.2, "every": 0.5},
+            {"frequencies": [0.1, 0.2], "dt": 0.2, "interval": 0.5},
             "above the critical step",
         ),
         ("impulse", {"averages": 4}, "no option of the method impulse"),
@@ -279,10 +279,15 @@ def test_refused_in_time(method, change, message):
 
 
 def test_steps_are_shortened_to_divide_the_sampling():
-    options = {"duration": 30.0, "every": 0.0123}
+    options = {"duration": 30.0, "interval": 0.0123}
     found = frf(chain(**DAMPING), PUSH, frequencies=F, method="impulse", dt=10.0, **options)
-    assert found.attrs["every"] <= 0.0123
+    assert found.attrs["interval"] <= 0.0123
     finer = frf(
-        chain(**DAMPING), PUSH, frequencies=F, method="impulse", dt=found.attrs["every"], **options
+        chain(**DAMPING),
+        PUSH,
+        frequencies=F,
+        method="impulse",
+        dt=found.attrs["interval"],
+        **options,
     )
     np.testing.assert_array_equal(found.receptance, finer.receptance)

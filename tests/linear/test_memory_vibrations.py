@@ -39,7 +39,7 @@ def test_the_response_is_that_of_a_simulated_sine():
         fd.frf(case, LIFT, frequencies=[frequency]).receptance.sel(node=WING, axis="z").values[0]
     )
     sine = fd.Force([WING], (0, 0, push), fd.Harmonic(frequency))
-    found = fd.simulate(case.altered(loads=[sine]), 16.0, method="rk4", dt=2.0**-9, every=32)
+    found = fd.simulate(case.altered(loads=[sine]), 16.0, method="rk4", dt=2.0**-9, every_steps=32)
     last = slice(-32, None)
     phase = np.exp(-2j * np.pi * frequency * found.time.values[last])
     response = 2j * np.mean(found.displacement.sel(node=WING, axis="z").values[last] * phase)

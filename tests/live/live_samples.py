@@ -34,7 +34,7 @@ history = {{ kind = "half_sine", duration = 0.5 }}
 kind = "dynamics"
 duration = 2.0
 [output]
-every = 0.01
+interval = 0.01
 """
 MIURA = f"""
 [pattern]

@@ -283,7 +283,7 @@ def thrown(kind: type[Net]) -> Any:
     case, v = fd.Case(net, [fd.Fix(range(1, 7))]), np.zeros((7, 3))
     v[0] = 8.0, 3.0, -5.0
     start = fd.State(velocity=v)
-    return fd.simulate(case, 20.0, method="energy_momentum", dt=0.02, every=50, initial=start)
+    return fd.simulate(case, 20.0, method="energy_momentum", dt=0.02, every_steps=50, initial=start)
 
 
 def test_a_sheet_of_ones_own_keeps_its_energy():

@@ -47,7 +47,7 @@ def test_motions(method):
     u, v = np.zeros((7, 3)), np.zeros((7, 3))
     u[0, 0], v[0, 0] = amplitude, -0.5 * alpha * amplitude
     motion = fd.simulate(
-        star(alpha=alpha), 1.0, method=method, dt=1e-3, every=0.1, initial=fd.State(u, v)
+        star(alpha=alpha), 1.0, method=method, dt=1e-3, interval=0.1, initial=fd.State(u, v)
     )
     t = motion.time.values
     wanted = amplitude * np.exp(-0.5 * alpha * t) * np.cos(omega * t)

@@ -118,7 +118,7 @@ def test_a_motion_that_closes_two_boards(model, method):
     s = make(model, fd.thicken(strip(2), T), soft, crease_stiffness=5.0)
     fold = fd.Actuate("all", fold_angle=180.0, history=fd.Ramp(0.5, smooth=True))
     case = fd.Case(s, loads=[fold], damping=fd.Rayleigh(alpha=15.0))
-    motion = fd.simulate(case, 1.5, method=method, every=0.25)
+    motion = fd.simulate(case, 1.5, method=method, interval=0.25)
     moved = (s.nodes + motion.displacement.to_numpy()[-1])[:6]
     assert np.linalg.norm(moved[2] - moved[0]) == pytest.approx(2 * T, rel=1e-3)
     assert motion.attrs["energy_error"] < 3e-3

@@ -49,7 +49,7 @@ def test_large_motions_come_back_in_simulated_ones(name):
     case = shaken(name, force=3e-4)
     one = fd.periodic_motion(case, harmonics=9)
     run = fd.simulate(
-        case, 1.0 / F1, method="dormand_prince", every=0.5 / F1, tolerance=1e-9,
+        case, 1.0 / F1, method="dormand_prince", interval=0.5 / F1, tolerance=1e-9,
         initial=fd.initial_state(one, 0),
     )  # fmt: skip
     swing = np.ptp(one.displacement.values, axis=0).max()

@@ -49,7 +49,7 @@ def path(case):
 @pytest.fixture(scope="module")
 def motion(case):
     pulled = fd.Case(case.structure, case.supports, case.loads[:1])
-    return fd.simulate(pulled, 0.2, method="generalized_alpha", every=0.02)
+    return fd.simulate(pulled, 0.2, method="generalized_alpha", interval=0.02)
 
 
 def lines(figure, label: str) -> list[np.ndarray]:

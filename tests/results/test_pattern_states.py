@@ -31,7 +31,7 @@ TOLD = told(MIURA)
 def motion():
     """A Miura cell that is pulled."""
     case = fd.Case(fd.discretize(TOLD, SHEET), HELD, [fd.Force([7], (0.01, 0, 0))])
-    return fd.simulate(case, 0.01, method="rk4", every=20)
+    return fd.simulate(case, 0.01, method="rk4", every_steps=20)
 
 
 @pytest.fixture(scope="module")

@@ -54,7 +54,7 @@ def crossed():
     case = folding(strip(0.05, 0.04, 0.045), 12.0, fd.Ramp(0.25))
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        motion = fd.simulate(case, 0.3, every=2e-3)
+        motion = fd.simulate(case, 0.3, interval=2e-3)
     return case, motion, said
 
 
@@ -141,7 +141,7 @@ def pushed(method: str, **options):
     return fd.simulate(case, 0.01, method=method, **options)
 
 
-@pytest.mark.parametrize("options", [{"every": 1e-4}, {"dt": 1e-6, "every": 100}])
+@pytest.mark.parametrize("options", [{"interval": 1e-4}, {"dt": 1e-6, "every_steps": 100}])
 def test_a_law_that_locks_but_is_overcome_is_no_remedy(options):
     with pytest.raises(PenetrationError, match="locks, but is overcome") as caught:
         pushed("rk4", **options)
@@ -152,7 +152,7 @@ def test_a_law_that_locks_but_is_overcome_is_no_remedy(options):
 def test_steps_that_shrink_where_panels_meet_say_so():
     said = r"panels meet about nodes \d+-\d+; the law"
     with pytest.raises(ComputationError, match=said) as caught:
-        pushed("dormand_prince", every=1e-4)
+        pushed("dormand_prince", interval=1e-4)
     assert "rk4" not in str(caught.value)
 
 
@@ -166,4 +166,4 @@ def test_where_a_law_that_locks_is_missing_it_is_the_remedy_unless_steps_are_too
     step = fd.critical_step(case)
     for dt, remedy in ((0.5 * step, "fold_law = 'enhanced'"), (1.001 * step, "use a step below")):
         with pytest.raises(PenetrationError, match=remedy):
-            fd.simulate(case, 0.5, dt=dt, every=100, initial=start, force=True)
+            fd.simulate(case, 0.5, dt=dt, every_steps=100, initial=start, force=True)

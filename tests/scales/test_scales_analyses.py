@@ -29,13 +29,13 @@ def simulated(make, by, method, dt=None, **damped):
     half = fd.HalfSine(0.3 * by.time)
     case = fd.Case(make(by), FOLD_SUPPORTS, [push(by, half)], damping(by, **damped))
     dt = None if dt is None else dt * by.time
-    return fd.simulate(case, 0.5 * by.time, method=method, dt=dt, every=0.1 * by.time)
+    return fd.simulate(case, 0.5 * by.time, method=method, dt=dt, interval=0.1 * by.time)
 
 
 def simulated_miura(by, loads=(), supports=(), method="generalized_alpha", mass="mixed_voronoi"):
     structure = miura(by, mass=mass)
     case = fd.Case(structure, [*MIURA_SUPPORTS, *supports], loads, damping(by))
-    return fd.simulate(case, 0.5 * by.time, method=method, every=0.1 * by.time)
+    return fd.simulate(case, 0.5 * by.time, method=method, interval=0.1 * by.time)
 
 
 def ramp(by):
@@ -219,7 +219,7 @@ def test_a_micrometer_is_as_long_as_a_meter():
         s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01 * size, 1.0))
         load = fd.Force([7], (1e-3 * size**2, 0, 0), fd.HalfSine(0.5 * size))
         case = fd.Case(s, MIURA_SUPPORTS, [load], fd.Rayleigh(0.1 / size))
-        return fd.simulate(case, 2.0 * size, method="generalized_alpha", every=0.25 * size)
+        return fd.simulate(case, 2.0 * size, method="generalized_alpha", interval=0.25 * size)
 
     one, small = motion(1.0).displacement.values, motion(1e-5).displacement.values
     assert np.abs(small / 1e-5 - one).max() < 1e-6 * np.abs(one).max()

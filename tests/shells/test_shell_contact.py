@@ -171,7 +171,7 @@ def lying(angle: float, friction: float, alpha: float = 0.0) -> fd.Case:
 
 def test_a_shell_slides_above_the_angle_of_friction():
     case, a = lying(20.0, 0.3), np.radians(20.0)
-    run = fd.simulate(case, 0.1, method="generalized_alpha", dt=2e-4, every=2e-3)
+    run = fd.simulate(case, 0.1, method="generalized_alpha", dt=2e-4, interval=2e-3)
     distance = run.displacement.values[-1, :, 0].mean()
     expected = 0.5 * G * (np.sin(a) - 0.3 * np.cos(a)) * 0.1**2
     assert distance == pytest.approx(expected, rel=0.02)
@@ -182,7 +182,7 @@ def test_a_shell_slides_above_the_angle_of_friction():
 
 def test_a_shell_sticks_below_the_angle_of_friction():
     case = lying(15.0, 0.3, alpha=200.0)
-    run = fd.simulate(case, 0.2, method="generalized_alpha", dt=2e-4, every=2e-3)
+    run = fd.simulate(case, 0.2, method="generalized_alpha", dt=2e-4, interval=2e-3)
     along = run.displacement.values[:, :, 0].mean(axis=1)
     assert abs(along[-1] - along[60]) < 1e-12
     assert along[-1] < 1e-3 and run.attrs["energy_error"] < 1e-2
@@ -206,7 +206,7 @@ def thrown(method: str, **options):
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_colliding_shells_keep_momentum_and_energy(method):
     pytest.importorskip("ipctk")
-    case, run = thrown(method, dt=1e-5, every=20)
+    case, run = thrown(method, dt=1e-5, every_steps=20)
     shell = case.structure
     momentum = np.einsum("nm,tmc->tnc", shell.mass.toarray(), run.velocity.values)
     x = shell.nodes + run.displacement.values
@@ -232,5 +232,5 @@ def test_explicit_methods_say_why_they_do_not_take_it():
 
 def test_auto_takes_a_method_that_shells_have():
     case = fd.Case(strip_shell(2, divisions=1), contact=fd.Contact())
-    run = fd.simulate(case, 1e-4, method="auto", every=1e-4)
+    run = fd.simulate(case, 1e-4, method="auto", interval=1e-4)
     assert run.attrs["method"] == "generalized_alpha"

@@ -137,7 +137,7 @@ def test_a_sheet_moves_as_in_a_slow_motion(part, laws, damping):
         duration,
         method="generalized_alpha",
         dt=duration / n,
-        every=n,
+        every_steps=n,
         spectral_radius=0.0,
     )
     elastic = fd.trace(cases[0], "newton", load_factors=[0.0, 1.0])

@@ -124,7 +124,7 @@ def test_explicit_and_implicit_motions_are_alike():
     case = fd.Case(clamped(), [fd.Fix("xmin")], [load], fd.Rayleigh(0.1))
     ends = []
     for method in ("central_difference", "generalized_alpha", "energy_momentum"):
-        motion = fd.simulate(case, 0.5, method=method, every=0.05)
+        motion = fd.simulate(case, 0.5, method=method, interval=0.05)
         stored = sum(motion[k] for k in motion if k == "kinetic" or k.startswith("strain"))
         gap = stored + motion.dissipated - motion.work
         assert float(np.abs(gap).max()) < 2e-3 * float(np.abs(motion.work).max())

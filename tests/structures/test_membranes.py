@@ -230,7 +230,7 @@ def test_all_methods_find_the_same_motion(options):
     case = fd.Case(structure, [fd.Fix("xmin")], [fd.Force([14], (0, 0, 2e-3))])
     ends = {}
     for method in METHODS:
-        step = {} if method == "dormand_prince" else {"dt": 2e-5, "every": 1000}
+        step = {} if method == "dormand_prince" else {"dt": 2e-5, "every_steps": 1000}
         motion = fd.simulate(case, 0.02, method=method, **step)
         ends[method] = motion.displacement.values[-1]
     assert abs(motion.attrs["energy_error"]) < 1e-10  # the last one conserves it

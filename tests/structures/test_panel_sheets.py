@@ -272,7 +272,7 @@ def test_all_panels_of_another_material_are_a_sheet_of_it(model):
     loads = [fd.Gravity("-z"), fd.Force([7], (0.1, 0, 0))]
     cases = [fd.Case(s, loads=loads) for s in (mixed, alone)]
     assert fd.critical_step(cases[0]) == pytest.approx(fd.critical_step(cases[1]), rel=1e-9)
-    one, two = (fd.simulate(case, 1e-3, dt=1e-6, every=200) for case in cases)
+    one, two = (fd.simulate(case, 1e-3, dt=1e-6, every_steps=200) for case in cases)
     assert one.attrs["energy_error"] < 1e-6
     np.testing.assert_allclose(one.kinetic, two.kinetic, rtol=1e-8, atol=1e-15)
 
@@ -286,7 +286,7 @@ def test_energy_of_a_motion_with_panels_that_differ(model, method):
     s = make(model, PAIR, boards)
     case = fd.Case(s, [fd.Fix([0, 3])], [fd.Gravity((0, 0, -0.05), fd.Ramp(0.2, smooth=True))],
                    fd.Rayleigh(alpha=1.0))  # fmt: skip
-    motion = fd.simulate(case, 0.5, method=method, every=0.1)
+    motion = fd.simulate(case, 0.5, method=method, interval=0.1)
     assert float(motion.kinetic[-1]) > 0.0
     assert motion.attrs["energy_error"] < (1e-6 if method == "rk4" else 3e-3)
 

@@ -29,7 +29,7 @@ duration = 40.0
 dt = 0.02
 method = "newmark"
 [output]
-every = 0.02
+interval = 0.02
 """
 BANDS = f"""{MIURA_TEXT}[analysis]
 kind = "bands"

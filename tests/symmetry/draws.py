@@ -354,7 +354,7 @@ def _draw(rng, chosen: Combination) -> Draw:
     scene = scene_of(s, rng, implicit)
     options: dict[str, Any] = {}
     if analysis != STATIC:
-        options = {"method": analysis, "duration": scene.time, "every": scene.time / STEPS}
+        options = {"method": analysis, "duration": scene.time, "interval": scene.time / STEPS}
         options |= {"dt": scene.time / STEPS} if implicit else {}
 
     def taken(case: fd.Case, initial: fd.State | None = None) -> Any:

@@ -99,7 +99,7 @@ def check_drift(seed: int, method: str, model: str) -> None:
 
     def make(scene: Scene):
         implicit, shape = METHODS[method].implicit, scene.structure.nodes.shape
-        options = {"method": method, "duration": scene.time, "every": scene.time / STEPS}
+        options = {"method": method, "duration": scene.time, "interval": scene.time / STEPS}
         options |= {"dt": scene.time / STEPS} if implicit else {}
         air = replace(drawn(scene, [fd.Air]), history=fd.Air().history)
         case = fd.Case(scene.structure, air=air)
@@ -255,7 +255,7 @@ def check_momenta(seed: int, model: str) -> None:
         options = {
             "duration": scene.time,
             "dt": scene.time / STEPS,
-            "every": 1,
+            "every_steps": 1,
             "method": "newmark",
         }
 
@@ -314,7 +314,7 @@ def check_settled(seed: int, model: str) -> None:
         damping = [fd.Rayleigh(alpha=2.0 * slowest)]
         loads = [replace(load, history=ramp) for load in case.loads]
         case = case.altered(loads=loads, damping=damping)
-        options = {"dt": duration / 300.0, "every": duration}
+        options = {"dt": duration / 300.0, "interval": duration}
         return case, path, fd.simulate(case, duration, method="generalized_alpha", **options)
 
     case, path, motion = first(seed, model, True, make)

@@ -61,7 +61,7 @@ def test_rest_angles_follow_what_folds_them_on_a_path(constant):
 def test_rest_angles_follow_what_folds_them_in_a_motion():
     s = structure(fold_law="linear", bend_law="linear")
     case = fd.Case(s, SUPPORTS, [fd.Actuate("all", fraction=0.6, history=fd.Ramp(0.01))])
-    check(s, fd.simulate(case, 0.01, every=2e-3))
+    check(s, fd.simulate(case, 0.01, interval=2e-3))
 
 
 MODELS = {
@@ -138,7 +138,7 @@ def test_warm_panels_store_what_they_may_not_do(model):
     ]
     case = fd.Case(s, [fd.Fix(pattern.faces[0])], loads)
     check(s, fd.trace(case, load_factors=[0.5, 1.0], constant=[0]))
-    check(s, fd.simulate(case, 1e-3, method="newmark", dt=1e-4, every=5e-4))
+    check(s, fd.simulate(case, 1e-3, method="newmark", dt=1e-4, interval=5e-4))
 
 
 def test_creases_of_rigid_shells_have_all_of_their_energy():

@@ -143,7 +143,7 @@ def _run(case_file: CaseFile, results: ByRule) -> Table:
         "amplitude": "amplitude",
         "pulse": "pulse (s)",
         "record": "record (s)",
-        "every": "sampling (s)",
+        "interval": "sampling (s)",
         "averages": "averages",
         "seed": "seed",
         "estimator": "estimator",

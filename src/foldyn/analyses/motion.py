@@ -14,6 +14,7 @@ from foldyn.analyses.sections import (
     AnalysisSection,
     Animation,
     CaseSchema,
+    Count,
     Positive,
     ShownSection,
     Switch,
@@ -41,20 +42,15 @@ from foldyn.report.charts import Charts
 from foldyn.report.sections import Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
 from foldyn.signals.spectrum import MINIMUM_SAMPLES
-from foldyn.values import number, show, whole
+from foldyn.values import number, show
 
 LOADS = "Loads and imposed motions over time."
 
+SAMPLING = ("every_steps", "interval")
 SAMPLES = 2000
 """Samples that a motion keeps when the file does not say."""
 MASSLESS_METHODS = tuple(name for name, method in METHODS.items() if method.massless)
 """Integrators that take dofs without mass, as the rotations of a shell are."""
-
-
-def _every(name: str, value: Any) -> int | float:
-    if isinstance(value, int) and not isinstance(value, bool):
-        return whole(name, value, least=1, what="steps")
-    return number(name, value, above=0.0)
 
 
 class MotionSection(AnalysisSection):
@@ -76,15 +72,18 @@ class MotionOutput(ShownSection):
 
     Parameters
     ----------
-    every : int or float, optional
-        Steps (a whole number) or seconds between samples; by default the duration over 2000.
+    every_steps : int, optional
+        Steps between samples, instead of `interval`.
+    interval : float, optional
+        Time between samples (s), by default the duration over 2000.
     max_frequency : float, optional
         Highest frequency of spectra that are drawn (Hz).
     animation : {"gif", "mp4"}, optional
         Film of the motion beside the page.
     """
 
-    every: Annotated[int | float | None, Check(_every)] = None
+    every_steps: Count | None = None
+    interval: Positive | None = None
     max_frequency: Positive | None = None
     animation: Animation = None
 
@@ -127,14 +126,20 @@ class MotionAnalysis(Analysis):
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
-        """See `Analysis`; output.every is an argument of `simulate` too."""
-        analysis, every = super().of(schema, case), schema.output.every
-        analysis.arguments["every"] = schema.analysis.duration / SAMPLES if every is None else every
+        """See `Analysis`; the sampling of [output] is an argument of `simulate` too."""
+        analysis, output = super().of(schema, case), schema.output
+        own = {name: getattr(output, name) for name in SAMPLING}
+        given = {name: value for name, value in own.items() if value is not None}
+        default = {"interval": schema.analysis.duration / SAMPLES}
+        analysis.arguments.update(given or default)
         return analysis
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
         """See `Analysis`."""
-        given = {**self.arguments, **changes}
+        kept = self.arguments
+        if any(name in changes for name in SAMPLING):
+            kept = {name: value for name, value in kept.items() if name not in SAMPLING}
+        given = {**kept, **changes}
         if "initial" not in given:
             given["initial"] = case_file.start(mass).state
         return _Prepared(prepare(case_file.case(mass), **given, kept=True))
@@ -148,7 +153,7 @@ class MotionAnalysis(Analysis):
             raise InputError(
                 f": gives {samples} samples, spectra need {MINIMUM_SAMPLES}: lower it, lengthen "
                 "analysis.duration, or run without --figures",
-                "every",
+                "interval",
             )
         case, count = motions[0].case, sum(motion.expected_samples for motion in motions)
         size = count, len(case.structure.nodes), len(case.reaction_dofs)

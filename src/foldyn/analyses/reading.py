@@ -180,7 +180,11 @@ def case_of_document(
             if chosen is None
             else resolve_nodes(case.structure, chosen, "output.nodes")
         )
-    shown = {k: v for k, v in schema.output.values().items() if k not in ("nodes", "every")}
+    shown = {
+        k: v
+        for k, v in schema.output.values().items()
+        if k not in ("nodes", "every_steps", "interval")
+    }
     case_file = CaseFile(
         path, schema.title, pattern, sheet, schema.model.kind, masses, analysis,
         Output(nodes, chosen is not None, **shown), schema, make,

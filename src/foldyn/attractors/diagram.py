@@ -234,11 +234,11 @@ class Steady(NamedTuple):
         begun : what has passed of its first period (s).
         """
         case, period = self.case_at(value), 1.0 / self.frequency_at(value)
-        every, transient = period / PER_PERIOD, self.settle * period
+        interval, transient = period / PER_PERIOD, self.settle * period
         if self.settle:
             left = transient - begun
-            _, run = run.advanced(case, left, left, every, begun)
-        stretch, run = run.advanced(case, self.record * period, every, every, transient)
+            _, run = run.advanced(case, left, left, interval, begun)
+        stretch, run = run.advanced(case, self.record * period, interval, interval, transient)
         values = measured(self.measure, stretch)
         path = states(stretch, period)
         repeats = repeats_after(path[:-1:PER_PERIOD], REPEATS * float(np.ptp(path, axis=0).max()))

@@ -260,7 +260,7 @@ def _ends(
     used : gets the device on which they have settled.
     """
     count = len(starts)
-    before = simulate_many([case] * count, settled, every=settled, initial=starts, **how)
+    before = simulate_many([case] * count, settled, interval=settled, initial=starts, **how)
     used["device"] = before.attrs["device"]
     out = np.full((count, record, 2, *case.structure.nodes.shape), np.nan)
     sound = np.flatnonzero(before.outcome.values == "done")
@@ -269,7 +269,7 @@ def _ends(
     later = [initial_state(before.isel(model=k)) for k in sound]
     span = (record - 1) * period
     after = simulate_many(
-        [case] * len(sound), span, every=period, initial=later, start=settled, **how
+        [case] * len(sound), span, interval=period, initial=later, start=settled, **how
     )
     out[sound, :, 0] = after.displacement.values
     out[sound, :, 1] = after.velocity.values

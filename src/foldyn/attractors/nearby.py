@@ -200,8 +200,8 @@ class Pair:
         self, case: Case, duration: float, interval: float, initial: State | None, method: str,
         dt: float,
     ) -> None:  # fmt: skip
-        given = case, duration, method, dt, interval, initial
-        self._motions: list[Motion] = [prepare(*given), prepare(*given)]
+        given = {"method": method, "dt": dt, "interval": interval, "initial": initial}
+        self._motions = [prepare(case, duration, **given), prepare(case, duration, **given)]
         self.dt = self._motions[0].plan.dt
         self._interval, self._speed = interval, interval / (2.0 * math.pi)
         self._ties, self._numbering = case.constraints, self._motions[0].packed.numbering

@@ -55,10 +55,10 @@ class Run:
             of_kind("initial", self.state, State)
 
     def advanced(
-        self, case: Case, duration: float, every: float, longest: float, start: float = 0.0,
+        self, case: Case, duration: float, interval: float, longest: float, start: float = 0.0,
         report: Reporter | None = None,
     ) -> tuple[Stretch, Run]:  # fmt: skip
-        """Go on with a case for a duration (s), sampled `every` so many seconds.
+        """Go on with a case for a duration (s), with a sample at every `interval` (s).
 
         longest : step (s) of methods with fixed steps where the user gives none.
         """
@@ -66,10 +66,10 @@ class Run:
         if dt is None and not (method.implicit or method.adaptive):
             dt = step_of(case, self.method, self.state, longest)
         if dt is not None:
-            dt = divisor(every, dt)
+            dt = divisor(interval, dt)
         motion = prepare(
-            case, duration, self.method, dt, every, self.state, tolerance=self.tolerance,
-            start=start,
+            case, duration, self.method, dt, interval=interval, initial=self.state,
+            tolerance=self.tolerance, start=start,
         )  # fmt: skip
         found = motion.samples(report)
         memory = found.memory if found.memory.size else None

@@ -73,7 +73,7 @@ def poincare_section(
     -----
     Between the samples a motion is the cubic with their displacements and velocities: its error is
     of the order h^4 in displacement and h^3 in velocity, h the sampling interval. With
-    ``every = period / k`` samples are the states themselves.
+    ``interval = period / k`` samples are the states themselves.
 
     Examples
     --------
@@ -82,7 +82,7 @@ def poincare_section(
     >>> push = fd.Force([0, 1], (1.0, 0, 0), history=fd.Harmonic(5.0))
     >>> supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "yz")]
     >>> case = fd.Case(s, supports, [push], damping=fd.Rayleigh(alpha=20.0))
-    >>> section = poincare_section(fd.simulate(case, 2.0, every=0.05), after=1.0)
+    >>> section = poincare_section(fd.simulate(case, 2.0, interval=0.05), after=1.0)
     >>> section.time.values.round(6).tolist()
     [1.0, 1.2, 1.4, 1.6, 1.8, 2.0]
     """

@@ -263,8 +263,8 @@ def _glide(
         _, run = run.advanced(at_frequency(case, line.start), wait, wait, longest)
     swept = with_histories(case, line.chirp(drive_frequency(case)))
     length = float(line.cycles[-1])
-    every = length / math.ceil(length / longest)
-    return run.advanced(swept, length, every, longest, report=report)
+    interval = length / math.ceil(length / longest)
+    return run.advanced(swept, length, interval, longest, report=report)
 
 
 def _amplitudes(

@@ -54,7 +54,8 @@ def simulate(
     *,
     method: str = "rk4",
     dt: float | None = None,
-    every: int | float = 1,
+    every_steps: int | None = None,
+    interval: float | None = None,
     initial: State | None = None,
     force: bool = False,
     tolerance: float | None = None,
@@ -80,10 +81,12 @@ def simulate(
         them.
     dt : float, optional
         Time step (s). Explicit methods: without it half the critical step, shortened to divide
-        `every`. Implicit methods and `dormand_prince`, which choose their steps by their error:
+        `interval`. Implicit methods and `dormand_prince`, which choose their steps by their error:
         with `tolerance` the largest step; `dt` alone fixes the step of an implicit method.
-    every : int or float, default 1
-        Sampling interval: an int counts steps, a float is seconds.
+    every_steps : int, optional
+        Steps between samples; every step is one by default.
+    interval : float, optional
+        Instead, the time between samples (s).
     initial : State, optional
         Displacement and velocity at the start; rest by default. Supported nodes stay where it
         puts them, base motions start from there, and imposed displacements must agree with it.
@@ -159,8 +162,8 @@ def simulate(
     if store is None and flag("resume", resume):
         raise InputError(": there is nothing to go on with; name the file of the result", "store")
     motion = prepare(
-        case, duration, method, dt, every, initial, force, tolerance, start, spectral_radius,
-        sample, keeping is not None, device,
+        case, duration, method, dt, every_steps, interval, initial, force, tolerance, start,
+        spectral_radius, sample, keeping is not None, device,
     )  # fmt: skip
     return motion.run(progress) if keeping is None else motion.run_into_file(keeping, progress)
 
@@ -170,7 +173,8 @@ def prepare(
     duration: float,
     method: str = "rk4",
     dt: float | None = None,
-    every: int | float = 1,
+    every_steps: int | None = None,
+    interval: float | None = None,
     initial: State | None = None,
     force: bool = False,
     tolerance: float | None = None,
@@ -195,6 +199,7 @@ def prepare(
     duration = number("duration", duration, above=0.0)
     force = flag("force", force)
     case.check_movable()
+    sampling = timing.sampling(duration, every_steps, interval)
     start = number("start", start, unit="s")
     u, v = check_start(case, initial)
     check_touching(case, u, float(start), float(start) + duration)
@@ -203,16 +208,16 @@ def prepare(
     modal = modal_rows(case, origin)
     chosen = Choice(integrator.name, "")
     if method == AUTO:
-        timing.counted_in_seconds(duration, every)
         chosen = choose(
-            case, u, v, float(start), duration, dt, every, tolerance, IMPLICIT_TOLERANCE, modal
-        )
+            case, u, v, float(start), duration, dt, sampling.interval, tolerance,
+            IMPLICIT_TOLERANCE, modal,
+        )  # fmt: skip
         integrator = suited(chosen.method, case)
     integrator = _with_radius(integrator, spectral_radius)
     if not integrator.implicit or not is_lumped(case.mass):
         check_mass(case.mass, case.constraints.determined)
     critical = integrator.critical_step(case, u, modal)
-    plan = _plan(case, integrator, duration, dt, every, critical, force, tolerance, float(start))
+    plan = _plan(case, integrator, duration, dt, sampling, critical, force, tolerance, float(start))
     _warn_of_damping(case, integrator, u, critical)
     warn_of_unstable_damping(case, origin)
     warn_of_standing_in_wind(case, v)
@@ -253,10 +258,10 @@ def prepare(
     better = None
     if chosen.better:
         if chosen.better == chosen.method:
-            dt, every = plan.dt / FINER, plan.every * FINER
+            dt, every_steps, interval = plan.dt / FINER, plan.every * FINER, None
         better = partial(
-            prepare, case, duration, chosen.better, dt, every, initial, force, tolerance, start,
-            None, sample, kept,
+            prepare, case, duration, chosen.better, dt, every_steps, interval, initial, force,
+            tolerance, start, None, sample, kept,
         )  # fmt: skip
     return Motion(
         case, integrator, plan, critical, force, state, origin, packed, sampler, chosen.reason,
@@ -279,7 +284,7 @@ def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrato
 
 
 def _plan(
-    case: Case, method: Integrator, duration: float, dt: float | None, every: int | float,
+    case: Case, method: Integrator, duration: float, dt: float | None, sampling: timing.Sampling,
     critical: float, force: bool, tolerance: float | None, start: float,
 ) -> StepPlan:  # fmt: skip
     """Steps and samples that the arguments of `simulate` ask for."""
@@ -296,9 +301,9 @@ def _plan(
         largest = math.inf if force else critical
         tolerance, floor = tolerance or default, FLOOR * case.body.sheet.longest()
         return timing.variable_steps(
-            duration, dt, every, largest, start, tolerance, floor, timing.knots(case)
+            duration, dt, sampling, largest, start, tolerance, floor, timing.knots(case)
         )
-    return timing.fixed_steps(duration, dt, every, critical, start)
+    return timing.fixed_steps(duration, dt, sampling, critical, start)
 
 
 def _warn_of_damping(case: Case, method: Integrator, u: NDArray, critical: float) -> None:

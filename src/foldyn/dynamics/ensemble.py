@@ -34,7 +34,7 @@ from foldyn.values import choice, flag, of_kind, show, whole
 
 METHOD = "central_difference"
 LANES = 2.5  # how much quicker models are in lanes
-COMMON = ("duration", "dt", "every", "start", "method", "device")
+COMMON = ("duration", "dt", "every_steps", "interval", "start", "method", "device")
 """Arguments that are those of all cases."""
 
 
@@ -43,7 +43,8 @@ def simulate_many(
     duration: float,
     *,
     dt: float | None = None,
-    every: int | float = 1,
+    every_steps: int | None = None,
+    interval: float | None = None,
     initial: State | Sequence[State | None] | None = None,
     start: float = 0.0,
     force: bool = False,
@@ -66,7 +67,7 @@ def simulate_many(
         Lanes take bars and hinges with laws of the package, lumped mass, fixed supports, dead loads
         and damping by alpha. Other cases are computed one after the other, as by `simulate`, and so
         is once more a motion that ends before its time.
-    duration, every, start, force :
+    duration, every_steps, interval, start, force :
         As of `simulate`.
     dt : float, optional
         Time step (s), one for all; by default half the least critical step.
@@ -116,7 +117,7 @@ def simulate_many(
             like = next((m for m in motions[:1] if dt is not None and _takes_starts(m, case)), None)
             asked = "gpu" if device == "gpu" else "cpu"
             try:
-                given = case, duration, method, dt, every, state
+                given = case, duration, method, dt, every_steps, interval, state
                 motions.append(
                     _from_start(like, state) if like
                     else prepare(*given, force=True, start=start, kept=True, device=asked)
@@ -153,7 +154,7 @@ def simulate_many(
     ended = _integrate(motions, out, threads, device)
     facts = {
         "method": method, "dt": plan.dt, "steps": plan.steps, "start": plan.start,
-        "duration": plan.end - plan.start, "every": plan.every, "critical_step": critical,
+        "duration": plan.end - plan.start, "every_steps": plan.every, "critical_step": critical,
         "wall_seconds": time.perf_counter() - clock,
         "processor_seconds": time.process_time() - spent,
         "threads": threads, "device": _name(device),

@@ -50,12 +50,13 @@ class Choice(NamedTuple):
 
 def choose(
     case: Case, u: NDArray, v: NDArray, start: float, duration: float, dt: float | None,
-    every: int | float, tolerance: float | None, default: float, modal: ModalRows,
+    interval: float, tolerance: float | None, default: float, modal: ModalRows,
 ) -> Choice:  # fmt: skip
     """The method that should be quicker for a motion from u and v (n, 3) at `start`, and why.
 
-    dt, every and tolerance are those of `simulate`, default what implicit methods take without;
-    modal is the modal damping of the motion.
+    dt and tolerance are arguments of `simulate`, default is the tolerance of implicit methods
+    without one, interval is the time between samples (s), 0.0 where steps are counted, and modal
+    the modal damping of the motion.
     """
     if case.air is not None and case.air.added_mass and not case.structure.massless:
         return Choice(ACCURATE, "explicit: the added mass of the air moves with the panels")
@@ -89,7 +90,7 @@ def choose(
     many = duration / (DEFAULT_FRACTION * critical)
     share = vibrating_share(case, u, v, start, duration, omega)
     few = CONTENT * duration * omega * (share / (12.0 * (tolerance or default))) ** (1.0 / 3.0)
-    few = max(few, FEWEST, duration / every if isinstance(every, float) else 0.0)
+    few = max(few, FEWEST, duration / interval if interval else 0.0)
     costs = (
         many * _explicit_cost(case, METHODS[explicit].evaluations),
         few * _implicit_cost(case, conserved),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from numbers import Integral, Real
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from foldyn.cases.history import CALLED
 from foldyn.dynamics.motion_state import StepPlan
 from foldyn.errors import InputError, warn
 from foldyn.ram_limit import GIB, check_memory
-from foldyn.values import number, show, single, whole
+from foldyn.values import number, whole
 
 MOST_STEPS = 1e13  # years of computing, whatever the structure
 DEFAULT_FRACTION = 0.5  # of the critical step, where the user leaves the choice to us
@@ -39,43 +39,65 @@ def apart(plan: StepPlan, critical: float) -> float:
     return SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
 
 
+class Sampling(NamedTuple):
+    """How often the state of a motion is kept."""
+
+    steps: int  # between samples; 0: they are `interval` apart
+    interval: float  # s; 0.0: counted in steps
+
+
+def sampling(duration: float, every_steps: int | None, interval: float | None) -> Sampling:
+    """The sampling that `simulate` is asked for: every step by default."""
+    if interval is None:
+        steps = 1 if every_steps is None else every_steps
+        return Sampling(whole("every_steps", steps, least=1, what="steps"), 0.0)
+    if every_steps is not None:
+        raise InputError(": give either every_steps or interval, not both", "every_steps")
+    interval = float(number("interval", interval, above=0.0, unit="s"))
+    if interval > duration * (1.0 + 1e-9):
+        raise InputError(
+            f" = {interval:g} s: longer than the duration of {duration:g} s", "interval"
+        )
+    return Sampling(0, interval)
+
+
 def fixed_steps(
-    duration: float, dt: float | None, every: int | float, critical: float, start: float
+    duration: float, dt: float | None, sampling: Sampling, critical: float, start: float
 ) -> StepPlan:
     """Fit a time step and the sampling to a duration.
 
-    `every` counts steps if it is an int and seconds if it is a float. Without `dt` the step is
-    half the critical one, shortened so that it divides the sampling interval and the duration.
+    Without `dt` the step is half the critical one, shortened so that it divides the sampling
+    interval and the duration.
     """
-    in_seconds = counted_in_seconds(duration, every)
+    per_sample, interval = sampling
     if dt is None:
         target = DEFAULT_FRACTION * critical
         if not math.isfinite(target):
             raise InputError(": nothing limits the step of this case (no stiffness); give dt", "dt")
-        span = float(every) if in_seconds else duration
+        span = interval or duration
         _check_count(duration, min(target, span))
         count = max(1, math.ceil(span / target * (1.0 - 1e-12)))
         dt = span / count
-        per_sample = count if in_seconds else int(every)
+        per_sample = per_sample or count
     else:
         dt = _given_step(duration, dt)
-        per_sample = max(1, round(every / dt)) if in_seconds else int(every)
-        if in_seconds and abs(per_sample * dt - every) > 1e-9 * every:
-            near = every / max(1, math.ceil(every / dt))
+        per_sample = per_sample or max(1, round(interval / dt))
+        if abs(per_sample * dt - interval) > 1e-9 * interval > 0.0:
+            near = interval / max(1, math.ceil(interval / dt))
             raise InputError(
-                f" = {every:g} s is not a whole number of steps of dt = {dt:g} s; "
+                f" = {interval:g} s is not a whole number of steps of dt = {dt:g} s; "
                 f"use dt = {near:.6g}, or leave dt out",
-                "every",
+                "interval",
             )
     steps = math.floor(duration / dt * (1.0 + 1e-12) + 1e-9)
     if per_sample > steps:
-        raise InputError(f" = {every}: longer than the motion of {steps} steps", "every")
-    end, interval = start + steps * dt, per_sample * dt
-    return StepPlan(start, end, dt, steps, per_sample, interval, 0.0, 0.0, np.zeros(0))
+        raise InputError(f" = {per_sample}: longer than the motion of {steps} steps", "every_steps")
+    end = start + steps * dt
+    return StepPlan(start, end, dt, steps, per_sample, per_sample * dt, 0.0, 0.0, np.zeros(0))
 
 
 def variable_steps(
-    duration: float, dt: float | None, every: int | float, largest: float, start: float,
+    duration: float, dt: float | None, sampling: Sampling, largest: float, start: float,
     tolerance: float, floor: float, knots: NDArray,
 ) -> StepPlan:  # fmt: skip
     """Plan of a motion whose steps follow their error; `dt` is the largest step.
@@ -83,15 +105,12 @@ def variable_steps(
     Without `dt` it is `largest`, at most a tenth of the motion. Knots outside the motion are
     dropped, and so are those that rounding cannot tell apart from the one before.
     """
-    in_seconds = counted_in_seconds(duration, every)
     dt = min(largest, 0.1 * duration) if dt is None else _given_step(duration, dt)
     _check_count(duration, dt)
-    interval = float(every) if in_seconds else 0.0
     end = start + duration
     within = np.sort(knots[(knots > start) & (knots <= end)])
     apart = np.diff(within, prepend=start) > SAME_TIME * max(abs(start), abs(end))
-    per_sample = 0 if in_seconds else int(every)
-    return StepPlan(start, end, dt, 0, per_sample, interval, tolerance, floor, within[apart])
+    return StepPlan(start, end, dt, 0, *sampling, tolerance, floor, within[apart])
 
 
 def expected_samples(plan: StepPlan) -> int:
@@ -107,30 +126,17 @@ def steps_taken(plan: StepPlan, tally: np.record) -> dict[str, float]:
     """Steps and samples of a motion, for its result."""
     facts = {"start": plan.start, "duration": plan.end - plan.start}
     if plan.steps:
-        return facts | {"dt": plan.dt, "steps": plan.steps, "every": plan.every}
+        return facts | {"dt": plan.dt, "steps": plan.steps, "every_steps": plan.every}
     steps = int(tally.steps)
     return facts | {
         "dt": float(tally.time - plan.start) / max(steps, 1),
         "steps": steps,
-        "every": plan.every or plan.interval,
+        **({"every_steps": plan.every} if plan.every else {"interval": plan.interval}),
         "tolerance": plan.tolerance,
         "refused_steps": int(tally.refused),
         "smallest_step": float(tally.shortest) if steps else 0.0,
         "largest_step": float(tally.longest),
     }
-
-
-def counted_in_seconds(duration: float, every: int | float) -> bool:
-    """Whether a sampling interval is in seconds; refuses one that fits no motion."""
-    every = single(every)
-    if isinstance(every, bool) or not isinstance(every, Real):
-        raise InputError(f" = {show(every)}: an int counts steps, a float is seconds", "every")
-    if isinstance(every, Integral):
-        whole("every", every, least=1, what="steps")
-        return False
-    if number("every", every, above=0.0) > duration * (1.0 + 1e-9):
-        raise InputError(f" = {every:g} s: longer than the duration of {duration:g} s", "every")
-    return True
 
 
 def _given_step(duration: float, dt: float) -> float:
@@ -154,8 +160,8 @@ def check_samples(samples: int, nodes: int, supported: int, motions: int = 1) ->
     """Refuse an output that memory cannot hold, before anything is computed."""
     together = f" of {motions} mass rules" if motions > 1 else ""
     check_memory(
-        "every", f"{samples:.3g} samples of {nodes} nodes{together}",
-        8.0 * samples * (6 * nodes + supported + 6), "raise it, or shorten the duration",
+        "interval", f"{samples:.3g} samples of {nodes} nodes{together}",
+        8.0 * samples * (6 * nodes + supported + 6), "keep fewer samples, or shorten the duration",
     )  # fmt: skip
 
 
@@ -165,9 +171,9 @@ def check_room(samples: int, nodes: int, supported: int, room: float) -> None:
     if needed > room:
         raise InputError(
             f": {samples:.3g} samples of {nodes} nodes needs about {needed / GIB:.3g} GiB, more "
-            f"than the {room / GIB:.3g} GiB that are free on the disk: raise it, or shorten the "
-            "duration",
-            "every",
+            f"than the {room / GIB:.3g} GiB that are free on the disk: keep fewer samples, or "
+            "shorten the duration",
+            "interval",
         )
 
 

@@ -47,7 +47,8 @@ class MotionGradient:
         if motion.method.tableau is not None:
             if (apart := segment(motion)) < wanted:
                 # samples between serve as states to go back from
-                motion = prepare(case, **{**given, "dt": motion.plan.dt, "every": apart})
+                own = {"dt": motion.plan.dt, "every_steps": apart, "interval": None}
+                motion = prepare(case, **{**given, **own})
             samples = motion.run(progress)
             self._adjoint: Callable[[], Adjoint] = lambda: RungeKuttaAdjoint(motion, samples)
         elif motion.method.name == "central_difference":

@@ -110,9 +110,9 @@ class _Motion:
 
     def advance(self, report: Reporter) -> None:
         """One more block."""
-        every = 1.0 / (PER_CYCLE * self.frequency)
+        interval = 1.0 / (PER_CYCLE * self.frequency)
         time, motion, self.state = self.rig.run(
-            self.history, self.block, every, report, self.time, self.state
+            self.history, self.block, interval, report, self.time, self.state
         )
         drive = self.rig.drive.value * self.history(time)
         # the last sample is the first one of the next block

@@ -116,7 +116,7 @@ class Rig:
         self,
         history: History,
         duration: float,
-        every: float,
+        interval: float,
         progress: Reporter,
         start: float = 0.0,
         initial: State | None = None,
@@ -124,10 +124,10 @@ class Rig:
         """Times, response (nt, n, 3) less the state, and the state at the end of a motion."""
         dt, tolerance = self.integration.dt, self.integration.tolerance
         if dt is not None:
-            dt = every / math.ceil(every / dt * (1.0 - 1e-12))
+            dt = interval / math.ceil(interval / dt * (1.0 - 1e-12))
         motion = prepare(
-            self.driven(history), duration, self.integrator, dt, every,
-            initial or State(self.state), tolerance=tolerance, start=start,
+            self.driven(history), duration, self.integrator, dt, interval=interval,
+            initial=initial or State(self.state), tolerance=tolerance, start=start,
         )  # fmt: skip
         found = motion.samples(progress)
         return found.time, found.displacement - self.state, motion.end

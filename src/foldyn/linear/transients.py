@@ -47,7 +47,7 @@ class Impulse(Integration):
     duration : float, optional
         Time (s) to simulate. Without it until damping leaves 1e-5 of a motion; without alpha, the
         inverse of the frequencies' spacing.
-    every : float, optional
+    interval : float, optional
         Largest sampling interval (s); a tenth of the pulse by default, at most a 20th of a cycle
         of the highest frequency.
     window_rate : float
@@ -57,7 +57,7 @@ class Impulse(Integration):
 
     pulse: Duration | None = None
     duration: Duration | None = None
-    every: Duration | None = None
+    interval: Duration | None = None
     window_rate: Annotated[float, Check(number, least=0.0)] = 0.0
 
 
@@ -78,7 +78,7 @@ class BurstRandom(Integration):
     duration : float, optional
         Time (s) to simulate for each burst. Without it damping leaves 1e-5 of a motion after the
         burst; without alpha, it is the inverse of the frequencies' spacing.
-    every : float, optional
+    interval : float, optional
         Largest sampling interval (s); a 20th of a cycle of the highest frequency by default.
     window_rate : float
         As of the impulse method.
@@ -89,7 +89,7 @@ class BurstRandom(Integration):
     burst: Annotated[float, Check(number, above=0.0, below=1.0)] = 0.5
     estimator: Annotated[str, Check(choice, known=("h1", "h2"))] = "h1"
     duration: Duration | None = None
-    every: Duration | None = None
+    interval: Duration | None = None
     window_rate: Annotated[float, Check(number, least=0.0)] = 0.0
 
 
@@ -103,12 +103,12 @@ def impulse(rig: Rig, frequency: NDArray, options: Impulse, report: Reporter) ->
     """
     width = WIDTH / float(frequency[-1])
     pulse = width if options.pulse is None else options.pulse
-    every = min(pulse, width) / PER_PULSE if options.every is None else options.every
-    record = record_of(frequency, rig.case.rayleigh.alpha, 1.0, every, options.duration)
+    interval = min(pulse, width) / PER_PULSE if options.interval is None else options.interval
+    record = record_of(frequency, rig.case.rayleigh.alpha, 1.0, interval, options.duration)
     check_records("duration", record, 1, len(rig.state))
     factor = _pulse(float(frequency[-1]), pulse, record)
     answer = respond(rig, [factor], record, options.window_rate, "h1", report)
-    width = (len(factor) - 1 - 2 * STILL) * record.every
+    width = (len(factor) - 1 - 2 * STILL) * record.interval
     return Answer(answer.response, {}, {"pulse": width, **answer.facts})
 
 
@@ -119,12 +119,12 @@ def _pulse(highest: float, pulse: float, record: Record) -> NDArray:
             f"pulse = {pulse:g} s: has no strength left at {highest:g} Hz; take at most "
             f"{1.0 / highest:.3g} s, or lower frequencies"
         )
-    count = round(pulse / record.every)
+    count = round(pulse / record.interval)
     if count < FEWEST:
         raise InputError(
-            f" = {record.every:g} s: the pulse of {pulse:g} s has only {count} samples, and "
-            f"at least {FEWEST} are needed; sample faster, or leave every out",
-            "every",
+            f" = {record.interval:g} s: the pulse of {pulse:g} s has only {count} samples, and "
+            f"at least {FEWEST} are needed; sample faster, or leave interval out",
+            "interval",
         )
     if count + 2 * STILL >= record.samples:
         raise InputError(
@@ -144,12 +144,14 @@ def burst_random(rig: Rig, frequency: NDArray, options: BurstRandom, report: Rep
     """
     alpha = rig.case.rayleigh.alpha
     quiet = 1.0 - options.burst
-    every = 1.0 / (PER_CYCLE * float(frequency[-1])) if options.every is None else options.every
-    record = record_of(frequency, alpha, quiet, every, options.duration)
+    interval = (
+        1.0 / (PER_CYCLE * float(frequency[-1])) if options.interval is None else options.interval
+    )
+    record = record_of(frequency, alpha, quiet, interval, options.duration)
     check_records("averages", record, options.averages, len(rig.state))
     count = int(options.burst * record.samples)
     random = np.random.default_rng(options.seed)
-    bursts = [_burst(random, count, record.every, frequency) for _ in range(options.averages)]
+    bursts = [_burst(random, count, record.interval, frequency) for _ in range(options.averages)]
     answer = respond(rig, bursts, record, options.window_rate, options.estimator, report)
     held = rig.case.fixed
     answer.response[:, held] = np.where(rig.drive.vector[held] != 0.0, 1.0, 0.0)
@@ -157,18 +159,19 @@ def burst_random(rig: Rig, frequency: NDArray, options: BurstRandom, report: Rep
     return answer._replace(facts={**own, **answer.facts})
 
 
-def _burst(random: np.random.Generator, count: int, every: float, frequency: NDArray) -> NDArray:
+def _burst(random: np.random.Generator, count: int, interval: float, frequency: NDArray) -> NDArray:
     """Samples of random numbers within the band, of root mean square 1, tapered to 0."""
     if count < 32:
         raise InputError(
             f"burst: {count} samples are too few; give a longer duration, or a larger part of it"
         )
-    lines = np.fft.rfftfreq(count, every)
+    lines = np.fft.rfftfreq(count, interval)
     inside = (lines >= BAND[0] * frequency[0]) & (lines <= BAND[1] * frequency[-1]) & (lines > 0.0)
     if inside.sum() < 4:
         raise InputError(
-            f"burst: only {int(inside.sum())} lines of {1.0 / (count * every):.3g} Hz lie between "
-            f"{frequency[0]:g} and {frequency[-1]:g} Hz; give a longer duration, or a wider band"
+            f"burst: only {int(inside.sum())} lines of {1.0 / (count * interval):.3g} Hz lie "
+            f"between {frequency[0]:g} and {frequency[-1]:g} Hz; give a longer duration, or a "
+            "wider band"
         )
     spectrum = np.zeros(len(lines), complex)
     spectrum[inside] = random.normal(size=inside.sum()) + 1j * random.normal(size=inside.sum())
@@ -184,17 +187,17 @@ class Record:
 
     Attributes
     ----------
-    every : float
+    interval : float
         Sampling interval (s).
     samples : int
         Samples simulated.
     length : int
-        Samples of the record, zeros appended; its lines are 1 / (length every) apart.
+        Samples of the record, zeros appended; its lines are 1 / (length interval) apart.
     lines : ndarray of int, shape (m,)
         The frequencies' numbers among the lines.
     """
 
-    every: float
+    interval: float
     samples: int
     length: int
     lines: NDArray[np.int64]
@@ -202,11 +205,11 @@ class Record:
     @property
     def duration(self) -> float:
         """Time simulated (s)."""
-        return self.samples * self.every
+        return self.samples * self.interval
 
 
 def record_of(
-    frequency: NDArray, alpha: float, quiet: float, every: float, duration: float | None
+    frequency: NDArray, alpha: float, quiet: float, interval: float, duration: float | None
 ) -> Record:
     """Choose the sampling of a transient record.
 
@@ -218,7 +221,7 @@ def record_of(
         Mass-proportional damping (1/s): a motion falls at least as fast as exp(-alpha t / 2).
     quiet : float
         Part of the record after the drive has ended.
-    every : float
+    interval : float
         Largest sampling interval (s).
     duration : float, optional
         Time to simulate (s).
@@ -228,17 +231,17 @@ def record_of(
         decay = 2.0 * math.log(1.0 / DECAYED) / alpha if alpha > 0.0 else 0.0
         duration = decay / quiet if decay > 0.0 else 1.0 / spacing
     whole = math.ceil(duration * spacing * (1.0 - 1e-9)) / spacing
-    length = math.ceil(whole / every * (1.0 - 1e-9))
-    every = whole / length
-    if frequency[-1] * every * FEWEST > 1.0 + 1e-9:
+    length = math.ceil(whole / interval * (1.0 - 1e-9))
+    interval = whole / length
+    if frequency[-1] * interval * FEWEST > 1.0 + 1e-9:
         raise InputError(
-            f" = {every:g} s: {frequency[-1]:g} Hz has only "
-            f"{1.0 / (frequency[-1] * every):.3g} samples in a cycle, and at least {FEWEST} are "
-            "needed; sample faster, or leave every out",
-            "every",
+            f" = {interval:g} s: {frequency[-1]:g} Hz has only "
+            f"{1.0 / (frequency[-1] * interval):.3g} samples in a cycle, and at least {FEWEST} are "
+            "needed; sample faster, or leave interval out",
+            "interval",
         )
-    samples = min(math.ceil(duration / every * (1.0 - 1e-9)), length)
-    return Record(every, samples, length, np.rint(frequency * whole).astype(np.int64))
+    samples = min(math.ceil(duration / interval * (1.0 - 1e-9)), length)
+    return Record(interval, samples, length, np.rint(frequency * whole).astype(np.int64))
 
 
 def check_records(field: str, record: Record, count: int, nodes: int) -> None:
@@ -289,13 +292,13 @@ def respond(
     drive = np.zeros((len(factors), record.length))
     responses = np.zeros((*drive.shape, *rig.state.shape))
     for k, factor in enumerate(factors):
-        history = Table(record.every * np.arange(len(factor)), factor, smooth=True)
+        history = Table(record.interval * np.arange(len(factor)), factor, smooth=True)
         ahead = overall(report, k * record.duration, len(factors) * record.duration)
-        motion = rig.run(history, record.duration, record.every, ahead)[1]
+        motion = rig.run(history, record.duration, record.interval, ahead)[1]
         drive[k, : len(factor)] = rig.drive.value * factor
         responses[k, : record.samples] = motion[: record.samples]
     if rate > 0.0:
-        window = exponential_window(record.length, record.every, rate=rate)
+        window = exponential_window(record.length, record.interval, rate=rate)
         drive = drive * window
         responses *= window[:, None, None]
     size = np.abs(responses).max(axis=(2, 3))
@@ -310,13 +313,13 @@ def respond(
             f"window_rate = {decay:.2g} (1/s)",
             "frequency-response.md#responses-from-simulated-motions",
         )
-    estimate = frequency_response(drive, responses, dt=record.every, estimator=estimator)
+    estimate = frequency_response(drive, responses, dt=record.interval, estimator=estimator)
     return Answer(
         estimate.response[record.lines],
         {"coherence": estimate.coherence[record.lines]},
         {
             "record": record.duration,
-            "every": record.every,
+            "interval": record.interval,
             "window_rate": rate,
             "left_at_end": left,
         },

@@ -30,7 +30,7 @@ KINDS: Mapping[str, str] = {
 STEPS, PERIODS, FREQUENCIES, COUNT = 10, 10.0, 200, 6
 """Of analyses that the file does not ask for: steps of a static curve, periods of the first mode
 that a motion lasts, frequencies of a response, modes."""
-SAMPLES, EVERY = 250, 4
+SAMPLES, STEPS_A_SAMPLE = 250, 4
 """Samples of a motion, and steps between them where they are ours: a hundred in a period."""
 MOST_WORK = 1e7
 """Steps times dofs of a motion with fixed steps: a second or some. Longer ones are cut."""
@@ -82,7 +82,7 @@ def computed(path: Path, document: Document, kind: str) -> tuple[CaseFile, xr.Da
         "computed soon; foldyn run computes the whole",
         "pages.md#change-parameters-in-the-viewer",
     )
-    return case_file, case_file.run(duration=duration, every=duration / SAMPLES)
+    return case_file, case_file.run(duration=duration, interval=duration / SAMPLES)
 
 
 def _curve_of_motions(case_file: CaseFile) -> xr.Dataset:
@@ -143,11 +143,11 @@ def _curve(_: Path, document: Document) -> Document:
 def _motion(path: Path, document: Document) -> Document:
     """Under loads and supports as they are: those without a history act from the start."""
     duration = PERIODS / float(_frequencies(path, document)[0])
-    steps = {"method": "generalized_alpha", "dt": duration / (SAMPLES * EVERY)}
+    steps = {"method": "generalized_alpha", "dt": duration / (SAMPLES * STEPS_A_SAMPLE)}
     shown = _kept(document)
     return {
         **shown,
-        "output": {**shown["output"], "every": EVERY},
+        "output": {**shown["output"], "every_steps": STEPS_A_SAMPLE},
         "analysis": {"kind": "dynamics", "duration": duration, **steps},
     }
 

@@ -210,10 +210,10 @@ def steady(case_file: CaseFile) -> dict[str, Any]:
     if method.implicit:
         given["tolerance"] = None
         if given["dt"] is None:
-            if not isinstance(given["every"], float):
+            if "interval" not in given:
                 raise InputError(
                     f"{case_file.path}: analysis.dt: missing; a fit needs fixed steps: give dt, or "
-                    "output.every in seconds, which is then the step"
+                    "output.interval, which is then the step"
                 )
-            given["dt"] = given["every"]
+            given["dt"] = given["interval"]
     return given

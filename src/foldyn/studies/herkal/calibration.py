@@ -165,7 +165,7 @@ def released_case(
             "dt": step,
             "duration": duration,
         },
-        "output": {"nodes": [WATCHED], "axis": "x", "every": step},
+        "output": {"nodes": [WATCHED], "axis": "x", "interval": step},
     }
     path = folder / "released.toml"
     write_text(path, tomli_w.dumps(document))

@@ -35,7 +35,7 @@ COMPUTING = tuple(
 )
 """Files that the results of the case studies depend on, besides the solvers."""
 SETTINGS = "study_settings"
-EVERY = 0.01  # s, between samples where the case file does not say
+INTERVAL = 0.01  # s, between samples where the case file does not say
 STEPS = 10  # of the load of a path
 SHELL_MODES, RULE_MODES = 5, 12  # of the reference, and among how many their partners are sought
 SECANT = 1.0  # degrees, by which hinges turn: superlinear bends have no slope at rest
@@ -145,7 +145,7 @@ def compute(job: Job) -> xarray.Dataset:
         found = modes(replace(case, loads=()), count, secant=secant if model.distribution else None)
     else:
         own = {"method": "newmark", "dt": job.numerics.dt} if model.implicit else {}
-        given = {"every": EVERY, **case_file.analysis.arguments, **own}
+        given = {"interval": INTERVAL, **case_file.analysis.arguments, **own}
         found = simulate(case, **{**given, "duration": job.numerics.duration})
     kept = found.drop_vars("velocity", errors="ignore")
     kept = kept.sel(node=range(len(case_file.pattern.vertices)))

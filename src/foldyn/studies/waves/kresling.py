@@ -177,7 +177,7 @@ def impact(unit: Unit, cells: int, velocity: float, duration: float) -> xarray.D
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StretchWarning)  # the unit of the literature is a truss
         motion = simulate(
-            case, duration, method="rk4", dt=SAMPLES / steps, every=SAMPLES,
+            case, duration, method="rk4", dt=SAMPLES / steps, interval=SAMPLES,
             initial=State(velocity=start),
         )  # fmt: skip
     cell = unit.cell

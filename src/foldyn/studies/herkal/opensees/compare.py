@@ -50,7 +50,7 @@ def our_motion(name: str, divisions: int, dt: float, duration: float | None = No
     case_file = case_study(name)
     case = case_with(case_file, REFERENCE, divisions=divisions)
     length = duration or case_file.analysis.arguments["duration"]
-    motion = simulate(case, length, method="newmark", dt=dt, every=SAMPLES)
+    motion = simulate(case, length, method="newmark", dt=dt, interval=SAMPLES)
     return stored.Moved(
         node=case_file.output.nodes,
         time=motion.time.values,
