@@ -30,7 +30,7 @@ def run(steps: int) -> None:
     supports = [fd.Fix(range(56, 63), "x"), fd.Fix([59], "y"), fd.Fix([57, 59, 61], "z")]
     case = fd.Case(structure, supports, [load])
     dt = 0.4 * fd.critical_step(case)
-    fd.simulate(case, steps * dt, dt=dt, every_steps=1000)
+    fd.simulate(case, steps * dt, method="rk4", dt=dt, every_steps=1000)
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
 
 

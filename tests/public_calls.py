@@ -213,7 +213,7 @@ CASE = changed(
 
 def solved(folder: Path) -> Calls:
     """Calls of what computes, reads and writes; files are in a folder."""
-    run = fd.simulate(case(), 0.02, dt=1e-3)
+    run = fd.simulate(case(), 0.02, method="rk4", dt=1e-3)
     path = fd.trace(case(), load_factors=[0.0, 0.5, 1.0])
     found = fd.modes(case(), count=2)
     light = fd.Case(fd.discretize(pattern(), sheet(), preset="herkal"), [fd.Fix([0, 1, 2, 3])])

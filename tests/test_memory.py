@@ -49,7 +49,7 @@ LARGE = {  # what is called with a case, and how the refusal begins
     "free steps": (lambda case: fd.trace(case, "arc_length", steps=MOST), "steps: .* points"),
     "modes": (lambda case: fd.modes(case, count=10**12), "count: 1e\\+12 modes"),
     "samples": (
-        lambda case: fd.simulate(case, 1e6, every_steps=1),
+        lambda case: fd.simulate(case, 1e6, method="rk4", every_steps=1),
         "every: .* samples of 13 nodes",
     ),
     "averages": (lambda case: records(case, 10**9), "averages: 1e\\+09 records"),

@@ -25,7 +25,7 @@ def gusty(frequency, push=0.0):
 
 
 def swing(case, frequency):
-    motion = fd.simulate(case, 3.0 / frequency, interval=1.0 / frequency / 64)
+    motion = fd.simulate(case, 3.0 / frequency, method="rk4", interval=1.0 / frequency / 64)
     return 0.5 * np.ptp(motion.displacement.values[-65:, 0, 2])
 
 
@@ -52,7 +52,7 @@ def test_a_gust_glides_and_sets_the_period():
     ends = fd.basins(case, lambda k: still[int(k)], grid={"k": [0, 1]}, duration=1.5, record=4)
     assert ends.basin.values.tolist() == [0, 0]
     assert ends.attrs["period"] == pytest.approx(0.5)
-    section = fd.poincare_section(fd.simulate(case, 2.5, interval=0.0125), after=1.5)
+    section = fd.poincare_section(fd.simulate(case, 2.5, method="rk4", interval=0.0125), after=1.5)
     assert section.sizes["time"] == 3 and np.ptp(section.displacement.values[:, 0, 2]) < 1e-6
 
 
@@ -85,4 +85,4 @@ def test_other_histories_are_refused_by_their_place(search):
 def test_a_wind_that_jumps_in_a_motion_is_refused_by_its_place():
     air = fd.Air(velocity=(0.0, 0.0, 1.0), history=fd.Step(0.1))
     with pytest.raises(InputError, match=r"air: the wind .* jumps at t = 0\.1 s"):
-        fd.simulate(gusty(2.0).altered(air=air), 0.2)
+        fd.simulate(gusty(2.0).altered(air=air), 0.2, method="rk4")

@@ -21,7 +21,11 @@ def periodic():
     """The motion x'' + 0.3 x' - x + x^3 = 0.28 cos 1.2 t, of two periods."""
     case = duffing(-1.0, 0.3, 0.28, omega=1.2, phase=90.0)
     period = TURN / 1.2
-    return case, period, fd.simulate(case, 300 * period, dt=period / 150, interval=period / 50)
+    return (
+        case,
+        period,
+        fd.simulate(case, 300 * period, method="rk4", dt=period / 150, interval=period / 50),
+    )
 
 
 def test_a_motion_of_two_periods_has_two_points(periodic):
@@ -36,14 +40,16 @@ def test_a_motion_of_two_periods_has_two_points(periodic):
 
 def test_a_periodic_motion_has_one_point():
     case = duffing(1.0, 0.4, 0.3, omega=1.3)
-    motion = fd.simulate(case, 80 * TURN / 1.3, dt=TURN / 1.3 / 60, interval=TURN / 1.3 / 4)
+    motion = fd.simulate(
+        case, 80 * TURN / 1.3, method="rk4", dt=TURN / 1.3 / 60, interval=TURN / 1.3 / 4
+    )
     section = fd.poincare_section(motion, TURN / 1.3, after=60 * TURN / 1.3)
     assert section.sizes["time"] == 21 and spread(case, section) < 1e-9
 
 
 def test_sections_by_a_plane_are_passed_once_in_a_vibration():
     case = duffing(1.0, cubic=False)
-    motion = fd.simulate(case, 40.0, dt=0.01, interval=0.1, initial=at(case, 1.0))
+    motion = fd.simulate(case, 40.0, method="rk4", dt=0.01, interval=0.1, initial=at(case, 1.0))
     down = fd.poincare_section(motion, plane=X, direction="down")
     np.testing.assert_allclose(down.time, np.pi / 2 + TURN * np.arange(7), rtol=0, atol=1e-6)
     np.testing.assert_allclose(down.velocity[:, 1, 2], -SIZE, rtol=1e-5)
@@ -57,7 +63,9 @@ def test_states_between_samples_are_those_of_a_cubic():
     case = duffing(1.0, cubic=False)
     errors = []
     for interval in (0.4, 0.2):
-        motion = fd.simulate(case, 20.0, dt=0.005, interval=interval, initial=at(case, 1.0))
+        motion = fd.simulate(
+            case, 20.0, method="rk4", dt=0.005, interval=interval, initial=at(case, 1.0)
+        )
         section = fd.poincare_section(motion, 0.7, phase=90.0)
         t = section.time.values
         np.testing.assert_allclose(t, 0.7 * (np.arange(len(t)) + 0.25))
@@ -71,7 +79,7 @@ def test_sections_keep_the_case_and_can_be_stored(tmp_path):
     )
     push = fd.Force([0, 1], (1e-3, 0, 0), history=fd.Harmonic(0.5))
     case = fd.Case(s, [fd.Fix([4, 5]), fd.Fix([0, 1], "yz")], [push], fd.Rayleigh(alpha=2.0))
-    motion = fd.simulate(case, 20.0, interval=0.5)
+    motion = fd.simulate(case, 20.0, method="rk4", interval=0.5)
     section = fd.poincare_section(motion, after=10.0)  # of the drive
     same = motion.displacement[20::4]
     np.testing.assert_allclose(section.displacement, same, rtol=0, atol=1e-14)

@@ -137,7 +137,7 @@ def test_states_that_do_not_satisfy_links_are_refused() -> None:
         with pytest.raises(InputError, match=tied):
             call(case, 1.0, initial=fd.State(u))
     with pytest.raises(InputError, match=r"initial: velocity of node 1 does not satisfy supports"):
-        fd.simulate(case, 1.0, initial=fd.State(0.0 * u, v))
+        fd.simulate(case, 1.0, method="rk4", initial=fd.State(0.0 * u, v))
     with pytest.raises(InputError, match=r"state: does not satisfy supports\[1\]"):
         fd.modes(case, 1, state=fd.State(u))
 
@@ -147,7 +147,7 @@ def test_supports_of_a_direction_hold_nodes_where_a_state_puts_them() -> None:
     case = fd.Case(BARS, [fd.Fix([4, 5]), fd.Fix([0, 1], direction=(1.0, 0.0, 1.0))])
     u = np.zeros_like(BARS.nodes)
     u[[0, 1], 0] = 1e-3
-    motion = fd.simulate(case, 0.1, initial=fd.State(u), dt=2.5e-5, interval=0.02)
+    motion = fd.simulate(case, 0.1, method="rk4", initial=fd.State(u), dt=2.5e-5, interval=0.02)
     assert motion.energy_error < 1e-4
     held = motion.displacement.values[:, [0, 1]] @ (1.0, 0.0, 1.0)
     np.testing.assert_allclose(held, 1e-3, rtol=1e-12)

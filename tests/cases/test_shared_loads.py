@@ -124,7 +124,9 @@ def test_case_files_and_results_hold_them(text, load, model, read, kept) -> None
 
 def test_a_motion_keeps_their_histories(kept) -> None:
     loads = [fd.Pressure(1e-3, [2, 3], fd.Ramp(0.1)), fd.CreaseMoment([0], 1e-3, fd.Pulse(0.02))]
-    motion = fd.simulate(fd.Case(bars(), [fd.Fix("xmin", "xyz")], loads), 0.05, interval=0.05)
+    motion = fd.simulate(
+        fd.Case(bars(), [fd.Fix("xmin", "xyz")], loads), 0.05, method="rk4", interval=0.05
+    )
     assert kept(motion).loads == tuple(loads)
     assert float(motion.work[-1]) != 0.0
 

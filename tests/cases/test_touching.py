@@ -67,7 +67,7 @@ def test_panels_that_meet_are_named(gap):
             FoldynWarning, match=r"than the sheet is thick \(0 and 1\); they will be"
         )
     with told:
-        fd.simulate(fd.Case(s, contact=fd.Contact()), 1e-6)
+        fd.simulate(fd.Case(s, contact=fd.Contact()), 1e-6, method="rk4")
 
 
 @pytest.mark.parametrize(
@@ -83,4 +83,4 @@ def test_nodes_in_or_behind_a_plane_are_refused(height, message, monkeypatch):
     plane = fd.Plane((0, 0, -height), (0, 0, 1))
     case = fd.Case(strip(), contact=fd.Contact(panels=False, planes=[plane]))
     with pytest.raises(InputError, match=rf"contact.planes\[0\]: {message}"):
-        fd.simulate(case, 1e-6)
+        fd.simulate(case, 1e-6, method="rk4")

@@ -29,7 +29,9 @@ def test_a_case_file_becomes_a_result_that_runs_again_from_itself(workplace, miu
     assert result.attrs["energy_error"] < 1e-5
     assert "stopped_because" not in result.attrs
     a = result.attrs
-    again = fd.simulate(fd.case_of(result), a["duration"], dt=a["dt"], every_steps=a["every_steps"])
+    again = fd.simulate(
+        fd.case_of(result), a["duration"], method="rk4", dt=a["dt"], every_steps=a["every_steps"]
+    )
     for name in ("time", "displacement", "velocity", "reaction", "work"):
         np.testing.assert_array_equal(again[name], result[name])
 

@@ -31,7 +31,7 @@ def test_energy_of_a_fold_that_opens_itself(law):
     open_up = fd.Actuate("all", 240.0, fd.Ramp(duration=0.5, smooth=True))
     case = fd.Case(fold(law), loads=[open_up], damping=fd.Rayleigh(alpha=1.0))
     steps = [2000, 4000, 8000]
-    motions = [fd.simulate(case, 0.6, dt=0.6 / n, every_steps=n // 20) for n in steps]
+    motions = [fd.simulate(case, 0.6, method="rk4", dt=0.6 / n, every_steps=n // 20) for n in steps]
     motion, errors = motions[-1], [one.attrs["energy_error"] for one in motions]
     folds, _ = case.structure.dihedrals(motion.displacement[-1])
     assert np.degrees(folds[0]) < 285.0  # it does open, from 300
@@ -44,7 +44,9 @@ def test_a_constant_actuation_is_another_rest_angle(law):
     """The same motion as of a structure made with these rest angles."""
     actuated = fd.Case(fold(law), loads=[fd.Actuate("all", 250.0)])
     made = fd.Case(fold(law, crease_rest=250.0))
-    one, two = (fd.simulate(case, 0.2, dt=1e-4, every_steps=100) for case in (actuated, made))
+    one, two = (
+        fd.simulate(case, 0.2, method="rk4", dt=1e-4, every_steps=100) for case in (actuated, made)
+    )
     assert float(np.abs(two.displacement).max()) > 1e-4
     assert apart(one, two) < 1e-10
     np.testing.assert_allclose(one.strain_folds, two.strain_folds, rtol=1e-10)
@@ -57,26 +59,31 @@ def test_only_the_chosen_creases_turn_and_the_structure_stays_as_it_was():
     before = s.model.hinge_rest.copy()
     target = np.degrees(s.fold_rest[5]) - 30.0
     case = fd.Case(s, loads=[fd.Actuate([5], target)])
-    start = fd.simulate(case, 1e-3, dt=1e-4)
+    start = fd.simulate(case, 1e-3, method="rk4", dt=1e-4)
     # at the start nothing has moved: the energy is that of one fold turned by 30 degrees
     wanted = 0.5 * s.fold_stiffness[5] * np.radians(30.0) ** 2
     assert float(start.strain_folds[0]) == pytest.approx(wanted, rel=1e-12)
     assert float(start.strain_bends[0]) == pytest.approx(0.0, abs=1e-12 * wanted)
     np.testing.assert_array_equal(s.model.hinge_rest, before)
-    again = fd.simulate(case, 1e-3, dt=1e-4)
+    again = fd.simulate(case, 1e-3, method="rk4", dt=1e-4)
     np.testing.assert_array_equal(again.displacement, start.displacement)
 
 
 def test_a_rest_angle_beyond_closing_is_named():
     swing = fd.Actuate([0], 350.0, fd.Harmonic(frequency=1.0, phase=0.0))
     big = fd.Actuate([0], 350.0, lambda t: 3.0 * t)
-    assert fd.simulate(fd.Case(fold(), loads=[swing]), 0.3, interval=0.1).sizes["time"] == 4
+    assert (
+        fd.simulate(fd.Case(fold(), loads=[swing]), 0.3, method="rk4", interval=0.1).sizes["time"]
+        == 4
+    )
     named = "rest dihedral of the crease between"
     with pytest.raises(fd.errors.InstabilityError, match=named) as e:
-        fd.simulate(fd.Case(fold(), loads=[big]), 1.0, interval=0.1)
+        fd.simulate(fd.Case(fold(), loads=[big]), 1.0, method="rk4", interval=0.1)
     assert 0.3 < float(e.value.partial.time[-1]) < 0.42
     with pytest.raises(fd.errors.InputError, match="actuation with the history step jumps"):
-        fd.simulate(fd.Case(fold(), loads=[fd.Actuate([0], 240.0, fd.Step(0.5))]), 1.0)
+        fd.simulate(
+            fd.Case(fold(), loads=[fd.Actuate([0], 240.0, fd.Step(0.5))]), 1.0, method="rk4"
+        )
 
 
 @pytest.mark.parametrize("history", [fd.Ramp(0.5, smooth=True), None])

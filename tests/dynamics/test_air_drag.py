@@ -92,7 +92,7 @@ def test_drag_turns_with_the_sheet_and_the_wind():
         case = fd.Case(plate(turned), loads=[gravity], air=air)
         spin = np.cross(turned @ (3.0, 1.0, 2.0), plate(turned).nodes)
         start = fd.State(velocity=spin + turned @ (0.3, 0.1, 0.2))
-        motion = fd.simulate(case, 0.02, interval=0.02, initial=start)
+        motion = fd.simulate(case, 0.02, method="rk4", interval=0.02, initial=start)
         moves.append(motion.displacement.values[-1] @ turned)
         taken.append(float(motion.air[-1]))
     assert abs(taken[0]) > 1e-8
@@ -103,7 +103,7 @@ def test_drag_turns_with_the_sheet_and_the_wind():
 def test_panels_that_move_along_themselves_meet_no_drag():
     case = fd.Case(plate(), air=fd.Air(**FLUID))
     start = fd.State(velocity=np.tile([0.7, -0.4, 0.0], (5, 1)))
-    motion = fd.simulate(case, 0.05, interval=0.05, initial=start)
+    motion = fd.simulate(case, 0.05, method="rk4", interval=0.05, initial=start)
     assert_allclose(motion.velocity[-1], start.velocity, rtol=1e-12)
     assert np.abs(motion.air).max() < 1e-20
 

@@ -126,7 +126,7 @@ def test_it_crosses_itself_without_contact_or_without_the_limit_of_steps(monkeyp
     pytest.importorskip("ipctk")
     case = folded_from_both_ends(None)
     with pytest.raises(PenetrationError) as passed:
-        fd.simulate(case, 0.35, interval=2e-3)
+        fd.simulate(case, 0.35, method="rk4", interval=2e-3)
     assert crossing(case.structure, passed.value.partial.displacement.values) > 0
 
     # the tower is where it matters: impacts at some m/s
@@ -254,7 +254,7 @@ def test_a_strip_sticks_below_the_angle_of_friction(kind, method, duration, dt, 
 
 
 def test_without_friction_a_sheet_slides_as_it_falls():
-    run = fd.simulate(on_slope(20.0, 0.0), 0.1, interval=2e-3)
+    run = fd.simulate(on_slope(20.0, 0.0), 0.1, method="rk4", interval=2e-3)
     distance = run.displacement.values[-1, :, 0].mean()
     assert distance == pytest.approx(0.5 * G * np.sin(np.radians(20.0)) * 0.01, rel=1e-9)
 
@@ -296,11 +296,11 @@ def test_supports_that_move_press_panels_together():
 def test_a_start_behind_a_plane_or_inside_each_other_is_refused():
     behind = fd.Contact(planes=[fd.Plane((0, 0, 1e-3), (0, 0, 1))])
     with pytest.raises(InputError, match=r"contact.planes\[0\]: node 0 is 0.001 m behind"):
-        fd.simulate(fd.Case(strip(), contact=behind), 0.01)
+        fd.simulate(fd.Case(strip(), contact=behind), 0.01, method="rk4")
     folded = fd.patterns.simple_fold(a=0.02, b=0.02, dihedral=1.0)
     case = fd.Case(fd.discretize(folded, SHEET, fold_law="linear"), contact=fd.Contact())
     with pytest.warns(FoldynWarning, match="nearer to each other than the sheet is thick"):
-        fd.simulate(case, 1e-4)
+        fd.simulate(case, 1e-4, method="rk4")
 
 
 def test_samples_tell_where_a_sheet_touches():

@@ -86,7 +86,7 @@ def test_a_pair_that_only_turns_loses_nothing():
     spin = np.sqrt(2.0 * stretch / (reduced * (LENGTH + stretch)))  # k e = mu w^2 l
     arm = (LENGTH + stretch) * np.array([-2 / 3, 1 / 3])
     start = fd.State([[0, 0, 0], [stretch, 0, 0]], spin * np.outer(arm, [0.0, 1.0, 0.0]))
-    motion = fd.simulate(case, 20.0, dt=0.02, initial=start, interval=0.5)
+    motion = fd.simulate(case, 20.0, method="rk4", dt=0.02, initial=start, interval=0.5)
     assert float(motion.dissipated[-1]) < 1e-9 * float(motion.kinetic[0])
 
 
@@ -143,7 +143,7 @@ def test_a_sheet_with_strong_dampers_stays_stable(method):
 def test_dashpots_that_cost_many_steps_are_told():
     case = damped(fd.Dashpot(2000.0 * C, nodes=[1]))
     with pytest.warns(FoldynWarning, match="the dashpots make the critical step .* times"):
-        fd.simulate(case, 0.01)
+        fd.simulate(case, 0.01, method="rk4")
 
 
 # ------------------------------------------------------------------ creases

@@ -72,7 +72,7 @@ REFUSED = {
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_has_no_kernel_is_named(card, what):
     with pytest.raises(InputError, match=f"{what}.*has no GPU kernel"):
-        fd.simulate(REFUSED[what](), 1e-3, device="gpu")
+        fd.simulate(REFUSED[what](), 1e-3, method="rk4", device="gpu")
 
 
 def test_what_is_added_to_cases_is_refused_until_kernels_know_it():
@@ -81,7 +81,7 @@ def test_what_is_added_to_cases_is_refused_until_kernels_know_it():
         charge: Any = None
 
     given = fd.discretize(PATTERN, SHEET, **LUMPED), [HELD]
-    packed = prepare(fd.Case(*given), 1e-3).packed
+    packed = prepare(fd.Case(*given), 1e-3, method="rk4").packed
     assert not checks.lacking(Charged(*given), packed)
     assert checks.lacking(Charged(*given, charge=1.2), packed) == "charge of the case"
     several = packed._replace(body=packed.body.with_terms(*[springs()] * 2))
@@ -155,7 +155,7 @@ def test_a_method_without_kernels_is_named():
     with pytest.raises(InputError, match="newmark has no GPU kernel; choose one of rk4"):
         fd.simulate(sheet(), 1e-3, method="newmark", device="gpu")
     with pytest.raises(InputError, match=r"device.*choose"):
-        fd.simulate(sheet(), 1e-3, device="tpu")
+        fd.simulate(sheet(), 1e-3, method="rk4", device="tpu")
 
 
 def test_without_a_package_or_a_card(monkeypatch):
@@ -164,7 +164,7 @@ def test_without_a_package_or_a_card(monkeypatch):
         monkeypatch.setattr("numba.cuda.is_available", lambda: False)
         why = "no GPU of NVIDIA"
     with pytest.raises(InputError, match=why):
-        fd.simulate(sheet(), 1e-3, device="gpu")
+        fd.simulate(sheet(), 1e-3, method="rk4", device="gpu")
 
 
 def test_a_card_that_is_too_small(monkeypatch):

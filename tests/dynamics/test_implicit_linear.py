@@ -135,7 +135,7 @@ def test_a_node_without_mass_is_in_equilibrium(method, beta):
     """Two springs with nothing between them are one of half the stiffness; explicit: refused."""
     case = chain([K, K], [0.0, MASS], beta=beta)
     with pytest.raises(fd.errors.InputError, match="node 1 is free but has no mass"):
-        fd.simulate(case, 1.0)
+        fd.simulate(case, 1.0, method="rk4")
     omega = np.sqrt(0.5 * K / MASS)
     steps, errors = [40, 80, 160], []
     for n in steps:

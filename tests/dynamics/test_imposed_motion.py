@@ -62,7 +62,8 @@ def test_base_motion_is_gravity_in_the_moving_frame(mass):
     steps = [400, 800, 1600]
     for n in steps:
         one, other = (
-            fd.simulate(case, 0.04, dt=0.04 / n, every_steps=n // 8) for case in (shaken, still)
+            fd.simulate(case, 0.04, method="rk4", dt=0.04 / n, every_steps=n // 8)
+            for case in (shaken, still)
         )
         base = value * np.multiply.outer(SMOOTH(one.time.values), [[1.0, 0.0, 0.0]])
         differences.append(apart(one.displacement.values - base, other.displacement.values))
@@ -77,7 +78,7 @@ def test_energy_of_a_jolted_sheet(mass):
     case = moved(miura(mass), pull(fd.Ramp(0.05)), damping=fd.Rayleigh(alpha=3.0, beta=1e-5))
     steps, errors = [25, 50, 75], []
     for n in steps:
-        motion = fd.simulate(case, 0.04, dt=0.04 / n)
+        motion = fd.simulate(case, 0.04, method="rk4", dt=0.04 / n)
         assert float(motion.work[0]) == 0.0
         assert float(motion.kinetic[0]) > 0.0  # the pulled nodes move at once
         errors.append(motion.attrs["energy_error"])
@@ -89,7 +90,7 @@ def test_energy_of_a_jolted_sheet(mass):
 def test_reactions_change_the_momentum(mass):
     """Sum of the reactions along x = d/dt of the momentum along x, by differences of order 4."""
     case, h = moved(miura(mass), pull(fd.Ramp(0.03, smooth=True))), 0.02 / 4000
-    motion = fd.simulate(case, 0.02, dt=h)
+    motion = fd.simulate(case, 0.02, method="rk4", dt=h)
     p = np.array([(case.structure.mass @ v)[:, 0].sum() for v in motion.velocity.values])
     rate = (p[:-4] - 8 * p[1:-3] + 8 * p[3:-1] - p[4:]) / (12 * h)
     along = motion.reaction.values[:, motion.support_axis.values == "x"].sum(axis=1)
@@ -99,7 +100,7 @@ def test_reactions_change_the_momentum(mass):
 def test_a_function_is_differentiated():
     """Velocities and reactions of a function of time are those of the same formula built in."""
     one, other = (
-        fd.simulate(moved(miura(), pull(history)), 0.01, dt=1e-4, every_steps=10)
+        fd.simulate(moved(miura(), pull(history)), 0.01, method="rk4", dt=1e-4, every_steps=10)
         for history in (fd.Harmonic(frequency=20.0), lambda t: np.sin(40.0 * np.pi * t))
     )
     for name in ("displacement", "velocity", "reaction"):
@@ -110,7 +111,7 @@ def test_a_slow_pull_ends_in_equilibrium():
     """After a slow pull with strong damping, reactions balance and forces vanish elsewhere."""
     slow = pull(fd.Ramp(duration=5.0, smooth=True), 0.05)
     case = moved(miura(sheet=SHEET), slow, damping=fd.Rayleigh(alpha=6.0))
-    end = fd.simulate(case, 12.0, interval=1.0).isel(time=-1)
+    end = fd.simulate(case, 12.0, method="rk4", interval=1.0).isel(time=-1)
     u = end.displacement.values
     np.testing.assert_allclose(u[[6, 7, 8], 0], 0.05)
     force = case.structure.internal_force(u)
@@ -140,10 +141,12 @@ def one_at(node, x) -> np.ndarray:
 )
 def test_refusals(support, initial, words):
     with pytest.raises(InputError, match=words):
-        fd.simulate(moved(miura(), support), 0.1, initial=initial)
+        fd.simulate(moved(miura(), support), 0.1, method="rk4", initial=initial)
 
 
 def test_what_is_imposed_from_the_start_stays():
     start = fd.State(displacement=one_at(6, 1e-3))
-    held = fd.simulate(moved(miura(), fd.Impose([6], "x", 1e-3)), 0.1, initial=start, dt=1e-4)
+    held = fd.simulate(
+        moved(miura(), fd.Impose([6], "x", 1e-3)), 0.1, method="rk4", initial=start, dt=1e-4
+    )
     np.testing.assert_array_equal(held.displacement[:, 6, 0], 1e-3)

@@ -121,7 +121,9 @@ def test_a_moving_base():
 def test_free_bodies_keep_their_momenta():
     """Rigid modes are not damped, and what is damped has no momentum."""
     case = fd.Case(sheet("bars").structure, damping=fd.ModalDamping(0.2, 5))
-    motion = fd.simulate(case, 0.5, dt=1e-4, initial=shaken(case, 1e-3, 5), interval=0.05)
+    motion = fd.simulate(
+        case, 0.5, method="rk4", dt=1e-4, initial=shaken(case, 1e-3, 5), interval=0.05
+    )
     assert drift(momenta(case.structure, motion)[0]) < 1e-9
     assert float(motion.dissipated[-1]) > 0.0
 
@@ -132,7 +134,7 @@ def test_an_unstable_state_is_refused():
     case = fd.Case(s, [fd.Fix([0, 1])], damping=fd.ModalDamping(0.1, 2, "start"))
     u = -0.3 * ~case.fixed * [1.0, 0.0, 0.0]
     with pytest.raises(fd.errors.InputError, match='the state "start" is unstable'):
-        fd.simulate(case, 0.1, initial=fd.State(u))
+        fd.simulate(case, 0.1, method="rk4", initial=fd.State(u))
 
 
 @pytest.mark.parametrize("method", ["rk4", "generalized_alpha", "auto"])

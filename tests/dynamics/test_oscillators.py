@@ -49,7 +49,7 @@ def test_rk4_loses_energy_with_the_fifth_power_of_the_step():
     """|R(i w h)|^2 = 1 - (w h)^6 / 72 + ...: over a fixed time the loss is T w (w h)^5 / 72."""
     steps, lost = np.array([200, 400, 800]), []
     for n in steps:
-        motion = fd.simulate(SPRING, 10.0, dt=10.0 / n, initial=released(0.1))
+        motion = fd.simulate(SPRING, 10.0, method="rk4", dt=10.0 / n, initial=released(0.1))
         energy = motion.kinetic + motion.strain_bars
         lost.append(float(1.0 - energy[-1] / energy[0]))
     assert order(steps, lost) == pytest.approx(5.0, abs=0.05)
@@ -88,7 +88,7 @@ def test_histories_are_evaluated_at_stage_times():
         return np.zeros_like(t)
 
     dt, n = 0.003, np.arange(700)
-    fd.simulate(pulled(SPRING, 1.0, history), 700 * dt, dt=dt)
+    fd.simulate(pulled(SPRING, 1.0, history), 700 * dt, method="rk4", dt=dt)
     wanted = np.unique(np.concatenate([n * dt, n * dt + 0.5 * dt, n * dt + dt]))
     assert np.isin(wanted, np.concatenate(seen)).all()
 
@@ -110,7 +110,7 @@ def test_superlinear_law_lowers_the_order_to_seven_thirds():
     case, steps = oscillator(law, 40.0), 2 ** np.arange(8, 13)
 
     def end(n, a):
-        return place(fd.simulate(case, 4.0, dt=4.0 / n, initial=released(a)))[-1]
+        return place(fd.simulate(case, 4.0, method="rk4", dt=4.0 / n, initial=released(a)))[-1]
 
     ends = np.array([[end(n, a) for n in (*steps, 2**16)] for a in np.linspace(0.2, 0.4, 24)])
     errors = np.linalg.norm(ends[:, :-1] - ends[:, -1:], axis=0)

@@ -34,7 +34,7 @@ def test_motion_of_the_golden_miura():
     loads = [fd.Force([int(n)], tuple(forces[n]), pulse) for n in pushed]
     case = fd.Case(s, supports, loads, fd.Rayleigh(float(golden["alpha"])))
     dt, steps, every = float(golden["dt"]), int(golden["n_steps"]), int(golden["store_every"])
-    motion = fd.simulate(case, steps * dt, dt=dt, every_steps=every)
+    motion = fd.simulate(case, steps * dt, method="rk4", dt=dt, every_steps=every)
     for name, stored in (("displacement", "Uhis"), ("velocity", "Vhis")):
         ours = motion[name].values[1:].reshape(steps // every, -1)  # theirs starts at sample 1
         theirs = golden[stored].T
@@ -43,7 +43,7 @@ def test_motion_of_the_golden_miura():
 
 def test_energy_of_case_2():
     """Balance below 1e-6 of the energies over 10 s at half the critical step (found: 2e-8)."""
-    motion = fd.simulate(case2(mass="circumcenter"), 10.0, interval=0.01)
+    motion = fd.simulate(case2(mass="circumcenter"), 10.0, method="rk4", interval=0.01)
     assert motion.attrs["dt"] == pytest.approx(0.01 / 27)
     assert motion.attrs["dt"] < 0.5 * motion.attrs["critical_step"]
     assert motion.attrs["energy_error"] < 1e-6
@@ -71,7 +71,7 @@ def test_consistent_mass_against_a_dense_solution():
 
     given = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-18}
     wanted = integrate.solve_ivp(rate, (0.0, 5e-3), np.zeros(2 * len(free)), **given).y[:, -1]
-    end = fd.simulate(case, 5e-3, dt=2.5e-5, every_steps=200).isel(time=-1)
+    end = fd.simulate(case, 5e-3, method="rk4", dt=2.5e-5, every_steps=200).isel(time=-1)
     found = [end[name].values.ravel()[free] for name in ("displacement", "velocity")]
     assert apart(found, np.split(wanted, 2)) < 1e-6
 
@@ -79,7 +79,7 @@ def test_consistent_mass_against_a_dense_solution():
 def test_reactions_balance_the_forces():
     """Momentum is the integral of reactions + loads - alpha times momentum, along each axis."""
     case = case2(mass="consistent")
-    motion = fd.simulate(case, 1.0)
+    motion = fd.simulate(case, 1.0, method="rk4")
     time = motion.time.values
     for k, axis in enumerate("xyz"):
         reaction = motion.reaction.values[:, (motion.support_axis == axis).values].sum(axis=1)
@@ -136,7 +136,7 @@ def test_a_result_can_be_run_again_from_itself():
     v = np.zeros((13, 3))
     v[7, 0] = 0.01
     case = case2(lambda t: np.cos(3.0 * t))
-    first = fd.simulate(case, 0.1, every_steps=5, initial=fd.State(velocity=v))
+    first = fd.simulate(case, 0.1, method="rk4", every_steps=5, initial=fd.State(velocity=v))
     assert first.attrs["started_from"] == "state"
     again = fd.simulate(
         fd.case_of(first), float(first.duration), method=first.method, dt=float(first.dt),
@@ -155,7 +155,7 @@ def test_progress_is_told(method):
 
 
 def test_the_progress_bar_tells_pace_and_energy_error(capsys):
-    fd.simulate(case2(), 1.0, interval=0.01, progress=True)
+    fd.simulate(case2(), 1.0, method="rk4", interval=0.01, progress=True)
     told = capsys.readouterr().err
     assert all(words in told for words in ("steps/s", "energy error", "/1 s"))
 
@@ -164,9 +164,9 @@ def test_step_above_the_critical_one_is_refused_and_explodes_when_forced():
     case = case2()
     critical = fd.critical_step(case)
     with pytest.raises(errors.InputError, match="above the critical step"):
-        fd.simulate(case, 1.0, dt=1.05 * critical)
+        fd.simulate(case, 1.0, method="rk4", dt=1.05 * critical)
     with pytest.raises(errors.ComputationError) as caught:
-        fd.simulate(case, 5.0, dt=1.3 * critical, force=True)
+        fd.simulate(case, 5.0, method="rk4", dt=1.3 * critical, force=True)
     kept = caught.value.partial
     assert 1 < kept.sizes["time"] < 5.0 / (1.3 * critical)
     assert all(np.isfinite(kept[name]).all() for name in ("displacement", "velocity", "kinetic"))
@@ -197,7 +197,7 @@ def test_stiffening_is_noticed_or_followed():
     """A bar that stiffens a thousandfold when stretched makes a safe explicit step unsafe."""
     case, fast = oscillator(duffing_law(1e3), 8.0), released(0.0, speed=20.0)
     with pytest.raises(errors.InstabilityError):
-        fd.simulate(case, 40.0, dt=0.99 * fd.critical_step(case), initial=fast)
+        fd.simulate(case, 40.0, method="rk4", dt=0.99 * fd.critical_step(case), initial=fast)
     motion = fd.simulate(case, 4.0, method="energy_momentum", dt=0.01, initial=fast)
     assert motion.attrs["energy_error"] < 1e-9
     assert float(np.abs(motion.velocity).max()) < 20.5
@@ -344,11 +344,11 @@ def test_bad_arguments_are_refused(arguments, message):
 def test_damping_that_costs_many_explicit_steps_is_told_with_a_remedy():
     stiff = case2(beta=1e-2)
     with pytest.warns(errors.FoldynWarning, match=r"(?s)times smaller.*generalized_alpha"):
-        fd.simulate(stiff, 1e-3)
+        fd.simulate(stiff, 1e-3, method="rk4")
     follows = stiff.altered(damping=fd.StrainDamping(1e-2))
     said = "the damping of strain rates makes the critical step"
     with pytest.warns(errors.FoldynWarning, match=said):
-        fd.simulate(follows, 1e-3)
+        fd.simulate(follows, 1e-3, method="rk4")
     motion = fd.simulate(follows, 1.0, method="generalized_alpha", interval=0.1)  # without a word
     assert motion.attrs["steps"] < 2000
 

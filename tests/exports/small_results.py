@@ -21,7 +21,7 @@ def case():
 
 @cache
 def motion():
-    return fd.simulate(case(), 0.5, interval=0.1)
+    return fd.simulate(case(), 0.5, method="rk4", interval=0.1)
 
 
 @cache

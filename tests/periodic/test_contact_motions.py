@@ -55,7 +55,7 @@ def test_harmonics_converge_to_what_shooting_finds(found):
 
 def test_simulated_motion_settles_on_it(found):
     assert bool(found[-1].stable)
-    run = fd.simulate(bouncing(), 16.0 / F, dt=1.0 / F / 512, every_steps=4)
+    run = fd.simulate(bouncing(), 16.0 / F, method="rk4", dt=1.0 / F / 512, every_steps=4)
     last = run.displacement.values[-129:-1, NODE, 2]
     assert last == pytest.approx(height(found[-1]), abs=2e-5)
 
@@ -66,7 +66,9 @@ def test_a_plane_that_swings_drives():
     assert at_level(swinging, 2.0).contact.planes[0].motion == (0.0, 0.0, 0.2)
     one = fd.periodic_motion(swinging, harmonics=12)
     start = fd.State(one.displacement.values[0], one.velocity.values[0])
-    run = fd.simulate(swinging, 1.0 / F, dt=1.0 / F / 512, initial=start, every_steps=128)
+    run = fd.simulate(
+        swinging, 1.0 / F, method="rk4", dt=1.0 / F / 512, initial=start, every_steps=128
+    )
     assert np.ptp(height(one)) > 0.02
     assert run.displacement.values[:, NODE, 2] == pytest.approx(
         height(one)[[0, 32, 64, 96, 0]], abs=1e-4 * np.ptp(height(one))
@@ -88,7 +90,7 @@ def test_free_motions_against_the_plane_keep_their_energy():
     start = fd.State(last.coefficient.values.sum(axis=0).real)
     free = bouncing().altered(loads=[], damping=fd.Rayleigh())
     period = 1.0 / float(last.frequency)
-    run = fd.simulate(free, period, dt=period / 512, initial=start, every_steps=64)
+    run = fd.simulate(free, period, method="rk4", dt=period / 512, initial=start, every_steps=64)
     assert run.displacement.values[-1] == pytest.approx(start.displacement, abs=1e-4 * 0.1)
 
 
@@ -104,7 +106,7 @@ def test_panels_touch():
     without = fd.periodic_motion(case.altered(contact=None), harmonics=12)
     assert np.abs(one.displacement - without.displacement).max() > 1e-3
     start = fd.State(one.displacement.values[0], one.velocity.values[0])
-    run = fd.simulate(case, 2.5, initial=start, interval=0.625)
+    run = fd.simulate(case, 2.5, method="rk4", initial=start, interval=0.625)
     assert run.displacement.values[-1] == pytest.approx(one.displacement.values[0], abs=1e-5)
 
 

@@ -74,7 +74,12 @@ def strobed(point, periods=600):
     one = fd.periodic_motion(absorber.case(f), f, start=point, steps=32)
     start = fd.State(one.displacement.values[0] * 1.001, one.velocity.values[0])
     run = fd.simulate(
-        absorber.case(f), periods / f, dt=1.0 / f / 128, initial=start, every_steps=128
+        absorber.case(f),
+        periods / f,
+        method="rk4",
+        dt=1.0 / f / 128,
+        initial=start,
+        every_steps=128,
     )
     return run.displacement.values[:, X, 2] - one.displacement.values[0, X, 2], one
 

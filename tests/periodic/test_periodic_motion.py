@@ -105,7 +105,9 @@ def test_multipliers_are_those_of_deviations_in_simulated_motion(strong):
         for sign in (1.0, -1.0):
             given = {n: np.array(getattr(start, n)) for n in ("displacement", "velocity")}
             given[name][NODE, 2] += sign * far
-            run = fd.simulate(case, 4.0, dt=1e-3, every_steps=4000, initial=fd.State(**given))
+            run = fd.simulate(
+                case, 4.0, method="rk4", dt=1e-3, every_steps=4000, initial=fd.State(**given)
+            )
             ends.append([run[n].values[-1, NODE, 2] for n in ("displacement", "velocity")])
         columns.append((np.array(ends[0]) - ends[1]) / (2.0 * far))
     found = np.linalg.eigvals(np.array(columns).T)
@@ -113,7 +115,7 @@ def test_multipliers_are_those_of_deviations_in_simulated_motion(strong):
 
 
 def test_simulated_motion_settles_on_it(strong):
-    run = fd.simulate(oscillator(), 400.0, dt=4.0 / 2048, every_steps=16)
+    run = fd.simulate(oscillator(), 400.0, method="rk4", dt=4.0 / 2048, every_steps=16)
     last = run.displacement.values[-129:-1, NODE, 2]
     assert np.abs(last - strong.displacement.values[:, NODE, 2]).max() < 1e-7
 
@@ -144,7 +146,7 @@ def test_simulation_from_a_point_of_it_comes_back(name):
     case = DRIVES[name]
     one = fd.periodic_motion(case, harmonics=12)
     period = 1.0 / one.attrs["frequency"]
-    run = fd.simulate(case, period, initial=at_start(one), interval=period / 4)
+    run = fd.simulate(case, period, method="rk4", initial=at_start(one), interval=period / 4)
     assert run.displacement.values[-1] == pytest.approx(one.displacement.values[0], abs=2e-5)
     quarter = one.displacement.values[32]
     assert run.displacement.values[1] == pytest.approx(quarter, abs=2e-5)

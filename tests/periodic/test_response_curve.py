@@ -88,7 +88,7 @@ def test_only_motions_between_the_folds_are_unstable_and_they_repel(curve):
     start = one.displacement.values[0].copy()
     start[NODE, 2] += 1e-4
     run = fd.simulate(
-        case, 60.0 / f, dt=1.0 / f / 512, every_steps=512,
+        case, 60.0 / f, method="rk4", dt=1.0 / f / 512, every_steps=512,
         initial=fd.State(start, one.velocity.values[0]),
     )  # fmt: skip
     away = run.displacement.values[:, NODE, 2] - one.displacement.values[0, NODE, 2]
@@ -188,7 +188,7 @@ def test_period_doubles_and_simulation_follows():
     assert one.time.values[1] == pytest.approx(2.0 / here / 128)
     load = fd.Force([NODE], case.loads[0].vector, history=fd.Harmonic(here))
     run = fd.simulate(
-        case.altered(loads=[load]), 2.0 / here, dt=1.0 / here / 500, every_steps=500,
+        case.altered(loads=[load]), 2.0 / here, method="rk4", dt=1.0 / here / 500, every_steps=500,
         initial=fd.State(one.displacement.values[0], one.velocity.values[0]),
     )  # fmt: skip
     z = run.displacement.values[:, NODE, 2]

@@ -54,7 +54,7 @@ def crossed():
     case = folding(strip(0.05, 0.04, 0.045), 12.0, fd.Ramp(0.25))
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        motion = fd.simulate(case, 0.3, interval=2e-3)
+        motion = fd.simulate(case, 0.3, method="rk4", interval=2e-3)
     return case, motion, said
 
 
@@ -166,4 +166,4 @@ def test_where_a_law_that_locks_is_missing_it_is_the_remedy_unless_steps_are_too
     step = fd.critical_step(case)
     for dt, remedy in ((0.5 * step, "fold_law = 'enhanced'"), (1.001 * step, "use a step below")):
         with pytest.raises(PenetrationError, match=remedy):
-            fd.simulate(case, 0.5, dt=dt, every_steps=100, initial=start, force=True)
+            fd.simulate(case, 0.5, method="rk4", dt=dt, every_steps=100, initial=start, force=True)

@@ -71,7 +71,9 @@ def in_a_well():
 def results(kind):
     rules = ("circumcenter", "panel")
     if kind == "motion":
-        return {rule: fd.simulate(case(mass=rule), 3.0, interval=0.01) for rule in rules}
+        return {
+            rule: fd.simulate(case(mass=rule), 3.0, method="rk4", interval=0.01) for rule in rules
+        }
     if kind == "path":
         return {"fold": fd.trace(case(), load_factors=[0.5, 1.0, 1.5, 2.0])}
     if kind == "bands":

@@ -208,7 +208,7 @@ def _fold_law_of(preset: str | None) -> Document:
 def _of_a_shell(analysis: Mapping[str, Any]) -> dict[str, Any]:
     """The table [analysis] without what means nothing to a shell."""
     left = {"secant", "internal"}
-    key = "method" if analysis["kind"] == "dynamics" else "integrator"
-    if analysis.get(key, "rk4") not in ("auto", *MASSLESS_METHODS):
+    key, usual = ("method", "auto") if analysis["kind"] == "dynamics" else ("integrator", "rk4")
+    if analysis.get(key, usual) not in ("auto", *MASSLESS_METHODS):
         left |= {key, "dt", "force"}
     return {key: value for key, value in analysis.items() if key not in left}

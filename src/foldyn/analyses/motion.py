@@ -58,7 +58,7 @@ class MotionSection(AnalysisSection):
 
     like = (simulate,)
     duration: Positive
-    method: Annotated[str, one_of((AUTO, *METHODS))] = "rk4"
+    method: Annotated[str, one_of((AUTO, *METHODS))] = AUTO
     dt: Positive | None = None
     force: Switch = False
     tolerance: Positive | None = None
@@ -96,10 +96,8 @@ class MotionSchema(CaseSchema):
     output: MotionOutput = MotionOutput()
 
     def agree(self) -> None:
-        """Let the method move the model."""
+        """Refuse a method that cannot move the model."""
         if self.model.kind == SHELL:
-            if "method" not in self.analysis.stated:
-                self.analysis._set(method=AUTO)
             check_massless(self, "method", (AUTO, *MASSLESS_METHODS))
 
 

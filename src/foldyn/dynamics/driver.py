@@ -52,7 +52,7 @@ def simulate(
     case: Case,
     duration: float,
     *,
-    method: str = "rk4",
+    method: str = AUTO,
     dt: float | None = None,
     every_steps: int | None = None,
     interval: float | None = None,
@@ -75,7 +75,7 @@ def simulate(
     case : Case
     duration : float
         Simulated time (s). The last step is the last that does not go beyond it.
-    method : str, default "rk4"
+    method : str, default "auto"
         Integrator, a name of `foldyn.dynamics.METHODS`, or "auto" for the one that should be
         quickest, and another one where its energies do not balance: the documentation has a page on
         them.
@@ -171,7 +171,7 @@ def simulate(
 def prepare(
     case: Case,
     duration: float,
-    method: str = "rk4",
+    method: str = AUTO,
     dt: float | None = None,
     every_steps: int | None = None,
     interval: float | None = None,
