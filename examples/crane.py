@@ -8,4 +8,4 @@ flat = fd.read_pattern(Path(__file__).parent / "patterns" / "crane.fold").rotate
 crane = fd.fold(flat, fraction=0.8, start="folded", panels="subdivided")
 print(crane)
 fd.plots.draw_folding(crane, view=(50.0, -75.0)).savefig("crane.png", dpi=90)
-fd.write_pattern("crane-opened.obj", crane.pattern)
+fd.write_pattern(crane.pattern, "crane-opened.obj")

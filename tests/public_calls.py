@@ -218,7 +218,7 @@ def solved(folder: Path) -> Calls:
     found = fd.modes(case(), count=2)
     light = fd.Case(fd.discretize(pattern(), sheet(), preset="herkal"), [fd.Fix([0, 1, 2, 3])])
     fd.save(run, folder / "run.nc")
-    fd.write_pattern(folder / "pattern.fold", pattern())
+    fd.write_pattern(pattern(), folder / "pattern.fold")
     (folder / "case.toml").write_text(CASE)
     reading = {
         "path": folder / "pattern.fold", "scale": 2.0, "unit": "m", "frame": 0, "facets": "hinge",

@@ -221,4 +221,4 @@ def check(patterns: dict) -> None:
 if __name__ == "__main__":
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
     for title, one in compute()[0].items():
-        fd.write_pattern(folder / f"{title}.fold", one)
+        fd.write_pattern(one, folder / f"{title}.fold")

@@ -136,7 +136,7 @@ def test_patterns_inline_and_from_a_file(read, short, tmp_path) -> None:
     inline += 'faces = [[0, 1, 3], [1, 2, 3]], assignments = ["U"] }; loads[0].nodes = [2]'
     pattern = read(changed(short, inline)).pattern
     assert pattern.assignments == ("U",)
-    write_pattern(tmp_path / "sheet.fold", pattern)
+    write_pattern(pattern, tmp_path / "sheet.fold")
     found = read(changed(short, 'pattern = { file = "sheet.fold" }; loads[0].nodes = [2]'))
     np.testing.assert_array_equal(found.pattern.vertices, pattern.vertices)
     assert found.pattern.faces == pattern.faces

@@ -25,7 +25,7 @@ def files(workplace):
     """A flat sheet with letters, in a file without a unit."""
     folded = fd.patterns.miura()
     flat = fd.patterns.miura(dihedral=180).changed(assignments=folded.assignments)
-    fd.write_pattern("sheet.fold", flat, frames=[fd.formats.Frame("folded", folded.vertices)])
+    fd.write_pattern(flat, "sheet.fold", frames=[fd.formats.Frame("folded", folded.vertices)])
     text = written("sheet.fold")
     del text["frame_unit"]
     Path("sheet.fold").write_text(json.dumps(text))
@@ -148,7 +148,7 @@ def test_bad_input_for_a_result(result, arguments, message) -> None:
 def test_slips_of_drawing_are_told_and_mended(files) -> None:
     flat = fd.patterns.miura(cells=(2, 2), a=0.03, b=0.04, panel_angle=65, dihedral=180)
     off = flat.vertices + [(5e-5 * (k % 3), 0, 0) for k in range(len(flat.vertices))]
-    fd.write_pattern("hand.fold", flat.changed(vertices=off))
+    fd.write_pattern(flat.changed(vertices=off), "hand.fold")
     told = files.good("convert", "--check", "hand.fold")
     assert "nearly flat-foldable" in told.out
     moved = next(line for line in told.out.splitlines() if "to be moved, to fold flat" in line)
@@ -166,7 +166,7 @@ def test_slips_of_drawing_are_told_and_mended(files) -> None:
 def test_slips_of_drawing_in_case_files(files) -> None:
     flat = fd.patterns.miura(cells=(2, 2), a=0.03, b=0.04, panel_angle=65, dihedral=180)
     off = flat.vertices + [(5e-5 * (k % 3), 0, 0) for k in range(len(flat.vertices))]
-    fd.write_pattern("hand.fold", flat.changed(vertices=off))
+    fd.write_pattern(flat.changed(vertices=off), "hand.fold")
     rest = "[sheet]\nyoungs_modulus = 1e9\npoissons_ratio = 0.3\nthickness = 2e-4\ndensity = 800\n"
     case = '[pattern]\nfile = "hand.fold"\n{}\n' + rest + '[analysis]\nkind = "modes"\ncount = 7\n'
     Path("x.toml").write_text(case.format("tolerance = 1e-4\nflat_foldable = true"))

@@ -20,7 +20,7 @@ FLAP = fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)], ["M"
 def flap(workplace):
     """A file with a square that folds on its diagonal, its second frame folded by 40 degrees."""
     folded = fd.fold(FLAP, 40, steps=2).pattern
-    fd.write_pattern("flap.fold", FLAP, frames=[Frame("half", folded.vertices)])
+    fd.write_pattern(FLAP, "flap.fold", frames=[Frame("half", folded.vertices)])
     return "flap.fold"
 
 
@@ -76,7 +76,7 @@ def test_a_pattern_is_folded_by_a_file_of_angles(workplace, flap) -> None:
 
 
 def test_a_file_of_angles_names_families(workplace) -> None:
-    fd.write_pattern("named.fold", FLAP.changed(families={"spine": [(0, 2)]}))
+    fd.write_pattern(FLAP.changed(families={"spine": [(0, 2)]}), "named.fold")
     workplace.write("spine 35\n", "angles.txt")
     quick = ("--steps", "2", "--no-figures")
     assert workplace.call("fold", "named.fold", "--angles", "angles.txt", *quick).status == 0
@@ -97,7 +97,7 @@ def test_creases_that_do_not_turn_are_told_and_kept(workplace) -> None:
     rim = np.column_stack([np.cos(way), np.sin(way)])
     faces = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 1)]
     vertex = fd.Pattern(np.vstack([[0, 0], rim]), faces, ["V", "V", "M", "V"])
-    fd.write_pattern("vertex.fold", vertex)
+    fd.write_pattern(vertex, "vertex.fold")
     told = workplace.call("fold", "vertex.fold", "--to", "50%", "--steps", "3", "--no-figures")
     assert told.status == 0
     assert "foldyn: warning: 2 mountains or valleys do not turn their way: creases " in told.err

@@ -14,7 +14,7 @@ import foldyn as fd
 
 @pytest.fixture
 def pattern(tmp_path):
-    fd.write_pattern(tmp_path / "fold.fold", fd.patterns.simple_fold())
+    fd.write_pattern(fd.patterns.simple_fold(), tmp_path / "fold.fold")
     return tmp_path
 
 

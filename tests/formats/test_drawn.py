@@ -24,7 +24,7 @@ def strip():
 
 
 def test_svg_has_its_true_size_and_the_colors_of_origami_simulator(strip, tmp_path):
-    write_pattern(tmp_path / "x.svg", strip)
+    write_pattern(strip, tmp_path / "x.svg")
     root = ElementTree.fromstring((tmp_path / "x.svg").read_text("utf-8"))
     _, _, width, height = map(float, root.attrib["viewBox"].split())
     assert root.attrib["width"] == f"{width!r}mm" and root.attrib["height"] == f"{height!r}mm"
@@ -46,7 +46,7 @@ def test_svg_has_its_true_size_and_the_colors_of_origami_simulator(strip, tmp_pa
 
 
 def test_a_crease_to_be_folded_by_nothing_is_still_drawn(strip, tmp_path):
-    write_pattern(tmp_path / "x.svg", strip.changed(fold_angles=[0.0]))
+    write_pattern(strip.changed(fold_angles=[0.0]), tmp_path / "x.svg")
     (share,) = re.findall('stroke-opacity="([^"]*)"', (tmp_path / "x.svg").read_text())
     assert 0.0 < float(share) < 1e-5
 
@@ -64,7 +64,7 @@ def facets(path):
 
 @pytest.mark.parametrize("p", [miura(), kresling(), simple_fold()], ids=repr)
 def test_stl_triangles_cover_the_panels_and_keep_their_front(p, tmp_path):
-    write_pattern(tmp_path / "x.stl", p)
+    write_pattern(p, tmp_path / "x.stl")
     normals, corners = facets(tmp_path / "x.stl")
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = 0.5 * np.linalg.norm(across, axis=1)
@@ -86,7 +86,7 @@ def test_stl_of_a_polygon_with_a_notch_and_a_corner_on_a_side():
 
 
 def test_dxf_has_layers_and_millimeters(strip, tmp_path):
-    write_pattern(tmp_path / "x.dxf", strip.changed(fold_angles=None))
+    write_pattern(strip.changed(fold_angles=None), tmp_path / "x.dxf")
     library = pytest.importorskip("ezdxf")
     assert ezdxf() is library
     document = library.readfile(tmp_path / "x.dxf")
@@ -98,7 +98,7 @@ def test_dxf_has_layers_and_millimeters(strip, tmp_path):
 
 
 def test_cp_has_the_numbers_of_oripa_and_the_y_of_the_screen(strip, tmp_path):
-    write_pattern(tmp_path / "x.cp", strip.changed(fold_angles=None))
+    write_pattern(strip.changed(fold_angles=None), tmp_path / "x.cp")
     rows = [line.split() for line in (tmp_path / "x.cp").read_text().splitlines()]
     assert sorted(row[0] for row in rows) == ["1"] * 6 + ["2"]
     (mountain,) = [list(map(float, row[1:])) for row in rows if row[0] == "2"]

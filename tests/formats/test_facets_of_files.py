@@ -70,7 +70,7 @@ def test_folded_facets_stay_hinges_by_default(tmp_path):
 def test_files_by_foldyn_say_which(facets, tmp_path):
     cut = fd.Pattern(SQUARE["vertices_coords"], SQUARE["faces_vertices"], ("F", "F"))
     pattern = fd.welded(cut, facets)
-    fd.write_pattern(tmp_path / "x.fold", pattern)
+    fd.write_pattern(pattern, tmp_path / "x.fold")
     with warnings.catch_warnings():
         warnings.simplefilter("error", FoldynWarning)
         again = fd.read_pattern(tmp_path / "x.fold")
@@ -84,7 +84,7 @@ def test_other_formats_draw_welds_as_facets(ending, tmp_path):
     path = tmp_path / f"x.{ending}"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
-        fd.write_pattern(path, fd.welded(cut, join=False))
+        fd.write_pattern(fd.welded(cut, join=False), path)
         found = [fd.read_pattern(path, facets=facets) for facets in ("line", "weld", "hinge")]
     assert [len(pattern.creases) for pattern in found] == [1, 1, 2]
     assert [len(pattern.faces) for pattern in found] == [3, 2, 3]
@@ -149,7 +149,7 @@ def test_panels_that_are_not_convex_are_cut_and_it_is_said(facets, tmp_path):
     with pytest.warns(FoldynWarning, match=r"cut 2 panels not convex.*panels 2 to 3 are new"):
         pattern = fd.read_pattern(file_of(tmp_path, **DART), facets=facets)
     assert (pattern.creases.tolist(), pattern.welds.tolist()) == ([[0, 1]], [[0, 2], [0, 4]])
-    fd.write_pattern(tmp_path / "y.fold", pattern)
+    fd.write_pattern(pattern, tmp_path / "y.fold")
     with warnings.catch_warnings():
         warnings.simplefilter("error", FoldynWarning)
         again = fd.read_pattern(tmp_path / "y.fold")

@@ -43,7 +43,7 @@ def test_paths_that_cannot_be_used(name, reading, writing, tmp_path):
     with pytest.raises(InputError, match=reading):
         read_pattern(tmp_path / name)
     with pytest.raises(InputError, match=writing):
-        write_pattern(tmp_path / name, simple_fold())
+        write_pattern(simple_fold(), tmp_path / name)
     assert list(tmp_path.rglob("*")) == before
 
 
@@ -55,13 +55,13 @@ def test_not_a_path(path):
 
 def test_write_needs_a_pattern(tmp_path):
     with pytest.raises(InputError, match="pattern: got int, give a Pattern"):
-        write_pattern(tmp_path / "x.fold", 5)
+        write_pattern(5, tmp_path / "x.fold")
     assert not list(tmp_path.iterdir())
 
 
 def test_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     path = tmp_path / "x.fold"
-    write_pattern(path, simple_fold())
+    write_pattern(simple_fold(), path)
     before = path.read_bytes()
 
     def full(self, content):
@@ -71,7 +71,7 @@ def test_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(InputError, match="No space left on device"):
-        write_pattern(path, miura())
+        write_pattern(miura(), path)
     monkeypatch.undo()
     assert path.read_bytes() == before
     assert os.listdir(tmp_path) == ["x.fold"]
@@ -80,9 +80,9 @@ def test_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
 def test_write_through_a_link(tmp_path):
     (tmp_path / "real").mkdir()
     real, link = tmp_path / "real" / "x.fold", tmp_path / "link.fold"
-    write_pattern(real, simple_fold())
+    write_pattern(simple_fold(), real)
     link.symlink_to(real)
-    write_pattern(link, miura())
+    write_pattern(miura(), link)
     assert link.is_symlink()
     assert read_pattern(real).name == "miura"
 
@@ -92,13 +92,13 @@ def test_one_way_formats(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="One files can be written but not read"):
         read_pattern(tmp_path / "x.one")
     with pytest.raises(InputError, match="One files can be read but not written"):
-        write_pattern(tmp_path / "x.one", simple_fold())
+        write_pattern(simple_fold(), tmp_path / "x.one")
 
 
 def test_libraries_of_drawings_are_loaded_where_they_are_needed(tmp_path):
     """Meshes are read without them, and nothing of them is loaded at the start of the command."""
     simple = tmp_path / "x.fold"
-    write_pattern(simple, simple_fold())
+    write_pattern(simple_fold(), simple)
     code = (
         f"import sys, foldyn as fd, foldyn.cli.main; fd.read_pattern({str(simple)!r})\n"
         "drawings = {'shapely', 'svgelements', 'defusedxml', 'ezdxf'}\n"

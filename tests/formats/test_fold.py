@@ -25,7 +25,7 @@ SAMPLES = Path(__file__).resolve().parents[3] / "shared" / "patterns"
 def test_round_trip_of_every_generator(kind, extension, tmp_path):
     p = GENERATORS[kind]()
     path = tmp_path / f"pattern{extension}"
-    write_pattern(path, p)
+    write_pattern(p, path)
     q = read_pattern(str(path))
     assert_same(p, q)
     assert not any(q.flipped)
@@ -35,7 +35,7 @@ def test_round_trip_of_every_generator(kind, extension, tmp_path):
 def test_round_trip_of_coincident_panels(tmp_path):
     vertices = [[1, 0], [0, 0], [1, 0], [1, 1], [0, 1], [1, 1]]
     p = Pattern(vertices, GOOD["faces_vertices"], "M")
-    write_pattern(tmp_path / "x.FOLD", p)
+    write_pattern(p, tmp_path / "x.FOLD")
     assert read_pattern(tmp_path / "x.FOLD").dihedrals[0] == 2 * np.pi
     assert json.loads((tmp_path / "x.FOLD").read_text())["edges_foldAngle"][3] == -180.0
 
@@ -70,7 +70,7 @@ def test_real_files(name, tmp_path):
     listed = {tuple(sorted(pair)): letter for pair, letter in edges}
     for pair, letter in zip(p.creases.tolist(), p.assignments, strict=True):
         assert listed[tuple(pair)] == letter
-    write_pattern(tmp_path / "x.fold", p)
+    write_pattern(p, tmp_path / "x.fold")
     assert_same(p, diagnose(tmp_path / "x.fold").pattern)
 
 
@@ -92,7 +92,7 @@ def test_real_file_without_faces():
 
 
 def test_written_fields(tmp_path):
-    write_pattern(tmp_path / "x.fold", simple_fold(dihedral=60))
+    write_pattern(simple_fold(dihedral=60), tmp_path / "x.fold")
     data = json.loads((tmp_path / "x.fold").read_text())
     assert data["file_spec"] == 1.2
     assert data["frame_title"] == "simple fold"
@@ -110,12 +110,12 @@ def test_written_fields(tmp_path):
 
 def test_a_flat_pattern_without_angles_has_none_in_the_file(tmp_path):
     p = miura(dihedral=180)
-    write_pattern(tmp_path / "x.fold", p)
+    write_pattern(p, tmp_path / "x.fold")
     data = json.loads((tmp_path / "x.fold").read_text())
     assert "edges_foldAngle" not in data
     assert (data["frame_classes"], data["frame_attributes"]) == (["creasePattern"], ["2D"])
     assert {len(row) for row in data["vertices_coords"]} == {2}
-    write_pattern(tmp_path / "x.fold", p.changed(fold_angles=[0.5, None, -1.0, None]))
+    write_pattern(p.changed(fold_angles=[0.5, None, -1.0, None]), tmp_path / "x.fold")
     data = json.loads((tmp_path / "x.fold").read_text())
     at = {
         tuple(pair): a
@@ -132,7 +132,7 @@ def test_families_and_data_of_others_survive(tmp_path):
         families={"zigzag": p.creases[2:5], "é": [p.creases[0]]},
         custom={"tm:tree": {"a": [1, None, "x"]}, "other:b": 2.5},
     )
-    write_pattern(tmp_path / "x.fold", p)
+    write_pattern(p, tmp_path / "x.fold")
     q = read_pattern(tmp_path / "x.fold")
     assert {name: rows.tolist() for name, rows in q.families.items()} == {
         "zigzag": [2, 3, 4], "é": [0],

@@ -147,7 +147,7 @@ def test_frames_are_written_with_their_angles(tmp_path):
     states = [miura(dihedral=angle) for angle in (170, 120, 60)]
     frames = [Frame(f"state {k}", state.vertices) for k, state in enumerate(states)]
     write_pattern(
-        tmp_path / "x.fold", flat.changed(assignments=states[0].assignments), frames=frames
+        flat.changed(assignments=states[0].assignments), tmp_path / "x.fold", frames=frames
     )
     assert json.loads((tmp_path / "x.fold").read_text())["file_classes"] == ["animation"]
     for k, state in enumerate(states):
@@ -164,8 +164,8 @@ def test_frames_are_written_with_their_angles(tmp_path):
 def test_other_formats_have_no_frames(tmp_path):
     p = simple_fold()
     with pytest.raises(InputError, match=r"frames: OBJ files hold one state; write \.fold"):
-        write_pattern(tmp_path / "x.obj", p, frames=[Frame("a", p.vertices)])
-    write_pattern(tmp_path / "x.obj", p)
+        write_pattern(p, tmp_path / "x.obj", frames=[Frame("a", p.vertices)])
+    write_pattern(p, tmp_path / "x.obj")
     with pytest.raises(InputError, match=r"x\.obj: frame: OBJ files have no frames"):
         read_pattern(tmp_path / "x.obj", frame=1)
 
@@ -178,7 +178,7 @@ def test_the_order_of_layers_is_kept(tmp_path) -> None:
     )
     folding = fd.fold(strip, fraction=1.0, steps=2)
     path = tmp_path / "strip.fold"
-    fd.write_pattern(path, folding.pattern)
+    fd.write_pattern(folding.pattern, path)
     assert json.loads(path.read_text())["faceOrders"] == folding.layers.tolist()
     back = fd.read_pattern(path)
     assert back.custom["faceOrders"] == folding.layers.tolist()

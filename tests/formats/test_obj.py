@@ -135,14 +135,14 @@ def test_what_is_wrong(text, message, read):
 
 
 def test_what_is_written(tmp_path):
-    write_pattern(tmp_path / "x.obj", simple_fold(dihedral=60))
+    write_pattern(simple_fold(dihedral=60), tmp_path / "x.obj")
     lines = (tmp_path / "x.obj").read_text().splitlines()
     assert "# unit: m" in lines and "o simple fold" in lines
     assert "f 1 3 4 2" in lines
     assert "#e 3 4 3" in lines  # a mountain, no angle to fold to
     assert sum(line.startswith("#e ") for line in lines) == 7
     p = miura().changed(fold_angles=[-1.0, None, None, None])
-    write_pattern(tmp_path / "x.obj", p)
+    write_pattern(p, tmp_path / "x.obj")
     (angle,) = [row.split()[4] for row in (tmp_path / "x.obj").read_text().splitlines()
                 if row.startswith("#e ") and len(row.split()) == 5]  # fmt: skip
     assert float(angle) == pytest.approx(np.degrees(-1.0))

@@ -91,7 +91,7 @@ def test_flat_patterns_of_every_generator(kind, extension, tmp_path):
     known = LETTERS.get(extension, "MVFU")
     letters = [known[k % len(known)] for k in range(len(p.creases))]
     p = p.changed(assignments=letters, fold_angles=[np.nan] * len(letters))  # made for others
-    write_pattern(tmp_path / f"x{extension}", p)
+    write_pattern(p, tmp_path / f"x{extension}")
     found = diagnose(tmp_path / f"x{extension}", facets="hinge")
     assert_alike(p, found.pattern)
     assert kind != "miura" or found.diagnosis.repairs == found.diagnosis.doubts == ()
@@ -103,7 +103,7 @@ def test_flat_patterns_of_every_generator(kind, extension, tmp_path):
 def test_random_flat_patterns(extension, seed, tmp_path_factory):
     p = planar(seed, LETTERS.get(extension, "MVFU"), extension in ANGLED)
     path = tmp_path_factory.mktemp("trip") / f"x{extension}"
-    write_pattern(path, p)
+    write_pattern(p, path)
     assert_alike(p, diagnose(path, facets="hinge").pattern)
 
 
@@ -117,7 +117,7 @@ def test_random_folded_patterns(extension, seed, tmp_path_factory):
     points = 1e6 * np.column_stack([p.vertices[:, :2], heights]) ** 3
     p = Pattern(points, p.faces, name='"hills" <\\> é')
     path = tmp_path_factory.mktemp("trip") / f"x{extension}"
-    write_pattern(path, p)
+    write_pattern(p, path)
     assert_same(p, read_pattern(path))
 
 
@@ -126,7 +126,7 @@ def test_angles_to_fold_to_survive_on_folded_patterns(extension, tmp_path):
     p = miura(dihedral=120)
     wanted = [-1.5 if letter == "M" else 1.25 for letter in p.assignments]
     p = p.changed(fold_angles=[*wanted[:-1], None])
-    write_pattern(tmp_path / f"x{extension}", p)
+    write_pattern(p, tmp_path / f"x{extension}")
     np.testing.assert_allclose(
         read_pattern(tmp_path / f"x{extension}", facets="hinge").fold_angles, p.fold_angles
     )
@@ -135,10 +135,10 @@ def test_angles_to_fold_to_survive_on_folded_patterns(extension, tmp_path):
 @pytest.mark.parametrize("extension", [".svg", ".dxf", ".cp"])
 def test_a_drawing_of_a_folded_pattern_is_refused(extension, tmp_path):
     with pytest.raises(InputError, match=r"folded at 1 creases; write the flat .* as .fold, .obj"):
-        write_pattern(tmp_path / f"x{extension}", simple_fold())
+        write_pattern(simple_fold(), tmp_path / f"x{extension}")
     upright = simple_fold(dihedral=180).rotated(90, "x")
     with pytest.raises(InputError, match="not level; write the flat pattern"):
-        write_pattern(tmp_path / f"x{extension}", upright)
+        write_pattern(upright, tmp_path / f"x{extension}")
     assert not list(tmp_path.iterdir())
 
 
@@ -146,14 +146,14 @@ def test_a_drawing_of_a_folded_pattern_is_refused(extension, tmp_path):
 def test_boards_are_left_out_aloud(extension, tmp_path):
     thick = thicken(simple_fold(dihedral=180).changed(assignments="F"), 0.1)
     with pytest.warns(FoldynWarning, match="no place for the thickness of its panels"):
-        write_pattern(tmp_path / f"x{extension}", thick)
+        write_pattern(thick, tmp_path / f"x{extension}")
 
 
 @pytest.mark.parametrize("extension", [".dxf", ".cp"])
 def test_angles_that_a_format_cannot_hold_are_left_out_aloud(extension, tmp_path):
     p = simple_fold(dihedral=180).changed(assignments="V", fold_angles=[1.0])
     with pytest.warns(FoldynWarning, match="no place for fold angles"):
-        write_pattern(tmp_path / f"x{extension}", p)
+        write_pattern(p, tmp_path / f"x{extension}")
 
 
 def test_cuts_survive(tmp_path):
@@ -164,7 +164,7 @@ def test_cuts_survive(tmp_path):
         {(1, 6): "B", (6, 7): "B", (5, 6): "V", (4, 6): "M", (3, 6): "V"},
     )  # fmt: skip
     for extension in (".fold", ".obj", ".svg", ".dxf"):
-        write_pattern(tmp_path / f"x{extension}", p)
+        write_pattern(p, tmp_path / f"x{extension}")
         q = diagnose(tmp_path / f"x{extension}", facets="hinge").pattern
         assert (len(q.vertices), len(q.faces), len(q.creases)) == (8, 4, 3), extension
         assert sorted(q.assignments) == ["M", "V", "V"]
@@ -185,5 +185,5 @@ def test_real_files_in_every_suitable_format(path, tmp_path):
         if not set(p.assignments) <= set(LETTERS.get(extension, "MVFU")):
             continue
         q = p if extension in ANGLED else p.changed(fold_angles=None)
-        write_pattern(tmp_path / f"x{extension}", q)
+        write_pattern(q, tmp_path / f"x{extension}")
         assert_alike(q, diagnose(tmp_path / f"x{extension}", facets=facets).pattern)

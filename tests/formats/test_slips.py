@@ -90,7 +90,7 @@ def test_digits_of_a_file_are_no_slips(digits, tmp_path):
 
 def test_exact_and_other_patterns_are_not_doubted(tmp_path):
     for k, pattern in enumerate((SHEET, fd.patterns.miura(dihedral=100), fd.patterns.resch())):
-        write_pattern(tmp_path / f"{k}.fold", pattern)
+        write_pattern(pattern, tmp_path / f"{k}.fold")
         told = diagnose(tmp_path / f"{k}.fold", flat_foldable=k == 0).diagnosis
         assert not len(told.moves) and not any("nearly" in doubt for doubt in told.doubts)
 
@@ -99,7 +99,7 @@ def test_folded_patterns_cannot_be_mended(tmp_path):
     off = built(drawn(*by_hand(SHEET, 3e-5))).pattern
     pair, letter = tuple(off.creases[0].tolist()), off.assignments[0]
     folded = fd.fold(off, {pair: 30 if letter == "V" else -30}, steps=1, start="pattern").pattern
-    write_pattern(tmp_path / "x.fold", folded)
+    write_pattern(folded, tmp_path / "x.fold")
     (doubt,) = diagnose(tmp_path / "x.fold").diagnosis.doubts
     assert "fold it anew from its flat drawing, read with flat_foldable = true" in doubt
     with pytest.raises(InputError, match="flat_foldable: pattern: is folded"):

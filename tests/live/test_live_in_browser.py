@@ -167,7 +167,7 @@ def test_results_and_patterns_are_served(tab, tmp_path):
     fd.save(fd.read_case(write(tmp_path, MIURA)).run(), tmp_path / "modes.nc")
     flat = fd.patterns.simple_fold(dihedral=179.99)
     flat = flat.changed(fold_angles=[-1.5])
-    fd.write_pattern(tmp_path / "fold.fold", flat)
+    fd.write_pattern(flat, tmp_path / "fold.fold")
     for name, kind in (("modes.nc", "modes"), ("fold.fold", "folding")):
         server, _ = served([tmp_path / name])
         with server:

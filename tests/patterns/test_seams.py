@@ -64,7 +64,7 @@ def test_joined_panels_apart_and_layers_are_no_seams():
 def test_a_cut_is_told_by_its_letter(edge, tmp_path):
     pattern = fd.Pattern(SQUARES, FACES, {edge: "B"})
     file = tmp_path / "cut.fold"
-    fd.write_pattern(file, pattern)
+    fd.write_pattern(pattern, file)
     assert file.read_text().count('"C"') == 2
     assert not told(lambda: fd.read_pattern(file))
     file.write_text(file.read_text().replace('"C"', '"B"'))  # in a flat sheet "B" says nothing

@@ -68,7 +68,7 @@ def test_states_of_a_motion_go_to_a_file_and_back(motion, tmp_path):
     assert len(frames) == motion.sizes["time"]
     np.testing.assert_array_equal(pattern.vertices, MIURA.vertices)
     x = motion["rest_position"].values + motion["displacement"].values
-    fd.write_pattern(tmp_path / "x.fold", pattern, frames=frames)
+    fd.write_pattern(pattern, tmp_path / "x.fold", frames=frames)
     for k in (0, len(frames) - 1):
         found = fd.formats.diagnose(tmp_path / "x.fold", frame=k + 1).pattern
         np.testing.assert_array_equal(found.vertices, x[k, : len(pattern.vertices)])
@@ -193,7 +193,7 @@ def test_unit_scale_and_frame_in_a_case_file(tmp_path):
     flat, folded = (fd.patterns.miura(dihedral=angle) for angle in (180, 90))
     frame = fd.formats.Frame("folded", folded.vertices)
     fd.write_pattern(
-        tmp_path / "x.fold", flat.changed(assignments=folded.assignments), frames=[frame]
+        flat.changed(assignments=folded.assignments), tmp_path / "x.fold", frames=[frame]
     )
     file = '[pattern]\nfile = "x.fold"\n'
     for keys, scale in (('frame = "folded"\nunit = "mm"\n', 1e-3), ("frame = 1\nscale = 2\n", 2.0)):

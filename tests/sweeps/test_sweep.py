@@ -256,12 +256,12 @@ def test_another_case_is_computed_anew(case, tmp_path, changed):
 
 
 def test_a_file_that_the_case_names_counts_with_its_content(case, tmp_path):
-    fd.write_pattern(tmp_path / "a.fold", fd.patterns.miura(dihedral=60))
+    fd.write_pattern(fd.patterns.miura(dihedral=60), tmp_path / "a.fold")
     start = MODES.index("[sheet]")
     case.write_text('[pattern]\nfile = "a.fold"\n' + MODES[start:])
     thickness, told = {"sheet.thickness": [0.01, 0.02]}, []
     first = of(case, vary=thickness, folder=tmp_path / "points")
-    fd.write_pattern(tmp_path / "a.fold", fd.patterns.miura(dihedral=100))
+    fd.write_pattern(fd.patterns.miura(dihedral=100), tmp_path / "a.fold")
     job._digest.cache_clear()  # of one sweep to the next, as a new process has it
     other = of(case, vary=thickness, folder=tmp_path / "points", progress=told.append)
     assert told[-1].found == 0

@@ -140,7 +140,7 @@ def _convert_pattern(given: argparse.Namespace, source: Path) -> None:
     else:
         pattern = read_pattern(source, facets="line", **reading_of(given))
     if given.out is not None:
-        write_pattern(given.out, pattern)
+        write_pattern(pattern, given.out)
         speech(given.quiet)(
             f"wrote {given.out}: {len(pattern.vertices)} vertices, {len(pattern.faces)} panels, "
             f"{len(pattern.creases)} creases"

@@ -150,7 +150,7 @@ def _writer(out: Path) -> Callable[[Folding], None]:
         able = ", ".join(end for end, each in FORMATS.items() if each.write is not None)
         raise InputError(f"--out {out}: name a file that ends in one of {able}, or in {RESULT}")
     return lambda folding: write_pattern(
-        out, folding.pattern, frames=frames_of(folding.path).frames if fmt.frames else ()
+        folding.pattern, out, frames=frames_of(folding.path).frames if fmt.frames else ()
     )
 
 

@@ -45,18 +45,18 @@ def write(
         raise InputError(": one sample or several: leave out every and frames", "frame")
     holds_frames = FORMATS[path.suffix.lower()].frames
     if frame is not None or not (several or holds_frames):
-        write_pattern(path, state_of(result, frame, scale=scale))
+        write_pattern(state_of(result, frame, scale=scale), path)
         return [path]
     pattern, states = frames_of(result, every, frames=frames, scale=scale)
     if holds_frames:
-        write_pattern(path, pattern, frames=states)
+        write_pattern(pattern, path, frames=states)
         return [path]
     files = [_numbered(path, k) for k in range(len(states))]
     left = _numbered(path, len(states))
     if left.exists():
         raise InputError(f"{left}: belongs to a longer series; remove that first")
     for file, state in zip(files, states, strict=True):
-        write_pattern(file, pattern.changed(vertices=state.vertices, name=state.title, boards=None))
+        write_pattern(pattern.changed(vertices=state.vertices, name=state.title, boards=None), file)
     return files
 
 

@@ -216,7 +216,7 @@ def _with_families(made: Built, drawing: Drawing) -> Built:
 
 
 def write_pattern(
-    path: str | os.PathLike[str], pattern: Pattern, *, frames: Sequence[Frame] = ()
+    pattern: Pattern, path: str | os.PathLike[str], *, frames: Sequence[Frame] = ()
 ) -> None:
     """Write a pattern to a file; its extension determines the format.
 
@@ -225,10 +225,10 @@ def write_pattern(
 
     Parameters
     ----------
-    path : path-like
-        The file to make or to replace; its directory must exist.
     pattern : Pattern
         What to write.
+    path : path-like
+        The file to make or to replace; its directory must exist.
     frames : sequence of Frame, optional
         States of the pattern, for formats that hold several; `fd.results.frames_of` makes them of
         a result.
