@@ -140,7 +140,7 @@ def test_a_response_that_depends_on_its_amplitude(write):
         PUSH + '[model]\npreset = "herkal"\n'
         f'[analysis]\nkind = "frf"\nmethod = "harmonic"\n{grid}amplitude = 2.0\n'
     )
-    largest = float(np.nanmax(found["swing"]))
+    largest = np.degrees(np.nanmax(found["swing"]))
     assert f"the largest is {largest:.3g} degrees" in page
     assert '<th scope="col" class="number">amplitude</th>' in page
     _, linear = write(PUSH + f'[analysis]\nkind = "frf"\n{grid}secant = 1\n')

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
 import numpy as np
@@ -276,7 +277,7 @@ def test_small_changes_of_periods_count():
     screw = tower.motions[0]
     state = fd.linear.relaxed(tower, [fd.Screw("z", screw.angle + 1e-6, screw.shift)])
     b = fd.bands(tower, [[0.5]], count=2, state=state)
-    assert float(b.angles[0]) - screw.angle == pytest.approx(1e-6, rel=1e-5)
+    assert math.degrees(b.angles[0]) - screw.angle == pytest.approx(1e-6, rel=1e-5)
 
 
 def test_states_on_a_line_keep_a_given_screw():
@@ -288,4 +289,4 @@ def test_states_on_a_line_keep_a_given_screw():
     moved = np.random.default_rng(0).normal(scale=1e-10, size=cell.case.structure.nodes.shape)
     with pytest.warns(FoldynWarning, match="no equilibrium"):
         b = fd.bands(cell, [[0.5]], count=2, state=fd.State(moved))
-    assert float(b.angles[0]) == pytest.approx(screw.angle, abs=1e-4)
+    assert math.degrees(b.angles[0]) == pytest.approx(screw.angle, abs=1e-4)

@@ -185,7 +185,7 @@ def _notes(
         at = int(np.nanargmax(swing)) if np.isfinite(swing).any() else 0
         notes.append(
             "Each superlinear hinge is linearized for its own amplitude: the largest is "
-            f"{swing[at]:.3g} degrees, at {response['frequency'].values[at]:.4g} Hz."
+            f"{np.degrees(swing[at]):.3g} degrees, at {response['frequency'].values[at]:.4g} Hz."
         )
     missing = [
         f"Peak at {peak.frequency:.4g} Hz of node {node}, {rule}: {_reason(peak.note)}."

@@ -78,7 +78,7 @@ def bands(
         R of a node moves as shape exp(i k . R), turned with a screw), and `polarization` (shares
         along x, y, z). Coordinate `wave_vector` (phase, period), rad, and what the phases bring
         (`distance`; attributes `ticks`, `tick_labels`, `grid`). Of the state: `vectors` (period,
-        axis), m, and `angles` (period), degrees, from a cell to the next, `axes` and `points` (m)
+        axis), m, and `angles` (period), rad, from a cell to the next, `axes` and `points` (m)
         of screws, and `displacement`. Like other results it holds its case.
 
     Raises

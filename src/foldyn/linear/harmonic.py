@@ -71,7 +71,7 @@ def harmonic(
     -------
     Answer
         Response at the amplitude of the drive, nan where the iteration does not converge or at a
-        resonance without damping; `swing` (m,), the largest amplitude (degrees) of a superlinear
+        resonance without damping; `swing` (m,), the largest amplitude (rad) of a superlinear
         hinge; the number of iterations.
 
     Warns
@@ -104,7 +104,7 @@ def harmonic(
         else:
             done = [*done[-1:], (float(f), slope)]
             response[k] = motion / drive.value
-            swing[k] = np.degrees(np.abs(hinges.gradient @ motion).max(initial=0.0))
+            swing[k] = np.abs(hinges.gradient @ motion).max(initial=0.0)
         report(Progress(k + 1.0, float(len(frequency)), spent, 0.0))
     warn_at(
         frequency[~converged],

@@ -82,7 +82,7 @@ class LinearizedCell:
         )
         return {
             "vectors": (("period", "axis"), self.vectors, {"units": "m"}),
-            "angles": ("period", angles, {"units": "degrees"}),
+            "angles": ("period", np.radians(angles), {"units": "rad"}),
             "axes": (("period", "axis"), axes, {"units": "1"}),
             "points": (("period", "axis"), points, {"units": "m"}),
             "displacement": (("node", "axis"), self.displacement, {"units": "m"}),

@@ -127,7 +127,7 @@ RESPONSES: Mapping[str, Quantity] = {
 """What a frequency response may hold, one of these,"""
 ESTIMATES: Mapping[str, Quantity] = {
     "coherence": Quantity("1", "coherence", PLACE),
-    "swing": Quantity("degrees", "largest amplitude of a superlinear hinge"),
+    "swing": Quantity("rad", "largest amplitude of a superlinear hinge"),
     "unsteadiness": Quantity("1", "relative error that transients leave, estimated"),
 }
 """and what its method adds to it."""
@@ -147,7 +147,7 @@ BANDS: Mapping[str, Quantity] = {
     "displacement": Quantity("m", "displacement of the state from the rest position", PLACE),
     "residual": Quantity("1", "residual of the state as a fraction of the forces at play"),
     "vectors": Quantity("m", "shift from a cell to the next", ("period", "axis")),
-    "angles": Quantity("degrees", "turn from a cell to the next", ("period",)),
+    "angles": Quantity("rad", "turn from a cell to the next", ("period",)),
     "axes": Quantity("1", "axis of the turn", ("period", "axis")),
     "points": Quantity("m", "point on the axis of the turn", ("period", "axis")),
     "zone_frequency": Quantity("Hz", "frequency in the whole zone", ("zone", "band")),

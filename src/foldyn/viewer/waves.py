@@ -92,7 +92,7 @@ def maps(result: xr.Dataset) -> NDArray[np.float64]:
         result[name].transpose("state", "period", "axis").values
         for name in ("vectors", "axes", "points")
     )
-    turn = result["angles"].transpose("state", "period").values
+    turn = np.degrees(result["angles"].transpose("state", "period").values)
     out = np.zeros((*turn.shape, 3, 4))
     for at in np.ndindex(turn.shape):
         along = float(shift[at] @ axis[at])
