@@ -104,8 +104,8 @@ output.interval = -0.1: must be greater
 output.interval = true: must be a number
 output.axis = "w": choose one of x, y, z
 output.axis = ["x"]: choose one of x, y, z
-output.axes = "x" | output.axes: unknown key; did you mean 'axis'? known keys: nodes, axis, every,
-    max_freq
+output.axes = "x" | output.axes: unknown key; did you mean 'axis'? known keys: nodes, axis,
+    every_steps, interval, max_freq
 output.max_frequency = 0: must be greater than 0
 output.animation = "mp3": did you mean 'mp4'? choose one of gif, mp4
 model.crease_stiffness = [1.0] | model:

@@ -94,7 +94,7 @@ def test_every_number_of_a_case_file_is_checked(text, word, tmp_path):
         ("nodes = [7]\nforce", "nodes = 0x" + "f" * 5000 + "\nforce",
          "loads[0].nodes = a number of about 6021 digits: must be a whole number of at most 64"),
         ("nodes = [7]\ninterval", f"nodes = [{2**63}]\ninterval",
-        "output.nodes[0] = 9223372036854"),
+         "output.nodes[0] = 9223372036854"),
         ("interval = 0.01", "every_steps = " + "9" * 30, "output.every_steps = 9999"),
         ("interval = 0.01", "every_steps = " + "9" * 4400, "is not valid TOML: "),
         ("thickness = 0.01", "thickness = 1e103",
