@@ -110,7 +110,7 @@ if __name__ == "__main__":
     fd.plots.plot_amplitudes(stepped).savefig(folder / "long-motions-jumps.png")
     fd.plots.plot_bifurcation_diagram(doublings()).savefig(folder / "long-motions-doublings.png")
     ueda = arch(alpha=0.05, force=7.5)
-    motion = fd.simulate(ueda, 4000 * TURN, dt=TURN / 100, interval=TURN)
+    motion = fd.simulate(ueda, 4000 * TURN, method="rk4", dt=TURN / 100, interval=TURN)
     section = fd.poincare_section(motion, TURN, after=50 * TURN)
     fd.plots.plot_poincare_section(section, 1, axis="z").savefig(
         folder / "long-motions-section.png"

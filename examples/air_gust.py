@@ -14,9 +14,8 @@ laws = {"fold_law": "linear", "bend_law": "linear", "crease_stiffness": STIFFNES
 structure = fd.discretize(pattern, foam, **laws)
 gust = fd.Air(velocity=(0, 0, 4.0), history=fd.HalfSine(0.1), drag_coefficient=1.2)
 held = [fd.Fix([0, 1, 2, 3])]
-motion = fd.simulate(
-    fd.Case(structure, held, air=gust), 1.5, method="central_difference", interval=0.002
-)
+case = fd.Case(structure, held, air=gust)
+motion = fd.simulate(case, 1.5, method="central_difference", interval=0.002)
 x, _, z = (structure.nodes[4] + motion.displacement.values[:, 4]).T
 angle = np.arctan2(z, x - A)  # rad
 # I phi'' + c |phi'| phi' + k phi = 0: half a swing takes 4/3 c/I phi^2 from its angle phi

@@ -11,10 +11,10 @@ import foldyn as fd
 def read(tmp_path):
     """Read a case file of a text."""
 
-    def read(text: str, *arguments):
+    def read(text: str, model: str | None = None, divisions: int | None = None):
         path = tmp_path / "case.toml"
         path.write_text(text, "utf-8")
-        return fd.read_case(path, *arguments)
+        return fd.read_case(path, model=model, divisions=divisions)
 
     return read
 

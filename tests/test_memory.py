@@ -50,7 +50,7 @@ LARGE = {  # what is called with a case, and how the refusal begins
     "modes": (lambda case: fd.modes(case, count=10**12), "count: 1e\\+12 modes"),
     "samples": (
         lambda case: fd.simulate(case, 1e6, method="rk4", every_steps=1),
-        "every: .* samples of 13 nodes",
+        "interval: .* samples of 13 nodes",
     ),
     "averages": (lambda case: records(case, 10**9), "averages: 1e\\+09 records"),
 }

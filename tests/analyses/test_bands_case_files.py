@@ -141,7 +141,7 @@ def test_one_of_the_periods_makes_a_chain(tmp_path):
     assert chain.sizes["period"] == 1
     tower = '[pattern]\nkind = "kresling"\n' + MIURA_TEXT.partition('miura"')[2]
     tower += '[analysis]\nkind = "bands"\nperiods = [0]\npoints = 3\n'
-    assert case_file(tmp_path, tower).run()["angles"].values == pytest.approx(30.0)
+    assert case_file(tmp_path, tower).run()["angles"].values == pytest.approx(np.pi / 6.0)
 
 
 def test_a_screw_of_the_file_is_that_of_the_generator(tmp_path):
@@ -160,7 +160,7 @@ screw = {{ axis = "z", angle = 30, shift = 0.05 }}
     marked = fd.bands(cell, cell.path("G-X", 5))["eigenvalue"].values
     noise = 1e-9 * np.abs(marked).max()
     np.testing.assert_allclose(np.sort(own["eigenvalue"]), np.sort(marked), rtol=0, atol=noise)
-    assert own["angles"].values == pytest.approx(30.0)
+    assert own["angles"].values == pytest.approx(np.pi / 6.0)
 
 
 @pytest.mark.parametrize(

@@ -51,7 +51,7 @@ def test_what_is_left_out_has_its_default(read, short) -> None:
     assert case.load_terms[0][1] == Constant()
     np.testing.assert_array_equal(found.output.nodes, [6, 7])  # the loaded ones
     assert found.analysis.arguments["interval"] == 10.0 / 2000
-    assert found.analysis.arguments["method"] == "rk4"
+    assert found.analysis.arguments["method"] == "auto"
 
 
 def test_sampling_by_steps(read, short) -> None:

@@ -79,7 +79,7 @@ def test_other_histories_are_refused_by_their_place(search):
     ):
         measure = X if other.structure is case.structure else RISE
         with pytest.raises(InputError, match=place):
-            search(other, measure, [0.1, 0.2], **options)
+            search(other, measure, frequencies=[0.1, 0.2], **options)
 
 
 def test_a_wind_that_jumps_in_a_motion_is_refused_by_its_place():

@@ -30,6 +30,7 @@ force = [0.01, 0, 0]
 history = {{ kind = "half_sine", duration = 0.05 }}
 [analysis]
 kind = "dynamics"
+method = "rk4"
 duration = 0.1
 [output]
 interval = 0.01

@@ -63,7 +63,8 @@ def test_a_sweep_that_is_killed_goes_on(tmp_path):
     assert not [one for one in points.iterdir() if one.suffix != ".npz"]
     found = fd.load(tmp_path / "case-sweep" / "sweep.nc")
     thickness = np.linspace(0.005, 0.02, count)
-    alone = fd.sweep(tmp_path / "case.toml", {"sheet.thickness": thickness}, ["frequencies"],
+    alone = fd.sweep(tmp_path / "case.toml", {"sheet.thickness": thickness},
+    measures=["frequencies"],
                      processes=1)  # fmt: skip
     np.testing.assert_array_equal(found["thickness"], alone["thickness"])
     np.testing.assert_array_equal(found["frequencies"], alone["frequencies"])

@@ -29,7 +29,7 @@ def test_linear_momentum_over_many_steps(method, mass):
     dt = (4.0 if implicit else 0.4) * fd.critical_step(case, "rk4" if implicit else method)
     motion = fd.simulate(
         case, (500 if implicit else 100_000) * dt, method=method, dt=dt,
-        interval=100 if implicit else 2000,
+        every_steps=100 if implicit else 2000,
         initial=tumbling(case), **equal_steps(method),
     )  # fmt: skip
     p, _ = momenta(s, motion)

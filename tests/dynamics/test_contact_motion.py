@@ -30,9 +30,8 @@ def thrown(method, duration=0.02, stiffness=None, friction=0.0, speed=(0.0, 0.0,
     case = fd.Case(s, contact=fd.Contact(stiffness=stiffness, friction=friction))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)  # few steps do not resolve an impact
-        return s, fd.simulate(
-            case, duration, method=method, initial=start, **{"interval": 1e-4} | options
-        )
+        sampled = {} if "every_steps" in options else {"interval": 1e-4}
+        return s, fd.simulate(case, duration, method=method, initial=start, **sampled | options)
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ def sheet(model: str, **options: Any) -> Any:
     pattern = fd.patterns.miura((2, 1), dihedral=100)
     options = {"fold_law": ELASTIC} | options
     if model == "shell":
-        return fd.shell(pattern, HEAVY, 1, **options)
+        return fd.shell(pattern, HEAVY, divisions=1, **options)
     return fd.discretize(pattern, HEAVY, preset=model, **options)
 
 
@@ -50,7 +50,7 @@ def paper(mass: str = "mixed_voronoi") -> tuple[fd.Case, fd.State]:
 
     Centrifugal forces open and close the folds.
     """
-    pattern = fd.patterns.miura((2, 1), 0.025, 0.025, dihedral=90)
+    pattern = fd.patterns.miura((2, 1), 0.025, b=0.025, dihedral=90)
     laws = {"bend_law": "linear", "fold_law": fd.EnhancedLinear(20, 340)}
     s = fd.discretize(pattern, PAPER, mass=mass, preset="herkal", **laws)
     return fd.Case(s), spinning(s, (2.0, 50.0, 1.5), (0.4, 0.0, 2.0))
@@ -67,7 +67,7 @@ def drifts(case: fd.Case, motion: Any) -> float:
 def test_a_free_sheet_with_springs_keeps_both_momenta_and_loses_what_creases_take(model, law, dt):
     """Also with steps in which it turns by 3 degrees, hundreds of times RK4's critical one."""
     case = fd.Case(sheet(model, fold_law=LAWS.get(law, ELASTIC)), AXIAL)
-    motion = fd.simulate(case, 100 * dt, METHOD, dt=dt, every=10, initial=thrown(case))
+    motion = fd.simulate(case, 100 * dt, method=METHOD, dt=dt, every_steps=10, initial=thrown(case))
     assert drifts(case, motion) < 1e-11
     assert np.ptp(motion.strain_springs.values) > 0.05 * float(motion.strain_springs[0])
     assert (np.diff(motion.dissipated) >= 0.0).all()
@@ -89,7 +89,7 @@ def test_nothing_adds_up_over_many_steps(kind):
     else:
         (case, start), dt = paper(kind), 1e-4
         assert dt > 5.0 * fd.critical_step(case)
-    motion = fd.simulate(case, count * dt, METHOD, dt=dt, every=100, initial=start)
+    motion = fd.simulate(case, count * dt, method=METHOD, dt=dt, every_steps=100, initial=start)
     assert motion.attrs["steps"] == count
     assert drifts(case, motion) < 1e-13 * count
     if kind not in MODELS:
@@ -102,7 +102,7 @@ def test_nothing_adds_up_over_many_steps(kind):
 def test_steps_that_follow_their_error_and_large_ones_conserve_too(duration, options):
     """A twentieth of a turn in a step, with stiff bars: no failure, nothing gained or lost."""
     case, start = paper()
-    motion = fd.simulate(case, duration, METHOD, initial=start, **options)
+    motion = fd.simulate(case, duration, method=METHOD, initial=start, **options)
     assert drifts(case, motion) < (1e-10 if "tolerance" in options else 1e-9)
     assert motion.attrs["halved_steps"] < 100
     if "tolerance" in options:
@@ -114,7 +114,7 @@ def test_steps_that_follow_their_error_and_large_ones_conserve_too(duration, opt
 def test_a_clamped_sheet_on_springs_keeps_its_energy(model, dt):
     case = fd.Case(sheet(model, clamped=[(0, 1)]), [fd.Fix([0, 1]), *AXIAL, *GROUNDED])
     start = thrown(case, (0.0, 0.3, 0.0))
-    motion = fd.simulate(case, 200 * dt, METHOD, dt=dt, every=10, initial=start)
+    motion = fd.simulate(case, 200 * dt, method=METHOD, dt=dt, every_steps=10, initial=start)
     total = energy(motion)
     assert np.ptp(motion.kinetic.values) > 0.05 * total[0]
     assert np.ptp(total) < 1e-9 * max(total[0], 1.0)
@@ -128,7 +128,7 @@ def test_snap_through_keeps_its_energy(bend_law):
     v = np.zeros(case.structure.nodes.shape)
     v[[6, 7, 8], 0] = -1.0
     motion, plain = (
-        fd.simulate(case, 2.0, method, dt=2e-3, initial=fd.State(velocity=v))
+        fd.simulate(case, 2.0, method=method, dt=2e-3, initial=fd.State(velocity=v))
         for method in (METHOD, "generalized_alpha")
     )
     assert float(motion.strain_folds.max()) > 0.2 * energy(motion)[0]
@@ -166,7 +166,7 @@ def everything(model: str, **options) -> fd.Case:
     ],
 )
 def test_the_balance_closes_with_everything_that_acts(model, options):
-    motion = fd.simulate(everything(model, **options), 0.1, METHOD, dt=5e-4)
+    motion = fd.simulate(everything(model, **options), 0.1, method=METHOD, dt=5e-4)
     parts = {name: float(np.abs(motion[name]).max()) for name in ("dissipated", "work", "kinetic")}
     assert min(parts.values()) > 1e-3 * max(parts.values())
     assert motion.attrs["energy_error"] < 1e-9
@@ -177,7 +177,9 @@ def test_it_is_of_order_two_and_tends_to_the_motion_of_other_methods(model):
     case, steps = everything(model), [50, 100, 200]
 
     def end(method: str, n: int) -> np.ndarray:
-        return fd.simulate(case, 0.02, method, dt=0.02 / n, every=n).displacement.values[-1]
+        return fd.simulate(
+            case, 0.02, method=method, dt=0.02 / n, every_steps=n
+        ).displacement.values[-1]
 
     right = end("newmark", 1600)
     errors = [apart(end(METHOD, n), right) for n in steps]
@@ -190,7 +192,9 @@ def test_dofs_without_mass_do_not_ring(model):
     """What they store beyond their balance: nothing with a linear law, little with another."""
     for law, most in (("linear", 1e-11), ("superlinear", 1e-4)):
         case = fd.Case(sheet(model, fold_law=law))
-        motion = fd.simulate(case, 2.0, METHOD, dt=5e-3, every=20, initial=thrown(case))
+        motion = fd.simulate(
+            case, 2.0, method=METHOD, dt=5e-3, every_steps=20, initial=thrown(case)
+        )
         body = case.structure.body
         least = [body.energies(body.dofs(u)).sum() for u in motion.displacement.values]
         assert np.abs(strain(motion) - least).max() < most * strain(motion).max()
@@ -200,7 +204,7 @@ def test_dofs_without_mass_do_not_ring(model):
 def test_a_moment_that_jumps_moves_dofs_without_mass_at_once(model):
     s = sheet(model)
     jump = fd.CreaseMoment("all", 0.3 * float(s.fold_stiffness[0]), fd.Step(0.05))
-    motion = fd.simulate(fd.Case(s, [fd.Fix([0, 1, 2])], [jump]), 0.2, METHOD, dt=2e-3)
+    motion = fd.simulate(fd.Case(s, [fd.Fix([0, 1, 2])], [jump]), 0.2, method=METHOD, dt=2e-3)
     assert float(motion.work[-1]) > 1e-6
     assert motion.attrs["energy_error"] < 1e-9
 
@@ -219,7 +223,7 @@ def test_the_balance_closes_also_where_moments_jump(model, law):
     jump = fd.CreaseMoment([1], 0.5 * MOMENT, fd.Step(0.31))
     case = moved(model, law, jump, damping=[fd.CreaseDamping(1e-4)])
     for options in ({"dt": 6e-3}, {"tolerance": 1e-4}):
-        motion = fd.simulate(case, 0.6, METHOD, **options)
+        motion = fd.simulate(case, 0.6, method=METHOD, **options)
         assert float(motion.dissipated[-1]) > 0.03 * float(motion.work.max())
         assert (np.diff(motion.dissipated) >= 0.0).all()
         assert motion.attrs["energy_error"] < 1e-11
@@ -232,7 +236,7 @@ def test_with_memory_it_tends_to_the_motion_of_other_methods_with_order_two(mode
     case, steps = moved(model, law), [100, 200, 400]
 
     def end(method: str, **options: Any) -> list[np.ndarray]:
-        motion = fd.simulate(case, 0.2, method, every=0.2, **options)
+        motion = fd.simulate(case, 0.2, method=method, interval=0.2, **options)
         return [motion[name].values[-1] for name in ("displacement", "memory")]
 
     if case.structure.massless:
@@ -248,7 +252,7 @@ def test_with_memory_it_tends_to_the_motion_of_other_methods_with_order_two(mode
 
 def test_newtons_method_takes_as_many_iterations_as_without_memory():
     counts = [
-        fd.simulate(moved("plate", law), 0.6, METHOD, dt=6e-3).attrs["iterations"]
+        fd.simulate(moved("plate", law), 0.6, method=METHOD, dt=6e-3).attrs["iterations"]
         for law in ("linear", *LAWS)
     ]
     assert max(counts) < 1.1 * counts[0]
@@ -259,7 +263,7 @@ def test_moments_that_jump_turn_creases_that_relax_at_once(model):
     """Elastically, as the motion does that starts with the jump: also dofs without mass."""
     jump = fd.CreaseMoment("all", MOMENT, fd.Step(0.01))
     case = fd.Case(sheet(model, fold_law=LAWS["prony"]), [fd.Fix([0, 1, 2])], [jump])
-    motion = fd.simulate(case, 0.02, "generalized_alpha", dt=1e-4)
+    motion = fd.simulate(case, 0.02, method="generalized_alpha", dt=1e-4)
     assert motion.attrs["energy_error"] < 1e-7
 
 
@@ -267,7 +271,7 @@ def test_moments_that_jump_turn_creases_that_relax_at_once(model):
 def test_a_moment_that_has_grown_may_jump(method, error):
     """What it did before does not count twice."""
     jump = fd.CreaseMoment("all", MOMENT, fd.Step(0.05))
-    motion = fd.simulate(moved("plate", "linear", jump), 0.1, method, dt=1e-3)
+    motion = fd.simulate(moved("plate", "linear", jump), 0.1, method=method, dt=1e-3)
     assert motion.attrs["energy_error"] < error
 
 
@@ -277,7 +281,7 @@ def test_contact_and_memory_go_together(law):
     ground = fd.Plane((0.0, 0.0, -0.05), (0.0, 0.0, 1.0), friction=0.2)
     s = sheet("plate", fold_law=LAWS[law])
     case = fd.Case(s, [], [fd.Gravity((0.0, 0.0, -9.81))], contact=fd.Contact(planes=[ground]))
-    motion = fd.simulate(case, 0.3, METHOD, dt=1e-3)
+    motion = fd.simulate(case, 0.3, method=METHOD, dt=1e-3)
     assert float(motion.contact.max()) > 0.0
     assert float(motion.memory[-1].max()) > 0.0
     assert motion.attrs["energy_error"] < 1e-9

@@ -38,9 +38,11 @@ def test_a_loop_serves_all_cases(method):
         fd.Case(plates, [fd.Fix([0, 1]), SPRING, moved], [turn], contact=PLANE),
     ]
     if METHODS[method].massless:
-        cases.append(fd.Case(fd.shell(FOLD, SHEET, 2), [fd.Fix([0, 1])], [fd.Pressure(1.0)]))
+        cases.append(
+            fd.Case(fd.shell(FOLD, SHEET, divisions=2), [fd.Fix([0, 1])], [fd.Pressure(1.0)])
+        )
     for case in cases:
-        fd.simulate(case, 2e-4, method, dt=1e-4)
+        fd.simulate(case, 2e-4, method=method, dt=1e-4)
     assert len(METHODS[method].loop.overloads) == 1
 
 

@@ -326,7 +326,7 @@ def test_damped_creases_of_plates_are_of_first_order_but_by_energy_momentum():
 
     def end(method: str, steps: int) -> float:
         run = fd.simulate(
-            case, 2 * period, method=method, dt=period / steps, interval=2 * steps, initial=start
+            case, 2 * period, method=method, dt=period / steps, every_steps=2 * steps, initial=start
         )
         return float(run.displacement[-1, 0, 2])
 
@@ -387,7 +387,7 @@ def test_damped_waves_of_a_side_are_the_poles_of_the_ring(kind, model):
     if "modes" in kind or "relaxing" in kind:
         for waves in (fd.bands, fd.linear.damped_bands):
             with pytest.raises(InputError, match=r"damping: modes of|fold_law = .*remembers"):
-                waves(cell, phases, 2)
+                waves(cell, phases, count=2)
         return
     found = fd.linear.damped_bands(cell, phases, count=2)
     rates, whole = found.rate.values.ravel(), linearize(drum(kind, model, 6))

@@ -247,7 +247,7 @@ def test_modes_bring_their_case(case, modes, tmp_path):
     """By its place or its name, with the other arguments behind it as they are."""
     expected = draw_modes(case, modes, which=[5, 1], amplitude=0.1)
     for figure in (
-        draw_modes(modes, [5, 1], which=0.1),
+        draw_modes(modes, which=[5, 1], amplitude=0.1),
         draw_modes(modes=modes, which=[5, 1], amplitude=0.1),
         draw_modes(modes=modes, case_or_structure=case, which=[5, 1], amplitude=0.1),
     ):

@@ -388,7 +388,7 @@ def test_a_path_alone_needs_no_label_and_brings_its_case(held):
     by_place = plot_load_displacement(path, "xmax", direction="-z")
     by_number = plot_load_displacement(path, nodes[nodes < 9].tolist(), direction="-z")
     assert keys(by_place) == keys(by_number) and keys(by_place)[0] == f"node {nodes[0]}"
-    figures = draw_shapes(path, [0, 7]), draw_shapes(held, path, points=[0, 7])
+    figures = draw_shapes(path, points=[0, 7]), draw_shapes(held, path, points=[0, 7])
     for one, other in zip(*(figure.axes for figure in figures), strict=True):
         for a, b in zip(one.collections, other.collections, strict=True):
             if hasattr(a, "_segments3d"):

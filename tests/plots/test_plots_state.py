@@ -87,9 +87,9 @@ def test_what_a_figure_cannot_show_is_refused(wrong, monkeypatch, tmp_path):
         if name.startswith(("plot_", "draw_", "animate")):
             draw = getattr(plots, name)
             others = [*inspect.signature(draw).parameters.values()][1:]
-            more = [REST.get(one.name, wrong) for one in others if one.default is NEEDED]
+            more = {one.name: REST.get(one.name, wrong) for one in others if one.default is NEEDED}
             with pytest.raises(InputError):
-                draw(wrong, *more)
+                draw(wrong, **more)
 
 
 def test_a_result_stands_for_its_case(case, trajectory):

@@ -68,11 +68,15 @@ def test_histories_have_gaps_and_say_how_much_was_measured():
 
 @pytest.mark.parametrize(
     ("arguments", "match"),
-    [(([],), "give nodes to show"), (([7],), "7 is not in"), (([0], "w"), "choose one of x, y, z")],
+    [
+        ({"nodes": []}, "give nodes to show"),
+        ({"nodes": [7]}, "7 is not in"),
+        ({"nodes": [0], "axis": "w"}, "choose one of x, y, z"),
+    ],
 )
 def test_histories_of_what_is_not_there(arguments, match):
     with pytest.raises(InputError, match=match):
-        plot_tracks(tracks(), *arguments)
+        plot_tracks(tracks(), **arguments)
 
 
 def test_histories_need_a_model():

@@ -134,19 +134,32 @@ PAIR = receptance(WIDE, Mode(9.3, 0.1), Mode(9.765, 0.1))  # too close for their
         (circle_fit, (F, np.abs(H)), "response: real"),
         (circle_fit, (F, H[:-1]), "response: shape"),
         (circle_fit, (F[::-1], H), "must increase"),
-        (circle_fit, (F, H, (9.0, 9.5)), "band: 3 points between 9 and 9.5 Hz"),
-        (circle_fit, (F, H, (9.0, 12.0), "velocity"), 'quantity = "velocity"'),
-        (circle_fit, (F, HOLE, (7.0, 12.0)), "first at 9 Hz"),
-        (circle_fit, (F, np.ones(81) + 0j, (7.0, 12.0), "mobility"), "constant in the band"),
-        (circle_fits, (F, H, []), "bands: empty"),
+        (circle_fit, (F, H, {"band": (9.0, 9.5)}), "band: 3 points between 9 and 9.5 Hz"),
+        (
+            circle_fit,
+            (F, H, {"band": (9.0, 12.0), "quantity": "velocity"}),
+            'quantity = "velocity"',
+        ),
+        (circle_fit, (F, HOLE, {"band": (7.0, 12.0)}), "first at 9 Hz"),
+        (
+            circle_fit,
+            (F, np.ones(81) + 0j, {"band": (7.0, 12.0), "quantity": "mobility"}),
+            "constant in the band",
+        ),
+        (circle_fits, (F, H, {"bands": []}), "bands: empty"),
         (circle_fit, (FAR, receptance(FAR, Mode(9.3, 0.05))), "no resonance found between 20 and"),
-        (circle_fits, (WIDE, PAIR, [(7.9, 9.5), (9.5, 11.2)]), "still change after 200 sweeps"),
+        (
+            circle_fits,
+            (WIDE, PAIR, {"bands": [(7.9, 9.5), (9.5, 11.2)]}),
+            "still change after 200 sweeps",
+        ),
     ],
 )
 def test_what_cannot_be_fitted(function, arguments, words):
     error = ComputationError if words.startswith(("no res", "still")) else InputError
+    first, second, *named = arguments
     with pytest.raises(error, match=words):
-        function(*arguments)
+        function(first, second, **(named[0] if named else {}))
 
 
 def test_holes_outside_the_band_do_not_matter():

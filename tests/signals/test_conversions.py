@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from known_poles import Mode, receptance
@@ -68,11 +70,31 @@ def test_transmissibility_is_the_same_of_all_quantities():
 @pytest.mark.parametrize(
     ("function", "arguments", "words"),
     [
-        (convert_response, (F, H, "receptance", "inertance"), 'target = "inertance"'),
-        (convert_response, (F, H, "flexibility", "mobility"), 'source = "flexibility"'),
-        (convert_response, (F, H[:-1], "mobility", "receptance"), "response: shape"),
-        (convert_response, (F[::-1], H, "mobility", "receptance"), "frequency: must increase"),
-        (convert_response, (-F[::-1], H, "mobility", "receptance"), "from 0 Hz"),
+        (
+            partial(convert_response, source="receptance", target="inertance"),
+            (F, H),
+            'target = "inertance"',
+        ),
+        (
+            partial(convert_response, source="flexibility", target="mobility"),
+            (F, H),
+            'source = "flexibility"',
+        ),
+        (
+            partial(convert_response, source="mobility", target="receptance"),
+            (F, H[:-1]),
+            "response: shape",
+        ),
+        (
+            partial(convert_response, source="mobility", target="receptance"),
+            (F[::-1], H),
+            "frequency: must increase",
+        ),
+        (
+            partial(convert_response, source="mobility", target="receptance"),
+            (-F[::-1], H),
+            "from 0 Hz",
+        ),
         (transmissibility, (H, H[:-1]), "reference: shape"),
         (base_transmissibility, (F, H[:-1]), "response: shape"),
     ],

@@ -158,7 +158,7 @@ def test_coherence_of_unrelated_records_is_one_over_their_number():
     rng = np.random.default_rng(6)
     estimate = frequency_response(rng.normal(size=(20, 512)), rng.normal(size=(20, 512)), dt=DT)
     assert estimate.coherence.mean() == pytest.approx(1 / 20, rel=0.15)
-    one = frequency_response(*rng.normal(size=(2, 100)), DT)  # tells none
+    one = frequency_response(*rng.normal(size=(2, 100)), dt=DT)  # tells none
     assert one.segments == 1 and np.isnan(one.coherence).all()
 
 

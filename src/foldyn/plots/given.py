@@ -53,13 +53,14 @@ def case_from_result(
     draw: Callable[Concatenate[Case | Structure, xr.Dataset, P], R],
 ) -> OfResult[P, R]:
     """Let a figure take the case from its result where only that is given."""
-    case, result = list(signature(draw).parameters)[:2]
+    case, result, *others = signature(draw).parameters
 
     @wraps(draw)
     def drawn(*given: Any, **named: Any) -> Any:
         first = given[0] if given else named.get(result)
         if isinstance(first, xr.Dataset) and case not in named:
-            given = (first, *given)
+            named |= zip(others, given[1:], strict=False)  # they stand one place further on
+            given = (first, first) if given else (first,)
         return draw(*given, **named)
 
     return drawn

@@ -93,7 +93,7 @@ def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]
             if is_grid(sweep)
             else f"{text}: the points over each parameter, and their means."
         )
-        draw = partial(plots.plot_main_effects, sweep, name, at)
+        draw = partial(plots.plot_main_effects, sweep, name, at=at)
         charts = Charts(effect_charts(sweep, name, at, not is_grid(sweep)), caption)
         yield from album.figure(f"effects-{name}", caption, draw, charts)
     if is_grid(sweep) and len(names) <= 2:

@@ -161,7 +161,7 @@ def _path(
     about = _changing(arrays, key, case, result, u, way(result))
     about["load"] = arrays.exact(f"{key}.load", result["load_factor"].values, "f4")
     if (moved := moved_supports(case)) is not None:  # the load factor is their displacement
-        force = total_reaction(result, *moved)
+        force = total_reaction(result, moved[0], direction=moved[1])
         about |= {"way": moved[1], "force": arrays.exact(f"{key}.force", force, "f4")}
     return [own | about | {"stable": stable.tolist()}]
 
