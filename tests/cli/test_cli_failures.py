@@ -38,7 +38,7 @@ def check_partial(file: str, duration: float) -> None:
 @pytest.mark.parametrize("factor", [1.2, 1.5, 10.0])
 def test_a_forced_step_far_above_the_critical_one(workplace, edited, factor) -> None:
     step = f"analysis.dt = {factor * 8.73e-4}; analysis.force = true"  # critical: 8.73e-4 s
-    text = edited(f"{step}; analysis.duration = 5.0; output.every_steps = 1")
+    text = edited(f"{step}; analysis.duration = 5.0; output.interval =; output.every_steps = 1")
     reason = workplace.run(text).failure("case-results/result.nc")
     assert reason.startswith("foldyn: case.toml: ") and "step" in reason
     check_partial("case-results/result.nc", 5.0)
@@ -62,7 +62,8 @@ def test_panel_through_panel(workplace) -> None:
 def test_rules_that_are_done_are_kept_beside_the_one_that_fails(workplace, edited) -> None:
     # 7e-4 s is below the critical step of panel and beyond the stability limit of consistent
     step = (
-        "analysis.dt = 7e-4; analysis.force = true; analysis.duration = 1.0; output.every_steps = 1"
+        "analysis.dt = 7e-4; analysis.force = true; analysis.duration = 1.0; output.interval =; "
+        "output.every_steps = 1"
     )
     text = edited(f'model.mass = ["panel", "consistent", "centroid"]; {step}')
     files = [f"case-results/result-{rule}.nc" for rule in ("panel", "consistent")]

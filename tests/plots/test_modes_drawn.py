@@ -254,7 +254,7 @@ def test_modes_bring_their_case(case, modes, tmp_path):
         assert texts(figure) == texts(expected)
         for axes, own in zip(figure.axes, expected.axes, strict=True):
             assert drawn(axes) == drawn(own)
-    film = animate_modes(modes, tmp_path / "m.gif", path=[5], frames=2)
+    film = animate_modes(modes, tmp_path / "m.gif", which=[5], frames=2)
     assert (
         film.read_bytes()
         == animate_modes(case, modes, path=tmp_path / "n.gif", which=[5], frames=2).read_bytes()
