@@ -314,7 +314,7 @@ def test_motions_of_basins_settle_at_that_rate(kind, model):
     left = float((found.velocity[0, 0].values * start.velocity).sum() / (start.velocity**2).sum())
     assert -np.log(left) / (3.0 * period) == pytest.approx(rate, rel=0.05)
     dt = float(found.attrs["dt"])
-    whole = fd.simulate(case, 424 * dt, "rk4", dt, every=424, initial=start)
+    whole = fd.simulate(case, 424 * dt, method="rk4", dt=dt, every_steps=424, initial=start)
     off = found.displacement[0, 3].values - whole.displacement[-1].values  # goes on from the end
     assert np.abs(off).max() < 1e-5 * np.abs(start.velocity).max() * period
 

@@ -198,7 +198,7 @@ def test_statics_motions_and_clamps():
     even = shell(pattern, STEEL[1e-3], divisions=8, clamped="xmin")
     usual = np.abs(fd.trace(fd.Case(even, supports, case.loads)).displacement.values[-1]).max()
     assert tip == pytest.approx(usual, rel=0.1)
-    motion = fd.simulate(case, 1e-3, dt=5e-5, every=4, method="generalized_alpha")
+    motion = fd.simulate(case, 1e-3, dt=5e-5, every_steps=4, method="generalized_alpha")
     assert np.isfinite(motion.displacement.values).all()
 
 

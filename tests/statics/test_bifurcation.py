@@ -85,7 +85,7 @@ def test_a_bifurcation_among_lost_equilibria_has_an_interval(monkeypatch):
     np.testing.assert_allclose(value["limit_interval"], STEEP.limit, rtol=1e-9)
     assert "between" in path.attrs["stability_changes"]
     assert "bifurcation between" in describe_point(path, 0)
-    (axes,) = fd.plots.plot_load_displacement(path, 2, "z").axes
+    (axes,) = fd.plots.plot_load_displacement(path, 2, direction="z").axes
     (ends,) = (line for line in axes.lines if line.get_label() == "_interval")
     np.testing.assert_allclose(ends.get_ydata(), [low[0], high[0]])
 
