@@ -125,9 +125,9 @@ def _followed(
             iterations, least = (150, 1e-10) if last else (ENOUGH, 1e-4)
             shape = minimum(energy, shape, aim, stiffness, iterations, least)
             if lets_go or last:
-                kept = relaxed(energy, stiffness, shape, kept, aim, angles[0], plane or last)
+                plane = plane or last
+                kept, plane = relaxed(energy, stiffness, shape, kept, aim, angles[0], plane)
             lets_go = kept is not None
-            plane = kept is not None and energy.bent(kept.turns).max(initial=0.0) <= SLIGHT
             if last and kept is None:
                 kept = eased(energy, stiffness, shape, aim, angles[0])
             way.shapes.append(shape if kept is None else kept)
@@ -141,8 +141,8 @@ def _followed(
 def relaxed(
     energy: FoldEnergy, stiffness: Stiffness, shape: Shape, before: Shape | None, aim: Aim,
     first: NDArray, plane: bool,
-) -> Shape | None:  # fmt: skip
-    """The shape without the springs of its creases, if it stays near.
+) -> tuple[Shape | None, bool]:  # fmt: skip
+    """The shape without the springs of its creases, if it stays near; whether panels stay plane.
 
     How near is measured by how far the creases have turned since the `first` state. What was kept
     at the step `before` mostly leads to it with few steps of Newton's.
@@ -184,8 +184,8 @@ def relaxed(
         if np.abs(energy.creases(kept.turns - shape.turns)).sum() > HELD * turned:
             continue  # elsewhere
         if len(wrong_ways(energy, kept.turns, aim.angles)) <= wrong:
-            return kept
-    return None
+            return kept, not thin
+    return None, False
 
 
 def eased(
