@@ -79,7 +79,7 @@ class Check(Unit):
 
     def __call__(self, name: str, value: Any, context: Mapping[str, Any] = NOTHING) -> Any:
         """The value as it is kept."""
-        return self.check(name, value, **self._options(context))
+        return self.check(name, value, **(self._options(context) if self.asks else self.limits))
 
     def _options(self, context: Mapping[str, Any]) -> dict[str, Any]:
         asked = {word: context[word] for word in self.asks if word in context}

@@ -49,14 +49,16 @@ def read(
     for key in unknown:
         reason = _of_others(key, others) or unknown_key(key, own)
         faults.add(UnknownKeyError(f": {reason}", f"{name}.{key[:SHOWN]}"))
+    context = {"folder": folder, "find": find, "beside": found}
     meant = {nearest(key, own) for key in unknown}  # that these are missing need not be said
     for field, argument in arguments(kind).items():
         key, place = argument.key, f"{name}.{argument.key}"
         if key in table:
             inner = _within_others(key, others) if table_under(key, kind) else NOTHING
-            context = {"folder": folder, "find": find, "beside": found, "others": inner}
-            with faults.collected():
-                found[field] = argument.read(place, table[key], context)
+            try:
+                found[field] = argument.read(place, table[key], {**context, "others": inner})
+            except InputError as error:
+                faults.add(error)
         elif key not in needed:
             found[field] = argument.default
         elif key not in meant:
@@ -97,7 +99,8 @@ def _placed(name: str, kind: type[Checked]) -> Iterator[None]:
         raise InputError(error.reason, f"{name}{inside}", error.file, error.others) from None
 
 
-def needs(kind: type[Checked]) -> dict[str, str]:
+@cache
+def needs(kind: type[Checked]) -> Mapping[str, str]:
     """Keys that the table of a data class must have, and what to do where one is missing."""
     return {
         one.key: f"give it ({one.unit})" if one.unit else "give its value"

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from inspect import signature
 from typing import Any
 
 from foldyn.arguments import Placed
+from foldyn.cases.decode import signature
 from foldyn.errors import Faults, InputError
 from foldyn.json_schema import Schema, any_of, closed, described, explained, of_call
 from foldyn.patterns import GENERATORS, Pattern

@@ -10,6 +10,7 @@ import inspect
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -21,6 +22,8 @@ from foldyn.json_schema import Schema, any_of, of_call
 from foldyn.mechanics.term import Term
 from foldyn.tables import check_keys, check_table, needs, read, schema_of
 from foldyn.values import choice, plain, show
+
+signature = cache(inspect.signature)
 
 
 def history_from(table: Any, folder: Path | None = None) -> History:
@@ -66,7 +69,7 @@ def call_from(
     skip : iterable of str
         Parameters that a table may not set.
     """
-    known = {n: p for n, p in inspect.signature(function).parameters.items() if n not in skip}
+    known = {n: p for n, p in signature(function).parameters.items() if n not in skip}
     check_keys(arguments, known)
     faults = Faults()
     for name, parameter in known.items():
