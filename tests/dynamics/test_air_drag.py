@@ -44,7 +44,7 @@ def test_a_falling_sheet_reaches_the_terminal_velocity(method):
     exact = TERMINAL * np.tanh(G * motion.time.values / TERMINAL)
     assert np.abs(speed - exact[:, None]).max() < 1e-3 * TERMINAL
     assert_allclose(speed[-1], TERMINAL, rtol=1e-3)
-    assert motion.attrs["energy_error"] < BALANCED[method]
+    assert motion.attrs["energy_error"] < BALANCED.get(method, 1e-4)
     assert_allclose(motion.air[-1], motion.work[-1] - motion.kinetic[-1], rtol=1e-5)
 
 
@@ -58,7 +58,7 @@ def test_wind_blows_a_sheet_away(method):
     assert_allclose(motion.velocity.values[:, 0, 2], exact, rtol=1e-3)
     assert np.abs(motion.velocity.values[:, :, :2]).max() < 1e-9 * wind
     assert_allclose(-motion.air[-1], 0.5 * MASS * exact[-1] ** 2, rtol=2e-3)
-    assert motion.attrs["energy_error"] < BALANCED[method]
+    assert motion.attrs["energy_error"] < BALANCED.get(method, 1e-4)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_gusts_move_a_sheet_alike_by_all_methods(hinged, blown, method):
     motion = fd.simulate(hinged, 0.25, method=method, interval=0.05, **steps(method))
     assert np.abs(blown).max() > 0.3 * SIDE
     assert_allclose(motion.displacement.values[:, 2], blown, atol=2e-3 * SIDE)
-    assert motion.attrs["energy_error"] < 100.0 * BALANCED[method]
+    assert motion.attrs["energy_error"] < 100.0 * BALANCED.get(method, 1e-4)
 
 
 def test_drag_turns_with_the_sheet_and_the_wind():

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 import foldyn as fd
 from foldyn.cases.directions import unit_vector
+from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns.topology import edge_lookup
 
 EARLIER = 1e-9  # s, between the histories of the halves of a load
@@ -191,7 +192,8 @@ class Copy:
         """A field of a kind of part."""
         if value is None:
             return None
-        known = FIELDS.get(f"{kind}.{name}", FIELDS.get(name))
+        number = Copy.same if kind in LAWS else None  # of a law: no symmetry changes it
+        known = FIELDS.get(f"{kind}.{name}", FIELDS.get(name, number))
         assert known is not None, f"say in FIELDS what a symmetry does to {kind}.{name}"
         return known(self, value)
 
@@ -229,6 +231,7 @@ class Copy:
         return [support]
 
 
+LAWS = {law.__name__ for law in (*BAR_LAWS.values(), *HINGE_LAWS.values())}
 FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     **dict.fromkeys(("nodes", "between", "to"), Copy.vertices),
     **dict.fromkeys(("edges", "clamped", "straight"), Copy.edges),

@@ -24,6 +24,7 @@ from foldyn.dynamics import METHODS
 from foldyn.dynamics.driver import prepare
 from foldyn.errors import ComputationError, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS, MemoryLaw
+from foldyn.materials.law import Law
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.presets import PRESETS
 
@@ -166,6 +167,11 @@ FIELDS: Mapping[str, Callable[[Scene, dict], Any]] = {
 }  # fmt: skip
 
 
+def _number(scene: Scene, _: dict) -> float:
+    """A number of a law that has no line above."""
+    return scene.positive(1.0)
+
+
 def drawn(scene: Scene, kinds: Any) -> Any:
     """A part of one of these kinds, with some of its fields."""
     kinds = list(kinds)
@@ -178,7 +184,8 @@ def drawn(scene: Scene, kinds: Any) -> Any:
             needed = needed or full in ALWAYS
             if item.name == "name" or not (needed or scene.rng.random() < 0.5):
                 continue
-            draw = FIELDS.get(full, FIELDS.get(item.name))
+            number = _number if issubclass(kind, Law) else None
+            draw = FIELDS.get(full, FIELDS.get(item.name, number))
             assert draw is not None, f"say in FIELDS how to draw {kind.__name__}.{item.name}"
             try:
                 given[item.name] = draw(scene, given)
