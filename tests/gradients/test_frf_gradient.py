@@ -41,6 +41,7 @@ CASES = {
     "pushed": (case, BASIC, PUSH),
     "modal": (case, BASIC, PUSH | {"method": "modal"}),
     "shaken": (case, BASIC, SHAKE),
+    "membranes": (partial(case, membrane="panel"), BASIC, SHAKE),
     "loaded": (case, BASIC | {"force": 12.0}, LOADED),
     "damped there": (partial(case, state="start"), BASIC | {"force": 12.0}, LOADED),
     "plates": (partial(case, model="n5b8e"), BASIC, PUSH),

@@ -62,14 +62,14 @@ def files_of(path: str, name: str) -> set[str]:
 
 def test_what_a_kernel_is_made_from():
     law, switch, fields = "materials/superlinear.py", "materials/switch.py", "mechanics/model.py"
-    assert {law, switch, "jit/compiled.py"} <= files_of("shells/kernels.py", "_forces")
+    assert {law, switch, "jit/compiled.py"} <= files_of("mechanics/plates.py", "_forces")
     assert {law, switch, fields} <= files_of("mechanics/bars_hinges.py", "_forces")
     assert "cases/histories.py" in files_of("dynamics/parts.py", "histories")
     # a loop holds none of what it calls by address
     loop = files_of("dynamics/runge_kutta.py", "advance")
     assert not {law, switch, "mechanics/force.py", "cases/histories.py"} & loop
     # and not from what only tells or draws, which would compile all anew with every change
-    others = {"cases/document.py", "cases/case.py", "dynamics/driver.py", "shells/kernels.py"}
+    others = {"cases/document.py", "cases/case.py", "dynamics/driver.py", "mechanics/plates.py"}
     assert not others & loop
     assert "dynamics/runge_kutta.py" not in files_of("mechanics/force.py", "internal_force")
 

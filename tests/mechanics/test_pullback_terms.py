@@ -127,10 +127,6 @@ OF_MEMBRANES = "vector per_length2 *stiffness"
 OF_BARS = " bars.bar_vector bars.bar_per_length2 *bars.bar_stiffness"
 OF_PLATES = "bars.rest per_reach *fold_stiffness *bend_rest *stiffness"
 IN_BALANCE = "bars.rest per_reach fold_stiffness stiffness"
-OF_SHELLS = (
-    "per_reach rest side per_length2 *membrane *bending *hinge_rest weight sign "
-    "*piece_stiffness *piece_rest"
-)
 ARRAYS = {  # that count, with a star where forces are linear, with a minus where there is no
     # difference: of a spring without length at rest, or of dofs that are not there
     "membranes": OF_MEMBRANES,
@@ -146,9 +142,9 @@ ARRAYS = {  # that count, with a star where forces are linear, with a minus wher
     "damped panels": "vector per_length2 *resistance",
     "damping matrix": "*data",
     "damping rows": "rows",
-    "shell": f"{OF_SHELLS} *piece_parameters",
-    "shell that locks": f"{OF_SHELLS} piece_parameters",
-    "clamped shell": OF_SHELLS,
+    "shell": f"{OF_PLATES} *fold_rest *fold_parameters",
+    "shell that locks": f"{OF_PLATES} *fold_rest fold_parameters",
+    "clamped shell": f"{OF_PLATES} *fold_rest wings",
     "plates": f"{OF_PLATES} *fold_rest *fold_parameters wings",
     "plates that lock": f"{OF_PLATES} *fold_rest fold_parameters {OF_BARS}",
     "plates of a user's law": f"{OF_PLATES} fold_rest",

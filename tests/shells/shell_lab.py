@@ -98,7 +98,7 @@ def at_rest(s: Shell) -> NDArray:
 def random_state(s: Shell, seed: int = 0, shift: float = 0.05, turn: float = 0.2) -> NDArray:
     """Displacements of the size `shift` times the shortest side, and rotations (rad)."""
     rng = np.random.default_rng(seed)
-    shortest = np.sqrt(1.0 / s.model.per_length2.max())
+    shortest = s.bar_length.min()
     u = shift * shortest * rng.uniform(-1, 1, s.nodes.size)
     return np.concatenate([u, turn * rng.uniform(-1, 1, s.rotations)])
 

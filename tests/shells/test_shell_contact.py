@@ -75,7 +75,7 @@ def test_a_crease_is_guarded_from_where_its_panels_meet(divisions):
     whole = touching(strip()).tables
     creases = np.isin(whole.hinges[:, :2], [2, 3, 4, 5]).all(axis=1)  # centers are their wings
     shell = strip_shell(divisions=divisions)
-    own, pieces = touching(shell).tables, shell.sides.piece_hinge
+    own, pieces = touching(shell).tables, slice(len(shell.sides.piece_crease))
     assert whole.hinge_limit[creases] == pytest.approx(2.0 * T / 0.04)
     assert own.hinge_limit[pieces] == pytest.approx(2.0 * T / 0.04)
     of = np.bincount(shell.sides.piece_crease, own.hinge_stiffness[pieces])

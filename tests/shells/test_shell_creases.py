@@ -145,11 +145,11 @@ def test_the_stiffness_of_a_crease_is_that_of_the_calibration():
     """1/kf = Ls/G + 1/(0.55 G (Lf/t)^(1/3)): 0.06387 N m/rad (design, section 5)."""
     s = shell(fd.patterns.simple_fold(1.0, 1.0, dihedral=60), PAPER, divisions=5)
     assert s.fold_stiffness == pytest.approx([0.06387], abs=5e-6)
-    assert s.model.piece_stiffness == pytest.approx(np.full(5, s.fold_stiffness[0] / 5))
+    assert s.model.fold_stiffness == pytest.approx(np.full(5, s.fold_stiffness[0] / 5))
     bars = fd.discretize(fd.patterns.miura(a=1.0, b=1.4), PAPER, preset="herkal")
     sheet = shell(fd.patterns.miura(a=1.0, b=1.4), PAPER, divisions=4)
     assert sheet.fold_stiffness == pytest.approx(bars.fold_stiffness, rel=1e-13)
-    whole = np.bincount(sheet.sides.piece_crease, sheet.model.piece_stiffness)
+    whole = np.bincount(sheet.sides.piece_crease, sheet.model.fold_stiffness)
     assert whole == pytest.approx(bars.fold_stiffness, rel=1e-13)
 
 

@@ -52,6 +52,7 @@ from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.values import number
 
 Mass = sparse.csr_array | Squared
+ROUNDING = 1e-12  # of what pulls at a node when the whole moves
 POWER = 4.0 / 3.0
 AT_REST = 0.9411457706782074
 """2/sqrt(pi) Gamma(POWER/2 + 1)/Gamma(POWER/2 + 3/2)."""
@@ -305,7 +306,10 @@ def _ground(body: Assembly, q: NDArray, whole: NDArray) -> NDArray:
     out = np.zeros_like(whole)
     for term in body.others:
         if not term.of_hinges:  # which strain nothing when the whole moves
-            out[: body.size] += term.tangent(q) @ whole[: body.size]
+            own, moved = term.tangent(q), whole[: body.size]
+            held = own @ moved
+            held[np.abs(held) <= ROUNDING * (abs(own) @ np.abs(moved))] = 0.0
+            out[: body.size] += held
     return out
 
 

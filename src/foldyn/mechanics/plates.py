@@ -302,6 +302,8 @@ class _Context(NamedTuple):
     model: BarsPlates
     work: PlatesWork
     rows: int
+    groups: NDArray  # (3,) of the energies of bars, folds and bends
+    energy: NDArray  # (3,) these, J
 
 
 @forces
@@ -319,7 +321,9 @@ def _energies(own, u, out):
     model, moved = own.model, rows_at(u, own.rows)
     n, r = model.bars.rest.shape[0], model.rotations
     here, x = parted_rows(moved, n, r)
-    plates_energy(model, here, x, own.work, numbers_at(out, 3))
+    plates_energy(model, here, x, own.work, own.energy)
+    for k in range(3):
+        numbers_at(out, 3)[own.groups[k]] = own.energy[k]
 
 
 @mean_forces
@@ -332,7 +336,9 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
     add_mean_plates_force(model, one, x0, other, x1, angle, pull, couple, own.work)
 
 
-def plates_kernels(model: BarsPlates, work: PlatesWork, rows: int) -> Compiled:
-    """Bars, folds and plates, whose dofs fill so many rows."""
-    own = Context(_Context(model, work, rows))
+def plates_kernels(
+    model: BarsPlates, work: PlatesWork, rows: int, groups: tuple[int, int, int]
+) -> Compiled:
+    """Bars, folds and plates, whose dofs fill so many rows, with the groups of their energies."""
+    own = Context(_Context(model, work, rows, np.array(groups), np.zeros(3)))
     return Compiled(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})

@@ -26,6 +26,7 @@ from foldyn.mechanics.plates import (
     turn_hinges,
     turn_plate,
 )
+from foldyn.mechanics.tangent import distinct
 
 
 class PlatesPattern(NamedTuple):
@@ -37,7 +38,7 @@ class PlatesPattern(NamedTuple):
 
     indptr: NDArray  # (size + 1,)
     indices: NDArray  # (nnz,)
-    bars: NDArray  # (entries of the tangent of the bars,) where they go
+    bars: NDArray  # (entries of the tangent of the bars,) where they go, if bars act
     fold_dof: NDArray  # (nf, 6) first dofs of the places of each fold
     fold: NDArray  # (nf, 36) first entries
     begin: NDArray  # (p + 1,) first place of each plate
@@ -81,8 +82,7 @@ def plates_pattern(model: BarsPlates, bars: tuple[NDArray, NDArray]) -> PlatesPa
     pairs = np.where(
         known[:, :, None] & known[:, None], fold[:, :, None] * count + fold[:, None], -1
     )
-    every = np.unique(np.concatenate([np.arange(count) * (count + 1), sides, pairs.ravel(), own]))
-    every = every[every >= 0]
+    every = distinct(np.concatenate([np.arange(count) * (count + 1), sides, pairs.ravel(), own]))
 
     width = np.where(np.arange(count) < n, 3, 1)
     dof = np.concatenate([[0], np.cumsum(width)])  # first of each place
@@ -99,13 +99,15 @@ def plates_pattern(model: BarsPlates, bars: tuple[NDArray, NDArray]) -> PlatesPa
         found = first[np.searchsorted(every, np.maximum(keys, 0))]
         return np.where(keys >= 0, found, -1).astype(np.int32)
 
-    axis = np.arange(3)
-    stride = length[dof[sides // count]][:, None, None] * axis[:, None]
-    blocks = entries(sides)[:, None, None] + stride + axis
+    of_bars = np.zeros(0, np.int32)
+    if len(model.bars.bar_runs):
+        axis, stride = np.arange(3, dtype=np.int32), length[dof[sides // count]].astype(np.int32)
+        blocks = entries(sides)[:, None, None] + stride[:, None, None] * axis[:, None] + axis
+        of_bars = sparse.bsr_array((blocks, bars[1], bars[0]), (3 * n, 3 * n)).tocsr().data
     return PlatesPattern(
         indptr=indptr.astype(np.int32),
         indices=once.astype(np.int32)[copy],
-        bars=sparse.bsr_array((blocks, bars[1], bars[0]), shape=(3 * n, 3 * n)).tocsr().data,
+        bars=of_bars,
         fold_dof=np.where(known, dof[fold], -1).astype(np.int32),
         fold=entries(pairs).reshape(-1, 36),
         begin=begin.astype(np.int32),
@@ -113,7 +115,7 @@ def plates_pattern(model: BarsPlates, bars: tuple[NDArray, NDArray]) -> PlatesPa
         dof=dof[place].astype(np.int32),
         start=start,
         plate=entries(own),
-        corner=corner.astype(np.int32),
+        corner=corner.astype(np.int16),
         owner=owner.astype(np.int32),
     )
 

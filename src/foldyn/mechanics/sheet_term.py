@@ -194,11 +194,10 @@ class SheetTerm(Term):
     def turn(self, q: NDArray, other: NDArray) -> float:
         """Largest turn (rad) of a part between two states; inf if parts collide."""
 
-    def plate_energies(self, q: NDArray, strain: NDArray, turn: NDArray) -> NDArray:
-        """Energy (p,), J, of each panel as a plate, or of each triangle of a shell.
+    def plate_energies(self, q: NDArray, turn: NDArray) -> NDArray:
+        """Energy (p,), J, of bending of each panel, or of each triangle of a shell.
 
-        strain, turn : Green strains and angles (rad) without stress of warm panels, as `Swelling`
-            has them, or none, (0,).
+        turn : angles (rad) without stress of warm panels, as `Swelling` has them, or none, (0,).
         """
         return np.zeros(0)
 

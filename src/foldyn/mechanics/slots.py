@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.compiled import kernel
+from foldyn.mechanics.tangent import distinct
 
 
 class Slots:
@@ -17,7 +18,7 @@ class Slots:
         self._found: tuple[NDArray, ...] = ()  # pattern of the last matrix, and what follows
 
     def added(self, matrix: sparse.csr_array, entries: NDArray) -> sparse.csr_array:
-        """The matrix, or a fuller one, with entries (k,) added."""
+        """The matrix, changed, or a fuller one, with entries (k,) added."""
         if not len(entries):
             return matrix
         matrix.sort_indices()
@@ -25,21 +26,24 @@ class Slots:
         if not self._found or not all(map(np.array_equal, of, self._found)):
             self._found = *of, *self._find(*of)
         indices, indptr, own, slots = self._found[2:]
-        data = np.zeros(len(indices))
-        data[own] = matrix.data
+        data = matrix.data
+        if len(data) < len(indices):
+            data = np.zeros(len(indices))
+            data[own] = matrix.data
+            matrix = sparse.csr_array((data, indices, indptr), matrix.shape)
         add_at(slots, entries, data)
-        return sparse.csr_array((data, indices, indptr), matrix.shape)
+        return matrix
 
     def _find(self, indices: NDArray, indptr: NDArray) -> tuple[NDArray, ...]:
         """Pattern of the sum, and slots there of what is in the matrix and of what is added."""
         size = len(indptr) - 1
         own = np.repeat(np.arange(size), np.diff(indptr)) * size + indices
         new = self._row * size + self._column
-        both = np.union1d(own, new)
+        both = distinct(np.concatenate([own, new]))
         row, column = np.divmod(both, size)
         ends = np.searchsorted(row, np.arange(size + 1))
-        pattern = column.astype(np.int32), ends.astype(np.int32)
-        return *pattern, np.searchsorted(both, own), np.searchsorted(both, new)
+        found = column, ends, np.searchsorted(both, own), np.searchsorted(both, new)
+        return tuple(array.astype(np.int32) for array in found)
 
 
 @kernel

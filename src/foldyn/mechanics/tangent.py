@@ -31,11 +31,17 @@ def block_keys(indptr: NDArray, indices: NDArray) -> NDArray:
     return np.repeat(np.arange(rows), np.diff(indptr)) * rows + indices.astype(np.int64)
 
 
+def distinct(keys: NDArray) -> NDArray:
+    """Each once, in increasing order: quicker than np.unique."""
+    ordered = np.sort(keys)
+    return ordered[np.diff(ordered, prepend=-1) > 0]
+
+
 def entry_slots(pattern: Sparsity, row: NDArray, column: NDArray) -> NDArray:
     """Where entries (k,) at dofs stand among those of the blocks of a pattern, all flat."""
     keys, rows = block_keys(pattern.indptr, pattern.indices), len(pattern.indptr) - 1
     block = np.searchsorted(keys, row // 3 * rows + column // 3)
-    return 9 * block + 3 * (row % 3) + column % 3
+    return (9 * block + 3 * (row % 3) + column % 3).astype(np.int32)
 
 
 def sparsity(model: BarsHinges) -> Sparsity:
@@ -59,7 +65,7 @@ def sparsity(model: BarsHinges) -> Sparsity:
 def joined(pattern: Sparsity, more: NDArray) -> Sparsity:
     """Pattern with further blocks too, by their numbers as `block_keys` has them."""
     rows, own = len(pattern.indptr) - 1, block_keys(pattern.indptr, pattern.indices)
-    both = np.union1d(own, more)
+    both = distinct(np.concatenate([own, more]))
     moved = np.searchsorted(both, own)
     return Sparsity(
         np.searchsorted(both // rows, np.arange(rows + 1)).astype(np.int32),

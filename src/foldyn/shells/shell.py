@@ -14,16 +14,24 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
-from foldyn.materials import EnhancedLinear, HingeLaw, hinge_law
+from foldyn.materials import EnhancedLinear, HingeLaw, LinearBar, LinearHinge, hinge_law
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.following import joined, moments, pushes, tensions
+from foldyn.mechanics.following import joined, moments, pushes
+from foldyn.mechanics.membranes import Membranes, MembranesTerm
+from foldyn.mechanics.plates import BarsPlates
 from foldyn.patterns import Pattern
 from foldyn.patterns.pattern import Patterned
 from foldyn.patterns.topology import Edge
 from foldyn.ram_limit import check_memory
-from foldyn.shells.kernels import ShellModel
 from foldyn.shells.mesh import shell_mesh
-from foldyn.shells.sides import Sides, sides, stiffness, without_free_sides
+from foldyn.shells.sides import (
+    Sides,
+    TrianglePlates,
+    sides,
+    stiffness,
+    triangle_plates,
+    without_free_sides,
+)
 from foldyn.shells.term import GROUPS, ShellTerm
 from foldyn.structures import Sheet
 from foldyn.structures.beyond_range import doubt_locking
@@ -34,14 +42,22 @@ from foldyn.structures.discretize import checked_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.graded import Grading, grading
 from foldyn.structures.mass import MASS_RULES
-from foldyn.structures.mesh import lengths
+from foldyn.structures.membranes import PanelKind, swelling
+from foldyn.structures.mesh import double_areas, lengths
 from foldyn.structures.plausibility import doubt_units
-from foldyn.structures.rigid_plates import Plate, check_welds, checked_panels, rigid_plates
+from foldyn.structures.rigid_plates import (
+    Plate,
+    check_welds,
+    checked_panels,
+    rigid_panels,
+    rigid_plates,
+)
 from foldyn.structures.swelling import Swelling, chord_turns
 from foldyn.values import choice, length, show, whole
 
 MASSES = {"lumped": "centroid", "consistent": "consistent"}  # and the rules they are
 STIFF = 100.0  # times the stiffness in the plane: corners about vertices that count as rigid
+RANDOM = 0.05  # of rounding errors, how much is left where many of either sign add up
 PER_NODE = 16_000.0
 """Bytes a node with its tangent: 14,200 and 16,000 measured with 3,721 and 14,641 nodes."""
 PER_DOUBLING, LEAST = 5900.0, 1450
@@ -150,7 +166,9 @@ class Shell(Discretized):
     @cached_property
     def body(self) -> Assembly:
         """What solvers take."""
-        return Assembly(ShellTerm(self.model, self.sides.piece_crease, self.fold_law))
+        laws = self.fold_law, LinearHinge()
+        sheet = ShellTerm(self.model, laws, self.sides.piece_crease, self._scale)
+        return Assembly(sheet, *(MembranesTerm(own, sheet.rows) for _, own in self.membranes))
 
     @property
     def rotations(self) -> int:
@@ -163,33 +181,31 @@ class Shell(Discretized):
         Triangles have a free strain of their sides and a free rotation beta0 of the sheet at them
         (see `shells.sides`): their energies are linear in those, which makes constant forces.
         """
-        model, panel = self.model, self.triangle_panel
-        free = 0.5 * ((1.0 + strain[panel]) ** 2 - 1.0)
-        tension = -(model.membrane @ np.ones(3)) * free[:, None] * model.per_length2
+        panel, plates, hinges = self.triangle_panel, self._plates, self.sides.hinges
+        bends = ~np.isin(panel, rigid_panels(self.options.rigid, len(self.pattern.faces)))
+        parts, stretched, pushed = swelling(self.membranes, None, self.nodes, strain)
         corners = self.triangles[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]]
         turns = chord_turns(self.nodes[corners.reshape(-1, 3)]).reshape(-1, 3)
-        turned_by = -curvature[panel, None] * turns
-        moment = np.einsum("tkm,tm->tk", model.bending, turned_by)
-        has, turned = model.hinge >= 0, model.rotation >= 0
-        on_hinge = np.bincount(
-            model.hinge[has], (model.weight * moment)[has], minlength=len(model.hinges)
-        )
-        hidden = np.bincount(
-            model.rotation[turned], (model.sign * moment)[turned], minlength=model.rotations
-        )
-        sides, hinges = corners[:, :, :2].reshape(-1, 2), model.hinges
-        rows = np.where(hinges < len(self.nodes), hinges, -1)
+        rotated = np.where(bends, -curvature[panel], 0.0)[:, None] * turns  # of sides
+        moment = np.einsum("tkm,tm->tk", self._stiffness[1], rotated).ravel()[plates.side]
+        moment = plates.share * moment
+        on_hinge = plates.angle >= 0
+        turning = np.bincount(plates.angle[on_hinge], moment[on_hinge], len(hinges))
+        hidden = np.bincount(-1 - plates.angle[~on_hinge], moment[~on_hinge], self.rotations)
+        rows, points = np.where(hinges < len(self.nodes), hinges, -1), self._points
         parts = (
-            tensions(self.nodes, sides, tension.ravel()),
-            moments(model.rest[hinges], rows, on_hinge),
-            pushes(self.nodes.size + np.arange(model.rotations), model.per_reach * hidden),
+            *parts,
+            moments(points[hinges], rows, turning),
+            pushes(self.nodes.size + np.arange(self.rotations), self.model.per_reach * hidden),
         )
-        pushed = (model.membrane @ np.ones(3)) * free[:, None]
+        # the last angle of a side gives it the whole rotation
+        last = np.append(plates.side[1:] != plates.side[:-1], True)
+        free = np.where(last, rotated.ravel()[plates.side] / plates.share, 0.0)
         return Swelling(
             np.zeros(len(self.folds)),
             joined((part, 0) for part in parts),
-            (np.broadcast_to(free[:, None], pushed.shape).ravel(), turned_by.ravel()),
-            (pushed.ravel(), moment.ravel()),
+            (stretched, free),
+            (pushed, moment),
         )
 
     @cached_property
@@ -197,7 +213,7 @@ class Shell(Discretized):
         """Hinge row (nf, 4) of the first piece of each crease: axis j, k, wings i, l."""
         crease, first = np.unique(self.sides.piece_crease, return_index=True)
         rows = np.zeros((len(self.fold_stiffness), 4), np.int64)
-        rows[crease] = self.sides.hinges[self.sides.piece_hinge[first]]
+        rows[crease] = self.sides.hinges[first]
         return read_only(rows)
 
     @cached_property
@@ -232,41 +248,85 @@ class Shell(Discretized):
         return float(np.sqrt((self.bar_length**2).mean()))
 
     @cached_property
-    def model(self) -> ShellModel:
-        """The arrays that the compiled kernels work on."""
-        corners, ends, law = self.nodes[self.triangles], self.sides, self.fold_law
-        side = np.roll(corners, -1, axis=1) - corners
-        membrane, bending = stiffness(corners, self.triangle_panel, self.sheet)
+    def _stiffness(self) -> tuple[NDArray, NDArray]:
+        """Of the triangles (nt, 3, 3): J of strains of their sides, N m of rotations there."""
+        membrane, bending = stiffness(self.nodes[self.triangles], self.triangle_panel, self.sheet)
         if self.graded:
             membrane[(self.triangles < len(self.pattern.vertices)).any(axis=1)] *= STIFF
-        rest = np.concatenate([self.nodes, ends.wings]) - self.nodes.mean(axis=0)
-        hinge_rest = mechanics.angles(rest, ends.hinges.astype(np.uint32))
-        length = lengths(self.nodes, ends.hinges[ends.piece_hinge])
+        return membrane, without_free_sides(bending, self.sides.free)
+
+    @cached_property
+    def membranes(self) -> tuple[PanelKind, ...]:
+        """The triangles as membranes, each of its panel."""
+        corners = self.nodes[self.triangles]
+        side = np.roll(corners, -1, axis=1) - corners
+        own = Membranes(
+            nodes=self.triangles.copy(),
+            ends=np.array([[0, 1], [1, 2], [2, 0]]),
+            vector=np.ascontiguousarray(side.transpose(1, 2, 0)),
+            per_length2=1.0 / np.einsum("tki,tki->kt", side, side),
+            stiffness=np.ascontiguousarray(self._stiffness[0].transpose(1, 2, 0)),
+        )
+        return (PanelKind(self.triangle_panel, own),)
+
+    @cached_property
+    def _plates(self) -> TrianglePlates:
+        """The triangles as plates."""
+        return triangle_plates(self.sides, self._stiffness[1])
+
+    @property
+    def _points(self) -> NDArray:
+        """Nodes, and wings of clamped sides, from the mean of the nodes (n + g, 3), m."""
+        return np.concatenate([self.nodes, self.sides.wings]) - self.nodes.mean(axis=0)
+
+    @cached_property
+    def model(self) -> BarsPlates:
+        """The arrays that the compiled kernels work on, without the membranes."""
+        ends, law, points = self.sides, self.fold_law, self._points
+        pieces, wings = len(ends.piece_crease), len(ends.wings)
+        hinges, angle = ends.hinges.copy(), mechanics.angles(points, ends.hinges.astype(np.uint32))
+        clamped = hinges[len(hinges) - wings :]
+        clamped[:, 3] = clamped[:, 0]
+        length = lengths(self.nodes, hinges[:pieces])
         whole = np.bincount(ends.piece_crease, length, len(self.fold_stiffness))
-        return ShellModel(
-            nodes=len(self.nodes),
+        bars = mechanics.build(self.nodes, self.bars, np.ones(len(self.bars)), LinearBar(), ())
+        plates = {name: getattr(self._plates, name) for name in TrianglePlates._fields[:5]}
+        return BarsPlates(
+            bars=bars._replace(bar_runs=bars.bar_runs[:0]),
             rotations=self.rotations,
             per_reach=1.0 / self._reach,
-            rest=rest,
-            triangles=self.triangles.copy(),
-            side=np.ascontiguousarray(side),
-            per_length2=1.0 / np.einsum("tki,tki->tk", side, side),
-            membrane=np.ascontiguousarray(membrane),
-            bending=np.ascontiguousarray(without_free_sides(bending, ends.free)),
-            hinges=ends.hinges,
-            hinge_rest=hinge_rest,
-            hinge=ends.hinge,
-            weight=ends.weight,
-            rotation=ends.rotation,
-            sign=ends.sign,
-            piece_hinge=ends.piece_hinge,
-            piece_rotations=ends.piece_rotations,
-            piece_stiffness=(self.fold_stiffness / whole)[ends.piece_crease] * length,
-            piece_rest=self.piece_rest.copy(),
-            piece_parameters=law.parameters(self.piece_rest).reshape(-1, 4),
+            hinges=hinges,
+            wings=points[len(self.nodes) :] - points[clamped[:, :2]].mean(axis=1),
+            fold_rotations=ends.piece_rotations,
+            fold_stiffness=(self.fold_stiffness / whole)[ends.piece_crease] * length,
+            fold_rest=self.piece_rest.copy(),
+            fold_parameters=law.parameters(self.piece_rest).reshape(-1, 4),
             code=int(law.code),
             addresses=np.array(law.addresses or (0, 0, 0), np.int64),
+            bend_rest=angle[pieces:],
+            **plates,
         )
+
+    @property
+    def _scale(self) -> NDArray:
+        """Stiffness of the triangles' sides in the plane times their lengths, summed at nodes.
+
+        Turns of sides come from positions, whose rounding errors small triangles feel: with them
+        the moments of a turn by what lies between node and origin, over a triangle's height. These
+        errors are random, about a twentieth of what they could add up to.
+        """
+        (membrane, bending), ((_, own),) = self._stiffness, self.membranes
+        per_length = np.sqrt(own.per_length2.T)
+        stiff = np.abs(membrane).sum(axis=2) * per_length
+        double = np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
+        height = double * per_length.min(axis=1)
+        reach = np.linalg.norm(self._points, axis=1).max(initial=0.0)
+        stiff += RANDOM * np.abs(bending).sum(axis=2) * (reach / height**2)[:, None]
+        nodal = np.zeros(len(self.nodes))
+        for end in (0, -1):
+            np.add.at(nodal, np.roll(self.triangles, end, axis=1), stiff)
+        turning = np.abs(bending).sum(axis=(1, 2)).max(initial=0.0) / self._reach
+        return np.concatenate([np.repeat(nodal, 3), np.full(self.rotations, turning)])
 
     @cached_property
     def mass(self) -> sparse.csr_array:
@@ -409,9 +469,8 @@ def shell(
     )  # fmt: skip
     check_sheet(sheet, pattern)
     mesh = shell_mesh(pattern, divisions, graded)
-    chosen = range(len(pattern.faces)) if isinstance(plates, str) else plates or ()
-    ends = sides(mesh, pattern, edges, chosen)
-    pieces = ends.hinges[ends.piece_hinge]
+    ends = sides(mesh, pattern, edges, rigid_panels(plates, len(pattern.faces)))
+    pieces = ends.hinges[: len(ends.piece_crease)]
     made = Shell(
         nodes=mesh.nodes,
         triangles=mesh.triangles,

@@ -45,14 +45,14 @@ class Sides(NamedTuple):
     beta = weight d[hinge] + sign x[rotation], where there is a hinge or a rotation (else -1).
     """
 
-    hinges: NDArray  # (nh, 4) axis j, k, wings i, l; nodes from n on are wings that ride
+    hinges: NDArray  # (nh, 4) axis j, k, wings i, l; first of the pieces of creases, last of the
+    # clamped sides, whose nodes from n on are wings that ride
     hinge: NDArray  # (nt, 3)
     weight: NDArray  # (nt, 3)
     rotation: NDArray  # (nt, 3)
     sign: NDArray  # (nt, 3)
     free: NDArray  # (nt, 3) bool
     rotations: int
-    piece_hinge: NDArray  # (c,)
     piece_rotations: NDArray  # (c, 2) -1 where there is none
     piece_crease: NDArray  # (c,) number of the pattern's crease
     wings: NDArray  # (g, 3) m
@@ -81,14 +81,15 @@ def sides(
     one, two = order[:-1][same], order[1:][same]
     alone = np.setdiff1d(np.arange(3 * count), np.concatenate([one, two]))
 
-    hinges = [np.stack([low[one], high[one], third[one], third[two]], axis=1)]
-    hinge, rotation = np.full((2, 3 * count), -1)
-    weight, sign = np.zeros((2, 3 * count))
-    numbers = np.arange(len(one))
     folded = mesh.panel[one // 3] != mesh.panel[two // 3]
     between = zip(low[one[folded]].tolist(), high[one[folded]].tolist(), strict=True)
     folded[folded] = [pair in crease_of for pair in between]
-    smooth = ~folded
+    first = np.argsort(~folded, kind="stable")  # pieces of creases come first
+    one, two, folded = one[first], two[first], folded[first]
+    hinges = [np.stack([low[one], high[one], third[one], third[two]], axis=1)]
+    hinge, rotation = np.full((2, 3 * count), -1)
+    weight, sign = np.zeros((2, 3 * count))
+    numbers, smooth = np.arange(len(one)), ~folded
     for side, turn in ((one, 1.0), (two, -1.0)):
         hinge[side[smooth]], weight[side[smooth]] = numbers[smooth], 0.5
         sign[side] = turn
@@ -120,7 +121,6 @@ def sides(
         sign=sign.reshape(-1, 3),
         free=free.reshape(-1, 3),
         rotations=rotations,
-        piece_hinge=numbers[folded],
         piece_rotations=pieces,
         piece_crease=np.array([crease_of[pair] for pair in pairs], np.int64),
         wings=np.array(wings).reshape(-1, 3),
@@ -154,6 +154,42 @@ def stiffness(corners: NDArray, panel: NDArray, sheet: Sheet) -> tuple[NDArray, 
             corners[rows], nu, stretching, own.bending_modulus
         )
     return membrane, bending
+
+
+class TrianglePlates(NamedTuple):
+    """Triangles as plates: what `BarsPlates` has of them, and how their sides turn."""
+
+    rotation_hinge: NDArray
+    start: NDArray
+    angle: NDArray
+    entry: NDArray
+    stiffness: NDArray
+    side: NDArray  # (nq,) 3 t + k of the side k of triangle t that each angle turns
+    share: NDArray  # (nq,) of the rotation of the side, in a turn of one
+
+
+def triangle_plates(ends: Sides, bending: NDArray) -> TrianglePlates:
+    """Triangles with the stiffness `bending` (nt, 3, 3) of the rotations of their sides."""
+    size = (len(bending), 6)
+    angle = np.stack([ends.hinge, -1 - ends.rotation], axis=2).reshape(size)
+    share = np.stack([ends.weight, ends.sign], axis=2).reshape(size)
+    there, side = share != 0.0, np.repeat(np.arange(3), 2)
+    whole = share[:, :, None] * bending[:, side][:, :, side] * share[:, None]
+    count = there.sum(axis=1)
+    at = np.zeros(ends.rotations, np.int64)
+    smooth = (ends.hinge >= 0) & (ends.rotation >= 0)
+    at[ends.rotation[smooth]] = ends.hinge[smooth]
+    piece, beside = np.nonzero(ends.piece_rotations >= 0)
+    at[ends.piece_rotations[piece, beside]] = piece
+    return TrianglePlates(
+        rotation_hinge=at,
+        start=np.concatenate([[0], np.cumsum(count)]),
+        angle=angle[there],
+        entry=np.concatenate([[0], np.cumsum(count**2)]),
+        stiffness=whole[there[:, :, None] & there[:, None]],
+        side=(3 * np.arange(len(bending))[:, None] + side)[there],
+        share=share[there],
+    )
 
 
 def without_free_sides(bending: NDArray, free: NDArray) -> NDArray:

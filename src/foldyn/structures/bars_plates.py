@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, partial
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +53,8 @@ class BarsPlatesTerm(SheetTerm):
     """
 
     energy_groups = GROUPS
+    _groups: ClassVar = (0, 1, 2)  # of bars, folds and bends
+    _no_slope: ClassVar[str] = "such folds have no slope at rest; with the scheme n5b8e modes and"
 
     def __init__(
         self, model: BarsPlates, laws: tuple[HingeLaw, HingeLaw], like: BarsPlatesTerm | None = None
@@ -139,7 +141,7 @@ class BarsPlatesTerm(SheetTerm):
 
     def compiled(self, work: Any, kept: PlatesWork, group: int) -> Compiled:
         """See `Term`."""
-        return plates_kernels(self.model, kept, self.rows)
+        return plates_kernels(self.model, kept, self.rows, self._groups)
 
     def arrays(self) -> Arrays:
         """See `Term`."""
@@ -185,7 +187,7 @@ class BarsPlatesTerm(SheetTerm):
         bars = self._bars.turn(q[: self._nodal], other[: self._nodal])
         return largest_turn(bars, self.angles(q), self.angles(other))
 
-    def plate_energies(self, q: NDArray, strain: NDArray, turn: NDArray) -> NDArray:
+    def plate_energies(self, q: NDArray, turn: NDArray) -> NDArray:
         """See `SheetTerm`."""
         model, work, (displacement, rotation) = self.model, plates_work(self.model), self._split(q)
         turn_hinges(model, displacement, work)
@@ -217,8 +219,8 @@ class BarsPlatesTerm(SheetTerm):
         """See `SheetTerm`: none."""
         if self.model.code == Superlinear.code:
             raise InputError(
-                ' = "superlinear": such folds have no slope at rest; with the scheme n5b8e modes '
-                'and frequency responses take "linear" or "enhanced"',
+                f' = "superlinear": {self._no_slope} frequency responses take "linear" or '
+                '"enhanced"',
                 "fold_law",
             )
         return super().soft_hinges(q)
@@ -288,7 +290,7 @@ class BarsPlatesTerm(SheetTerm):
         bars = self.model.bars._replace(bar_runs=self.model.bars.bar_runs[:0])
         return self._with(self.model._replace(bars=bars))
 
-    def unstrained(self, q: NDArray) -> Unstrained:
+    def unstrained(self, q: NDArray) -> Unstrained | None:
         """See `SheetTerm`."""
         model, bars = self.model, self._bars.unstrained_model(q[: self._nodal])
         angle, folds = self.angles(q), len(model.fold_rest)

@@ -47,7 +47,7 @@ STRAIGHT = 100.0  # resistance, over E t and the area, from which edges are stra
 class PanelKind(NamedTuple):
     """Panels of one kind: which, and their membranes."""
 
-    panels: NDArray  # (p,)
+    panels: NDArray  # (p,), of a shell those of its triangles
     membranes: Membranes
 
 
@@ -261,7 +261,8 @@ def energies(
             end = first + bars * count
             own_free, first = free[:, first:end].reshape(samples, bars, count), end
             strain -= own_free.transpose(1, 0, 2)
-        out[:, which] = 0.5 * np.einsum("isp,ijp,jsp->sp", strain, own.stiffness, strain)
+        energy = 0.5 * np.einsum("isp,ijp,jsp->sp", strain, own.stiffness, strain)
+        np.add.at(out.T, which, energy.T)
     for sample, here in enumerate(u if gives else ()):
         assert gives is not None
         strain = gives.strains(here)

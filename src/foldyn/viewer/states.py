@@ -85,7 +85,7 @@ def states(case: Case, result: Any, displacement: NDArray) -> States:
             hidden = q[body.hidden]
             there = np.minimum(hinges.hidden, body.size)
             angle[k] -= (np.append(q, 0.0)[there] * hinges.hidden_turn).sum(axis=1)
-            found.append(here.sheet.plate_energies(q, free[k], curl[k]))
+            found.append(here.sheet.plate_energies(q, curl[k]))
         plates = np.array(found)
     if count := body.sheet.offsets:
         angle += changes[:, -count:] + body.sheet.rest_angles[-count:]
@@ -147,12 +147,11 @@ def energy_density(structure: Any, displacement: NDArray, found: States) -> NDAr
     panel, pairs, parts = structure.triangle_panel, [found.pairs], [found.energy]
     triangle = 0.5 * np.linalg.norm(double_areas(structure.nodes, structure.triangles), axis=1)
     area = np.bincount(panel, triangle)
-    panels = np.zeros((len(displacement), len(area)))
+    panels = membranes.energies(
+        structure.membranes, getattr(structure, "edge_gives", None), structure.nodes, displacement,
+        len(area), found.free if found.free.shape[1] else None,
+    )  # fmt: skip
     if isinstance(structure, Structure):
-        panels += membranes.energies(
-            structure.membranes, structure.edge_gives, structure.nodes, displacement, len(area),
-            found.free if found.free.shape[1] else None,
-        )  # fmt: skip
         if not structure.membranes:
             stiffness = structure.sheet.youngs_modulus * structure.bar_area * structure.bar_length
             strain, law = bar_strain(structure, displacement), structure.bar_law
