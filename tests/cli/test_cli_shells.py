@@ -8,7 +8,7 @@ import pytest
 import foldyn as fd
 from case_texts import changed
 
-SHELL = 'model = { kind = "shell", divisions = 2 }'
+SHELL = 'model = { kind = "shell", divisions = 2 }; analysis.method ='
 STATICS = 'output =; loads[0].history =; analysis = { kind = "statics", steps = 2 }'
 AS_SHELL = ("--no-figures", "--model", "shell", "--divisions", "2")
 

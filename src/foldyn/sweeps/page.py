@@ -101,12 +101,12 @@ def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]
         kept = {dim: value for dim, value in at.items() if dim != by}
         lines = text if by not in own else str(one.attrs["long_name"]).capitalize()
         caption = f"{lines}, over {sweep[names[0]].attrs['long_name']}."
-        draw = partial(plots.plot_sweep_lines, sweep, name, names[0], by, kept)
+        draw = partial(plots.plot_sweep_lines, sweep, name, x=names[0], by=by, at=kept)
         charts = Charts([line_chart(sweep, name, names[0], by, kept, MOST_CURVES)], caption)
         yield from album.figure(f"lines-{name}", caption, draw, charts)
     elif len(names) == 1:
         caption = f"{text}, at all points."
-        draw = partial(plots.plot_sweep_lines, sweep, name, names[0], None, at)
+        draw = partial(plots.plot_sweep_lines, sweep, name, x=names[0], at=at)
         charts = Charts(effect_charts(sweep, name, at, True), caption)
         yield from album.figure(f"lines-{name}", caption, draw, charts)
     if sweep.attrs["method"] == SALTELLI:
