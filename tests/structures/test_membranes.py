@@ -272,7 +272,7 @@ def test_extrapolated_stress_saves_iterations(preset, monkeypatch):
     monkeypatch.setattr(
         MembranesTerm,
         "mean_entries",
-        lambda term, q0, q1, before, again, floor: mean(term, q0, q1, q1, True, floor),
+        lambda term, q0, q1, way, floor: mean(term, q0, q1, (q1, q1), floor),
     )
     plain = fallen()
     np.testing.assert_allclose(plain.displacement, quick.displacement, atol=1e-8)

@@ -230,7 +230,7 @@ class Assembly:
         flat, old = (np.ascontiguousarray(x, float).ravel()[: self.size] for x in (q, before))
         known = [type(term).tangent is Term.tangent for term in self.others]
         for term in compress(self.others, known):
-            matrix = term.slots.added(matrix, term.step_entries(flat, old, True, floor))
+            matrix = term.slots.added(matrix, term.step_entries(flat, (old, flat), floor))
         for term in compress(self.others, np.logical_not(known)):  # whose places change
             matrix = sparse.csr_array(matrix + term.tangent(flat, floor))
         return matrix
@@ -381,7 +381,8 @@ class AssembledBlocks:
     ) -> None:  # fmt: skip
         """See `Blocks`."""
         self._sheet.put(of.sheet, pattern, u, before, again, out)
-        own = [term.step_entries(u, before, again, FLOOR) for term in _with_places(of)]
+        way = before, u if again else before
+        own = [term.step_entries(u, way, FLOOR) for term in _with_places(of)]
         self._add(pattern, own, out)
 
     def put_mean(
@@ -390,8 +391,9 @@ class AssembledBlocks:
     ) -> None:  # fmt: skip
         """See `Blocks`."""
         self._sheet.put_mean(of.sheet, pattern, u0, u1, angle, before, again, out)
-        step = u0, u1, before, again, FLOOR
-        self._add(pattern, [term.mean_entries(*step) for term in _with_places(of)], out)
+        way = before, u1 if again else before
+        own = [term.mean_entries(u0, u1, way, FLOOR) for term in _with_places(of)]
+        self._add(pattern, own, out)
 
     def _add(self, pattern: Sparsity, entries: Sequence[NDArray], out: NDArray) -> None:
         """Add the entries of further terms."""

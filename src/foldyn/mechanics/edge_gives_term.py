@@ -13,7 +13,7 @@ from foldyn.mechanics.edge_gives import EdgeGives, balanced_kernels, gives_kerne
 from foldyn.mechanics.edge_gives_pullback import balanced_pulled, gives_pulled
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.pullback import Arrays, Pulled, arrays_of
-from foldyn.mechanics.term import Compiled, Term, Unstrained, nodal
+from foldyn.mechanics.term import Compiled, Term, Unstrained, Way, nodal
 
 
 class EdgeGivesTerm(Term):
@@ -63,9 +63,7 @@ class EdgeGivesTerm(Term):
         """See `Term`."""
         return panel_tangents(self.gives, nodal(q), nodal(q), self._gives(q)).ravel()
 
-    def mean_entries(
-        self, q0: NDArray, q1: NDArray, before: NDArray, again: bool, floor: float
-    ) -> NDArray:
+    def mean_entries(self, q0: NDArray, q1: NDArray, way: Way, floor: float) -> NDArray:
         """See `Term`."""
         mean = 0.5 * (self._gives(q0) + self._gives(q1))
         return 0.5 * panel_tangents(self.gives, nodal(q0), nodal(q1), mean).ravel()
@@ -119,11 +117,9 @@ class BalancedGivesTerm(EdgeGivesTerm):
         """See `Term`: without the places, which would take more room than the matrix."""
         return sparse.csr_array(self._condensed(q, self._gives(q)))
 
-    def mean_entries(
-        self, q0: NDArray, q1: NDArray, before: NDArray, again: bool, floor: float
-    ) -> NDArray:
+    def mean_entries(self, q0: NDArray, q1: NDArray, way: Way, floor: float) -> NDArray:
         """See `Term`."""
-        return Term.mean_entries(self, q0, q1, before, again, floor)
+        return Term.mean_entries(self, q0, q1, way, floor)
 
     def _condensed(self, q: NDArray, g: NDArray) -> NDArray:
         """Tangent of displacements, the gives g giving way with them."""

@@ -20,7 +20,7 @@ from foldyn.mechanics.inelastic import (
     memory_tangents,
 )
 from foldyn.mechanics.sheet_term import SheetTerm
-from foldyn.mechanics.term import Compiled, Term, in_rows
+from foldyn.mechanics.term import Compiled, Term, Way, in_rows
 from foldyn.mechanics.viscous import WIDTH, coupled
 
 
@@ -119,9 +119,7 @@ class HingeMemory(Term):
         memory_tangents(own, u, out)
         return out[self._coupled[0]]
 
-    def mean_entries(
-        self, q0: NDArray, q1: NDArray, before: NDArray, again: bool, floor: float
-    ) -> NDArray:
+    def mean_entries(self, q0: NDArray, q1: NDArray, way: Way, floor: float) -> NDArray:
         """See `Term`."""
         out = np.empty((len(self.own.rest), WIDTH, WIDTH))
         ends = in_rows(q0, self._rows), in_rows(q1, self._rows)

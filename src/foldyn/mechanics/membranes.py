@@ -35,6 +35,7 @@ from foldyn.mechanics.term import (
     Strains,
     Term,
     Unstrained,
+    Way,
     energies,
     forces,
     mean_forces,
@@ -442,18 +443,16 @@ class MembranesTerm(Term):
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
         """See `Term`."""
-        return self.step_entries(q, q, False, floor)
+        return self.step_entries(q, (q, q), floor)
 
-    def step_entries(self, q: NDArray, before: NDArray, again: bool, floor: float) -> NDArray:
+    def step_entries(self, q: NDArray, way: Way, floor: float) -> NDArray:
         """See `Term`."""
-        return self._entries(q, q, self._strains(before, q if again else before))
+        return self._entries(q, q, self._strains(*way))
 
-    def mean_entries(
-        self, q0: NDArray, q1: NDArray, before: NDArray, again: bool, floor: float
-    ) -> NDArray:
+    def mean_entries(self, q0: NDArray, q1: NDArray, way: Way, floor: float) -> NDArray:
         """See `Term`."""
-        end = self._strains(before, q1 if again else before)
-        return 0.5 * self._entries(q0, q1, 0.5 * (self._strains(q0, q0) + end))
+        strain = 0.5 * (self._strains(q0, q0) + self._strains(*way))
+        return 0.5 * self._entries(q0, q1, strain)
 
     def _strains(self, q0: NDArray, q1: NDArray) -> NDArray:
         return strains_toward(self.membranes, nodal(q0), nodal(q1))

@@ -61,6 +61,7 @@ from foldyn.values import writable
 ) = EVERY = range(9)  # fmt: skip
 MEAN_FORCES = 9  # of `dynamics.energy_momentum` alone
 ADDRESS, NUMBER = types.int64, types.float64
+Way = tuple[NDArray, NDArray]  # states: from one, stresses are extrapolated to the other
 
 forces = addressed(ADDRESS, ADDRESS, NUMBER, ADDRESS, ADDRESS)
 energies = addressed(ADDRESS, ADDRESS)
@@ -200,14 +201,15 @@ class Term(ABC):
         """
         return np.zeros(0)
 
-    def step_entries(self, q: NDArray, before: NDArray, again: bool, floor: float) -> NDArray:
-        """What a step of Newton's method takes for these (k,); see `sheet_term.Blocks.put`."""
+    def step_entries(self, q: NDArray, way: Way, floor: float) -> NDArray:
+        """What a step of Newton's method takes for these (k,), with the stresses of a way."""
         return self.entries(q, floor)
 
-    def mean_entries(
-        self, q0: NDArray, q1: NDArray, before: NDArray, again: bool, floor: float
-    ) -> NDArray:
-        """Derivative (k,) likewise of its mean forces from q0 to q1, after these, by q1."""
+    def mean_entries(self, q0: NDArray, q1: NDArray, way: Way, floor: float) -> NDArray:
+        """Derivative (k,) likewise of its mean forces from q0 to q1, after these, by q1.
+
+        way : of the stresses at q1.
+        """
         return 0.5 * self.entries(0.5 * (q0 + q1), floor)
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from foldyn import mechanics
 from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, LinearBar, LinearHinge, hinge_law
@@ -26,7 +25,6 @@ from foldyn.ram_limit import check_memory
 from foldyn.shells.mesh import shell_mesh
 from foldyn.shells.sides import (
     Sides,
-    TrianglePlates,
     sides,
     stiffness,
     triangle_plates,
@@ -40,10 +38,11 @@ from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness, per_crease
 from foldyn.structures.discretize import checked_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
+from foldyn.structures.edge_angles import EdgePlates, plates_model
 from foldyn.structures.graded import Grading, grading
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.membranes import PanelKind, swelling
-from foldyn.structures.mesh import double_areas, lengths
+from foldyn.structures.mesh import double_areas, hinge_angles, lengths
 from foldyn.structures.plausibility import doubt_units
 from foldyn.structures.rigid_plates import (
     Plate,
@@ -181,26 +180,26 @@ class Shell(Discretized):
         Triangles have a free strain of their sides and a free rotation beta0 of the sheet at them
         (see `shells.sides`): their energies are linear in those, which makes constant forces.
         """
-        panel, plates, hinges = self.triangle_panel, self._plates, self.sides.hinges
+        panel, hinges, (plates, side, share) = self.triangle_panel, self.sides.hinges, self._plates
         bends = ~np.isin(panel, rigid_panels(self.options.rigid, len(self.pattern.faces)))
         parts, stretched, pushed = swelling(self.membranes, None, self.nodes, strain)
         corners = self.triangles[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]]
         turns = chord_turns(self.nodes[corners.reshape(-1, 3)]).reshape(-1, 3)
         rotated = np.where(bends, -curvature[panel], 0.0)[:, None] * turns  # of sides
-        moment = np.einsum("tkm,tm->tk", self._stiffness[1], rotated).ravel()[plates.side]
-        moment = plates.share * moment
+        moment = share * np.einsum("tkm,tm->tk", self._stiffness[1], rotated).ravel()[side]
         on_hinge = plates.angle >= 0
         turning = np.bincount(plates.angle[on_hinge], moment[on_hinge], len(hinges))
         hidden = np.bincount(-1 - plates.angle[~on_hinge], moment[~on_hinge], self.rotations)
-        rows, points = np.where(hinges < len(self.nodes), hinges, -1), self._points
+        rows = np.where(hinges < len(self.nodes), hinges, -1)
+        points = np.concatenate([self.nodes, self.sides.wings])
         parts = (
             *parts,
             moments(points[hinges], rows, turning),
             pushes(self.nodes.size + np.arange(self.rotations), self.model.per_reach * hidden),
         )
         # the last angle of a side gives it the whole rotation
-        last = np.append(plates.side[1:] != plates.side[:-1], True)
-        free = np.where(last, rotated.ravel()[plates.side] / plates.share, 0.0)
+        last = np.append(side[1:] != side[:-1], True)
+        free = np.where(last, rotated.ravel()[side] / share, 0.0)
         return Swelling(
             np.zeros(len(self.folds)),
             joined((part, 0) for part in parts),
@@ -242,10 +241,10 @@ class Shell(Discretized):
         """Rest dihedrals of the folds (nf,), rad: the mean along each crease."""
         return read_only(self.body.sheet.rest_angles)
 
-    @cached_property
+    @property
     def _reach(self) -> float:
         """Length (m) that turns a rotation into a displacement: that of a side."""
-        return float(np.sqrt((self.bar_length**2).mean()))
+        return 1.0 / self.model.per_reach
 
     @cached_property
     def _stiffness(self) -> tuple[NDArray, NDArray]:
@@ -270,42 +269,23 @@ class Shell(Discretized):
         return (PanelKind(self.triangle_panel, own),)
 
     @cached_property
-    def _plates(self) -> TrianglePlates:
-        """The triangles as plates."""
+    def _plates(self) -> tuple[EdgePlates, NDArray, NDArray]:
+        """See `triangle_plates`."""
         return triangle_plates(self.sides, self._stiffness[1])
-
-    @property
-    def _points(self) -> NDArray:
-        """Nodes, and wings of clamped sides, from the mean of the nodes (n + g, 3), m."""
-        return np.concatenate([self.nodes, self.sides.wings]) - self.nodes.mean(axis=0)
 
     @cached_property
     def model(self) -> BarsPlates:
         """The arrays that the compiled kernels work on, without the membranes."""
-        ends, law, points = self.sides, self.fold_law, self._points
-        pieces, wings = len(ends.piece_crease), len(ends.wings)
-        hinges, angle = ends.hinges.copy(), mechanics.angles(points, ends.hinges.astype(np.uint32))
-        clamped = hinges[len(hinges) - wings :]
-        clamped[:, 3] = clamped[:, 0]
-        length = lengths(self.nodes, hinges[:pieces])
-        whole = np.bincount(ends.piece_crease, length, len(self.fold_stiffness))
-        bars = mechanics.build(self.nodes, self.bars, np.ones(len(self.bars)), LinearBar(), ())
-        plates = {name: getattr(self._plates, name) for name in TrianglePlates._fields[:5]}
-        return BarsPlates(
-            bars=bars._replace(bar_runs=bars.bar_runs[:0]),
-            rotations=self.rotations,
-            per_reach=1.0 / self._reach,
-            hinges=hinges,
-            wings=points[len(self.nodes) :] - points[clamped[:, :2]].mean(axis=1),
-            fold_rotations=ends.piece_rotations,
-            fold_stiffness=(self.fold_stiffness / whole)[ends.piece_crease] * length,
-            fold_rest=self.piece_rest.copy(),
-            fold_parameters=law.parameters(self.piece_rest).reshape(-1, 4),
-            code=int(law.code),
-            addresses=np.array(law.addresses or (0, 0, 0), np.int64),
-            bend_rest=angle[pieces:],
-            **plates,
-        )
+        hinges, crease = self.sides.hinges, self.sides.piece_crease
+        folds, bends, clamps = np.split(hinges, [len(crease), len(hinges) - len(self.sides.wings)])
+        length = lengths(self.nodes, folds)
+        whole = np.bincount(crease, length, len(self.fold_stiffness))
+        model = plates_model(
+            self.nodes, self.bars, np.ones(len(self.bars)), LinearBar(), folds,
+            (self.fold_stiffness / whole)[crease] * length, self.piece_rest, self.fold_law, bends,
+            hinge_angles(self.nodes, bends), self._plates[0], clamps[:, :3],
+        )  # fmt: skip
+        return model._replace(bars=model.bars._replace(bar_runs=model.bars.bar_runs[:0]))
 
     @property
     def _scale(self) -> NDArray:
@@ -320,7 +300,7 @@ class Shell(Discretized):
         stiff = np.abs(membrane).sum(axis=2) * per_length
         double = np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
         height = double * per_length.min(axis=1)
-        reach = np.linalg.norm(self._points, axis=1).max(initial=0.0)
+        reach = np.linalg.norm(self.nodes - self.nodes.mean(axis=0), axis=1).max(initial=0.0)
         stiff += RANDOM * np.abs(bending).sum(axis=2) * (reach / height**2)[:, None]
         nodal = np.zeros(len(self.nodes))
         for end in (0, -1):

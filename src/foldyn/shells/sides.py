@@ -36,6 +36,7 @@ from foldyn.patterns.topology import Edge, edge_lookup, edge_of
 from foldyn.shells.mesh import ShellMesh
 from foldyn.structures import Sheet
 from foldyn.structures.clamps import opposite
+from foldyn.structures.edge_angles import EdgePlates
 
 
 class Sides(NamedTuple):
@@ -156,20 +157,12 @@ def stiffness(corners: NDArray, panel: NDArray, sheet: Sheet) -> tuple[NDArray, 
     return membrane, bending
 
 
-class TrianglePlates(NamedTuple):
-    """Triangles as plates: what `BarsPlates` has of them, and how their sides turn."""
+def triangle_plates(ends: Sides, bending: NDArray) -> tuple[EdgePlates, NDArray, NDArray]:
+    """Triangles as plates, with the stiffness `bending` (nt, 3, 3) of rotations of their sides.
 
-    rotation_hinge: NDArray
-    start: NDArray
-    angle: NDArray
-    entry: NDArray
-    stiffness: NDArray
-    side: NDArray  # (nq,) 3 t + k of the side k of triangle t that each angle turns
-    share: NDArray  # (nq,) of the rotation of the side, in a turn of one
-
-
-def triangle_plates(ends: Sides, bending: NDArray) -> TrianglePlates:
-    """Triangles with the stiffness `bending` (nt, 3, 3) of the rotations of their sides."""
+    And of each angle (nq,) the side that it turns, 3 t + k of triangle t, and how far in a turn of
+    one.
+    """
     size = (len(bending), 6)
     angle = np.stack([ends.hinge, -1 - ends.rotation], axis=2).reshape(size)
     share = np.stack([ends.weight, ends.sign], axis=2).reshape(size)
@@ -181,15 +174,15 @@ def triangle_plates(ends: Sides, bending: NDArray) -> TrianglePlates:
     at[ends.rotation[smooth]] = ends.hinge[smooth]
     piece, beside = np.nonzero(ends.piece_rotations >= 0)
     at[ends.piece_rotations[piece, beside]] = piece
-    return TrianglePlates(
+    plates = EdgePlates(
         rotation_hinge=at,
+        fold_rotations=ends.piece_rotations,
         start=np.concatenate([[0], np.cumsum(count)]),
         angle=angle[there],
         entry=np.concatenate([[0], np.cumsum(count**2)]),
         stiffness=whole[there[:, :, None] & there[:, None]],
-        side=(3 * np.arange(len(bending))[:, None] + side)[there],
-        share=share[there],
     )
+    return plates, (3 * np.arange(len(bending))[:, None] + side)[there], share[there]
 
 
 def without_free_sides(bending: NDArray, free: NDArray) -> NDArray:
