@@ -113,9 +113,8 @@ def track(given: Namespace) -> Path:
             bar.update()
 
         if film is None:
-            ds = experiment.track_photos(
-                given.inputs, model, tracking=settings, loads=loads, roi=roi, tell=tell
-            )  # type: ignore
+            named: Any = {"tracking": settings, "loads": loads, "roi": roi, "tell": tell}
+            ds = experiment.track_photos(given.inputs, model, **named)  # type: ignore
         else:
             ds = experiment.track_film(film, model, tracking=settings, tell=tell)
     out.parent.mkdir(parents=True, exist_ok=True)

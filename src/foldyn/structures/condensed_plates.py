@@ -141,10 +141,10 @@ class CondensedPlatesTerm(BarsPlatesTerm):
         return np.ones(len(self.condensed.offset)), self.condensed.offset
 
     # ------------------------------------------------------------------ other bodies
-    def unstrained(self, q: NDArray) -> Unstrained:
+    def unstrained(self, q: NDArray) -> Unstrained | None:
         """See `SheetTerm`."""
         found, hidden = self._full.unstrained(self._whole(q)), self._full.hidden
-        return Unstrained(
+        return found and Unstrained(
             balanced(found.tangent, hidden), balanced(found.hinges, hidden), found.stretch
         )
 
