@@ -227,12 +227,13 @@ def solved(folder: Path) -> Calls:
     return {
         "simulate": (fd.simulate, {
             "case": case(), "duration": 0.02, "method": "rk4", "dt": 1e-3, "every_steps": 2,
-            "initial": fd.State(), "force": False, "tolerance": None, "start": 0.0,
+            "interval": None, "initial": fd.State(), "force": False, "tolerance": None, "start": 0.0,
             "progress": None, "spectral_radius": None, "sample": None, "store": None,
             "checkpoint": 60.0, "resume": False, "device": "cpu",
         }),
         "simulate_many": (fd.simulate_many, {
-            "cases": [light], "duration": 0.02, "dt": 1e-4, "every_steps": 100, "initial": None,
+            "cases": [light], "duration": 0.02, "dt": 1e-4, "every_steps": 100,
+            "interval": None, "initial": None,
             "start": 0.0, "force": False, "threads": 1, "method": "central_difference",
             "device": "cpu",
         }),

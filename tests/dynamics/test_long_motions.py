@@ -171,7 +171,7 @@ def test_ctrl_c_says_what_is_kept(kept):
 
 
 def test_a_motion_that_fails_is_stored_until_then(kept, tmp_path):
-    wild = {"duration": 4.0, "every_steps": 1, "dt": 0.0175, "force": True}
+    wild = {"duration": 4.0, "every_steps": 1, "interval": None, "dt": 0.0175, "force": True}
     failed = []
     for given in (kept | wild, wild):
         with pytest.raises(ComputationError) as error:

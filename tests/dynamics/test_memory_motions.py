@@ -157,7 +157,7 @@ def test_motions_come_to_those_of_small_equal_steps(name):
     """As the tolerance goes down, with the balance of energy; states of branches too."""
     case = pushed(LAWS[name])
     for method, near in (("rk4", 1e-6), ("newmark", 2e-5)):
-        fine = fd.simulate(case, 2.0, method=method, dt=2.0**-13, interval=2**10)
+        fine = fd.simulate(case, 2.0, method=method, dt=2.0**-13, every_steps=2**10)
         scale = np.abs(opened(fine)).max()
         for tolerance, error in ((1e-4, 2e-3), (1e-6, 4e-5), (1e-8, 1e-6)):
             found = controlled(case, tolerance, interval=0.125)
@@ -183,7 +183,7 @@ def test_steps_are_cut_where_a_crease_begins_to_yield_or_turns_back():
 @pytest.mark.parametrize("name", LAWS)
 def test_refused_steps_leave_no_trace(name):
     """A step that is taken after others were refused has the bits of one that is taken at once."""
-    motion = prepare(pushed(LAWS[name]), 2.0, DP, tolerance=1e-7, interval=10**6)
+    motion = prepare(pushed(LAWS[name]), 2.0, DP, tolerance=1e-7, every_steps=10**6)
     motion.run()  # to where everything has flowed
     plan = motion.plan._replace(end=4.0, dt=1.0)
     engine = motion.method.engine(motion.case, motion.packed, motion.course, plan)
@@ -229,7 +229,7 @@ def test_folds_and_bends_of_a_sheet(law):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", fd.errors.FoldynWarning)
         fine = fd.simulate(
-            case, 0.025, method="rk4", dt=0.025 / 2**14, interval=2**14, initial=start
+            case, 0.025, method="rk4", dt=0.025 / 2**14, every_steps=2**14, initial=start
         )
     found = controlled(case, 1e-7, 0.025, interval=0.025, initial=start)
     assert apart(found, fine) < 1e-4

@@ -61,12 +61,12 @@ def error(motion, exact) -> float:
     return np.abs(place(motion) - exact).max() / np.abs(exact).max()
 
 
-def tried(*arguments, **options):
+def tried(case, duration, method, **options):
     """The motion, None if it was stopped, and whether it was said that steps are too coarse."""
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         try:
-            motion = fd.simulate(*arguments, **options)
+            motion = fd.simulate(case, duration, method=method, **options)
         except InstabilityError:  # the work of a pulse that is not resolved is nonsense
             motion = None
     return motion, any("do not resolve" in str(one.message) for one in told)

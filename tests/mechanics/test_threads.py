@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 import threading
 from itertools import pairwise
 
@@ -225,7 +226,7 @@ def test_a_forked_process_can_use_threads_too():
         pytest.skip("no fork here")
     code = """
 import multiprocessing, sys
-sys.path.insert(0, {here!r})
+sys.path[:0] = {places}
 from test_threads import alone, sheet, together
 from foldyn import mechanics
 from samples import relative
@@ -236,8 +237,7 @@ assert error() < 1e-13
 with multiprocessing.get_context("fork").Pool(1) as pool:
     assert pool.apply_async(error).get(60) < 1e-13
 """
-    here = str(__import__("pathlib").Path(__file__).parent)
-    done = subprocess.run(
-        [sys.executable, "-c", code.format(here=here)], capture_output=True, text=True, timeout=240
-    )
+    here = Path(__file__).parent
+    code = code.format(places=[str(here), str(here.parent)])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=240)
     assert done.returncode == 0, done.stderr

@@ -325,7 +325,7 @@ def identity(
         "spectral_radius": options.get("facts", {}).get("spectral_radius"),
         "start": plan.start,
         "duration": plan.end - plan.start,
-        "every_steps": plan.every,
+        "every_steps": 0 if plan.steps else plan.every,
         "interval": plan.interval,
         "dt": plan.dt,
         "tolerance": plan.tolerance,
