@@ -1,8 +1,8 @@
 """Switching to the path that crosses a path at a bifurcation.
 
-At a bifurcation the tangent has a mode that no load drives. A small amplitude of it is prescribed
-and an equilibrium with it is sought, the load factor free: it lies on the other path, which is
-then followed away from the crossing.
+At a bifurcation the tangent has a mode that no load drives. A small amplitude of this mode is
+prescribed, and an equilibrium is sought with the load factor free: it lies on the other path, which
+is then followed away from the crossing.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     import xarray
 
 FIRST_TURN = np.radians(1.0)  # of the hinge that turns most in the first step onto the branch
-TRIES = 6  # of amplitudes, each half of the one before
-FAR = 10.0  # times the amplitude: farther away is not beside the bifurcation
+TRIES = 6  # amplitudes tried, each half of the previous one
+FAR = 10.0  # amplitudes: an equilibrium farther away is not on the branch
 
 
 def switch_branch(
@@ -56,14 +56,14 @@ def switch_branch(
     path : xarray.Dataset
         A path from `trace` with a located bifurcation.
     at : int, optional
-        Its step; the first bifurcation of the path unless given.
+        Step of the bifurcation; by default the first one of the path.
     direction : {1, -1}
-        Which way along the branch; of a symmetric structure the two are mirror images.
+        Direction along the branch; in a symmetric structure the two are mirror images.
     case : Case, optional
-        The case of the path; needed where the path cannot rebuild it (`foldyn.case_of`).
+        The case of the path; needed if the path cannot rebuild it (`foldyn.case_of`).
     mode : int
-        Which of the tangent's modes, counted from the one nearest to zero: a multiple bifurcation
-        has several.
+        Which mode of the tangent, counted from the eigenvalue nearest to zero: a multiple
+        bifurcation has several.
     method : {"arc_length", "mgdcm"}
     steps, until, settings, progress
         As in `trace`.
@@ -76,9 +76,9 @@ def switch_branch(
     Raises
     ------
     InputError
-        The path has no bifurcation there, or was computed with an adaptive load.
+        The path has no bifurcation at this step, or was computed with an adaptive load.
     ComputationError
-        The branch cannot be followed; `partial` has it up to its last point.
+        The branch cannot be followed; `partial` holds the branch up to its last point.
     """
     check_result(path, "path: ")
     at = _bifurcation(path, at)
@@ -134,7 +134,7 @@ def _bifurcation(path: xarray.Dataset, at: int | None) -> int:
 
 
 def problem_of(path: xarray.Dataset, case: Case | None, at: int) -> OrigamiProblem:
-    """The problem that a path solved, its supports where they are at a step."""
+    """The problem that a path solved, with its supports as they stand at a step."""
     if "adaptive load" in str(path.attrs.get("not_rerunnable_because", "")):
         raise InputError("path: was traced with an adaptive load, which a path does not keep")
     case = case_of(path) if case is None else of_kind("case", case, Case)
@@ -153,7 +153,7 @@ def problem_of(path: xarray.Dataset, case: Case | None, at: int) -> OrigamiProbl
 
 
 def station_of(solver: Solver, problem: OrigamiProblem, path: xarray.Dataset, at: int) -> Station:
-    """A station at a step of a path, as it is stored."""
+    """Station at a step of a stored path."""
     factor = float(path["load_factor"].values[at])
     u = problem.state(path["displacement"].values[at], factor)
     reached = balance(problem, u, factor, problem.residual(u, factor))
@@ -164,7 +164,7 @@ def station_of(solver: Solver, problem: OrigamiProblem, path: xarray.Dataset, at
 
 
 def _multiplicity(path: xarray.Dataset, at: int) -> int:
-    """How many eigenvalues vanish at a bifurcation: by how much their count changes there."""
+    """Number of eigenvalues that vanish at a bifurcation: the jump of the negative count there."""
     counts = path["negative_eigenvalues"].values[max(at - 1, 0) : at + 2]
     return max(int(np.ptp(counts)), 1)
 
@@ -184,14 +184,14 @@ def _onto_branch(
                 return arrive(solver, attempt)
             failure = attempt.failure
     raise PathStoppedError(
-        f"no equilibrium on a branch was found beside the load factor {crossing.point.factor:.6g} "
+        f"no equilibrium on a branch was found near the load factor {crossing.point.factor:.6g} "
         f"({failure})",
         "try another mode, or trace the path with a tighter tolerance",
     )
 
 
 def _aside(solver: Solver, crossing: Station, shape: NDArray, turn: float) -> Attempt:
-    """Equilibrium with an amplitude of a shape by which a hinge turns by `turn`."""
+    """Equilibrium at an amplitude of a shape at which some hinge has turned by `turn` (rad)."""
     point, probe = crossing.point, 1e-6 * solver.problem.length
     amplitude = probe * turn / solver.problem.turn(point.u, point.u + probe * shape)
     start, rule = point.u + amplitude * shape, plane(shape, amplitude)
@@ -204,7 +204,7 @@ def _aside(solver: Solver, crossing: Station, shape: NDArray, turn: float) -> At
 def _directions(shapes: NDArray, mode: int, multiplicity: int) -> list[NDArray]:
     """Shapes (m,) along which a branch may leave.
 
-    Where several eigenvalues vanish together, only some of the combinations of their shapes do.
+    If several eigenvalues vanish together, a branch leaves along some combinations of shapes only.
     """
     first = shapes[:, mode]
     others = [k for k in range(multiplicity) if k != mode and mode < multiplicity]

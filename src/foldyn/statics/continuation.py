@@ -1,11 +1,11 @@
-"""Paths along which the load factor moves freely: through limit points and snap-backs.
+"""Paths with a free load factor, through limit points and snap-backs.
 
 A step predicts along the tangent of the path, over a length, and corrects under the rule of its
-method. The length grows and shrinks with the iterations that a step took against those aimed at;
-it also shrinks where the path bends, in the plane of motion and load factor (the latter scaled so
-that the first step has a slope of 1), and where hinges turn much. A step is cut where it does not
-converge, where a hinge turns by more than 1.5 times `largest_turn`, or where it lies more than 60
-degrees off the step before or the tangent at its own end: there it may have left the path.
+method. The length follows the ratio of target to actual iterations; it also shrinks where the
+path bends, in the plane of motion and load factor (the latter scaled so that the first step has a
+slope of 1), and where hinges turn far. A step is cut if it does not converge, if a hinge turns by
+more than 1.5 times `largest_turn`, or if it lies more than 60 degrees off the previous step or off
+the tangent at its own end: it may then have left the path.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from foldyn.statics.stepping import (
 # rule of one step from its length and its prediction (m,)
 ArcRule = Callable[[float, NDArray], Rule]
 
-ALIGNED = 0.5  # cosine of the largest angle to the step before and to the tangent at its end
-BEND = np.radians(12.0)  # of the path within a step, aimed at
+ALIGNED = 0.5  # cosine of the largest angle to the previous step and to the tangent at the end
+BEND = np.radians(12.0)  # target for the bend of the path within a step
 REMEDY = (
     "take smaller steps (first_step, or settings with a smaller largest_turn), or start from a "
     "state that is less symmetric"
@@ -40,29 +40,29 @@ REMEDY = (
 
 
 class Plane:
-    """Rule of the modified generalized displacement control, the method of MERLIN2, for one step.
+    """Rule of modified generalized displacement control, the method of MERLIN2, for one step.
 
     After the prediction c1 = df1 b1, with b1 the response to the load factor at the start of the
     step, every correction a + df b is orthogonal to b1: df = -(b1.a)/(b1.b). Predictions are as
     long as the first step of the path, |df1| = length/|b1|, which with the first response b0 is
     the square root of the generalized stiffness parameter |b0.b0/(b1.b1)| (Leon, Lages, de Araujo
-    and Paulino, Comput. Mech. 53, 2014: "modified" is that the parameter and the plane take the
-    present step's response twice instead of that of the step before).
+    and Paulino, Comput. Mech. 53, 2014: "modified" because the parameter and the plane use the
+    response of the present step twice, not once that of the previous step).
     """
 
     def __init__(self, length: float, prediction: NDArray) -> None:
-        self.prediction = prediction  # the plane stands at its end, whatever the length
+        self.prediction = prediction  # the plane passes through its end, whatever the length
 
     def __call__(self, moved: NDArray, step: NDArray, response: NDArray) -> float:
         """Change of the load factor; nan where the plane contains the response."""
         across = float(self.prediction @ response)
-        # the motion reached is brought back into the plane where a step was taken in part only
+        # if only part of a step was taken, the motion is brought back into the plane
         short = float(self.prediction @ (moved + step)) - float(self.prediction @ self.prediction)
         return -short / across if across != 0.0 else math.nan
 
 
 class Cylinder:
-    """Rule of the cylindrical arc length for one step: its end lies at a distance from its start.
+    """Rule of the cylindrical arc length for one step, which fixes its length from start to end.
 
     With c the motion since the start of the step, a the step of Newton's method at the present
     load factor and b the response to the factor, |c + a + df b| = length is a quadratic equation
@@ -93,18 +93,18 @@ class Cylinder:
 def follow(
     solver: Solver, start: Station, rule: ArcRule, first_step: float, direction: NDArray | None,
 ) -> Walk:  # fmt: skip
-    """Stations along a path without end.
+    """Stations along a path, without end.
 
     Parameters
     ----------
     solver, start
         Where the path begins.
     rule : ArcRule
-        That of a method, such as `Cylinder`.
+        Rule of the method, such as `Cylinder`.
     first_step : float
-        Change of the load factor in the first step; the next steps are as long.
+        Change of the load factor in the first step, which sets the length of the next ones.
     direction : (m,) or None
-        Motion that the path continues; with it, the first step is as long as this instead.
+        Motion that the path continues; if given, it sets the length of the first step instead.
     """
     station = start if direction is not None else _first(solver, start, first_step)
     if direction is None:
@@ -130,7 +130,7 @@ def follow(
 
 
 class _Pace:
-    """Length of the steps, and the last step (m,) taken."""
+    """Step length control, with the last step (m,) taken."""
 
     def __init__(self, solver: Solver, station: Station, moved: NDArray) -> None:
         self.solver, self.settings, self.moved = solver, solver.settings, moved
@@ -142,10 +142,10 @@ class _Pace:
         self.slope = np.arctan2(self.scale * climb, self.length)
 
     def objection(self, station: Station, arrived: Station) -> str:
-        """Why a converged step is not taken; empty if it is.
+        """Reason to reject a converged step; empty if it is accepted.
 
-        The tangent at its end must lie along the step as well: otherwise the direction in which
-        the path continues would be arbitrary.
+        The tangent at its end must also lie along the step: otherwise the direction in which the
+        path continues would be arbitrary.
         """
         moved = arrived.point.u - station.point.u
         along = _cosine(moved, self.moved), abs(_cosine(moved, arrived.response))
@@ -155,12 +155,12 @@ class _Pace:
         return "a hinge turns too far" if turn > 1.5 * self.largest else ""
 
     def cut(self) -> bool:
-        """Halve the length; false where that has been done too often, or it is lost in rounding."""
+        """Halve the step; return False after too many cuts or below round-off."""
         self.length, self.cuts = 0.5 * self.length, self.cuts + 1
         return self.cuts < self.settings.cuts and self.length > EPS * self.solver.problem.length
 
     def accept(self, station: Station, arrived: Station) -> None:
-        """Choose the next length after a step: at most the size of the structure."""
+        """Set the length of the next step, at most the size of the structure."""
         one, other = station.point, arrived.point
         self.moved = other.u - one.u
         length = float(np.linalg.norm(self.moved))
@@ -174,7 +174,7 @@ class _Pace:
 
 
 def _first(solver: Solver, start: Station, first_step: float) -> Station:
-    """Station after a step of the load factor, or as much of it as converges."""
+    """Station after a first step of the load factor, halved until it converges."""
     step = first_step
     for _ in range(solver.settings.cuts + 1):
         attempt = step_to(solver, start, start.point.factor + step)
@@ -188,7 +188,7 @@ def _first(solver: Solver, start: Station, first_step: float) -> Station:
 def _advance(
     solver: Solver, station: Station, rule: ArcRule, length: float, moved: NDArray
 ) -> Attempt:
-    """One step of a length along the path in the direction in which it `moved`."""
+    """One step of a given length along the path, in the direction of the last motion `moved`."""
     climb = _climb(station, length, moved)
     prediction = climb * station.response
     problem, point = solver.problem, station.point
@@ -202,7 +202,7 @@ def _advance(
 
 
 def _climb(station: Station, length: float, moved: NDArray) -> float:
-    """Change of the load factor over a length along the tangent, continuing a motion."""
+    """Change of the load factor over a length along the tangent, in the direction of a motion."""
     size = float(np.linalg.norm(station.response))
     return float(np.copysign(length / size, station.response @ moved))
 

@@ -1,11 +1,11 @@
 """The energy landscape along a path of a bistable structure.
 
-A path is read as a curve of a driving force against a stroke that is conjugate to it: the load
-factor times the size of the forces against the mean displacement along them, or the force that
-moved supports take against how far they are moved. Where the driving force vanishes the structure
-is in equilibrium by itself: stable where the force rises with the stroke, unstable (the top of the
-barrier) where it falls. These states, and the ends of the ranges in which the force falls (negative
-stiffness), are located to rounding.
+A path is read as a curve of a driving force against its conjugate stroke: the load factor times the
+size of the forces against the mean displacement along them, or the force on the moved supports
+against their displacement. Where the driving force vanishes, the structure is in equilibrium
+without it: stable where the force rises with the stroke, unstable (the top of the barrier) where it
+falls. These states, and the ends of the ranges in which the force falls (negative stiffness), are
+located to round-off.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from foldyn.statics.stepping import Station
 if TYPE_CHECKING:
     import xarray
 
-NO_FORCE = 1e-9  # of the largest driving force: counts as none at the ends of a path
+NO_FORCE = 1e-9  # of the largest driving force: counts as zero at the ends of a path
 
 
 @brief
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """A state without driving force.
+    """An equilibrium without driving force.
 
     Attributes
     ----------
@@ -46,9 +46,9 @@ class Equilibrium:
     stroke : float
         Stroke (m).
     energy : float
-        Energy (J) above that of the landscape's first point.
+        Energy (J) above the first point of the landscape.
     stable : bool
-        Whether it stays there when released.
+        Whether the structure stays there when released.
     """
 
     displacement: Annotated[NDArray, Unit("m")]
@@ -65,9 +65,9 @@ class Landscape:
     ----------
     stroke, force, energy : ndarray, shape (steps,)
         Stroke (m), driving force (N), and energy (J, strain less the work of constant loads)
-        above that of the first point.
+        above the first point.
     states : tuple of Equilibrium
-        States without driving force, in their order along the path.
+        States without driving force, ordered along the path.
     negative_stiffness : tuple of (float, float)
         Ranges of the stroke (m), in the order of the path, in which the force falls.
     """
@@ -99,12 +99,12 @@ class Landscape:
         return tuple(state for state in self.states if state.stable)
 
     def barrier(self, start: int = 0, end: int = 1) -> float:
-        """Energy (J) to be overcome from one stable state to another, by their numbers.
+        """Energy barrier (J) from one stable state to another, given by their numbers.
 
         Raises
         ------
         InputError
-            There are no such stable states.
+            A number is not that of a stable state.
         """
         stable = self.stable
         for number in (start, end):
@@ -129,9 +129,9 @@ def landscape(
     ----------
     path : xarray.Dataset
         A path from `trace` under forces ("arc_length", "mgdcm") or with moved supports
-        ("displacement"), of which one must drive it alone.
+        ("displacement"), but not both.
     case : Case, optional
-        The case of the path; needed where the path cannot rebuild it (`foldyn.case_of`).
+        The case of the path; needed if the path cannot rebuild it (`foldyn.case_of`).
     settings : Settings or mapping, optional
 
     Returns
@@ -143,7 +143,7 @@ def landscape(
     InputError
         The path is driven by folds, or by forces and moved supports together.
     ComputationError
-        A state without force was not found between two points of the path.
+        No state without force was found between two points of the path.
     """
     check_result(path, "path: ")
     problem = problem_of(path, case, 0)
@@ -163,7 +163,7 @@ def landscape(
         if k + 1 < len(stations) and force[k] * force[k + 1] < 0.0:
             found = walker.root(walker.force, station, stations[k + 1])
             states.append(walker.state(found, energy[0]))
-    sloping = [s for s in stations if s.point.kind != "bifurcation"]  # singular: no slope is sure
+    sloping = [s for s in stations if s.point.kind != "bifurcation"]  # singular: slope uncertain
     falls = [walker.rigidity(s) < 0.0 for s in sloping]
     for (before, fell), (after, fall) in pairwise(zip(sloping, falls, strict=True)):
         if fell != fall:
@@ -223,10 +223,10 @@ class _Walker:
         return float(self.driver @ (station.stiffness.matrix @ station.response))
 
     def compliance(self, station: Station) -> float:
-        """A smooth function that vanishes where the slope changes its sign.
+        """Smooth function that vanishes where the slope changes its sign.
 
-        Under forces the slope passes through infinity in terms of the response, so its inverse is
-        what vanishes.
+        Under forces the slope, expressed by the response, passes through infinity; its inverse
+        passes through zero.
         """
         value = self.rigidity(station)
         return value if self.by_motion else 1.0 / value

@@ -1,4 +1,4 @@
-"""A case as a problem of equilibrium, whatever its structure."""
+"""A case as an equilibrium problem, for structures of any kind."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from foldyn.statics.path_memory import REFUSED, Memories
 from foldyn.statics.problem import EPS
 from foldyn.statics.rigid import Relief
 
-PROBE = 1e-4  # change of the load factor that gives derivatives of what is not linear in it
+PROBE = 1e-4  # change of the load factor in central differences
 
 AdaptiveLoad = Callable[[NDArray, float], NDArray]
 
 
 class Actuation:
-    """A body whose rest angles change by `change` (nr,) per unit of the factor.
+    """A body whose rest angles change by `change` (nr,), rad, per unit of the load factor.
 
     A rest angle that leaves 0..2 pi becomes nan, which no solver accepts.
     """
@@ -55,46 +55,46 @@ class Actuation:
 class OrigamiProblem:
     """Equilibrium of a case along the load factor; dofs as in `mechanics.assembly`.
 
-    Where constraints tie displacements together, states and forces are those of `Constraints`, x
-    and E' f: in place of each slave stands the value of its equation, which is held. `dofs` and
-    `displacement` give displacements of a state, `state` the state of displacements.
+    If constraints tie displacements together, states and forces are the x and E' f of
+    `Constraints`: each slave is replaced by the value of its equation, which is held. `dofs` and
+    `displacement` map a state to displacements, `state` maps displacements to a state.
 
     Parameters
     ----------
     case : Case
-        Its loads, imposed displacements and actuations are multiplied by the factor; its
-        histories and motions of the base play no part.
+        Its loads, imposed displacements and actuations are multiplied by the factor;
+        its histories and base motions are ignored.
     constant : sequence of int
-        Numbers of the loads that act in full at every factor.
+        Numbers of the loads that act in full at every load factor.
     rest : ndarray, shape (n, 3), optional
         Displacement (m) at which supports hold their nodes; zero unless given.
     adaptive_load : callable, optional
         Further forces (n, 3), N, from (displacement (n, 3), factor). Their stiffness is left out
         of the tangent.
     inertia_relief : bool
-        Balance the loads of a free body by its inertia.
+        Balance the loads on a free body by its inertia.
     flow : {"refused", "followed", "at rest"}
-        What to do with friction, and with creases that yield or creep: a path follows those that
-        yield; at rest nothing has flowed.
+        How to treat friction, and creases that yield or creep: refuse them, follow them along
+        the path (if they yield), or take the state at rest, in which nothing has flowed.
     memory : ndarray of shape (b, 2) or "fresh", optional
-        State of the creases where it begins; see `cases.State`.
+        State of the creases at the start; see `cases.State`.
     timed : bool
-        Whether steps take time, in which creases relax and creep.
+        Whether steps take time, during which creases relax and creep.
 
     Attributes
     ----------
     constant, growing : ndarray, shape (m,)
         Forces (N) at every factor, and per unit of the factor.
     load : float
-        Sum of the magnitudes of the latter's components, N.
+        Sum of the absolute components of `growing`, N.
     motion : ndarray, shape (m,)
         Displacements (m) imposed per unit of the factor.
     actuation : Actuation
         The body at each factor.
     following : Following
-        Forces that depend on the displacement: at every factor in row 0, growing in row 1.
+        Forces that depend on the displacement: constant in row 0, growing in row 1.
     pinned : Constraints
-        Of the case, with the dofs that fix a free body's place in space.
+        Constraints of the case, and the dofs that fix the position of a free body.
     """
 
     def __init__(
@@ -148,7 +148,7 @@ class OrigamiProblem:
         self.force_rounding = EPS * float(np.linalg.norm(scale[self.free]))
 
     def _extended(self, values: NDArray) -> NDArray:
-        """Values (n, 3) as those of all dofs (m,), zero at the hidden ones."""
+        """Values (n, 3) extended to all dofs (m,), zero at the hidden ones."""
         return np.concatenate([np.asarray(values, float).ravel(), np.zeros(self._hidden)])
 
     def dofs(self, u: NDArray) -> NDArray:
@@ -160,17 +160,17 @@ class OrigamiProblem:
         return self.dofs(u)[: math.prod(self._shape)].reshape(self._shape)
 
     def state(self, displacement: NDArray, factor: float) -> NDArray:
-        """State (m,) with displacements (n, 3) of the nodes, the hidden dofs in balance."""
+        """State (m,) with nodal displacements (n, 3), its hidden dofs in balance."""
         push = self._external(self._extended(displacement), factor)
         q = self.actuation.body(factor).dofs(displacement, push)
         return self._plates.joined(self._ties.coordinates(q.copy()), factor * self._plates.length)
 
     def projected(self, force: NDArray) -> NDArray:
-        """Forces (m,) on states, of forces (m,) on the body's dofs, N."""
+        """Forces (m,) on states, N, from forces (m,) on the body's dofs."""
         return self._ties.force(force)
 
     def start(self, factor: float = 0.0) -> NDArray:
-        """State (m,) from which the path is sought, with planes where they are at a factor."""
+        """State (m,) from which the path starts, with planes where they stand at a factor."""
         return self._plates.joined(self._plates.others(self._rest), factor * self._plates.length)
 
     def planes(self, u: NDArray) -> NDArray:
@@ -178,15 +178,15 @@ class OrigamiProblem:
         return self._plates.moved(u)
 
     def body(self, u: NDArray, factor: float) -> Assembly:
-        """The body, its folds actuated and its planes where they are in a state (m,)."""
+        """The body with its folds actuated and its planes placed for a state (m,)."""
         return self._plates.placed(self.actuation.body(factor), u)
 
     def _contact(self, u: NDArray) -> ContactTerm:
-        """Its contact, planes where they are in a state (m,)."""
+        """The contact, with its planes placed for a state (m,)."""
         return self.body(u, 0.0).term(ContactTerm)
 
     def prescribed(self, factor: float) -> NDArray:
-        """Displacements of held dofs: imposed ones times the factor, others where they stood."""
+        """Displacements of held dofs: imposed ones times the factor, the others at their start."""
         return np.where(self._moves, factor * self.motion, self._rest)[self.held]
 
     def external(self, u: NDArray, factor: float) -> NDArray:
@@ -224,7 +224,7 @@ class OrigamiProblem:
         return np.append(force, self._plates.force(self._contact(u), self.dofs(u)))
 
     def reactions(self, u: NDArray, factor: float) -> NDArray:
-        """What supports exert, N, on `case.reaction_dofs`."""
+        """Support reactions, N, on `case.reaction_dofs`."""
         force = self.unbalanced(u, factor)
         return self._ties.reactions @ force[: math.prod(self._shape)]
 
@@ -259,7 +259,7 @@ class OrigamiProblem:
         return (ahead - behind) / (2.0 * PROBE)
 
     def reference(self, u: NDArray, factor: float) -> float:
-        """Largest of the norms of the external forces and of the hinges' forces alone, N."""
+        """Largest of the norms of the external, hinge and contact forces, N."""
         q, body = self.dofs(u), self.body(u, factor)
         forces = [body.hinge_forces(q), self._external(q, factor)]
         if self.case.contact is not None:
@@ -267,18 +267,18 @@ class OrigamiProblem:
         return max(float(np.linalg.norm(force)) for force in forces)
 
     def begin(self, factor: float) -> None:
-        """Begin at a factor, with friction at rest."""
+        """Begin at a load factor, with friction at rest."""
         at_rest = self.memories.body.energies(self.dofs(self.start()))
         self.energy_at_rest = float(at_rest.sum())
         self._evaluate(self.start(factor), factor)
         self.memories.tie()
 
     def elapse(self, seconds: float) -> None:
-        """Seek the next state so long (s) after the last one accepted."""
+        """Set the time (s) from the last accepted state to the next one."""
         self.memories.elapse(seconds)
 
     def keep(self, u: NDArray, factor: float) -> Any:
-        """Accept a state (m,), where creases have yielded and nodes slipped; see `recall`."""
+        """Accept a state (m,), storing what has yielded and slipped; see `recall`."""
         if not self.memories:
             return None
         self._evaluate(u, factor)
@@ -315,7 +315,7 @@ class OrigamiProblem:
         return out
 
     def clear(self, u: NDArray, step: NDArray) -> float:
-        """Share of a step (m,) from a state in which nothing crosses."""
+        """Share of a step (m,) that can be taken before anything crosses."""
         if self.case.contact is None:
             return 1.0
         q, contact = self.dofs(u), self._contact(u)
@@ -331,7 +331,7 @@ class OrigamiProblem:
         return out
 
     def working(self, u: NDArray, factor: float) -> NDArray:
-        """External forces (m,), N, without those of heat, which is no load."""
+        """External forces (m,), N, without thermal forces, which are no load."""
         force = self.external(u, factor)
         if self.heat is None:
             return force
@@ -339,30 +339,30 @@ class OrigamiProblem:
         return force - self._plates.joined(self._ties.force(pushed))
 
     def actuation_rate(self, u: NDArray, factor: float) -> float:
-        """Derivative (J) of the energy with respect to the factor at fixed u: of folds, by heat."""
+        """Derivative (J) of the energy by the factor at fixed u, from actuation and heat."""
         if not self.actuation.acts and self.heat is None:
             return 0.0
-        first = 1 if self.heat is None else 0  # of bars: without heat it stays
+        first = 1 if self.heat is None else 0  # bars (group 0) change with heat only
         ahead, behind = self.energies(u, factor + PROBE), self.energies(u, factor - PROBE)
         return float((ahead - behind)[first:].sum() / (2.0 * PROBE))
 
 
 def _factors(steady: float, growing: float) -> NDArray:
-    """Factors (2, 1) of loads that are constant, and of those that grow."""
+    """Factors (2, 1) of constant and of growing loads."""
     return np.array([[steady], [growing]])
 
 
 def _total(terms: Iterable[tuple[NDArray, Any]], shape: tuple[int, ...]) -> NDArray:
-    """Sum of the vectors of a case's terms, whatever their histories."""
+    """Sum of the vectors of load terms, regardless of their histories."""
     return sum((vector for vector, _ in terms), np.zeros(shape))
 
 
 def drives(case: Case, constant: Sequence[int]) -> bool:
-    """Whether anything of a case grows with the load factor."""
+    """Whether anything in a case grows with the load factor."""
     growing = any(i not in set(constant) for i in range(len(case.loads)))
     return growing or bool(case.imposed_terms) or bool(case.obstacle_terms)
 
 
 def is_actuated(case: Case) -> bool:
-    """Whether a case actuates folds."""
+    """Whether a case has actuated folds."""
     return any(isinstance(load, Actuate) for load in case.loads)

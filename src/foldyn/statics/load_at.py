@@ -1,4 +1,4 @@
-"""The equilibrium on a path at which a node has moved so far."""
+"""The equilibrium on a path at which a node has moved by a given displacement."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from foldyn.statics.stability import LostError, Section
 if TYPE_CHECKING:
     import xarray
 
-SHARP = 1e-13  # share of a step to which it is located
+SHARP = 1e-13  # share of a step to which the point is located
 
 
 class Moved(NamedTuple):
@@ -28,7 +28,7 @@ class Moved(NamedTuple):
 
 
 def load_at(path: xarray.Dataset, dof: int, displacement: float, case: Case | None = None) -> Moved:
-    """The first equilibrium on a path at which a node has moved so far along an axis.
+    """The first equilibrium on a path at which a node has a given displacement along an axis.
 
     Parameters
     ----------
@@ -37,14 +37,14 @@ def load_at(path: xarray.Dataset, dof: int, displacement: float, case: Case | No
     dof : int
         3 * node + axis.
     displacement : float
-        How far, m.
+        Displacement along the axis, m.
     case : Case, optional
-        The case of the path; needed where the path cannot rebuild it.
+        The case of the path; needed if the path cannot rebuild it.
 
     Raises
     ------
     InputError
-        The node does not come there on the path.
+        The node never has this displacement on the path.
     ComputationError
         No equilibrium is found between two points of the path.
     """

@@ -1,13 +1,13 @@
-"""Mechanisms: motions that nothing resists, found and named before a path is sought.
+"""Mechanisms: motions without resistance, found and named before a path is computed.
 
-Hinges count with their stiffness k whatever their law (superlinear bends have no slope at rest,
-but they do resist), and forces in the structure do not count: what is judged is whether a motion
-stretches a bar or turns a hinge at all.
+Hinges count with their stiffness k whatever their law (superlinear bends have zero slope at rest,
+but still resist), and internal forces do not count: the criterion is whether a motion stretches a
+bar or turns a hinge at all.
 
-Rigid motions follow from the supports alone, springs and clamped edges among them. For others the
-stiffness matrix is factorized; only where its smallest eigenvalue is suspicious are its softest
-modes computed, and a mode is a mechanism if the strain that it causes is rounding. Bars are judged
-by their elongations, which rounding leaves exact: soft modes of a large sheet are millions of times
+Rigid motions follow from the supports alone, including springs and clamped edges. For others the
+stiffness matrix is factorized; only if its smallest eigenvalue is suspicious are its softest modes
+computed, and a mode is a mechanism if its strain is round-off. Bars are judged by their
+elongations, which are accurate to round-off: soft modes of a large sheet are millions of times
 softer than its bars and still not free.
 """
 
@@ -25,20 +25,20 @@ from foldyn.statics.equilibrium import OrigamiProblem
 from foldyn.statics.rigid import AXES, name_rigid_motions
 from foldyn.statics.stability import softest_modes
 
-SHIFT = 1e-13  # of the diagonal, so that the matrix of a mechanism can be factorized
-SUSPICIOUS = 1e-11  # eigenvalue, of the matrix with a unit diagonal, that asks for a closer look
+SHIFT = 1e-13  # of the diagonal, added so that the matrix of a mechanism can be factorized
+SUSPICIOUS = 1e-11  # eigenvalue, of the matrix with a unit diagonal, below which modes are computed
 INVERSE_ITERATIONS = 4
 MOST_MODES = 12
-BAR_STRAIN = 1e-9  # elongations, as a fraction of what the motion of their ends could cause
-HINGE_STRAIN = 1e-6  # and turns of hinges
-MOVED = 0.3  # of the largest motion: nodes that a message names
+BAR_STRAIN = 1e-9  # elongations, relative to the largest that their end motions allow
+HINGE_STRAIN = 1e-6  # likewise, turns of hinges
+MOVED = 0.3  # of the largest motion: nodes beyond it are named
 MOST_NAMED = 8
 
 
 def refuse_mechanisms(problem: OrigamiProblem, factor: float = 0.0) -> None:
     """Refuse a case whose supports or members leave a mechanism, naming its motions.
 
-    factor : load factor at which it begins, where planes that it touches hold it as well.
+    factor : load factor at the start, where planes in contact also hold the structure.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def refuse_mechanisms(problem: OrigamiProblem, factor: float = 0.0) -> None:
 
 
 def mechanisms(problem: OrigamiProblem, factor: float = 0.0) -> list[str]:
-    """Free motions in words: rigid ones, and where there are none, internal mechanisms."""
+    """Free motions in words: rigid ones, or, if there are none, internal mechanisms."""
     structure = problem.structure
     start = problem.start(factor)
     body = problem.body(start, 0.0)
@@ -81,14 +81,14 @@ def _name(mode: NDArray) -> str:
 
 
 def free_modes(problem: OrigamiProblem, unstrained: Unstrained) -> NDArray:
-    """Motions (m, k) of the free dofs that strain nothing, orthonormal."""
+    """Orthonormal motions (m, k) of the free dofs that strain nothing."""
     free = problem.free
     ties = problem.case.constraints
     matrix = ties.matrix(unstrained.tangent)[free][:, free].tocsc()
     diagonal = matrix.diagonal()
     if not (diagonal > 0.0).all():
         return _unresisted(problem, diagonal)
-    scale = 1.0 / np.sqrt(diagonal)  # all pivots of a like size, whatever the members'
+    scale = 1.0 / np.sqrt(diagonal)  # scaled so that all pivots are of similar size
     scaled = sparse.csc_array(matrix.multiply(scale[:, None]).multiply(scale[None, :]))
     size = len(free)
     shifted = sparse.csc_array(scaled + SHIFT * sparse.eye_array(size, format="csc"))
@@ -105,7 +105,7 @@ def free_modes(problem: OrigamiProblem, unstrained: Unstrained) -> NDArray:
 
 
 def _softest(factors: Factorization, size: int) -> float:
-    """Smallest eigenvalue, from above, by a few inverse iterations."""
+    """Upper bound of the smallest eigenvalue, by a few inverse iterations."""
     value, guess = np.inf, np.random.default_rng(0).standard_normal(size)
     for _ in range(INVERSE_ITERATIONS):
         guess = guess / np.linalg.norm(guess)
@@ -123,7 +123,7 @@ def _unresisted(problem: OrigamiProblem, diagonal: NDArray) -> NDArray:
 
 
 def _strains_nothing(unstrained: Unstrained, mode: NDArray) -> bool:
-    """Whether the strain that a mode causes is rounding."""
+    """Whether the strain of a mode is round-off."""
     if unstrained.stretch(mode) > BAR_STRAIN:
         return False
     turned = float(mode @ (unstrained.hinges @ mode))

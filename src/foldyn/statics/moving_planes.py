@@ -1,8 +1,8 @@
-"""Planes of contact that move along a path: one more dof, held like a support that moves.
+"""Contact planes that move along a path: one more dof, held like a moving support.
 
-Its value is the way (m) of the plane that goes farthest; at the load factor f all planes have gone
-f times their motion. So a step of Newton's method moves them together with the sheet, and is cut
-where they would overtake it.
+Its value is the travel (m) of the plane that moves farthest; at the load factor f each plane has
+moved by f times its motion. So a Newton step moves the planes together with the sheet, and is cut
+where they would cross it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from foldyn.mechanics.contact.term import ContactTerm
 
 
 class Plates:
-    """The planes of a case as one dof of its states, or none.
+    """The moving planes of a case as one more dof of its states, if there are any.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Plates:
     Attributes
     ----------
     length : float
-        Way of that dof per unit of the load factor, m.
+        Travel of this dof per unit of the load factor, m.
     """
 
     def __init__(self, case: Case) -> None:
@@ -44,36 +44,36 @@ class Plates:
 
     @property
     def held(self) -> NDArray[np.bool_]:
-        """One True for the dof, if there is one."""
+        """One True for the dof; empty if no plane moves."""
         return np.ones(int(bool(self)), bool)
 
     def joined(self, values: NDArray, own: float = 0.0) -> NDArray:
-        """Values (m,) of the other dofs with that of this one."""
+        """Values (m,) of the other dofs, with the value of this one appended."""
         return np.append(values, own) if self else values
 
     def others(self, values: NDArray) -> NDArray:
-        """Values (m, ...) of the other dofs, of those of all."""
+        """Values (m, ...) of the other dofs, without this one."""
         return values[:-1] if self else values
 
     def moved(self, values: NDArray) -> NDArray:
-        """Displacements (p, 3) of the planes, m, of the values of all dofs."""
+        """Displacements (p, 3) of the planes, m, from the values of all dofs."""
         return float(values[-1]) * self._motion if self else np.zeros_like(self._motion)
 
     def placed(self, body: Assembly, values: NDArray) -> Assembly:
-        """A body with its planes where they are in a state."""
+        """A body with its planes at their places in a state."""
         return body.displaced(self.moved(values)) if self else body
 
     def force(self, contact: ContactTerm, q: NDArray) -> float:
-        """What moves the planes along their motion, N; q (m,) of the body."""
+        """Force that moves the planes along their motion, N; q (m,) of the body."""
         pushed = contact.plane_forces(q) + contact.plane_friction(q)
         return float((pushed * self._motion).sum())
 
     def bordered(
         self, matrix: sparse.csr_array, contact: ContactTerm, q: NDArray, project: Any
     ) -> sparse.csr_array:
-        """A tangent of the other dofs with the row and column of this one, N/m.
+        """A tangent of the other dofs, bordered by the row and column of this one, N/m.
 
-        project : makes of forces on the body's dofs those on states.
+        project : maps forces on the body's dofs to forces on states.
         """
         column, row, own = contact.plane_borders(q, self._motion)
         right, below = project(column)[:, None], project(row)[None, :]

@@ -1,14 +1,14 @@
 """Newton's method for one equilibrium, with line search and an optional moving load factor.
 
-Each iteration solves K a = -residual with the held dofs moved to where they are prescribed, and,
-where a rule lets the load factor f move too, K b = -d residual/df (the response to the factor):
-the step is a + df b, df from the rule (Batoz and Dhatt, Int. J. Numer. Meth. Eng. 14, 1979). The
-factor stands still without a rule.
+Each iteration solves K a = -residual with the held dofs at their prescribed values. If a rule lets
+the load factor f move too, it also solves K b = -d residual/df (the response to the factor): the
+step is a + df b, df from the rule (Batoz and Dhatt, Int. J. Numer. Meth. Eng. 14, 1979). Without a
+rule the factor is fixed.
 
-Steps are cut where a part would turn by more than `MOST_TURN` or run into another. With
-`search`, they are also cut to where the residual along the step is half of what it was at its
-start, as in Crisfield's line search; plain steps are tried first, because the residual of sheets
-often grows once (bars stretch to second order as panels turn) before it vanishes.
+Steps are cut if a part would turn by more than `MOST_TURN` or run into another. With `search`, they
+are also cut until the residual along the step is at most half its initial value, as in Crisfield's
+line search; plain steps are tried first, because the residual of sheets often grows once (bars
+stretch to second order as panels turn) before it vanishes.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ from foldyn.values import choice, number, whole
 
 COLLIDES = "panel would pass through panel"
 MOST_TURN = 0.2  # rad, of any part within one iteration
-HALVINGS = 40  # of a step that would let parts collide
+HALVINGS = 40  # of a step, to avoid collisions
 TRIALS = 10  # of a line search
-STALL = 10  # iterations without a new least residual after which an attempt is given up
-SLACK = 0.5  # of the residual along a step that a line search leaves
-SHIFT = 1e-13  # of the mean diagonal, added to a tangent that is singular to rounding
+STALL = 10  # iterations without progress of the residual after which an attempt is given up
+SLACK = 0.5  # of the residual along a step: the most that a line search leaves
+SHIFT = 1e-13  # of the mean diagonal, added to a tangent singular to round-off
 
 S = TypeVar("S", bound=Solution)
-# df from (motion since the start of the step, a, b); nan where the rule cannot be met
+# df from (motion since the start of the step, a, b); nan if the rule cannot be met
 Rule = Callable[[NDArray, NDArray, NDArray], float]
 
 
 @dataclass(frozen=True)
 class Settings(Checked):
-    """How equilibria are solved for and how steps are chosen.
+    """How equilibria are solved for and steps are chosen.
 
     Parameters
     ----------
@@ -55,21 +55,21 @@ class Settings(Checked):
     iterations : int
         Newton iterations after which an attempt is given up and the step is cut.
     target : int
-        Iterations per point that the step control aims at: steps shrink above and grow below.
+        Iterations per point at which the step control aims: more shrink the step, fewer enlarge it.
     cuts : int
         Halvings after which a path ends: of the first step of each interval of load factors, or,
-        where these are free, of a step after the last one that was taken.
+        if the factor is free, of a step since the last accepted one.
     largest_turn : float
         Degrees by which a hinge (or, without hinges, a bar) may turn within one step of
         "mgdcm" and "arc_length".
     jump : float
-        A step that moves more than this many times as far as its linear prediction has left the
-        path (snapped) and is cut.
+        A step more than this many times as long as its linear prediction has left the path
+        (snapped) and is cut.
     stability : bool
         Count the negative eigenvalues of the tangent at every point.
     locate : bool
         Find the limit and bifurcation points between the points of a path ("newton" returns only
-        the factors it is given and locates none).
+        the given factors and locates none).
     solver : str
         "auto", or one of `statics.SOLVERS`.
     """
@@ -88,7 +88,7 @@ class Settings(Checked):
 
 
 def settings_of(given: Any) -> Settings:
-    """Settings as they are, or of a mapping of some of their values."""
+    """Settings as given, or from a mapping of some of their values."""
     if isinstance(given, Settings):
         return given
     if given is not None and not isinstance(given, Mapping):
@@ -103,14 +103,14 @@ def settings_of(given: Any) -> Settings:
 
 
 def plane(normal: NDArray, reach: float) -> Rule:
-    """Rule of a step that ends in a plane at a distance (times |normal|) from its origin."""
+    """Rule of a step that ends in a plane at a distance (times |normal|) from the step's origin."""
     return lambda moved, step, response: (
         (reach - float(normal @ (moved + step))) / float(normal @ response)
     )
 
 
 class Attempt(NamedTuple):
-    """Outcome of a correction: an equilibrium, unless `failure` says why not."""
+    """Outcome of a correction: an equilibrium, or a `failure` that says why not."""
 
     u: NDArray
     factor: float
@@ -136,9 +136,9 @@ class Stiffness:
     problem : Problem
     matrix : csr_array, shape (m, m)
     factors : Solution
-        Of the block of the free dofs.
+        Factors of the block of the free dofs.
     symmetric : callable
-        Makes those of its symmetric part, whose eigenvalues are counted.
+        Returns factors of its symmetric part, whose eigenvalues are counted.
     """
 
     def __init__(
@@ -154,7 +154,7 @@ class Stiffness:
         return self._symmetric()
 
     def solve(self, force: NDArray, motion: NDArray) -> NDArray:
-        """Motion (m,) of all dofs under a force (m,) on the free ones while the held ones move."""
+        """Motion (m,) of all dofs under a force (m,) on free ones and a motion of held ones."""
         problem = self.problem
         full = np.zeros(len(force))
         full[problem.held] = motion
@@ -172,7 +172,7 @@ class Stiffness:
 
 
 class Solver:
-    """A problem with the settings and memory that its equilibria are solved with."""
+    """A problem, with the settings and work arrays for its equilibria."""
 
     def __init__(self, problem: Problem, settings: Settings | None = None) -> None:
         self.problem = problem
@@ -182,10 +182,10 @@ class Solver:
         self.backend, self._factorize = factorizer(self.settings.solver, len(problem.free))
 
     def stiffness(self, u: NDArray, factor: float, before: NDArray | None = None) -> Stiffness:
-        """Factorize the tangent at a state, for a step after one from the state `before`.
+        """Factorize the tangent at a state, for a step that follows one from the state `before`.
 
-        Where it is singular to rounding (exactly at a critical point) a shift of its diagonal far
-        below any stiffness lets the iteration go on.
+        If it is singular to round-off (exactly at a critical point), a shift of its diagonal far
+        below any stiffness lets the iteration continue.
         """
         matrix = sparse.csr_array(self.problem.tangent(u, factor, before))
         block = self.reduce(matrix)
@@ -207,8 +207,8 @@ class Solver:
     ) -> Attempt:  # fmt: skip
         """Iterate from a state (m,) to an equilibrium.
 
-        stiffness : what the first iteration takes, if it is known already.
-        origin : where the step began that the rule restricts; `u` unless given.
+        stiffness : stiffness for the first iteration, if known already.
+        origin : start of the step that the rule restricts; `u` by default.
         """
         problem, settings = self.problem, self.settings
         before = origin
@@ -231,7 +231,7 @@ class Solver:
                 response = tangent.response(u, factor)
                 climb = rule(u - origin, step, response)
                 step = step + climb * response
-            del tangent  # its memory serves the next
+            del tangent  # frees its memory for the next one
             if not np.isfinite(step).all():
                 return Attempt(u, factor, iteration, reached, "no step meets the path")
             share = self._share(u, step)
@@ -265,7 +265,7 @@ class Solver:
         return 0.0
 
     def _search(self, u: NDArray, factor: float, step: NDArray, residual: NDArray) -> float:
-        """Share of a step at which the residual along it is small against that at its start."""
+        """Share of a step at which the residual along it is small compared to its initial value."""
         start = float(step @ residual)
         low, high, share = 0.0, 1.0, 1.0
         for _ in range(TRIALS):
@@ -274,14 +274,14 @@ class Solver:
             if abs(along) <= SLACK * abs(start):
                 return share
             if along * start > 0.0 and share == 1.0:
-                return share  # still going down at the full step
+                return share  # still descending at the full step
             low, high = (share, high) if along * start > 0.0 else (low, share)
             share = 0.5 * (low + high)
         return share
 
 
 def _factorized(block: sparse.csc_array, factorize: Callable[[sparse.csc_array], S]) -> S:
-    """Factors of a block, shifted where it is singular to rounding."""
+    """Factors of a block, shifted if it is singular to round-off."""
     try:
         return factorize(block)
     except SingularTangentError:

@@ -1,7 +1,7 @@
-"""What the accepted steps of a path change: creases that yield or creep, and friction.
+"""What accepted steps of a path remember: creases that yield or creep, and friction.
 
-Both are functions of the state within a step. Only an accepted step moves what they start from, so
-iterations, steps that are cut and points that are located between others leave no trace.
+Both are functions of the state within a step. Only an accepted step updates their start, so that
+iterations, cut steps and points located in between leave no trace.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ REFUSED, FOLLOWED, AT_REST = "refused", "followed", "at rest"
 
 
 class Kept(NamedTuple):
-    """An accepted step, to go back to; None for what there is not."""
+    """An accepted step that can be restored; None for a memory that a case lacks."""
 
     creases: tuple[NDArray, ...] | None
     friction: tuple[NDArray, ...] | None
@@ -29,21 +29,21 @@ class Kept(NamedTuple):
 
 
 class Memories:
-    """The body of a case along a path, with what it remembers.
+    """The body of a case along a path, with its memory.
 
     Parameters
     ----------
     case : Case
     flow : {"refused", "followed", "at rest"}
-        What to do with friction and with creases that yield or creep: a path follows those that
-        yield; at rest nothing has flowed.
+        How to treat friction, and creases that yield or creep: refuse them, follow them along
+        the path (if they yield), or take the state at rest, in which nothing has flowed.
     timed : bool
-        Whether the steps of the path take time: then all that remembers flows along it.
+        Whether the steps of the path take time: then all laws with memory evolve along it.
 
     Attributes
     ----------
     body : Assembly
-        With memory of its own, where there is any.
+        The body, with its own memory if there is any.
     timed : bool
         As given.
     """
@@ -76,22 +76,22 @@ class Memories:
             self._creases.start(q, state)
 
     def tie(self) -> None:
-        """Begin with springs of friction at rest where the body was evaluated last."""
+        """Begin with friction springs at rest where the body was last evaluated."""
         if self._friction is not None:
             self._friction.start()
 
     def slips(self) -> bool:
-        """Whether anything slips where the body was evaluated last."""
+        """Whether anything slips where the body was last evaluated."""
         return self._friction is not None and self._friction.slips()
 
     def elapse(self, seconds: float) -> None:
-        """Evaluate next so long after the last accepted step."""
+        """Set the time (s) from the last accepted step to the next evaluation."""
         self._step = seconds
         if self._creases is not None:
             self._creases.own.elapsed[0] = seconds
 
     def commit(self) -> Kept:
-        """Accept the step that ends where the body was evaluated last."""
+        """Accept the step that ends where the body was last evaluated."""
         self._time, self._step = self._time + self._step, 0.0
         own = (self._creases, self._friction)
         for memory in own:
@@ -101,7 +101,7 @@ class Memories:
         return Kept(creases, friction, self._time)
 
     def recall(self, kept: Kept | None) -> None:
-        """Go back to an accepted step."""
+        """Restore an accepted step."""
         if kept is None:
             return
         self._time, self._step = kept.time, 0.0
@@ -110,7 +110,7 @@ class Memories:
                 memory.recall(snapshot)
 
     def branches(self, kept: Kept | None) -> NDArray:
-        """State (b, 2) of all branches of the case there, those that relax relaxed."""
+        """State (b, 2) of all branches of the case there, with relaxing ones relaxed."""
         parts = self._case.remembering
         state = np.zeros((sum(part.count for part in parts), VARIABLES))
         if kept is not None and kept.creases is not None:
@@ -118,7 +118,7 @@ class Memories:
         return state
 
     def lost(self, kept: Kept | None) -> float:
-        """What creases and friction have dissipated there, J."""
+        """Energy dissipated there by creases and friction, J."""
         own = [] if kept is None else [memory for memory in kept[:2] if memory is not None]
         return float(sum(memory[2][0] for memory in own))
 
@@ -129,7 +129,7 @@ def _rubs(case: Case, flow: str) -> bool:
     Raises
     ------
     InputError
-        It has, and the solver cannot have it.
+        It has friction that the solver cannot handle.
     """
     contact = case.contact
     if contact is None or not contact.rubs:
@@ -144,18 +144,18 @@ def _rubs(case: Case, flow: str) -> bool:
 
 
 def flowing(case: Case, timed: bool) -> NDArray:
-    """Mask (b,) of the branches that a path moves on; without a time, others are relaxed."""
+    """Mask (b,) of the branches that evolve along a path; without time, relaxing ones do not."""
     parts = case.remembering
     return np.repeat([timed or not p.law.relaxes for p in parts], [p.count for p in parts])
 
 
 def _flows(case: Case, flow: str, timed: bool) -> tuple[Remembering, ...]:
-    """Laws with memory that are not taken for their elastic parts, to which some of them relax.
+    """Laws with memory that evolve along a path, checked; the others are taken as elastic.
 
     Raises
     ------
     InputError
-        There are such, and the solver cannot have them.
+        The solver cannot handle one of them.
     """
     parts = tuple(part for part in case.remembering if timed or not part.law.relaxes)
     for part in parts:

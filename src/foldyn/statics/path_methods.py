@@ -1,4 +1,4 @@
-"""How a path is followed: the methods, where they lead, and which points belong to the path."""
+"""The methods for following a path, the course it takes, and the points that belong to it."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from foldyn.values import choice, number, numbers, show
 
 STEPS_DRIVEN = 10
 STEPS_FREE = 100
-FIRST_STEP = 0.05  # of the load, or of the way to the last load factor
+FIRST_STEP = 0.05  # of the load, or of the range to the last load factor
 
 
 class PathMethod(NamedTuple):
-    """How a path is followed.
+    """A method for following a path.
 
-    `rule` is None where the load factor drives the path; `between` says whether points between
-    the given load factors belong to the path too.
+    `rule` is None if the load factor drives the path; `between` says whether points between the
+    given load factors also belong to the path.
     """
 
     name: str
@@ -42,21 +42,21 @@ METHODS: Mapping[str, PathMethod] = {
 
 
 class PathPlan(NamedTuple):
-    """How a path is followed, from where to where."""
+    """How a path is followed, from its start to its end."""
 
     method: PathMethod
     begin: float
-    factors: list[float]  # that drive it; empty where the factor is free
-    end: float | None  # of a free factor
+    factors: list[float]  # that drive the path; empty if the factor is free
+    end: float | None  # end of a free factor
     steps: int
     first_step: float
-    durations: Sequence[float] = ()  # s, of the ways to `factors`; empty without a time
+    durations: Sequence[float] = ()  # s, of the steps to `factors`; empty without time
 
 
 def plan_path(
     name: str, load_factors: Any, steps: int | None, first_step: float | None, duration: Any = None
 ) -> PathPlan:
-    """Check the arguments that say where a path leads."""
+    """Check the arguments that define the course of a path."""
     method = METHODS[choice("method", name, METHODS)]
     factors = None
     if load_factors is not None:
@@ -119,7 +119,7 @@ def _driven(
 
 
 def _durations(given: Any, steps: int) -> list[float]:
-    """Times (s) of so many steps."""
+    """Times (s) of a number of steps."""
     array = numbers("duration", given)
     if array.ndim > 1 or (array.ndim and len(array) != steps) or not (array >= 0.0).all():
         raise InputError(
@@ -131,7 +131,7 @@ def _durations(given: Any, steps: int) -> list[float]:
 
 
 def along(solver: Solver, start: Station, plan: PathPlan, direction: NDArray | None = None) -> Walk:
-    """Stations of a path after its first one; `direction` as of `continuation.follow`."""
+    """Stations of a path after its first one; `direction` as in `continuation.follow`."""
     method = plan.method
     if method.rule is None:
         way = walk(solver, start, plan.factors, method.between, plan.durations)
@@ -152,7 +152,7 @@ def _with_critical(solver: Solver, start: Station, way: Walk) -> Walk:
 
 
 def _up_to(solver: Solver, start: Station, way: Iterator[Station], end: float, steps: int) -> Walk:
-    """The way until the load factor first passes `end`, where it stops exactly."""
+    """The way until the load factor first passes `end`; its last station lies exactly there."""
     before = start
     for station in way:
         one, other = before.point.factor - end, station.point.factor - end
@@ -168,7 +168,7 @@ def _up_to(solver: Solver, start: Station, way: Iterator[Station], end: float, s
 
 
 def _landed(solver: Solver, before: Station, after: Station, end: float) -> Station:
-    """Station at the load factor `end` between two others; the one after it if none is found."""
+    """Station at the load factor `end` between two others; the second one if none is found."""
     section = Section(solver, before, after)
     recall(solver.problem, before)
     try:

@@ -1,22 +1,22 @@
-"""What the solvers of equilibrium take: a small protocol on flat vectors of dofs.
+"""The protocol of an equilibrium problem, on flat vectors of dofs.
 
 With u (m,) all dofs and a load factor f, a path is the set of solutions of
 
     residual(u, f) = internal force - external force = 0  on the free dofs,
     u = prescribed(f)                                     on the held ones,
 
-so a von Mises truss, a sheet of origami and a shell all look the same from here.
+so a von Mises truss, a sheet of origami and a shell all look the same to a solver.
 
-A state counts as an equilibrium if both of these hold, with `tolerance` the same fraction (1e-9 by
+A state counts as an equilibrium if both conditions hold, with the fraction `tolerance` (1e-9 by
 default):
 
 - the residual's norm over the free dofs is below tolerance times the forces at play: the largest
-  of the norms of the external forces, of the supports' forces and of the hinges' forces alone
-  (which bars balance where nothing is loaded, as in a sheet that unfolds by itself);
+  of the norms of the external forces, the support forces and the hinge forces alone (which bars
+  balance if nothing is loaded, as in a sheet that unfolds without loads);
 - the last step is below tolerance times the displacements.
 
-Neither can be met below rounding. A residual below the rounding errors of the bars' forces (eps
-times the bars' EA) counts as zero, and with it the step, which is then noise as well.
+Neither can be met below round-off. A residual below the rounding errors of the bar forces (eps
+times the bars' EA) counts as zero, and so does the step, which is then noise as well.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ class Problem(Protocol):
     Attributes
     ----------
     free, held : ndarray of int
-        The dofs solved for, and the others; together all of them, each increasing.
+        The dofs solved for and the others, each in increasing order; together they are all dofs.
     force_rounding : float
         Norm (N) of the residual's rounding errors on the free dofs.
     length : float
-        Norm (m) of the dofs' rest positions: the rounding of displacements is measured by it.
+        Norm (m) of the dofs' rest positions: the scale for rounding errors of displacements.
     """
 
     free: NDArray
@@ -52,16 +52,16 @@ class Problem(Protocol):
         ...
 
     def residual(self, u: NDArray, factor: float) -> NDArray:
-        """Internal minus external force (m,), N; on held dofs the force of their supports."""
+        """Internal minus external force (m,), N; on held dofs the support force."""
         ...
 
     def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> Any:
-        """Sparse (m, m) derivative of the residual, slopes floored where they vanish.
+        """Sparse (m, m) derivative of the residual, with vanishing slopes floored.
 
-        Symmetric, but for loads that have no potential. Only for steps and, its symmetric part, for
-        the count of negative eigenvalues; the residual never sees a floor. With `before`, the state
-        from which the last step came, it may be another matrix that serves the next step better;
-        without, it is the derivative.
+        Symmetric, except for loads without potential. Used only for steps and, its symmetric part,
+        for the count of negative eigenvalues; the residual never sees a floor. With `before`, the
+        state from which the last step came, it may be another matrix that serves the next step
+        better; without, it is the derivative.
         """
         ...
 
@@ -70,7 +70,7 @@ class Problem(Protocol):
         ...
 
     def reference(self, u: NDArray, factor: float) -> float:
-        """Force (N) against which residuals are judged, beside those of the supports."""
+        """Force (N) that residuals are compared with, besides the support forces."""
         ...
 
     def turn(self, u: NDArray, v: NDArray) -> float:
@@ -79,13 +79,13 @@ class Problem(Protocol):
 
 
 def clear_share(problem: Problem, u: NDArray, step: NDArray) -> float:
-    """Share of a step (m,) from a state in which nothing crosses: all of it without contact."""
+    """Share of a step (m,) that can be taken before anything crosses; 1 without contact."""
     clear = getattr(problem, "clear", None)  # problems without contact have none
     return clear(u, step) if clear else 1.0
 
 
 def is_counted(problem: Problem, u: NDArray) -> bool:
-    """Whether the negative eigenvalues in a state (m,) say something: not where a node slips."""
+    """Whether negative eigenvalues in a state (m,) are meaningful: not if a node slips."""
     slips = getattr(problem, "slips", None)  # problems without friction have none
     return not (slips and slips(u))
 
@@ -112,7 +112,7 @@ def balance(problem: Problem, u: NDArray, factor: float, residual: NDArray) -> B
 
 
 def converged(problem: Problem, forces: Balance, u: NDArray, step: float, tolerance: float) -> bool:
-    """Whether a state u reached by a last step of norm `step` is an equilibrium."""
+    """Whether a state u, reached by a last step of norm `step`, is an equilibrium."""
     if not forces.residual < np.inf:  # false for nan
         return False
     if forces.residual <= problem.force_rounding:

@@ -1,4 +1,4 @@
-"""Where a path ends: what `until` of `trace` and of case files says."""
+"""Where a path ends: the argument `until` of `trace`, also in case files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from foldyn.values import number, whole
 
 @dataclass(frozen=True)
 class Reached(Part):
-    """Whether a node has moved so far along an axis.
+    """Whether a node has reached a displacement along an axis.
 
     Parameters
     ----------
@@ -27,8 +27,8 @@ class Reached(Part):
     axis : {"x", "y", "z"}
         Axis along which it moves.
     displacement : float
-        Displacement (m) from the rest position, not zero; reached where the node's own is as far
-        from zero on the same side.
+        Displacement (m) from the rest position, not zero; reached once the node is at least as far
+        from zero, on the same side.
     """
 
     node: Annotated[int, Check(whole)]
@@ -36,22 +36,22 @@ class Reached(Part):
     displacement: Annotated[float, Check(number, unit="m")]
 
     def agree(self) -> None:
-        """Refuse the place at which the path begins."""
+        """Refuse a displacement of zero, where the path begins."""
         if self.displacement == 0.0:
             raise InputError(" = 0: the path begins there; say where it ends", "displacement")
 
     def __call__(self, displacement: NDArray, load_factor: float) -> bool:
-        """Whether it is so for displacements (n, 3), m."""
+        """Whether it is reached for displacements (n, 3), m."""
         moved = displacement[self.node, AXES.index(self.axis)]
         return bool(moved / self.displacement >= 1.0)
 
 
 UNTIL = PartOf((Reached,), "analysis.until", "node, axis and displacement")
-"""What ends a path, in a case file and as an argument."""
+"""End condition of a path, in a case file and as an argument."""
 
 
 def until_of(given: Any, structure: Any) -> Callable[[NDArray, float], bool] | None:
-    """What ends a path of a structure: a function as it is, a table as `Reached`."""
+    """End condition of a path: a function as given, a table as `Reached`."""
     if given is None:
         return None
     if callable(given) and not isinstance(given, Reached):

@@ -1,8 +1,8 @@
-"""The record of a path: its dataset, and where it gains and loses stability, in words.
+"""The record of a path: its dataset, and the changes of its stability in words.
 
-A limit point that a method with a free load factor has located is what that method is for, and is
-marked in the result. Wherever else negative eigenvalues appear, a warning says so: there a real
-structure leaves the path, although the points that follow are equilibria like all others.
+A limit point located by a method with a free load factor is expected, and is marked in the result.
+If negative eigenvalues appear anywhere else, a warning says so: a real structure leaves the path
+there, although the points that follow are equilibria like all others.
 """
 
 from __future__ import annotations
@@ -44,26 +44,26 @@ from foldyn.structures.stretching import remedy, stretch
 if TYPE_CHECKING:
     import xarray
 
-MOST_STRETCH = 2.0  # of a bar: no sheet can be followed beyond
+MOST_STRETCH = 2.0  # stretch of a bar: no sheet can be followed beyond it
 CLOSED = 179.0  # degrees from flat beyond which a fold counts as closed
-MOST_LISTED = 20  # changes that the attribute lists
+MOST_LISTED = 20  # changes listed in the attribute
 
 
 def place_of(point: Point) -> str:
-    """Where a critical point lies, in words."""
+    """Location of a critical point, in words."""
     low, high = (f"{factor:.4g}" for factor in point.interval or (point.factor, point.factor))
     return f"the load factor {low}" if low == high else f"a load factor between {low} and {high}"
 
 
 class Change(NamedTuple):
-    """Neighboring points whose counts differ; without a first one, where the path begins."""
+    """Neighboring points with different counts; `before` is None at the start of the path."""
 
     before: Point | None
     after: Point
 
     @property
     def critical(self) -> Point | None:
-        """The located critical point among them."""
+        """The located critical point of the two, if any."""
         both = sorted(filter(None, (self.before, self.after)), key=lambda point: point.negative)
         return next((point for point in both if point.kind != "regular"), None)
 
@@ -88,7 +88,7 @@ class Change(NamedTuple):
 
 
 def stability_changes(points: Sequence[Point], from_rest: bool) -> list[Change]:
-    """Changes of the count along a path; `from_rest`, where there were none, included."""
+    """Changes of the count along a path; with `from_rest`, also from zero before its start."""
     counted = [point for point in points if point.negative >= 0]
     changes = [Change(a, b) for a, b in pairwise(counted) if a.negative != b.negative]
     if from_rest and counted and counted[0].negative:
@@ -97,7 +97,7 @@ def stability_changes(points: Sequence[Point], from_rest: bool) -> list[Change]:
 
 
 def stability_facts(points: Sequence[Point], from_rest: bool) -> dict[str, Any]:
-    """Attributes of a path: how many points are unstable, and where the count changes."""
+    """Attributes of a path: number of unstable points, and where the count changes."""
     counts = [point.negative for point in points]
     if max(counts, default=-1) < 0:
         return {"unstable_points": -1, "stability_changes": "not counted"}
@@ -112,9 +112,9 @@ def stability_facts(points: Sequence[Point], from_rest: bool) -> dict[str, Any]:
 def stability_warning(
     points: Sequence[Point], from_rest: bool, free: bool, timed: bool = False
 ) -> str:
-    """Warning of where a path loses stability; empty where it does not.
+    """Warning where a path loses stability; empty if it does not.
 
-    free : whether the method follows a path through limit points, by a free load factor.
+    free : whether the load factor is free, so that the path passes limit points.
     timed : whether its steps take time.
     """
     losses = [
@@ -130,7 +130,7 @@ def stability_warning(
     if losses[0].before is None:
         remedy = "start from a stable state"
     elif timed:
-        remedy = "shorter steps tell when, and whether creep has brought it there"
+        remedy = "shorter steps show when this happens, and whether creep causes it"
     elif not any(change.critical for change in losses):
         remedy = f"method 'arc_length' locates the point, and {remedy}"
     return (
@@ -144,10 +144,10 @@ def record(
     problem: OrigamiProblem, facts: dict[str, Any],
     until: Callable[[NDArray, float], bool] | None = None, adaptive: bool = False,
 ) -> xarray.Dataset:  # fmt: skip
-    """Follow a path to its end and make its dataset; raises where it cannot go on, with what is.
+    """Follow a path and make its dataset; if it stops early, raise with the part computed.
 
-    facts : what was asked for, stored as attributes.
-    until : says of displacements (n, 3) and load factor whether the path ends there.
+    facts : the arguments of the run, stored as attributes.
+    until : whether the path ends, given displacements (n, 3) and load factor.
     adaptive : whether an adaptive load acts.
     """
     began = time.perf_counter()
@@ -193,7 +193,7 @@ def _ends(
 
 
 def _check_stretch(problem: OrigamiProblem, point: Point) -> None:
-    """Stop where the path has left any sensible range: where a bar is twice as long as at rest."""
+    """Stop the path once a bar is twice as long as at rest, beyond any sensible range."""
     structure = problem.structure
     longer = lengths(structure.nodes + problem.displacement(point.u), structure.bars)
     longer /= structure.bar_length
@@ -209,14 +209,14 @@ def _check_stretch(problem: OrigamiProblem, point: Point) -> None:
 
 
 def _true(remedy: str, problem: OrigamiProblem) -> str:
-    """The remedy of a path that has stopped, or what can be done where that is done already."""
+    """The remedy for a stopped path, or another one if it is already in place."""
     if remedy == REMEDY_COLLISION and locks(problem.structure.fold_law):
         return REMEDY_LOCKED
     return remedy
 
 
 def _closed(problem: OrigamiProblem, points: Sequence[Point]) -> str:
-    """A remedy where the path ends because a fold is closed; empty otherwise."""
+    """Remedy if the path ends because a fold is closed; empty otherwise."""
     structure = problem.structure
     if not points or not len(structure.folds) or problem.case.contact is not None:
         return ""
@@ -233,7 +233,7 @@ def _dataset(
     points: Sequence[Point], solver: Solver, problem: OrigamiProblem, facts: dict[str, Any],
     effort: dict[str, float], adaptive: bool,
 ) -> xarray.Dataset:  # fmt: skip
-    """The points, with the case and the facts about the run."""
+    """Dataset of the points, with the case and the facts about the run."""
     from_rest = facts["started_from"] == "rest"
     free, timed = METHODS[facts["method"]].rule is not None, problem.memories.timed
     message = stability_warning(points, from_rest, free, timed)
@@ -290,7 +290,7 @@ def _stretch_warning(
     problem: OrigamiProblem, points: Sequence[Point], energies: Sequence[NDArray],
     displacement: NDArray,
 ) -> str:  # fmt: skip
-    """Warning where panels that stretch hold much of the strain energy; empty otherwise."""
+    """Warning if stretched panels hold much of the strain energy; empty otherwise."""
     by_group = dict(zip(problem.groups, np.transpose(energies), strict=True))
     found = stretch(problem.structure, by_group, displacement)
     if found is None:
@@ -305,7 +305,7 @@ def _stretch_warning(
 def _recorded(
     problem: OrigamiProblem, point: Point
 ) -> tuple[NDArray, NDArray, NDArray, dict[str, NDArray]]:
-    """Residual (m,), energies by groups, reactions and forces of contact at a point, as it was."""
+    """Residual (m,), energies, reactions and contact forces at a point, with its memory."""
     problem.recall(point.memory)
     at = point.u, point.factor
     return (
@@ -317,20 +317,20 @@ def _recorded(
 
 
 def _intervals(points: Sequence[Point]) -> dict[str, list[tuple[float, float]]]:
-    """Load factors between which critical points lie, if some could not be located."""
+    """Load factors that bracket critical points, if some could not be located."""
     if all(point.interval is None for point in points):
         return {}
     return {"interval": [point.interval or (point.factor, point.factor) for point in points]}
 
 
 def _begun(problem: OrigamiProblem, first: Point, energies: NDArray) -> float:
-    """Work (J) that has led from rest to the first point: what is stored there, or dissipated."""
+    """Work (J) from rest to the first point: the energy stored there, plus what has dissipated."""
     stored = float(energies.sum()) - problem.energy_at_rest
     return stored + problem.memories.lost(first.memory)
 
 
 def _memory(problem: OrigamiProblem, points: Sequence[Point], from_rest: bool) -> dict[str, Any]:
-    """States of the branches of laws with memory, and what they and friction dissipate, J."""
+    """States of branches with memory, and the energy (J) dissipated by them and friction."""
     own, out = problem.memories, {}
     if problem.case.remembering:
         out["memory"] = [own.branches(point.memory) for point in points]
@@ -344,7 +344,7 @@ def _memory(problem: OrigamiProblem, points: Sequence[Point], from_rest: bool) -
 
 
 def _asymmetry_warning(point: Point, problem: OrigamiProblem) -> str:
-    """Warning where stability is judged without what loads have that is not symmetric."""
+    """Warning if stability is judged without a large antisymmetric part of the load stiffness."""
     if point.negative < 0 or not problem.following.acts:
         return ""
     loads = problem.load_stiffness(point.u, point.factor)

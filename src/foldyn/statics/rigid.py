@@ -1,10 +1,9 @@
-"""Rigid motions: which ones supports leave free, their names, and inertia relief.
+"""Rigid motions: the ones that supports leave free, their names, and inertia relief.
 
-A free body under loads that do not balance accelerates as a rigid body. In the frame that moves
-with it the inertia forces M R a balance the loads, with R (3n, r) its free rigid motions in the
-current configuration and a = (R' M R)^-1 R' p their accelerations. What deforms the body is the
-difference p - M R a. Its place in space is fixed by holding r of its dofs, whose supports carry
-nothing.
+A free body under unbalanced loads accelerates as a rigid body. In the frame that moves with it the
+inertia forces M R a balance the loads, with R (3n, r) its free rigid motions in the current
+configuration and a = (R' M R)^-1 R' p their accelerations. The difference p - M R a deforms the
+body. Its position is fixed by holding r of its dofs, whose supports carry no force.
 """
 
 from __future__ import annotations
@@ -18,9 +17,9 @@ from foldyn.cases import Case
 from foldyn.cases.constraints import Constraints
 from foldyn.errors import InputError
 
-FREE = 1e-9  # of a rigid motion's size: what held dofs may move in it
+FREE = 1e-9  # of a rigid motion's size: motion of held dofs that counts as zero
 AXES = "xyz"
-TIE = 1e-6  # by how much the last dof counts less than the first one where pins are chosen
+TIE = 1e-6  # by how much less the last dof counts than the first when pins are chosen
 
 
 def rigid_motions(x: NDArray) -> NDArray:
@@ -42,14 +41,14 @@ def free_rigid_motions(
 ) -> NDArray:
     """Rigid motions (3n, r) of points x (n, 3) that supports and constraints allow.
 
-    holds : what else keeps them in place, see `Assembly.holds`.
+    holds : further restraints, see `Assembly.holds`.
     """
     motions = rigid_motions(x)
     return motions @ _free_space(motions, ties, holds)
 
 
 def _free_space(motions: NDArray, ties: Constraints, holds: sparse.csr_array | None) -> NDArray:
-    """Combinations (6, r) of the rigid motions that leave held dofs still, but not everything."""
+    """Combinations (6, r) of rigid motions that leave the held dofs still and move something."""
     still = motions[ties.held]
     if ties:
         still = np.concatenate([still, ties.rows @ motions])
@@ -58,7 +57,7 @@ def _free_space(motions: NDArray, ties: Constraints, holds: sparse.csr_array | N
     _, values, right = np.linalg.svd(np.linalg.qr(still, mode="r"))
     rank = int((values > FREE * np.sqrt(len(still))).sum())
     space = right[rank:].T
-    # points on a line stand still as it turns about itself
+    # points on a line do not move when it turns about itself
     _, values, right = np.linalg.svd(motions @ space, full_matrices=False)
     return space @ right[values > FREE * np.sqrt(len(motions))].T
 
@@ -73,7 +72,7 @@ def name_rigid_motions(
         return []
     left, values, right = np.linalg.svd(space[3:])
     rank = int((values > 1e-8).sum())
-    # rotations last: those that remain once the translations are taken out
+    # rotations last: what remains once the translations are removed
     translations, rotations = (space @ right[rank:].T)[:3], left[:, :rank]
     return [
         *(f"translation along {_direction(t)}" for t in _tidy(translations)),
@@ -82,7 +81,7 @@ def name_rigid_motions(
 
 
 def _tidy(directions: NDArray) -> list[NDArray]:
-    """A basis of the span of columns (3, k), along the axes as far as they lie in it."""
+    """Basis of the span of columns (3, k), along the axes where possible."""
     if not directions.size:
         return []
     basis, _ = np.linalg.qr(directions)
@@ -106,7 +105,7 @@ def _direction(vector: NDArray) -> str:
 
 
 class Relief:
-    """Balance of the loads of a case whose supports leave it free to move as a rigid body."""
+    """Inertia forces that balance the loads on a case whose supports leave rigid motions free."""
 
     def __init__(self, case: Case, start: NDArray) -> None:
         self._nodes, self._ties, self._body = case.structure.nodes, case.constraints, case.body
@@ -123,7 +122,7 @@ class Relief:
                 ": the supports leave no rigid motion free: leave it out", "inertia_relief"
             )
         free = case.free_dofs
-        first = np.linspace(1.0, 1.0 - TIE, len(free))  # of dofs that hold it as well, the first
+        first = np.linspace(1.0, 1.0 - TIE, len(free))  # of equally good dofs, the first is chosen
         _, _, order = qr(motions[free].T * first, mode="economic", pivoting=True)
         self.pins = np.sort(free[order[: self._count]])
 

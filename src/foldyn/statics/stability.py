@@ -1,11 +1,11 @@
-"""Critical points between the points of a path: located and classified.
+"""Critical points between the points of a path, located and classified.
 
-Where the count of negative eigenvalues of the tangent changes along a step, an eigenvalue has
-passed through zero. The step is halved until one crossing remains, and the crossing is then found
-as the zero of the tangent's determinant, each point an equilibrium in the plane across the step.
+If the count of negative eigenvalues of the tangent changes along a step, an eigenvalue has passed
+through zero. The step is halved until one crossing remains, which is then found as the zero of the
+tangent's determinant, each point an equilibrium in the plane across the step.
 
-Where equilibria are not found all the way to a crossing, it is known by the interval of load
-factors between the nearest ones on both sides; the point that stands for it is one of these.
+If no equilibria are found close to a crossing, it is bracketed by the load factors of the nearest
+ones on both sides; one of these stands for it.
 
 At a limit point the load factor turns: the response to the factor points along the step on one
 side and against it on the other. At a bifurcation it does not, and another path crosses.
@@ -27,7 +27,7 @@ from foldyn.statics.stepping import Station, arrive, elapse, kept, recall
 
 APART = 1e-6  # share of a step within which crossings count as one multiple point
 SHARP = 1e-13  # share of a step to which a crossing is located
-LOOKS = 0.5, 0.25, 0.75  # where an equilibrium is sought between two others
+LOOKS = 0.5, 0.25, 0.75  # tried in turn to find an equilibrium between two others
 
 
 class Mark(NamedTuple):
@@ -43,7 +43,7 @@ class Mark(NamedTuple):
 
 
 class LostError(Exception):
-    """An equilibrium on a section of the path was not found."""
+    """No equilibrium was found on a section of the path."""
 
 
 class Section:
@@ -58,7 +58,7 @@ class Section:
         self.seconds = next(times) - next(times)
 
     def at(self, share: float, low: Mark, high: Mark) -> Mark | None:
-        """Station at a share of the step, sought from between two marks; None if not found."""
+        """Station at a share of the step, starting between two marks; None if not found."""
         weight = (share - low.share) / (high.share - low.share)
         one, other = low.station.point, high.station.point
         factor = one.factor + weight * (other.factor - one.factor)
@@ -73,18 +73,18 @@ class Section:
         return Mark(share, arrive(self.solver, attempt))
 
     def share(self, station: Station) -> float:
-        """The share at which a station on one of them lies."""
+        """Share of the step at which a station lies."""
         return float((station.point.u - self.start.point.u) @ self.chord) / self.whole
 
     def zero(
         self, function: Callable[[Mark], float], xtol: float,
         ends: tuple[Mark, Mark] | None = None, nearest: bool = False,
     ) -> Mark:  # fmt: skip
-        """Mark between two others at which a function of marks vanishes, or `LostError`.
+        """Mark between two others at which a function of marks vanishes; raises `LostError`.
 
-        xtol : share of the step to which it is located.
-        ends : the two; those of the section unless given.
-        nearest : whether equilibria are sought from between the nearest marks known.
+        xtol : share of the step to which the mark is located.
+        ends : the two marks; the ends of the section by default.
+        nearest : whether iterations start between the nearest known marks.
         """
         from scipy.optimize import brentq
 
@@ -108,7 +108,7 @@ class Section:
         return marks[root]
 
     def slope(self, mark: Mark) -> float:
-        """Derivative of the load factor by the share there."""
+        """Derivative of the load factor with respect to the share there."""
         return self.whole / float(self.chord @ mark.station.response)
 
     def climbs(self, mark: Mark) -> bool:
@@ -117,10 +117,10 @@ class Section:
 
 
 def critical_points(solver: Solver, start: Station, end: Station) -> list[Station]:
-    """Stations at the limit and bifurcation points of a step, in their order, and its end.
+    """Stations at the limit and bifurcation points of a step, in order, and its end.
 
-    The end itself stands for a crossing if no equilibrium is found between it and the start. Each
-    of the others is on the way of the step: from what the structure remembered at its start.
+    The end itself stands for a crossing if no equilibrium is found between it and the start. All
+    other stations follow from the memory of the structure at the start of the step.
     """
     counts = start.point.negative, end.point.negative
     if counts[0] == counts[1] or min(counts) < 0:
@@ -150,7 +150,7 @@ def _crossings(section: Section, low: Mark, high: Mark) -> list[Station]:
 
 
 def _crossing(section: Section, low: Mark, high: Mark) -> Station:
-    """The critical point between two marks, as near as equilibria are found to it."""
+    """The critical point between two marks, as close as equilibria are found."""
     kind = "bifurcation" if section.climbs(low) == section.climbs(high) else "limit"
     count = min(low.negative, high.negative)
     single = abs(high.negative - low.negative) == 1
@@ -173,9 +173,9 @@ def _crossing(section: Section, low: Mark, high: Mark) -> Station:
 
 
 def _interval(section: Section, low: Mark, high: Mark, limit: bool) -> tuple[float, float]:
-    """Load factors between which the critical point between two marks lies.
+    """Load factors that bracket the critical point between two marks.
 
-    A limit point lies beyond both, by no more than where the tangents there meet.
+    A limit point lies beyond both marks, but not beyond the intersection of their tangents.
     """
     one, other = low.station.point.factor, high.station.point.factor
     if limit:
@@ -205,7 +205,7 @@ def _log_determinant(mark: Mark) -> float:
 
 
 def _bracketed(section: Section, low: Mark, high: Mark) -> tuple[Mark, Mark]:
-    """The nearest marks found on both sides of a crossing."""
+    """The nearest marks found on the two sides of a crossing."""
     while high.share - low.share > SHARP:
         middle = _between(section, low, high)
         if middle is None:
@@ -215,7 +215,7 @@ def _bracketed(section: Section, low: Mark, high: Mark) -> tuple[Mark, Mark]:
 
 
 def _between(section: Section, low: Mark, high: Mark) -> Mark | None:
-    """A mark between two others whose negative eigenvalues are counted; None if none is found."""
+    """A mark between two others with a count of negative eigenvalues; None if not found."""
     for weight in LOOKS if high.share - low.share > APART else LOOKS[:1]:
         share = low.share + weight * (high.share - low.share)
         mark = section.at(share, low, high) if low.share < share < high.share else None
@@ -225,7 +225,7 @@ def _between(section: Section, low: Mark, high: Mark) -> Mark | None:
 
 
 def critical_modes(solver: Solver, station: Station, count: int = 1) -> tuple[NDArray, NDArray]:
-    """Eigenvalues (k,) of the tangent nearest to zero, N/m, and their oriented shapes (m, k)."""
+    """Eigenvalues (k,) of the tangent nearest to zero, N/m, and oriented shapes (m, k)."""
     problem = solver.problem
     matrix = solver.reduce(station.stiffness.matrix).symmetric
     values, vectors = softest_modes(matrix, station.stiffness.symmetric, count, dense=300)
@@ -240,7 +240,7 @@ def softest_modes(
 ) -> tuple[NDArray, NDArray]:
     """Eigenvalues of a symmetric matrix nearest to a shift, and their vectors.
 
-    All of them up to a number of rows `dense`; else by Lanczos with the factors at the shift.
+    Returns all of them for up to `dense` rows; else uses Lanczos with the factors at the shift.
     """
     size = matrix.shape[0]
     if size <= dense or count >= size - 1:
@@ -251,9 +251,9 @@ def softest_modes(
 
 
 def oriented(shapes: NDArray) -> NDArray:
-    """Shapes (m, k), the largest entry of each positive: their sign depends on no solver.
+    """Shapes (m, k) with the largest entry of each positive, independent of the solver.
 
-    Of entries equal to rounding the first one counts.
+    Among entries equal to round-off the first one decides.
     """
     size = np.abs(shapes)
     first = np.argmax(size > (1.0 - 1e-6) * size.max(axis=0), axis=0)

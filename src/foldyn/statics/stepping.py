@@ -1,14 +1,13 @@
-"""Load stepping: equilibria one after the other, driven by the load factor.
+"""Load stepping: successive equilibria, driven by the load factor.
 
-A step that does not converge, or that snaps to somewhere else, is tried again with a line search
-and then halved; after a success steps grow again. So a path ends where no equilibrium follows it:
-at a limit point, which only the methods with a moving load factor pass.
+A step that does not converge, or that snaps elsewhere, is repeated with a line search and then
+halved; after a success steps grow again. So a path ends where no equilibrium continues it: at a
+limit point, which only the methods with a free load factor pass.
 
-The first point of a path is an equilibrium near a given state. A state that is not in equilibrium
-(under loads that are constant along the path, with folds that have a moment at rest, or simply a
-guess) is held by its own out-of-balance force, which is then released little by little: the same
-load stepping as along a path leads to the equilibrium that belongs to the state, instead of
-wherever one big step of Newton's method lands.
+The first point of a path is an equilibrium near a given state. A state out of equilibrium (under
+constant loads, with folds that have a moment at rest, or simply a guess) is held by its own
+out-of-balance force, which is then gradually released: load stepping as along a path leads to the
+equilibrium that belongs to the state, rather than to wherever one large Newton step lands.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from foldyn.arguments import brief
 from foldyn.statics.newton import COLLIDES, Attempt, Solver, Stiffness
 from foldyn.statics.problem import Problem, balance, clear_share, is_counted
 
-NEGLIGIBLE = 1e-6  # of the structure's size: motions below are never a snap
+NEGLIGIBLE = 1e-6  # of the structure's size: smaller motions are never a snap
 SNAPS = "the structure snaps to a state off its path"
 REMEDY_LIMIT = (
     "a limit point may lie ahead: method 'arc_length' follows the path through it "
@@ -62,7 +61,7 @@ class Point:
     interval : tuple of (float, float), optional
         Load factors between which a critical point lies that could not be located.
     memory
-        Of a problem whose parts yield, what its `recall` takes.
+        Argument of the problem's `recall`, if parts of it yield.
     """
 
     u: NDArray
@@ -76,7 +75,7 @@ class Point:
 
 
 class Station(NamedTuple):
-    """A point with the tangent there and the response to the load factor (m,)."""
+    """A point, with the tangent and the response (m,) to the load factor there."""
 
     point: Point
     stiffness: Stiffness
@@ -84,7 +83,7 @@ class Station(NamedTuple):
 
 
 class PathStoppedError(Exception):
-    """A path cannot be continued; with the reason and a remedy."""
+    """A path cannot be continued; holds the reason and a remedy."""
 
     def __init__(self, reason: str, remedy: str) -> None:
         super().__init__(f"{reason}; {remedy}")
@@ -95,7 +94,7 @@ Walk = Iterator[Station]
 
 
 def arrive(solver: Solver, attempt: Attempt) -> Station:
-    """Station at the equilibrium that a correction found."""
+    """Station at the equilibrium found by a correction."""
     stiffness = solver.stiffness(attempt.u, attempt.factor)
     counted = solver.settings.stability and is_counted(solver.problem, attempt.u)
     negative = stiffness.symmetric.negative() if counted else -1
@@ -105,8 +104,8 @@ def arrive(solver: Solver, attempt: Attempt) -> Station:
 
 
 def kept(problem: Problem, station: Station) -> Station:
-    """The station with what has yielded or slipped on the way; the problem goes on from there."""
-    keep = getattr(problem, "keep", None)  # problems that forget have none
+    """The station with its memory of yield and slip, from which the problem continues."""
+    keep = getattr(problem, "keep", None)  # problems without memory have none
     memory = keep(station.point.u, station.point.factor) if keep else None
     if memory is None:
         return station
@@ -114,21 +113,21 @@ def kept(problem: Problem, station: Station) -> Station:
 
 
 def recall(problem: Problem, station: Station) -> None:
-    """Go back to what a problem remembered at a station."""
-    back = getattr(problem, "recall", None)  # problems that forget have none
+    """Restore a problem's memory at a station."""
+    back = getattr(problem, "recall", None)  # problems without memory have none
     if back:
         back(station.point.memory)
 
 
 def elapse(problem: Problem, seconds: float) -> None:
-    """Seek the next state so long after the last one accepted."""
-    pass_time = getattr(problem, "elapse", None)  # problems without a time have none
+    """Set the time (s) from the last accepted state to the next one."""
+    pass_time = getattr(problem, "elapse", None)  # problems without time have none
     if pass_time and seconds > 0.0:
         pass_time(seconds)
 
 
 def step_to(solver: Solver, start: Station, factor: float, seconds: float = 0.0) -> Attempt:
-    """Equilibrium at another load factor, or later, on the path on which `start` lies."""
+    """Equilibrium at another load factor, or later, on the path of `start`."""
     elapse(solver.problem, seconds)
     plain = _step(solver, start, factor, seconds, False)
     if not plain.failure or plain.failure == SNAPS:
@@ -138,14 +137,14 @@ def step_to(solver: Solver, start: Station, factor: float, seconds: float = 0.0)
 
 
 def _step(solver: Solver, start: Station, factor: float, seconds: float, search: bool) -> Attempt:
-    """One attempt; it has snapped if it goes much farther than its linear prediction."""
+    """One attempt; a motion much larger than its linear prediction counts as a snap."""
     problem, u = solver.problem, start.point.u
     attempt = solver.correct(u, factor, None, start.stiffness, search)
     if attempt.failure:
         return attempt
     change = factor - start.point.factor
     length = float(np.linalg.norm(attempt.u - u))
-    # what has relaxed at the start by the end of the step, N
+    # force relaxed at the start by the end of the step, N
     relaxed = problem.residual(u, start.point.factor) if seconds > 0.0 else None
 
     def snaps(stiffness: Stiffness, response: NDArray) -> bool:
@@ -158,7 +157,7 @@ def _step(solver: Solver, start: Station, factor: float, seconds: float, search:
     if not snaps(start.stiffness, start.response):
         return attempt
     if start.point.memory is not None:
-        # what begins to yield or to slip within the step goes on as it does at its end
+        # parts that yield or slip within the step: compare with the tangent at its end
         there = solver.stiffness(attempt.u, factor)
         if not snaps(there, there.response(attempt.u, factor)):
             return attempt
@@ -169,9 +168,9 @@ def walk(
     solver: Solver, start: Station, factors: Sequence[float], between: bool,
     durations: Sequence[float] = (),
 ) -> Walk:  # fmt: skip
-    """Stations at the given factors, reached in turn, and those in between if `between`.
+    """Stations at the given factors, in turn, and also between them if `between`.
 
-    durations : times (s) to get there, if any; a factor may then be that before it.
+    durations : time (s) to each factor, if any; a factor may then repeat the previous one.
     """
     station = start
     step = abs(factors[0] - start.point.factor) if len(factors) else 0.0
@@ -181,7 +180,7 @@ def walk(
         step = whole if waits else min(max(step, 1e-3 * whole), whole)
         shortest = whole * 2.0**-solver.settings.cuts
         while left > 0.0:
-            # no crumbs: the rest is taken in one or in two equal steps
+            # avoid tiny last steps: the rest is taken in one or two equal steps
             length = left if left <= 1.01 * step else min(step, 0.5 * left)
             last = waits or length == left
             ahead = math.copysign(length, goal - station.point.factor)
@@ -202,7 +201,7 @@ def walk(
 
 
 def stopped(station: Station, attempt: Attempt) -> PathStoppedError:
-    """The end of a path driven by the load factor."""
+    """Error for a path, driven by the load factor, that cannot go on."""
     time = getattr(station.point.memory, "time", 0.0)
     after = f"after {time:.6g} s " if time else ""
     remedy = REMEDY_CREEP if time else REMEDY_LIMIT
@@ -214,7 +213,7 @@ def stopped(station: Station, attempt: Attempt) -> PathStoppedError:
 
 
 class Released:
-    """A problem at one load factor; its out-of-balance force fades as this one's factor grows."""
+    """A problem at one load factor, whose out-of-balance force fades as this factor goes to 1."""
 
     def __init__(self, problem: Problem, u: NDArray, factor: float) -> None:
         self.problem, self.factor = problem, factor
@@ -226,11 +225,11 @@ class Released:
         self._out[problem.held] = 0.0
 
     def prescribed(self, factor: float) -> NDArray:
-        """The held dofs, on their way from where they stood to where they belong."""
+        """The held dofs, between where they stood and where they belong."""
         return self._from + factor * (self._to - self._from)
 
     def residual(self, u: NDArray, factor: float) -> NDArray:
-        """Residual less the force that still holds it."""
+        """Residual less the remaining holding force."""
         return self.problem.residual(u, self.factor) - (1.0 - factor) * self._out
 
     def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> Any:
@@ -255,12 +254,12 @@ class Released:
         return self.problem.turn(u, v)
 
     def clear(self, u: NDArray, step: NDArray) -> float:
-        """Share of a step in which nothing crosses in the problem."""
+        """Share of a step before anything crosses in the problem."""
         return clear_share(self.problem, u, step)
 
 
 def settle(solver: Solver, u: NDArray, factor: float) -> Station:
-    """Station at the equilibrium at a load factor that belongs to a state (m,).
+    """Station at the equilibrium, at a load factor, that belongs to a state (m,).
 
     Raises
     ------

@@ -28,9 +28,9 @@ from foldyn.values import choice, flag, function, indices, of_kind, show, single
 if TYPE_CHECKING:
     import xarray
 
-SHORTEST = 1e-3  # of a bar's length, that is left of it where a path starts
-LOOKS = 51  # load factors from one to the next at which supports and planes are looked at
-COPIES = 8  # of a point's dofs, while forces, work and the dataset are made of it
+SHORTEST = 1e-3  # of its rest length: least length of a bar where a path starts
+LOOKS = 51  # load factors between two given ones at which supports and planes are checked
+COPIES = 8  # of a point's dofs in memory while forces, work and the dataset are computed
 
 
 def trace(
@@ -52,14 +52,14 @@ def trace(
     """Follow the equilibria of a case along a load factor.
 
     The factor multiplies the case's forces, gravity, imposed displacements and actuations;
-    histories and motions of the base play no part.
+    histories and base motions are ignored.
 
     Parameters
     ----------
     case : Case
     method : {"newton", "displacement", "mgdcm", "arc_length"}
-        "newton" steps the load factor and returns the points at the given ones only;
-        "displacement" does so where supports or folds are moved, and returns every point on the
+        "newton" steps the load factor and returns the points at the given factors only;
+        "displacement" steps the factor of moved supports or folds, and returns every point on the
         way; "mgdcm" and "arc_length" let the factor move freely, through limit points.
     load_factors : sequence of float, optional
         For "newton" and "displacement" the factors to reach, in this order. For the others two
@@ -68,26 +68,25 @@ def trace(
     steps : int, optional
         Instead of load_factors: equal steps from 0 to 1 (default 10). For "mgdcm" and
         "arc_length": steps after which the path ends (default 100).
-    duration : float or sequence of float, optional
-        For "newton" and "displacement" the time (s) from each load factor to the next, one for all
-        or one each: the factor changes at a constant rate, or stays where it is repeated. Creases
-        with memory relax and creep meanwhile; without it they have had the time to relax.
+    For "newton" and "displacement" the time (s) from each load factor to the next, one for all
+    or one each: the factor changes at a constant rate, or stays constant if repeated. Creases
+    with memory relax and creep meanwhile; without a duration they are fully relaxed.
     constant : "gravity", int or sequence of int
-        Loads, by their numbers in `case.loads`, each once, that act in full at every factor.
+        Numbers, each once, of loads in `case.loads` that act in full at every factor.
     initial : State, optional
-        Displacements near which the first point is sought; fixed supports hold their nodes where
-        it puts them. Without it the path is sought from rest at the factor 0.
+        Displacements near which the first point is sought; fixed supports hold their nodes at these
+        displacements. Without it the path starts from rest at the factor 0.
     first_step : float, optional
-        Change of the factor in the first step of "mgdcm" and "arc_length" (default 0.05, or that
-        part of the way to the last factor); the next steps are about as long.
+        Change of the factor in the first step of "mgdcm" and "arc_length" (default 0.05, or this
+        fraction of the range to the last factor); the next steps are about as long.
     until : callable or mapping, optional
         Function of displacements (n, 3) and load factor, or {"node": 6, "axis": "z",
-        "displacement": -0.03} for a node that moves so far (m); the path ends at the first point
-        where it is true.
+        "displacement": -0.03} for a nodal displacement (m); the path ends at the first point at
+        which it is true.
     adaptive_load : callable, optional
         Further forces (n, 3), N, as a function of displacements (n, 3) and load factor.
     inertia_relief : bool
-        Balance the loads of a body that is free to move by its inertia.
+        Balance the loads on a free body by its inertia.
     settings : Settings or mapping, optional
         Values of `statics.Settings`, as {"largest_turn": 3.0}: tolerance, step control,
         stability, linear solver.
@@ -110,12 +109,12 @@ def trace(
     InputError
         An argument out of range; supports that leave a mechanism; nothing that loads the case.
     ComputationError
-        The path cannot go on; the exception's `partial` has it up to its last point.
+        The path cannot go on; the exception's `partial` holds it up to its last point.
 
     Warns
     -----
     FoldynWarning
-        The count of negative eigenvalues changes along the path, but for limit points that
+        The count of negative eigenvalues changes along the path, except at limit points that
         "mgdcm" and "arc_length" have located; or the path ends before `until` is reached.
     CrossingWarning
         Panels pass through each other at a point.
@@ -169,7 +168,7 @@ def trace(
 
     def stations() -> Walk:
         start = settle(solver, problem.start(begin), begin)
-        if initial is None and not steady:  # what the sheet releases by itself is no work
+        if initial is None and not steady:  # energy released by the sheet without loads is not work
             problem.energy_at_rest = float(problem.energies(start.point.u, begin).sum())
         first = kept(problem, start)
         if first.point.factor != plan.begin:
@@ -181,13 +180,13 @@ def trace(
 
 
 def _flowed(case: Case, initial: State | None, timed: bool) -> NDArray | str | None:
-    """State in which branches begin that the path moves on, of that of all (b, 2)."""
+    """Initial state of the branches that evolve along the path, selected from all (b, 2)."""
     state = case.memory_in(initial)
     return state[flowing(case, timed)] if isinstance(state, np.ndarray) else state
 
 
 def check_steps(steps: Any, dofs: int) -> None:
-    """Refuse steps that are not a positive whole number, or that memory cannot hold."""
+    """Refuse steps that are not a positive whole number, or too many for memory."""
     count = whole("steps", steps, least=1)
     check_memory(
         "steps", f"a path of {float(count):.3g} points", 8.0 * COPIES * count * dofs, "take fewer"
@@ -195,7 +194,7 @@ def check_steps(steps: Any, dofs: int) -> None:
 
 
 def _constant_loads(case: Case, constant: Any) -> tuple[int, ...]:
-    """Numbers of the loads that do not grow with the load factor."""
+    """Numbers of the loads that are constant along the path."""
     if isinstance(constant, str):
         if constant != "gravity":
             raise InputError(
@@ -221,7 +220,7 @@ def _constant_loads(case: Case, constant: Any) -> tuple[int, ...]:
 def displacement_of(
     state: Any, case: Case, field: str, expected: str = "a State, as fd.initial_state(path, at=-1)"
 ) -> NDArray:
-    """Displacements (n, 3) of a case in a state, zero where it has none."""
+    """Displacements (n, 3) of a case in a state, zero if it has none."""
     if not isinstance(state, State):
         raise InputError(f": got {type(state).__name__}; give {expected}", field)
     displacement = state.of_nodes("displacement", case.structure.nodes.shape, field)
@@ -230,7 +229,7 @@ def displacement_of(
 
 
 def _check_case(case: Case, plan: PathPlan, constant: Sequence[int], adaptive: bool) -> None:
-    """Refuse a case in which nothing happens along the path."""
+    """Refuse a case in which nothing changes along the path."""
     case.check_movable()
     moves = bool(case.imposed_terms) or is_actuated(case) or bool(case.obstacle_terms)
     if plan.method.name == "displacement" and not moves:
@@ -241,7 +240,7 @@ def _check_case(case: Case, plan: PathPlan, constant: Sequence[int], adaptive: b
             "method",
         )
     if not plan.factors and plan.begin == 0.0 and plan.method.rule is None:
-        return  # one point, of what is constant
+        return  # one point, under constant loads
     if not (drives(case, constant) or adaptive):
         raise InputError(
             "nothing grows along the path: give a Force, Gravity, Actuate, Impose or moving plane "
@@ -251,7 +250,7 @@ def _check_case(case: Case, plan: PathPlan, constant: Sequence[int], adaptive: b
 
 
 def _check_start(problem: OrigamiProblem, factor: float) -> None:
-    """Refuse a state at a factor in which a bar has no length left, or something has crossed."""
+    """Refuse a state at a factor in which a bar has collapsed, or something has crossed."""
     structure, u = problem.structure, problem.start(factor)
     check_contact(problem.case, problem.displacement(u), problem.planes(u))
     x = structure.nodes + problem.displacement(u)
@@ -263,7 +262,7 @@ def _check_start(problem: OrigamiProblem, factor: float) -> None:
 
 
 def _check_driven(problem: OrigamiProblem, begin: float, plan: PathPlan) -> None:
-    """Refuse load factors at which supports and planes have gone through each other."""
+    """Refuse load factors at which supports and planes have passed through each other."""
     if problem.case.contact is None or not drives(problem.case, range(len(problem.case.loads))):
         return
     ends = [begin, *plan.factors, *([] if plan.end is None else [plan.end])]

@@ -1,9 +1,9 @@
 """The matrix of a step of folding, and its solution.
 
 A bar or hinge with the strain or turn q has the gradient g and adds slope g g' to the matrix: the
-Gauss-Newton part. The rest is what it pulls with, times the second derivative of q. The entries
-stand where they are factorized: in a band, with the nodes numbered along the sheet, or in a sparse
-matrix where that band would be too wide.
+Gauss-Newton part. The second part is its force or moment times the second derivative of q. Entries
+are stored as they are factorized: in a band, with the nodes numbered along the sheet, or in a
+sparse matrix if that band would be too wide.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from foldyn.mechanics.model import ranks
 
 
 class Places(NamedTuple):
-    """Where blocks between p nodes of k elements stand: entry (a, b) at start + a + stride b."""
+    """Places of p x p node blocks of k elements: entry (a, b) at start + a + stride b."""
 
-    start: NDArray  # (k, p, p); -1 where the block across the diagonal is enough
+    start: NDArray  # -1 for blocks whose transpose is stored
     stride: NDArray
 
 
 class Parts(NamedTuple):
-    """What bars (p = 2) or hinges (p = 4) make a matrix of."""
+    """Contributions of bars (p = 2) or hinges (p = 4) to a matrix."""
 
     gradients: NDArray  # (k, 3 p) of strains or turns
     slopes: NDArray  # (k,)
@@ -42,7 +42,7 @@ class Parts(NamedTuple):
 
 
 class Curvature:
-    """Matrices of bars (nb, 2) and hinges (nh, 4) between so many nodes."""
+    """Matrices of bars (nb, 2) and hinges (nh, 4) on a given number of nodes."""
 
     def __init__(self, bars: NDArray, hinges: NDArray, nodes: int) -> None:
         self._bars, self._hinges = bars.astype(np.int64), hinges.astype(np.int64)
@@ -79,16 +79,16 @@ class Curvature:
         self._diagonal = (own.start[:, 0] + np.arange(3) * (own.stride[:, 0] + 1)).ravel()
 
     def matrix(self, x: NDArray, bars: Parts, hinges: Parts) -> NDArray:
-        """Entries of a matrix at positions x (n, 3), where they are factorized."""
+        """Entries of the matrix at positions x (n, 3), in the storage that is factorized."""
         out = np.zeros(np.prod(self._shape) if self._band else len(self._pattern[0]))
         _put(x, self._bars, bars, self._places[0], self._band, out)
         _put(x, self._hinges, hinges, self._places[1], self._band, out)
         return out
 
     def factorized(self, entries: NDArray, damping: float) -> Callable[[NDArray], NDArray] | None:
-        """Solutions (n, 3) for forces (m,); None where the matrix is not positive definite.
+        """Solver from forces (m,) to steps (n, 3); None if the matrix is not positive definite.
 
-        damping : added to the diagonal, over its mean.
+        damping : added to the diagonal, as a fraction of its mean.
         """
         damped = entries.copy()
         damped[self._diagonal] += damping * entries[self._diagonal].mean()
@@ -112,7 +112,7 @@ class Curvature:
 
 
 def _graph(pairs: NDArray, nodes: int) -> sparse.csc_array:
-    """Pairs (k, 2) of nodes as the pattern of a matrix by columns, in order."""
+    """Pairs (k, 2) of nodes as a sparsity pattern by columns, sorted."""
     graph = sparse.coo_array((np.ones(len(pairs)), tuple(pairs.T)), (nodes, nodes)).tocsc()
     graph.sort_indices()
     return graph

@@ -1,4 +1,4 @@
-"""The energy that folding makes least: stiff panels, soft creases with moving rest angles.
+"""The energy that folding minimizes: stiff panels, soft creases with moving rest angles.
 
 Panels are cut into triangles. With l and L the length of a bar now and in the flat panel, theta the
 fold angle of a hinge (pi less its dihedral) and all lengths in units of the mean bar,
@@ -8,11 +8,10 @@ fold angle of a hinge (pi less its dihedral) and all lengths in units of the mea
       + 1/2 s sum L (shortfall^2 + excess^2)                     mountains and valleys,
 
 where a mountain or valley falls short if it has turned its own way by less than a margin, and
-exceeds if it has turned by more than is allowed, at most 180 degrees: beyond, its panels have
-passed each other. This is the energy of bars and hinges with linear laws; s is a law that pushes
-back from one side. It is a sum of squares, so that the Gauss-Newton matrix is positive semidefinite
-everywhere. The tangent stiffness is not: at the flat state it is singular in every direction that
-folds.
+exceeds if it has turned by more than is allowed, at most 180 degrees: beyond, its panels would have
+passed through each other. This is the energy of bars and hinges with linear laws; s is a one-sided
+law. It is a sum of squares, so that the Gauss-Newton matrix is positive semidefinite everywhere.
+The tangent stiffness is not: in the flat state it is singular in every direction that folds.
 """
 
 from __future__ import annotations
@@ -29,11 +28,11 @@ from foldyn.statics.folding.curvature import Curvature, Parts
 from foldyn.structures.mesh import lengths, n4b5
 
 SIGNS = {"M": -1.0, "V": 1.0, "F": 0.0, "U": 0.0}
-"""Sign of the fold angle of each assignment; 0 where either way is right."""
+"""Sign of the fold angle of each assignment; 0 if a crease may fold either way."""
 
 
 class Stiffness(NamedTuple):
-    """Stiffnesses of hinges, over that of the bars."""
+    """Stiffnesses of hinges, relative to the bars."""
 
     bends: float
     creases: float
@@ -41,7 +40,7 @@ class Stiffness(NamedTuple):
 
 
 class Aim(NamedTuple):
-    """Rest angles (nc,) of creases, nan where free, and their least and most turns (nc,), rad."""
+    """Rest angles (nc,) of creases, nan if free; least and largest turns (nc,), rad."""
 
     angles: NDArray
     least: NDArray
@@ -49,7 +48,7 @@ class Aim(NamedTuple):
 
 
 class Shape(NamedTuple):
-    """A state: positions (n, 3) in units of the mean bar, turns (nh,), strains (nb,), energy."""
+    """A state: positions (n, 3) in mean bar lengths, turns (nh,), strains (nb,), energy."""
 
     x: NDArray
     turns: NDArray
@@ -58,7 +57,7 @@ class Shape(NamedTuple):
 
 
 class Evaluated(NamedTuple):
-    """A shape with its energy, and what its gradient and its matrix are made of."""
+    """A shape with its energy and the parts of its gradient and matrix."""
 
     shape: Shape
     bars: Parts
@@ -66,7 +65,7 @@ class Evaluated(NamedTuple):
 
 
 class FoldEnergy:
-    """The energy of a pattern, of which welds and flat creases that nothing drives are bends.
+    """Folding energy of a pattern; its welds and undriven flat creases count as bends.
 
     Attributes
     ----------
@@ -75,7 +74,7 @@ class FoldEnergy:
     stiff : (nc,)
         Whether a crease belongs to a panel.
     bends : int
-        How many hinges lie within panels or on welds; those of the creases follow.
+        Number of hinges within panels or on welds, which precede the creases.
     size : float
         Mean length of the bars, m.
     """
@@ -95,27 +94,27 @@ class FoldEnergy:
         self._length, self._axis = lengths(x, bars), lengths(x, hinges[:, :2])
         self.curvature = Curvature(bars, hinges, len(x))
         turns, _ = self._turns(x, np.zeros(len(hinges)))
-        # the letter, not the geometry, says which way a closed crease has turned
+        # the letter, not the geometry, decides which way a closed crease has turned
         apart = math.pi - pattern.dihedrals - turns[self.bends :]
         turns[self.bends :] += 2.0 * math.pi * np.round(apart / (2.0 * math.pi))
         self.rest = turns.copy()
         self.start = Shape(x, turns, np.zeros(len(bars)), 0.0)
 
     def creases(self, turns: NDArray) -> NDArray:
-        """Fold angles (nc,), rad, of creases among those of all hinges."""
+        """Fold angles (nc,), rad, of the creases, from the turns of all hinges."""
         return turns[self.bends :]
 
     def bent(self, turns: NDArray) -> NDArray:
-        """By how much (rad) hinges within panels have turned, flat creases among them."""
+        """Turns (rad) of hinges within panels, flat creases among them."""
         stiff = np.concatenate([np.ones(self.bends, bool), self.stiff])
         return np.abs(turns - self.rest)[stiff]
 
     def place(self, x: NDArray) -> NDArray:
-        """Positions (n, 3), m."""
+        """Positions (n, 3), m, from dimensionless ones."""
         return x * self.size + self.center
 
     def moved(self, shape: Shape, x: NDArray) -> Shape:
-        """Shape at other positions, none of whose hinges has turned by more than pi."""
+        """Shape at other positions; assumes that no hinge turns by more than pi."""
         strains, _ = self._stretch(x)
         turns, _ = self._turns(x, shape.turns)
         return Shape(x, turns, strains, math.nan)
@@ -152,8 +151,8 @@ class FoldEnergy:
     ) -> NDArray:  # fmt: skip
         """Gradient (m,) of the energy.
 
-        pulls : of bars and hinges, as far as they pull along their gradients here; with the rest
-            they pull along those at the `first` shape, to which the matrix of the step belongs.
+        pulls : forces of bars and moments of hinges that act along their gradients here; the rest
+            acts along the gradients at the `first` shape, whose matrix the step uses.
         """
         out = np.zeros(at.shape.x.size)
         here = pulls or (at.bars.pulls, at.hinges.pulls)
@@ -166,9 +165,9 @@ class FoldEnergy:
         return out
 
     def expected(self, at: Evaluated, first: Evaluated, step: NDArray) -> tuple[NDArray, NDArray]:
-        """What bars (nb,) and hinges (nh,) pull with after a step (n, 3), to first order.
+        """Forces of bars (nb,) and moments of hinges (nh,) after a step (n, 3), to first order.
 
-        first : as of `gradient`.
+        first : as in `gradient`.
         """
         bars, hinges = (
             own.pulls
@@ -178,7 +177,7 @@ class FoldEnergy:
         return bars, hinges
 
     def matrix(self, at: Evaluated, pulls: tuple[NDArray, NDArray] | None = None) -> NDArray:
-        """Entries of the matrix where bars and hinges pull so, or of its Gauss-Newton part."""
+        """Entries of the matrix with these forces and moments, or of its Gauss-Newton part."""
         pulls = pulls or (0.0 * at.bars.pulls, 0.0 * at.hinges.pulls)
         parts = (own._replace(pulls=pull) for own, pull in zip(at[1:], pulls, strict=True))
         return self.curvature.matrix(at.shape.x, *parts)
@@ -190,12 +189,12 @@ class FoldEnergy:
         return length / self._length - 1.0, span / (length * self._length)[:, None]
 
     def _turns(self, x: NDArray, near: NDArray) -> tuple[NDArray, NDArray]:
-        """Turns (nh,) within pi of those `near`, and their gradients (nh, 12)."""
+        """Turns (nh,), each within pi of `near`, and their gradients (nh, 12)."""
         dihedral, gradient = dihedrals_and_gradients(np.ascontiguousarray(x), self._hinges)
         turns = math.pi - dihedral
         return turns + 2.0 * math.pi * np.round((near - turns) / (2.0 * math.pi)), -gradient
 
 
 def _dofs(rows: NDArray) -> NDArray:
-    """Numbers of the coordinates (k, 3 p) of the nodes in rows (k, p)."""
+    """Coordinate numbers (k, 3 p) of the nodes in rows (k, p)."""
     return (3 * rows[:, :, None] + np.arange(3)).reshape(len(rows), -1)

@@ -39,43 +39,43 @@ from foldyn.values import choice, function, whole
 if TYPE_CHECKING:
     import xarray
 
-MOST_SHOWN = 8  # creases that a text names
-SHUT = 1e-3  # rad from 180 degrees: a crease counts as closed
-CRUMPLED = 0.1  # strain beyond which a state is taken only where there is no other
+MOST_SHOWN = 8  # creases listed in a message
+SHUT = 1e-3  # rad from 180 degrees within which a crease counts as closed
+CRUMPLED = 0.1  # strain beyond which a state is the last choice
 STARTS = ("auto", "pattern", "folded")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Folding:
-    """A folded pattern, the way to it, and how good it is.
+    """A folded pattern, the path to it, and its quality.
 
     Attributes
     ----------
     pattern : Pattern
         The folded state, free of stress: its shape is the shape at rest. Vertices, assignments,
-        families, fold angles to reach and further data are those of the pattern that was folded.
-        Panels that have bent are cut along their bends, which are welds: its creases are those
-        that were folded.
+        families, target fold angles and custom data are taken from the pattern that was folded.
+        Panels that have bent are cut along their bends, which become welds: the creases are the
+        ones that were folded.
     path : xarray.Dataset
         The states on the way, with dimensions step, node, axis and crease: `position` (m),
-        `fold_angle` (rad, valleys positive), `strain` and `bend` (rad), the largest of a bar and of
-        a panel, and `share`, how far along the way a state is, from 0 to 1.
+        `fold_angle` (rad, valleys positive), the largest `strain` of a bar and the largest `bend`
+        (rad) of a panel, and `share`, the progress from 0 to 1.
     targets : ndarray, shape (nc,)
-        Fold angle (rad) that each crease was to reach; nan where it was free.
+        Target fold angle (rad) of each crease; nan if it was free.
     angles : ndarray, shape (nc,)
-        Fold angle (rad) that it has reached.
+        Fold angle (rad) reached by each crease.
     wrong : tuple of int
-        Mountains and valleys that have not turned their own way.
+        Mountains and valleys that have not folded as assigned.
     strain, bend : float
-        What is left in the folded state: the largest strain of a bar, and the largest turn (rad)
+        Residuals of the folded state: the largest strain of a bar, and the largest turn (rad)
         within a panel.
     crossings : ndarray of int, shape (k, 2)
         Pairs of panels that pass through each other in the folded state.
     first_crossings : mapping
-        For each step of the path with crossings that are not in the step before, those pairs.
+        New pairs of crossing panels, for each step at which some appear.
     started_from : {"pattern", "folded"}
-        Whether the path begins at the pattern as it was, or at the folded state that rotations of
-        the panels give, from which it was opened.
+        Whether the path begins at the pattern as given, or at the folded state found by rotating
+        the panels, from which it was opened.
     """
 
     pattern: Pattern
@@ -107,7 +107,7 @@ class Folding:
 
     @property
     def error(self) -> float:
-        """Largest difference (rad) of a crease from its target; 0 where there is none."""
+        """Largest difference (rad) between a crease and its target; 0 without targets."""
         given = ~np.isnan(self.targets)
         return float(np.abs(self.angles - self.targets)[given].max(initial=0.0))
 
@@ -119,15 +119,15 @@ class Folding:
 
     @property
     def closed(self) -> NDArray[np.int64]:
-        """Creases (k,) that are closed, so that panels lie upon each other."""
+        """Closed creases (k,), whose panels lie on each other."""
         return np.flatnonzero(np.abs(self.angles) > math.pi - SHUT)
 
     @property
     def layers(self) -> NDArray[np.int64] | None:
-        """Order of the layers of a state that lies flat, None of others.
+        """Layer order of a flat-folded state; None if the state is not flat.
 
         Rows (f, g, s), as FOLD's faceOrders: panel f lies on the side of panel g to which the front
-        of g faces (s = 1) or on the other (-1). There is one for each pair that overlaps.
+        of g faces (s = 1) or on the other (-1). Each pair that overlaps has one row.
         """
         found = self.pattern.custom.get(FACE_ORDERS)
         return None if found is None else np.array(found, np.int64).reshape(-1, 3)
@@ -146,7 +146,7 @@ class Folding:
         )
 
     def report(self) -> str:
-        """Text of a few lines: which creases turn, strain left, panels that cross."""
+        """Report of a few lines: which creases turn, remaining strain, panels that cross."""
         lines = [self._turned]
         if self.wrong:
             lines[0] += f"; not {_listed([str(k) for k in self.wrong])}"
@@ -196,11 +196,11 @@ def fold(
 ) -> Folding:
     """Fold a flat or partly folded pattern.
 
-    Creases are springs whose rest angles move to the ones wanted, in panels that are stiff (see
-    `foldyn.statics.folding.energy`); mountains and valleys are pushed back where they would turn
-    the other way. Then the springs are let go, so that what is left is an isometric state near by,
-    where there is one. Where panels do not stay plane, or creases turn the wrong way, panels that
-    bend more easily are tried as well.
+    Creases are springs whose rest angles move to the angles wanted, in stiff panels (see
+    `foldyn.statics.folding.energy`); mountains and valleys are pushed back if they would turn the
+    wrong way. Then the springs are released, which leaves a nearby isometric state if there is one.
+    If panels do not stay plane, or creases turn the wrong way, panels that bend more easily are
+    tried as well.
 
     Parameters
     ----------
@@ -211,24 +211,24 @@ def fold(
         "all") or family, by size, and by pairs of vertices, valleys positive: {"zigzag": 90, (3,
         4): -60}. A sequence has one for each crease, valleys positive. A pattern with the same
         creases, such as another frame of a file, gives the angles of its state. Creases that are
-        left out, or None, are free: mountains and valleys turn their way as far as the others make
-        them, flat ones belong to the panels.
+        left out, or None, are free: mountains and valleys fold their way as far as the others make
+        them; flat creases belong to the panels.
     fraction : float or str, optional
-        Instead, 0.8 or "80%" of `pattern.fold_angles`, and of 180 degrees for mountains and valleys
-        that have none. Without either the pattern is folded to its own fold angles.
+        Alternatively, 0.8 or "80%" of `pattern.fold_angles`, and of 180 degrees for mountains and
+        valleys without one. Without either the pattern is folded to its own fold angles.
     steps : int
         States on the way, 1 to 1000.
     start : {"auto", "pattern", "folded"}
-        Where the path begins. "folded" takes the state that rotations of the panels by the full
-        angles give, where they close, and opens it to the angles wanted. "auto" folds the pattern
-        as it is, and where creases turn the wrong way tries the folded state as well: that is
-        taken if all creases open from there.
+        Where the path begins. "folded" takes the state found by rotating the panels by the full
+        angles, if it closes, and opens it to the angles wanted. "auto" folds the pattern as given,
+        and if creases turn the wrong way also tries the folded state: this is taken if all creases
+        open from there.
     panels : {"whole", "subdivided"}
-        "subdivided" cuts panels from their middles to their corners and to the middles of their
-        edges, so that they can bend as paper does where whole ones, cut once, stretch. The path and
-        the folded pattern then have more vertices, after the others, and each crease is two.
+        "subdivided" cuts panels from their middles to their corners and edge midpoints, so that
+        they bend as paper does where whole panels, cut once, stretch. The path and the folded
+        pattern then have more vertices, after the others, and each crease becomes two.
     progress : callable, optional
-        Called with a step and the count of steps, which begin again where another way is tried.
+        Called with a step and the number of steps; steps restart with each new attempt.
 
     Returns
     -------
@@ -237,24 +237,24 @@ def fold(
     Raises
     ------
     InputError
-        An argument out of range; angles that contradict the assignments; a folded state that lies
-        flat, but in no order of its layers (or not in the one that the pattern's file gives).
+        An argument out of range; angles that contradict the assignments; a flat-folded state
+        with no valid layer order, or none that agrees with the pattern's file.
     MotionInterrupted
-        From the keyboard (Ctrl-C); its `partial` is the folding until the last step that is done.
+        From the keyboard (Ctrl-C); its `partial` is the folding up to the last step done.
 
     Warns
     -----
     FoldynWarning
-        Mountains or valleys that have not turned their own way; creases that have stayed closed
-        where the path begins at the folded state.
+        Mountains or valleys that have not folded their own way; creases that stay closed in a
+        path from the folded state.
     CrossingWarning
         Panels that pass through each other in a state of the path.
 
     Notes
     -----
-    A pattern of one degree of freedom with an angle for one crease is folded to rounding. Angles
-    that no state has all at once (180 degrees times a fraction, of a Miura-ori) are met as nearly
-    as springs of the same stiffness per length do.
+    A pattern of one degree of freedom with an angle for one crease is folded to round-off. Angles
+    that no state has all at once (180 degrees times a fraction, of a Miura-ori) are met as
+    closely as springs of equal stiffness per length allow.
 
     Examples
     --------
@@ -303,9 +303,9 @@ def _best_way(
     pattern: Pattern, energy: FoldEnergy, bending: Bending, targets: NDArray,
     steps: int, start: str, tell: Callable[[int], None],
 ) -> Way:  # fmt: skip
-    """The way with the fewest creases that turn the wrong way, without strain, near the targets.
+    """The best way: fewest creases turned wrong, then no strain, then closest to the targets.
 
-    From the folded state only if all creases open there, and come nearer to the targets.
+    The folded state is used only if all its creases open and end closer to the targets.
     """
 
     def cost(way: Way) -> tuple[bool, int, bool, float]:
@@ -338,7 +338,7 @@ def _best_way(
 
 
 def _off(energy: FoldEnergy, way: Way, targets: NDArray) -> float:
-    """Mean difference (rad) of the creases from their targets; 0 where there are none."""
+    """Mean difference (rad) between creases and their targets; 0 without targets."""
     off = np.abs(energy.creases(way.shapes[-1].turns) - targets)
     return float(np.nansum(off) / max(1, np.isfinite(off).sum()))
 
@@ -361,7 +361,7 @@ def _strain(way: Way) -> float:
 
 
 def _result(pattern: Pattern, energy: FoldEnergy, way: Way, targets: NDArray) -> Folding:
-    """Measure the states of a way."""
+    """Make the `Folding` of a way: crossings, angles, layers."""
     from foldyn.statics.folding.layer_order import with_layers  # loads a library
 
     path = path_of(pattern, energy, way)
@@ -392,7 +392,7 @@ def _result(pattern: Pattern, energy: FoldEnergy, way: Way, targets: NDArray) ->
 
 
 def _crossed(pattern: Pattern, energy: FoldEnergy, x: NDArray, turns: NDArray) -> NDArray[np.int64]:
-    """Pairs of panels that cross in a state, neighbors whose crease has passed 180 degrees too."""
+    """Pairs of panels that cross in a state, or whose crease has passed 180 degrees."""
     beyond = pattern.crease_faces[np.abs(turns) > math.pi + PLANE]
     pairs = crossing_panels(x, energy.triangles, energy.triangle_panel)
     return np.unique(np.concatenate([pairs, np.sort(beyond, axis=1)]), axis=0)

@@ -1,4 +1,4 @@
-"""What the order of the layers of a flat-folded sheet must satisfy, so that no panel crosses.
+"""Conditions on the layer order of a flat-folded sheet under which no panel crosses another.
 
 For each pair of panels that overlap, the order x is 1 where the lower-numbered panel lies above the
 other, and -1 below; x_ba = -x_ab. The conditions are those of J. Justin (Towards a mathematical
@@ -28,14 +28,14 @@ from foldyn.errors import ComputationError
 from foldyn.patterns import Pattern
 
 MOST_TRIPLES = 1_000_000
-GRID = 0.1  # of the distance that counts as none
+GRID = 0.1  # of the smallest distance that counts
 
 
 class FlatState(NamedTuple):
     """A folded sheet that lies flat.
 
     points : (n, 2), m. up : (nf,), whether a panel's front faces up. signs : (nc,), 1 for
-    valleys, -1 for mountains, 0 where neither. near : distance (m) that counts as none.
+    valleys, -1 for mountains, 0 for others. near : distance (m) that counts as zero.
     """
 
     points: NDArray
@@ -52,10 +52,9 @@ class LayerConstraints(NamedTuple):
     pairs : (k, 2)
         Panels that overlap, the lower number first.
     products : list of (tuple of int, int)
-        Rows of `pairs`, and what their orders multiplied together are.
+        Rows of `pairs`, and the product of their orders.
     triples, turns : (t, 3)
-        Rows of `pairs` of three panels, and the signs with which their orders must not all be
-        equal.
+        Three rows of `pairs` each, and the signs with which their orders must not all be equal.
     """
 
     pairs: NDArray[np.int64]
@@ -67,12 +66,12 @@ class LayerConstraints(NamedTuple):
 def layer_constraints(pattern: Pattern, state: FlatState) -> LayerConstraints:
     """Conditions on the layers of a pattern in a flat state.
 
-    Panels overlap where they do by more than the distance that counts as none.
+    Overlaps of no more than the distance that counts as zero are ignored.
 
     Raises
     ------
     ComputationError
-        Too many panels lie upon each other.
+        Too many panels lie on each other.
     """
     panels = [shapely.Polygon(state.points[list(face)]) for face in pattern.faces]
     inside = np.asarray(shapely.buffer(panels, -state.near, join_style="mitre"))
@@ -81,7 +80,7 @@ def layer_constraints(pattern: Pattern, state: FlatState) -> LayerConstraints:
     products = []
 
     def multiplied(orders: list[tuple[int, int]], value: int) -> None:
-        """Add a product, unless panels of it do not overlap."""
+        """Add a product if all its pairs of panels overlap."""
         rows = [row.get((min(a, b), max(a, b)), -1) for a, b in orders]
         if min(rows) >= 0:
             value *= int(np.prod([1 if a < b else -1 for a, b in orders]))
@@ -118,12 +117,12 @@ def layer_constraints(pattern: Pattern, state: FlatState) -> LayerConstraints:
 
 
 def _overlaps(inside: NDArray, near: float) -> tuple[NDArray[np.int64], NDArray]:
-    """Pairs of polygons that overlap, the lower number first, and what they share."""
+    """Pairs of polygons that overlap, the lower number first, and their intersections."""
     one, other = shapely.STRtree(inside).query(inside, predicate="intersects")
     one, other = one[one < other], other[one < other]
     order = np.lexsort((other, one))
     one, other = one[order], other[order]
-    # on a grid: of panels that differ by rounding alone the overlay finds nothing otherwise
+    # on a grid: else the overlay finds nothing for panels that differ by round-off alone
     grid = GRID * near
     common = np.asarray(shapely.intersection(inside[one], inside[other], grid_size=grid)).reshape(
         -1
@@ -133,14 +132,14 @@ def _overlaps(inside: NDArray, near: float) -> tuple[NDArray[np.int64], NDArray]
 
 
 def _through(lines: NDArray, inside: NDArray, near: float) -> list[tuple[int, int]]:
-    """Lines and polygons that they run through."""
+    """Pairs of a line and a polygon that it runs through."""
     line, panel = shapely.STRtree(inside).query(lines, predicate="intersects")
     within = shapely.length(shapely.intersection(lines[line], inside[panel])) > near
     return list(zip(line[within].tolist(), panel[within].tolist(), strict=True))
 
 
 def _upon(ends: NDArray, lines: NDArray, near: float) -> list[tuple[int, int, int]]:
-    """Pairs of lines that lie upon each other; 1 if they run the same way, else -1."""
+    """Pairs of lines that lie on each other; 1 if they run the same way, else -1."""
     one, other = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=near)
     one, other = one[one < other], other[one < other]
     vector = ends[:, 1] - ends[:, 0]
@@ -149,7 +148,7 @@ def _upon(ends: NDArray, lines: NDArray, near: float) -> list[tuple[int, int, in
     offset = ends[other] - ends[one][:, :1]
     along = np.sort(np.einsum("kei,ki->ke", offset, unit[one]), axis=1)
     start, end = np.maximum(along[:, 0], 0.0), np.minimum(along[:, 1], length[one])
-    # distance of the other line from the middle of what they share
+    # distance of the other line from the middle of the common part
     middle = ends[one, 0] + 0.5 * (start + end)[:, None] * unit[one] - ends[other, 0]
     apart = np.abs(middle[:, 0] * unit[other][:, 1] - middle[:, 1] * unit[other][:, 0])
     turn = np.abs(unit[one][:, 0] * unit[other][:, 1] - unit[one][:, 1] * unit[other][:, 0])

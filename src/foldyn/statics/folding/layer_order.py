@@ -1,4 +1,4 @@
-"""The order of the layers of a folded sheet that lies flat: found, or why there is none."""
+"""The layer order of a flat-folded sheet: found, or the reason why there is none."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from foldyn.statics.folding.layer_constraints import FlatState, layer_constraint
 from foldyn.statics.folding.layers import CrossingError, ordered
 
 Orders = Sequence[Sequence[int]]
-EXACT = 1e-6  # of the size of the pattern: thickness of a state that lies flat, at least
+EXACT = 1e-6  # of the size of the pattern: least tolerance of a flat state
 
 
 def flat_state(pattern: Pattern, angles: NDArray, closed: float) -> FlatState | None:
-    """A folded pattern as a flat state; None where it does not lie flat.
+    """A folded pattern as a flat state; None if it does not lie flat.
 
-    angles : fold angles (nc,), rad. closed : least size of one that counts as closed; as far from 0
-    one counts as open.
+    angles : fold angles (nc,), rad. closed : least size of a closed fold; one as close to 0 counts
+    as open.
     """
     size = np.abs(angles)
     if ((size > math.pi - closed) & (size < closed)).any() or not (size >= closed).any():
@@ -40,9 +40,9 @@ def flat_state(pattern: Pattern, angles: NDArray, closed: float) -> FlatState | 
 
 
 def _flattened(pattern: Pattern) -> tuple[NDArray, float]:
-    """Vertices (n, 2), m, in the plane in which a sheet lies, and the distance that counts as none.
+    """Vertices (n, 2), m, in the plane of a sheet, and the distance that counts as zero.
 
-    Separate sheets that do not lie in one plane have planes of their own, put side by side.
+    Separate sheets that do not lie in one plane are placed side by side, each in its own plane.
     """
     edges = np.array([pair for face in pattern.faces for pair in around(face)])
     size = len(pattern.vertices)
@@ -63,17 +63,17 @@ def _flattened(pattern: Pattern) -> tuple[NDArray, float]:
 
 
 def _in_plane(x: NDArray) -> tuple[NDArray, float]:
-    """Points x (k, 3) in their plane (k, 2), and how thick they are across it."""
+    """Points x (k, 3) in their plane (k, 2), and their thickness across it."""
     middle = x - x.mean(axis=0)
     axes = np.linalg.svd(middle, full_matrices=False)[2]
     return middle @ axes[:2].T, float(np.ptp(middle @ axes[2]))
 
 
 def with_layers(pattern: Pattern, angles: NDArray, closed: float, given: Orders) -> Pattern:
-    """The pattern with the order of its layers in its custom data, if it lies flat.
+    """The pattern, with its layer order in its custom data if it lies flat.
 
-    Without an order where the search is given up. Arguments and errors as of the functions above
-    and below.
+    No order is stored if the search is given up. Arguments and errors are as in `flat_state` and
+    `layer_order`.
     """
     state = flat_state(pattern, angles, closed)
     if state is None:
@@ -86,10 +86,10 @@ def with_layers(pattern: Pattern, angles: NDArray, closed: float, given: Orders)
 
 
 def layer_order(pattern: Pattern, state: FlatState, given: Orders = ()) -> NDArray[np.int64]:
-    """Order of the panels that overlap: rows (f, g, s) as FOLD's faceOrders.
+    """Layer order of overlapping panels: rows (f, g, s) as FOLD's faceOrders.
 
     s is 1 where panel f lies on the side of g to which the front of g faces, -1 on the other.
-    `given` are rows that are to hold.
+    `given` holds rows to satisfy.
 
     Raises
     ------

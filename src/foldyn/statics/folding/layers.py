@@ -1,7 +1,7 @@
-"""The order of the layers of a flat-folded sheet, by propagation and backtracking.
+"""Layer order of a flat-folded sheet, by propagation and backtracking.
 
-What follows from the orders that are known is set first; what is left falls apart into independent
-groups of pairs, each of which is searched on its own (J. Ku and others' Flat-Folder does the same).
+First, all orders implied by the known ones are set; the remaining pairs fall into independent
+groups, each searched on its own (as in Flat-Folder by J. Ku and others).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ MOST_TRIES = 100_000  # guesses in one group
 
 
 class CrossingError(Exception):
-    """No order satisfies a condition on these rows of the pairs."""
+    """No order satisfies one condition, on these rows of the pairs."""
 
     def __init__(self, rows: tuple[int, ...]) -> None:
         super().__init__(rows)
@@ -31,7 +31,7 @@ def ordered(constraints: LayerConstraints) -> NDArray[np.int64]:
     Raises
     ------
     CrossingError
-        There are none; with the rows of the pairs of the first condition that cannot be satisfied.
+        There are none; holds the rows of the first condition that cannot be satisfied.
     ComputationError
         None was found within a bounded number of guesses.
     """
@@ -43,7 +43,7 @@ def ordered(constraints: LayerConstraints) -> NDArray[np.int64]:
 
 
 class _Search:
-    """Orders so far, with the conditions on each."""
+    """Orders so far, and the conditions on each."""
 
     def __init__(self, constraints: LayerConstraints) -> None:
         self.orders = [0] * len(constraints.pairs)
@@ -62,7 +62,7 @@ class _Search:
                 self.of_row[row].append(k)
 
     def propagate(self, touched) -> list[int]:
-        """Set what the touched conditions imply, and what follows; returns the rows set."""
+        """Set all orders that the touched conditions imply; returns the rows set."""
         orders, conditions = self.orders, self.conditions
         found, queue = [], list(touched)
         while queue:
@@ -98,7 +98,7 @@ class _Search:
             self.orders[row] = 0
 
     def groups(self) -> list[list[int]]:
-        """Rows without an order, in groups that no condition connects."""
+        """Rows without an order, in groups that share no condition."""
         one, other = [], []
         for rows, _ in self.conditions:
             left = [row for row in rows if not self.orders[row]]
@@ -114,8 +114,8 @@ class _Search:
         return list(groups.values())
 
     def solve(self, group: list[int]) -> None:
-        """Order a group, by guesses that are taken back where they fail."""
-        guesses: list[tuple[int, int, list[int]]] = []  # place in the group, value, what followed
+        """Order a group by guesses, taken back if they fail."""
+        guesses: list[tuple[int, int, list[int]]] = []  # place in the group, value, implied rows
         place, value, tries = 0, 1, 0
         while True:
             while place < len(group) and self.orders[group[place]]:

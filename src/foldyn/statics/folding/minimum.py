@@ -1,14 +1,15 @@
-"""The least energy near a shape.
+"""Minimization of the folding energy near a shape.
 
-Far away damped steps lead there (Levenberg and Marquardt). Near by Newton's take over: where
-springs are weak a step along a mechanism strains bars by its square, which pull so much that the
-energy rises and that their share of the second derivatives misleads. What bars and hinges pull
-with is therefore what the last step expected, and the next step lets go what strains it has left
-(mixed Newton, Magisano and others, Int. J. Numer. Meth. Eng. 109, 2017).
+Far from the minimum, damped steps lead toward it (Levenberg and Marquardt). Close to it Newton's
+method takes over: where springs are weak, a step along a mechanism strains bars by its square.
+Their forces then raise the energy, and make their second-derivative terms misleading. The forces of
+bars and moments of hinges are therefore the ones that the last step predicted, and the next step
+removes the strains that it left (mixed Newton, Magisano and others, Int. J. Numer. Meth. Eng. 109,
+2017).
 
-Factors of the matrix take ten times as long as the rest of a step, and serve as long as steps get
-shorter. What strains are left is then let go along the gradients that the matrix is made of: along
-those that have turned since it would push creases, whose springs are far weaker than bars.
+A factorization takes ten times as long as the rest of a step, and is kept as long as steps get
+shorter. The remaining strains are then removed along the gradients of the factorized matrix: along
+current gradients they would push creases, whose springs are far weaker than bars.
 """
 
 from __future__ import annotations
@@ -21,21 +22,21 @@ from numpy.typing import NDArray
 from foldyn.statics.folding.energy import Aim, Evaluated, FoldEnergy, Shape, Stiffness
 
 LARGEST_TURN = 0.5  # rad, of a hinge in a step
-NEAR = 0.1  # rad, turn in a damped step after which Newton's are tried
-CLOSER = 0.1  # times as near they are tried again, where they have failed
-TRIES, MORE_DAMPED = 12, 3  # of Newton's matrices, and of one that is not definite
-SHORTER = 0.3  # of the last turn: after a step with less the next one takes the same matrix
-CLOSE = 0.01  # of the least turn: what such steps may leave
-DAMPING = 1e-4  # at first, over the mean of the matrix's diagonal
+NEAR = 0.1  # rad, turn in a damped step below which Newton's method is tried
+CLOSER = 0.1  # factor on this turn after each failure
+TRIES, MORE_DAMPED = 12, 3  # Newton matrices, and dampings tried for an indefinite one
+SHORTER = 0.3  # factor on the last turn: after a shorter step the matrix is kept
+CLOSE = 0.01  # of `least`: remaining turn accepted with a kept matrix
+DAMPING = 1e-4  # initial, over the mean of the matrix diagonal
 LEAST, MOST = 1e-14, 1e8
-LESS, MORE = 0.3, 5.0  # by which it changes after a good step, and after a bad one
-FIRM, SOFT = 1e-12, 0.01  # damping of Newton's: at least, and for each rad of the last turn
+LESS, MORE = 0.3, 5.0  # factors on the damping after a good and after a bad step
+FIRM, SOFT = 1e-12, 0.01  # damping of Newton's method: least, and per rad of the last turn
 ROUNDING = 1e-14  # of an energy
-UNSTRAINED = 1e-24  # energy of strains that are rounding
+UNSTRAINED = 1e-24  # energy of strains at round-off
 
 
 def lowest(energy: FoldEnergy, shape: Shape, x: NDArray, aim: Aim, stiffness: Stiffness) -> Shape:
-    """The shape, or that at positions x (n, 3) if its energy is less."""
+    """The shape itself, or the shape at positions x (n, 3) if its energy is lower."""
     one, other = (energy.evaluated(shape, at, aim, stiffness).shape for at in (shape.x, x))
     return other if other.energy < one.energy else one
 
@@ -48,9 +49,9 @@ def minimum(
     iterations: int = 150,
     least: float = 1e-6,
 ) -> Shape:
-    """Shape of least energy near `shape`; the best found where steps no longer lead down.
+    """Shape of least energy near `shape`; the best one found if steps stop descending.
 
-    least : largest turn of a hinge (rad) in the last step.
+    least : largest turn (rad) of a hinge in the last step.
     """
     now, damping = energy.evaluated(shape, shape.x, aim, stiffness), DAMPING
     turn, near, again = 0.0, NEAR, 0
@@ -81,9 +82,9 @@ def minimum(
 def settled(
     energy: FoldEnergy, shape: Shape, aim: Aim, stiffness: Stiffness, least: float
 ) -> Shape | None:
-    """Where Newton's steps from a shape settle; None where they do not, or where it is higher.
+    """Shape to which Newton's method converges; None if it diverges or ends at a higher energy.
 
-    Arguments as of `minimum`.
+    Arguments as in `minimum`.
     """
     now = energy.evaluated(shape, shape.x, aim, stiffness)
     highest = (1.0 + ROUNDING) * now.shape.energy + UNSTRAINED
@@ -112,7 +113,7 @@ def settled(
 def _factorized(
     energy: FoldEnergy, at: Evaluated, pulls: tuple[NDArray, NDArray] | None, soft: float
 ) -> Callable[[NDArray], NDArray] | None:
-    """Solver of Newton's steps with the matrix at a shape; None where it is not definite."""
+    """Solver for Newton steps with the matrix at a shape; None if it is indefinite."""
     matrix, damping = energy.matrix(at, pulls), FIRM + SOFT * soft
     for _ in range(MORE_DAMPED):
         solution = energy.curvature.factorized(matrix, damping)

@@ -1,4 +1,4 @@
-"""What folding leaves: the states on the way as a dataset, and the folded pattern."""
+"""The results of folding: a dataset of the states on the way, and the folded pattern."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def path_of(pattern: Pattern, energy: FoldEnergy, way: Way) -> xarray.Dataset:
-    """States of a way, each placed where it differs least from the one before."""
+    """States of a way, each placed as close as possible to the previous one."""
     place, positions = pattern.vertices, []
     for shape in way.shapes:
         place = placed(energy.place(shape.x), place)
@@ -38,7 +38,7 @@ def path_of(pattern: Pattern, energy: FoldEnergy, way: Way) -> xarray.Dataset:
 
 
 def placed(x: NDArray, near: NDArray) -> NDArray:
-    """Points x (n, 3) moved as a rigid body to where they are nearest to others (Kabsch)."""
+    """Points x (n, 3), moved as a rigid body as close as possible to `near` (Kabsch)."""
     middle, target = x.mean(axis=0), near.mean(axis=0)
     left, _, right = np.linalg.svd((x - middle).T @ (near - target))
     way = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
@@ -46,9 +46,9 @@ def placed(x: NDArray, near: NDArray) -> NDArray:
 
 
 def folded_pattern(pattern: Pattern, energy: FoldEnergy, shape: Shape, x: NDArray) -> Pattern:
-    """The pattern at positions x (n, 3), panels that have bent cut along their bends.
+    """The pattern at positions x (n, 3), with bent panels cut along their bends.
 
-    Panels that would fall into slivers, as with three corners on a line, stay whole.
+    Panels that would leave slivers, such as with three corners on a line, stay whole.
     """
     bent = np.abs(shape.turns - energy.rest)[: len(energy.diagonals)] > PLANE
     cut = np.setdiff1d(energy.diagonal_panel[bent], _with_slivers(energy, x))
@@ -67,5 +67,5 @@ def folded_pattern(pattern: Pattern, energy: FoldEnergy, shape: Shape, x: NDArra
 
 
 def _with_slivers(energy: FoldEnergy, x: NDArray) -> NDArray[np.int64]:
-    """Panels with a triangle that is much longer than wide."""
+    """Panels with a triangle much longer than wide."""
     return np.unique(energy.triangle_panel[are_slivers(x[energy.triangles])])

@@ -1,14 +1,14 @@
-"""Where folding begins: a branch that leaves the flat state, or the folded state itself.
+"""Starts of folding: a branch that leaves the flat state, or the folded state itself.
 
-At the flat state bars do not feel displacements across the sheet, and fold angles are linear in
-them. A first least-squares step towards small angles of the assigned signs therefore costs nothing;
-the energy with its one-sided terms then closes the panels again, and what it finds is a branch on
-which every mountain and valley turns its own way, if there is one.
+In the flat state bars do not feel displacements across the sheet, and fold angles are linear in
+them. A first least-squares step toward small angles of the assigned signs therefore costs no
+energy; minimizing the energy with its one-sided terms then closes the panels again. The result is a
+branch on which every mountain and valley folds as assigned, if there is one.
 
-Some patterns have none with plane panels (a crane: what one vertex asks of a crease another
-forbids). Their folded state may be isometric all the same, when the rotations across the creases
-around every vertex close. It is found by composing them, panel by panel, and opened to the angles
-wanted.
+Some patterns have no such branch with plane panels (in a crane, vertices make conflicting demands
+on a crease). Their folded state may still be isometric, if the rotations across the creases around
+every vertex close. It is found by composing these rotations panel by panel, and opened to the
+angles wanted.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from foldyn.statics.folding.energy import Aim, FoldEnergy, Shape, Stiffness
 from foldyn.statics.folding.minimum import minimum
 
 FIRST_TURN = math.radians(8.0)
-PERTURBED = Stiffness(bends=30.0, creases=1.0, sides=0.0)  # bars have little say
+PERTURBED = Stiffness(bends=30.0, creases=1.0, sides=0.0)  # bars hardly matter
 
 
 def opened(energy: FoldEnergy, stiffness: Stiffness) -> Shape:
-    """Shape near the start in which mountains and valleys have begun to turn their way."""
+    """Shape near the start, in which mountains and valleys have begun to fold as assigned."""
     turned = energy.creases(energy.start.turns)
     least = np.where(energy.signs == 0.0, 0.0, FIRST_TURN)
     if (energy.signs * turned >= least).all():
@@ -42,7 +42,7 @@ def opened(energy: FoldEnergy, stiffness: Stiffness) -> Shape:
 
 
 def ajar(energy: FoldEnergy, folded: Shape) -> Shape:
-    """Shape near a folded one, whose creases have begun to open."""
+    """Shape near a folded one, in which creases have begun to open."""
     turns = energy.creases(folded.turns)
     none, most = np.zeros_like(turns), np.full(len(turns), math.pi)
     aim = Aim(turns - FIRST_TURN * np.sign(turns), none, most)
@@ -50,9 +50,9 @@ def ajar(energy: FoldEnergy, folded: Shape) -> Shape:
 
 
 def composed(pattern: Pattern, angles: NDArray) -> tuple[NDArray, float]:
-    """Vertices (n, 3) of a flat pattern folded by angles (nc,), rad, and how they fail to close.
+    """Vertices (n, 3) of a flat pattern folded by angles (nc,), rad, and the closing error, m.
 
-    The latter is the largest distance (m) of a vertex from where another of its panels has it.
+    The error is the largest deviation of a vertex, as one of its panels has it, from the mean.
     """
     axes = pattern.vertices[np.concatenate([pattern.creases, pattern.welds]).astype(np.int64)]
     turns = np.concatenate([angles, np.zeros(len(pattern.welds))])

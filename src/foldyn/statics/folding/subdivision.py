@@ -1,8 +1,8 @@
-"""Panels cut so that they can bend along lines from all their corners.
+"""Panels cut so that they can bend along lines from every corner.
 
 A crease pattern whose panels are cut once, or not at all, has few ways to bend: a triangle has
 none. In its barycentric subdivision each triangle of a panel becomes six, around its centroid, and
-each edge two. Lines within panels are welds, across which the sheet runs on.
+each edge becomes two. Lines within panels are welds, across which the sheet continues.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ def are_slivers(corners: NDArray) -> NDArray[np.bool_]:
 
 
 def _sides(triangles: NDArray) -> tuple[NDArray, NDArray[np.int64]]:
-    """Sides (k, 2) of triangles (n, 3), each once; the rows (n, 3) of those of each, in order."""
+    """Distinct sides (k, 2) of triangles (n, 3), and the rows (n, 3) of each triangle's sides."""
     pairs = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     sides, row = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
     return sides, row.reshape(-1, 3)
 
 
 def subdivided(pattern: Pattern) -> tuple[Pattern, NDArray[np.int64]]:
-    """Barycentric subdivision of a pattern, and the crease (nc,) that each of its creases halves.
+    """Barycentric subdivision of a pattern, and the original crease (nc,) of each of its creases.
 
-    The vertices of the pattern come first, then the middles of edges, then those of triangles.
+    The vertices of the pattern come first, then edge midpoints, then triangle centroids.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Angles that creases are to fold to, from what a user says."""
+"""Target fold angles, from the arguments of `fold`."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _NAMES = {"M": "mountain", "V": "valley"}
 
 
 def full_angles(pattern: Pattern) -> NDArray[np.float64]:
-    """Fold angles (nc,), rad, of the pattern when it is folded.
+    """Fold angles (nc,), rad, of the pattern when fully folded.
 
-    Those of `Pattern.fold_angles` where there are any, else 180 degrees of mountains and valleys;
-    nan for flat and unassigned creases.
+    `Pattern.fold_angles` where given, else 180 degrees for mountains and valleys; nan for flat and
+    unassigned creases.
     """
     signs = np.array([SIGNS[letter] for letter in pattern.assignments])
     closed = np.where(signs == 0.0, np.nan, math.pi * signs)
@@ -32,12 +32,12 @@ def full_angles(pattern: Pattern) -> NDArray[np.float64]:
 
 
 def fold_targets(pattern: Pattern, angles: Any, fraction: Any) -> NDArray[np.float64]:
-    """Fold angles (nc,), rad, to reach, nan where a crease is free; arguments as `fold` has them.
+    """Target fold angles (nc,), rad, nan if a crease is free; arguments as in `fold`.
 
     Raises
     ------
     InputError
-        Both or neither are given, a crease is not there, an angle that its assignment forbids.
+        Both or neither are given; a crease does not exist; an angle contradicts its assignment.
     """
     if angles is not None and fraction is not None:
         raise InputError(": give either angles or fraction", "fraction")
@@ -81,7 +81,7 @@ def _given(pattern: Pattern, angles: Any) -> NDArray[np.float64]:
             raise InputError(": is empty; name creases and their angles", "angles")
         targets, row = np.full(count, np.nan), edge_lookup(pattern.creases)
         words = [key for key in angles if isinstance(key, str)]
-        for word in words:  # pairs after words, which they refine
+        for word in words:  # pairs come after words, and refine them
             rows = folded_rows(f"angles.{word}", word, pattern)
             targets[rows] = _sized(pattern, rows, angles[word], f"angles.{word}")
         for key in (key for key in angles if not isinstance(key, str)):
@@ -118,7 +118,7 @@ def _angle(field: str, value: Any) -> float:
 
 
 def _sized(pattern: Pattern, rows: NDArray, value: Any, field: str) -> NDArray[np.float64]:
-    """Targets (rad) of creases, each its own way, from a size (degrees)."""
+    """Targets (rad) of creases, each folding as assigned, from a size (degrees)."""
     size = _angle(field, value)
     if size < 0.0:
         raise InputError(

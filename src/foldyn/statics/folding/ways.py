@@ -1,4 +1,4 @@
-"""The way from the start to the angles wanted, step by step, and what is left without springs."""
+"""The way from the start to the target angles, step by step, and the release of the springs."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from foldyn.statics.folding.energy import Aim, FoldEnergy, Shape, Stiffness
 from foldyn.statics.folding.minimum import lowest, minimum, settled
 from foldyn.statics.folding.starts import FIRST_TURN, ajar, composed, opened
 
-PLATES = Stiffness(bends=0.3, creases=1e-3, sides=0.1)  # panels that hardly bend
-PAPER = Stiffness(bends=0.03, creases=5e-3, sides=0.1)  # and some that do, driven harder
+PLATES = Stiffness(bends=0.3, creases=1e-3, sides=0.1)  # panels hardly bend
+PAPER = Stiffness(bends=0.03, creases=5e-3, sides=0.1)  # panels bend, creases are driven harder
 THIN = Stiffness(bends=1e-3, creases=1e-3, sides=1.0)
-CLOSING = 10.0  # stiffness of sides, so that closed creases stay within 180
-AJAR = math.radians(179.8)  # most turn of creases that are to open from the folded state
-OPENED = 0.1  # part of what was asked: a crease that has opened by less stays closed
-FREE_MARGIN = math.radians(1.0)  # of mountains and valleys without an angle to reach
-WEAKER = (0.1, 0.01, 0.001)  # springs, in turn, before what they held is let go
-ENOUGH = 60  # iterations before the last step: what is kept there does without springs
-LESS = 0.3  # of the strain must be left with these
-HELD = 0.3  # of what creases have turned: change by which a state counts as kept
-TURNED = 1e-3  # rad, least turn that counts as one
-ISOMETRIC = 1e-9  # strain
-PLANE = 1e-6  # rad, bend of a panel
-SLIGHT = 0.01  # rad, bend of panels that would be plane but for slips of drawing
-CLOSES = 0.02  # of the size of the pattern: gap that a start from the folded state may have
+CLOSING = 10.0  # stiffness of `sides` that keeps closed creases within 180 degrees
+AJAR = math.radians(179.8)  # largest turn of creases that open from the folded state
+OPENED = 0.1  # of the opening wanted: a crease that opens by less counts as closed
+FREE_MARGIN = math.radians(1.0)  # for mountains and valleys without a target
+WEAKER = (0.1, 0.01, 0.001)  # factors on the springs, in turn, before they are released
+ENOUGH = 60  # iterations at steps before the last, where the state with springs is enough
+LESS = 0.3  # of the strain: the most that may remain with the weakest springs
+HELD = 0.3  # of the turns so far: a larger change by the release is rejected
+TURNED = 1e-3  # rad, least turn that counts
+ISOMETRIC = 1e-9  # strain below which a state counts as isometric
+PLANE = 1e-6  # rad, bend below which a panel counts as plane
+SLIGHT = 0.01  # rad, bend of panels that are plane but for drawing errors
+CLOSES = 0.02  # of the size of the pattern: largest closing error of a folded state
 
 
 class Bending(NamedTuple):
-    """Stiffnesses to fold with, in turn, and those to open the folded state with."""
+    """Stiffnesses tried in turn to fold with, and the one to open the folded state with."""
 
     folding: tuple[Stiffness, ...]
     opening: Stiffness
@@ -47,7 +47,7 @@ BENDING = {
 
 
 class Way(NamedTuple):
-    """Shapes from the first to the last, their shares of the way, and where it began."""
+    """Shapes from first to last, their progress (0 to 1), and where the way began."""
 
     shapes: list[Shape]
     shares: list[float]
@@ -55,7 +55,7 @@ class Way(NamedTuple):
 
 
 class WayInterrupted(KeyboardInterrupt):
-    """A way was interrupted from the keyboard: `way` is what there is of it."""
+    """A way was interrupted from the keyboard: `way` is the part computed so far."""
 
     def __init__(self, way: Way) -> None:
         super().__init__()
@@ -63,14 +63,14 @@ class WayInterrupted(KeyboardInterrupt):
 
 
 def wrong_ways(energy: FoldEnergy, turns: NDArray, targets: NDArray) -> NDArray[np.int64]:
-    """Mountains and valleys that have not turned their own way, unless they are to stay flat."""
+    """Mountains and valleys that have not folded as assigned, unless they are to stay flat."""
     flat = np.abs(np.nan_to_num(targets, nan=1.0)) <= TURNED
     late = energy.signs * energy.creases(turns) <= TURNED
     return np.flatnonzero((energy.signs != 0.0) & late & ~flat)
 
 
 def unopened(first: NDArray, turns: NDArray, targets: NDArray) -> NDArray[np.int64]:
-    """Creases that were to open from their first turns (nc,) and have hardly done so."""
+    """Creases that should open from their first turns (nc,) and have hardly done so."""
     asked = np.abs(first) - np.abs(targets)  # nan where a crease is free
     return np.flatnonzero((asked > TURNED) & (np.abs(first) - np.abs(turns) < OPENED * asked))
 
@@ -79,7 +79,7 @@ def from_pattern(
     energy: FoldEnergy, stiffness: Stiffness, targets: NDArray, steps: int,
     progress: Callable[[int], None],
 ) -> Way:  # fmt: skip
-    """Fold from the pattern as it is."""
+    """Fold from the pattern as given."""
     first = energy.creases(energy.start.turns)
     start = opened(energy, stiffness)
     way = Way([energy.start], [0.0], "pattern")
@@ -90,7 +90,7 @@ def from_folded(
     energy: FoldEnergy, stiffness: Stiffness, pattern: Pattern, full: NDArray, targets: NDArray,
     steps: int, progress: Callable[[int], None],
 ) -> Way | None:  # fmt: skip
-    """Open from the folded state; None where the panels of a flat pattern do not close in it."""
+    """Open from the folded state; None if the panels of a flat pattern do not close in it."""
     folded = np.nan_to_num(full)
     if (np.abs(energy.start.turns) > PLANE).any():
         return None
@@ -110,10 +110,10 @@ def _followed(
     angles: tuple[NDArray, NDArray], steps: int, progress: Callable[[int], None],
     most: float = math.pi,
 ) -> Way:  # fmt: skip
-    """Follow the least energy from `shape` while the rest angles go from the first to the second.
+    """Minimize the energy step by step, from `shape`, while rest angles go from first to second.
 
-    Where springs cannot be let go at a step, or not without bent panels, that is not tried again
-    before the last one.
+    If the springs cannot be released at a step, or not without bending panels, this is not tried
+    again until the last step.
     """
     before, plane, lets_go, kept = shape, True, True, None
     try:
@@ -142,14 +142,14 @@ def relaxed(
     energy: FoldEnergy, stiffness: Stiffness, shape: Shape, before: Shape | None, aim: Aim,
     first: NDArray, plane: bool,
 ) -> tuple[Shape | None, bool]:  # fmt: skip
-    """The shape without the springs of its creases, if it stays near; whether panels stay plane.
+    """The shape with its springs released, if it stays near; and whether panels stay plane.
 
-    How near is measured by how far the creases have turned since the `first` state. What was kept
-    at the step `before` mostly leads to it with few steps of Newton's.
+    The allowed distance is a fraction of the turns since the `first` state. The released shape of
+    the previous step, `before`, usually leads to it within a few Newton steps.
 
-    First, if they may end `plane`, panels stay as stiff as they are, as in a pattern that can be
-    folded rigidly, or but for slips of drawing: by these they bend slightly in the end. Failing
-    that they bend as they like, as thin paper does.
+    First, if `plane` is allowed, panels keep their stiffness, as in rigidly foldable patterns, or
+    ones with drawing errors, by which they bend slightly in the end. Failing that, they bend
+    freely, as thin paper does.
     """
     wrong = len(wrong_ways(energy, shape.turns, aim.angles))
     most = max(ISOMETRIC, LESS * largest_strain(shape))
@@ -163,7 +163,7 @@ def relaxed(
         weak = stiffness._replace(bends=bends, creases=stiffness.creases * WEAKER[-1])
         if start is not shape:
             kept = settled(energy, start, aim, weak, 1e-6)
-        else:  # in stages: springs that are weak at once take many steps
+        else:  # in stages: weak springs from the start take many steps
             kept = shape
             for weaker in WEAKER:
                 if weaker == WEAKER[-1] and largest_strain(kept) > most:
@@ -171,7 +171,7 @@ def relaxed(
                 weak = weak._replace(creases=stiffness.creases * weaker)
                 kept = minimum(energy, kept, aim, weak)
         if kept is None or largest_strain(kept) > most:
-            continue  # strained by more than the springs
+            continue  # strained more than with springs
         for held in (0.0,) if thin else (bends, 0.0):
             let = settled(energy, kept, free, weak._replace(bends=held, creases=0.0), 1e-10)
             if let is not None and largest_strain(let) <= ISOMETRIC:
@@ -182,7 +182,7 @@ def relaxed(
         if not thin and energy.bent(kept.turns).max(initial=0.0) > SLIGHT:
             continue
         if np.abs(energy.creases(kept.turns - shape.turns)).sum() > HELD * turned:
-            continue  # elsewhere
+            continue  # too far away
         if len(wrong_ways(energy, kept.turns, aim.angles)) <= wrong:
             return kept, not thin
     return None, False
@@ -191,7 +191,7 @@ def relaxed(
 def eased(
     energy: FoldEnergy, stiffness: Stiffness, shape: Shape, aim: Aim, first: NDArray
 ) -> Shape:
-    """The shape with springs and bends so much weaker as it stays near and strains get less."""
+    """The shape with springs and bends as weak as possible while it stays near and strains fall."""
     turned = np.abs(energy.creases(shape.turns) - first).sum() + TURNED
     wrong, kept = len(wrong_ways(energy, shape.turns, aim.angles)), shape
     for weaker in WEAKER:
@@ -214,7 +214,7 @@ def largest_strain(shape: Shape) -> float:
 
 
 def _aim(energy: FoldEnergy, angles: NDArray, most: float) -> Aim:
-    """Angles with the least and the most turns of mountains and valleys on their way there."""
+    """Target angles, with the least and largest turns of mountains and valleys toward them."""
     least = np.where(np.isnan(angles), FREE_MARGIN, np.minimum(FIRST_TURN, 0.5 * np.abs(angles)))
     turned = np.abs(np.nan_to_num(angles))
     return Aim(angles, np.where(energy.signs == 0.0, 0.0, least), np.maximum(most, turned))
