@@ -1,10 +1,10 @@
-"""Ends of a chain that absorb long waves: dashpots with the impedance of the chain that is cut off.
+"""Absorbing ends of a chain: dashpots with the impedance of the chain that is cut off.
 
-Long waves move the sections of a chain as rigid bodies, q (k,): along it, and about its axis where
-it is a tube. With the mass M of a cell and its stiffness K against differences of q between cells,
-M q'' = K (q_n+1 - 2 q_n + q_n-1): waves travel c_j = sqrt(eig(M^-1 K)) cells per second, and the
+Long waves move the sections of a chain as rigid bodies, q (k,): along it, and about its axis for a
+tube. With the mass M of a cell and its stiffness K against differences of q between cells,
+M q'' = K (q_n+1 - 2 q_n + q_n-1): waves travel at c_j = sqrt(eig(M^-1 K)) cells per second, and the
 rest of the chain pushes back with -Z q', Z the sum over waves of c_j (M q_j)(M q_j)^T, with
-q_j^T M q_j = 1. Dampers with that impedance absorb long waves exactly (J. Lysmer, R. L. Kuhlemeyer,
+q_j^T M q_j = 1. Dampers with this impedance absorb long waves exactly (J. Lysmer, R. L. Kuhlemeyer,
 Finite dynamic model for infinite media, J. Eng. Mech. Div. 95, 1969).
 """
 
@@ -30,9 +30,9 @@ from foldyn.linear.wave_solver import WaveSolver
 from foldyn.values import numbers, of_kind, vector
 
 PHASE = 1e-3  # rad per cell: a long wave
-LEAST = 0.5  # share of a wave's kinetic energy in sections that move as rigid bodies
-LOOKED_AT = 8  # lowest waves: bending ones are below those along the chain
-NEGLIGIBLE = 1e-3  # of the largest coefficient: dashpots that are left out
+LEAST = 0.5  # least share of rigid section motions in the kinetic energy of a wave
+LOOKED_AT = 8  # lowest waves computed: bending waves lie below those along the chain
+NEGLIGIBLE = 1e-3  # of the largest coefficient: smaller dashpots are left out
 ON_AXIS = 1e-6  # of the largest distance from the axis
 
 
@@ -49,7 +49,7 @@ def _matrix(name: str, value: ArrayLike) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class LongWaves(Checked):
-    """Long waves of a chain: its cells as rigid sections, along it and about its axis.
+    """Long waves of a chain, whose cells move as rigid sections along it and about its axis.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class LongWaves(Checked):
         Direction of the chain, of any length.
     stiffness : array_like, shape (1, 1) or (2, 2)
         K of a cell: force along the chain (N) and torque about it (N m) for the elongation (m) and
-        the twist (rad) of a cell, as statics of one cell gives them.
+        the twist (rad) of a cell, from the statics of one cell.
     mass : array_like of the same shape
         M of a cell: its mass (kg) and, with rotations, its moment of inertia (kg m2).
     point : sequence of float, shape (3,)
@@ -76,7 +76,7 @@ class LongWaves(Checked):
     point: Annotated[Sequence[float], Check(vector, unit="m")] = (0.0, 0.0, 0.0)
 
     def agree(self) -> None:
-        """Ask for matrices of one shape, and for mass."""
+        """Check that both matrices have the same shape and the mass is positive definite."""
         stiffness, mass = np.asarray(self.stiffness), np.asarray(self.mass)
         if stiffness.shape != mass.shape:
             raise InputError(f": shape {mass.shape}: the stiffness has {stiffness.shape}", "mass")
@@ -85,12 +85,12 @@ class LongWaves(Checked):
 
     @property
     def speeds(self) -> NDArray[np.float64]:
-        """Cells per second (k,), the slowest first: slopes of bands at the origin, rad/s."""
+        """Speeds (k,) in cells per second, slowest first: slopes of bands at the origin, rad/s."""
         return np.sqrt(eigh(self.stiffness, self.mass, eigvals_only=True).clip(min=0.0))
 
     @property
     def impedance(self) -> NDArray[np.float64]:
-        """Z (k, k): N s/m, N s, and N m s of rotations."""
+        """Impedance Z (k, k): N s/m, with rotations also N s and N m s."""
         _, shapes = eigh(self.stiffness, self.mass)
         momenta = np.asarray(self.mass) @ shapes
         return (momenta * self.speeds) @ momenta.T
@@ -102,12 +102,12 @@ def long_waves(cell: UnitCell, state: State | None = None, *, along: int = 0) ->
     Parameters
     ----------
     cell : UnitCell
-        Of a chain or tube. With a screw the sections turn, too; else they move along the chain
-        alone.
+        Cell of a chain or tube. With a screw, sections also turn; otherwise they only move along
+        the chain.
     state : State, optional
-        About which; see `bands`.
+        State to linearize about; see `bands`.
     along : int
-        Which motion of the cell leads along the chain.
+        Number of the cell's motion along the chain.
 
     Returns
     -------
@@ -116,9 +116,9 @@ def long_waves(cell: UnitCell, state: State | None = None, *, along: int = 0) ->
     Raises
     ------
     InputError
-        Arguments as of `bands`.
+        As from `bands`.
     ComputationError
-        The cell has no such waves, as where it is held.
+        The cell has no such waves, for instance because it is held.
 
     Examples
     --------
@@ -142,7 +142,7 @@ def long_waves(cell: UnitCell, state: State | None = None, *, along: int = 0) ->
     solver = WaveSolver(linear.bloch, _lowest(linear.bloch, phase))
 
     def rigid_part(waves: Waves) -> tuple[NDArray, NDArray]:
-        """Momenta (k, m) of sections that move as rigid bodies, and their share (m,) of waves."""
+        """Momenta (k, m) of rigid section motions, and their share (m,) in each wave."""
         parts = momenta.T @ waves.shapes
         return parts, np.einsum("ij,ij->j", parts.conj(), np.linalg.solve(mass, parts)).real
 
@@ -169,23 +169,23 @@ def absorbing_end(case: Case, nodes: Nodes, *, waves: LongWaves) -> list[Dashpot
     Parameters
     ----------
     case : Case
-        Of the chain, without them.
+        Case of the chain, without these dashpots.
     nodes : int, sequence of int, or str
         Nodes of its last section, which share the impedance equally.
     waves : LongWaves
-        Of the chain: `long_waves(cell)`, or from the stiffness and mass of a cell.
+        Long waves of the chain: `long_waves(cell)`, or from a cell's stiffness and mass.
 
     Returns
     -------
     list of Dashpot
-        To the ground, one or two for each node along fixed directions, for the supports of a case.
-        Their sum on rigid motions of the section is `waves.impedance`. As the directions stand
-        still, the section must not turn far.
+        To the ground, one or two per node along fixed directions, as supports of a case. On rigid
+        motions of the section they add up to `waves.impedance`. As their directions are fixed, the
+        section must not turn far.
 
     Raises
     ------
     InputError
-        No such nodes, or one on the axis of sections that rotate.
+        There are no such nodes, or one lies on the axis of rotating sections.
 
     Examples
     --------
@@ -232,7 +232,7 @@ def _rigid(points: NDArray, axis: NDArray, center: NDArray, turns: bool) -> NDAr
 
 
 def _lowest(bloch: Bloch, phase: NDArray) -> int:
-    """How many waves are looked at, with long ones among them: those that there are at most."""
+    """Number of waves to compute, long ones among them: at most as many as there are."""
     free = WaveSolver(bloch, 1).free
     if bloch.ties.empty:
         return min(LOOKED_AT, len(free))

@@ -1,4 +1,4 @@
-"""Which model a comparison with the shell speaks for, in words that follow from its numbers."""
+"""Advice on a model from a comparison with the shell, in words."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from foldyn.linear.reference import NO_LIMIT
 
 OWN = "own"
 """Name of the case's own model."""
-GOOD, LARGEST = 0.02, 0.10  # errors: of a model that is left as it is, and of one that can be used
-MESH = 0.02  # error of the mesh that is told
+GOOD, LARGEST = 0.02, 0.10  # errors: of a model that is kept, and of one that can be used
+MESH = 0.02  # mesh error above which it is mentioned
 SHELL = " (--model shell on the command line, fd.shell)"
 SCOPE = (
     "Only small vibrations about rest and small loads were compared: motions and loads that turn "
@@ -22,13 +22,13 @@ SCOPE = (
 
 
 class Reach(NamedTuple):
-    """How far up a model follows the shell: the modes with errors of at most 10 %, from the lowest.
+    """Range in which a model follows the shell: the lowest modes with errors of at most 10 %.
 
     Attributes
     ----------
     model : str
     count : int
-        How many.
+        Number of these modes.
     worst : float
         Largest error among them; infinite without any.
     """
@@ -39,17 +39,17 @@ class Reach(NamedTuple):
 
 
 def advice(result: xarray.Dataset) -> str:
-    """Sentences on a comparison; see `foldyn.fidelity`."""
+    """Advice in sentences from a comparison; see `foldyn.fidelity`."""
     return " ".join(_sentences(result))
 
 
 def percent(value: float) -> str:
-    """Write a fraction with its sign: "+2.1 %", "-34 %"."""
+    """Format a fraction with its sign: "+2.1 %", "-34 %"."""
     return f"{100.0 * value:+.{0 if abs(value) >= 0.1 else 1}f} %"
 
 
 def size(value: float) -> str:
-    """The same of its size, without a sign."""
+    """Format the size of a fraction, without a sign."""
     return percent(abs(value))[1:]
 
 
@@ -103,7 +103,7 @@ def _vibrations(result: xarray.Dataset, below: int, best: Reach) -> Iterator[str
 
 
 def _own(result: xarray.Dataset, below: int) -> Iterator[str]:
-    """What the case's own model does with the modes below the limit."""
+    """Errors of the case's own model below the limit."""
     error = np.abs(result["error"].sel(model=OWN).values[:below])
     lost = int(np.isinf(error).sum())
     parts = []
@@ -121,7 +121,7 @@ def _own(result: xarray.Dataset, below: int) -> Iterator[str]:
 
 
 def _statics(result: xarray.Dataset, best: Reach) -> str:
-    """Displacements of the model that is advised, and of the case's own."""
+    """Displacements of the recommended model, and of the case's own."""
     errors = result["deflection_error"]
     told = {one: float(errors.sel(model=one)) for one in dict.fromkeys([best.model, OWN])}
     texts = (
@@ -134,7 +134,7 @@ def _statics(result: xarray.Dataset, best: Reach) -> str:
 
 
 def reach(result: xarray.Dataset, model: str, below: int) -> Reach:
-    """How far up a model follows the shell among the lowest modes."""
+    """Range in which a model follows the shell among the lowest modes."""
     error = np.abs(result["error"].sel(model=model).values[:below])
     bad = np.flatnonzero(error > LARGEST)
     count = int(bad[0]) if len(bad) else below
@@ -142,7 +142,7 @@ def reach(result: xarray.Dataset, model: str, below: int) -> Reach:
 
 
 def _mesh(result: xarray.Dataset, below: int) -> Iterator[str]:
-    """How far the shell itself may be off."""
+    """Errors of the shell itself."""
     if "touched_clamp" in result.attrs:
         yield (
             f"No mesh of the shell converges: {NO_LIMIT.format(result.attrs['touched_clamp'])}. "

@@ -15,24 +15,24 @@ if TYPE_CHECKING:
     import xarray
 
 ALL = "all"
-"""Direction of gaps that are there at every phase."""
+"""Direction of full gaps, at every phase."""
 
 
 def band_gaps(bands: Any, least: float = 1e-3) -> xarray.Dataset:
-    """Gaps between bands, full ones and those along each leg of a path.
+    """Gaps between bands: full ones, and those along each leg of a path.
 
     Parameters
     ----------
     bands : xarray.Dataset
-        From `foldyn.bands`; a gap is as sure as its phases are close, and as they fill the zone
+        From `foldyn.bands`; gaps are as reliable as the phases are dense and cover the zone
         (`UnitCell.grid`).
     least : float
-        Width over the middle frequency below which a gap is not listed.
+        Least relative width (over the middle frequency) of a listed gap.
 
     Returns
     -------
     xarray.Dataset
-        A row `gap` for each: `direction` ("all" for full gaps, "G-X" for those on this leg alone),
+        A row `gap` for each: `direction` ("all" for full gaps, "G-X" for a gap on this leg only),
         `below` and `above` (numbers of the bands in the order of frequency; 0 below the first one),
         `bottom`, `top`, `middle` and `width` (Hz), and `relative_width`. Full ones come first, each
         direction from low to high frequencies. `to_dataframe()` prints it.
@@ -40,7 +40,7 @@ def band_gaps(bands: Any, least: float = 1e-3) -> xarray.Dataset:
     Raises
     ------
     InputError
-        Not what `foldyn.bands` returns.
+        Not a result of `foldyn.bands`.
     """
     import xarray
 
@@ -48,7 +48,7 @@ def band_gaps(bands: Any, least: float = 1e-3) -> xarray.Dataset:
     least = number("least", least, least=0.0)
     found = []
     for direction, rows in legs(bands).items():
-        # what lies below the first band is a gap of the whole zone, or none
+        # a gap below the first band concerns the whole zone, or does not exist
         found += [
             (direction, *gap) for gap in _gaps(frequency[rows], least) if gap[0] or direction == ALL
         ]
@@ -71,7 +71,7 @@ def band_gaps(bands: Any, least: float = 1e-3) -> xarray.Dataset:
 
 
 def frequencies_of(bands: Any) -> NDArray[np.float64]:
-    """Frequencies (phase, band), Hz, in increasing order at each phase; unstable ones as 0."""
+    """Frequencies (phase, band), Hz, sorted at each phase; 0 for unstable waves."""
     if not hasattr(bands, "data_vars") or "frequency" not in bands or "band" not in bands.dims:
         raise InputError(f": got {type(bands).__name__}; give what foldyn.bands returns", "bands")
     values = bands["frequency"].transpose("phase", "band").values
@@ -79,7 +79,7 @@ def frequencies_of(bands: Any) -> NDArray[np.float64]:
 
 
 def legs(bands: Any) -> dict[str, NDArray[np.int64]]:
-    """Phases of each direction by its name: all of them, and those between the points of a path."""
+    """Rows of phases by direction: all, and those on each leg of a path."""
     every = np.arange(bands.sizes["phase"])
     found = {ALL: every}
     if "ticks" not in bands.attrs or "distance" not in bands.coords:
@@ -95,7 +95,7 @@ def legs(bands: Any) -> dict[str, NDArray[np.int64]]:
 
 
 def _gaps(frequency: NDArray, least: float) -> list[tuple[int, float, float]]:
-    """Number of the band below, bottom and top of the gaps of some phases."""
+    """Number of the band below, bottom and top (Hz) of each gap over some phases."""
     tops = frequency.min(axis=0)
     bottoms = np.concatenate([[0.0], frequency.max(axis=0)[:-1]])
     wide = tops - bottoms > np.maximum(least * 0.5 * (tops + bottoms), 0.0)

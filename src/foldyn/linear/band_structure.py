@@ -42,44 +42,44 @@ def bands(
     """Frequencies of Bloch waves: the bands of a repeated case.
 
     Solves K(k) phi = lambda M(k) phi for the lowest eigenvalues lambda = (2 pi f)^2, K the tangent
-    of the repeated sheet in the state. Damping plays no part: `damped_bands` has it.
+    of the repeated sheet in the state. Damping is ignored; see `damped_bands`.
 
     Parameters
     ----------
     cell : UnitCell
     phases : array_like, shape (n, d), or DataArray
-        Wave vectors as phases (rad) per period, as `UnitCell.path` and `UnitCell.grid` make them.
+        Wave vectors as phases (rad) per period, as from `UnitCell.path` and `UnitCell.grid`.
     count : int
-        How many bands, the lowest ones.
+        Number of bands, the lowest ones.
     state : State, optional
-        About which: displacements of the cell's own nodes that repeat, maybe with other periods, as
-        `fd.initial_state(path)`; by default the rest state.
+        State to linearize about: displacements of the cell's own nodes that repeat, possibly with
+        other periods, as `fd.initial_state(path)`; by default the rest state.
     group_velocity : bool
-        Whether to give group velocities, by the Hellmann-Feynman theorem.
+        Whether to return group velocities, by the Hellmann-Feynman theorem.
     shape : bool
-        Whether to give the motions of all nodes.
+        Whether to return the shapes at all nodes.
     polarization : bool
-        Whether to give the shares of the directions in the kinetic energy.
+        Whether to return the shares of the axes in the kinetic energy.
     secant : float, optional
         Amplitude (degrees) of hinges of the superlinear law; see `modes`.
     load_factor : float
-        How far actuated folds are folded in a given state.
+        Load factor of actuated folds in a given state.
     track : bool
-        Whether bands follow the shapes of their waves from a phase to the next (MAC), through
-        crossings; else they are in the order of their frequencies.
+        Whether bands follow the shapes of their waves from phase to phase (MAC), through
+        crossings; otherwise they are sorted by frequency.
 
     Returns
     -------
     xarray.Dataset
-        Dimensions phase, band, and period, node, axis where they are needed. `frequency` (Hz; nan
-        of unstable waves), `eigenvalue` (rad2/s2); on request `slope` (d omega/d k, rad/s per rad
-        of each period; nan where omega is 0) and `group_velocity` (m/s, along x, y, z: the shifts
-        of the periods times their slopes), `shape` (complex, phi^H M phi = 1 kg m2 in a cell; copy
-        R of a node moves as shape exp(i k . R), turned with a screw), and `polarization` (shares
-        along x, y, z). Coordinate `wave_vector` (phase, period), rad, and what the phases bring
-        (`distance`; attributes `ticks`, `tick_labels`, `grid`). Of the state: `vectors` (period,
-        axis), m, and `angles` (period), rad, from a cell to the next, `axes` and `points` (m)
-        of screws, and `displacement`. Like other results it holds its case.
+        Dimensions phase, band, and period, node, axis where needed. `frequency` (Hz; nan for
+        unstable waves), `eigenvalue` (rad2/s2); on request `slope` (d omega/d k, rad/s per rad of
+        each period; nan if omega is 0), `group_velocity` (m/s, along x, y, z: the slopes times the
+        shifts of the periods), `shape` (complex, phi^H M phi = 1 kg m2 in a cell; copy R of a node
+        moves as shape exp(i k . R), turned with a screw), and `polarization` (shares along x, y,
+        z). Coordinate `wave_vector` (phase, period), rad, and the coordinates and attributes of
+        the phases (`distance`; `ticks`, `tick_labels`, `grid`). For the state: `vectors` (period,
+        axis), m, and `angles` (period), rad, from a cell to the next, `axes` and `points` (m) of
+        screws, and `displacement`. Like other results it contains its case.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def bands(
     Warns
     -----
     FoldynWarning
-        The state is no equilibrium, or unstable; hinges have no slope.
+        The state is not an equilibrium, or unstable; hinges have no slope.
 
     Notes
     -----
@@ -156,7 +156,7 @@ def bands(
 
 
 def polarizations(nodes: int, waves: Waves) -> NDArray[np.float64]:
-    """Shares (k, 3) of the directions in the kinetic energy of waves of so many nodes."""
+    """Shares (k, 3) of the axes in the kinetic energy of waves of a number of nodes."""
     energy = (waves.shapes.conj() * waves.momentum)[: 3 * nodes]
     shares = np.real(energy).reshape(nodes, 3, -1).sum(axis=0).T
     return shares / shares.sum(axis=1, keepdims=True)

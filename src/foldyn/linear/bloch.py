@@ -1,8 +1,8 @@
-"""Matrices of Bloch waves: K(k) = sum over R of K_R exp(i k . R), and so M, C and constraints.
+"""Matrices of Bloch waves: K(k) = sum over R of K_R exp(i k . R), likewise M, C and constraints.
 
-K_R is what the displacements of cell R exert on the dofs of cell 0, taken from the patch about it
-(`cell_patch`); displacements of cell R are given in axes turned with it. K_-R is the transpose of
-K_R, so that K(k) is Hermitian: this is checked, and with it that the cells are alike.
+K_R maps displacements of cell R to forces on the dofs of cell 0, and is taken from the patch around
+it (`cell_patch`); displacements of cell R are given in axes that turn with the cell. K_-R is the
+transpose of K_R, so that K(k) is Hermitian: this is checked, and with it that all cells are alike.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from scipy import sparse
 
 from foldyn.errors import InputError
 
-ALIKE = 1e-8  # of the largest entry: how far K_-R may be from the transpose of K_R
+ALIKE = 1e-8  # of the largest entry: largest difference between K_-R and the transpose of K_R
 
 
 class Hops(NamedTuple):
-    """A matrix A(k) = sum over R of A_R exp(i k . R), (r, n), by its places.
+    """A matrix A(k) = sum over R of A_R exp(i k . R), (r, n), by its nonzero entries.
 
     Attributes
     ----------
     rows, columns : (p,)
-        Places that are not zero for some R.
+        Entries that are nonzero for some R.
     values : sparse (p, s)
         Their values for each R.
     shape : (int, int)
@@ -44,23 +44,23 @@ class Hops(NamedTuple):
         return out
 
     def sparse_at(self, factors: NDArray) -> sparse.csc_array:
-        """The same as a sparse matrix."""
+        """A (r, n) as a sparse matrix; see `at`."""
         entries = (self.values @ factors, (self.rows, self.columns))
         return sparse.csc_array(sparse.coo_array(entries, self.shape))
 
     @property
     def empty(self) -> bool:
-        """Whether it is zero."""
+        """Whether the matrix is zero."""
         return not len(self.rows)
 
 
 def hops(
     matrix: sparse.sparray, rows: NDArray, unit: NDArray, number: NDArray, count: int, steps: int
 ) -> Hops:
-    """A matrix (m, m) of a patch, its rows those of cell 0.
+    """Rows of cell 0 of a matrix (m, m) of a patch, as `Hops`.
 
     rows : (n,) rows of the dofs of cell 0, in their order.
-    unit, number : (m,) dof of cell 0 that stands for each, -1 for none, and number of its R.
+    unit, number : (m,) dof of cell 0 of which each is a copy, -1 for none, and number of its R.
     """
     own = sparse.coo_array(sparse.csr_array(matrix)[rows])
     return collected(own.row, unit[own.col], number[own.col], own.data, (len(rows), count), steps)
@@ -70,7 +70,7 @@ def collected(
     row: NDArray, column: NDArray, number: NDArray, value: NDArray, shape: tuple[int, int],
     steps: int,
 ) -> Hops:  # fmt: skip
-    """The same from entries, which add up."""
+    """`Hops` from entries; duplicates add up."""
     kept = (column >= 0) & (value != 0.0)
     row, column, number, value = row[kept], column[kept], number[kept], value[kept]
     places, place = np.unique(row.astype(np.int64) * shape[1] + column, return_inverse=True)
@@ -85,13 +85,13 @@ class Bloch:
     Attributes
     ----------
     steps : (s, d)
-        R of the cells that reach cell 0; they come with their opposites.
+        R of the cells that reach cell 0, and their opposites.
     stiffness, mass, damping : Hops
         (n, n).
     ties : Hops
         (k, n), the constraints of links and rigid panels.
     hidden, held : (n,) bool
-        Dofs without mass, and those that supports hold.
+        Dofs without mass, and dofs held by supports.
     """
 
     steps: NDArray[np.int64]
@@ -112,12 +112,12 @@ class Bloch:
         return np.exp(1j * (self.steps @ phase))
 
     def slopes(self, phase: NDArray, period: int) -> NDArray[np.complex128]:
-        """Their derivatives by one phase."""
+        """Derivatives (s,) of `factors` with respect to one phase."""
         return 1j * self.steps[:, period] * self.factors(phase)
 
     @cached_property
     def lumped(self) -> NDArray[np.float64] | None:
-        """Masses (n,), kg, where they are the same for all k and not coupled; else None."""
+        """Masses (n,), kg, if they are diagonal and the same for all k; else None."""
         mass, here = self.mass, np.flatnonzero((self.steps == 0).all(axis=1))
         if (mass.rows != mass.columns).any() or mass.values.nnz != len(mass.rows):
             return None
@@ -128,7 +128,7 @@ class Bloch:
 
     @cached_property
     def nodal(self) -> Hops | None:
-        """The mass of nodes (n/3, n/3), kg, where it serves the three axes alike; else None."""
+        """Nodal mass (n/3, n/3), kg, if it is the same for all three axes; else None."""
         mass, nodes = self.mass, int((~self.hidden).sum()) // 3
         axis = mass.rows % 3
         if (axis != mass.columns % 3).any() or mass.rows.max(initial=0) >= 3 * nodes:
@@ -147,7 +147,7 @@ class Bloch:
 
 
 def hermitian(own: Hops, steps: NDArray, what: str) -> Hops:
-    """The Hermitian part of a matrix; refuses one that differs from it by more than rounding."""
+    """Hermitian part of a matrix; raises if the rest is more than round-off."""
     opposite = _opposites(steps)
     entries = own.values.tocoo()
     row, column = own.rows[entries.row], own.columns[entries.row]
@@ -171,7 +171,7 @@ def hermitian(own: Hops, steps: NDArray, what: str) -> Hops:
 
 
 class NotAlikeError(InputError):
-    """Matrices of different cells that differ; `dofs` are where they do most."""
+    """Matrices of different cells that differ, most at the `dofs`."""
 
     def __init__(self, what: str, share: float, dofs: tuple[int, int]) -> None:
         self.what, self.share, self.dofs = what, share, dofs
@@ -184,7 +184,7 @@ class NotAlikeError(InputError):
         )
 
     def naming(self, first: NDArray) -> InputError:
-        """The same that names nodes, by the node (m,) that each of cell 0 is."""
+        """The same error with node names, by the node (m,) of each node of cell 0."""
         names = [
             f"node {first[dof // 3]}" if dof < 3 * len(first) else "a rotation of a panel's edge"
             for dof in self.dofs
@@ -199,13 +199,13 @@ def _opposites(steps: NDArray) -> NDArray[np.int64]:
 
 
 def steps_of(offset: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """All R (s, d) among some (m, d), with their opposites; and the number (m,) of each."""
+    """Distinct R (s, d) of the given ones (m, d) and their opposites; the number (m,) of each."""
     steps, number = np.unique(np.concatenate([offset, -offset]), axis=0, return_inverse=True)
     return steps, np.ravel(number)[: len(offset)]
 
 
 def null_space(rows: NDArray) -> NDArray[np.complex128]:
-    """Orthonormal motions (n, m) that meet constraints (k, n)."""
+    """Orthonormal motions (n, m) that satisfy constraints (k, n)."""
     _, sizes, motions = np.linalg.svd(rows)
     rank = int((sizes > 1e-10 * sizes.max(initial=0.0)).sum())
     return motions[rank:].conj().T

@@ -1,4 +1,4 @@
-"""Equilibria of a repeated sheet whose periods are given."""
+"""Equilibria of a repeated sheet with given periods."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from foldyn.values import listed, number, of_kind, vector, whole
 
 ITERATIONS = 40
 HALVINGS = 12
-NULL = 1e-11  # of the largest stiffness: motions that nothing resists
+NULL = 1e-11  # of the largest stiffness: less counts as zero
 
 
 def relaxed(
@@ -33,22 +33,22 @@ def relaxed(
 ) -> State:
     """Equilibrium of a repeated sheet with given periods: a state that repeats.
 
-    Copies of the cell move as the periods say; everything else is free but for supports. Newton's
-    method, from an even deformation of the cell, in steps of the periods.
+    Copies of the cell follow the periods; everything else is free except for supports. Newton's
+    method, starting from a uniform deformation of the cell, in steps of the periods.
 
     Parameters
     ----------
     cell : UnitCell
     motions : sequence of Screw or array_like of shape (3,), optional
-        The motion from a cell to the next in the state for each of the cell's: a translation by its
-        vector (m), or a screw; a translation that becomes a rotation bends the sheet evenly. Those
-        at rest, or in the state given, by default.
+        Motion from a cell to the next in the final state, for each motion of the cell: a
+        translation by its vector (m), or a screw; a translation that becomes a rotation bends the
+        sheet uniformly. By default the motions at rest, or in the given state.
     state : State, optional
-        From where the search begins; it repeats.
+        Periodic state from which the search starts.
     load_factor : float
-        How far actuated folds are folded.
+        Load factor of actuated folds.
     steps : int
-        Of the way there.
+        Number of steps to the final motions.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def relaxed(
 
 
 def _given(cell: UnitCell, motions: Any) -> tuple[Screw, ...]:
-    """The motions at the end."""
+    """The final motions."""
     given = [
         motion
         if isinstance(motion, Screw)
@@ -110,9 +110,9 @@ def _given(cell: UnitCell, motions: Any) -> tuple[Screw, ...]:
 
 
 def _carried(points: NDArray, one: Sequence[Screw], two: Sequence[Screw]) -> NDArray[np.float64]:
-    """Points (m, 3) as an even deformation takes them along from motions to others.
+    """Points (m, 3) moved by the uniform deformation that takes motions `one` to `two`.
 
-    Each goes back along the first ones by its place among the cells, and forth along the others.
+    Each point moves back along `one` by its position among the cells, and forward along `two`.
     """
     shifts = np.array([motion.vector for motion in one])
     place = (points - points.mean(axis=0)) @ np.linalg.pinv(shifts)
@@ -128,7 +128,7 @@ def _carried(points: NDArray, one: Sequence[Screw], two: Sequence[Screw]) -> NDA
 def _newton(
     reach: CellReach, patch: Any, motions: Sequence[Screw], first: NDArray
 ) -> NDArray[np.float64]:
-    """Places (m, 3) of the nodes of cell 0 in equilibrium, from others."""
+    """Places (m, 3) of the nodes of cell 0 in equilibrium, starting from others."""
     rest, moves = patch.case.structure.nodes, reach.moves
     free, enough = ~reach.hidden, ROUNDING * float(reach.body.scale().max())
     ones = np.ones(len(reach.steps))
@@ -137,7 +137,7 @@ def _newton(
         return reach.balanced(spread(motions, points, patch.unit, patch.step) - rest)
 
     def better(first: NDArray, step: NDArray, left: NDArray) -> tuple[NDArray, ...] | None:
-        """Places nearer to equilibrium on the way of a step, their dofs, and the forces left."""
+        """Places along a step closer to equilibrium, their dofs, and the remaining forces."""
         for halving in range(HALVINGS):
             trial = first + 0.5**halving * step
             try:
@@ -155,12 +155,12 @@ def _newton(
     for _ in range(ITERATIONS):
         if done:
             return first
-        done = np.abs(left).max(initial=0.0) <= enough  # one more step leaves rounding alone
+        done = np.abs(left).max(initial=0.0) <= enough  # one more step leaves only round-off
         stiffness = moves.T @ reach.hops(reach.body.step_tangent(q)).at(ones) @ moves
         values, shapes = np.linalg.eigh(0.5 * (stiffness + stiffness.T))
         kept = np.abs(values) > NULL * np.abs(values).max()
         push = shapes[:, kept].T @ left
-        # downhill, and if that leads nowhere to the next equilibrium, be it an unstable one
+        # downhill; if that fails, to the next equilibrium, even an unstable one
         for slopes in (np.abs(values[kept]), values[kept]):
             step = (-moves @ (shapes[:, kept] @ (push / slopes)))[free].reshape(-1, 3)
             if found := better(first, step, left):

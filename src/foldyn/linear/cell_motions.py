@@ -1,8 +1,8 @@
-"""What each cell of a finite chain or sheet does: over time, in waves, and from end to end.
+"""Motion of each cell of a finite chain or sheet: over time, as waves, and from end to end.
 
-A finite chain is made by repeating the pattern of a cell (`storeys`, `cells`). The motion
-that brings a cell to the next one says which node belongs to which cell, and displacements of cell
-n are given in the axes of cell 0, turned back with the screw, as those of Bloch waves.
+A finite chain is made by repeating the pattern of a cell (`storeys`, `cells`). The motion from a
+cell to the next determines which node belongs to which cell, and displacements of cell n are given
+in the axes of cell 0, turned back with the screw, as for Bloch waves.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from foldyn.values import choice, of_kind
 if TYPE_CHECKING:
     import xarray
 
-FEWEST = 3  # cells of a chain
+FEWEST = 3  # least number of cells of a chain
 AXES = ("x", "y", "z")
 COMPONENTS = (*AXES, "rotation")
-FLOOR = 1e-8  # of the largest amplitude: below it there is rounding
-ENDS = 0.2  # of the cells at each end: there waves decay that come from the end
+FLOOR = 1e-8  # of the largest amplitude: below it is round-off
+ENDS = 0.2  # of the cells at each end, where waves decay away from the end
 
 
 class Cells(NamedTuple):
@@ -48,10 +48,10 @@ def cells_of(positions: NDArray, cell: UnitCell, along: int = 0) -> Cells:
     Parameters
     ----------
     positions : ndarray, shape (nodes, 3)
-        At rest (m). Nodes without partners, and incomplete cells at the end, are left out.
+        Rest positions (m). Nodes without partners, and incomplete cells at the end, are left out.
     cell : UnitCell
     along : int
-        Which motion, from 0; the rows of a sheet along the other one count as one cell.
+        Number of the motion, from 0; the rows of a sheet along the other one count as one cell.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def cells_of(positions: NDArray, cell: UnitCell, along: int = 0) -> Cells:
     following = np.where(distance <= near, partner, -1)
     rows, left = [], np.ones(len(positions), bool)
     starts = np.setdiff1d(np.arange(len(positions)), following)
-    for node in (*starts, *range(len(positions))):  # the latter lie on rings, which have no ends
+    for node in (*starts, *range(len(positions))):  # the latter lie on closed rings
         if left[node]:
             row = [int(node)]
             while (after := int(following[row[-1]])) >= 0 and after != node:
@@ -94,26 +94,26 @@ def space_time(
     Parameters
     ----------
     trajectory : xarray.Dataset
-        A motion of a chain or sheet of such cells, as `simulate` returns it.
+        Motion of a chain or sheet of such cells, from `simulate`.
     cell : UnitCell
     component : {"x", "y", "z", "rotation"}
-        Which displacement: along an axis of cell 0, in cells that turn with a screw along that
-        which has turned with it; or the rotation about the axis of the screw, in rad.
+        Displacement component: along an axis of cell 0 (in cells turned by a screw, along the axis
+        turned likewise), or the rotation about the axis of the screw, in rad.
     along : int
-        Which motion of the cell leads along the chain.
+        Number of the cell's motion along the chain.
 
     Returns
     -------
     xarray.Dataset
         Dimensions time and cell: `displacement` (m, or rad) and `velocity`, means over the nodes of
-        a cell, and `strain` (time, gap): how much farther apart two cells are along the motion,
-        over their distance at rest (of all nodes alike; negative in compression). Coordinates
+        a cell, and `strain` (time, gap): elongation between neighboring cells along the motion over
+        their distance at rest (equal for all nodes; negative in compression). Coordinates
         `position` (cell), m, along the motion, and `between` (gap), the cell before it plus 1/2.
 
     Raises
     ------
     InputError
-        No motion, or not one of these cells; rotations of cells that no screw repeats.
+        Not a motion, or not of such cells; a rotation of cells that repeat without a screw.
 
     Examples
     --------
@@ -173,31 +173,31 @@ def wave_spectrum(
     along: int = 0,
     window: Window = "hann",
 ) -> xarray.Dataset:
-    """Two-dimensional spectrum of a motion, which lies on the bands where the motion is small.
+    """Two-dimensional spectrum of a motion; for small motions it lies on the bands.
 
     Parameters
     ----------
     trajectory : xarray.Dataset
-        A motion of a chain or sheet of such cells.
+        Motion of a chain or sheet of such cells.
     cell : UnitCell
     component : {"x", "y", "z"}, optional
-        Of the axes of cell 0, as in `space_time`; by default all.
+        Velocity component, as in `space_time`; by default all three.
     along : int
-        Which motion of the cell leads along the chain.
+        Number of the cell's motion along the chain.
     window : str, tuple, array_like, or None
         See `signals.wavenumber_spectrum`.
 
     Returns
     -------
     xarray.Dataset
-        `amplitude` (phase, frequency), m/s: root of the sum of squares over the nodes of a cell,
-        of their velocities. Coordinates `phase` (rad per cell; positive for waves that travel to
+        `amplitude` (phase, frequency), m/s: root of the sum of squared velocity amplitudes over
+        the nodes of a cell. Coordinates `phase` (rad per cell; positive for waves that travel to
         higher cells) and `frequency` (Hz). Attributes: their steps, `phase_step`, `frequency_step`.
 
     Raises
     ------
     InputError
-        No motion, or not one of these cells; times that are not evenly spaced.
+        Not a motion, or not of such cells; times that are not evenly spaced.
     """
     import xarray as xr
 
@@ -224,29 +224,30 @@ def wave_spectrum(
 
 
 def transmission(response: xarray.Dataset, cell: UnitCell, *, along: int = 0) -> xarray.Dataset:
-    """How far a vibration reaches along a chain, from its frequency response.
+    """Transmission of a vibration along a chain, from its frequency response.
 
     Parameters
     ----------
     response : xarray.Dataset
-        Of `frf`: to forces, or to a moving base.
+        From `frf`: to forces, or to a moving base.
     cell : UnitCell
     along : int
-        Which motion of the cell leads along the chain, away from the drive.
+        Number of the cell's motion along the chain, away from the drive.
 
     Returns
     -------
     xarray.Dataset
-        Dimensions frequency and cell: `amplitude`, the root mean square over the nodes of a cell of
-        their response (its unit); `ratio` (frequency), that of the last cell over the first; and
-        `decay` (frequency), nepers per cell, the slope of the logarithm over the cells (the median
-        over all pairs) but a fifth at each end and what is rounding: in a gap the imaginary part
-        of the phase of the slowest wave that the drive excites; next to nothing in a band.
+        Dimensions frequency and cell: `amplitude`, the root mean square response over the nodes of
+        a cell (in its unit); `ratio` (frequency), the amplitude of the last cell over the first;
+        and `decay` (frequency), nepers per cell, the slope of the logarithmic amplitude over the
+        cells (median over all pairs), without a fifth at each end and amplitudes at round-off: in
+        a gap the imaginary phase of the slowest-decaying wave that the drive excites; near zero in
+        a band.
 
     Raises
     ------
     InputError
-        No frequency response, or not of a chain of these cells.
+        Not a frequency response, or not of a chain of such cells.
     """
     import xarray as xr
     from scipy.stats import theilslopes
@@ -297,7 +298,7 @@ def _motion(trajectory: Any) -> tuple[NDArray, NDArray]:
 def _rotation(
     motion: Screw, rest: NDArray, moved: NDArray, speed: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Mean rotation (times, n) of nodes (n, m, 3) about a screw's axis, rad, and its rate."""
+    """Mean rotation (times, n), rad, of nodes (n, m, 3) about a screw's axis, and its rate."""
     if not motion.turns:
         raise InputError(
             ' = "rotation": the cell repeats under a translation, without an axis; take x, y or z',

@@ -1,10 +1,10 @@
-"""A cell among its neighbors: the patch of copies from which the matrices of a cell are taken.
+"""A cell among its neighbors: the patch of copies that yields the matrices of a cell.
 
 Creases across the boundary of a cell are folds of the repeated sheet, between panels of two cells.
-So the model is built of a patch of panels about one cell: all panels at its nodes, the panels
-across their edges, with which forces on these nodes are complete, and the panels across those,
-with which each of them is discretized as in the repeated sheet. The patch is discretized by the
-recipe of the cell's own structure.
+So the model is built on a patch of panels around one cell: all panels at its nodes; the panels
+across their edges, which complete the forces on these nodes; and the panels across those edges, so
+that the former are discretized as in the repeated sheet. The patch is discretized with the options
+of the cell's own structure.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ from foldyn.structures.sheet import Sheet
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """A patch of a repeated sheet, and its nodes and hidden dofs as copies of those of cell 0.
+    """A patch of a repeated sheet, with its nodes and hidden dofs as copies of cell 0.
 
     Attributes
     ----------
     case : Case
-        With copies of the supports, masses, damping and actuated creases.
+        Case of the patch, with copies of supports, masses, damping and actuated creases.
     unit, step : (n,), (n, d)
-        Number of the node of cell 0 that stands for each node, and R.
+        For each node, the node of cell 0 of which it is a copy, and R.
     hidden_unit, hidden_step : (h,), (h, d)
-        The same of the hidden dofs, -1 where the patch has none in cell 0.
+        The same for the hidden dofs, -1 if the patch lacks the one in cell 0.
     own_unit, own_step : (k,), (k, d)
-        The same of the nodes of the cell's own structure.
+        The same for the nodes of the cell's own structure.
     first : (m,)
-        Node of the cell's own structure that stands for each node of cell 0.
+        Representative of each node of cell 0 in the cell's own structure.
     """
 
     case: Case
@@ -60,21 +60,21 @@ class Patch:
 
     @property
     def hidden(self) -> int:
-        """Hidden dofs of a cell."""
+        """Number of hidden dofs of a cell."""
         return int(self.hidden_unit.max(initial=-1)) + 1
 
     @property
     def own_nodes(self) -> NDArray[np.int64]:
-        """Nodes of cell 0 among those of the patch."""
+        """Nodes of cell 0 in the patch."""
         return np.flatnonzero((self.step == 0).all(axis=1))
 
     @property
     def determined(self) -> NDArray[np.bool_]:
-        """Whether each of them (m, 3) is held along each axis, or follows others."""
+        """Whether each node of cell 0 is held along each axis, or follows others, (m, 3)."""
         return self.case.constraints.determined[self.own_nodes]
 
     def own_pairs(self, k: int) -> NDArray[np.int64]:
-        """Pairs (m, 2) of nodes of the cell's own structure, the second one period k further."""
+        """Pairs (m, 2) of nodes of the cell's own structure, one period k apart."""
         steps = map(tuple, self.own_step.tolist())
         at = {site: v for v, site in enumerate(zip(self.own_unit.tolist(), steps, strict=True))}
         pairs = []
@@ -86,12 +86,12 @@ class Patch:
 
 
 def cell_patch(cell: UnitCell) -> Patch:
-    """Patch about a cell.
+    """Patch around a cell.
 
     Raises
     ------
     InputError
-        The case has what does not repeat.
+        The case has parts that do not repeat.
     """
     case, structure = cell.case, cell.case.structure
     _check(case)
@@ -122,7 +122,7 @@ def cell_patch(cell: UnitCell) -> Patch:
 def _numbered(
     sites: Sequence[Site], number: Mapping[tuple, int], dimensions: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Number (n,) of what stands for each site, and R (n, d)."""
+    """Number (n,) of the representative of each site, and R (n, d)."""
     units = np.array([number.get(part, -1) for _, part in sites], np.int64)
     return units, np.array([step for step, _ in sites], np.int64).reshape(-1, dimensions)
 
@@ -162,7 +162,7 @@ def _check(case: Case) -> None:
 def _structure(
     lattice: Lattice, panels: Sequence[Panel], pattern: Pattern, vertices: Sequence[Vertex]
 ) -> Any:
-    """The patch, discretized as the cell is."""
+    """The patch, discretized like the cell."""
     own = lattice.cell.case.structure
     options = {item.name: getattr(own.options, item.name) for item in fields(own.options)}
     for name in ("crease_stiffness", "crease_rest"):
@@ -183,13 +183,13 @@ def _structure(
 
 
 def _copied(chosen: Iterable[int], panels: Sequence[Panel]) -> list[int]:
-    """Panels of the patch that are copies of some of the cell's."""
+    """Panels of the patch that are copies of chosen panels of the cell."""
     kinds = set(chosen)
     return [k for k, (_, f) in enumerate(panels) if f in kinds]
 
 
 def _sheet(sheet: Sheet, panels: Sequence[Panel]) -> Sheet:
-    """The sheet with the panels that differ in all cells."""
+    """The sheet, with its panel-wise parts repeated in all cells."""
     parts = [
         replace(part, panels=rows)
         for part in sheet.panels
@@ -201,7 +201,7 @@ def _sheet(sheet: Sheet, panels: Sequence[Panel]) -> Sheet:
 def _per_crease(
     name: str, given: Any, lattice: Lattice, pattern: Pattern, vertices: Sequence[Vertex]
 ) -> Any:
-    """Values of the creases of the patch from those of the cell's."""
+    """Values for the creases of the patch, from the values for the cell."""
     if given is None or isinstance(given, float):
         return given
     seams, families = lattice.seams(), lattice.families()
@@ -231,7 +231,7 @@ def _edges(
     name: str, given: Sequence[tuple[int, int]], lattice: Lattice, pattern: Pattern,
     vertices: Sequence[Vertex],
 ) -> list[tuple[int, int]]:  # fmt: skip
-    """Boundary edges of the patch that are copies of some of the cell's."""
+    """Boundary edges of the patch that are copies of chosen edges of the cell."""
     kinds = {lattice.edge(a, b).kind: (a, b) for a, b in given}
     inside = [pair for kind, pair in kinds.items() if len(lattice.beside[kind]) == 2]
     if inside:
@@ -265,7 +265,7 @@ def node_sites(structure: Any, vertices: Sequence[Vertex], panels: Sequence[Pane
 def hidden_sites(structure: Any, unit: NDArray, step: NDArray) -> list[Site]:
     """Sites of the hidden dofs of a structure: rotations about sides, and gives of edges.
 
-    unit, step : those of its nodes (n,), (n, d).
+    unit, step : unit and R of its nodes, (n,), (n, d).
     """
     place = list(zip(map(tuple, step.tolist()), unit.tolist(), strict=True))
 
@@ -274,7 +274,7 @@ def hidden_sites(structure: Any, unit: NDArray, step: NDArray) -> list[Site]:
         return edge.step, (edge.kind, *what)
 
     def turns(ends: Iterable[Iterable[int]]) -> list[Site]:
-        """Rotations about sides in their order, of which one may have several."""
+        """Rotations about sides, in order; a side may have several."""
         times: dict[Any, int] = {}
         found = []
         for pair in map(tuple, ends):
@@ -298,7 +298,7 @@ def hidden_sites(structure: Any, unit: NDArray, step: NDArray) -> list[Site]:
         of_give: dict[int, Site] = {}
         for panel, numbers in zip(gives.panel.tolist(), gives.number.tolist(), strict=True):
             sides_ = [s for s in around(structure.pattern.faces[panel]) if edge_of(*s) in edges]
-            ends_ = [(side, end) for side in sides_ for end in side]  # as the panel has its gives
+            ends_ = [(side, end) for side in sides_ for end in side]  # as in the panel's gives
             for number, (side, end) in zip(numbers, ends_, strict=False):
                 of_give[number] = site(side, ("give", place[end] == min(place[v] for v in side)))
         found += [of_give[number] for number in range(gives.count)]

@@ -1,7 +1,7 @@
-"""The dofs of a patch as those of a cell and its neighbors.
+"""The dofs of a patch as dofs of a cell and its neighbors.
 
-Displacements of cell R are given in axes turned with it, so that those of a wave differ from cell
-to cell by a factor alone.
+Displacements of cell R are given in axes that turn with the cell, so that a wave differs between
+cells only by a factor.
 """
 
 from __future__ import annotations
@@ -21,31 +21,31 @@ from foldyn.mechanics.assembly import Assembly
 from foldyn.patterns.screw import Screw
 
 ITERATIONS = 30
-BALANCED = 1e-13  # rad, of the last step of Newton's method for hidden dofs
-TURNED = 1e-13  # of coefficients of constraints: what rounding leaves of zeros
+BALANCED = 1e-13  # rad, of the last Newton step for hidden dofs
+TURNED = 1e-13  # of coefficients of constraints: round-off of zeros
 
 
 class CellReach:
-    """Dofs of cell 0, m = 3 node + axis and then the hidden ones, and of all that reach them.
+    """Dofs of cell 0, m = 3 node + axis followed by hidden ones, and all dofs that reach them.
 
     Parameters
     ----------
     patch : Patch
     motions : sequence of Screw
-        From a cell to the next, in the state.
+        Motions from a cell to the next in the state.
     body : Assembly
-        Of the patch.
+        Body of the patch.
 
     Attributes
     ----------
     rows : ndarray of int, shape (m,)
         Dofs of cell 0 among those of the patch.
     steps : ndarray of int, shape (s, d)
-        R of the cells that the patch has nodes of, with their opposites.
+        R of the cells with nodes in the patch, and their opposites.
     hidden : ndarray of bool, shape (m,)
         Dofs without mass.
     held : ndarray of bool, shape (m,)
-        Dofs that supports hold.
+        Dofs held by supports.
     """
 
     def __init__(self, patch: Patch, motions: Sequence[Screw], body: Assembly) -> None:
@@ -69,31 +69,31 @@ class CellReach:
         )
 
     def hops(self, matrix: sparse.sparray) -> Hops:
-        """A matrix of the dofs of the patch in the axes of the cells."""
+        """A matrix of the patch's dofs as `Hops`, in the axes of the cells."""
         own = sparse.csr_array(self._frames.T @ matrix @ self._frames)
         return hops(own, self.rows, self._unit, self._number, self.count, len(self.steps))
 
     def forces(self, q: NDArray) -> NDArray[np.float64]:
-        """Forces (m,) of the sheet on the dofs of cell 0 where the patch is at q, N."""
+        """Forces (m,), N, of the sheet on the dofs of cell 0 for the patch at q."""
         return self.body.internal(q)[self.rows]
 
     @cached_property
     def _known(self) -> sparse.csr_array:
-        """Hidden dofs of the patch from those of a cell, as far as the patch has them there."""
+        """Map from hidden dofs of a cell to those of the patch, as far as they are known."""
         unit = self.patch.hidden_unit
         there = np.flatnonzero(unit >= 0)
         entries = (np.ones(len(there)), (there, unit[there]))
         return sparse.csr_array(entries, shape=(len(unit), self.patch.hidden))
 
     def balanced(self, displacement: NDArray) -> NDArray[np.float64]:
-        """All dofs of the patch at a displacement (n, 3), hidden ones alike in all cells.
+        """All dofs of the patch at a displacement (n, 3), hidden ones equal in all cells.
 
-        They are in balance in cell 0, by Newton's method.
+        Newton's method balances them in cell 0.
 
         Raises
         ------
         ComputationError
-            There is no balance near zero.
+            No balance is found near zero.
         """
         first, own = displacement.size, self.rows[self.hidden]
         hidden = np.zeros(len(own))
@@ -114,7 +114,7 @@ class CellReach:
 
     @cached_property
     def ties(self) -> Hops:
-        """Constraints (k, m) of one cell: those whose first cell is cell 0."""
+        """Constraints (k, m) of one cell: the ones whose first cell is cell 0."""
         ties = self.patch.case.constraints
         rows = (
             sparse.csr_array(ties.rows) if ties else sparse.csr_array((0, 3 * len(self.patch.unit)))
@@ -134,7 +134,7 @@ class CellReach:
 
     @cached_property
     def moves(self) -> NDArray[np.float64]:
-        """Motions (m, r) alike in all cells that supports and constraints allow; orthonormal."""
+        """Orthonormal motions (m, r), equal in all cells, that supports and constraints allow."""
         basis = np.eye(self.count)[:, ~self.held]
         if self.ties.empty:
             return basis
@@ -142,5 +142,5 @@ class CellReach:
         return basis @ null_space(together @ basis).real
 
     def projected(self, force: NDArray) -> NDArray[np.float64]:
-        """Forces (r,) on those motions, N."""
+        """Forces (r,), N, on `moves`."""
         return self.moves.T @ force

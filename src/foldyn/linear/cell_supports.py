@@ -1,4 +1,4 @@
-"""Supports, masses, damping and actuated creases of a cell, repeated with it."""
+"""Supports, masses, damping and actuated creases of a cell, repeated in all cells."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from foldyn.linear.lattice import Lattice, Site, Step, Vertex, kinds_of, minus, 
 from foldyn.linear.unit_cell import rotation
 from foldyn.patterns.crease_data import ASSIGNED
 
-SAME_AXES = 1e-9  # how exactly a screw keeps a set of axes
+SAME_AXES = 1e-9  # tolerance for axes that a screw preserves
 
 
 def tied_vertices(case: Case, lattice: Lattice) -> set[Vertex]:
-    """Vertices that links and connectors tie to those of cell 0."""
+    """Vertices tied to vertices of cell 0 by links and connectors."""
     found: set[Vertex] = set()
     count = len(lattice.vertices)
     for i, part in enumerate(case.supports):
@@ -41,19 +41,19 @@ def tied_vertices(case: Case, lattice: Lattice) -> set[Vertex]:
 
 @dataclass(frozen=True, eq=False)
 class Repeated:
-    """What is said of nodes and creases of a cell, said of all their copies in a patch.
+    """The parts of a cell's case, applied to all copies of its nodes and creases in a patch.
 
     Attributes
     ----------
     case : Case
-        Of the cell.
+        Case of the cell.
     lattice : Lattice
     structure : Structure or Shell
         The patch.
     own : sequence of Site
-        Of the nodes of the cell's own structure.
+        Sites of the nodes of the cell's own structure.
     sites : sequence of Site
-        Of the nodes of the patch.
+        Sites of the nodes of the patch.
     """
 
     case: Case
@@ -92,7 +92,7 @@ class Repeated:
 
     @cached_property
     def _copies(self) -> dict[Any, list[tuple[Step, int]]]:
-        """Cell and node of all copies, by what stands for them."""
+        """Cell and node of all copies, by their representative."""
         found: dict[Any, list[tuple[Step, int]]] = {}
         for node, (step, part) in enumerate(self.sites):
             found.setdefault(part, []).append((step, node))
@@ -107,7 +107,7 @@ class Repeated:
         return sorted(node for part in parts for _, node in self._copies[part])
 
     def _groups(self, nodes: Sequence[int]) -> list[tuple[Step, list[int]]]:
-        """Copies of nodes that belong together, where the patch has all; how far each has moved."""
+        """Copies of a group of nodes that are complete in the patch, and the offset of each."""
         sites = [self.own[v] for v in nodes]
         base = sites[0][0]
         found = []
@@ -124,9 +124,9 @@ class Repeated:
         return any(motion.turns for motion in self.lattice.cell.motions)
 
     def _supports(self, part: Any, field: str) -> list[Any]:
-        if isinstance(part, BaseMotion):  # of a base that stands still
+        if isinstance(part, BaseMotion):  # a base at rest
             return []
-        if isinstance(part, Impose):  # which holds its nodes where the state has them
+        if isinstance(part, Impose):  # holds its nodes where the state puts them
             part = Fix(part.nodes, part.axis, part.direction, part.along)
         if isinstance(part, Link):
             return self._links(part, field)
@@ -139,7 +139,7 @@ class Repeated:
             return [replace(part, nodes=self._nodes(nodes, field))]
         if getattr(part, "axes", None) is not None:
             part = [replace(part, axes=None, direction=axis) for axis in part.axes or ""]
-        elif part.direction is None:  # alike in all directions
+        elif part.direction is None:  # same in all directions
             return [replace(part, nodes=self._nodes(nodes, field))]
         first: dict[Any, Step] = {}  # partners count once
         for node in nodes:
@@ -152,7 +152,7 @@ class Repeated:
         ]
 
     def _turned(self, part: Any, step: Step, **changes: Any) -> Any:
-        """A copy with its direction, if it has one, turned as the cell is."""
+        """A copy, its direction (if any) turned with the cell."""
         if part.direction is None or not self._turns:
             return replace(part, **changes)
         way = rotation(self.lattice.cell.motions, step) @ unit_vector(part.direction)
@@ -181,7 +181,7 @@ class Repeated:
                 )
 
     def _between(self, part: Any) -> list[Any]:
-        """Connectors between nodes, those of partners once."""
+        """Connectors between nodes; partners count once."""
         found, seen = [], set()
         for pair in np.reshape(part.between, (-1, 2)).tolist():
             (at, one), (there, two) = sorted((self.own[v] for v in pair), key=repr)
@@ -193,7 +193,7 @@ class Repeated:
 
     # ------------------------------------------------------------------ creases
     def _on_creases(self, part: Any, field: str) -> Any:
-        """The same of all copies of its creases, by word where the patch has that."""
+        """The part with all copies of its creases, by name if the patch has this name."""
         creases, pattern = part.creases, self.structure.pattern
         if isinstance(creases, str) and (creases in ASSIGNED or creases in pattern.families):
             return part

@@ -1,4 +1,4 @@
-"""What a mode does, in numbers and a name: axial, bending, torsion along a main axis.
+"""Character of a mode, in numbers and a name: axial, bending, torsion along a main axis.
 
 A shape is compared with the motions of a beam along the axis. At stations along it the sections
 move by t and turn by w, both linear in between (s the coordinate along the axis a, c(s) the center
@@ -11,9 +11,9 @@ t and w are found by least squares weighted by mass. The fitted motion is the su
     axial        t_a             bending along b    t_b and w_c
     torsion      w_a             bending along c    t_c and w_b
 
-and phi' M (part) / phi' M phi is the share of each; what is left is distortion of the sections. The
-shares add up to 1; a small negative one can occur where sections are not symmetric. A mode is named
-for the part that has more than half of its motion; one that has none is mixed.
+and phi' M (part) / phi' M phi is the share of each; the rest is distortion of the sections. The
+shares add up to 1; a small negative one can occur if sections are not symmetric. A mode is named
+after the part with more than half of its motion; a mode without such a part is mixed.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 NODES_PER_STATION = 12
 MOST_STATIONS = 9
-AWAY = 0.2  # distance of the supports' center from the sheet's, as a part of its extent
+AWAY = 0.2  # distance of the supports' center from the sheet's, as a fraction of its extent
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 
 
@@ -46,7 +46,7 @@ def character(
     stations: int | None = None,
     case: Case | None = None,
 ) -> xarray.Dataset:
-    """Name what modes do along a main axis, by computed shares.
+    """Name modes by their shares of beam motions along a main axis.
 
     Parameters
     ----------
@@ -55,12 +55,11 @@ def character(
     axis : {"x", "y", "z"}, optional
         Main axis of the structure; by default `main_axis` of the case.
     nodes : int, sequence of int, or str, optional
-        Judge the motion of these nodes alone, such as a loaded edge; all unless given.
+        Consider only the motion of these nodes, such as a loaded edge; all by default.
     stations : int, optional
-        Sections along the axis, 1 for a single one; by default one for each dozen of nodes, from
-        2 to 9.
+        Sections along the axis, 1 for a single one; by default one per dozen nodes, from 2 to 9.
     case : Case, optional
-        The case of the modes, needed where they cannot rebuild it (`foldyn.case_of`).
+        The case of the modes, needed if they cannot rebuild it (`foldyn.case_of`).
 
     Returns
     -------
@@ -117,7 +116,7 @@ def character(
 
 
 def main_axis(case: Case) -> str:
-    """Axis along which a structure leads away from its supports, or else its longest one."""
+    """Axis from the supports to the rest of a structure, or else its longest axis."""
     nodes = case.structure.nodes
     extent = np.ptp(nodes, axis=0)
     held = case.fixed.sum(axis=1)
@@ -129,7 +128,7 @@ def main_axis(case: Case) -> str:
 
 
 def _beam_parts(x: NDArray, weight: NDArray, a: int, stations: int) -> dict[str, NDArray]:
-    """Motions (3n, k) of the parts of a beam at points x (n, 3)."""
+    """Motions (3n, k) of each part of a beam at points x (n, 3)."""
     hats = _hats(x[:, a], stations)
     loads = hats * weight[:, None]
     total = loads.sum(axis=0)
@@ -165,7 +164,7 @@ def _hats(along: NDArray, stations: int) -> NDArray:
 
 
 def _shares(shapes: NDArray, weight: NDArray, parts: dict[str, NDArray]) -> NDArray:
-    """Shares (modes, kinds) of the parts, and last what is left."""
+    """Shares (modes, kinds) of the parts, and the remainder last."""
     root = np.sqrt(weight)
     flat = shapes.reshape(len(shapes), -1).T * root[:, None]
     whole = (flat**2).sum(axis=0)

@@ -1,4 +1,4 @@
-"""`Fidelity`: what a comparison with the shell found, mode by mode, and what it advises."""
+"""`Fidelity`: the result of a comparison with the shell, mode by mode, and its advice."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from foldyn.linear.advice import OWN, advice, percent
 from foldyn.linear.matched import LEAST
 from foldyn.values import choice
 
-ABREAST, WIDE = 4, 79  # models beside each other in plain text, and letters of a line
+ABREAST, WIDE = 4, 79  # models side by side in plain text, and characters of a line
 
 __all__ = ["OWN", "ComparedMode", "Fidelity"]
 
@@ -29,13 +29,13 @@ class ComparedMode(NamedTuple):
     mode : int
         Number of the elastic mode of the shell, from 1.
     shell : float
-        Its frequency, Hz, extrapolated in the size of the mesh.
+        Frequency of the mode, Hz, extrapolated in mesh size.
     mesh_error : float
-        Relative error of the finer mesh against that.
+        Relative error of the finest mesh against it.
     below : bool
         Whether it lies below 0.6 of the plate frequency.
     error : float
-        Relative error of the partner's frequency; infinite where the mode is lost: no mode of the
+        Relative error of the partner's frequency; infinite if the mode is lost, i.e. no mode of the
         model has a MAC of 0.5 or more with it.
     mac : float
         Modal assurance criterion of the two.
@@ -51,12 +51,12 @@ class ComparedMode(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fidelity:
-    """A comparison of models with the shell, as `foldyn.fidelity` makes it.
+    """A comparison of models with the shell, from `foldyn.fidelity`.
 
     Parameters
     ----------
     result : xarray.Dataset
-        Its numbers: what `fidelity` computed, or what `fd.load` read from a result of this kind.
+        Numbers of the comparison, from `fidelity` or from `fd.load` of such a result.
         Dimensions mode and model; the attribute `limit` is 0.6 of the plate frequency (Hz).
 
     Raises
@@ -91,21 +91,21 @@ class Fidelity:
 
     @property
     def models(self) -> tuple[str, ...]:
-        """Names of the models: "own", then what stands beside it."""
+        """Names of the models: "own", then the others."""
         return tuple(self.result["model"].values.tolist())
 
     @property
     def limit(self) -> float:
-        """0.6 of the plate frequency, Hz: above, modes are those of plates."""
+        """0.6 of the plate frequency, Hz: above it, panels vibrate as plates."""
         return float(self.result.attrs["limit"])
 
     @property
     def advice(self) -> str:
-        """Which model is right and up to which frequency, and what was not compared."""
+        """The model to use and up to which frequency, and the limits of the comparison."""
         return advice(self.result)
 
     def table(self, model: str = OWN) -> tuple[ComparedMode, ...]:
-        """Modes of the shell beside those of a model."""
+        """Modes of the shell, each paired with a mode of the model."""
         one = self.result.sel(model=choice("model", model, self.models))
         names = ("mode", "frequency", "mesh_error", "error", "mac")
         columns = (one[name].values.tolist() for name in names)
@@ -116,13 +116,13 @@ class Fidelity:
 
 
 def _wrapped(text: str) -> str:
-    """Lines of a text, numbers beside their units."""
+    """A text in lines, with numbers kept next to their units."""
     held = re.sub(r"(\d) (%|Hz)", "\\1\u00a0\\2", text)
     return fill(held, WIDE).replace("\u00a0", " ")
 
 
 def _text(found: Fidelity) -> str:
-    """Modes and errors of all models in aligned columns, some models below the others."""
+    """Modes and errors of all models in aligned columns, in blocks of models."""
     parts = [
         _columns(found, found.models[k : k + ABREAST]) for k in range(0, len(found.models), ABREAST)
     ]
@@ -131,7 +131,7 @@ def _text(found: Fidelity) -> str:
 
 
 def legend(found: Fidelity) -> list[str]:
-    """What the words and signs of the table mean, those that it has."""
+    """Meaning of the words and signs that the table contains."""
     deflection = found.result.get("deflection_error")
     lines = [f"{OWN}: the model of the case"]
     if not np.isfinite(found.result["error"].values).all():

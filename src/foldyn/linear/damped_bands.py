@@ -1,7 +1,7 @@
 """Damped Bloch waves: complex frequencies at real phases.
 
-Waves phi exp(s t) of a phase k solve (s^2 M(k) + s C(k) + K(k)) phi = 0. The lowest ones are found
-by Arnoldi iteration about a shift on the positive real axis, where the matrix is positive definite.
+Waves phi exp(s t) of a phase k solve (s^2 M(k) + s C(k) + K(k)) phi = 0. The lowest s are found by
+Arnoldi iteration about a shift on the positive real axis, where the matrix is positive definite.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from foldyn.values import of_kind, whole
 if TYPE_CHECKING:
     import xarray
 
-SHIFT = 1e-4  # of the root of the pencil's scale
-NOISE = 1e-3  # of the shift: what counts as zero
+SHIFT = 1e-4  # of the square root of the stiffness-to-mass scale
+NOISE = 1e-3  # of the shift: smaller s count as zero
 DENSE = 200  # dofs up to which all eigenvalues are computed
-SPARE = 4  # eigenvalues beyond those asked for
+SPARE = 4  # extra eigenvalues beyond the count
 TURN = 2.0 * np.pi
 
 
@@ -53,14 +53,14 @@ def damped_bands(
     Returns
     -------
     xarray.Dataset
-        Dimensions phase, band, in the order of abs(s). `rate` (s, complex, 1/s), `frequency` (Hz,
-        abs(Im s) / 2 pi; 0 of waves that creep back) and `damping_ratio` (-Re s / abs(s); 1 of
-        those; nan of rigid motions). Coordinates and attributes as of `bands`.
+        Dimensions phase, band, sorted by abs(s). `rate` (s, complex, 1/s), `frequency` (Hz,
+        abs(Im s) / 2 pi; 0 for overdamped waves) and `damping_ratio` (-Re s / abs(s); 1 for
+        overdamped waves; nan for rigid motions). Coordinates and attributes as in `bands`.
 
     Raises
     ------
     InputError
-        As of `bands`.
+        As in `bands`.
 
     Examples
     --------
@@ -92,7 +92,7 @@ def damped_bands(
 
 
 def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex128]:
-    """The lowest s (count,), 1/s, one of each pair, by |s|."""
+    """The lowest s (count,), 1/s, by |s|, one of each complex pair."""
     factors = bloch.factors(phase)
     free = np.flatnonzero(~bloch.held)
     basis = np.eye(len(free))
@@ -111,21 +111,21 @@ def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex
     factor = linalg.lu_factor(stiffness + shift * damping + shift**2 * mass)
 
     def solve(x: NDArray) -> NDArray:
-        """(A - shift B)^-1 B x of the linear problem in phi and s phi."""
+        """(A - shift B)^-1 B x of the linearized problem in phi and s phi."""
         f, g = x[:size], x[size:]
         u = -linalg.lu_solve(factor, mass @ g + damping @ f + shift * (mass @ f))
         return np.concatenate([u, f + shift * u])
 
     if (
         size <= DENSE or wanted >= 2 * size - 1
-    ):  # where iterations over clusters of bands may not converge
+    ):  # iterations over clusters of bands may not converge
         inverse = linalg.eigvals(solve(np.eye(2 * size)))
         found = shift + 1.0 / inverse[np.argsort(-np.abs(inverse))[:wanted]]
     else:
         start = np.random.default_rng(0).normal(size=2 * size) + 0j
         operator = LinearOperator((2 * size, 2 * size), solve, dtype=complex)
         found = shift + 1.0 / eigs(operator, wanted, v0=start, return_eigenvectors=False)
-    noise = NOISE * shift  # a double root of zero is one to the root of rounding
+    noise = NOISE * shift  # a double root of zero is accurate to the square root of round-off
     found = np.where(np.abs(found) <= noise, 0.0, found)
     upper = found[np.imag(found) >= -noise]
     return upper[np.argsort(np.abs(upper), kind="stable")][:count]

@@ -1,14 +1,13 @@
-"""Waves of a given frequency: those that travel, and those that decay from cell to cell.
+"""Waves of a given frequency: traveling ones, and ones that decay from cell to cell.
 
 With the dynamic stiffness D_s = K_s + i omega C_s - omega^2 M_s of cells s periods apart along one
-direction, phases along the other one given, a wave u lambda^s needs
+direction, at given phases along the other one, a wave u lambda^s satisfies
 
     sum over s of lambda^s D_s u = 0,    lambda = exp(i k),
 
-a polynomial eigenvalue problem in lambda, quadratic where only neighbors reach each other. Dofs
-that reach no other cell are condensed. Im k is the attenuation (Np per cell); k and -k come
-together.
-(B. R. Mace, E. Manconi, J. Sound Vib. 318, 2008.)
+a polynomial eigenvalue problem in lambda, quadratic if only neighbors interact. Dofs without
+coupling to other cells are condensed. Im k is the attenuation (Np per cell); k and -k come in
+pairs (B. R. Mace, E. Manconi, J. Sound Vib. 318, 2008).
 """
 
 from __future__ import annotations
@@ -32,13 +31,13 @@ from foldyn.values import number, numbers, whole
 if TYPE_CHECKING:
     import xarray
 
-TRAVELS = 1e-6  # Np per cell: attenuation of a wave that travels
-FASTEST = 40.0  # Np per cell beyond which rounding is all that is left of a wave
+TRAVELS = 1e-6  # Np per cell: below this attenuation a wave counts as traveling
+FASTEST = 40.0  # Np per cell beyond which a wave is lost in round-off
 TURN = 2.0 * np.pi
 
 
 class Reach(NamedTuple):
-    """A matrix by the distance of cells: steps (s,) from -r to r, and blocks (s, n, n)."""
+    """A matrix by cell distance: steps (s,) from -r to r, and blocks (s, n, n)."""
 
     steps: NDArray[np.int64]
     blocks: NDArray
@@ -60,15 +59,15 @@ def attenuation(
     Parameters
     ----------
     cell : UnitCell
-        Its damping counts, and makes all waves decay.
+        Its damping is included, and makes all waves decay.
     frequencies : float or array_like, shape (n,)
         Frequencies (Hz), above 0.
     along : int
-        Along which period: 0 or 1.
+        Number of the period: 0 or 1.
     phase : float
         Phase (rad) along the other period of a sheet.
     count : int
-        How many waves, those that decay least.
+        Number of waves, the slowest-decaying ones.
     state, secant, load_factor
         As in `bands`.
 
@@ -76,10 +75,10 @@ def attenuation(
     -------
     xarray.Dataset
         Dimensions frequency, wave. `phase` (complex, rad per cell; the real part from -pi to pi,
-        the imaginary part not negative: waves that decay in the direction; of those that
-        travel, the ones with a phase from 0 to pi where the other period has no phase), nan where
-        there are fewer; and `attenuation` (Np per cell) of the wave that decays least, 0 where one
-        travels: motions of this frequency fall by exp(-attenuation) from cell to cell.
+        the imaginary part not negative, for waves that decay in the direction; of traveling waves,
+        only phases from 0 to pi if `phase` is 0), nan if there are fewer waves; and `attenuation`
+        (Np per cell) of the slowest-decaying wave, 0 if one travels: motions of this frequency
+        fall by exp(-attenuation) per cell.
 
     Raises
     ------
@@ -113,7 +112,7 @@ def attenuation(
     kept = np.flatnonzero(~linear.bloch.held)
 
     def waves(frequency: float) -> NDArray[np.complex128]:
-        """Phases (count,) of a frequency, Hz."""
+        """Phases (count,) of the waves at a frequency, Hz."""
         omega = TURN * frequency
         stiffness, damping, mass = (each.blocks[:, kept[:, None], kept] for each in parts)
         dynamic = stiffness + 1j * omega * damping - omega**2 * mass
@@ -149,7 +148,7 @@ def _blocks(bloch: Bloch, matrix: Any, along: int, phase: float) -> Reach:
 
 
 def _bordered(dynamic: NDArray, ties: NDArray) -> NDArray[np.complex128]:
-    """Blocks with the forces of constraints (s, k, n) as further unknowns."""
+    """Blocks bordered by constraints (s, k, n), with their forces as further unknowns."""
     count = ties.shape[1]
     if not count:
         return dynamic.astype(complex)
@@ -167,9 +166,9 @@ def _bordered(dynamic: NDArray, ties: NDArray) -> NDArray[np.complex128]:
 
 
 def phases_of(reach: Reach, condense: bool = True) -> NDArray[np.complex128]:
-    """All complex phases k of waves u exp(i k s), without those that decay too fast to resolve.
+    """All complex phases k of waves u exp(i k s), except those that decay too fast to resolve.
 
-    condense : whether unknowns that reach no other cell are eliminated first.
+    condense : whether unknowns without coupling to other cells are eliminated first.
     """
     steps, blocks = reach
     far = blocks[steps != 0]
@@ -204,9 +203,9 @@ def phases_of(reach: Reach, condense: bool = True) -> NDArray[np.complex128]:
 
 
 def _forward(phases: NDArray, both: bool) -> NDArray[np.complex128]:
-    """Waves that decay in the direction, the least first, and those that travel.
+    """Waves that decay in the direction, slowest first, and traveling waves.
 
-    both : whether waves with k and -k have one frequency, of which one is kept.
+    both : whether k and -k are both solutions, so that only one is kept.
     """
     real, decay = np.real(phases), np.imag(phases)
     travels = np.abs(decay) <= TRAVELS

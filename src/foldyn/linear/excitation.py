@@ -1,20 +1,19 @@
-"""What drives a frequency response, and the response: to forces on nodes, or to a moving base.
+"""The drive of a frequency response, and the response: to nodal forces, or to a moving base.
 
-The response to a moving base is the absolute displacement over that of the base. With x = t y + z,
-t the unit translation of all nodes along the axis of the base, y the motion of the base and z the
-motion relative to it, the equation of motion M x'' + C x' + K x = 0 on the free dofs becomes
+The response to a moving base is the absolute displacement over the base displacement. With x = t y
++ z, t the unit translation of all nodes along the axis of the base, y the motion of the base and z
+the motion relative to it, the equation of motion M x'' + C x' + K x = 0 on the free dofs becomes
 
     M z'' + C z' + K z = -(M t)_f (y'' + alpha y') - (C_g t)_f y',
 
-because a translation strains nothing: K t = 0, and so is what beta K0, creases, dashpots between
-nodes and modal damping make of it. (Springs that stand on the ground do resist it; their
--K t (y + beta y') is added.) Rayleigh's alpha M and the dashpots to the ground, C_g, damp the
-absolute motion, as air does, and therefore drag at the moving body; beta K0 damps the strain. For
-one mass m on a spring k
+because a translation strains nothing: K t = 0, and likewise for beta K0, creases, dashpots between
+nodes and modal damping. (Springs to the ground do resist it; their -K t (y + beta y') is added.)
+Rayleigh's alpha M and the dashpots to the ground, C_g, damp the absolute motion, as air does, and
+therefore drag on the moving body; beta K0 damps the strain. For one mass m on a spring k
 
     x / y = (k + i w beta k) / (k - w^2 m + i w (alpha m + beta k)),
 
-the textbook formula with c = beta k where alpha = 0.
+the textbook formula with c = beta k if alpha = 0.
 """
 
 from __future__ import annotations
@@ -37,13 +36,13 @@ NAMED = 5  # frequencies that a warning lists
 
 
 class Answer(NamedTuple):
-    """What a method of frequency response gives.
+    """Result of a method of frequency response.
 
     Attributes
     ----------
     response : ndarray, complex
-        Per unit of the drive: of the free dofs, shape (m, nf), relative to the base, from methods
-        on matrices; of all nodes, shape (m, n, 3), absolute, from simulated motions.
+        Per unit of the drive: from matrix methods on the free dofs, shape (m, nf), relative to the
+        base; from simulated motions at all nodes, shape (m, n, 3), absolute.
     more : dict
         Further variables of the dataset.
     facts : dict
@@ -62,14 +61,14 @@ class Drive:
     Attributes
     ----------
     amplitude : float
-        Factor on what was given.
+        Factor on the given drive.
     vector : (n, 3)
         Amplitudes of the forces on the nodes (N), or of the displacements of the base (m).
     value : float
-        What the response is divided by: the sum of the magnitudes of the nodal forces (N), or the
+        Divisor of the response: the sum of the magnitudes of the nodal forces (N), or the
         displacement of the base (m).
     axis : str or None
-        Of the motion of the base; None for forces.
+        Axis of the base motion; None for forces.
     """
 
     amplitude: float
@@ -79,7 +78,7 @@ class Drive:
 
     @property
     def quantity(self) -> str:
-        """What the response is called."""
+        """Name of the response."""
         return "receptance" if self.axis is None else "transmissibility"
 
     def facts(self) -> dict[str, Any]:
@@ -96,13 +95,13 @@ def drive_of(case: Case, drive: Any, amplitude: float) -> Drive:
     Raises
     ------
     InputError
-        Neither forces nor one motion of the base, a history of its own, forces on held axes only,
-        or a base that cannot move as a whole.
+        Neither forces nor one base motion; a drive with a history of its own; forces on held axes
+        only; or a base that cannot move as a whole.
 
     Warns
     -----
     FoldynWarning
-        A force acts in part on held axes: that part moves nothing and is left out.
+        A force acts partly on held axes: this part moves nothing and is left out.
     """
     parts = (drive,) if isinstance(drive, Force | BaseMotion) else drive
     if not isinstance(parts, Sequence) or isinstance(parts, str) or not len(parts):
@@ -129,7 +128,7 @@ def drive_of(case: Case, drive: Any, amplitude: float) -> Drive:
 
 
 def _forces(case: Case, parts: list[Force], amplitude: float) -> Drive:
-    """A drive by forces; those on held axes reach the supports, not the structure."""
+    """A drive by forces; their part on held axes is left out."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FoldynWarning)
         try:
@@ -181,10 +180,10 @@ class Term(NamedTuple):
 
 
 def drive_terms(system: Linearized, drive: Drive) -> list[Term]:
-    """Load per unit of the drive: forces per N, or what a moving base does.
+    """Load per unit of the drive: forces per N, or the effective load of a moving base.
 
-    The base accelerates masses, and drags at them; springs, planes and dashpots that stand on the
-    ground, which does not move with it, hold back.
+    The base drives masses by inertia, and drags on them by dashpots; springs, planes and dashpots
+    attached to the ground, which stays at rest, hold them back.
     """
     if drive.axis is None:
         return [Term(system.projected((drive.vector / drive.value).ravel()), lambda omega: 1.0)]
@@ -204,7 +203,7 @@ def drive_terms(system: Linearized, drive: Drive) -> list[Term]:
 
 
 def absolute(system: Linearized, drive: Drive, relative: NDArray) -> NDArray[np.complex128]:
-    """Response (m, n, 3) to the drive from that of the free dofs (m, nf), relative to the base."""
+    """Absolute response (m, n, 3) from the response (m, nf) of free dofs relative to the base."""
     response = system.expanded(relative.T).T.reshape(-1, *drive.vector.shape).copy()
     if drive.axis is not None:
         response[:, :, AXES.index(drive.axis)] += 1.0
@@ -212,7 +211,7 @@ def absolute(system: Linearized, drive: Drive, relative: NDArray) -> NDArray[np.
 
 
 def warn_at(frequency: NDArray, text: str) -> None:
-    """Warn of frequencies (m,), if any, with a text that has a place for them."""
+    """Warn about frequencies (m,), if any; the text has a placeholder for them."""
     if not frequency.size:
         return
     listed = ", ".join(f"{f:.6g}" for f in frequency[:NAMED])

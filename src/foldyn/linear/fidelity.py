@@ -1,4 +1,4 @@
-"""`fidelity`: how far models of bars and hinges of a case are right, beside its shell."""
+"""`fidelity`: accuracy of bar-and-hinge models of a case, compared with its shell."""
 
 from __future__ import annotations
 
@@ -55,15 +55,15 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
         "membrane": "bars",
     },
 }  # fmt: skip
-"""Models that stand beside the case's own: arguments of `discretize` in place of its own.
+"""Models compared with the case's own: arguments of `discretize` that replace its own.
 
-"bars" is "n5b8e" with bars that resist alone."""
+"bars" is "n5b8e" in which only bars resist stretching."""
 BESIDE = ("standard", "plate", "n5b8e")
-"""Those that do so unless others are named."""
+"""Models compared by default."""
 SHOWN = ("calibration", "mass", "bend_law")
-"""Options by which models are told apart."""
-BEYOND = 2  # modes of the shell that are computed, but not compared
-RUNS, SECONDS = 5, 3.0  # how often a modal analysis is timed, unless that takes longer
+"""Options that distinguish models in tables."""
+BEYOND = 2  # extra modes of the shell that are computed, but not compared
+RUNS, SECONDS = 5, 3.0  # timed runs of a modal analysis, and seconds that end them
 
 
 def fidelity(
@@ -76,55 +76,53 @@ def fidelity(
     vertex_radius: float | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Fidelity:
-    """Compare models of bars and hinges with the shell, for one's own case.
+    """Compare bar-and-hinge models with the shell, for one's own case.
 
-    The shell has the pattern, sheet, creases, supports, loads and masses of the case, and
+    The shell has the pattern, sheet, creases, supports, loads and masses of the case, and a
     consistent mass. Its lowest elastic modes about rest, extrapolated from two meshes, are paired
-    with those of each model by their MAC at the nodes that both have. Where forces act and
-    supports hold the sheet, displacements along small forces are compared too. A third mesh, half
-    as fine, shows with which order the shell converges, and so how far it is off, or that it has
-    not converged.
+    with the modes of each model by their MAC at shared nodes. If forces act and supports hold the
+    sheet, displacements along small forces are compared too. A third mesh, half as fine, gives the
+    order of convergence of the shell, and so its error, or shows that it has not converged.
 
     Parameters
     ----------
     case : Case
-        Of bars and hinges, as `discretize` makes them. Histories and damping play no part, loads
-        act in full.
+        Case of bars and hinges, from `discretize`. Histories and damping are ignored; loads act in
+        full.
     count : int
-        How many elastic modes of the shell.
+        Number of elastic modes of the shell.
     divisions : (int, int), optional
-        Pieces of every edge of the two finer shells: (6, 12), or fewer where the pattern has so
-        many panels that the shell would be large; a warning then says so.
+        Pieces of every edge of the two finer shells: (6, 12) by default, or fewer, with a warning,
+        if the shell would be large because of many panels.
     models : sequence of str, or mapping of str to mapping, optional
-        What stands beside the case's own model: names of `foldyn.linear.fidelity.MODELS`, by
-        default "standard", "plate" and "n5b8e" as far as they take its other options, or
-        arguments of `discretize` in place of the case's own, by name.
+        Models compared with the case's own: names from `foldyn.linear.fidelity.MODELS`, by default
+        "standard", "plate" and "n5b8e" as far as they accept its other options; or, by name,
+        arguments of `discretize` that replace the case's own.
     secant : float, optional
-        Amplitude (degrees) of the turns of superlinear hinges, which have no stiffness at rest; as
-        of `modes`.
+        Amplitude (degrees) of superlinear hinges, which have no stiffness at rest; as in `modes`.
     vertex_radius : float, optional
-        Radius (m) within which corners of the shell are rigid in their plane, as of `shell`; the
-        thickness is a good one. The shells then have meshes graded toward vertices, by default of
-        4, 8 and 12 divisions, and frequencies are extrapolated with the order that these show.
-        Large sheets that are held, and towers, have no other limit.
+        Radius (m) within which corners of the shell are rigid in their plane, as in `shell`; the
+        thickness is a good choice. The shells then have meshes graded toward vertices, by default
+        with 4, 8 and 12 divisions, and frequencies are extrapolated with the observed order. Large
+        supported sheets, and towers, converge only with such a radius.
     progress : callable
-        Is told the steps, one by one.
+        Called with the name of each step.
 
     Returns
     -------
     Fidelity
-        Its `advice` says which model to use and up to which frequency.
+        Its `advice` names the model to use and its frequency range.
 
     Raises
     ------
     InputError
-        The case is a shell, its structure was changed by hand, the sheet has no density, or it
-        names nodes that are not vertices; a panel cannot be meshed; an argument out of range.
+        The case is a shell, its structure was changed by hand, the sheet has no density, or nodes
+        other than vertices are named; a panel cannot be meshed; an argument out of range.
 
     Warns
     -----
     FoldynWarning
-        The shell is coarser than (6, 12); the rest state is no equilibrium.
+        The shell is coarser than (6, 12); the rest state is not an equilibrium.
 
     Examples
     --------
@@ -143,20 +141,20 @@ def fidelity(
 @brief
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A comparison that is checked, but not begun.
+    """A checked comparison, not yet computed.
 
     Attributes
     ----------
     case : Case
-        As it was given.
+        Case as given.
     count : int
-        How many modes of the shell.
+        Number of modes of the shell.
     shells : (Case, Case, Case)
-        It with shells of three meshes, the finest last, its forces alone as loads.
+        The case with shells of three meshes, finest last, with forces as its only loads.
     compared : mapping of str to Case
-        It with each model, its own first, likewise.
+        The case with each model, its own first, likewise.
     not_forces : tuple of int
-        Numbers of the loads that are left out.
+        Numbers of the loads left out.
     secant : float or None
     """
 
@@ -168,7 +166,7 @@ class Comparison:
     secant: float | None
 
     def run(self, progress: Callable[[str], None] = lambda step: None) -> Fidelity:
-        """Compute it; `progress` is told the steps, one by one."""
+        """Compute the comparison; `progress` is called with the name of each step."""
         began = time.perf_counter()
         divisions = [one.structure.options.divisions for one in self.shells]
         progress("shell with {}, {} and {} divisions".format(*divisions))
@@ -213,16 +211,16 @@ class Comparison:
         return Fidelity(fidelity_dataset(self.case, list(self.compared), values, facts))
 
     def _times(self, true: Reference) -> dict[str, Any]:
-        """Times of modal analyses for as many modes of all, s, and their ratio."""
+        """Times (s) of modal analyses, each for the same number of modes, and their ratio."""
         count, taken = true.found.sizes["mode"], [float(true.found.attrs["wall_seconds"])]
         shell = _seconds(true.case, count, self.secant, taken)
         own = np.array([_seconds(held, count, self.secant) for held in self.compared.values()])
         return {"seconds": shell, "model_seconds": own, "cost_ratio": shell / own}
 
     def _deflections(self, held: Sequence[str]) -> dict[str, Any]:
-        """Displacements along the forces, work over the forces on the nodes of the case.
+        """Displacements along the forces: work over the forces on the nodes of the case.
 
-        held : names of the models that supports and hinges hold.
+        held : names of the models without free motions.
         """
         divisions = [one.structure.options.divisions for one in self.shells]
         works = np.array([small_loads(case).work for case in self.shells])
@@ -248,7 +246,7 @@ def comparison(
     secant: float | None = None,
     vertex_radius: float | None = None,
 ) -> Comparison:
-    """Check a comparison and make its structures; arguments as of `fidelity`."""
+    """Check a comparison and make its structures; arguments as in `fidelity`."""
     count = whole("count", count, least=1)
     if secant is not None:
         number("secant", secant, above=0.0, most=180.0, unit="degrees")
@@ -269,17 +267,17 @@ def comparison(
 
 
 def _held(found: xarray.Dataset) -> bool:
-    """Whether something resists every motion."""
+    """Whether every motion has stiffness."""
     return bool((found["eigenvalue"] > 0.0).all())
 
 
 def _compared(case: Case, models: Any) -> dict[str, Case]:
-    """The case with its own model and with others, without one that is its own."""
+    """The case with its own model and with others, except one equal to its own."""
     structure = case.structure
     compared = {OWN: with_structure(case, structure)}
-    _ = structure.mass  # its rule may refuse this pattern: say so before anything runs
+    _ = structure.mass  # its rule may refuse this pattern: fail early
     for name, changes in named(models, structure).items():
-        law = {"bar_law": None} if "membrane" in changes else {}  # that of the membrane
+        law = {"bar_law": None} if "membrane" in changes else {}  # the membrane decides
         options = {**vars(structure.options), **law, **changes}
         with within(f"models: {name}: "):
             options |= straightened(ModelOptions(**options), structure.pattern, case.supports)
@@ -294,7 +292,7 @@ def _compared(case: Case, models: Any) -> dict[str, Case]:
 def named(models: Any, structure: Structure) -> Mapping[str, Mapping[str, Any]]:
     """Arguments of `discretize` by the name of the model.
 
-    By default those of `BESIDE` that take the other options of the structure.
+    By default the models of `BESIDE` that accept the other options of the structure.
     """
     if models is None:
         refused = isinstance(structure.fold_law, Superlinear)
@@ -315,7 +313,7 @@ def named(models: Any, structure: Structure) -> Mapping[str, Mapping[str, Any]]:
 
 
 def _told(case: Case, own: Case) -> str:
-    """Options of a model as a case file has them: those that tell models apart."""
+    """Options of a model, in case file syntax, that distinguish it from others."""
     options, others = vars(case.structure.options), vars(own.structure.options)
     usual = options["scheme"] == others["scheme"] == MODELS["plate"]["scheme"]
     further = (key for key in options if options[key] != others[key])
@@ -328,13 +326,13 @@ def _written(value: Any) -> str:
 
 
 def _seconds(case: Case, count: int, secant: float | None, taken: Sequence[float] = ()) -> float:
-    """Median of the times of a modal analysis, s; of fewer runs where that takes long.
+    """Median time (s) of a modal analysis; from fewer runs if that takes long.
 
-    taken : times that are known already.
+    taken : times already measured.
     """
     times = list(taken)
     if not times:
-        modes_at_rest(case, 1, secant)  # what is computed on first use
+        modes_at_rest(case, 1, secant)  # warm-up: computes cached values
     while not times or (len(times) < RUNS and sum(times) < SECONDS):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)

@@ -1,6 +1,6 @@
-"""Frequency responses of linearized cases: one solution for each frequency, or modes superposed.
+"""Frequency responses of linearized cases: direct solutions per frequency, or modal superposition.
 
-The static response of the modes left out completes those superposed.
+The static response of the omitted modes completes the superposition.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from foldyn.linear.modes import rigid_space, unresisted
 from foldyn.ram_limit import check_memory
 from foldyn.values import whole
 
-DIAGONAL = 1e-12  # of the modal damping: couplings of modes that are rounding
-FOLLOWS = 1e-8  # of the terms of a damping force on a dof without mass: below it is none
-COPIES = 3  # of the matrix of the amplitudes
-BESIDE = 0.01  # of the lowest eigenvalue above 0: how far below 0 a free body is held up
+DIAGONAL = 1e-12  # of the modal damping: smaller couplings of modes count as round-off
+FOLLOWS = 1e-8  # of the terms of a damping force on a massless dof: less counts as zero
+COPIES = 3  # of the matrix of the amplitudes in memory
+BESIDE = 0.01  # of the lowest positive eigenvalue: shift below 0 for a free body
 RESONANCE = (
     "there is no response at {} (nan): a resonance without damping, or 0 Hz of a body that is free "
     "to move; give the case damping, as Rayleigh(alpha=...), or leave these frequencies out"
@@ -46,8 +46,8 @@ def direct(
 ) -> Answer:
     """Solve (K - w^2 M + i w (C + G'G)) x = f at each frequency, G the rows of modal damping.
 
-    The response is nan where the matrix is singular to rounding: at a resonance without damping,
-    and at 0 Hz of a body that is free to move.
+    The response is nan if the matrix is singular to round-off: at a resonance without damping,
+    and at 0 Hz for a body that is free to move.
 
     Warns
     -----
@@ -66,7 +66,7 @@ def direct(
 
 
 def dynamic_stiffness(system: Linearized, omega: float) -> sparse.csc_array:
-    """K - w^2 M + i w C at an angular frequency (rad/s), with the complex stiffness of memories."""
+    """K - w^2 M + i w C at an angular frequency (rad/s), with the stiffness of memory laws."""
     if isinstance(system.mass, Squared):
         raise InputError(
             ": the fluid couples too many dofs for full matrices at each frequency; take "
@@ -86,10 +86,10 @@ class Modal(Checked):
     Parameters
     ----------
     count : int, optional
-        How many modes, the lowest ones; all without it.
+        Number of modes, the lowest ones; all by default.
     static_correction : bool
-        Whether to add the static response of the modes left out: errors then fall as the fourth
-        power of the highest frequency kept instead of as the second.
+        Whether to add the static response of the omitted modes: errors then fall with the fourth
+        power of the highest frequency kept instead of the second.
     """
 
     count: Annotated[int | None, Check(whole, least=1, what="modes")] = None
@@ -101,12 +101,12 @@ def modal(
 ) -> Answer:
     """Superpose modes: x = Phi q + r with (Lambda - w^2 + i w Phi' C Phi) q = Phi' f.
 
-    The matrix of the modal damping is taken whole: modes that damping couples (dashpots and
-    creases, beta K0 about a state where the tangent is not K0) stay coupled, and so do dofs without
-    mass that damping or memory parts from the modes, in which they follow statically.
-    r = (K - s M)^-1 f - Phi (Lambda - s)^-1 Phi' f is the response of all other modes at the
-    squared frequency s: 0, or slightly below for a body that is free to move (mode acceleration:
-    Craig and Kurdila, Fundamentals of Structural Dynamics, 2nd ed. 2006, chapter 11).
+    The modal damping matrix is kept in full: modes coupled by damping (dashpots and creases, beta
+    K0 about a state where the tangent is not K0) stay coupled. So do massless dofs that damping or
+    memory moves differently from the modes, in which they follow statically. r = (K - s M)^-1 f -
+    Phi (Lambda - s)^-1 Phi' f is the response of all other modes at the squared frequency s: 0, or
+    slightly below for a body that is free to move (mode acceleration: Craig and Kurdila,
+    Fundamentals of Structural Dynamics, 2nd ed. 2006, chapter 11).
 
     At a resonance without damping the response is nan.
 
@@ -145,9 +145,9 @@ def modal(
 
 
 class _Basis(NamedTuple):
-    """Motions, r of them, that neither stiffness nor mass couples: modes, and those without mass.
+    """Motions, r of them, uncoupled in stiffness and mass: modes, and massless motions.
 
-    values : (r,) stiffness; inertia : (r,) 1 or 0; noise : (r,) rounding of the values.
+    values : (r,) stiffness; inertia : (r,) 1 or 0; noise : (r,) rounding errors of the values.
     """
 
     shapes: NDArray  # (nf, r)
@@ -157,10 +157,10 @@ class _Basis(NamedTuple):
 
 
 def _with_massless(system: Linearized, pencil: Pencil, modes: Spectrum) -> _Basis:
-    """Modes with the motions of dofs without mass by which damping or memory parts from them.
+    """Modes, and the motions by which massless dofs deviate from them due to damping or memory.
 
-    In modes dofs without mass follow the others statically. What resists their rates moves them
-    beside that, while those among them that nothing else resists follow.
+    In modes, massless dofs follow the others statically. Damping forces on their rates add a motion
+    of their own; massless dofs without damping follow this motion statically.
     """
     shapes, light = modes.shapes, ~pencil.heavy
     pull, most = np.abs(system.damping @ shapes), abs(system.damping) @ np.abs(shapes)
@@ -191,7 +191,7 @@ def _amplitudes(
 ) -> NDArray:
     """Amplitudes (r,) of the basis at an angular frequency (rad/s).
 
-    memory : complex stiffness of laws with memory between its motions there.
+    memory : complex stiffness of memory laws between the motions at this frequency.
     """
     own, noise = damping.diagonal(), basis.noise
     detuned = basis.values - omega**2 * basis.inertia
@@ -209,7 +209,7 @@ def _amplitudes(
 
 
 def _residual(pencil: Pencil, basis: _Basis, shape: NDArray, load: NDArray) -> NDArray:
-    """Static response (nf,) of the modes left out."""
+    """Static response (nf,) of the omitted modes."""
     modal = basis.values[basis.inertia > 0.0]
     positive = modal[modal > 0.0]
     shift = 0.0

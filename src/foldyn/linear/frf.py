@@ -34,11 +34,11 @@ if TYPE_CHECKING:
 
 
 class ResponseMethod(NamedTuple):
-    """A way to a frequency response.
+    """A method for frequency responses.
 
-    `compute` takes what moves, a `Linearized` with its drive if `linear`, else a `Rig`; then the
-    frequencies, an object of `options` and a reporter, and gives an `Answer`. A method with a
-    `secant` (degrees) finds the slopes of superlinear hinges itself, starting from those.
+    `compute` takes a `Linearized` and its drive if `linear`, else a `Rig`; then the frequencies,
+    an instance of `options` and a reporter, and returns an `Answer`. A method with a `secant`
+    (degrees) finds the slopes of superlinear hinges itself, starting from that amplitude.
     """
 
     name: str
@@ -65,7 +65,7 @@ METHODS: Mapping[str, ResponseMethod] = {
     )
 }
 
-COPIES = 4  # of the response, while it is found and stored
+COPIES = 4  # of the response in memory, while it is computed and stored
 PER_FORCE = tuple(name for name in RESPONSES if name != "transmissibility")
 
 
@@ -88,35 +88,35 @@ def frf(
     Parameters
     ----------
     case : Case
-        Its loads and imposed displacements are preloads, in full; histories play no part, nor do
-        motions of the base.
+        Its loads and imposed displacements are preloads, in full; histories and base motions are
+        ignored.
     drive : sequence of Force, or a BaseMotion
-        What moves it, without a history: forces in phase with each other, or the motion of all
+        Drive without a history: forces in phase with each other, or the common motion of all nodes
         that `Fix` holds along an axis.
     frequencies : array_like
         Frequencies (Hz), increasing. For `impulse` and `burst_random` multiples of one spacing,
         as numpy.arange(0.5, 20, 0.1).
     state : State or "equilibrium", optional
-        About which: a state, as `fd.initial_state(path)`; the equilibrium under the loads, found
-        by statics; without it the rest state, in which no load acts.
+        State to linearize about: a state, as `fd.initial_state(path)`; the equilibrium under the
+        loads, found by statics; by default the rest state, in which no load acts.
     method : {"direct", "modal", "harmonic", "impulse", "stepped_sine", "burst_random"}
-        "direct" and "modal" linearize the case; "harmonic" does so for the swing that the drive
-        gives to each superlinear hinge; the others simulate its motion and estimate the response
-        from it, with all that is nonlinear in it.
+        "direct" and "modal" linearize the case; "harmonic" linearizes each superlinear hinge for
+        its own swing under the drive; the others simulate motions and estimate the response from
+        them, including all nonlinearities.
     secant : float, optional
-        For "direct" and "modal": amplitude (degrees) for which superlinear hinges have their
+        For "direct" and "modal": amplitude (degrees) at which superlinear hinges take their
         equivalent slope.
     amplitude : float
-        Factor on the drive, for structures whose response depends on it.
+        Factor on the drive, for structures whose response depends on the amplitude.
     load_factor : float
-        How far actuated folds are folded in a given state.
+        Load factor of actuated folds in a given state.
     internal : int
-        For "direct" and "modal": internal amplitudes of each panel, as of `modes`.
+        For "direct" and "modal": internal amplitudes of each panel, as in `modes`.
     progress : bool or callable, optional
-        True shows a bar; a callable gets a `Progress`: for methods that simulate, of the simulated
-        time, for the others of the number of frequencies.
+        True shows a bar; a callable gets a `Progress`: of the simulated time for methods that
+        simulate, of the number of frequencies for the others.
     **options
-        Of the method: the fields of `linear.Modal`, `linear.HarmonicBalance`, `linear.Impulse`,
+        Fields of `linear.Modal`, `linear.HarmonicBalance`, `linear.Impulse`,
         `linear.SteppedSine` and `linear.BurstRandom`.
 
     Returns
@@ -124,8 +124,8 @@ def frf(
     xarray.Dataset
         Dimensions frequency, node, axis. `receptance` (m/N): displacement over the sum of the
         magnitudes of the nodal forces, attribute `drive_force`; or `transmissibility`: absolute
-        displacement over that of the base. Complex, for the time dependence exp(+i w t): a lag is
-        a negative phase; nan where there is none. `displacement` of the state and `drive`, its
+        displacement over base displacement. Complex, for the time dependence exp(+i w t): a lag is
+        a negative phase; nan if there is no response. `displacement` of the state and `drive`, its
         amplitudes. `coherence` (burst_random), `unsteadiness` (stepped_sine) or `swing` (harmonic).
         Attributes hold the method, its options and facts about the run.
 
@@ -140,12 +140,12 @@ def frf(
     Warns
     -----
     FoldynWarning
-        The state is no equilibrium, or an unstable one; hinges have no slope; a resonance without
-        damping; a motion that has not died away or settled.
+        The state is not an equilibrium, or is unstable; hinges have no slope; a resonance without
+        damping; a motion that has not decayed or settled.
 
     Notes
     -----
-    Damping is all that the case has, linearized in the state. Peaks and their damping:
+    All damping of the case is included, linearized in the state. Peaks and their damping:
     `linear.peaks_of`; velocities and accelerations per force: `linear.convert`.
 
     Examples
@@ -225,13 +225,13 @@ def _warn_of_instability(system: Linearized) -> None:
     if unstable:
         warn(
             f"the state is an unstable equilibrium ({unstable} negative eigenvalues): a motion "
-            "leaves it, and the response is that of the equations only; give a stable state",
+            "leaves it, so that this response is never observed; give a stable state",
             "modes.md#rigid-and-unstable-modes",
         )
 
 
 def _warn_of_stretch(system: Linearized, frequency: NDArray, response: NDArray) -> None:
-    """Warn where stretching holds much of the strain energy of the response (m, nf) at a peak."""
+    """Warn if stretching holds much of the strain energy of the response (m, nf) at a peak."""
     structure, motion = system.case.structure, np.nan_to_num(response).T
     limit = most(structure)
     if not np.isfinite(limit):
@@ -281,12 +281,12 @@ def _frequencies(given: ArrayLike, way: ResponseMethod) -> NDArray:
 
 
 def quantity_of(response: xarray.Dataset) -> str:
-    """Which quantity a frequency response holds.
+    """The quantity of a frequency response.
 
     Raises
     ------
     InputError
-        None: not a frequency response.
+        Not a frequency response.
     """
     held = [name for name in RESPONSES if name in getattr(response, "data_vars", ())]
     if len(held) != 1:
@@ -298,20 +298,20 @@ def quantity_of(response: xarray.Dataset) -> str:
 
 
 def convert(response: xarray.Dataset, quantity: str) -> xarray.Dataset:
-    """Turn a frequency response into receptance, mobility or accelerance.
+    """Convert a frequency response to receptance, mobility or accelerance.
 
     Parameters
     ----------
     response : xarray.Dataset
         A result of `frf` under forces.
     quantity : {"receptance", "mobility", "accelerance"}
-        What it is to hold: displacement (m/N), velocity (m/(N s)) or acceleration (m/(N s2)) per
+        Quantity to return: displacement (m/N), velocity (m/(N s)) or acceleration (m/(N s2)) per
         force.
 
     Returns
     -------
     xarray.Dataset
-        With that variable instead; nan at 0 Hz where a division by i w would be needed.
+        The response with this variable; nan at 0 Hz if a division by i w would be needed.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""How the frequencies of Bloch waves change with their phases, by the Hellmann-Feynman theorem.
+"""Slopes of Bloch frequencies over the phases, by the Hellmann-Feynman theorem.
 
 For waves with phi^H M phi = 1, d lambda = phi^H (dK - lambda dM) phi; constraints G(k) phi = 0 add
-the work of their forces in dG phi. Of waves of one frequency those combinations go on along a
-direction for which the matrix of these numbers is diagonal.
+the work of their forces in dG phi. Waves of equal frequency are combined so that this matrix is
+diagonal along a direction: these combinations continue along it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from foldyn.linear.bloch import Bloch
 
-DEGENERATE = 1e-10  # of the largest of some eigenvalues: those that are one
+DEGENERATE = 1e-10  # of the largest eigenvalue: closer ones count as equal
 
 
 class Waves(NamedTuple):
@@ -33,16 +33,16 @@ class Waves(NamedTuple):
     momentum: NDArray
 
     def ordered(self, order: NDArray) -> Waves:
-        """The same in another order."""
+        """The waves in another order."""
         return Waves(self.values[order], self.shapes[:, order], self.momentum[:, order])
 
 
 def slopes_of(bloch: Bloch, phase: NDArray, waves: Waves) -> NDArray[np.float64]:
     """d omega/d k (k, d), rad/s per rad, of waves by the Hellmann-Feynman theorem.
 
-    d lambda = phi^H (dK - lambda dM) phi, with the forces of constraints that change with the
-    phase. Of waves of one frequency it takes the combinations that go on along each period by
-    themselves. nan where the frequency is zero: bands have corners there.
+    d lambda = phi^H (dK - lambda dM) phi, plus the forces of constraints that change with the
+    phase. Waves of equal frequency are combined as they continue along each period. nan if the
+    frequency is zero, where bands have corners.
     """
     values = waves.values
     out = np.empty((len(values), bloch.steps.shape[1]))
@@ -78,7 +78,7 @@ def eigenvalue_slopes(
 
 
 def degenerate(values: NDArray) -> list[list[int]]:
-    """Numbers of eigenvalues in groups that are one to rounding, increasing in each."""
+    """Indices of eigenvalues in groups equal to round-off, increasing in each."""
     order = np.argsort(values, kind="stable")
     near = DEGENERATE * np.abs(values).max(initial=0.0)
     gaps = np.flatnonzero(np.diff(values[order]) > near) + 1
@@ -86,7 +86,7 @@ def degenerate(values: NDArray) -> list[list[int]]:
 
 
 def separated(bloch: Bloch, phase: NDArray, waves: Waves, way: NDArray) -> Waves:
-    """The waves with those of one frequency combined as they go on along a direction (d,)."""
+    """The waves, with equal frequencies combined as they continue along a direction (d,)."""
     groups = [group for group in degenerate(waves.values) if len(group) > 1]
     if not groups or not way.any():
         return waves

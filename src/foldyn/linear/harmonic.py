@@ -1,13 +1,13 @@
-"""Frequency response of a given amplitude: superlinear hinges linearized for their own swing.
+"""Frequency response at a given amplitude: superlinear hinges linearized for their own swing.
 
-Under a sine of finite amplitude each superlinear hinge swings by an amplitude A_h of its own. With
-one harmonic its moment is that of a linear hinge of the slope k_eq(A_h) (`equivalent_slope`), and
+Under a sine of finite amplitude each superlinear hinge swings with its own amplitude A_h. With one
+harmonic its moment equals that of a linear hinge with the slope k_eq(A_h) (`equivalent_slope`), and
 
     (K(A) - w^2 M + i w C) x = f,    A_h = |g_h x|,
 
 g_h the gradient of the hinge's dihedral, is a nonlinear equation for the slopes: single harmonic
 balance (Krylov and Bogoliubov 1947; Krack and Gross, Harmonic Balance for Nonlinear Vibration
-Problems, 2019). Displacements are taken as small against the structure, but for these slopes.
+Problems, 2019). Displacements are small compared to the structure, except for these slopes.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from foldyn.linear.linearized import Linearized, equivalent_slope
 from foldyn.materials import Superlinear
 from foldyn.values import number, whole
 
-REFERENCE = 1.0  # degrees: the swing for which the slopes stand in the system that is given
-DEPTH = 5  # iterations that the acceleration looks back on
+REFERENCE = 1.0  # degrees: the swing for which slopes are included in the given system
+DEPTH = 5  # previous iterations used by the acceleration
 PATIENCE = 25  # accelerated iterations before slow ones are tried
-RELAXED = 0.3  # of the way in a slow iteration
-FURTHEST = 1.5  # times: how far slopes are extrapolated from one frequency to the next
-LEAST = 1e-12  # rad: a swing is never taken as smaller
-APART = 1e-4  # of a swing: distance of the slopes whose difference is their derivative
+RELAXED = 0.3  # share of the full step in a slow iteration
+FURTHEST = 1.5  # factor: limit of the extrapolation of slopes to the next frequency
+LEAST = 1e-12  # rad: least swing
+APART = 1e-4  # of a swing: half width of the difference for the derivative of slopes
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class HarmonicBalance(Checked):
     tolerance : float
         Largest change of the response in an iteration, relative to its maximum.
     iterations : int
-        At a frequency, at most.
+        Most iterations at a frequency.
     """
 
     tolerance: Annotated[float, Check(number, above=0.0)] = 1e-6
@@ -58,21 +58,21 @@ class HarmonicBalance(Checked):
 def harmonic(
     system: Linearized, drive: Drive, frequency: NDArray, options: HarmonicBalance, report: Reporter
 ) -> Answer:
-    """Balance one harmonic at each frequency, starting from the slopes of the one before.
+    """Balance one harmonic at each frequency, starting from the slopes at the previous one.
 
-    Where the response has several branches, rising frequencies follow one until it ends.
+    If the response has several branches, rising frequencies follow one until it ends.
 
     Parameters
     ----------
     system : Linearized
-        Its superlinear hinges have the slope for a swing of `REFERENCE`.
+        System whose superlinear hinges have the slope for a swing of `REFERENCE`.
 
     Returns
     -------
     Answer
-        Response at the amplitude of the drive, nan where the iteration does not converge or at a
-        resonance without damping; `swing` (m,), the largest amplitude (rad) of a superlinear
-        hinge; the number of iterations.
+        Response at the amplitude of the drive, nan if the iteration does not converge or at an
+        undamped resonance; `swing` (m,), the largest amplitude (rad) of a superlinear hinge; the
+        number of iterations.
 
     Warns
     -----
@@ -117,7 +117,7 @@ def harmonic(
 
 
 def _ahead(done: list[tuple[float, NDArray]], frequency: float, first: NDArray) -> NDArray:
-    """Slopes to begin with: on the straight line through those of the last two frequencies."""
+    """Initial slopes, extrapolated linearly from the last two frequencies."""
     if not done:
         return first
     (f1, s1), (f2, s2) = done[0], done[-1]
@@ -146,18 +146,18 @@ class Hinges:
         return equivalent_slope(self.offset, swing)
 
     def change(self, slope: NDArray) -> sparse.csr_array:
-        """What slopes add to the stiffness with those of reference."""
+        """Stiffness to add to the reference stiffness for these slopes."""
         weight = sparse.diags_array(self.stiffness * (slope - self.reference))
         return self.gradient.T @ weight @ self.gradient
 
     def left(self, stiffness: sparse.csc_array, motion: NDArray, load: NDArray) -> NDArray:
-        """Out-of-balance force (nf,) of a motion (nf,), for the dynamic stiffness of reference."""
+        """Out-of-balance force (nf,) of a motion (nf,), given the reference dynamic stiffness."""
         turned = self.gradient @ motion
         change = self.stiffness * (self.slope(motion) - self.reference)
         return stiffness @ motion + self.gradient.T @ (change * turned) - load
 
     def tangent(self, stiffness: sparse.csc_array, motion: NDArray) -> sparse.csc_array:
-        """Derivative (2 nf, 2 nf) of real and imaginary parts of that by those of the motion.
+        """Jacobian (2 nf, 2 nf) of `left`, by real and imaginary parts of the motion.
 
         A moment k s(A) y of the turn y changes by k s dy + k s' Re(y* dy) y / A.
         """
@@ -182,7 +182,7 @@ class Hinges:
 
 
 class _Balance:
-    """The iteration for the slopes at one frequency."""
+    """Iteration for the slopes at one frequency."""
 
     def __init__(
         self, hinges: Hinges, system: Linearized, omega: float, load: NDArray,
@@ -193,11 +193,11 @@ class _Balance:
         self.options, self.iterations = options, 0
 
     def balanced(self, start: NDArray) -> tuple[NDArray | None, NDArray]:
-        """Motion (nf,), None without convergence, and the slopes in it.
+        """Motion (nf,), None without convergence, and its slopes.
 
-        Accelerated first (Anderson), which may run in circles near the end of a branch, or find
-        the branch between two others, where the motion does not stay; then slowly, which converges
-        to the others only.
+        The accelerated iteration (Anderson) comes first; it may cycle near the end of a branch, or
+        find the unstable branch between two others. The slow iteration follows, which converges to
+        the stable ones only.
         """
         for accelerated in (True, False):
             motion, slope = self._iterate(start, accelerated)
@@ -210,7 +210,7 @@ class _Balance:
         slopes: list[NDArray] = []
         misses: list[NDArray] = []
         before = None
-        # a slow step changes less than what is left to go
+        # a slow step changes less than the remaining error
         tolerance = self.options.tolerance * (1.0 if accelerated else RELAXED)
         while len(slopes) < most and self.iterations < self.options.iterations:
             self.iterations += 1
@@ -247,7 +247,7 @@ def _steps(values: list[NDArray]) -> NDArray:
 
 
 def _repels(slopes: list[NDArray], misses: list[NDArray]) -> bool:
-    """Whether plain iterations would leave the solution: a multiplier above 1, of those seen."""
+    """Whether plain iterations would leave the solution: an observed multiplier above 1."""
     moved, turned = _steps(slopes), _steps(misses)
     if not moved.size:
         return False

@@ -1,11 +1,11 @@
-"""Laws with memory in small vibrations: a stiffness that depends on the frequency, and is complex.
+"""Laws with memory in small vibrations: a complex stiffness that depends on frequency.
 
-About a state at rest a hinge resists a turn exp(s t) with k (relaxed + sum share s / (s + rate))
-beside its elastic part: with s = i w the complex modulus of its branches. Modes solve
+About a state at rest a hinge resists a turn exp(s t) with k (relaxed + sum share s / (s + rate)) in
+addition to its elastic part: with s = i w the complex modulus of its branches. Modes solve
 
     (s^2 M + K + K_b(s)) x = 0
 
-for each s near that of a mode of K and M: the frequency is |s| / 2 pi, the damping ratio -Re s/|s|.
+for each s near a mode of K and M: the frequency is |s| / 2 pi, the damping ratio -Re s/|s|.
 Iterations are Rayleigh quotients, which for symmetric matrices converge to the third order (H. Voss
 in Handbook of Linear Algebra, 2nd ed. 2014, chapter 115).
 """
@@ -26,8 +26,8 @@ from foldyn.structures.inelastic_hinges import memory, remembering
 
 MOST = 40  # iterations for a mode
 SETTLED = 1e-11  # relative change of s
-OSCILLATES = 1e-6  # least imaginary part of s, over s
-BESIDE = 1e-7  # of s: how far beside a solution a singular matrix is factorized instead
+OSCILLATES = 1e-6  # least imaginary part of s, relative to |s|
+BESIDE = 1e-7  # of s: offset from s if the matrix at s is singular
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +37,13 @@ class Branches:
     Attributes
     ----------
     gradient : (h, nf)
-        Of the hinges' angles, 1/m.
+        Gradients of the hinge angles, 1/m.
     relaxed : (h,)
-        Stiffness without memory that they add to K, N m/rad.
+        Relaxed stiffness that they add to K, N m/rad.
     share, rate : (h, b)
-        Stiffness (N m/rad) and rate (1/s) of each branch; of none 0 and 1.
+        Stiffness (N m/rad) and rate (1/s) of each branch; 0 and 1 if there is none.
     viscous : (h,)
-        What of their damping is counted elsewhere, N m s/rad.
+        Part of their damping counted elsewhere, N m s/rad.
     """
 
     gradient: sparse.csr_array
@@ -58,18 +58,18 @@ class Branches:
         return self.relaxed + relaxing - s * self.viscous
 
     def slopes(self, s: complex) -> NDArray:
-        """Their derivative with respect to s."""
+        """Derivative of `weights` with respect to s."""
         return (self.share * (self.rate / (s + self.rate) ** 2)).sum(axis=1) - self.viscous
 
     def stiffness(self, s: complex) -> sparse.csc_array:
-        """Their stiffness (nf, nf), N/m."""
+        """Stiffness (nf, nf) of the branches, N/m."""
         return self._matrix(self.weights(s))
 
     def _matrix(self, weights: NDArray) -> sparse.csc_array:
         return sparse.csc_array(self.gradient.T @ sparse.diags_array(weights) @ self.gradient)
 
     def between(self, shapes: NDArray, s: complex) -> NDArray:
-        """Their stiffness between shapes (nf, k), as a matrix (k, k)."""
+        """Stiffness of the branches between shapes (nf, k), as a matrix (k, k)."""
         turns = self.gradient @ shapes
         return turns.T @ (self.weights(s)[:, None] * turns)
 
@@ -77,11 +77,11 @@ class Branches:
 def branches_of(
     case: Case, q: NDArray, free: NDArray, inner: Amplitudes, dampers: bool = False
 ) -> Branches | None:
-    """Branches of a case about the dofs q (m,), on the free ones of all unknowns.
+    """Branches of a case about the dofs q (m,), on the free dofs of all unknowns.
 
-    inner : its internal amplitudes, with which creases turn unevenly, too.
-    dampers : whether those of damped creases are among them, less what `dynamics.dampers` counts
-        of these as quasi-static.
+    inner : internal amplitudes of the case, with which creases also turn unevenly.
+    dampers : whether to include the branches of damped creases, less the quasi-static part that
+        `dynamics.dampers` counts.
     """
     parts = case.remembering
     if not dampers:
@@ -121,14 +121,14 @@ def damped_mode(
     stiffness: sparse.csc_array, mass: sparse.csc_array, branches: Branches, value: float,
     shape: NDArray,
 ) -> tuple[complex, NDArray[np.complex128]]:  # fmt: skip
-    """Angular frequency s (rad/s) and shape (nf,), x' M x = 1, of the mode near one without memory.
+    """Complex frequency s (rad/s) and shape (nf,), x' M x = 1, of the mode near an elastic one.
 
-    value, shape : its eigenvalue (rad2/s2), above 0, and shape.
+    value, shape : eigenvalue (rad2/s2), above 0, and shape of the mode without memory.
 
     Raises
     ------
     ComputationError
-        The iteration does not converge, or to a motion that creeps back without swinging.
+        The iteration does not converge, or converges to an overdamped motion.
     """
     x = shape.astype(complex)
     s = _quotient(stiffness, mass, branches, 1j * _swinging(branches, value, shape), x)
@@ -146,9 +146,9 @@ def damped_mode(
 
 
 def _swinging(branches: Branches, value: float, shape: NDArray) -> float:
-    """Angular frequency (rad/s) at which a shape swings by the storage modulus there.
+    """Angular frequency (rad/s) of a shape with the storage modulus at this frequency.
 
-    That of its own frequency without memory may be so far below that damping is all there is.
+    The frequency without memory may be so far below it that damping dominates there.
     """
     turns, omega = (branches.gradient @ shape) ** 2, float(np.sqrt(value))
     for _ in range(MOST):

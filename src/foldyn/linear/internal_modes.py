@@ -1,18 +1,18 @@
-"""Internal amplitudes of the panels of a sheet, in small vibrations about a state (scheme n5b8e).
+"""Internal amplitudes of panels, in small vibrations about a state (scheme n5b8e).
 
-Each panel moves across itself as `structures.panel_modes` says, with the plate's own mass in place
-of that of the rule condensed:
+Each panel moves out of plane as in `structures.panel_modes`, with the plate's own mass in place of
+the mass rule "condensed":
 
     M = sum over panels of (1 - n n') x R + n n' x F,    R of the rule, F of the plate,
 
 n the normal of the panel in the state; F also couples the heights of its nodes with the turns of
-its creased edges, which thereby have mass, and with the amplitudes. Amplitudes are dofs behind
-those of the body, m. They share stiffness with these in the creases alone: a crease of length L
+its creased edges, which thereby gain mass, and with the amplitudes. Amplitudes are numbered after
+the m dofs of the body. They share stiffness with these in the creases only: a crease of length L
 that turns by theta_k P_k along it, k = 1 and on, adds
 
     1/2 (stiffness per length) L / (2 k + 1) theta_k^2,    theta_k the sum of both edges' turns,
 
-and is damped likewise. What stresses in a panel do to amplitudes is left out.
+and is damped likewise. The effect of stresses in a panel on its amplitudes is neglected.
 """
 
 from __future__ import annotations
@@ -33,29 +33,29 @@ from foldyn.structures.panel_modes import TURNS, panel_modes
 from foldyn.structures.panel_plate import TRIANGLE_MASS
 from foldyn.values import show, whole
 
-MOST = 6  # the meshes of panels have further shapes, but less and less well
+MOST = 6  # panel meshes have more shapes, but of decreasing accuracy
 
 
 class Amplitudes(NamedTuple):
-    """What k amplitudes bring to matrices of m dofs, behind which they stand.
+    """Contributions of k amplitudes, numbered after m dofs, to the matrices of a case.
 
     Attributes
     ----------
     stiffness : (m + k, m + k)
-        What comes to the stiffness: of themselves, and of creases that turn unevenly, N/m.
+        Stiffness to add: of the amplitudes, and of creases that turn unevenly, N/m.
     mass : (m + k, m + k)
-        What comes to the mass of the nodes, kg.
+        Mass to add to the mass of the nodes, kg.
     points : (q, 3)
-        Middles of the edges and of the spokes of all panels at rest, one after the other, m.
+        Midpoints of the edges and spokes of all panels in turn, at rest, m.
     between : (3 q, m + k)
-        Their displacements by all dofs.
+        Their displacements, as a function of all dofs.
     turns : (r, m + k)
-        Uneven turns of the creases: by each times P_k along it, 1/m.
+        Amplitudes of the uneven turns P_k along the creases, 1/m.
     fold, share : (r,)
-        Whose they are, and the mean square of P_k: what a fold has of stiffness and damping
-        against each.
+        Fold of each uneven turn, and the mean square of its P_k: the fraction of the fold's
+        stiffness and damping that resists it.
     count : int
-        k.
+        Number k of amplitudes.
     """
 
     stiffness: sparse.csr_array
@@ -69,38 +69,38 @@ class Amplitudes(NamedTuple):
 
     @property
     def dofs(self) -> NDArray[np.int64]:
-        """Their numbers (k,)."""
+        """Dof numbers (k,) of the amplitudes."""
         size = self.mass.shape[0]
         return np.arange(size - self.count, size)
 
     def behind(self, matrix: sparse.csr_array) -> sparse.csr_array:
-        """A matrix (m, m) with rows and columns of zeros for them."""
+        """A matrix (m, m), padded with zero rows and columns for the amplitudes."""
         if not self.count:
             return matrix
         none = sparse.csr_array((self.count, self.count))
         return sparse.csr_array(sparse.block_diag([matrix, none], format="csr"))
 
     def stiffened(self, matrix: sparse.csr_array) -> sparse.csr_array:
-        """A stiffness (m, m), N/m, with theirs."""
+        """A stiffness (m, m), N/m, with the amplitudes added."""
         return sparse.csr_array(self.behind(matrix) + self.stiffness) if self.count else matrix
 
     def damped(self, matrix: sparse.csr_array, damping: NDArray) -> sparse.csr_array:
-        """A damping (m + k, m + k), N s/m, and that of folds of so much (nf,), N m s/rad."""
+        """A damping (m + k, m + k), N s/m, plus uneven turns by fold damping (nf,), N m s/rad."""
         uneven = self.turns.T @ (self.turns * (damping[self.fold] * self.share)[:, None])
         return sparse.csr_array(matrix + uneven)
 
     def massed(self, matrix: sparse.csr_array) -> sparse.csr_array:
-        """A mass (m, m), kg, with theirs."""
+        """A mass (m, m), kg, with the amplitudes added."""
         return sparse.csr_array(self.behind(matrix) + self.mass) if self.count else matrix
 
 
 def check_internal(structure: Any, internal: Any) -> int:
-    """Return the number of internal amplitudes of each panel of a structure.
+    """Return the checked number of internal amplitudes of each panel of a structure.
 
     Raises
     ------
     InputError
-        No number from 0 to 6; amplitudes of a structure that does not have them, as with welds.
+        Not a number from 0 to 6; a structure without amplitudes, such as one with welds.
     """
     count = whole("internal", internal, least=0, most=MOST, what="amplitudes of a panel")
     if not count:
@@ -133,12 +133,12 @@ def amplitudes(structure: Any, body: Assembly, q: NDArray, count: int) -> Amplit
     Parameters
     ----------
     structure : Structure
-        Of the scheme n5b8e and the mass rule condensed.
+        Structure of the scheme n5b8e and the mass rule condensed.
     body : Assembly
-        Its own, or one with other rest angles and further terms.
+        The body of the structure, or one with other rest angles and more terms.
     count : int
-        How many of each panel beside one for each edge without a crease; one more where symmetry
-        makes two alike.
+        Amplitudes of each panel, in addition to one for each edge without a crease; one more if
+        symmetry makes two alike.
     """
     size = body.size
     if not count:
@@ -170,7 +170,7 @@ def amplitudes(structure: Any, body: Assembly, q: NDArray, count: int) -> Amplit
         turns = structure.nodes.size + edges
         inner = np.arange(first, first + len(modes.stiffness))
         first += len(inner)
-        # heights of the nodes, turns of the edges and amplitudes by the dofs
+        # heights of nodes, turns of edges, and amplitudes, in terms of the dofs
         height = np.kron(np.eye(len(nodes)), normal)
         turned = np.sqrt(length2) * body.sheet.per_hidden * np.eye(len(turns))
         by = block_diag(height, turned, np.eye(len(inner)))
@@ -180,7 +180,7 @@ def amplitudes(structure: Any, body: Assembly, q: NDArray, count: int) -> Amplit
         masses.append(_entries(dofs, dofs, by.T @ mass @ by))
         stiff = own.bending_modulus / length2 * modes.stiffness
         stiffness.append(_entries(inner, inner, stiff))
-        # neighbors count along their edge from opposite ends
+        # the two panels at an edge number it from opposite ends
         own_turns = modes.turns @ angles[rows][:, dofs[: -len(inner)]].toarray()
         more = np.eye(len(own_turns), len(inner)) / np.sqrt(length2)
         sign = np.where(side[edges, None], (-1.0) ** order, 1.0).ravel()
@@ -206,14 +206,14 @@ def amplitudes(structure: Any, body: Assembly, q: NDArray, count: int) -> Amplit
 
 
 def _sides(rotations: NDArray) -> tuple[NDArray, NDArray]:
-    """Fold (r,) at which each rotation is, and the side of it (r,), by rotations (nf, 2)."""
+    """Fold (r,) of each rotation, and its side of the fold (r,), from rotations (nf, 2)."""
     fold, side = np.nonzero(rotations >= 0)
     order = np.argsort(rotations[fold, side])
     return fold[order], side[order]
 
 
 def _ends(nodes: NDArray, corners: int) -> NDArray:
-    """Which nodes (q, k) end the edges and the spokes of a panel: ones."""
+    """Incidence (q, k) of nodes and the edges and spokes of a panel."""
     edges = np.eye(corners) + np.roll(np.eye(corners), 1, axis=1)
     if len(nodes) == corners:
         return edges
@@ -234,7 +234,7 @@ def _entries(rows: NDArray, columns: NDArray, matrix: NDArray) -> NDArray:
 
 
 def _matrix(entries: list[NDArray], rows: int, columns: int) -> sparse.csr_array:
-    """Sum of matrices given by their entries."""
+    """Sum of matrices given by entries."""
     value, row, column = np.concatenate([np.zeros((3, 0)), *entries], axis=1)
     places = (row.astype(np.int64), column.astype(np.int64))
     return sparse.csr_array(sparse.coo_array((value, places), shape=(rows, columns)))

@@ -1,9 +1,9 @@
-"""Panels, edges and vertices of a cell as those of all cells, and patches of them.
+"""Panels, edges and vertices of a cell, valid for all cells, and patches of them.
 
 A vertex of the repeated sheet is one of a kind in a cell: (R, kind). Vertices are ordered by cell
-first, then by kind, and so are panels. Two of them so stand in the same order in all cells, and
-with them whatever a discretization decides by the order of numbers: directions of hinges, signs of
-rotations, ties.
+first, then by kind, and so are panels. Any two of them are therefore in the same order in all
+cells, and so is every choice of a discretization that depends on the order of numbers: directions
+of hinges, signs of rotations, ties.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from foldyn.linear.unit_cell import UnitCell
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import around, edge_lookup, edge_of
 
-RINGS = 2  # of panels about those at the nodes of the cell
-FLAT = 1e-6  # rad from pi: a crease between cells that has no letter by its dihedral
+RINGS = 2  # of panels around the ones at the nodes of the cell
+FLAT = 1e-6  # rad from pi: below it, a crease between cells gets no letter from its dihedral
 
 Step = tuple[int, ...]  # R
 Vertex = tuple[Step, int]  # cell and kind
 Panel = tuple[Step, int]  # cell and number
-Site = tuple[Step, tuple[Any, ...]]  # cell, and what stands for all copies of a node or hidden dof
+Site = tuple[Step, tuple[Any, ...]]  # cell, and representative of a node or hidden dof
 Kind = tuple[int, int, Step]  # of an edge: kinds of its vertices, R from the first to the second
 
 
@@ -59,7 +59,7 @@ def kinds_of(pairs: NDArray, vertices: Sequence[Vertex]) -> list[Kind]:
 
 
 class Lattice:
-    """A cell whose panels, edges and vertices are those of all cells.
+    """A cell with panels, edges and vertices named so that they are valid for all cells.
 
     Parameters
     ----------
@@ -68,13 +68,13 @@ class Lattice:
     Attributes
     ----------
     vertices : list of Vertex
-        The cell's own.
+        Vertices of the cell itself.
     faces : list of list of Vertex
-        Corners of each panel, moved to where the first of them is in cell 0.
+        Corners of each panel, moved so that the lowest one is in cell 0.
     steps : list of Step
-        From where the panel of the pattern itself stands in that numbering.
+        Cell of each panel of the pattern in this numbering.
     beside : dict
-        Panels at each kind of edge, each with the cell where the edge is if the panel is in cell 0.
+        Panels at each kind of edge, with the edge's cell if the panel is in cell 0.
 
     Raises
     ------
@@ -134,7 +134,7 @@ class Lattice:
         return list(kinds.values())
 
     def families(self) -> dict[str, set[Kind]]:
-        """Kinds of the edges of each family, of creases between cells too."""
+        """Kinds of the edges of each family, including creases between cells."""
         own = self.pattern
         found = {}
         for name, rows in own.families.items():
@@ -145,7 +145,7 @@ class Lattice:
 
     # ------------------------------------------------------------------ a patch
     def around_cell(self) -> list[Panel]:
-        """Panels about cell 0, in order: those at its nodes, and rings across their edges."""
+        """Panels around cell 0, sorted: those at its nodes, and rings across their edges."""
         found = {
             (minus(self.zero, step), f) for f, face in enumerate(self.faces) for step, _ in face
         }
@@ -154,7 +154,7 @@ class Lattice:
         return sorted(found)
 
     def _across(self, step: Step, f: int) -> Iterator[Panel]:
-        """Panels at the edges of one."""
+        """Panels at the edges of a panel."""
         for edge in self._edges(f):
             for other, at in self.beside[edge.kind]:
                 yield minus(plus(step, edge.step), at), other
@@ -164,9 +164,9 @@ class Lattice:
         return {(plus(step, at), kind) for step, f in panels for at, kind in self.faces[f]}
 
     def patch_pattern(self, panels: Sequence[Panel], vertices: Sequence[Vertex]) -> Pattern:
-        """Panels as a pattern, with the letters, families and welds of the cell's.
+        """Panels as a pattern, with the letters, families and welds of the cell.
 
-        Creases between cells have the letter of their dihedral, "U" where it is flat.
+        Creases between cells get the letter of their dihedral, "U" if flat.
         """
         own, cell = self.pattern, self.cell
         number = {vertex: k for k, vertex in enumerate(vertices)}
@@ -184,7 +184,7 @@ class Lattice:
         shared, times = np.unique(np.array(sides), axis=0, return_counts=True)
         shared = shared[times == 2]
         welds = [kind in welded for kind in kinds_of(shared, vertices)]
-        with warnings.catch_warnings():  # it is doubted by the cell's own pattern
+        with warnings.catch_warnings():  # the cell's own pattern has warned already
             warnings.simplefilter("ignore", FoldynWarning)
             bare = Pattern(points, faces, name=own.name, welds=shared[welds])
             if any(bare.flipped):

@@ -1,10 +1,10 @@
 """A case linearized about a state: M q'' + C q' + K q = f on its free dofs.
 
-C is a sparse matrix, and the rows of modal damping.
+C is a sparse matrix plus the rows of modal damping.
 
-Superlinear hinges may take the slope that is equivalent to an oscillation of finite amplitude.
-A hinge that swings about its angle in the state, d = d0 + A cos(phi) from its rest angle, has the
-moment M(d) = k sgn(d) |d|^p with p = 4/3. The harmonic in phase with the motion is that of a linear
+Superlinear hinges may take the slope equivalent to an oscillation of finite amplitude. A hinge that
+swings about its angle in the state, d = d0 + A cos(phi) from its rest angle, has the moment
+M(d) = k sgn(d) |d|^p with p = 4/3. Its harmonic in phase with the motion equals that of a linear
 hinge with the slope
 
     k_eq = (1 / (pi A)) int_0^2pi M(d0 + A cos phi) cos phi dphi = k A^(1/3) g(|d0| / A)
@@ -15,8 +15,8 @@ Mechanics, 1947). The integral is a Gauss hypergeometric function of a = |d0| / 
     a <= 1:  g = 2/sqrt(pi) Gamma(p/2 + 1) / Gamma(p/2 + 3/2) F((1-p)/2, -(1+p)/2; 1/2; a^2)
     a >= 1:  g = p a^(p-1) F((1-p)/2, (2-p)/2; 2; 1/a^2)
 
-About rest k_eq = 0.941 k A^(1/3), where the chord to the largest moment has k A^(1/3); far from
-rest it is the slope there.
+About rest k_eq = 0.941 k A^(1/3), while the chord to the largest moment has k A^(1/3); far from
+rest k_eq is the local slope.
 """
 
 from __future__ import annotations
@@ -69,48 +69,48 @@ class Linearized:
     displacement : (n, 3)
         The state, m.
     free : (nf,)
-        Numbers of the free dofs, increasing: 3 node + axis, from 3 n on those without mass
-        that a shell has beside the displacements of its nodes, and internal amplitudes. Where
-        constraints tie others to them, `expanded` gives the motion of all.
+        Numbers of the free dofs, increasing: 3 node + axis, then, from 3 n, massless dofs that a
+        shell has in addition to nodal displacements, and internal amplitudes. If constraints tie
+        others to them, `expanded` gives the motion of all.
     stiffness, mass, damping : (nf, nf)
-        Sparse and symmetric: tangent (N/m), mass (kg) and damping but for that of modes (N s/m):
-        alpha M + beta K0, dashpots and creases in the state. The tangent has the symmetric part of
-        what loads add that depend on the displacement. K0 is the exact tangent of the structure at
-        rest, or in this state where the damping says so.
+        Sparse and symmetric: tangent (N/m), mass (kg) and damping without modal damping (N s/m):
+        alpha M + beta K0, dashpots and creases in the state. The tangent includes the symmetric
+        part of the load stiffness. K0 is the exact tangent of the structure at rest, or in this
+        state if the damping says so.
     modal : (r, nf)
         Rows G of modal damping, which adds G' G.
     drag : (nf, 3)
-        Forces on the free dofs per unit velocity of the whole along x, y, z, but for alpha M: those
-        of dashpots to the ground, N s/m.
+        Forces on the free dofs per unit velocity of the whole along x, y, z, without alpha M: from
+        dashpots to the ground, N s/m.
     ground : (nf, 3)
-        Forces on the free dofs per unit displacement of the whole along x, y, z: those of springs
-        to the ground and of planes that touch, N/m.
+        Forces on the free dofs per unit displacement of the whole along x, y, z: from springs to
+        the ground and planes in contact, N/m.
     inertia : (nf, 3)
-        Forces on the free dofs per unit acceleration of the whole along x, y, z, but for those of
+        Forces on the free dofs per unit acceleration of the whole along x, y, z, without the
         fluid, kg.
     added : (nf, nf) or None
-        What of the mass is that of fluid around the sheet, kg. Where it couples too many dofs for
-        a matrix, it and the mass are `Squared`.
+        Mass of the fluid around the sheet, included in `mass`, kg. If it couples too many dofs for
+        a matrix, both are `Squared`.
     pushed : (nf, 3)
-        Forces of that fluid per unit acceleration of the whole along x, y, z, kg.
+        Forces of this fluid per unit acceleration of the whole along x, y, z, kg.
     soft : int
-        Hinges of the superlinear law that stand at their rest angle, where their slope vanishes;
-        they count without stiffness. 0 with `secant`.
+        Number of superlinear hinges at their rest angle, where their slope vanishes; they count
+        without stiffness. 0 with `secant`.
     secant : float or None
-        Amplitude (degrees) for which superlinear hinges have their equivalent slope.
+        Amplitude (degrees) at which superlinear hinges take their equivalent slope.
     residual : float
-        How far the state is from an equilibrium, as a fraction of the forces at play.
+        Residual of the state, as a fraction of the forces at play.
     unbalanced : float
-        The same in N.
+        Residual of the state, N.
     internal : int
-        Internal amplitudes of each panel.
+        Number of internal amplitudes of each panel.
     inner : Amplitudes
-        All of them.
+        All internal amplitudes.
     branches : Branches or None
-        Those of laws with memory, whose stiffness depends on the frequency; `stiffness` is without.
+        Branches of laws with memory, which `stiffness` excludes: theirs depends on the frequency.
     responding : Branches or None
-        The same with what damped creases between panels that give way are beyond `damping`: what
-        responses at given frequencies take.
+        `branches`, plus the part of damped creases between compliant panels that `damping` lacks:
+        used by responses at given frequencies.
     """
 
     case: Case
@@ -136,7 +136,7 @@ class Linearized:
 
     @cached_property
     def gram(self) -> Gram:
-        """What modal damping adds to `damping`, G'G."""
+        """Modal damping G'G, in addition to `damping`."""
         return Gram(self.modal)
 
     def expanded(self, motions: NDArray) -> NDArray:
@@ -158,7 +158,7 @@ class Linearized:
         return self.case.constraints.displacement(full)
 
     def projected(self, force: NDArray) -> NDArray:
-        """Forces (nf,) on the free dofs, N, of forces (3n,) on all nodes."""
+        """Forces (nf,), N, on the free dofs, from forces (3n,) on all nodes."""
         on_nodes = self.free < force.size
         out = np.zeros(len(self.free))
         out[on_nodes] = self.case.constraints.force(force)[self.free[on_nodes]]
@@ -178,19 +178,18 @@ def linearize(
     Parameters
     ----------
     case : Case
-        Its loads and imposed displacements are preloads, in full; histories play no part.
+        Its loads and imposed displacements are preloads, in full; histories are ignored.
     state : State or "equilibrium", optional
-        Where: a state, as `fd.initial_state(path)`; the equilibrium under the loads, found by
-        statics; without it the rest state, in which no load acts.
+        State to linearize about: a state, as `fd.initial_state(path)`; the equilibrium under the
+        loads, found by statics; by default the rest state, in which no load acts.
     secant : float, optional
-        Amplitude (degrees) of the turns of the hinges: superlinear hinges get the slope that is
-        equivalent to an oscillation of that amplitude (see `equivalent_slope`), all others keep
-        their tangent.
+        Amplitude (degrees) of the turns of the hinges: superlinear hinges get the slope equivalent
+        to an oscillation of this amplitude (see `equivalent_slope`), all others keep their tangent.
     load_factor : float
-        How far actuated folds are folded in a given state, and the factor there of loads that
-        depend on the displacement.
+        Load factor of actuated folds in a given state, and of loads there that depend on the
+        displacement.
     internal : int
-        How many internal amplitudes each panel has beside its nodes (scheme n5b8e; see `modes`).
+        Number of internal amplitudes of each panel (scheme n5b8e; see `modes`).
 
     Raises
     ------
@@ -203,8 +202,8 @@ def linearize(
     Warns
     -----
     FoldynWarning
-        The state is no equilibrium; loads do not act at rest; hinges have no slope; the stiffness
-        of the loads is not symmetric.
+        The state is not an equilibrium; loads do not act at rest; hinges have no slope; the load
+        stiffness is not symmetric.
     """
     if case.contact is not None and case.contact.rubs:
         raise InputError(
@@ -246,7 +245,7 @@ def linearize(
     added = _added(case, point.displacement, body, inner)
     mass = _moved(mass, added)
     modal = _modal_rows(case, point.displacement, stiffness, mass, internal)
-    if contact is not None:  # it damps nothing
+    if contact is not None:  # contact has no damping
         stiffness = sparse.csr_array(stiffness + inner.behind(contact.tangent(point.dofs)))
     whole = np.zeros((len(inner.dofs) + body.size, 3))
     whole[: point.displacement.size] = np.tile(np.eye(3), (len(point.displacement), 1))
@@ -275,7 +274,7 @@ def linearize(
 
 
 def _symmetric(loads: sparse.csr_array, free: NDArray) -> sparse.csr_array:
-    """Symmetric part of the stiffness (m, m) of loads; warns where there is more to it."""
+    """Symmetric part of the load stiffness (m, m); warns if the antisymmetric part is large."""
     share = asymmetry(sparse.csr_array(loads[free][:, free]))
     if share > ASYMMETRIC:
         warn(
@@ -289,9 +288,9 @@ def _symmetric(loads: sparse.csr_array, free: NDArray) -> sparse.csr_array:
 def slope_change(
     case: Case, body: Assembly, q: NDArray, amplitude: float | None
 ) -> tuple[sparse.csr_array | None, int]:
-    """What to add to the tangent (m, m) for other slopes, and how many hinges are soft.
+    """Correction of the tangent (m, m) for other slopes, and the number of soft hinges.
 
-    Hinges that constraints keep from turning are left alone.
+    Hinges that constraints keep from turning are left unchanged.
     """
     if amplitude is None:
         return soft_slopes(case, body, q)
@@ -302,10 +301,10 @@ def slope_change(
 
 
 def _ground(body: Assembly, q: NDArray, whole: NDArray) -> NDArray:
-    """Forces (m, 3) of what stands on the ground per unit displacement of the whole (m, 3)."""
+    """Forces (m, 3) of parts on the ground, per unit displacement of the whole (m, 3)."""
     out = np.zeros_like(whole)
     for term in body.others:
-        if not term.of_hinges:  # which strain nothing when the whole moves
+        if not term.of_hinges:  # hinges strain nothing when the whole moves
             own, moved = term.tangent(q), whole[: body.size]
             held = own @ moved
             held[np.abs(held) <= ROUNDING * (abs(own) @ np.abs(moved))] = 0.0
@@ -314,7 +313,7 @@ def _ground(body: Assembly, q: NDArray, whole: NDArray) -> NDArray:
 
 
 def _added(case: Case, displacement: NDArray, body: Assembly, inner: Amplitudes) -> Mass | None:
-    """Mass of the fluid (m, m) at a displacement (n, 3), kg: where it would be full, by rows."""
+    """Mass of the fluid (m, m) at a displacement (n, 3), kg; as rows if it would be full."""
     found = operator_at(case, displacement)
     if found is None:
         return None
@@ -336,7 +335,7 @@ def _added(case: Case, displacement: NDArray, body: Assembly, inner: Amplitudes)
 
 
 def _moved(mass: sparse.csr_array, added: Mass | None) -> Mass:
-    """Mass (m, m) with that of the fluid."""
+    """Mass (m, m) including the fluid."""
     if added is None:
         return mass
     if isinstance(added, Squared):
@@ -345,7 +344,7 @@ def _moved(mass: sparse.csr_array, added: Mass | None) -> Mass:
 
 
 def _tied(matrix: Mass, ties: Constraints, free: NDArray) -> sparse.csc_array | Squared:
-    """A mass (m, m) on the free dofs, as constraints leave it."""
+    """A mass (m, m) reduced to the free dofs by constraints."""
     if isinstance(matrix, Squared):
         block = _block(ties.matrix(sparse.csr_array(matrix.matrix)), free)
         return Squared(block, ties.force(matrix.rows.T)[free].T)
@@ -364,7 +363,7 @@ def _inertia(case: Case, whole: NDArray, inner: Amplitudes) -> NDArray:
 def _modal_rows(
     case: Case, state: NDArray, stiffness: sparse.csr_array, mass: sparse.csr_array, internal: int
 ) -> NDArray:
-    """Rows (r, m) of the modal damping: of the modes in the state (n, 3), or of those at rest."""
+    """Rows (r, m) of modal damping: from the modes in the state (n, 3), or at rest."""
     damping = case.modal_damping
     if damping is not None and damping.state == "start":
         modal = rows_of(damping, case, stiffness, mass, state)
@@ -381,7 +380,7 @@ def _modal_rows(
 
 
 def _reference(case: Case, exact: sparse.csr_array, internal: int) -> sparse.csr_array:
-    """K0 of the damping (m, m), N/m: the exact tangent in the state, or that at rest."""
+    """K0 of the damping (m, m), N/m: the exact tangent in the state, or at rest."""
     if case.rayleigh.state != "rest" or case.rayleigh.beta == 0.0:
         return exact
     body = case.elastic_body

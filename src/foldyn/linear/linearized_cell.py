@@ -1,8 +1,8 @@
-"""A cell of a repeated sheet linearized about a state that repeats.
+"""A cell of a repeated sheet, linearized about a state that repeats.
 
-The periods may change with the state: translations become others, screws get another angle and
-shift. Displacements of all cells follow from those of one and from the motions of the deformed
-sheet; dofs without mass are in balance as they are in the repeated sheet.
+The periods may change with the state: translations into others, screws to another angle and shift.
+Displacements of all cells follow from one cell and from the motions of the deformed sheet; massless
+dofs are in balance as in the repeated sheet.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from foldyn.patterns.screw import Screw, motion_between
 from foldyn.statics.tracing import displacement_of
 from foldyn.values import number, of_kind
 
-BALANCED = 1e-6  # of the forces at play: the largest residual of a state taken for an equilibrium
-ROUNDING = 1e-12  # of the bars' EA: forces that count as none
-SAME = 1e-12  # of the pattern's size: changes of a motion that rounding makes
-SLACK = 10.0  # times the tolerance: how far partners may be from each other's copies in a state
+BALANCED = 1e-6  # of the forces at play: largest residual that counts as equilibrium
+ROUNDING = 1e-12  # of the bars' EA: forces that count as zero
+SAME = 1e-12  # of the pattern's size: round-off changes of a motion
+SLACK = 10.0  # factor on the tolerance: largest distance of partners from their copies in a state
 PLACES = "None (the rest state), or a State, as fd.initial_state(path)"
 
 
@@ -47,7 +47,7 @@ class LinearizedCell:
     cell : UnitCell
     patch : Patch
     motions : tuple of Screw
-        From a cell to the next in the state.
+        Motions from a cell to the next in the state.
     bloch : Bloch
         Matrices of the dofs (3 node + axis, then hidden ones) of cell 0.
     displacement : (n, 3)
@@ -75,7 +75,7 @@ class LinearizedCell:
 
     @property
     def variables(self) -> dict[str, Any]:
-        """What results tell of the state."""
+        """Variables of results that describe the state."""
         angles, axes, points = (
             np.array([getattr(motion, name) for motion in self.motions])
             for name in ("angle", "unit", "point")
@@ -89,7 +89,7 @@ class LinearizedCell:
         }
 
     def expanded(self, shapes: NDArray, phase: NDArray) -> NDArray[np.complex128]:
-        """Shapes (k, n, 3) at the nodes of the cell's own structure from those (m, k) of dofs."""
+        """Shapes (k, n, 3) at the nodes of the cell's structure, from shapes (m, k) of the dofs."""
         count, patch = shapes.shape[1], self.patch
         own = shapes[: 3 * self.nodes].T.reshape(count, self.nodes, 3)
         out = np.empty((count, len(patch.own_unit), 3), complex)
@@ -110,8 +110,8 @@ def linearize_cell(
     ----------
     cell : UnitCell
     state : State, optional
-        Of the cell's own structure: the same displacements in all cells, but for the motions that
-        bring a cell to the next; by default the rest state.
+        State of the cell's own structure, the same in all cells up to the motions from a cell to
+        the next; by default the rest state.
     secant, load_factor : float
         As in `linearize`.
 
@@ -123,7 +123,7 @@ def linearize_cell(
     Warns
     -----
     FoldynWarning
-        The state is no equilibrium; hinges have no slope.
+        The state is not an equilibrium; hinges have no slope.
     """
     of_kind("cell", cell, UnitCell)
     load_factor = number("load_factor", load_factor)
@@ -187,7 +187,7 @@ def _warn(message: str) -> None:
 
 
 def _reference(patch: Patch, tangent: sparse.csr_array) -> sparse.csr_array:
-    """K0 of the damping: the tangent in the state, or that at rest."""
+    """K0 of the damping: the tangent in the state, or at rest."""
     rayleigh, body = patch.case.rayleigh, patch.case.elastic_body
     if rayleigh.state != "rest" or rayleigh.beta == 0.0:
         return tangent
@@ -217,7 +217,7 @@ def deformed_motions(cell: UnitCell, patch: Patch, displacement: NDArray) -> tup
         moved, off = motion, np.linalg.norm(change, axis=1)
         if off.max() > SAME * pattern.size:
             other, left = motion_between(place[one], place[two], SAME * pattern.size)
-            # a turn that comes or goes with a small change is noise, or pairs on a line hide it
+            # a turn that comes or goes with a small change is noise, or hidden by pairs on a line
             if off.max() > near or other.turns == motion.turns:
                 moved, off = other, left
         if off.max() > near:
@@ -237,12 +237,12 @@ def deformed_motions(cell: UnitCell, patch: Patch, displacement: NDArray) -> tup
 def tiled(
     cell: UnitCell, patch: Patch, motions: Sequence[Screw], displacement: NDArray
 ) -> NDArray[np.float64]:
-    """Displacements (n, 3), m, of the patch from those of the cell's own structure.
+    """Displacements (n, 3), m, of the patch, from displacements of the cell's own structure.
 
     Raises
     ------
     InputError
-        Partners are not where each other's copies are.
+        Partners do not coincide with each other's copies.
     """
     place = cell.case.structure.nodes + displacement
     first = np.array(
@@ -263,7 +263,7 @@ def tiled(
 def spread(
     motions: Sequence[Screw], first: NDArray, unit: NDArray, step: NDArray
 ) -> NDArray[np.float64]:
-    """Places (n, 3) of copies R (n, d) of points (m, 3), which of them each is (n,)."""
+    """Places (n, 3) of copies R (n, d) of points (m, 3); `unit` (n,) numbers the point of each."""
     out = np.empty((len(unit), 3))
     for each in np.unique(step, axis=0):
         rows = (step == each).all(axis=1)
@@ -272,7 +272,7 @@ def spread(
 
 
 def folded_body(cell: UnitCell, patch: Patch, factor: float) -> Assembly:
-    """The patch with its actuated folds folded by a factor; refuses loads that follow."""
+    """The patch with its folds actuated by a factor; refuses loads that depend on displacement."""
     if cell.case.following_terms:
         raise InputError(
             ": some depend on the displacement, as a pressure does, and their stiffness is not "

@@ -1,4 +1,4 @@
-"""Modal assurance criterion: how alike the shapes of two sets of modes are.
+"""Modal assurance criterion: similarity of the shapes of two sets of modes.
 
 MAC_ij = |a_i^H W b_j|^2 / ((a_i^H W a_i) (b_j^H W b_j)): 1 for the same shape, whatever its size
 and sign, 0 for orthogonal ones. W is the mass, or the identity (Allemang and Brown, Proc. 1st Int.
@@ -26,17 +26,17 @@ def mac(a: Any, b: Any, *, mass: Any = None, nodes: Any = None) -> NDArray[np.fl
         Modes from `foldyn.modes`, or shapes of any other origin, also complex ones (measured, or of
         a damped structure). Arrays (k, n) are shapes with one component per node.
     mass : array_like or sparse matrix, optional
-        Weights: nodal masses (n,) or the nodal mass matrix (n, n), as `Case.mass`, of the
-        nodes that are compared. With it the modes of one structure are orthogonal:
-        the matrix of a set with itself is the identity. Without it all nodes count alike.
+        Weights: nodal masses (n,) or the nodal mass matrix (n, n), as `Case.mass`, of the compared
+        nodes. With it the modes of one structure are orthogonal: the matrix of a set with itself is
+        the identity. Without it all nodes count equally.
     nodes : array_like of int, or a pair of them, optional
-        Which nodes are compared: numbers that mean the same node in both sets, or (numbers in a,
-        numbers in b) of models that share some nodes only. All unless given.
+        Nodes to compare: numbers that mean the same node in both sets, or (numbers in a, numbers in
+        b) for models that share only some nodes. All by default.
 
     Returns
     -------
     ndarray, shape (ka, kb)
-        Numbers from 0 to 1; nan where a shape does not move the nodes that are compared.
+        Numbers from 0 to 1; nan if a shape does not move the compared nodes.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def mac(a: Any, b: Any, *, mass: Any = None, nodes: Any = None) -> NDArray[np.fl
 
 
 class Pairs(NamedTuple):
-    """Modes of two sets that belong together, numbered from 0 as the rows of the sets."""
+    """Paired modes of two sets, numbered from 0 as the rows of the sets."""
 
     first: NDArray[np.int64]  # (k,) increasing
     second: NDArray[np.int64]  # (k,) their partners
@@ -65,8 +65,8 @@ class Pairs(NamedTuple):
 def pair_modes(values: ArrayLike, least: float = 0.0) -> Pairs:
     """Pair the modes of two sets so that the sum of their MAC is greatest.
 
-    Each mode has one partner at most. A pair of equal frequencies, whose shapes may turn into each
-    other, is better compared as a pair than mode by mode.
+    Each mode has at most one partner. Two modes of equal frequency, whose shapes may mix, are
+    better compared as a pair than mode by mode.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def _shapes(name: str, given: Any) -> NDArray:
 
 
 def _chosen(first: NDArray, second: NDArray, nodes: Any) -> tuple[NDArray, NDArray]:
-    """The shapes at the nodes that are compared."""
+    """The shapes at the compared nodes."""
     if nodes is not None:
         pair = nodes if isinstance(nodes, tuple) and len(nodes) == 2 else (nodes, nodes)
         first, second = (_at(s, n) for s, n in zip((first, second), pair, strict=True))

@@ -1,4 +1,4 @@
-"""Modes of a model beside those of a shell."""
+"""Modes of a model, paired with the modes of a shell."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from foldyn.linear.pairing import pairs
 from foldyn.linear.reference import elastic
 from foldyn.linear.shell_of import with_structure
 
-LEAST = 0.5  # MAC of a partner
-SPARE = 10  # modes of a model, beyond those that are compared, among which partners are sought
+LEAST = 0.5  # least MAC of a partner
+SPARE = 10  # extra modes of a model among which partners are sought
 
 
 class Shown(Protocol):
@@ -27,21 +27,21 @@ class Shown(Protocol):
         ...
 
     def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
-        """Which of points (m, 3) have shapes (j,), and these (k, j, 3)."""
+        """Which points (m, 3) have shapes (j,), and the shapes (k, j, 3)."""
         ...
 
 
 class Matched(NamedTuple):
-    """What a model has in place of each mode of a shell.
+    """The counterpart in a model of each mode of a shell.
 
     Attributes
     ----------
     frequency : (k,)
-        Of the partner, Hz; nan where no mode has a MAC of 0.5 or more: the mode is lost.
+        Frequency of the partner, Hz; nan if the mode is lost, i.e. no MAC is 0.5 or more.
     error : (k,)
-        Its relative error; nan likewise.
+        Relative error of this frequency; nan likewise.
     mac : (k,)
-        Of the partner, or of what is nearest to one.
+        MAC of the partner, or of the best candidate.
     """
 
     frequency: NDArray
@@ -57,10 +57,10 @@ def matched(true: Shown, count: int, case: Case, found: xarray.Dataset) -> Match
     true : Shown
         Such as a `Reference`.
     count : int
-        How many modes of the shell.
+        Number of modes of the shell.
     case, found : Case, xarray.Dataset
-        The model and its modes, `SPARE` more of them. Shapes are compared at its nodes, with
-        internal amplitudes also between them, as far as these are nodes of the shell's mesh.
+        The model, and its modes, `SPARE` more than `count`. Shapes are compared at its nodes, and
+        with internal amplitudes also between them, if these are nodes of the shell's mesh.
     """
     points, weights = _points(case, found)
     seen, shape = true.at(points)
@@ -79,8 +79,8 @@ def matched(true: Shown, count: int, case: Case, found: xarray.Dataset) -> Match
 def _points(case: Case, found: xarray.Dataset) -> tuple[NDArray, NDArray]:
     """Points (p, 3) where modes are compared, and their weights (p,) in the MAC.
 
-    The nodes, with weights that are the same for all mass rules; with internal amplitudes also
-    points between them, which weigh together as much.
+    The nodes, with weights equal for all mass rules; with internal amplitudes also points between
+    them, with the same total weight.
     """
     structure = case.structure
     even = replace(structure, options=replace(structure.options, mass="mixed_voronoi"))

@@ -1,4 +1,4 @@
-"""Warnings of frequencies at which a model lacks what its panels do by themselves."""
+"""Warnings about frequencies at which a model lacks the vibrations of single panels."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ def warn_beyond(
     name: str = "",
     internal: int | None = None,
 ) -> None:
-    """Warn of frequencies (k,), Hz, above the range of the model.
+    """Warn about frequencies (k,), Hz, above the range of the model.
 
     Parameters
     ----------
     structure : Discretized
     frequency : (k,)
-        Of modes, of responses, or the highest of each band; nan is not told.
+        Frequencies of modes, of responses, or the highest of each band; nan is ignored.
     name : str
-        What they are numbered as, "mode" or "band"; nothing where they are themselves the input.
+        Name of the numbered items, "mode" or "band"; empty if the frequencies are the input.
     internal : int or None
-        Internal amplitudes of each panel; None where the analysis takes none.
+        Internal amplitudes of each panel; None if the analysis has none.
     """
     limit, share = range_of(structure, internal or 0)
     above = np.flatnonzero(frequency > limit)

@@ -1,9 +1,9 @@
 """`modes`: natural frequencies and shapes of a case about a state.
 
-What a mode means for motions of the base: with shapes of the modal mass 1, the participation
-factor along an axis is phi' M r, r the unit translation of the free dofs along it, and its square
-the effective mass. Over all modes effective masses add up to r' M r, the mass that is free to move
-along the axis.
+Participation in base motions: with shapes of unit modal mass, the participation factor along an
+axis is phi' M r, r the unit translation of the free dofs along it, and its square is the effective
+mass. Over all modes the effective masses add up to r' M r, the mass that is free to move along the
+axis.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from foldyn.values import of_kind, whole
 if TYPE_CHECKING:
     import xarray
 
-COPIES = 4  # of the shapes, while they are found and stored
-RIGID = 1.0 - 1e-6  # share of a shape in the space of rigid motions from which it is one
-ROUNDING = 1e3 * EPS  # of |K| |r|: what counts as no force on a rigid motion
+COPIES = 4  # of the shapes in memory, while they are found and stored
+RIGID = 1.0 - 1e-6  # share in the space of rigid motions above which a shape counts as rigid
+ROUNDING = 1e3 * EPS  # of |K| |r|: force on a rigid motion that counts as zero
 TURN = 2.0 * np.pi
-TWINS = 1e-8  # relative difference of eigenvalues that are one
-INDEPENDENT = 1e-6  # of a motion's size that must be left of it after those before are taken out
+TWINS = 1e-8  # relative difference below which eigenvalues count as one
+INDEPENDENT = 1e-6  # of a motion's size: least remainder after orthogonalization
 
 
 def modes(
@@ -65,40 +65,38 @@ def modes(
     count : int
         How many modes, the lowest ones, rigid and unstable ones included.
     state : State or "equilibrium", optional
-        About which: a state, as `fd.initial_state(path)`; the equilibrium under the loads in full;
-        without it the rest state, in which no load acts.
+        State to linearize about: a state, as `fd.initial_state(path)`; the equilibrium under the
+        loads in full; by default the rest state, in which no load acts.
     secant : float, optional
-        Amplitude (degrees) by which hinges turn: those of the superlinear law, without slope at
-        rest, then have the slope equivalent to an oscillation of that amplitude.
+        Amplitude (degrees) by which hinges turn: superlinear ones, without slope at rest, then get
+        the slope equivalent to an oscillation of this amplitude.
     load_factor : float
-        How far actuated folds are folded in a given state.
+        Load factor of actuated folds in a given state.
     internal : int
-        How many internal amplitudes (Craig and Bampton) each panel has beside its nodes, 0 to 6:
-        what its plate does between corners, center and creased edges. One comes with each edge
-        without a crease, and three with each of the others, by which creases turn unevenly along
-        their length. With the scheme "n5b8e" and the mass "condensed" alone; see
-        `foldyn.linear.internal_modes`.
+        Number of internal amplitudes (Craig and Bampton) of each panel, 0 to 6, for the motion of
+        its plate between corners, center and creased edges. Each edge without a crease adds one
+        more, and each of the other edges three, by which creases turn unevenly along their length.
+        Only for the scheme "n5b8e" and the mass "condensed"; see `foldyn.linear.internal_modes`.
     verify : bool
-        Whether to prove by one more factorization that no mode was missed. It costs about as much
-        as the first one; few dofs are solved in full and need no proof.
+        Whether to verify by one more factorization that no mode was missed. It costs about as much
+        as the first one; small problems are solved in full and need none.
     solver : {"auto", "superlu", "pardiso"}
-        Backend of the sparse factorization, as of the settings of `trace`.
+        Backend of the sparse factorization, as in the settings of `trace`.
 
     Returns
     -------
     xarray.Dataset
-        Dimensions mode, node, axis; `mode` counts from 1. `frequency` (Hz; 0 of rigid modes, nan
-        of unstable ones), `eigenvalue` (rad2/s2; negative: unstable; 0: zero to rounding), `shape`
-        (phi' M phi = 1 kg m2, the entry of largest size positive), `rigid`, `rigid_share` (of the
-        shape in the space of rigid motions), `damping_ratio` (phi' C phi / (2 omega), nan where
-        the frequency is 0 or nan), `participation`, `effective_mass`, and `displacement` of the
-        state; in air also `air_share`, the fluid's share of the modal mass, which `free_mass`,
+        Dimensions mode, node, axis; `mode` counts from 1. `frequency` (Hz; 0 for rigid modes, nan
+        for unstable ones), `eigenvalue` (rad2/s2; negative: unstable; 0: zero to round-off),
+        `shape` (phi' M phi = 1 kg m2, the largest entry positive), `rigid`, `rigid_share` (of the
+        shape in the space of rigid motions), `damping_ratio` (phi' C phi / (2 omega), nan if the
+        frequency is 0 or nan), `participation`, `effective_mass`, and `displacement` of the state;
+        in air also `air_share`, the fluid's share of the modal mass, which `free_mass`,
         `participation` and `effective_mass` include; with internal amplitudes also
         `internal_share`, their share of the strain energy, which shapes at nodes do not show.
-        Attributes: `free_mass` (kg along x, y, z), `complete`
-        (how many of the lowest modes are proven to be all there are), `soft_hinges`, `residual` of
-        the state, `rounding` (a
-        bound on that of the eigenvalues, as a fraction) and facts about the computation.
+        Attributes: `free_mass` (kg along x, y, z), `complete` (number of lowest modes verified to
+        be complete), `soft_hinges`, `residual` of the state, `rounding` (bound on the relative
+        rounding error of the eigenvalues) and facts about the computation.
 
     Raises
     ------
@@ -110,7 +108,7 @@ def modes(
     Warns
     -----
     FoldynWarning
-        The state is no equilibrium, or an unstable one; loads do not act at rest; hinges have no
+        The state is not an equilibrium, or is unstable; loads do not act at rest; hinges have no
         slope; a mode was missed.
     StretchWarning
         Panels that stretch hold much of the strain energy of a mode.
@@ -125,7 +123,7 @@ def modes(
 
 
 class Found(NamedTuple):
-    """Modes as `modes` returns them, and what they were made of."""
+    """Modes as `modes` returns them, with the system and spectrum behind them."""
 
     linear: Linearized
     spectrum: Spectrum  # shapes in their own order and signs
@@ -143,7 +141,7 @@ def spectrum_of(
     verify: bool = True,
     solver: str = "auto",
 ) -> Found:
-    """See `modes`."""
+    """Modes as from `modes`, with the linearized system and its spectrum; arguments as there."""
     of_kind("case", case, Case)
     count = whole("count", count, least=1)
     check_memory(
@@ -213,7 +211,7 @@ def _variables(
 def _remembered(
     linear: Linearized, branches: Branches, values: NDArray, shapes: NDArray
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Eigenvalues |s|^2, shapes in phase, and damping ratios of modes with laws that remember."""
+    """Eigenvalues |s|^2, in-phase shapes and damping ratios of modes with memory laws."""
     values, shapes, ratio = values.copy(), shapes.copy(), np.zeros(len(values))
     for k in np.flatnonzero(values > 0.0):
         s, x = damped_mode(linear.stiffness, linear.mass, branches, values[k], shapes[:, k])
@@ -226,7 +224,7 @@ def _remembered(
 
 
 def _warn_of_twins(linear: Linearized, values: NDArray, shapes: NDArray) -> None:
-    """Warn of modes that have become one, in whose place another is missing."""
+    """Warn if two modes have merged, so that another one is missing."""
     for k in range(1, len(values)):
         near = abs(values[k] - values[k - 1]) <= TWINS * abs(values[k])
         if near and abs(shapes[:, k] @ (linear.mass @ shapes[:, k - 1])) > RIGID:
@@ -238,7 +236,7 @@ def _warn_of_twins(linear: Linearized, values: NDArray, shapes: NDArray) -> None
 
 
 def _internal(linear: Linearized, values: NDArray, shapes: NDArray) -> dict[str, Any]:
-    """What shapes (nf, k) do between the nodes of panels with internal amplitudes."""
+    """Shapes (nf, k) between nodes, and energy shares, of panels with internal amplitudes."""
     strain = np.einsum("ik,ik->k", shapes, linear.stiffness @ shapes)
     whole, points = linear.whole(shapes), linear.inner.points
     part = np.einsum("ik,ik->k", whole, linear.inner.stiffness @ whole)
@@ -259,7 +257,7 @@ def _air(linear: Linearized, shapes: NDArray) -> dict[str, Any]:
 def unit_translations(linear: Linearized) -> NDArray:
     """Unit translations (nf, 3) of the free dofs along x, y, z.
 
-    Where constraints allow none, the motions that are nearest to them, weighted by mass.
+    If constraints allow none, the closest allowed motions, weighted by mass.
     """
     on_nodes = linear.free < linear.displacement.size
     if not linear.case.constraints:
@@ -276,14 +274,14 @@ def unit_translations(linear: Linearized) -> NDArray:
 
 
 def nodes_translated(case: Case) -> NDArray:
-    """Unit translations (3n, 3) of all that is not fixed, whatever constraints allow."""
+    """Unit translations (3n, 3) of all dofs that are not fixed, regardless of constraints."""
     moves = ~case.fixed.ravel()
     unit = moves[:, None] & (np.arange(len(moves))[:, None] % 3 == np.arange(3))
     return unit.astype(float)
 
 
 def _rounding(pencil: Pencil, spectrum: Spectrum) -> float:
-    """Largest bound on the rounding of the eigenvalues that are not zero, as a fraction of each."""
+    """Largest relative bound on the rounding error of the nonzero eigenvalues."""
     finite = spectrum.values != 0.0
     noise = pencil.noise(spectrum.shapes[:, finite])
     return float((noise / np.abs(spectrum.values[finite])).max(initial=0.0))
@@ -328,7 +326,7 @@ def _warn_of_stretch(linear: Linearized, spectrum: Spectrum) -> None:
 def rigid_space(linear: Linearized) -> NDArray:
     """Rigid motions (nf, r) about the state that the supports allow, M-orthonormal.
 
-    Translations along x, y, z come first as far as they are among them, then rotations.
+    Allowed translations along x, y, z come first, then rotations.
     """
     x = linear.case.structure.nodes + linear.displacement
     allowed = free_rigid_motions(x, linear.case.constraints)
@@ -342,11 +340,11 @@ def rigid_space(linear: Linearized) -> NDArray:
 
 
 def _orthonormal(linear: Linearized, motions: NDArray) -> NDArray:
-    """M-orthonormal columns that span motions (nf, k), in their order, dependent ones left out."""
+    """M-orthonormal basis (nf, r) of motions (nf, k), in their order, without dependent ones."""
     kept: list[NDArray] = []
     for motion in motions.T:
         left = motion
-        for _ in range(2):  # once more for the rounding of the first time
+        for _ in range(2):  # twice, to remove the rounding error of the first pass
             for other in kept:
                 left = left - other * float(other @ (linear.mass @ left))
         size = _size(linear, left)
@@ -360,10 +358,10 @@ def _size(linear: Linearized, motion: NDArray) -> float:
 
 
 def unresisted(linear: Linearized, space: NDArray) -> NDArray:
-    """Part (nf, k) of the rigid motions (nf, r) that causes no force: modes of frequency zero.
+    """Part (nf, k) of the rigid motions (nf, r) without restoring force: modes of zero frequency.
 
-    Loads that keep their direction resist rotations, as gravity does those of a pendulum; without
-    them none is resisted in an equilibrium.
+    Loads with a fixed direction resist rotations, as gravity does for a pendulum; without such
+    loads, no rotation is resisted in an equilibrium.
     """
     if not space.shape[1]:
         return space
@@ -375,9 +373,9 @@ def unresisted(linear: Linearized, space: NDArray) -> NDArray:
 
 
 def _is_null(linear: Linearized, motions: NDArray) -> NDArray:
-    """Whether the stiffness meets each motion (nf, k) with no more than rounding (k,).
+    """Whether the stiffness force on each motion (nf, k) is round-off (k,).
 
-    In an equilibrium to within a force r a rotation by w turns that force: |w| r.
+    If the state has a residual force r, a rotation by w turns this force: |w| r.
     """
     force = np.linalg.norm(linear.stiffness @ motions, axis=0)
     rounding = ROUNDING * np.linalg.norm(abs(linear.stiffness) @ np.abs(motions), axis=0)

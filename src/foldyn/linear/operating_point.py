@@ -1,4 +1,4 @@
-"""The state about which a case is linearized: found, or given and judged."""
+"""The state about which a case is linearized: found by statics, or given and checked."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from foldyn.statics.problem import Balance, balance
 from foldyn.statics.rigid import free_rigid_motions
 from foldyn.statics.tracing import displacement_of
 
-BALANCED = 1e-6  # of the forces at play: the largest residual of a state taken for an equilibrium
+BALANCED = 1e-6  # of the forces at play: largest residual that counts as equilibrium
 PLACES = "None (the rest state), 'equilibrium' or a State, as fd.initial_state(path)"
 
 
 class OperatingPoint(NamedTuple):
-    """A state, and how far it is from an equilibrium."""
+    """A state and its residual."""
 
     displacement: NDArray  # (n, 3) m
     problem: OrigamiProblem
-    factor: float  # of actuated folds and of loads that depend on the displacement, there
-    body: Assembly  # with its folds as they are actuated
+    factor: float  # of actuated folds and of loads that depend on the displacement
+    body: Assembly  # with its folds actuated
     dofs: NDArray  # (m,) the state on all dofs of the body
     balance: Balance
     kind: str  # "rest", "equilibrium" or "state"
@@ -44,7 +44,7 @@ class OperatingPoint(NamedTuple):
         return self.problem.planes(self.problem.state(self.displacement, self.factor))
 
     def load_stiffness(self) -> sparse.csr_array | None:
-        """What loads that depend on the displacement add to the stiffness (m, m), N/m."""
+        """Load stiffness (m, m), N/m, of loads that depend on the displacement."""
         if self.kind == "rest" or not self.problem.following.acts:
             return None
         return self.problem.load_stiffness(self.dofs, self.factor)
@@ -60,12 +60,12 @@ class OperatingPoint(NamedTuple):
 def operating_point(
     case: Case, state: State | str | None, load_factor: float = 1.0
 ) -> OperatingPoint:
-    """The state that a linearization is asked for.
+    """The state requested for a linearization.
 
     Warns
     -----
     FoldynWarning
-        It is no equilibrium, or the case has steady loads, which do not act at rest.
+        The state is not an equilibrium, or the case has steady loads, which do not act at rest.
     """
     case.check_movable()
     if state is None:
@@ -87,16 +87,16 @@ def operating_point(
 
 
 def _equilibrium(case: Case) -> NDArray:
-    """Displacement (n, 3) under the loads of a case in full, near its rest state.
+    """Displacement (n, 3), m, under the full loads of a case, near its rest state.
 
-    Superlinear hinges take one more step of Newton's method: what statics leaves of the forces as
-    rounding turns one 1e-6 rad from rest by 1e-4 of that, and its slope shows it.
+    Superlinear hinges need one more Newton step: a residual at round-off leaves a hinge at 1e-6 rad
+    from rest off by 1e-4 of that turn, which its slope shows.
     """
     factors = [0.0, 1.0] if drives(case, ()) else [0.0]
     nodes, body = case.structure.nodes, case.body
     holds = body.holds(np.zeros(body.size))
     free = free_rigid_motions(nodes, case.constraints, holds).shape[1] > 0
-    with warnings.catch_warnings():  # the linearization itself warns of these
+    with warnings.catch_warnings():  # the linearization itself gives these warnings
         for told in ("the path loses stability", NO_POTENTIAL[:20]):
             warnings.filterwarnings("ignore", told, FoldynWarning)
         path = trace(case, "newton", load_factors=factors, inertia_relief=free)
@@ -111,9 +111,9 @@ def _equilibrium(case: Case) -> NDArray:
 def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> OperatingPoint:
     """A state with its residual.
 
-    Forces that keep their direction have no part in the tangent, and a state does not say by
-    which factor they act in it: each may have its own, the one that leaves the least residual.
-    Loads that depend on the displacement act by the factor of actuated folds.
+    Forces with a fixed direction do not enter the tangent, and a state does not record their
+    factors: each load gets the factor that minimizes the residual. Loads that depend on the
+    displacement act with the factor of actuated folds.
     """
     flow = AT_REST if kind == "rest" else REFUSED
     problem = OrigamiProblem(case, (), displacement, flow=flow)

@@ -1,8 +1,7 @@
-"""Which mode of one model belongs to which of another.
+"""Pairing of the modes of two models.
 
-Modes of nearly equal frequency turn into each other at the least disturbance, so a cluster of them
-is compared as a space: the mean of the squared cosines between two spaces stands in for the MAC of
-each pair in them.
+Modes of nearly equal frequency mix at the slightest disturbance, so a cluster of them is compared
+as a space: the mean squared cosine between two spaces replaces the MAC of each pair in them.
 """
 
 from __future__ import annotations
@@ -15,11 +14,11 @@ from numpy.typing import NDArray
 from foldyn.linear.mac import mac
 
 NEAR = 3e-3  # relative distance of frequencies in a cluster
-FREQUENCY_WEIGHT = 0.05  # of |log(f_b / f_a)| beside 1 - MAC: decides between like shapes
+FREQUENCY_WEIGHT = 0.05  # of |log(f_b / f_a)|, added to 1 - MAC: decides between similar shapes
 
 
 class Pair(NamedTuple):
-    """Modes that belong together: their numbers from 0 and their MAC."""
+    """Paired modes: their numbers from 0 and their MAC."""
 
     first: int
     second: int
@@ -33,7 +32,7 @@ def clusters(frequency: NDArray) -> NDArray:
 
 
 def likeness(fa: NDArray, a: NDArray, fb: NDArray, b: NDArray, mass: NDArray) -> NDArray:
-    """MAC (ka, kb) of shapes (ka, n, 3) and (kb, n, 3), of whole clusters where there are any."""
+    """MAC (ka, kb) of shapes (ka, n, 3) and (kb, n, 3), averaged over clusters."""
     values = np.nan_to_num(
         mac(a, b, mass=mass)
     )  # shapes that do not move these nodes are like none

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 PROMINENT = 0.05
 HALF_POWER = math.sqrt(2.0)
-SIDES = 1.5  # half-power widths on either side of a peak that a circle fit takes at most
+SIDES = 1.5  # most half-power widths on either side of a peak for a circle fit
 
 
 @dataclass(frozen=True)
@@ -39,20 +39,20 @@ class Peak:
     Attributes
     ----------
     frequency, height : float
-        Of the peak (Hz), refined between the frequencies, and in the unit of the response.
+        Frequency (Hz), interpolated between samples, and height in the unit of the response.
     half_power, textbook : float
         Damping ratio from the half-power points: exact for a single mode, and
         (upper - lower) / (2 peak).
     asymmetry : float
-        Of the half-power points; above 0.1 the peak is not that of a single mode.
+        Asymmetry of the half-power points; above 0.1 the peak has more than a single mode.
     natural_frequency, damping_ratio : float
         From the circle fit (Hz).
     frequency_error, damping_error : float
         Standard errors of the circle fit.
     misfit : float
-        Of the circle, as a part of its radius.
+        Misfit of the circle, as a fraction of its radius.
     note : str
-        Why something is nan.
+        Reason for nan values.
     """
 
     frequency: float
@@ -85,24 +85,24 @@ def peaks_of(
         A result of `frf`.
     node : int
     axis : {"x", "y", "z", "-x", "-y", "-z"}
-        The sign changes nothing.
+        The sign has no effect.
     quantity : {"receptance", "mobility", "accelerance"}, optional
-        The curve whose peaks and half-power points are meant; by default what the response holds.
+        Curve whose peaks and half-power points are taken; by default the one that is stored.
         A strongly damped mode peaks at the lowest frequency in the receptance, at its natural
         frequency in the mobility. The circle fit does not depend on it.
     prominence : float, optional
-        Least prominence of a peak, as a part of the curve's maximum. By default 0.05, and a lower
-        peak counts too if it falls to half its power on both sides, as a logarithmic axis shows
-        it; not in an estimate from random bursts, which scatters.
+        Least prominence of a peak, as a fraction of the curve's maximum. By default 0.05; a lower
+        peak also counts if it falls to half its power on both sides, as seen on a logarithmic axis,
+        except in an estimate from random bursts, which scatters.
     count : int, optional
-        Only the so many most prominent peaks.
+        Number of peaks, the most prominent ones.
 
     Returns
     -------
     tuple of Peak
-        Circles are fitted to all peaks together, or, where that does not succeed, to each alone.
-        Where the response was estimated with an exponential window, `half_power`,
-        `natural_frequency` and `damping_ratio` are without its damping.
+        Circles are fitted to all peaks together, or, if that fails, to each alone. For a response
+        estimated with an exponential window, `half_power`, `natural_frequency` and `damping_ratio`
+        exclude the damping of the window.
 
     Raises
     ------
@@ -142,12 +142,12 @@ def resonances(
     f: NDArray, curve: NDArray, shown: str, prominence: float | None, count: int | None,
     scatters: bool,
 ) -> Peaks:  # fmt: skip
-    """Peaks of a finite curve that figures mark and tables list; see `peaks_of`.
+    """Peaks of a finite curve, as marked in figures and listed in tables; see `peaks_of`.
 
-    shown : what it shows; a transmissibility has the peaks of a receptance.
-    scatters : whether the curve is an estimate from random records, where low peaks mean nothing.
+    shown : quantity of the curve; a transmissibility has the peaks of a receptance.
+    scatters : whether the curve is an estimate from random records, with meaningless low peaks.
     """
-    kind, size = kind_of(shown), np.abs(curve)  # without damping a response is real, of either sign
+    kind, size = kind_of(shown), np.abs(curve)  # an undamped response is real, of either sign
     if prominence is not None:
         return find_peaks(f, size, prominence=prominence, count=count, quantity=kind)
     return find_peaks(
@@ -161,7 +161,7 @@ def resonances(
 
 
 def kind_of(shown: str) -> str:
-    """What estimators of peaks take a quantity as."""
+    """The quantity name that peak estimators take."""
     return shown if shown in PER_FORCE else "receptance"
 
 
@@ -186,7 +186,7 @@ def _with_half_power(
 def _bands(
     f: NDArray, size: NDArray, index: NDArray, widths: list[float]
 ) -> list[tuple[float, float]]:
-    """Band (Hz) of each peak: to the lowest point before the next one, but not too wide."""
+    """Band (Hz) of each peak, up to the lowest points next to it, with limited width."""
     ends = [0, *index.tolist(), len(f) - 1]
     valleys = [
         ends[k] + int(np.argmin(size[ends[k] : ends[k + 1] + 1])) for k in range(len(index) + 1)
@@ -202,10 +202,10 @@ def _bands(
 def _modal(
     response: xarray.Dataset, f: NDArray, curve: NDArray, shown: str, axis: str, rate: float
 ) -> NDArray:
-    """The curve as one in which a mode makes a circle.
+    """The curve converted to one in which modes trace circles.
 
-    A transmissibility is 1 - (s^2 + alpha s) times the receptance of what the base accelerates,
-    s = i w and the rate of the window, if any.
+    A transmissibility is 1 - (s^2 + alpha s) H, H the receptance to the forces M t of a unit
+    translation t of the base, s = i w plus the rate of the window, if any.
     """
     if shown in PER_FORCE:
         return curve
@@ -219,7 +219,7 @@ def _with_circles(
     peaks: list[Peak], f: NDArray, curve: NDArray, bands: list[tuple[float, float]], kind: str,
     rate: float,
 ) -> list[Peak]:  # fmt: skip
-    """The peaks with their circle fits: of all together, or else of each alone."""
+    """The peaks with their circle fits: to all together, or else to each alone."""
     try:
         fits = circle_fits(f, curve, bands=bands, quantity=kind)
         return [_with_circle(peak, fit, rate) for peak, fit in zip(peaks, fits, strict=True)]
@@ -234,7 +234,7 @@ def _with_circles(
 
 
 def _with_circle(peak: Peak, fit: CircleFit, rate: float) -> Peak:
-    """The peak with its circle fit, without the damping of the window."""
+    """The peak with its circle fit, excluding the damping of the window."""
     natural, ratio = fit.natural_frequency, fit.damping_ratio
     if rate > 0.0:
         natural, ratio = (float(value) for value in without_window(natural, ratio, rate=rate))

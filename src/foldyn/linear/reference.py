@@ -1,4 +1,4 @@
-"""The lowest modes of a shell, extrapolated in the size of its mesh, to compare models with."""
+"""The lowest modes of a shell, extrapolated in mesh size, as the reference for models."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from foldyn.linear.modes import modes
 from foldyn.linear.pairing import pairs
 from foldyn.structures.discretized import Discretized
 
-DIVISIONS = (6, 12)  # of every edge in the two meshes, beside which stands one half as fine
-SPARE = 3  # further modes of each mesh, which may change places with those that count
-RIGID = 6  # modes without stiffness that a sheet may have
-SAME_PLACE = 1e-6  # of the pattern's size: how near a node of the mesh must be
-FLAT = np.cos(np.radians(5.0))  # of the normals of panels that are nearly in one plane
+DIVISIONS = (6, 12)  # of every edge in the two finer meshes; a third one is half as fine
+SPARE = 3  # extra modes of each mesh, which may swap with the ones compared
+RIGID = 6  # most modes without stiffness of a sheet
+SAME_PLACE = 1e-6  # of the pattern's size: largest distance of a matching node
+FLAT = np.cos(np.radians(5.0))  # of the normals of panels nearly in one plane
 NO_LIMIT = (
     "a panel touches a clamped edge at vertex {} alone, folded against it, where frequencies have "
     "no limit: meshes and programs differ by 20 %"
@@ -40,7 +40,7 @@ class MeshModes(NamedTuple):
         Hz, increasing.
     shape : (k, n, 3)
     found : xarray.Dataset
-        All as they were computed, rigid ones included; empty where nothing can move.
+        All modes computed, rigid ones included; empty if nothing can move.
     """
 
     structure: Discretized
@@ -49,7 +49,7 @@ class MeshModes(NamedTuple):
     found: xarray.Dataset
 
     def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
-        """Which of points (m, 3) are nodes of the mesh (j,), and the shapes there (k, j, 3)."""
+        """Which points (m, 3) are nodes of the mesh (j,), and the shapes there (k, j, 3)."""
         from scipy.spatial import cKDTree
 
         apart, place = cKDTree(self.structure.nodes).query(nodes)
@@ -58,9 +58,9 @@ class MeshModes(NamedTuple):
 
 
 def mesh_modes(case: Case, count: int) -> MeshModes:
-    """The lowest elastic modes on the mesh of a case: `count`, and a few to spare."""
+    """The lowest elastic modes on the mesh of a case: `count`, and a few spare ones."""
     structure = case.structure
-    if not len(case.free_dofs):  # of a coarse mesh
+    if not len(case.free_dofs):  # in a coarse mesh
         still = np.zeros((0, *structure.nodes.shape))
         return MeshModes(structure, np.zeros(0), still, xarray.Dataset())
     found = modes_at_rest(case, count + SPARE)
@@ -68,10 +68,10 @@ def mesh_modes(case: Case, count: int) -> MeshModes:
 
 
 def same_modes(own: MeshModes, meshes: Sequence[MeshModes], count: int) -> NDArray[np.float64]:
-    """Frequencies (meshes, k) of the lowest modes on one mesh, and of the same ones on others.
+    """Frequencies (meshes, k) of the lowest modes on one mesh, and of the same modes on others.
 
-    Modes are paired by their shapes at the nodes that two meshes share, for a coarse mesh may
-    change the order of close ones. At most `count`; nan of modes that a mesh does not have.
+    Modes are paired by their shapes at the nodes that two meshes share, since a coarse mesh may
+    swap close modes. At most `count`; nan for modes that a mesh lacks.
     """
     first, k = own.frequency[:count], min(count, len(own.frequency))
     frequencies = np.full((len(meshes), k), np.nan)
@@ -93,16 +93,16 @@ class Reference:
     frequency : (k,)
         Frequencies extrapolated from the meshes, Hz.
     mesh_error : (k,)
-        Relative errors of the finer mesh by the order that it shows with two coarser ones; nan
-        where the meshes have not converged, or there is no limit.
+        Relative errors of the finest mesh, by the order observed with the two coarser ones; nan if
+        the meshes have not converged, or there is no limit.
     mesh_frequency : (3, k)
-        Of the same modes on each mesh, Hz; nan of those that a coarse one does not have.
+        Frequencies of these modes on each mesh, Hz; nan if a coarse mesh lacks one.
     shape : (k, n, 3)
         Shapes of the fine mesh.
     case : Case
-        The shell of the fine mesh, held.
+        The case with the shell of the fine mesh.
     found : xarray.Dataset
-        Its modes as they were computed, rigid ones included.
+        All modes of this mesh, rigid ones included.
     """
 
     frequency: Annotated[NDArray, Unit("Hz")]
@@ -113,14 +113,14 @@ class Reference:
     found: xarray.Dataset
 
     def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
-        """Which of points (m, 3) are nodes of the mesh (j,), and the shapes there (k, j, 3)."""
+        """Which points (m, 3) are nodes of the mesh (j,), and the shapes there (k, j, 3)."""
         return MeshModes(self.case.structure, self.frequency, self.shape, self.found).at(nodes)
 
 
 def elastic(
     found: xarray.Dataset, count: int | None = None, shape: str = "shape"
 ) -> tuple[NDArray, NDArray]:
-    """Frequencies (k,), Hz, and shapes (k, n, 3) of the modes that something resists."""
+    """Frequencies (k,), Hz, and shapes (k, n, 3) of the modes with stiffness."""
     kept = np.flatnonzero(found["eigenvalue"].values > 0.0)[:count]
     return found["frequency"].values[kept], found[shape].values[kept]
 
@@ -128,9 +128,9 @@ def elastic(
 def modes_at_rest(
     case: Case, count: int, secant: float | None = None, internal: int = 0
 ) -> xarray.Dataset:
-    """At least `count` elastic modes of a case about its rest state, as far as it has as many.
+    """At least `count` elastic modes of a case about rest, or as many as it has.
 
-    What the case's loads would warn of is left unsaid: none acts at rest.
+    Warnings about the case's loads are suppressed: none acts at rest.
     """
     asked = min(count + RIGID, len(case.free_dofs))
     while True:
@@ -138,22 +138,22 @@ def modes_at_rest(
             warnings.simplefilter("ignore", FoldynWarning)
             found = modes(case, asked, secant=secant, internal=internal)
         missing = count - int((found["eigenvalue"].values > 0.0).sum())
-        most = int(found.attrs["free_dofs"])  # with internal amplitudes among them
+        most = int(found.attrs["free_dofs"])  # includes internal amplitudes
         if missing <= 0 or asked == most:
             return found
         asked = min(max(asked + missing, 2 * asked), most)
 
 
 def reference_modes(cases: Sequence[Case], count: int) -> Reference:
-    """The lowest elastic modes of a shell, from three meshes of it, held alike.
+    """The lowest elastic modes of a shell, from three meshes with the same supports.
 
     Parameters
     ----------
     cases : (Case, Case, Case)
         Shells of increasing `divisions`. The last two give the frequencies, all three their error;
-        with a vertex radius all three give both, for such meshes have an order below 2.
+        with a vertex radius all three give both, since such meshes have an order below 2.
     count : int
-        How many modes, if those two have as many.
+        Number of modes, at most as many as the last two meshes have.
     """
     _, coarse, fine = meshes = [mesh_modes(case, count) for case in cases]
     values = same_modes(fine, meshes, min(count, len(coarse.frequency)))
@@ -162,7 +162,7 @@ def reference_modes(cases: Sequence[Case], count: int) -> Reference:
     error = values[2] / convergence(values, divisions).limit - 1.0
     if touched_clamp(cases[-1].structure) is not None:
         error[:] = np.nan
-    rank = np.argsort(limit, kind="stable")  # which close modes of a coarse mesh may change
+    rank = np.argsort(limit, kind="stable")  # extrapolation may swap close modes of a coarse mesh
     return Reference(
         limit[rank], error[rank], values[:, rank], fine.shape[rank], cases[-1], fine.found
     )
@@ -174,10 +174,10 @@ def is_graded(case: Case) -> bool:
 
 
 def touched_clamp(structure: Discretized) -> int | None:
-    """A vertex at which a panel touches the clamped edges of others alone, folded against them.
+    """A vertex at which a panel only touches the clamped edges of others, folded against them.
 
-    Its membrane meets the clamp in that point, and holds it the more the finer the mesh is there;
-    with a vertex radius it depends on the radius.
+    Its membrane meets the clamp at this point, which holds it more strongly the finer the mesh is
+    there; with a vertex radius the result depends on the radius.
     """
     pattern, clamped = structure.pattern, [set(edge) for edge in structure.options.clamped]
     for vertex in sorted(set().union(*clamped)):
@@ -192,6 +192,6 @@ def touched_clamp(structure: Discretized) -> int | None:
 
 
 def _normal(corners: NDArray) -> NDArray:
-    """Unit normal (3,) of a panel with these corners (k, 3)."""
+    """Unit normal (3,) of a panel with corners (k, 3)."""
     twice = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
     return twice / np.linalg.norm(twice)

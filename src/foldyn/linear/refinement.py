@@ -1,4 +1,4 @@
-"""How far a mesh is from what finer ones tend to, from it and others of the same pattern."""
+"""Convergence of a mesh, estimated from it and other meshes of the same pattern."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from foldyn.errors import InputError
 from foldyn.linear.reference import MeshModes, mesh_modes, same_modes, touched_clamp
 
 MODES = 3
-FINE = 16  # pieces: beyond, the judgement is dear
+FINE = 16  # pieces: beyond, the estimate is expensive
 
 
 class Refinement(NamedTuple):
-    """Lowest frequencies of a structure on three meshes, and what finer meshes tend to."""
+    """Lowest frequencies of a structure on three meshes, and their extrapolated limits."""
 
     divisions: int  # of the structure
-    meshes: tuple[int, ...]  # (3,) pieces of every edge, increasing: its own among them
+    meshes: tuple[int, ...]  # (3,) pieces of every edge, increasing, `divisions` among them
     frequencies: NDArray[np.float64]  # (3, k) Hz
-    order: NDArray[np.float64]  # (k,) that the meshes show; nan: they have not converged
+    order: NDArray[np.float64]  # (k,) observed order; nan: not converged
     extrapolated: NDArray[np.float64]  # (k,) Hz; nan likewise
     touched: int | None  # vertex at which there is no limit; see `touched_clamp`
 
@@ -34,24 +34,24 @@ class Refinement(NamedTuple):
 
     @property
     def error(self) -> float:
-        """The largest error of these frequencies, negative where the mesh is too soft.
+        """The largest error of these frequencies, negative if the mesh is too soft.
 
-        nan where one of them has not converged.
+        nan if one of them has not converged.
         """
         errors = self.frequency / self.extrapolated - 1.0
         return float(errors[np.abs(errors).argmax()])
 
     @property
     def changes(self) -> NDArray[np.float64]:
-        """Relative changes (2,) from mesh to mesh of a frequency that has not converged, or of one.
+        """Relative changes (2,) between meshes of one frequency, if possible one not converged.
 
-        Of that which changes most in the end; nan where a mesh does not have it.
+        This is the one that changes most in the last step; nan if a mesh lacks it.
         """
         changes = self.frequencies[1:] / self.frequencies[:-1] - 1.0
         return changes[:, (np.isnan(self.order) + np.abs(changes[1])).argmax()]
 
     def facts(self) -> dict[str, Any]:
-        """What a result says of its mesh: attributes."""
+        """Attributes of a result that describe its mesh."""
         return {
             "mesh_error": self.error,
             "mesh_frequencies": self.frequency,
@@ -64,22 +64,21 @@ class Refinement(NamedTuple):
 
 
 def refinement(case: Case, count: int = MODES) -> Refinement | None:
-    """Judge the mesh of a case by its lowest elastic frequencies at rest.
+    """Estimate the error of a case's mesh from its lowest elastic frequencies at rest.
 
     Parameters
     ----------
     case : Case
-        Its supports count, its loads do not. The sheet needs no density here.
+        Its supports matter, its loads do not. The sheet needs no density here.
     count : int
         How many frequencies.
 
     Returns
     -------
     Refinement or None
-        From this mesh and two with half and a quarter of its pieces of every edge; where there
-        are no such meshes, finer ones stand in. None where the structure has no mesh, where that
-        is fine (more than 16 pieces of every edge), or where supports are given by nodes that
-        another mesh does not have.
+        From this mesh and two with half and a quarter of its pieces per edge, or finer ones if
+        there are no such meshes. None if the structure has no mesh, if its mesh is fine (more than
+        16 pieces per edge), or if supports are given by nodes that another mesh lacks.
     """
     structure = case.structure
     divisions = structure.divisions
@@ -101,7 +100,7 @@ def refinement(case: Case, count: int = MODES) -> Refinement | None:
 
 
 def _meshes(divisions: int) -> tuple[int, ...]:
-    """Pieces of every edge in three meshes: the same, half as many, a quarter."""
+    """Pieces of every edge in three meshes: `divisions`, half and a quarter, or finer ones."""
     coarser = [divisions >> halvings for halvings in range(3) if divisions >> halvings]
     return tuple(sorted([*coarser, *(divisions << k + 1 for k in range(3 - len(coarser)))]))
 

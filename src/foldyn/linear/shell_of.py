@@ -1,4 +1,4 @@
-"""The shell that a case of bars and hinges stands for: the same pattern, sheet, supports, loads."""
+"""The shell equivalent of a case of bars and hinges: same pattern, sheet, supports and loads."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from foldyn.shells import Shell, ShellOptions, shell
 from foldyn.values import of_kind, show, whole
 
 MOST_TRIANGLES = 15_000
-"""Of a shell that nobody asked for: its modes take ten to twenty seconds."""
+"""Most triangles of a default shell: its modes take ten to twenty seconds."""
 GRADED = (8, 12)
-"""Divisions of the two finer meshes with a vertex radius; that of 4 stands beside them."""
+"""Divisions of the two finer meshes with a vertex radius; the coarsest has 4."""
 MESH = {"divisions", "mass", "vertex_radius"}
-"""Options of a shell that a case of bars and hinges does not have."""
+"""Options of a shell that bars and hinges lack."""
 
 
 def check_reduced(case: Any) -> None:
-    """Refuse what is not a case of bars and hinges that a shell can stand for.
+    """Refuse anything but a case of bars and hinges that has a shell equivalent.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def check_reduced(case: Any) -> None:
 
 
 def _check_nodes(case: Case) -> None:
-    """Refuse nodes beyond the vertices, which a shell does not have where they are."""
+    """Refuse nodes beyond the vertices, which a shell has elsewhere."""
     count = len(case.structure.pattern.vertices)
     for place, nodes in _numbered(case):
         beyond = [node for node in nodes if node >= count]
@@ -67,7 +67,7 @@ def _check_nodes(case: Case) -> None:
 
 
 def _numbered(case: Case) -> Iterator[tuple[str, list[int]]]:
-    """Places of a case that name nodes by number, and the nodes."""
+    """Fields of a case that name nodes by number, and these nodes."""
     for name in ("supports", "loads", "masses"):
         for i, part in enumerate(getattr(case, name)):
             for key in ("nodes", "between", "to"):
@@ -77,9 +77,9 @@ def _numbered(case: Case) -> Iterator[tuple[str, list[int]]]:
 
 
 def shell_of(case: Case, divisions: int, vertex_radius: float | None = None) -> Case:
-    """The case with a shell of the same pattern, sheet, creases and panels; without damping.
+    """The case with a shell of the same pattern, sheet, creases and panels, without damping.
 
-    Its first nodes are the vertices, so supports, loads and masses hold for both.
+    Its first nodes are the vertices, so that supports, loads and masses apply to both.
     """
     structure = case.structure
     own = {item.name for item in fields(structure.options)} - MESH
@@ -108,7 +108,7 @@ def triangle_count(pattern: Pattern, divisions: int) -> int:
 
 
 def meshes(pattern: Pattern, given: Sequence[int] | None) -> tuple[int, int]:
-    """Divisions of the two shells: as given, or as fine as `DIVISIONS` while that is quick.
+    """Divisions of the two shells: as given, or up to `DIVISIONS` within a size limit.
 
     Raises
     ------
@@ -145,25 +145,25 @@ def meshes(pattern: Pattern, given: Sequence[int] | None) -> tuple[int, int]:
 
 
 def graded_meshes(given: Sequence[int] | None) -> tuple[int, int]:
-    """Divisions of the two finer shells with a vertex radius, the third half as fine as the first.
+    """Divisions of the two finer shells with a vertex radius; the third is half as fine.
 
     Raises
     ------
     InputError
-        Not two increasing numbers, or no multiples of which graded meshes are made.
+        Not two increasing numbers, or not multiples that graded meshes need.
     """
     coarse, fine = checked_divisions(GRADED if given is None else given)
     if coarse % 8 or fine % 4:
         raise InputError(
-            f" = {show(given)}: with a vertex_radius the first is a multiple of 8, for a mesh half "
-            f"as fine stands beside it, and the second one of 4, as in {GRADED}",
+            f" = {show(given)}: with a vertex_radius the first is a multiple of 8, since a "
+            f"mesh half as fine is also made, and the second one of 4, as in {GRADED}",
             "divisions",
         )
     return coarse, fine
 
 
 def checked_divisions(given: Any, name: str = "divisions") -> tuple[int, int]:
-    """Two increasing whole numbers, from 2: a mesh of half the first stands beside them."""
+    """Two increasing whole numbers, at least 2, since a mesh of half the first is also made."""
     if isinstance(given, str) or not isinstance(given, Sequence) or len(given) != 2:
         raise InputError(f" = {show(given)}: give two numbers, as in (6, 12)", name)
     coarse, fine = (whole(name, value, least=2) for value in given)

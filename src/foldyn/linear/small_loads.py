@@ -1,4 +1,4 @@
-"""How far small loads move a structure: its linear equilibrium about rest."""
+"""Displacements under small loads: the linear equilibrium about rest."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from foldyn.mechanics.following import following_force, joined
 
 
 class SmallLoads(NamedTuple):
-    """Forces in full, as if the sheet's stiffness were that at rest.
+    """Forces in full, with the stiffness of the sheet at rest.
 
     Attributes
     ----------
@@ -36,9 +36,9 @@ class SmallLoads(NamedTuple):
 
 
 def forces_alone(case: Case) -> tuple[Case, list[int]]:
-    """The case with only those loads that are forces, and the numbers of the others.
+    """The case with only the loads that are forces, and the numbers of the others.
 
-    Forces on nodes, gravity and pressure are; what turns or heats creases and panels is not.
+    Nodal forces, gravity and pressure are kept; loads that turn or heat parts are not.
     """
     structure = case.structure
     others = []
@@ -70,9 +70,9 @@ def small_loads(case: Case, secant: float | None = None) -> SmallLoads:
     Parameters
     ----------
     case : Case
-        Its supports and hinges hold it in place.
+        Its supports and hinges resist every motion.
     secant : float, optional
-        As of `modes`.
+        As in `modes`.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)

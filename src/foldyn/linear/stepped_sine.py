@@ -1,4 +1,4 @@
-"""Frequency response from steady motions under a sine, frequency after frequency."""
+"""Frequency response from steady motions under a sine, one frequency at a time."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from foldyn.signals import stepped_sine as response_per_drive
 from foldyn.values import choice, number, whole
 
 PER_CYCLE = 32  # samples in a cycle
-SLOWEST = 0.99  # ratio of successive changes above which no decay is seen
-NEGLIGIBLE = 1e-12  # change that is rounding
+SLOWEST = 0.99  # ratio of successive changes above which no decay is assumed
+NEGLIGIBLE = 1e-12  # change at round-off
 
 
 @dataclass(frozen=True)
 class SteppedSine(Integration):
-    """Options of the stepped sine method, beside those of the integration.
+    """Options of the stepped sine method, in addition to the integration.
 
     Parameters
     ----------
     cycles : int
         Cycles whose motion is fitted, at least 2.
     settled : float
-        Relative error that the transient may leave, as estimated from its decay: cycles are added
-        until it is below.
+        Relative error that the transient may leave, estimated from its decay: cycles are added
+        until the error is smaller.
     most_cycles : int
-        Cycles at a frequency after which to go on all the same.
+        Largest number of cycles at a frequency, settled or not.
     sweep : {"up", "down"}
-        Whether frequencies rise or fall; each motion starts from the end of the one before.
+        Whether frequencies rise or fall; each motion starts from the end of the previous one.
     """
 
     cycles: Annotated[int, Check(whole, least=2)] = 4
@@ -44,12 +44,12 @@ class SteppedSine(Integration):
     sweep: Annotated[str, Check(choice, known=("up", "down"))] = "up"
 
     def agree(self) -> None:
-        """Refuse fewer cycles than show whether a motion has settled."""
+        """Refuse too few cycles to tell whether a motion has settled."""
         whole("most_cycles", self.most_cycles, least=3 * self.cycles)
 
 
 def stepped_sine(rig: Rig, frequency: NDArray, options: SteppedSine, report: Reporter) -> Answer:
-    """Response to sines, and how unsteady each motion is.
+    """Response to sines, and the unsteadiness of each motion.
 
     Warns
     -----
@@ -99,17 +99,17 @@ class _Motion:
 
     @property
     def time(self) -> float:
-        """Simulated so far (s)."""
+        """Simulated time so far (s)."""
         return self.blocks * self.block
 
     @property
     def settled(self) -> bool:
-        """Whether to go on to the next frequency."""
+        """Whether to continue with the next frequency."""
         long = (self.blocks + 1) * self.options.cycles > self.options.most_cycles
         return self.unsteady <= self.options.settled or long
 
     def advance(self, report: Reporter) -> None:
-        """One more block."""
+        """Simulate one more block."""
         interval = 1.0 / (PER_CYCLE * self.frequency)
         time, motion, self.state = self.rig.run(
             self.history, self.block, interval, report, self.time, self.state
@@ -127,7 +127,7 @@ class _Motion:
 
 
 def _remaining(change: float, before: float) -> float:
-    """What is left of changes that fall by the same factor from block to block."""
+    """Remaining error of changes that fall geometrically from block to block."""
     if change <= NEGLIGIBLE:
         return change
     if not np.isfinite(before):

@@ -43,10 +43,10 @@ class Integration(Checked):
     integrator : str, optional
         Method of `simulate`. Without it "rk4", for shells "generalized_alpha".
     dt : float, optional
-        Largest time step (s), shortened to divide the sampling interval. Without it, the default
+        Largest time step (s), shortened to divide the sampling interval; by default the one
         of `simulate`.
     tolerance : float, optional
-        As of `simulate`.
+        As in `simulate`.
     """
 
     integrator: Annotated[str | None, Check(choice, known=METHODS)] = None
@@ -57,9 +57,9 @@ class Integration(Checked):
 class Rig:
     """A case held in a state by its loads, ready to be driven.
 
-    The loads of the case act as the constant forces that balance the state, so that nothing moves
-    without the drive, whatever the tolerance with which the state was found. Actuated folds and
-    loads that depend on the displacement stay what they are.
+    The loads of the case are replaced by constant forces that balance the state, so that nothing
+    moves without the drive, whatever the tolerance of the state. Actuated folds and loads that
+    depend on the displacement are kept.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Rig:
         self.integrator = integration.integrator or ("generalized_alpha" if massless else "rk4")
         history = Table([0.0, 1.0], [point.factor, point.factor])
         self.case = case
-        if case.contact is not None:  # planes stand where they do in the state
+        if case.contact is not None:  # planes stay where they are in the state
             planes = [
                 plane if plane.history is None else replace(plane, history=history)
                 for plane in case.contact.planes
@@ -92,7 +92,7 @@ class Rig:
         self._supports = self._held()
 
     def _held(self) -> list[Support]:
-        """Supports that stay where the state puts them; a base of the case's own stands still."""
+        """Supports fixed where the state puts them; a moving base of the case stands still."""
         moving = (Impose, BaseMotion)
         held: list[Support] = [s for s in self.case.supports if not isinstance(s, moving)]
         for support in self.case.supports:
@@ -104,7 +104,7 @@ class Rig:
         return held
 
     def driven(self, history: History) -> Case:
-        """The case under its drive."""
+        """The case under the drive."""
         loads, supports = list(self._loads), list(self._supports)
         if self.drive.axis is None:
             loads += forces(self.drive.vector, history)
@@ -121,7 +121,7 @@ class Rig:
         start: float = 0.0,
         initial: State | None = None,
     ) -> tuple[NDArray, NDArray, State]:
-        """Times, response (nt, n, 3) less the state, and the state at the end of a motion."""
+        """Times, response (nt, n, 3) relative to the state, and the final state of a motion."""
         dt, tolerance = self.integration.dt, self.integration.tolerance
         if dt is not None:
             dt = interval / math.ceil(interval / dt * (1.0 - 1e-12))
@@ -139,7 +139,7 @@ def _moves_along(load: Load, case: Case) -> bool:
 
 
 def forces(vectors: NDArray, history: History | None = None) -> list[Force]:
-    """Forces (n, 3) on nodes as loads, equal ones together."""
+    """Loads for forces (n, 3) on nodes, equal ones combined."""
     distinct, which = np.unique(vectors, axis=0, return_inverse=True)
     return [
         Force(np.flatnonzero(which.ravel() == k).tolist(), vector.tolist(), history)
@@ -149,5 +149,5 @@ def forces(vectors: NDArray, history: History | None = None) -> list[Force]:
 
 
 def overall(report: Reporter, before: float, total: float) -> Callable[[Progress], Any]:
-    """Reporter of one of several motions: `before` of `total` simulated seconds are done."""
+    """Reporter for one of several motions, after `before` of `total` simulated seconds."""
     return lambda now: report(Progress(before + now.time, total, now.steps, now.energy_error))

@@ -12,11 +12,11 @@ from foldyn.linear.group_velocity import Waves, separated
 
 
 def tracked(bloch: Bloch, phases: NDArray, waves: Sequence[Waves]) -> list[Waves]:
-    """Waves of phases (n, d) in the order in which their shapes go on.
+    """Waves of phases (n, d), sorted so that their shapes continue.
 
-    The waves of neighboring phases are paired so that the sum of their MAC, with the mass for a
-    weight, is greatest; those of one frequency as they go on along the way from the one to the
-    other. Bands that leave the lowest ones, at a crossing with one above, end there.
+    The waves of neighboring phases are paired so that the sum of their mass-weighted MAC is
+    greatest; waves of equal frequency are first combined as they continue along the step between
+    the phases. Bands that leave the lowest ones, at a crossing with one above, end there.
     """
     from scipy.optimize import linear_sum_assignment
 

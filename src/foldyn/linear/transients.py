@@ -1,4 +1,4 @@
-"""Frequency response from motions that die away: after a pulse, or bursts of random excitation."""
+"""Frequency response from decaying motions: after a pulse, or bursts of random excitation."""
 
 from __future__ import annotations
 
@@ -20,39 +20,40 @@ from foldyn.ram_limit import check_memory
 from foldyn.signals import exponential_window, frequency_response
 from foldyn.values import choice, number, whole
 
-MOST_LINES = 100  # of the frequencies' spacing: how fine a spacing may be that holds them all
-DECAYED = 1e-5  # what damping leaves of a motion within the default duration
-COPIES = 4  # of the samples, while their spectra are taken
-LEFT = 1e-3  # of the largest response: what may be left at the end of a record
-END = 0.05  # of the record: where that is looked for
-FEWEST = 4  # samples in a cycle of the highest frequency, and in a pulse
+MOST_LINES = 100  # most lines per spacing of the frequencies that may be needed to hold them all
+DECAYED = 1e-5  # share of a motion left by damping at the end of the default duration
+COPIES = 4  # of the samples in memory, while their spectra are computed
+LEFT = 1e-3  # of the largest response: most that may remain at the end of a record
+END = 0.05  # of the record: its end, where the remainder is measured
+FEWEST = 4  # least samples in a cycle of the highest frequency, and in a pulse
 PER_PULSE = 10  # samples in the pulse
-WIDTH = 0.5  # of a cycle of the highest frequency: the pulse
-WEAK = 1.5  # cycles of a frequency in a pulse, from which it has next to no strength there
-STILL = 8  # samples of rest before and after it, in which its spline dies away
-PER_CYCLE = 20  # samples in a cycle of the highest frequency, of bursts
-BAND = (0.8, 1.2)  # of the lowest and the highest frequency: what a burst excites
-TAPER = 0.1  # of the burst: how much of it rises and falls
+WIDTH = 0.5  # of a cycle of the highest frequency: length of the pulse
+WEAK = 1.5  # cycles of a frequency in a pulse above which its spectrum there is too weak
+STILL = 8  # samples of rest before and after a pulse, in which its spline decays
+PER_CYCLE = 20  # samples in a cycle of the highest frequency, in bursts
+BAND = (0.8, 1.2)  # of the lowest and the highest frequency: band that a burst excites
+TAPER = 0.1  # of the burst: part in which it rises and falls
 
 
 @dataclass(frozen=True)
 class Impulse(Integration):
-    """Options of the impulse method, beside those of the integration.
+    """Options of the impulse method, in addition to the integration.
 
     Parameters
     ----------
     pulse : float, optional
-        Duration (s) of the pulse (1 - cos(2 pi t / pulse)) / 2, whose height is the drive. Without
-        it half a cycle of the highest frequency, where it then still has 0.85 of its strength.
+        Duration (s) of the pulse (1 - cos(2 pi t / pulse)) / 2, whose height is the drive. By
+        default half a cycle of the highest frequency, where its spectrum still has 0.85 of its
+        strength.
     duration : float, optional
-        Time (s) to simulate. Without it until damping leaves 1e-5 of a motion; without alpha, the
-        inverse of the frequencies' spacing.
+        Time (s) to simulate. By default until damping leaves 1e-5 of a motion; without alpha, the
+        inverse of the spacing of the frequencies.
     interval : float, optional
         Largest sampling interval (s); a tenth of the pulse by default, at most a 20th of a cycle
         of the highest frequency.
     window_rate : float
-        Decay rate (1/s) of an exponential window, for motions that have not died away at the end.
-        It adds its damping to the response, which `peaks_of` takes off again.
+        Decay rate (1/s) of an exponential window, for motions that have not decayed at the end. It
+        adds damping to the response, which `peaks_of` subtracts again.
     """
 
     pulse: Duration | None = None
@@ -63,25 +64,25 @@ class Impulse(Integration):
 
 @dataclass(frozen=True)
 class BurstRandom(Integration):
-    """Options of the burst random method, beside those of the integration.
+    """Options of the burst random method, in addition to the integration.
 
     Parameters
     ----------
     averages : int
         Number of bursts, each from the state at rest, at least 2.
     seed : int
-        Of the random numbers: the same seed gives the same bursts.
+        Seed of the random numbers: the same seed gives the same bursts.
     burst : float
-        Part of each record that is driven; in the rest the motion dies away.
+        Driven fraction of each record; in the rest the motion decays.
     estimator : {"h1", "h2"}
-        As of `signals.frequency_response`.
+        As in `signals.frequency_response`.
     duration : float, optional
-        Time (s) to simulate for each burst. Without it damping leaves 1e-5 of a motion after the
-        burst; without alpha, it is the inverse of the frequencies' spacing.
+        Time (s) to simulate for each burst. By default until damping leaves 1e-5 of a motion after
+        the burst; without alpha, the inverse of the spacing of the frequencies.
     interval : float, optional
         Largest sampling interval (s); a 20th of a cycle of the highest frequency by default.
     window_rate : float
-        As of the impulse method.
+        As in the impulse method.
     """
 
     averages: Annotated[int, Check(whole, least=2)] = 8
@@ -99,7 +100,7 @@ def impulse(rig: Rig, frequency: NDArray, options: Impulse, report: Reporter) ->
     Warns
     -----
     FoldynWarning
-        The motion has not died away at the end.
+        The motion has not decayed at the end.
     """
     width = WIDTH / float(frequency[-1])
     pulse = width if options.pulse is None else options.pulse
@@ -140,7 +141,7 @@ def burst_random(rig: Rig, frequency: NDArray, options: BurstRandom, report: Rep
     Warns
     -----
     FoldynWarning
-        Motions have not died away at the end.
+        Motions have not decayed at the end.
     """
     alpha = rig.case.rayleigh.alpha
     quiet = 1.0 - options.burst
@@ -160,7 +161,7 @@ def burst_random(rig: Rig, frequency: NDArray, options: BurstRandom, report: Rep
 
 
 def _burst(random: np.random.Generator, count: int, interval: float, frequency: NDArray) -> NDArray:
-    """Samples of random numbers within the band, of root mean square 1, tapered to 0."""
+    """Random samples within the band, of root mean square 1, tapered to 0."""
     if count < 32:
         raise InputError(
             f"burst: {count} samples are too few; give a longer duration, or a larger part of it"
@@ -183,7 +184,7 @@ def _burst(random: np.random.Generator, count: int, interval: float, frequency: 
 
 @dataclass(frozen=True)
 class Record:
-    """Sampling of transient records, the lines of which hold the frequencies asked for.
+    """Sampling of transient records whose spectral lines include the given frequencies.
 
     Attributes
     ----------
@@ -192,9 +193,9 @@ class Record:
     samples : int
         Samples simulated.
     length : int
-        Samples of the record, zeros appended; its lines are 1 / (length interval) apart.
+        Samples of the zero-padded record; its lines are 1 / (length interval) apart.
     lines : ndarray of int, shape (m,)
-        The frequencies' numbers among the lines.
+        Line numbers of the frequencies.
     """
 
     interval: float
@@ -245,18 +246,18 @@ def record_of(
 
 
 def check_records(field: str, record: Record, count: int, nodes: int) -> None:
-    """Refuse records that memory cannot hold."""
+    """Refuse records too large for memory."""
     what = f"{float(count):.3g} records of {float(record.length):.3g} samples of {nodes} nodes"
     check_memory(field, what, 8.0 * COPIES * count * record.length * 3 * nodes, "take fewer")
 
 
 def common_spacing(frequency: NDArray) -> float:
-    """Largest spacing (Hz) of lines from 0 Hz on that hold all the frequencies.
+    """Largest spacing (Hz) of lines, from 0 Hz on, that include all the frequencies.
 
     Raises
     ------
     InputError
-        None that is coarse enough.
+        No spacing is coarse enough.
     """
     step = float(np.diff(frequency, prepend=0.0)[frequency > 0.0].min())
     for divisor in range(1, MOST_LINES + 1):
@@ -276,9 +277,9 @@ def respond(
     rig: Rig, factors: Sequence[NDArray], record: Record, rate: float, estimator: str,
     report: Reporter,
 ) -> Answer:  # fmt: skip
-    """Response estimated from the motions under a drive, each from the state at rest.
+    """Response estimated from motions under the drive, each from the state at rest.
 
-    Warns where a motion has not died away.
+    Warns if a motion has not decayed.
 
     Parameters
     ----------
@@ -287,7 +288,7 @@ def respond(
         cubic spline between them. Below a tenth of the sampling frequency its spectrum is that of
         the samples to 3e-5: a cubic spline errs by (2 pi f dt)^4 / 720.
     rate : float
-        Of the exponential window, 1/s.
+        Decay rate of the exponential window, 1/s.
     """
     drive = np.zeros((len(factors), record.length))
     responses = np.zeros((*drive.shape, *rig.state.shape))

@@ -1,8 +1,8 @@
 """`UnitCell`: a case that repeats under translations or a screw motion, and its Brillouin zone.
 
-The pattern repeats under one or two motions g_1, g_2 that commute. Each vertex v is a copy of one
-that stands for all of its kind, v = g^R u with whole numbers R: two that belong to the same kind
-are one vertex of the repeated sheet, as are the edges between them. Wave vectors are phases k (rad)
+The pattern repeats under one or two commuting motions g_1, g_2. Each vertex v is a copy of a
+representative u of its kind, v = g^R u with integers R: two vertices of the same kind are one
+vertex of the repeated sheet, and likewise for edges between them. Wave vectors are phases k (rad)
 per period: a Bloch wave moves copy R of a vertex as Q^R a exp(i k . R), with Q the rotation of the
 motion (F. Bloch, Z. Phys. 52, 1929; with rotations, C. T. White, D. H. Robertson, J. W. Mintmire,
 Phys. Rev. B 47, 1993).
@@ -31,22 +31,22 @@ from foldyn.values import number, numbers, of_kind, show, whole
 if TYPE_CHECKING:
     import xarray
 
-NEAR_MISS = 0.05  # of the pattern's size: how near an image is to a vertex that it was to meet
-COMMUTE = 10.0  # times the tolerance: how far two orders of two motions may lead apart
-SHOWN = 6  # vertices that a message names
+NEAR_MISS = 0.05  # of the pattern's size: nearer misses of a vertex are reported
+COMMUTE = 10.0  # factor on the tolerance: largest difference between the two orders of two motions
+SHOWN = 6  # vertices named in a message
 
 
 class Copies(NamedTuple):
-    """Each vertex as a copy of one that stands for all of its kind.
+    """Each vertex as a copy of the representative of its kind.
 
     Attributes
     ----------
     kind : ndarray of int, shape (n,)
-        Number of the vertex that stands for it, among those that do, increasing.
+        Number of its kind, in the order of the representatives.
     offset : ndarray of int, shape (n, d)
-        R, how many of each motion bring that one to it.
+        R: powers of the motions that take the representative to the vertex.
     first : ndarray of int, shape (m,)
-        The vertices that stand for others, by kind.
+        The representative of each kind.
     """
 
     kind: NDArray[np.int64]
@@ -56,44 +56,43 @@ class Copies(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class UnitCell:
-    """A case of which a sheet, a chain or a tube consists.
+    """A case that is repeated to form a sheet, a chain or a tube.
 
-    Its supports, point masses, springs, dashpots and damping repeat with it. What is said of a node
-    holds for its partners on the other side of the cell too: it is one node of the repeated sheet,
-    and counts once where one support or mass names several of them. Loads count for the state
-    alone.
+    Its supports, point masses, springs, dashpots and damping repeat with it. A support or mass at a
+    node also applies to its partners on the other side of the cell: they are one node of the
+    repeated sheet, which counts once if a support or mass names several of them. Loads only matter
+    for the state.
 
     Parameters
     ----------
     case : Case
-        Its structure as `discretize` or `shell` makes it. Creases between cells have the stiffness
-        and the law of the others, and their letters by the dihedral.
+        Its structure is made by `discretize` or `shell`. Creases between cells have the stiffness
+        and law of the others, and letters from their dihedrals.
     vectors : sequence of sequences of float, shape (d, 3), optional
         One or two translations (m) from a cell to the next: a chain or a sheet.
     screw : Screw, optional
-        Instead of them, or beside one of them: a screw motion from a cell to the next, for tubes
-        and rings.
+        Instead of `vectors`, or in addition to one of them: a screw motion from a cell to the next,
+        for tubes and rings.
     tolerance : float
-        Distance, as a fraction of the pattern's size (below 0.05), at which vertices lie in the
-        same place.
+        Distance below which vertices coincide, as a fraction of the pattern's size (below 0.05).
 
     Attributes
     ----------
     motions : tuple of Screw
-        From a cell to the next, one or two; those of the pattern (`Pattern.periods`) where neither
-        vectors nor a screw are given, or two translations that are found.
+        One or two motions from a cell to the next; without vectors or screw, the periods of the
+        pattern (`Pattern.periods`), or two translations found from its boundary.
     vectors : ndarray, shape (d, 3)
-        Their shifts (m).
+        Shifts of the motions (m).
     dimensions : int
-        How many, d.
+        Number d of motions.
     copies : Copies
-        Which vertices belong together.
+        Vertices as copies of others.
 
     Raises
     ------
     InputError
-        The pattern does not repeat, or not under the motions that are given: the message names the
-        vertices without a partner.
+        The pattern does not repeat, or not under the given motions: the message names vertices
+        without a partner.
 
     Examples
     --------
@@ -130,7 +129,7 @@ class UnitCell:
         object.__setattr__(self, "copies", _copies(len(pattern.vertices), len(motions), pairs))
 
     def __repr__(self) -> str:
-        """One line: how large it is, and how it repeats."""
+        """One line: size of the cell and its motions."""
         ways = ["screw" if motion.turns else "translation" for motion in self.motions]
         return (
             f"<UnitCell: {self.kinds} vertices, {len(self.case.structure.pattern.faces)} panels, "
@@ -138,13 +137,13 @@ class UnitCell:
         )
 
     def _found(self, pattern: Any, near: float) -> tuple[tuple[Screw, ...], list[tuple]]:
-        """The motions, and pairs of vertices that are known to belong together."""
+        """The motions, and pairs of vertices known to be copies."""
         if self.vectors is not None or self.screw is not None:
             given = [] if self.vectors is None else list(map(translation, _steps(self.vectors)))
             if self.screw is not None:
                 given.append(of_kind("screw", self.screw, Screw))
             if len(given) > 2:
-                raise InputError(": give at most two, or one beside a screw", "vectors")
+                raise InputError(": give at most two, or one with a screw", "vectors")
             return tuple(given), []
         if not pattern.periods:
             try:
@@ -162,7 +161,7 @@ class UnitCell:
         return self._marked(pattern, near)
 
     def _marked(self, pattern: Any, near: float) -> tuple[tuple[Screw, ...], list[tuple]]:
-        """The motions that the pattern names, and pairs; those of a seam are one vertex."""
+        """The motions and pairs named by the pattern; pairs of a seam are one vertex."""
         motions, found = [], []
         for k, rows in enumerate(pattern.periods):
             points, ends = pattern.vertices[rows[:, 0]], pattern.vertices[rows[:, 1]]
@@ -191,16 +190,16 @@ class UnitCell:
 
     @property
     def near(self) -> float:
-        """Distance (m) at which points lie in the same place."""
+        """Distance (m) below which points coincide."""
         return self.tolerance * self.case.structure.pattern.size
 
     @property
     def dimensions(self) -> int:
-        """How many motions repeat it."""
+        """Number of motions that repeat the cell."""
         return len(self.motions)
 
     def period(self, name: str, value: Any) -> int:
-        """Number of one of the motions, given as an argument of that name."""
+        """Checked number of one of the motions, given as the argument `name`."""
         number_ = whole(name, value, least=0)
         if number_ >= self.dimensions:
             known = "periods, 0 and 1" if self.dimensions > 1 else "period, 0"
@@ -209,7 +208,7 @@ class UnitCell:
 
     # ------------------------------------------------------------------ copies
     def images(self, points: ArrayLike, step: Sequence[int]) -> NDArray[np.float64]:
-        """Where points (n, 3), m, lie in cell R of the repeated sheet, R = step (d,)."""
+        """Positions (n, 3), m, of points (n, 3) in cell R of the repeated sheet, R = step (d,)."""
         return images(self.motions, points, step)
 
     @cached_property
@@ -228,7 +227,7 @@ class UnitCell:
             along the second) and "M" (pi along both) of a sheet; "G" and "X" of a chain or tube. A
             hexagonal lattice has "K" too, the corner of its zone.
         count : int
-            How many phases in all, corners among them.
+            Total number of phases, including corners.
 
         Returns
         -------
@@ -244,17 +243,17 @@ class UnitCell:
         return zone_path(self.vectors, points, count)
 
     def grid(self, count: int = 24) -> xarray.DataArray:
-        """Phases all over the Brillouin zone, from -pi to pi along each period.
+        """Phases covering the Brillouin zone, from -pi to pi along each period.
 
         Parameters
         ----------
         count : int
-            Phases along each period, at least 2; without the end at pi, which is that at -pi.
+            Phases along each period, at least 2; without the end at pi, which is equivalent to -pi.
 
         Returns
         -------
         xarray.DataArray
-            Phases (phase, period), rad; the attribute `grid` says how many there are along each.
+            Phases (phase, period), rad; the attribute `grid` holds the number along each.
         """
         return zone_grid(self.dimensions, count)
 
@@ -262,7 +261,7 @@ class UnitCell:
 def images(
     motions: Sequence[Screw], points: ArrayLike, step: Sequence[int] | NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Where motions, each as often as `step` says, bring points (n, 3), m."""
+    """Points (n, 3), m, moved by each motion as often as `step` says."""
     out = np.asarray(points, float)
     for motion, power in zip(motions, step, strict=True):
         out = motion.images(out, int(power))
@@ -272,7 +271,7 @@ def images(
 def rotation(
     motions: Sequence[Screw], step: Sequence[int] | NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Rotation (3, 3) of motions, each as often as `step` says."""
+    """Rotation (3, 3) of the motions, each applied as often as `step` says."""
     out = np.eye(3)
     for motion, power in zip(motions, step, strict=True):
         out = motion.rotation(int(power)) @ out
@@ -280,7 +279,7 @@ def rotation(
 
 
 def _steps(vectors: Any) -> NDArray[np.float64]:
-    """Translations (d, 3) as they are given, one or two that are not parallel."""
+    """Checked translations (d, 3), one or two that are not parallel."""
     array = numbers("vectors", vectors)
     array = array[None] if array.ndim == 1 else array
     if array.ndim != 2 or array.shape[1] != 3 or len(array) > 2 or not len(array):
@@ -295,7 +294,7 @@ def _steps(vectors: Any) -> NDArray[np.float64]:
 
 
 def check_commuting(vertices: NDArray, motions: Sequence[Screw], near: float, field: str) -> None:
-    """Refuse two motions that lead to different places in different orders."""
+    """Refuse two motions that do not commute."""
     if len(motions) < 2:
         return
     one, two = motions
@@ -313,7 +312,7 @@ def _partners(
 ) -> list[tuple[int, int, tuple[int, ...]]]:
     """Pairs of vertices (v, w, R), w = g^R v, of boundary edges that meet edges of other cells.
 
-    known : vertices whose partners are known.
+    known : vertices with known partners.
     """
     from scipy.spatial import cKDTree
 
@@ -336,7 +335,7 @@ def _partners(
 def _check_all(
     pattern: Any, motions: Sequence[Screw], pairs: Sequence[tuple], near: float, field: str
 ) -> None:
-    """Refuse motions under which nothing meets, or some vertices just miss their partners."""
+    """Refuse motions under which nothing meets, or some vertices narrowly miss their partners."""
     from scipy.spatial import cKDTree
 
     rim = np.unique(pattern.boundary)
@@ -370,7 +369,7 @@ def _check_all(
             raise InputError(
                 f": motion {k} brings vertex {a} to {b}, but no boundary edge of the pattern to "
                 "another one: it has more than one cell, or copies touch at points alone; give "
-                "motions that put it beside itself",
+                "motions that put copies next to each other",
                 field,
             )
         raise InputError(
@@ -411,7 +410,7 @@ def _copies(count: int, dimensions: int, pairs: Sequence[tuple]) -> Copies:
 
 
 def _named(vertices: Sequence[int] | NDArray) -> str:
-    """Some vertices for a message."""
+    """Vertices listed in a message."""
     listed = [str(int(v)) for v in vertices]
     more = f" and {len(listed) - SHOWN} more" if len(listed) > SHOWN else ""
     return ", ".join(listed[:SHOWN]) + more

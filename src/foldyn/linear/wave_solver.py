@@ -1,8 +1,8 @@
-"""The lowest Bloch waves of one phase after the other.
+"""The lowest Bloch waves at given phases.
 
-Small problems are solved with full matrices, hidden dofs condensed, constraints met by motions that
-span what they leave. Where the mass is that of nodes, one value for the three axes, its factor is a
-third as large. Large ones are solved by Lanczos iteration about a shift below zero.
+Small problems are solved with full matrices: hidden dofs are condensed, constraints are satisfied
+by a basis of allowed motions. If the nodal mass is the same for all three axes, its factor is a
+third as large. Large problems are solved by Lanczos iteration about a shift below zero.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from foldyn.linear.group_velocity import Waves
 from foldyn.threads import in_threads
 
 DENSE = 500  # dofs up to which a problem is solved with full matrices
-GUARD = 3  # waves beyond those asked for, that none is missed where several coincide
+GUARD = 3  # extra waves, so that none is missed if several coincide
 EPS = float(np.finfo(float).eps)
-ROUNDING = 1e-15  # of |phi|' |K| |phi|: what counts as zero
-NOISE = 30.0  # times the rounding of the largest entries: what counts as zero, too
+ROUNDING = 1e-15  # of |phi|' |K| |phi|: smaller counts as zero
+NOISE = 30.0  # factor on the rounding errors of the largest entries: smaller counts as zero, too
 SHIFT = 1e-6  # of the pencil's scale: the shift below zero
 
 
 @dataclass(frozen=True, eq=False)
 class WaveSolver:
-    """Solves for the `count` lowest waves of a cell."""
+    """Solver for the `count` lowest waves of a cell."""
 
     bloch: Bloch
     count: int
@@ -46,11 +46,11 @@ class WaveSolver:
         return np.flatnonzero(self.bloch.hidden)
 
     def at(self, phases: NDArray) -> list[Waves]:
-        """Waves of each phase (n, d), on all processors."""
+        """Waves at each phase (n, d), on all processors."""
         return in_threads(self.waves, phases)
 
     def waves(self, phase: NDArray) -> Waves:
-        """Waves of a phase (d,)."""
+        """Waves at a phase (d,)."""
         bloch = self.bloch
         if bloch.size > DENSE and bloch.ties.empty:
             return self._lanczos(phase)
@@ -74,7 +74,7 @@ class WaveSolver:
     def _lowest(
         self, stiffness: NDArray, factors: NDArray, phase: NDArray
     ) -> tuple[NDArray, NDArray, NDArray, float]:
-        """Eigenvalues (k,), motions and M phi (n, k) of the free dofs, and what counts as zero."""
+        """Eigenvalues (k,), motions and M phi (n, k) of the free dofs, and the zero threshold."""
         bloch, free = self.bloch, self.free
         wanted = {"subset_by_index": [0, self.count - 1], "check_finite": False}
         diagonal = np.real(np.diag(stiffness))
@@ -110,7 +110,7 @@ class WaveSolver:
         return values, basis @ own, mass @ (basis @ own), _zero(scale)
 
     def _lanczos(self, phase: NDArray) -> Waves:
-        """The same for large matrices."""
+        """Waves at a phase (d,), for large matrices."""
         bloch = self.bloch
         factors, kept = bloch.factors(phase), np.flatnonzero(~bloch.held)
         check_count(self.count, len(self.free) - GUARD - 1, phase)
@@ -145,12 +145,12 @@ def check_count(count: int, most: int, phase: NDArray) -> None:
 
 
 def _zero(scale: NDArray) -> float:
-    """What counts as zero of the eigenvalues, by diagonals of stiffness over mass (n,)."""
+    """Zero threshold of the eigenvalues, from diagonals of stiffness over mass (n,)."""
     return NOISE * EPS * float(scale.max())
 
 
 def _noise(stiffness: NDArray | sparse.csc_array, shapes: NDArray) -> NDArray[np.float64]:
-    """Rounding (k,) of the eigenvalues of shapes (n, k)."""
+    """Rounding errors (k,) of the eigenvalues of shapes (n, k)."""
     size = np.abs(shapes)
     return ROUNDING * np.einsum("ik,ik->k", size, abs(stiffness) @ size)
 
@@ -165,5 +165,5 @@ def _inverse_root(mass: NDArray) -> NDArray[np.complex128]:
 
 
 def _by_nodes(matrix: NDArray, values: NDArray) -> NDArray[np.complex128]:
-    """A matrix (n, n) of nodes, times what all axes of them have (3 n, k)."""
+    """Product of a nodal matrix (n, n) with values (3 n, k), axis by axis."""
     return (matrix @ values.reshape(len(matrix), -1)).reshape(values.shape)

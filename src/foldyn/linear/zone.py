@@ -14,12 +14,12 @@ from foldyn.ram_limit import check_memory
 from foldyn.values import numbers, show, whole
 
 OF_PHASES = ("ticks", "tick_labels", "grid")
-"""Attributes of phases, which bands take over."""
-HEXAGONAL = 1e-6  # how exactly lengths and angle of a hexagonal lattice must be right
+"""Attributes of phases that bands take over."""
+HEXAGONAL = 1e-6  # tolerance for lengths and angle of a hexagonal lattice
 
 
 def zone_path(vectors: NDArray, points: str, count: int) -> xarray.DataArray:
-    """See `UnitCell.path`; vectors (d, 3) of the periods, m."""
+    """Phases along a path, see `UnitCell.path`; vectors (d, 3) of the periods, m."""
     known = special_points(vectors)
     if not isinstance(points, str):
         raise InputError(f' = {show(points)}: give names, as in "G-X-M-G"', "points")
@@ -41,7 +41,7 @@ def zone_path(vectors: NDArray, points: str, count: int) -> xarray.DataArray:
     ends = np.concatenate([[0.0], np.cumsum(lengths)])
     marks = np.round(ends / ends[-1] * (count - 1)).astype(int)
     marks = np.maximum.accumulate(np.maximum(marks, np.arange(len(marks))))
-    for k in range(len(marks) - 1, 0, -1):  # room for the corners behind
+    for k in range(len(marks) - 1, 0, -1):  # leave room for the remaining corners
         marks[k] = min(marks[k], count - len(marks) + k)
     rows = [
         corners[k]
@@ -54,7 +54,7 @@ def zone_path(vectors: NDArray, points: str, count: int) -> xarray.DataArray:
 
 
 def _check_memory(count: int, dimensions: int) -> None:
-    """Refuse more phases than there is memory for; twice as much is held while they are made."""
+    """Refuse more phases than memory can hold; building them takes twice as much."""
     check_memory(
         "count", f"a list of {count:g} phases", 16.0 * count * (dimensions + 1), "take fewer"
     )
@@ -63,7 +63,7 @@ def _check_memory(count: int, dimensions: int) -> None:
 def array(
     phases: NDArray, distance: NDArray, ticks: ArrayLike, names: list[str]
 ) -> xarray.DataArray:
-    """Phases (n, d) of a path with what a plot needs."""
+    """Phases (n, d) of a path, with the data for a plot."""
     return xarray.DataArray(
         phases,
         dims=("phase", "period"),
@@ -73,7 +73,7 @@ def array(
 
 
 def zone_grid(dimensions: int, count: int) -> xarray.DataArray:
-    """See `UnitCell.grid`."""
+    """Phases covering the zone; see `UnitCell.grid`."""
     count = whole("count", count, least=2)
     _check_memory(count**dimensions, dimensions)
     along = -np.pi + 2.0 * np.pi / count * np.arange(count)
@@ -101,7 +101,7 @@ def special_points(vectors: NDArray) -> dict[str, NDArray]:
 
 
 def of_phases(phases: object, given: NDArray) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Coordinates and attributes that results have of their phases (n, d)."""
+    """Coordinates and attributes of results that describe their phases (n, d)."""
     along: dict[str, Any] = {"wave_vector": (("phase", "period"), given, {"units": "rad"})}
     if not isinstance(phases, xarray.DataArray):
         return along, {}
@@ -111,7 +111,7 @@ def of_phases(phases: object, given: NDArray) -> tuple[dict[str, Any], dict[str,
 
 
 def checked_phases(phases: object, dimensions: int) -> NDArray[np.float64]:
-    """Phases (n, d), rad; a list of numbers is one phase for each for d = 1."""
+    """Phases (n, d), rad; for d = 1 also a list of numbers."""
     values = phases.values if isinstance(phases, xarray.DataArray) else phases
     array = numbers("phases", values)
     if array.ndim == 1 and dimensions == 1:
