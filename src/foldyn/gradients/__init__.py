@@ -1,4 +1,4 @@
-"""Exact gradients of what Foldyn computes, with respect to a design's parameters."""
+"""Exact gradients of results with respect to design parameters."""
 
 from __future__ import annotations
 

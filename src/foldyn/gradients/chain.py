@@ -1,4 +1,4 @@
-"""From measures to parameters: derivatives of a number by the result, the case and the design."""
+"""From measures to parameters: derivatives with respect to the result, the case and the design."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from foldyn.gradients.parameters import SHORTER, Parameters
 from foldyn.mechanics.pullback import Arrays
 from foldyn.sweeps.measure import Asked
 
-SAME, ROUNDING = 1e-6, 1e-9  # of derivatives, and of a number: derivatives that are one
+SAME, ROUNDING = 1e-6, 1e-9  # of derivatives, and of the value: differences that count as zero
 
 
 class Differentiated(Protocol):
-    """A result, and gradients of numbers that are functions of it."""
+    """A result, with gradients of functions of it."""
 
     result: xr.Dataset
 
     def numbers(self, case: Case) -> Arrays:
-        """Numbers of a case by which gradients are taken."""
+        """Numbers of a case with respect to which gradients are taken."""
         ...
 
     def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:
-        """Gradient of a number, by its derivatives by variables of the result."""
+        """Gradient of a function of the result, from its derivatives by the result's variables."""
         ...
 
 
 class Wanted(NamedTuple):
-    """A number to be differentiated: an expression of measures with their derivatives."""
+    """A quantity to differentiate: an expression of measures, with their derivatives."""
 
     text: str
     expression: Expression
@@ -45,8 +45,8 @@ class Wanted(NamedTuple):
 
 
 def _add(seeds: dict[Any, Any], variable: Any, seed: Any, share: float) -> None:
-    """Add a share of derivatives by a variable of a result to others."""
-    if isinstance(seed, Mapping):  # by what a variable takes: see `path.PathGradient`
+    """Add a share of derivatives by a variable of a result."""
+    if isinstance(seed, Mapping):  # nested: see `path.PathGradient`
         own = seeds.setdefault(variable, {})
         for key, each in seed.items():
             _add(own, key, each, share)
@@ -55,31 +55,31 @@ def _add(seeds: dict[Any, Any], variable: Any, seed: Any, share: float) -> None:
 
 
 class _Changes(NamedTuple):
-    """Derivatives of a number by variables of a result, parameters, and numbers of the case."""
+    """Derivatives of a quantity by variables of a result, parameters, and numbers of the case."""
 
     seeds: Seeds
     explicit: dict[str, NDArray]
     numbers: dict[str, NDArray]
 
     def add(self, other: _Changes, share: float) -> None:
-        """Add a share of those of another number."""
+        """Add a share of the derivatives of another quantity."""
         for own, more in zip(self, other, strict=True):
             for key, each in more.items():
                 _add(own, key, each, share)
 
 
 class Chain(NamedTuple):
-    """All that values and gradients of measures are made of."""
+    """Everything needed for values and gradients of measures."""
 
     found: Differentiated
     case: Case
     design: Parameters
     slopes: dict[str, Any]
-    cut: bool  # whether lengths to which bars are cut are among the parameters
-    shared: dict[Any, Any]  # what measures have come through
+    cut: bool  # whether cut lengths of bars are among the parameters
+    shared: dict[Any, Any]  # intermediate results shared by measures
 
     def of(self, one: Wanted) -> tuple[float, dict[str, NDArray]]:
-        """Value of a number, and its derivatives by all entries of each parameter."""
+        """Value of a quantity, and its derivatives by all entries of each parameter."""
         values = {}
         for name, (measure, _) in one.measures.items():
             value = measure.of(self.found.result, self.case, self.shared)
@@ -90,13 +90,13 @@ class Chain(NamedTuple):
         total = _Changes({}, {}, {})
         for name, (measure, derivative) in one.measures.items():
             with said_of(measure.text):
-                if parts[name]:  # what counts for nothing needs no derivative
+                if parts[name]:  # a zero factor needs no derivative
                     total.add(self._of_measure(measure, derivative, values[name]), parts[name])
         with said_of(one.text):
             return value, self._by_parameters(total)
 
     def _of_measure(self, measure: Asked, derivative: Derivative, value: float) -> _Changes:
-        """Derivatives of a measure, the same wherever an extreme is reached."""
+        """Derivatives of a measure, if they agree wherever its extreme is reached."""
         if derivative.cut and self.cut:
             raise InputError(
                 "has no derivative by bar_length, the lengths to which bars are cut; leave it out "
@@ -124,14 +124,14 @@ class Chain(NamedTuple):
         return one
 
     def _subject(self, measure: Asked) -> Any:
-        """The result, or what a measure has come through."""
+        """The result, or the intermediate result of a measure."""
         return self.shared.get(measure.measure.through, self.found.result)
 
     def _at(
         self, measure: Asked, derivative: Derivative, places: Sequence[dict[str, Any]],
         shares: NDArray,
     ) -> _Changes:  # fmt: skip
-        """Derivatives of shares of a measure at some places."""
+        """Weighted sum of the derivatives of a measure at some places."""
         total, frozen = _Changes({}, {}, {}), []
         for place, share in zip(places, shares.tolist(), strict=True):
             given = {**place, **measure.arguments}
@@ -161,12 +161,12 @@ class Chain(NamedTuple):
 
     @property
     def _nothing(self) -> dict[str, NDArray]:
-        """Gradient of nothing."""
+        """Zero gradient."""
         numbers = self.found.numbers(self.case).numbers
         return {name: np.zeros_like(array) for name, array in numbers.items()}
 
     def _explicit(self, frozen: Callable[[Case], float]) -> dict[str, NDArray]:
-        """Derivatives of a measure where the result stays as it is."""
+        """Derivatives of a measure with the result held fixed."""
 
         def number(case: Case) -> Arrays:
             return Arrays({"value": np.array([frozen(case)])}, {})
@@ -177,7 +177,7 @@ class Chain(NamedTuple):
 
 @contextmanager
 def said_of(text: str) -> Iterator[None]:
-    """Say of which measure bad input is."""
+    """Prefix an `InputError` with the text of the measure."""
     try:
         yield
     except InputError as error:

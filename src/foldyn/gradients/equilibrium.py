@@ -1,4 +1,4 @@
-"""What an equilibrium adds to gradients: the state follows the parameters."""
+"""Gradients through an equilibrium, whose state depends on the parameters."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.mechanics.pullback import Pullback
 
-SINGULAR = 1e-13  # of the stiffness at play: a motion that meets no more is a critical point's
+SINGULAR = 1e-13  # of the largest stiffness: a motion with less belongs to a critical point
 
 
 def free_block(
     case: Case, q: NDArray, free: NDArray | None = None
 ) -> tuple[NDArray, sparse.csc_array]:
-    """Free dofs (nf,), all by default, and the tangent (nf, nf) there."""
+    """Free dofs (nf,), all by default, and their tangent (nf, nf)."""
     if free is None:
         free = np.concatenate([case.free_dofs, case.body.hidden])
     tangent = sparse.csr_array(case.constraints.matrix(case.body.tangent(q)))
@@ -28,16 +28,16 @@ def free_block(
 
 
 class Balance:
-    """An equilibrium (m,) of a case, and its motions under forces.
+    """An equilibrium (m,) of a case, and its response to forces.
 
-    The factors of its tangent serve for all numbers of which derivatives are taken.
+    The factors of its tangent are reused for all derivatives.
 
     Parameters
     ----------
     case : Case
     q : ndarray, shape (m,)
     free : ndarray of int, shape (nf,), optional
-        Dofs that are in balance there, all free ones by default; the others stand.
+        Dofs in equilibrium, all free ones by default; the others are fixed.
     """
 
     def __init__(self, case: Case, q: NDArray, free: NDArray | None = None) -> None:
@@ -45,7 +45,7 @@ class Balance:
 
     @cached_property
     def _factors(self) -> tuple[NDArray, float, Any]:
-        """Free dofs, the stiffness at play (N/m), and factors; None where it is singular."""
+        """Free dofs, the largest stiffness (N/m), and factors; None if the tangent is singular."""
         free, block = free_block(self.case, self.q, self._free)
         try:
             return free, float(np.abs(block).max()), splu(block)
@@ -58,7 +58,7 @@ class Balance:
         Raises
         ------
         InputError
-            At a critical point, where there is none.
+            The equilibrium is a critical point, without such a motion.
         """
         free, stiffness, factors = self._factors
         load, out = self.case.constraints.force(force)[free], np.zeros(len(self.q))
@@ -74,9 +74,9 @@ class Balance:
     def add_seen(
         self, by_state: NDArray, pullback: Pullback, total: dict[str, NDArray], factor: float = 1.0
     ) -> None:
-        """Add to a gradient what comes by the state, under loads times a factor.
+        """Add the gradient through the state, under loads times a factor.
 
-        by_state : derivatives (m,) of the number by the dofs at constant numbers.
+        by_state : derivatives (m,) of the quantity by the dofs with the numbers fixed.
         """
         adjoint = self.under(by_state)
         seen_through(self.case, self.q, by_state, adjoint, pullback, total, factor)
@@ -86,7 +86,7 @@ def seen_through(
     case: Case, q: NDArray, by_state: NDArray, adjoint: NDArray, pullback: Pullback,
     total: dict[str, NDArray], factor: float,
 ) -> None:  # fmt: skip
-    """Add -adjoint' dR to a gradient, R = F - factor p, and what supports move."""
+    """Add -adjoint' dR, R = F - factor p, and the effect of imposed displacements to a gradient."""
     pullback.clear()
     product = pullback.at(q, adjoint)
     for name, out in pullback.gradient.items():

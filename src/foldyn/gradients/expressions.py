@@ -1,7 +1,7 @@
 """Expressions of measures, "-frequency[2] / frequency[1]", with their derivatives.
 
-They are read by Python's parser and worked out here, never evaluated as code. Derivatives go
-forward with the values.
+They are read by Python's parser and evaluated here, never executed as code. Derivatives are
+propagated forward with the values.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from foldyn.values import show, suggest
 EXAMPLE = 'write for example "-frequency[2] / frequency[1]"'
 SENSES = {ast.Eq: "==", ast.LtE: "<=", ast.GtE: ">="}
 TIE = 1e-9
-"""Relative difference below which two numbers are one, but for rounding."""
+"""Relative difference below which two numbers are equal up to round-off."""
 SMOOTH = (
     "has no derivative there; write it smoothly, as (a**8 + b**8)**(1/8), or bound both: let one "
     "of them be the objective and keep the other beside it by a constraint"
@@ -44,7 +44,7 @@ class Expression:
     ----------
     text : str
     measures : tuple of str
-        What it needs, as measures are asked for: "peak_frequency[8,x]".
+        Measures in it, in the form "peak_frequency[8,x]".
     """
 
     text: str
@@ -52,22 +52,22 @@ class Expression:
     tree: ast.expr = field(repr=False, compare=False)
 
     def value(self, values: Mapping[str, float]) -> float:
-        """Its value, by values of the measures.
+        """Value of the expression, from values of the measures.
 
         Raises
         ------
         InputError
-            It has none there.
+            The expression has no value there.
         """
         return self._at(values, np.zeros((len(self.measures), 0))).value
 
     def value_and_slopes(self, values: Mapping[str, float]) -> tuple[float, dict[str, float]]:
-        """Its value, and its derivative by each of the measures.
+        """Value of the expression, and its derivatives by all measures.
 
         Raises
         ------
         InputError
-            It has no value or no derivative there.
+            The expression has no value or no derivative there.
         """
         found = self._at(values, np.eye(len(self.measures)))
         return found.value, dict(zip(self.measures, found.slope.tolist(), strict=True))
@@ -95,7 +95,7 @@ def parse(text: str) -> Expression:
     Raises
     ------
     InputError
-        It cannot be read, or has something else; the message names the text and the place.
+        It cannot be read, or contains anything else; the message quotes text and place.
     """
     if not isinstance(text, str) or not text.strip():
         raise InputError(f" = {show(text)}: must be an expression of measures; {EXAMPLE}")
@@ -119,7 +119,7 @@ def _expression(own: str, tree: ast.expr, text: str) -> Expression:
 
 
 def _check(node: ast.expr, text: str, found: dict[str, None]) -> None:
-    """Refuse what is not of the few kinds, and collect the measures."""
+    """Refuse nodes of other kinds, and collect the measures."""
     if isinstance(node, ast.BinOp) and type(node.op) in _OPERATIONS:
         _check(node.left, text, found)
         _check(node.right, text, found)
@@ -163,7 +163,7 @@ def _is_number(node: ast.expr) -> bool:
 
 
 def _measure(node: ast.expr) -> str:
-    """How a measure is asked for, without spaces."""
+    """Text of a measure, without spaces."""
     return "".join(ast.unparse(node).split())
 
 
@@ -210,7 +210,7 @@ def _power(one: _Number, other: _Number) -> _Number:
 def _chosen(
     choose: Callable[[Sequence[float]], float], arguments: Sequence[_Number], text: str
 ) -> _Number:
-    """The least or the largest of several; where some tie, they must have one derivative."""
+    """The least or largest of several numbers; tied ones must have equal derivatives."""
     value = choose([one.value for one in arguments])
     tied = [one for one in arguments if abs(one.value - value) <= TIE * abs(value)]
     if any(not np.allclose(one.slope, tied[0].slope, TIE, 0.0) for one in tied):
@@ -219,7 +219,7 @@ def _chosen(
 
 
 def _rounding(node: ast.expr, known: Mapping[str, _Number]) -> float:
-    """Up to what a part of an expression is 0, but for rounding: by the parts of a difference."""
+    """Bound below which a part counts as 0 up to round-off, from the terms of a difference."""
     if not (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub)):
         return 0.0
     return TIE * max(abs(_worked(one, known, 0).value) for one in (node.left, node.right))
@@ -254,7 +254,7 @@ _FUNCTIONS: Mapping[str, tuple[Callable[[float], float], Callable[[np.float64], 
 # ------------------------------------------------------------------ constraints
 @dataclass(frozen=True)
 class Constraint:
-    """What a design must keep: "frequency[1] == 12", "mass <= 0.1".
+    """A condition on a design: "frequency[1] == 12", "mass <= 0.1".
 
     Attributes
     ----------
@@ -270,7 +270,7 @@ class Constraint:
 
     @property
     def measures(self) -> tuple[str, ...]:
-        """What both sides need."""
+        """Measures in both sides."""
         return tuple(dict.fromkeys((*self.left.measures, *self.right.measures)))
 
     def value(self, values: Mapping[str, float]) -> float:
@@ -278,7 +278,7 @@ class Constraint:
         return self.left.value(values) - self.right.value(values)
 
     def value_and_slopes(self, values: Mapping[str, float]) -> tuple[float, dict[str, float]]:
-        """The same, and its derivative by each of the measures."""
+        """`value`, and its derivatives by all measures."""
         (left, slopes), (right, others) = (
             side.value_and_slopes(values) for side in (self.left, self.right)
         )
@@ -286,14 +286,14 @@ class Constraint:
         return left - right, {n: slopes.get(n, 0.0) - others.get(n, 0.0) for n in every}
 
     def size(self, values: Mapping[str, float]) -> float:
-        """What a violation is compared with: a side that is a number, else the larger one."""
+        """Scale of a violation: a side that is a number, else the larger side."""
         sides = [abs(side.value(values)) for side in (self.left, self.right)]
         if 0.0 not in sides and not (self.left.measures and self.right.measures):
             return sides[0] if not self.left.measures else sides[1]
         return max(sides) or 1.0
 
     def violation(self, difference: float) -> float:
-        """By how much a difference of both sides violates it; 0 where it does not."""
+        """Violation for a difference of both sides; 0 if satisfied."""
         return {"==": abs(difference), "<=": max(difference, 0.0), ">=": max(-difference, 0.0)}[
             self.sense
         ]
@@ -305,7 +305,7 @@ def constraint(text: str) -> Constraint:
     Raises
     ------
     InputError
-        It cannot be read, or is none.
+        It cannot be read, or is not a constraint.
     """
     example = 'write for example "frequency[1] == 12" or "mass <= 0.1"'
     if not isinstance(text, str) or not text.strip():

@@ -1,13 +1,13 @@
-"""Gradients of numbers that are functions of a frequency response.
+"""Gradients of functions of a frequency response.
 
-At an angular frequency w the response x has Z x = f, Z = K + i w (alpha M + beta K0) - w^2 M, which
-is symmetric. With the derivatives s of a real number by the response, dJ = Re(s' dx), and the
-solution of Z z = s,
+At an angular frequency w the response x satisfies Z x = f, Z = K + i w (alpha M + beta K0) - w^2 M,
+which is symmetric. With the derivatives s of a real quantity by the response, dJ = Re(s' dx), and
+the solution of Z z = s,
 
     dJ = Re(z' (df - dZ x)):
 
-products of `gradients.linearized`, of real and imaginary parts. K and K0 also change with what is
-in balance, as those of modes do.
+products as in `gradients.linearized`, of real and imaginary parts. K and K0 also depend on the
+state in equilibrium, as for modes.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ Complex = NDArray[np.complex128]
 
 
 class FrfGradient:
-    """A frequency response of a case, and gradients of numbers that are functions of it.
+    """A frequency response of a case, with gradients of functions of it.
 
     Parameters
     ----------
     case : Case
     arguments : mapping
-        Of `fd.frf`.
+        Arguments of `fd.frf`.
 
     Attributes
     ----------
     result : xarray.Dataset
-        As `fd.frf` returns it.
+        As from `fd.frf`.
     """
 
     def __init__(self, case: Case, arguments: Mapping[str, Any]) -> None:
@@ -61,7 +61,7 @@ class FrfGradient:
         if equilibrium:
             state = State(self.result["displacement"].transpose("node", "axis").values)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FoldynWarning)  # all was said by `frf`
+            warnings.simplefilter("ignore", FoldynWarning)  # `frf` has warned already
             self._linear = linearize(
                 case, state, secant=given.get("secant"), load_factor=given.get("load_factor", 1.0),
                 internal=given.get("internal", 0),
@@ -77,13 +77,13 @@ class FrfGradient:
         self._products = Products(self._linear, equilibrium)
 
     def numbers(self, case: Case) -> Arrays:
-        """Numbers of a case by which gradients are taken."""
+        """Numbers of a case with respect to which gradients are taken."""
         return numbers_of(case)
 
     def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:
-        """Gradient of a number by the numbers of the case.
+        """Gradient with respect to the numbers of the case.
 
-        seeds : its derivatives s by the response, complex: it changes by Re(s' dx).
+        seeds : complex derivatives s of the quantity by the response: it changes by Re(s' dx).
         """
         known = quantity_of(self.result)
         if unknown := [name for name in seeds if name != known]:
@@ -105,9 +105,9 @@ class FrfGradient:
         self, frequency: float, by: Complex, total: dict[str, NDArray], state: NDArray,
         reference: NDArray,
     ) -> None:  # fmt: skip
-        """Add what a number has at a frequency (Hz), by numbers and by the states (m,) of K and K0.
+        """Add the part of one frequency (Hz) to `total` and to the derivatives by the states (m,).
 
-        by : its derivatives (3n,) by the response.
+        by : derivatives (3n,) by the response; `state` and `reference` are the states of K and K0.
         """
         linear, rayleigh = self._linear, self.case.rayleigh
         omega = 2.0 * np.pi * frequency
@@ -136,7 +136,7 @@ class FrfGradient:
     def _add_products(
         self, products: Products, z: Complex, x: Complex, total: dict[str, NDArray]
     ) -> NDArray:
-        """Add the gradient of Re(z' K x), for complex z and x; returns that by the dofs (m,)."""
+        """Add the gradient of Re(z' K x), z and x complex; returns the part by the dofs (m,)."""
         real = products.add_stiffness(z.real, x.real, 1.0, total)
         return real + products.add_stiffness(z.imag, x.imag, -1.0, total)
 
@@ -147,7 +147,7 @@ class FrfGradient:
 
     @cached_property
     def _reference(self) -> Products:
-        """Products with K0, to which damping is proportional: at rest, or in the state."""
+        """Products with K0, for the stiffness-proportional damping: at rest, or in the state."""
         if self.case.rayleigh.state != "rest" or not self._linear.displacement.any():
             return self._products
         return Products(self._linear, False, np.zeros_like(self._linear.displacement))
@@ -161,7 +161,7 @@ class FrfGradient:
 
 
 def _check_method(given: Mapping[str, Any]) -> None:
-    """Refuse methods whose response is not that of all modes."""
+    """Refuse methods whose response does not include all modes."""
     method, count = given["method"], given.get("count")
     if method not in ("direct", "modal") or count is not None:
         what = f"{method!r} with count = {count!r}" if method == "modal" else f"{method!r}"
@@ -173,7 +173,7 @@ def _check_method(given: Mapping[str, Any]) -> None:
 
 
 def _check_damping(case: Case) -> None:
-    """Refuse other dampers than alpha and beta."""
+    """Refuse dampers other than alpha and beta."""
     plain = all(isinstance(part, Rayleigh) for part in case.dampings)
     if not plain or case.dashpots or case.crease_damping.any():
         raise InputError(

@@ -1,9 +1,9 @@
-"""Products z' K x and z' M x with the matrices of small motions, differentiated.
+"""Derivatives of products z' K x and z' M x with the matrices of small motions.
 
-Of K, the derivative of forces, what is needed is the pullback of the forces with the weights z,
-differentiated along x: by differences over turns so small that their error is 1e-12. Where hinges
-stand near a kink of their law, as superlinear ones near rest, the steps are a hundredth of the way
-there; bars and panels, whose rounding such steps would show, keep the larger ones.
+K is the derivative of the forces, so dK needs the pullback of the forces with the weights z,
+differentiated along x: by differences over turns so small that their error is 1e-12. If hinges are
+near a kink of their law, such as superlinear ones near rest, steps are a hundredth of the distance
+to it; bars and panels, whose round-off such steps would show, keep the larger ones.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from foldyn.mechanics.pullback import Pullback, refuse_lacking
 from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges, SheetTerm
 from foldyn.mechanics.term import nodal
 
-TURN = 1e-3  # rad: of the largest turn in a difference along a motion
-SMALL = 1e-6  # of the longest bar: a motion by which turns are measured
-NEAR, NEAREST = 1e-2, 4e-7  # of the way to a kink, and rad: superlinear hinges nearer are soft
+TURN = 1e-3  # rad: largest turn in a difference along a motion
+SMALL = 1e-6  # of the longest bar: size of the motion used to measure turns
+NEAR, NEAREST = 1e-2, 4e-7  # of the way to a kink, and rad: closer superlinear hinges are soft
 
 
 class Products:
-    """Products of motions of the free dofs with the matrices of a case, differentiated.
+    """Derivatives of products of free-dof motions with the matrices of a case.
 
     Parameters
     ----------
     linear : Linearized
     equilibrium : bool
-        Whether its state is an equilibrium under the loads, and moves with the design. Elsewhere
-        only dofs without mass do: they are in balance where the nodes stand.
+        Whether the state is an equilibrium under the loads, and moves with the design. Otherwise
+        only massless dofs do, which are in balance for given nodes.
     displacement : (n, 3), optional
-        Where K is the tangent, m; by default in the state of `linear`.
+        State of the tangent K, m; by default the state of `linear`.
     """
 
     def __init__(
@@ -56,20 +56,20 @@ class Products:
         at_rest = soft_at_rest(linear.case, body, self.q)[0]
         self._sheet = body.sheet.weakened(at_rest) if at_rest.any() else body.sheet
         self._soft = at_rest.any() and self._sheet.folds.stiffness != body.sheet.folds.stiffness
-        self._balanced = Pullback(body)  # where soft hinges, too, have their small slope
+        self._balanced = Pullback(body)  # with the small slopes of soft hinges
         self._pullback = Pullback(body.on(self._sheet)) if at_rest.any() else self._balanced
         self._mass = sparse.csr_array(linear.case.mass)
         self._mass.sort_indices()
         self._rows = np.repeat(np.arange(self._mass.shape[0]), np.diff(self._mass.indptr))
 
     def nothing(self) -> dict[str, NDArray]:
-        """Gradient of nothing."""
+        """Zero gradient."""
         return nothing(self._case, self._pullback)
 
     def add_stiffness(
         self, z: NDArray, x: NDArray, by: float, total: dict[str, NDArray]
     ) -> NDArray:  # fmt: skip
-        """Add the gradient of by z' K x, for z and x (nf,); returns that by the dofs (m,)."""
+        """Add the gradient of by z' K x, z and x (nf,); returns the part by the dofs (m,)."""
         weight, motion = (self._linear.whole(each[:, None])[:, 0] for each in (z, x))
         state = np.zeros(len(self.q))
         if by == 0.0 or not motion.any():
@@ -88,7 +88,7 @@ class Products:
         self, pullback: Pullback, weight: NDArray, motion: NDArray, step: float, by: float,
         total: dict[str, NDArray],
     ) -> NDArray:  # fmt: skip
-        """Add how a pullback changes along a motion, of the fourth order; returns that by q."""
+        """Add the fourth-order difference of a pullback along a motion; returns the part by q."""
         state = np.zeros(len(self.q))
         for place, share in ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0)):
             factor = by * share / (12.0 * step)
@@ -102,7 +102,7 @@ class Products:
 
     @cached_property
     def _hinges(self) -> Pullback:
-        """The forces of the sheet's hinges alone."""
+        """Pullback of the hinge forces of the sheet alone."""
         alone = self._sheet.hinges_alone()
         assert alone is not None
         return Pullback(Assembly(alone))
@@ -117,13 +117,13 @@ class Products:
         total["mass"] += by * product
 
     def add_state(self, state: NDArray, total: dict[str, NDArray]) -> None:
-        """Add what a gradient (m,) by the state has as that moves with the design."""
+        """Add the effect of a state that moves with the design, given derivatives (m,) by it."""
         if self._moves:
             self._balance.add_seen(state, self._balanced, total, self._factor)
 
 
 def refuse(linear: Linearized, what: str) -> None:
-    """Refuse linearizations that have no derivatives yet, with a remedy."""
+    """Refuse linearizations without derivatives, with a remedy."""
     case = linear.case
     lacks = {
         "contact": case.contact is not None,
@@ -142,7 +142,7 @@ def refuse(linear: Linearized, what: str) -> None:
 
 
 def _way_to_kinks(sheet: SheetTerm, q: NDArray, motion: NDArray) -> float:
-    """Least factor of a small motion (m,) by which a hinge gets to a kink or pole of its law."""
+    """Least factor on a small motion (m,) at which a hinge reaches a kink or pole of its law."""
     way = np.inf
     folds = sheet.fold_hinges()
     for hinges, number in ((folds, 0), (sheet.bend_hinges(), len(np.unique(folds.fold)))):
@@ -157,7 +157,7 @@ def _way_to_kinks(sheet: SheetTerm, q: NDArray, motion: NDArray) -> float:
 
 
 def _creased(sheet: SheetTerm, hinges: FoldHinges, law: HingeLaw, q: NDArray) -> NDArray:
-    """Angles (k,) that the laws of hinges see, rad."""
+    """Angles (k,), rad, that enter the laws of hinges."""
     points = (hinges.corners + nodal(q)[hinges.nodes]).reshape(-1, 3)
     turned = angles(points, np.arange(len(points), dtype=np.uint32).reshape(-1, 4))
     there = np.where(hinges.hidden == NO_DOF, 0, hinges.hidden)

@@ -1,4 +1,4 @@
-"""Derivatives of measures: what a number that is taken of a result changes with, in the result."""
+"""Derivatives of measures with respect to variables of the result."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ from foldyn.sweeps.measures import (
 from foldyn.viewer.states import bar_strain
 
 Seeds = dict[str, NDArray]
-"""Derivatives of a number by variables of a result, of their shapes, by name."""
+"""Derivatives of a quantity by variables of a result, by name and in their shapes."""
 
 
 class Derivative(NamedTuple):
     """The derivative of a measure.
 
-    seeds : of a result and a case, with the measure's arguments.
-    frozen : of a measure that also takes numbers of the case itself: of the result, or what
-        measures come through, and the case, the measure as a function of another case, where the
-        result stays as it is. Differences are taken of it: it must be smooth.
-    numbers : of the same the derivatives of such a measure by numbers of the case.
-    places : of the same, for an extreme: all places where it is reached, of which `seeds` and
-        `frozen` take one as `at`. It has a derivative where all of them have the same.
-    cut : whether it depends on the lengths to which bars are cut, beside the result.
+    seeds : function of a result, a case and the measure's arguments.
+    frozen : for a measure that also depends on the case directly: function of the result (or the
+        measure's intermediate result), the case and the arguments that returns the measure as a
+        function of another case, with the result fixed. It is differenced, so it must be smooth.
+    numbers : with the same arguments, derivatives of such a measure by numbers of the case.
+    places : with the same arguments, for an extreme: all places where it is reached; `seeds` and
+        `frozen` take one as `at`. The measure has a derivative if they all agree.
+    cut : whether it depends on the cut lengths of bars, in addition to the result.
     """
 
     seeds: Callable[..., Seeds]
@@ -54,7 +54,7 @@ class Derivative(NamedTuple):
 
 
 def _largest(numbers: NDArray) -> list[tuple[int, ...]]:
-    """Where the largest of some numbers stand: that of all first, then those that tie with it."""
+    """Places of the largest number, followed by ties."""
     top = numbers.max()
     tied = np.argwhere(numbers >= top - TIE * abs(top))
     order = np.argsort(-numbers[tuple(tied.T)], kind="stable")
@@ -70,7 +70,7 @@ def _of_mode(variable: str) -> Derivative:
 
 
 def _at(result: xr.Dataset, variable: str, place: Mapping[str, Any], value: Any) -> Seeds:
-    """Seeds of one variable, zero but at a place."""
+    """Seeds of one variable, zero except at a place."""
     array = xr.zeros_like(result[variable], dtype=float)
     order = [dim for dim in ("time", "step", "mode", "node", "axis") if dim in array.dims]
     array.loc[dict(place)] = value
@@ -82,7 +82,7 @@ def _moved(result: xr.Dataset, node: int, axis: str) -> NDArray:
 
 
 def _samples(result: xr.Dataset, node: int, axis: str, weights: NDArray) -> Seeds:
-    """Seeds of a weighted sum of the displacements of a node, sample by sample."""
+    """Seeds of a weighted sum of one node's displacements over the samples."""
     array = np.zeros((len(weights), result.sizes["node"], result.sizes["axis"]))
     array[:, node, AXES.index(axis)] = weights
     return {"displacement": array}
@@ -116,7 +116,7 @@ def _velocity(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
 
 
 def _extreme(sign: float) -> Derivative:
-    """The highest displacement of a node (sign 1), or the lowest one (-1)."""
+    """Derivative of the highest (sign 1) or lowest (-1) displacement of a node."""
 
     def places(result: xr.Dataset, case: Case, node: int, axis: str) -> list[tuple[int, ...]]:
         return _largest(sign * _moved(result, node, axis))
@@ -130,7 +130,7 @@ def _extreme(sign: float) -> Derivative:
 
 
 def _trapezoid(result: xr.Dataset) -> NDArray:
-    """Weights (k,) of samples in an integral over time, s."""
+    """Weights (k,), s, of samples in a time integral."""
     step = np.diff(result["time"].values)
     weights = np.zeros(len(step) + 1)
     weights[:-1] += 0.5 * step
@@ -174,14 +174,14 @@ def _strained_most(result: xr.Dataset, case: Case) -> list[tuple[int, ...]]:
 
 
 class _Bar(NamedTuple):
-    """A bar that is stretched (sign 1) or shortened (-1), whose ends move apart by so much (m)."""
+    """A bar, stretched (sign 1) or shortened (-1), whose ends move apart by `apart` (m)."""
 
     ends: NDArray  # (2,)
     apart: NDArray  # (3,)
     sign: float
 
     def strain(self, case: Case) -> tuple[NDArray, float]:
-        """Its vector at rest, m, and the size of its strain; small ones keep all their digits."""
+        """Vector at rest, m, and absolute strain, without cancellation for small strains."""
         a, b = case.structure.nodes[self.ends]
         rest = b - a
         excess = float((2.0 * rest + self.apart) @ self.apart / (rest @ rest))
@@ -212,7 +212,7 @@ def _strain_of(result: xr.Dataset, case: Case, at: tuple[int, int]) -> Callable[
 
 
 class _Apart(NamedTuple):
-    """Two points of panels that are closest, in a sample; see `Clearance`."""
+    """The closest points of two panels in a sample; see `Clearance`."""
 
     sample: int
     nodes: NDArray  # (4,)
@@ -220,17 +220,17 @@ class _Apart(NamedTuple):
     moved: NDArray  # (n, 3) of all nodes, m
 
     def vector(self, case: Case) -> NDArray:
-        """From one to the other (3,), m."""
+        """Vector (3,), m, from one point to the other."""
         return self.weights @ (case.structure.nodes + self.moved)[self.nodes]
 
     def along(self, case: Case) -> NDArray:
-        """The same, of the length 1."""
+        """Unit vector (3,) from one point to the other."""
         vector = self.vector(case)
         return vector / np.linalg.norm(vector)
 
 
 def _closest(result: xr.Dataset, case: Case) -> list[_Apart]:
-    """All pairs of points of panels that are closest."""
+    """All closest pairs of points of panels."""
     found = closest_panels(result, case)
     distance = np.array([one.distance for one in found])
     if not distance.min() > 0.0:
@@ -253,7 +253,7 @@ def _clearance(result: xr.Dataset, case: Case, at: _Apart) -> Seeds:
 
 def _clearance_of(result: xr.Dataset, case: Case, at: _Apart) -> Callable[[Case], float]:
     along = at.along(case)
-    return lambda other: float(along @ at.vector(other))  # the size turns round where they touch
+    return lambda other: float(along @ at.vector(other))  # signed distance: changes sign on contact
 
 
 def _reaction(result: xr.Dataset, case: Case, axis: str) -> Seeds:
@@ -263,7 +263,7 @@ def _reaction(result: xr.Dataset, case: Case, axis: str) -> Seeds:
 
 
 def _strain_energies(result: xr.Dataset, case: Case) -> NDArray:
-    """Of all samples, J."""
+    """Strain energies of all samples, J."""
     return sum(result[name].values for name in case.energy_groups)  # type: ignore
 
 
@@ -316,7 +316,7 @@ def _load_at(result: xr.Dataset, case: Case, node: int, axis: str, displacement:
 
 
 def _climb(start: int, end: int) -> Derivative:
-    """Energy from one stable state to the top on the way to another: it has no other derivative."""
+    """Energy from one stable state to the top on the way to another; it has no seeds."""
 
     def places(found: Landscape, case: Case) -> list[tuple[Equilibrium, Equilibrium]]:
         stable = found.stable
@@ -355,7 +355,7 @@ def _response(result: xr.Dataset, case: Case, node: int, axis: str, frequency: f
 
 
 def _sizes(result: xr.Dataset, node: int, axes: list[int], weights: Mapping[int, float]) -> Seeds:
-    """Seeds of a weighted sum of the magnitudes of the response of a node along some axes."""
+    """Seeds of a weighted sum of response magnitudes of a node along some axes."""
     name = quantity_of(result)
     response = result[name].transpose("frequency", "node", "axis").values
     out = np.zeros_like(response)
@@ -369,7 +369,7 @@ def _sizes(result: xr.Dataset, node: int, axes: list[int], weights: Mapping[int,
 
 
 def _peak(what: str) -> Derivative:
-    """Of the "frequency" or the "height" of the highest peak, from the samples around it."""
+    """Derivative of "frequency" or "height" of the highest peak, from the samples around it."""
 
     def places(
         result: xr.Dataset, case: Case, node: int, axis: str | None = None
@@ -422,16 +422,16 @@ DERIVATIVES: Mapping[str, Derivative] = {
     "barrier": _climb(0, 1),
     "barrier_back": _climb(1, 0),
 }
-"""By the name of the measure."""
+"""Derivatives by the name of the measure."""
 
 
 def one_number(text: str, kind: Any) -> Asked:
-    """A measure of the registry that is one number of results of a kind.
+    """A registered measure that is a single number of results of a kind.
 
     Raises
     ------
     InputError
-        There is none, or it is none.
+        There is no such measure, or it is not a single number.
     """
     one = asked(text, MEASURES)
     kinds = one.measure.kinds
@@ -448,7 +448,7 @@ def derivative_of(one: Asked) -> Derivative:
     Raises
     ------
     InputError
-        It has none.
+        The measure has no derivative.
     """
     found = DERIVATIVES.get(one.measure.name)
     if found is None:

@@ -1,16 +1,16 @@
-"""Gradients of natural frequencies, and of all that follows from modes.
+"""Gradients of natural frequencies, and of other functions of modes.
 
 With phi' M phi = 1 an eigenvalue has d lambda = phi' (dK - lambda dM) phi (Nelson, AIAA Journal 14,
-1976): products of `gradients.linearized`.
+1976): products as in `gradients.linearized`.
 
 A shape has d phi from (K - lambda M) d phi = -(dK - lambda dM - d lambda M) phi with
-phi' M d phi = -phi' dM phi / 2. The derivatives s of a number by the shape give, with the solution
+phi' M d phi = -phi' dM phi / 2. With the derivatives s of a quantity by the shape, and the solution
 of (K - lambda M) z + c M phi = s, phi' M z = 0,
 
     s' d phi = -z' (dK - lambda dM) phi - c/2 phi' dM phi.
 
-K also changes with what is in balance, all of an equilibrium, and about rest what has no mass:
-K mu = the derivative of the number by these dofs gives -mu' dR, R their residual.
+K also depends on the dofs in balance: all of them in an equilibrium, massless ones about rest. With
+K mu = the derivatives of the quantity by these dofs, they add -mu' dR, R their residual.
 """
 
 from __future__ import annotations
@@ -33,24 +33,24 @@ from foldyn.linear.modes import nodes_translated, spectrum_of, unit_translations
 from foldyn.mechanics.pullback import Arrays
 from foldyn.statics.stability import oriented
 
-ALONE = 1e-6  # relative distance of eigenvalues below which they are one
-SAME = 1e-12  # relative difference of derivatives that are one
+ALONE = 1e-6  # relative distance below which eigenvalues count as one
+SAME = 1e-12  # relative difference below which derivatives count as equal
 KNOWN = ("frequency", "eigenvalue", "shape", "damping_ratio", "effective_mass", "participation")
 
 
 class ModesGradient:
-    """Modes of a case, and gradients of numbers that are functions of them.
+    """Modes of a case, with gradients of functions of them.
 
     Parameters
     ----------
     case : Case
     arguments : mapping
-        Of `fd.modes`.
+        Arguments of `fd.modes`.
 
     Attributes
     ----------
     result : xarray.Dataset
-        As `fd.modes` returns it.
+        As from `fd.modes`.
     """
 
     def __init__(self, case: Case, arguments: Mapping[str, Any]) -> None:
@@ -63,13 +63,13 @@ class ModesGradient:
         self._parted = False
 
     def numbers(self, case: Case) -> Arrays:
-        """Numbers of a case by which gradients are taken."""
+        """Numbers of a case with respect to which gradients are taken."""
         return numbers_of(case)
 
     def along(self, rate: Callable[[Gradient], float]) -> ModesGradient:
-        """The same for derivatives in one direction, where modes of one frequency part.
+        """These modes for derivatives in one direction, in which modes of equal frequency separate.
 
-        rate : what a gradient by the numbers of the case is in this direction.
+        rate : derivative in this direction, from a gradient by the numbers of the case.
         """
         other = copy(self)
         other._shapes, other._parted = self._shapes.copy(), True
@@ -87,9 +87,9 @@ class ModesGradient:
         return other
 
     def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:
-        """Gradient of a number by the numbers of the case.
+        """Gradient with respect to the numbers of the case.
 
-        seeds : its derivatives by variables of the result.
+        seeds : derivatives of the quantity by variables of the result.
         """
         if unknown := [name for name in seeds if name not in KNOWN]:
             raise InputError(
@@ -114,7 +114,7 @@ class ModesGradient:
     def _seeds(
         self, seeds: Mapping[str, NDArray], total: dict[str, NDArray], state: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Derivatives by eigenvalues (k,) and shapes (nf, k); others go to `total` and `state`."""
+        """Derivatives by eigenvalues (k,) and shapes (nf, k); adds others to `total`, `state`."""
         linear, values, shapes = self._linear, self._values, self._shapes
         zeros = np.zeros(len(values))
         with np.errstate(invalid="ignore"):
@@ -130,7 +130,7 @@ class ModesGradient:
         by_factor = np.array(seeds.get("participation", np.zeros((len(values), 3))), float)
         if "effective_mass" in seeds:
             by_factor += 2.0 * self.result["participation"].values * seeds["effective_mass"]
-        # the nearest motions r to unit translations have phi' M r = phi' M (unit translations)
+        # allowed motions r closest to unit translations have the same phi' M r
         by_shape += linear.mass @ (unit_translations(linear) @ by_factor.T)
         moved = nodes_translated(self.case).T.reshape(3, -1, 3)
         for k, a in np.argwhere(by_factor != 0.0):
@@ -157,7 +157,7 @@ class ModesGradient:
         return self._products.add_stiffness(z, shape, by_stiffness, total)
 
     def _nelson(self, k: int, by_shape: NDArray) -> tuple[NDArray, float]:
-        """See the module's text."""
+        """Solution z, c of the bordered system of the module docstring."""
         linear = self._linear
         carried = sparse.csc_array((linear.mass @ self._shapes[:, k])[:, None])
         matrix = linear.stiffness - self._values[k] * linear.mass
@@ -167,7 +167,7 @@ class ModesGradient:
 
     # ------------------------------------------------------------------ where there is none
     def _clusters(self) -> list[tuple[int, int]]:
-        """First and last + 1 of modes that have one eigenvalue."""
+        """First and last + 1 of modes with a common eigenvalue."""
         values = self._values
         near = np.abs(np.diff(values)) <= ALONE * np.abs(values[1:])
         ends = np.flatnonzero(~near) + 1
@@ -175,7 +175,7 @@ class ModesGradient:
         return [(a, b) for a, b in pairwise(edges) if b - a > 1]
 
     def _check_alone(self, by_value: NDArray, by_shape: NDArray) -> None:
-        """Refuse derivatives of one of several modes with one frequency."""
+        """Refuse derivatives of one of several modes with equal frequency."""
         for first, last in self._clusters():
             values = by_value[first:last]
             sum_alone = not by_shape[:, first:last].any() and np.ptp(values) <= SAME * np.abs(
@@ -199,7 +199,7 @@ class ModesGradient:
             )
 
     def _check_damping(self) -> None:
-        """Refuse derivatives of damping ratios that are not those of alpha and beta."""
+        """Refuse derivatives of damping ratios from anything but alpha and beta."""
         case = self.case
         plain = all(isinstance(part, Rayleigh) for part in case.dampings)
         if not plain or case.dashpots or case.crease_damping.any() or self._equilibrium:

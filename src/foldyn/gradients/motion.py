@@ -1,4 +1,4 @@
-"""Gradients of numbers that are functions of a motion's samples, by discrete adjoints."""
+"""Gradients of functions of a motion's samples, by discrete adjoints."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ KNOWN = ("displacement", "velocity")
 
 
 class MotionGradient:
-    """A motion, and gradients of numbers that are functions of it.
+    """A motion, with gradients of functions of it.
 
     Parameters
     ----------
     case : Case
     arguments : mapping
-        Of `fd.simulate`.
+        Arguments of `fd.simulate`.
 
     Attributes
     ----------
     result : xarray.Dataset
-        As `fd.simulate` returns it.
+        As from `fd.simulate`.
     """
 
     def __init__(self, case: Case, arguments: Mapping[str, Any]) -> None:
@@ -46,7 +46,7 @@ class MotionGradient:
         wanted = motion.plan.every
         if motion.method.tableau is not None:
             if (apart := segment(motion)) < wanted:
-                # samples between serve as states to go back from
+                # samples in between are checkpoints for the backward pass
                 own = {"dt": motion.plan.dt, "every_steps": apart, "interval": None}
                 motion = prepare(case, **{**given, **own})
             samples = motion.run(progress)
@@ -63,16 +63,16 @@ class MotionGradient:
         self.result = samples.isel(time=slice(None, None, self._stride))
 
     def numbers(self, case: Case) -> Arrays:
-        """Numbers of a case by which gradients are taken."""
+        """Numbers of a case with respect to which gradients are taken."""
         packed = self._motion.packed
         made = with_mass(self._motion.method, case)
         other = pack(made, packed.system.waves.span, self._motion.origin)
         return numbers_of_motion(other, self._motion.start)
 
     def backward(self, seeds: Mapping[str, NDArray]) -> Gradient:
-        """Gradient of a number by the numbers of the case.
+        """Gradient with respect to the numbers of the case.
 
-        seeds : its derivatives by variables of the result.
+        seeds : derivatives of the quantity by variables of the result.
         """
         if unknown := [name for name in seeds if name not in KNOWN]:
             raise InputError(

@@ -1,10 +1,10 @@
-"""Results of cases that differ a little from one, each found from its result.
+"""Results of slightly different cases, each found from the result of one case.
 
-Differences of them are derivatives. A neighbor's equilibria, modes or responses follow by Newton's
-steps with the factors of the matrix of the one result: no path is followed and no mode searched
-for, so that each costs a few solutions. They go on until the steps are small: after the first one
-bars are strained by what is of second order in the motion, and they are far stiffer than creases.
-Neighbors of a motion go along with it, step by step (`dynamics.companions`).
+Their differences are derivatives. A neighbor's equilibria, modes or responses follow by Newton
+steps with the factorized matrix of the one result: no path is followed and no mode is searched for,
+so each costs a few solutions. Steps are repeated until they are small: after the first one, bars
+are strained to second order in the motion, and they are far stiffer than creases. Neighbors of a
+motion are integrated along with it, step by step (`dynamics.companions`).
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ from foldyn.linear.linearized import Linearized, linearize
 from foldyn.linear.modes import Found
 from foldyn.statics.equilibrium import OrigamiProblem
 
-GAINED = 1e-6  # of the first step: the size of the last one
-ROUNDING = 1e-14  # of the whole: a step that is none
-ENOUGH, STALLED = 1e-4, 1e-8  # of the first step, and of the whole: what rounding may leave
+GAINED = 1e-6  # of the first step: size at which steps end
+ROUNDING = 1e-14  # of the whole: size of a step that counts as zero
+ENOUGH, STALLED = 1e-4, 1e-8  # of the first step, and of the whole: most that round-off may leave
 ROUNDS = 12
 TURN = 2.0 * np.pi
 ALONG = ("newmark", "generalized_alpha")
-"""Methods along whose steps neighbors go."""
+"""Methods whose motions have neighbors."""
 RESPONSES = ("direct", "harmonic")
-"""Methods of responses that have neighbors."""
+"""Methods whose responses have neighbors."""
 NONE = "there is no neighbor of"
 
 
@@ -59,21 +59,21 @@ class Asked(NamedTuple):
 
 
 def refined(x: NDArray, step_at: Callable[[NDArray], NDArray], size: float) -> NDArray:
-    """Where Newton's steps with the matrix of a neighbor end.
+    """Limit of Newton steps with the matrix of a neighbor.
 
     Parameters
     ----------
     x : ndarray, shape (n,) or (n, c)
-        Where they begin, for one neighbor or several.
+        Start, for one neighbor or several.
     step_at : callable
-        The steps from there.
+        The next steps from given points.
     size : float
-        Of the whole, by which rounding is measured.
+        Scale for rounding errors.
 
     Raises
     ------
     ComputationError
-        They do not end: a neighbor is too far away.
+        The steps do not converge: a neighbor is too far away.
     """
     sizes: list[NDArray] = []
     going = np.ones(x.shape[1:], bool)
@@ -83,7 +83,7 @@ def refined(x: NDArray, step_at: Callable[[NDArray], NDArray], size: float) -> N
         sizes.append(np.linalg.norm(step, axis=0))
         near = sizes[-1] <= np.maximum(ENOUGH * sizes[0], STALLED * size)
         going = sizes[-1] > np.maximum(GAINED * sizes[0], ROUNDING * size)
-        if len(sizes) > 2:  # even and odd ones differ
+        if len(sizes) > 2:  # even and odd steps differ
             stalled = sizes[-1] > 0.5 * sizes[-3]
             going &= ~(stalled & near)
             if (stalled & going).any():
@@ -97,7 +97,7 @@ def refined(x: NDArray, step_at: Callable[[NDArray], NDArray], size: float) -> N
 
 # ------------------------------------------------------------------ statics
 def equilibria(one: Asked, result: xarray.Dataset, others: Sequence[Asked]) -> list[Any]:
-    """Equilibria of other cases beside those of a path with given load factors."""
+    """Equilibria of other cases, near a path with given load factors."""
     problem = _problem(one)
     beside = [problem if each.case is one.case else _problem(each) for each in others]
     factors = [each.arguments["load_factors"] for each in others]
@@ -136,7 +136,7 @@ def _problem(one: Asked) -> OrigamiProblem:
 
 
 def _balanced(problem: OrigamiProblem, x: NDArray, factor: float, factored: Any) -> NDArray:
-    """State (m,) in equilibrium beside a state (m,) of another problem."""
+    """State (m,) in equilibrium, near a state (m,) of another problem."""
     x = x.copy()
     x[problem.held] = problem.prescribed(factor)
 
@@ -152,9 +152,9 @@ def _balanced(problem: OrigamiProblem, x: NDArray, factor: float, factored: Any)
 def motions(
     motion: Motion, one: Asked, others: Sequence[Asked], share: float
 ) -> list[NDArray[np.float64]]:
-    """Displacements (k, n, 3) of other cases at the samples of a motion, which is computed.
+    """Displacements (k, n, 3) of other cases at the samples of a motion, which is integrated too.
 
-    share : change of a difference between motions, in itself, at which a step has found it.
+    share : relative change of a difference between motions at which a step has converged.
     """
     case, state, lasting = motion.case, one.arguments.get("initial"), ("initial", "sample")
     lacks = (
@@ -191,7 +191,7 @@ def motions(
 
 # ------------------------------------------------------------------ modes
 def modes(found: Found, others: Sequence[Asked], wanted: Sequence[int]) -> list[Any]:
-    """Modes of other cases beside some of those found, those with the places `wanted`."""
+    """Modes of other cases, near the modes found at the places `wanted`."""
     linear, result = found.linear, found.result
     beside = [linear if each.case is linear.case else _linear(each) for each in others]
     frequency, eigenvalue, ratio = (
@@ -200,7 +200,7 @@ def modes(found: Found, others: Sequence[Asked], wanted: Sequence[int]) -> list[
     )
     seen = result["shape"].transpose("mode", "node", "axis").values
     shapes = [seen.copy() for _ in others]
-    assert not isinstance(linear.mass, Squared)  # of large sheets in air, which have no gradients
+    assert not isinstance(linear.mass, Squared)  # large sheets in air have no gradients
     for k in wanted:
         value = float(result["eigenvalue"].values[k])
         matrix = linear.stiffness - value * linear.mass
@@ -209,7 +209,7 @@ def modes(found: Found, others: Sequence[Asked], wanted: Sequence[int]) -> list[
             [[matrix, -carried[:, None]], [-carried[None], None]], format="csc"
         )
         factored = factorize(bordered, pivot=PIVOT)
-        full = factored.solve(np.append(np.zeros(len(carried)), -1.0))[:-1]  # hidden dofs too
+        full = factored.solve(np.append(np.zeros(len(carried)), -1.0))[:-1]  # includes hidden dofs
         full /= np.sqrt(full @ (linear.mass @ full))
         for j, other in enumerate(beside):
             at = _vibrating(other, np.append(full, value), factored)
@@ -248,16 +248,16 @@ def _linear(one: Asked) -> Linearized:
 
 
 def _on_free(linear: Linearized, motion: NDArray) -> NDArray:
-    """Motion (nf,) of the free dofs in one (3n,) of all nodes; 0 for those that are hidden."""
+    """Motion (nf,) of the free dofs from a motion (3n,) of all nodes; 0 for hidden dofs."""
     out = np.zeros(len(linear.free))
     out[linear.free < motion.size] = motion[linear.free[linear.free < motion.size]]
     return out
 
 
 def _vibrating(linear: Linearized, mode: NDArray, factored: Any) -> NDArray:
-    """Shape and eigenvalue (nf + 1,) of the mode beside one, with phi' M phi = 1."""
+    """Shape and eigenvalue (nf + 1,) of the mode near a given one, with phi' M phi = 1."""
     scale = np.ones(len(mode))
-    scale[-1] = 1.0 / abs(mode[-1])  # the eigenvalue counts by its relative change
+    scale[-1] = 1.0 / abs(mode[-1])  # scaled so that its relative change counts
 
     def step_at(scaled: NDArray) -> NDArray:
         shape, value = scaled[:-1], scaled[-1] / scale[-1]
@@ -270,7 +270,7 @@ def _vibrating(linear: Linearized, mode: NDArray, factored: Any) -> NDArray:
 
 # ------------------------------------------------------------------ frequency responses
 def responses(one: Asked, others: Sequence[Asked]) -> list[xarray.Dataset]:
-    """Frequency responses of a case, by the direct or harmonic method, and of those beside it."""
+    """Frequency responses, by the direct or harmonic method, of a case and its neighbors."""
     if (method := one.arguments["method"]) not in RESPONSES:
         raise InputError(f"{NONE} a response by another method than {', '.join(RESPONSES)}")
     cases = [_Driven(each) for each in (one, *others)]
@@ -292,11 +292,11 @@ def responses(one: Asked, others: Sequence[Asked]) -> list[xarray.Dataset]:
 
 
 def _silent(_: Progress) -> None:
-    """Tell nobody how far it is."""
+    """Ignore progress."""
 
 
 def _direct(cases: Sequence[_Driven], omegas: NDArray) -> NDArray[np.complex128]:
-    """Responses (c, f, nf) of the first case and of those beside it by the direct method."""
+    """Responses (c, f, nf) of the first case and its neighbors by the direct method."""
     linear, beside = cases[0].linear, cases[1:]
     found = np.full((len(cases), len(omegas), len(linear.free)), np.nan, np.complex128)
     matrices = sparse.block_diag([each.matrices for each in beside], format="csr")
@@ -314,7 +314,7 @@ def _direct(cases: Sequence[_Driven], omegas: NDArray) -> NDArray[np.complex128]
 def _left(
     beside: Sequence[_Driven], matrices: sparse.csr_array, omega: float, x: NDArray
 ) -> NDArray[np.complex128]:  # fmt: skip
-    """Forces (nf, c) that responses (nf, c) of cases leave out of balance."""
+    """Out-of-balance forces (nf, c) of responses (nf, c) of the cases."""
     parts = np.stack([np.real(x.T).ravel(), np.imag(x.T).ravel()], axis=1)
     products = ((matrices @ parts) @ (1.0, 1.0j)).reshape(len(beside), 3, -1)
     each = zip(beside, products, x.T, strict=True)
@@ -324,7 +324,7 @@ def _left(
 def _repeated(
     x: NDArray, count: int, left: Callable[[NDArray], NDArray], factors: Any
 ) -> NDArray[np.complex128]:  # fmt: skip
-    """Responses (c, nf) beside one (nf,), where no forces are left."""
+    """Balanced responses (c, nf) near one response (nf,)."""
     begin = np.repeat(x[:, None], count, axis=1)
     size = float(np.linalg.norm(x))
     return refined(begin, lambda each: -factors.solve(left(each)), size).T
@@ -333,7 +333,7 @@ def _repeated(
 def _harmonic(
     cases: Sequence[_Driven], omegas: NDArray, response: NDArray
 ) -> NDArray[np.complex128]:
-    """Responses (c, f, nf) by the harmonic method, that (f, nf) of the first case given."""
+    """Responses (c, f, nf) by the harmonic method, given the response (f, nf) of the first case."""
     if len(cases[0].linear.modal):
         raise InputError(f"{NONE} a harmonic response with modal damping")
     values = np.array([each.drive.value for each in cases])
@@ -343,7 +343,7 @@ def _harmonic(
         x, omega = response[k] * values[0], float(omegas[k])
         stiffness = [dynamic_stiffness(each.linear, omega) for each in cases]
         loads = [each.drive.value * each.load(omega) for each in cases]
-        own = balances[0].left(stiffness[0], x, loads[0])  # with which it was content
+        own = balances[0].left(stiffness[0], x, loads[0])  # residual at which it stopped
         beside = [*zip(balances[1:], stiffness[1:], loads[1:], strict=True)]
         factors = _InParts(balances[0].tangent(stiffness[0], x))
         left = partial(_out_of_balance, beside, own)
@@ -354,7 +354,7 @@ def _harmonic(
 def _out_of_balance(
     beside: Sequence[tuple[Hinges, sparse.csc_array, NDArray]], own: NDArray, x: NDArray
 ) -> NDArray[np.complex128]:
-    """Forces (nf, c) that motions (nf, c) of cases leave out of balance beyond those of one."""
+    """Out-of-balance forces (nf, c) of motions (nf, c), beyond the residual of the first case."""
     each = zip(beside, x.T, strict=True)
     forces = [hinges.left(matrix, motion, load) for (hinges, matrix, load), motion in each]
     return np.stack(forces, axis=1) - own[:, None]
@@ -374,7 +374,7 @@ class _InParts:
 
 
 class _Driven:
-    """A case linearized, and what drives it."""
+    """A linearized case and its drive."""
 
     def __init__(self, one: Asked) -> None:
         harmonically = one.arguments["method"] == "harmonic"
@@ -391,12 +391,12 @@ class _Driven:
         return np.sum(parts, axis=0).astype(complex)
 
     def left(self, products: NDArray, x: NDArray, omega: float) -> NDArray:
-        """Out-of-balance force (nf,) of a response x, from the products (3, nf) with it."""
+        """Out-of-balance force (nf,) of a response x, from its matrix products (3, nf)."""
         elastic, damped, inertia = products
         rows = self.linear.modal
         damped = damped + rows.T @ (rows @ x) if len(rows) else damped
         return elastic - omega**2 * inertia + 1j * omega * damped - self.load(omega)
 
     def absolute(self, response: NDArray) -> NDArray[np.complex128]:
-        """Response (f, n, 3) from that of the free dofs (f, nf)."""
+        """Response (f, n, 3) from the response of the free dofs (f, nf)."""
         return absolute(self.linear, self.drive, response)

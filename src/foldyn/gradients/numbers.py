@@ -1,7 +1,7 @@
-"""The numbers that a case is made of, as solvers see them: between parameters and results.
+"""The numbers that define a case for the solvers: between parameters and results.
 
-Gradients of results are taken by these numbers (`mechanics.pullback`), and these numbers are
-differentiated by the parameters of a design (`gradients.parameters`).
+Gradients of results are taken with respect to these numbers (`mechanics.pullback`), and these
+numbers are differentiated by the parameters of a design (`gradients.parameters`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from foldyn.errors import InputError
 from foldyn.mechanics.pullback import Arrays, Pullback, arrays_of_body
 
 Gradient = Mapping[str, NDArray]
-"""Derivatives of a number by arrays of numbers, by the name of these."""
+"""Derivatives of a quantity by arrays of numbers, by the name of the array."""
 
 
 def numbers_of(case: Case) -> Arrays:
@@ -30,7 +30,7 @@ def numbers_of(case: Case) -> Arrays:
         for k, (vector, _) in enumerate(getattr(case, f"{kind}_terms")):
             numbers[f"{kind}.{k}"] = np.asarray(vector, float)
     layout["held"] = case.fixed
-    if case.constraints:  # no solver has derivatives by what they tie: any change shows in these
+    if case.constraints:  # no solver differentiates ties: any change of them shows here
         basis = case.constraints.basis
         numbers["constraints"] = basis @ np.random.default_rng(0).uniform(1.0, 2.0, basis.shape[1])
     numbers["alpha"], numbers["beta"] = np.array([[case.rayleigh.alpha], [case.rayleigh.beta]])
@@ -43,7 +43,7 @@ def numbers_of(case: Case) -> Arrays:
 
 
 def numbers_of_motion(packed: Packed, start: tuple[NDArray, NDArray]) -> Arrays:
-    """Numbers of a case as motions have it in memory, and its state at the start."""
+    """Numbers of a case as packed for motions, and its initial state."""
     arrays, system, mass = arrays_of_body(packed.body), packed.system, packed.mass
     numbers = {
         **arrays.numbers,
@@ -55,7 +55,7 @@ def numbers_of_motion(packed: Packed, start: tuple[NDArray, NDArray]) -> Arrays:
         "start.velocity": start[1],
     }
     ties = system.ties
-    if len(ties.slave):  # no solver has derivatives by what they tie
+    if len(ties.slave):  # no solver differentiates ties
         numbers["constraints"] = ties.masters.value
     waves = system.waves._asdict()
     waves = {f"histories.{key}": np.asarray(waves[key]) for key in waves if key != "address"}
@@ -75,7 +75,7 @@ def numbers_of_motion(packed: Packed, start: tuple[NDArray, NDArray]) -> Arrays:
 
 
 def nothing(case: Case, pullback: Pullback) -> dict[str, NDArray]:
-    """Gradient of nothing by the numbers of a case whose body's forces are differentiated."""
+    """Zero gradient by the numbers of a case, given the pullback of its body's forces."""
     total = {name: np.zeros_like(out) for name, out in pullback.gradient.items()}
     for kind in ("load", "imposed"):
         for k, (vector, _) in enumerate(getattr(case, f"{kind}_terms")):

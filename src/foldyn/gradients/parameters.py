@@ -1,13 +1,14 @@
-"""From the parameters of a design to the numbers of its case, differentiated.
+"""Derivatives of a case's numbers with respect to the parameters of a design.
 
-Nothing is solved to build a case, so that central differences of its numbers are cheap; they are of
-the fourth order, with steps of a thousandth, and right to about 1e-11.
+Building a case solves nothing, so that central differences of its numbers are cheap; they are of
+fourth order, with steps of a thousandth, and accurate to about 1e-11.
 
-All entries of an array are changed at once where each number of the case depends on one of them, as
-stiffnesses do on those of their creases. Which one is found exactly: some of the entries are
-changed at a time, in groups, and each entry is in a set of groups of its own, all of one size. A
-number that depends on one entry changes with as many groups, a number that depends on several with
-more, and then entries are changed one by one, as thicknesses of panels that share an edge are.
+All entries of an array are changed at once if each number of the case depends on one of them, as
+stiffnesses do on the stiffnesses of their creases. The entry is identified exactly: groups of
+entries are changed in turn, and each entry is in its own set of groups, all sets of one size. A
+number that depends on one entry changes with that many groups. A number that depends on several
+changes with more, and then entries are changed one by one, such as thicknesses of panels that share
+an edge.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ from foldyn.mechanics.pullback import Arrays
 from foldyn.values import numbers, show
 
 STEP = 1e-3  # of the size of a parameter
-SHORTER = STEP, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8  # of measures, as energies near a kink of a law
-SMOOTH = 1e-5  # of a change: what is of the third order within a step that is short enough
-LEAST = 1e-6  # of a value: smaller changes are hidden by its rounding
-GOLDEN = 0.6180339887498949  # multiples of it, less whole numbers, differ from each other
-SILENT = 1e-11, 1e-12  # of a number, and of the largest of its array: rounding of a change
+SHORTER = STEP, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8  # for measures, such as energies near a kink of a law
+SMOOTH = 1e-5  # of a change: most third-order part within a step that is short enough
+LEAST = 1e-6  # of a value: smaller changes are lost in round-off
+GOLDEN = 0.6180339887498949  # its multiples modulo 1 are all distinct
+SILENT = 1e-11, 1e-12  # of a number, and of the largest of its array: round-off of a change
 KINK = (
     "{}: the numbers of the case ({}) have a kink here, where their slopes jump, as where another "
     "diagonal of a panel becomes the shorter one, or a corner passes 120 degrees: the gradient is "
@@ -41,10 +42,10 @@ Build = Callable[..., Any]
 
 
 class Slope(NamedTuple):
-    """How the numbers of a case change with the entries of a parameter, each with its own.
+    """Derivatives of a case's numbers by a parameter, if each depends on one entry.
 
-    by : of each array how each number changes.
-    entry : of each array to which entry that belongs, -1 for none.
+    by : derivatives, by array of numbers.
+    entry : entry on which each number depends, by array; -1 for none.
     """
 
     by: Mapping[str, NDArray]
@@ -52,7 +53,7 @@ class Slope(NamedTuple):
     count: int
 
     def pulled(self, gradient: Gradient) -> NDArray:
-        """Derivatives (count,) of a number with this gradient."""
+        """Derivatives (count,) of a quantity by the parameter, from its gradient by numbers."""
         out = np.zeros(self.count)
         for name, by in self.by.items():
             here = self.entry[name] >= 0
@@ -63,16 +64,16 @@ class Slope(NamedTuple):
 
 
 class Parameters:
-    """Parameters of a design where its gradient is sought.
+    """Parameters of a design at the point where its gradient is taken.
 
     Parameters
     ----------
     build : callable
-        Case from values of the parameters.
+        Returns a case from values of the parameters.
     values : mapping
         Numbers, or arrays of one dimension.
     steps : mapping
-        Of parameters that are 0 and the like: their size, of which the step is a thousandth.
+        Sizes of parameters that are 0, or others; steps are a thousandth of the size.
     """
 
     def __init__(self, build: Build, values: Values, steps: Values) -> None:
@@ -98,7 +99,7 @@ class Parameters:
             raise InputError(f": build cannot take these parameters ({error})", "build") from error
 
     def size(self, name: str) -> NDArray:
-        """What a parameter is measured by, of its shape."""
+        """Scale of a parameter, in its shape."""
         value = self.values[name]
         if name in self.steps:
             return np.broadcast_to(np.asarray(self.steps[name], float), value.shape)
@@ -113,7 +114,7 @@ class Parameters:
         return np.where(own > LEAST * common, own, common)
 
     def moved(self, name: str, direction: NDArray, by: float) -> Any:
-        """The case with a parameter moved by so much of a direction."""
+        """The case with a parameter moved by a multiple of a direction."""
         try:
             return self.case({name: self.values[name] + by * direction})
         except FoldynError as error:
@@ -126,9 +127,9 @@ class Parameters:
     def slopes(
         self, numbers_of: Callable[[Any], Arrays], steps: Sequence[float] = (STEP,)
     ) -> dict[str, Slope]:
-        """How the numbers of the case change with each of the parameters.
+        """Derivatives of the numbers of the case by each of the parameters.
 
-        steps : of differences; shorter ones where the numbers are not smooth within the others.
+        steps : of differences; shorter ones are tried if the numbers are not smooth within them.
         """
         here = numbers_of(self.case())
         return {name: self._slope(name, numbers_of, here, steps) for name in self.values}
@@ -170,7 +171,7 @@ class Parameters:
         self, at: Callable[[NDArray, float], Mapping[str, NDArray]], size: NDArray,
         here: Mapping[str, NDArray],
     ) -> dict[str, NDArray] | None:  # fmt: skip
-        """Entry on which each number depends, -1 for none; None where one depends on several."""
+        """Entry on which each number depends, -1 for none; None if one depends on several."""
         count = len(size)
         groups = next(m for m in range(2, 64) if math.comb(m, m // 2) >= count)
         sets = list(islice(combinations(range(groups), groups // 2), count))
@@ -206,12 +207,12 @@ def _difference(
     step: float, ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDArray,
     here: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Rate of numbers from those a step and two steps ahead and behind."""
+    """Derivative of numbers, from values one and two steps ahead and behind."""
     return _seen((8.0 * (ahead - behind) - (far_ahead - far_behind)) / (12.0 * step), here)
 
 
 def _smooth(ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDArray) -> bool:
-    """Whether numbers change by twice as much in twice the step, but for a little."""
+    """Whether changes of numbers over two steps are nearly twice those over one."""
     one, two = ahead - behind, far_ahead - far_behind
     return bool((np.abs(two - 2.0 * one) <= SMOOTH * np.abs(one).max(initial=0.0)).all())
 
@@ -219,9 +220,9 @@ def _smooth(ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDA
 def _kinked(
     here: NDArray, ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDArray
 ) -> bool:
-    """Whether slopes of numbers jump: what is of the second order then grows with the step alone.
+    """Whether slopes jump, so that the even part of a change is linear in the step.
 
-    The last four are changes of the numbers, a step and two steps ahead and behind.
+    Arguments after `here` are changes of the numbers, one and two steps ahead and behind.
     """
     bent, far = np.abs(ahead + behind), np.abs(far_ahead + far_behind)
     least = max(
@@ -231,19 +232,19 @@ def _kinked(
 
 
 def _seen(rate: NDArray, here: NDArray) -> NDArray:
-    """Rate of numbers, 0 where it is but their rounding."""
+    """Derivative of numbers, set to 0 where it is round-off."""
     size = np.abs(here)
     rounding = SILENT[0] * size + SILENT[1] * size.max(initial=0.0)
     return np.where(np.abs(rate) > rounding, rate, 0.0)
 
 
 class Columns(NamedTuple):
-    """The same where numbers depend on several entries: of each entry how all numbers change."""
+    """Derivatives of a case's numbers by each entry, if numbers depend on several."""
 
     by: list[dict[str, NDArray]]
 
     def pulled(self, gradient: Gradient) -> NDArray:
-        """See `Slope`."""
+        """Derivatives (count,) of a quantity by the parameter; see `Slope`."""
         return np.array(
             [
                 sum(
@@ -257,7 +258,7 @@ class Columns(NamedTuple):
 
 
 def _known(gradient: Gradient, name: str) -> NDArray:
-    """Derivative by the numbers of a name."""
+    """Derivative by the named array of numbers; refuses unknown ones."""
     if name not in gradient:
         raise InputError(
             f"the design changes numbers of the case ({name}) by which there are no derivatives; "
@@ -267,7 +268,7 @@ def _known(gradient: Gradient, name: str) -> NDArray:
 
 
 def checked(values: Values, argument: str = "parameters") -> dict[str, NDArray]:
-    """Values of parameters as arrays."""
+    """Checked values of parameters as arrays."""
     if not isinstance(values, Mapping) or not values:
         raise InputError(f" = {show(values)}: give a mapping of names to values", argument)
     found = {}

@@ -1,13 +1,13 @@
-"""Gradients of numbers that are functions of equilibria on a path.
+"""Gradients of functions of equilibria on a path.
 
-An equilibrium R(u, f; p) = 0 has K du = -R_p dp - R_f df. Three kinds of points stay well defined
-as the parameters p change:
+An equilibrium R(u, f; p) = 0 satisfies K du = -R_p dp - R_f df. Three kinds of points remain well
+defined as the parameters p change:
 
-- at a given load factor, where df = 0;
-- a limit point, where phi' K = 0 and so df = -phi' R_p dp / (phi' R_f);
-- one at which a node has moved so far, e' u = const: with K mu = e, df = -mu' R_p dp / (mu' R_f).
+- a point at a given load factor, with df = 0;
+- a limit point, with phi' K = 0 and so df = -phi' R_p dp / (phi' R_f);
+- a point at a given nodal displacement e' u: with K mu = e, df = -mu' R_p dp / (mu' R_f).
 
-All take -w' R_p dp of the forces' pullback with some weights w.
+All need -w' R_p dp, from the pullback of the forces with some weights w.
 """
 
 from __future__ import annotations
@@ -32,22 +32,22 @@ from foldyn.statics.stability import softest_modes
 KNOWN = ("displacement", "reaction", "load_factor", "load_at")
 GIVEN = ("newton", "displacement")
 """Methods whose points have given load factors."""
-DENSE = 300  # dofs up to which the shape of a limit point is found from all
+DENSE = 300  # dofs up to which the shape at a limit point is found from a dense matrix
 
 
 class PathGradient:
-    """An equilibrium path, and gradients of numbers that are functions of its points.
+    """An equilibrium path, with gradients of functions of its points.
 
     Parameters
     ----------
     case : Case
     arguments : mapping
-        Of `fd.path`.
+        Arguments of `fd.path`.
 
     Attributes
     ----------
     result : xarray.Dataset
-        As `fd.path` returns it.
+        As from `fd.path`.
     """
 
     def __init__(self, case: Case, arguments: Mapping[str, Any]) -> None:
@@ -58,14 +58,14 @@ class PathGradient:
         self._balances: dict[int, Balance] = {}
 
     def numbers(self, case: Case) -> Arrays:
-        """Numbers of a case by which gradients are taken."""
+        """Numbers of a case with respect to which gradients are taken."""
         return numbers_of(case)
 
     def backward(self, seeds: Mapping[str, Any]) -> Gradient:
-        """Gradient of a number by the numbers of the case.
+        """Gradient with respect to the numbers of the case.
 
-        seeds : its derivatives by variables of the result, and by load factors where nodes have
-            moved so far: "load_at", a mapping of (dof, displacement) to them.
+        seeds : derivatives of the quantity by variables of the result, and by load factors at given
+            nodal displacements: "load_at", a mapping from (dof, displacement) to derivatives.
         """
         if unknown := [name for name in seeds if name not in KNOWN]:
             raise InputError(
@@ -84,7 +84,7 @@ class PathGradient:
         return total
 
     def _add_point(self, k: int, seeds: Mapping[str, Any], total: dict[str, NDArray]) -> None:
-        """Add what is a function of the displacement and reactions at a point, and its factor."""
+        """Add the part of the displacement, reactions and load factor at a point."""
         case, result = self.case, self.result
         moved, pulled, climbed = (
             np.ravel(seeds[name][k]) if name in seeds else np.zeros(1) for name in KNOWN[:3]
@@ -122,7 +122,7 @@ class PathGradient:
     def _add_factor(
         self, moved: Moved, weight: NDArray, seed: float, total: dict[str, NDArray]
     ) -> None:
-        """Add the derivatives of a load factor df = -w' R_p dp / (w' R_f), times a seed."""
+        """Add the derivatives of a load factor, df = -w' R_p dp / (w' R_f), times a seed."""
         case, q = self.case, self.case.body.dofs(moved.displacement)
         growing = sum((vector for vector, _ in case.load_terms), np.zeros_like(moved.displacement))
         motion = sum(
@@ -141,7 +141,7 @@ class PathGradient:
         seen_through(case, q, np.zeros(len(q)), adjoint, self._pullback, total, moved.factor)
 
     def _soft(self, q: NDArray) -> NDArray:
-        """Motion (m,) that meets no stiffness at a limit point."""
+        """Motion (m,) without stiffness at a limit point."""
         free, block = free_block(self.case, q)
         scale = 1e-12 * float(np.abs(block.diagonal()).max())
         factors = splu(sparse.csc_array(block + scale * sparse.eye_array(block.shape[0])))
@@ -152,7 +152,7 @@ class PathGradient:
 
 
 def _refuse(case: Case, arguments: Mapping[str, Any]) -> None:
-    """Refuse paths that have no derivatives yet, with a remedy."""
+    """Refuse paths without derivatives, with a remedy."""
     lacks = {
         "contact": case.contact is not None,
         "creases that yield, creep or relax": bool(case.remembering),

@@ -1,4 +1,4 @@
-"""`sensitivity`: numbers that are taken of a result, and their exact gradients."""
+"""`sensitivity`: measures of a result, and their exact gradients."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ KINDS: Mapping[str, Callable[[Case, Mapping[str, Any]], Differentiated]] = {
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "modes": modes, "frf": frf, "dynamics": simulate, "statics": trace,
 }  # fmt: skip
-"""What computes them, whose arguments they take."""
+"""Functions of these analyses, which define their arguments."""
 LENGTH = "bar_length"
 ARRAYS = (
     "fold_stiffness", "fold_rest", "bend_stiffness", "bend_rest", "bar_area", LENGTH,
     "node_mass",
 )  # fmt: skip
-"""Arrays of a structure that can be parameters as they are."""
+"""Arrays of a structure that can be parameters themselves."""
 Source = Callable[..., Case] | Case | str | os.PathLike[str]
 Own = tuple[Callable[..., float], Callable[..., Seeds]]
 
@@ -71,44 +71,44 @@ def sensitivity(
     sizes: Values | None = None,
     along: Values | None = None,
 ) -> xr.Dataset:
-    """Numbers that are taken of a result, and their exact gradients.
+    """Values of measures of a result, and their exact gradients.
 
     Parameters
     ----------
     build : callable, Case or path
-        ``build(**parameters)`` returns the case; or a case file, whose parameters are keys, as
-        "pattern.panel_angle"; or a case, whose parameters are arrays of its structure:
+        ``build(**parameters)`` returns the case; or a case file, with keys as parameters, such as
+        "pattern.panel_angle"; or a case, with arrays of its structure as parameters:
         `fold_stiffness` and `bend_stiffness` (N m/rad, of whole hinges), `fold_rest` and
-        `bend_rest` (rad), `bar_area` (m2), `bar_length` (m, to which bars were cut: those that do
-        not fit are strained at rest), `node_mass` (kg).
+        `bend_rest` (rad), `bar_area` (m2), `bar_length` (m, the cut length: bars that do not fit
+        are strained at rest), `node_mass` (kg).
     parameters : mapping, or names of arrays of a case
-        Where the gradient is taken: numbers, or arrays of one dimension, whose entries count one by
-        one. Arrays of a case are taken where they stand.
+        Where the gradient is taken: numbers, or arrays of one dimension, each of whose entries is a
+        parameter. Names of a case's arrays take their present values.
     measures : str, sequence of str, or mapping
         Measures of a sweep, as "frequency[2]", and expressions of them, as
-        "-frequency[2] / frequency[1]"; or own ones by name: pairs of a function of the result and
-        the case, and one that returns its derivatives by variables of the result, by name.
+        "-frequency[2] / frequency[1]"; or your own by name: pairs of a function of the result and
+        the case, and a function that returns its derivatives by variables of the result, by name.
     analysis : mapping, optional
-        What is computed: its kind, "modes", "statics", "dynamics" or "frf", and arguments of
+        The analysis: its kind, "modes", "statics", "dynamics" or "frf", and arguments of
         `fd.modes`, `fd.path`, `fd.simulate` or `fd.frf`. A case file has its own.
     sizes : mapping, optional
-        Sizes of parameters that are 0 where the gradient is taken: a case is built for differences
-        of a thousandth of them.
+        Sizes of parameters that are 0 where the gradient is taken: differences change a parameter
+        by a thousandth of its size.
     along : mapping, optional
-        A direction: its rates of the parameters. The result then has one derivative, in this
-        direction, where modes that have one frequency part too.
+        A direction: rates of the parameters. The result then has one derivative, in this
+        direction, which also exists for modes of equal frequency.
 
     Returns
     -------
     xarray.Dataset
         `value` (measure,), and for each parameter `gradient_<name>` (measure,), or
         (measure, <name>_entry) of an array, per unit of the parameter; with `along` instead
-        `derivative` (measure,). Attributes: the kind of the analysis and the time it all took.
+        `derivative` (measure,). Attributes: the kind of the analysis and the total time.
 
     Raises
     ------
     InputError
-        A measure or a parameter has no derivative there: the message says why, and what has.
+        A measure or a parameter has no derivative there; the message gives reason and remedy.
     ComputationError
         The analysis fails.
 
@@ -119,10 +119,9 @@ def sensitivity(
 
     Notes
     -----
-    Derivatives of the mechanics are analytic, those of the numbers that a case is made of by its
-    parameters central differences of the fourth order, in which nothing is solved. Motions are
-    differentiated as they were computed, step by step, with steps that stay as they are: give `dt`
-    where it should not depend on the case.
+    Derivatives of the mechanics are analytic; derivatives of a case's numbers by its parameters are
+    central differences of fourth order, which solve nothing. Motions are differentiated as
+    computed, step by step, with fixed steps: give `dt` if it should not depend on the case.
 
     Examples
     --------
@@ -179,7 +178,7 @@ def _sizes(given: Values | None) -> dict[str, NDArray]:
 
 
 class Sourced(NamedTuple):
-    """What is differentiated: how a case is built, where, and what is computed."""
+    """What to differentiate: how a case is built, the parameters, and the analysis."""
 
     build: Callable[..., Case]
     values: dict[str, NDArray]
@@ -197,7 +196,7 @@ class Sourced(NamedTuple):
 
 
 def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None) -> Sourced:
-    """Check what `sensitivity` is to differentiate."""
+    """Check the case source, parameters and analysis of `sensitivity`."""
     if analysis is not None:
         of_kind("analysis", analysis, Mapping)
     if isinstance(build, Case):
@@ -223,16 +222,16 @@ def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None
     kind = choice("analysis.kind", analysis["kind"], tuple(KINDS))
     arguments = {name: value for name, value in analysis.items() if name != "kind"}
     known = [*signature(FUNCTIONS[kind]).parameters.values()][1:]
-    if all(one.kind is not one.VAR_KEYWORD for one in known):  # `frf` has options of its methods
+    if all(one.kind is not one.VAR_KEYWORD for one in known):  # `frf` takes options of methods
         for name in arguments:
             choice("analysis", name, [one.name for one in known])
     return Sourced(build, values, kind, arguments)
 
 
 def _by_lengths(areas: Slope, numbers: Gradient) -> Slope:
-    """How numbers change with the lengths to which bars are cut, from how they do with EA / L0.
+    """Derivatives of numbers by the cut lengths of bars, from derivatives by EA / L0.
 
-    With x = (l^2 - L^2) / L^2 the excess of a bar of the length l, and its stiffness EA / L.
+    x = (l^2 - L^2) / L^2 is the excess of a bar of length l cut to L, and EA / L its stiffness.
     """
     name = next(key for key in numbers if key.endswith("bar_stiffness"))
     prefix = name.removesuffix("bar_stiffness")
@@ -246,7 +245,7 @@ def _by_lengths(areas: Slope, numbers: Gradient) -> Slope:
 
 
 def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, NDArray]]:
-    """A case whose structure has other arrays."""
+    """A function that returns the case with other arrays of its structure, and their values."""
     given = (
         names
         if isinstance(names, Mapping)
@@ -257,7 +256,7 @@ def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, N
         choice("parameters", name, ARRAYS)
         _check_acts(case.structure, name)
         own = getattr(case.structure, name)
-        if own is None:  # masses by a rule
+        if own is None:  # masses from a rule
             own = case.structure.mass.sum(axis=1)
         values[name] = own if value is None else value
         if np.shape(values[name]) != np.shape(own):
@@ -267,7 +266,7 @@ def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, N
             )
 
     def build(**arrays: NDArray) -> Case:
-        if LENGTH in arrays:  # no structure has bars that do not fit: see `by_lengths`
+        if LENGTH in arrays:  # no structure has bars that do not fit: see `_by_lengths`
             share = arrays.pop(LENGTH) / case.structure.bar_length
             arrays["bar_area"] = arrays.get("bar_area", case.structure.bar_area) * share
         return replace(case, structure=replace(case.structure, **arrays))
@@ -276,7 +275,7 @@ def _of_arrays(case: Case, names: Any) -> tuple[Callable[..., Case], dict[str, N
 
 
 def _check_acts(structure: Any, name: str) -> None:
-    """Refuse arrays that a structure does not work with."""
+    """Refuse arrays that have no effect in a structure."""
     if not isinstance(structure, Structure):
         raise InputError(": a shell has no such arrays; give a function that builds it", name)
     if name == "node_mass" and not is_lumped(structure.mass):
@@ -300,7 +299,7 @@ def _check_acts(structure: Any, name: str) -> None:
 
 
 def case_file_at(place: Path, document: dict[str, Any], values: Mapping[str, Any]) -> CaseFile:
-    """A case file with other values of its keys."""
+    """A case file with other values for some keys."""
     plain = {key: np.asarray(value).tolist() for key, value in values.items()}
     changed = replaced(document, plain)
     return case_of_document(place, {k: v for k, v in changed.items() if k not in ASIDE})
@@ -309,7 +308,7 @@ def case_file_at(place: Path, document: dict[str, Any], values: Mapping[str, Any
 def _of_file(
     path: str | os.PathLike[str], parameters: Any
 ) -> tuple[Callable[..., Case], dict[str, NDArray], dict[str, Any]]:
-    """A case file with other values of its keys; its analysis."""
+    """A function that returns the case for other key values, these values, and the analysis."""
     place = path_of(path, "build")
     document = read_document(place)
 
@@ -344,7 +343,7 @@ def _wanted(measures: Any, kind: str) -> list[Wanted]:
 
 
 def _of_registry(text: str, kind: str) -> Wanted:
-    """An expression of measures of the registry."""
+    """An expression of registered measures."""
     expression = parse(text)
     measures = {}
     for name in expression.measures:
@@ -363,13 +362,13 @@ def _own(name: str, pair: Any) -> Wanted:
 
 
 def _own_of(function: Callable[..., float]) -> Callable[..., Callable[[Case], float]]:
-    """A user's function where the result stays as it is."""
+    """A user's function of the case, with the result held fixed."""
     return lambda result, case: lambda other: float(function(result, other))
 
 
 # ------------------------------------------------------------------ directions
 def _direction(along: Values, design: Parameters) -> dict[str, NDArray]:
-    """Rates (count,) of the parameters of a direction."""
+    """Rates (count,) of the parameters in a direction."""
     found = {}
     for name, rate in checked(along, "along").items():
         if name not in design.values:
@@ -382,5 +381,5 @@ def _direction(along: Values, design: Parameters) -> dict[str, NDArray]:
 def _rate(
     slopes: Mapping[str, Slope], direction: Mapping[str, NDArray], gradient: Gradient
 ) -> float:
-    """Rate of a number with this gradient in a direction."""
+    """Derivative of a quantity in a direction, from its gradient."""
     return sum(float(rate @ slopes[name].pulled(gradient)) for name, rate in direction.items())
