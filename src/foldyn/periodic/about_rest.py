@@ -1,13 +1,13 @@
-"""Free motions about an equilibrium, accurate however small they are.
+"""Free motions about an equilibrium, accurate for arbitrarily small amplitudes.
 
-Dihedrals come from the places of nodes, and lose the digits by which these exceed the motion. So
-near the equilibrium x0 forces f and energies V are sums of tangents K,
+Dihedrals are computed from node positions, and lose the digits by which these exceed the motion. So
+near the equilibrium x0 forces f and energies V are integrated from tangents K,
 
     f(x) = int_0^1 K d ds,    V(x) = V(x0) + int_0^1 (1 - s) d' K d ds,
 
-with d = x - x0 and K at x0 + s d: wherever that agrees with them to what they lose, which it does
-unless laws bend in between. About the rest position these are the hinges' alone, as bars there have
-the stretch of small displacements exactly.
+with d = x - x0 and K at x0 + s d, if the result agrees with them to within their loss of accuracy,
+as it does unless laws bend in between. About the rest position only the hinges are integrated, as
+bars there are accurate for small displacements.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from foldyn.mechanics.assembly import Assembly
 from foldyn.periodic.equation import EPS, Equation, Instants
 
-SMALL = 1e-3  # of the sheet: the largest motion that counts as small
-LOST = 100.0  # times the rounding of places over the motion: what its forces lose at most
+SMALL = 1e-3  # of the sheet: largest motion that counts as small
+LOST = 100.0  # times the rounding of positions over the motion: largest loss of accuracy of forces
 SHARES = np.array([0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)])  # Gauss's
 WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
 
 class AboutRest(Instants):
-    """The equation without its drive; see the module's text.
+    """The equation without its drive; see the module docstring.
 
     Parameters
     ----------
@@ -42,12 +42,12 @@ class AboutRest(Instants):
         self._tangents = equation.tangents.of(self._part)
 
     def forces(self, x: NDArray) -> NDArray:
-        """See `Instants`."""
+        """Forces f (s, k), N; see `Instants`."""
         plain, found = super().forces(x), self._summed(x)
         return plain if found is None else plain + found[0]
 
     def energies(self, x: NDArray) -> NDArray:
-        """Above that of the equilibrium (s,), J."""
+        """Energies (s,), J, above the equilibrium."""
         found = self._summed(x)
         if found is None:
             return super().energies(x) - super().energies(np.tile(self._place, (len(x), 1)))
@@ -55,9 +55,9 @@ class AboutRest(Instants):
         return found[1] + others[1:] - others[0]
 
     def _summed(self, x: NDArray) -> tuple[NDArray, NDArray] | None:
-        """What forces (s, k) have lost, and energies (s,) above that at x0, of what is summed.
+        """Correction (s, k) of the forces, and integrated energies (s,) above x0.
 
-        None where motions are not small, or the sums do not hold.
+        None if motions are not small, or the integrals do not agree with the forces.
         """
         d, equation, part = x - self._place, self.equation, self._part
         size = float(np.abs(d @ equation.basis.T).max())
@@ -80,7 +80,7 @@ class AboutRest(Instants):
         return (lost, energy) if np.linalg.norm(lost) <= most else None
 
     def _others(self, u: NDArray) -> float:
-        """Energy of what is not summed at displacements (m,), J."""
+        """Energy (J) of the parts not integrated, at displacements (m,)."""
         body, part = self.bodies[0], self._part
         summed = dict(zip(part.energy_groups, part.energies(u), strict=True))
         every = zip(body.energy_groups, body.energies(u), strict=True)

@@ -7,7 +7,7 @@ With X (c, k) the coefficients, w the base frequency and F the forces at the sam
 G the values of the series at the samples and P the projection back (alternating frequency-time:
 Cameron and Griffin, J. Appl. Mech. 56, 1989). The tangents at the samples give the exact
 derivative, P K G (Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019). The
-base frequency is that of the drive over `multiple`, so that longer periods than its own fit in.
+base frequency is the drive frequency over `multiple`, so that longer periods are included.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Balance:
 
     @property
     def threads(self) -> AbstractContextManager:
-        """Those of LAPACK for matrices of all unknowns: one where they are few."""
+        """Limits LAPACK to one thread for small matrices of all unknowns."""
         return one_thread(math.prod(self.shape))
 
     @cached_property
@@ -53,14 +53,14 @@ class Balance:
         return np.ascontiguousarray(pairs.reshape(-1, len(self.fourier.phase)))
 
     def instants(self, level: float = 1.0) -> Instants:
-        """The equation at the samples, all that varies times a level."""
+        """The equation at the samples, with all varying terms times a level."""
         return self.equation.at(self.multiple * self.fourier.phase, level)
 
     def residual(self, x: NDArray, omega: float, at: Instants) -> NDArray:
         """R (c, k), N, of coefficients (c, k) under a drive of omega rad/s."""
         w, fourier = omega / self.multiple, self.fourier
         force = at.forces(fourier.values @ x) + at.driving(omega)
-        if not np.isfinite(force).all():  # it goes through what it touches
+        if not np.isfinite(force).all():  # passes through a contact
             return np.full_like(x, np.inf)
         out = w**2 * (self._bends * x) @ self.equation.mass + fourier.fit @ force
         return out if fourier.even else out + w * (fourier.rate @ x) @ self.equation.damping.T
@@ -91,23 +91,23 @@ class Balance:
 
 
 class Converged(NamedTuple):
-    """A solution of Newton's method."""
+    """A solution found by Newton's method."""
 
     x: NDArray
     iterations: int
 
 
 def newton(system, x: NDArray, tolerance: float, most: int = 25) -> Converged | None:
-    """Solve `system.residual(x) = 0`, or None.
+    """Solve `system.residual(x) = 0`; None if it does not converge.
 
-    Steps that lead through something, where forces of contact are not finite, are halved.
+    Steps are halved if they pass through a contact, where forces are not finite.
 
     Parameters
     ----------
     system
         Has `residual(x)` and `jacobian(x)` of vectors (n,), and `rounding` of the residual's norm.
     tolerance : float
-        Largest last step, as a fraction of the solution.
+        Largest size of the last step, as a fraction of the solution.
     """
     x, step, first = x.copy(), np.zeros_like(x), np.inf
     for iteration in range(most):
@@ -136,7 +136,7 @@ def newton(system, x: NDArray, tolerance: float, most: int = 25) -> Converged | 
 
 
 class AtFrequency:
-    """A balance at one frequency and level, as Newton's method takes it."""
+    """A balance at one frequency and level, in the form that Newton's method takes."""
 
     def __init__(self, balance: Balance, omega: float, level: float = 1.0) -> None:
         self.balance, self.omega, self.level = balance, omega, level
@@ -147,5 +147,5 @@ class AtFrequency:
         return self.balance.residual(x.reshape(self.balance.shape), self.omega, self.at).ravel()
 
     def jacobian(self, x: NDArray) -> NDArray:
-        """Its derivative."""
+        """Derivative (c k, c k) of R."""
         return self.balance.jacobian(x.reshape(self.balance.shape), self.omega, self.at)

@@ -1,7 +1,7 @@
-"""Bifurcations between two points of a family of forced motions: found, located and named.
+"""Bifurcations between two points of a family of forced motions: detected, located and named.
 
-With the parameter, multipliers pass through the unit circle at 1 (fold, or pitchfork where another
-branch crosses), at -1 (period doubling) or elsewhere in pairs (Neimark-Sacker): Kuznetsov, Elements
+As the parameter changes, multipliers cross the unit circle at 1 (fold, or pitchfork if another
+branch crosses), at -1 (period doubling) or in complex pairs (Neimark-Sacker): Kuznetsov, Elements
 of Applied Bifurcation Theory, 3rd ed. 2004, chapters 4 and 5.
 """
 
@@ -18,12 +18,12 @@ from foldyn.periodic.continuation import Point, Step, located
 FOLD, PITCHFORK = "fold", "pitchfork"
 DOUBLING, TORUS = "period doubling", "Neimark-Sacker"
 SURE = {FOLD: 1e-6, PITCHFORK: 1e-3, DOUBLING: 1e-3, TORUS: 1e-3}
-"""How near to zero what tells a bifurcation must come."""
-REAL = 1e-9  # imaginary part of a multiplier that is real
+"""How close to zero the test function of a bifurcation must come."""
+REAL = 1e-9  # largest imaginary part of a real multiplier
 
 
 class Event(NamedTuple):
-    """A bifurcation, and where it is."""
+    """A bifurcation and its location."""
 
     name: str
     point: Point
@@ -48,7 +48,7 @@ def events(family: Any, step: Step, of: Multipliers) -> list[Event]:
         found.append((DOUBLING, lambda point: _parity(of(point)) * _nearest(of(point), -1.0)))
     moduli = _moduli(of(one)), _moduli(of(other))
     counts = [int((pairs > 1.0).sum()) for pairs in moduli]
-    # a pair that crosses has not met on the real axis: it is one at both ends
+    # a pair that crosses has not met on the real axis: it exists at both ends
     if counts[0] != counts[1] and min(map(len, moduli)) >= max(counts):
         found.append((TORUS, lambda point: _modulus(_moduli(of(point)), max(counts)) - 1.0))
     events = []
@@ -65,7 +65,7 @@ def _along(one: Point, point: Point) -> float:
 
 
 def _nearest(found: Found, value: float) -> float:
-    """Distance of the real multiplier that is nearest to a value; of any if none is real."""
+    """Distance of the nearest real multiplier from a value; of any multiplier if none is real."""
     real = found[np.abs(found.imag) <= REAL].real
     return float(np.abs((real if len(real) else found) - value).min())
 
@@ -82,5 +82,5 @@ def _moduli(found: Found) -> NDArray:
 
 
 def _modulus(moduli: NDArray, place: int) -> float:
-    """One of them, counted from 1; 0 where there are fewer."""
+    """Modulus at a place, counted from 1; 0 if there are fewer."""
     return float(moduli[place - 1]) if len(moduli) >= place else 0.0

@@ -6,10 +6,10 @@ The accelerations a_i of the three stages of a step of length h solve
 
 Gauss's method, of order 6, is symplectic without damping, so that multipliers keep their pairs
 (m, 1/m): it integrates the variational equation (Hairer, Lubich and Wanner, Geometric Numerical
-Integration, 2nd ed. 2006, section II.1). Radau's IIA, of order 5, takes out what is faster than the
-steps, as the bars of a sheet are: it is for shooting (Hairer and Wanner, Solving Ordinary
-Differential Equations II, 2nd ed. 1996, section IV.5). Derivatives of a step are exact: they are
-those of its own equations.
+Integration, 2nd ed. 2006, section II.1). Radau's IIA, of order 5, damps motions faster than the
+steps, such as vibrations of a sheet's bars: it is used for shooting (Hairer and Wanner, Solving
+Ordinary Differential Equations II, 2nd ed. 1996, section IV.5). Derivatives of a step are exact:
+they are derivatives of its own equations.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ ROOT15, ROOT6 = np.sqrt(15.0), np.sqrt(6.0)
 
 
 class Tableau:
-    """Coefficients of a method of collocation, with those of displacements."""
+    """Coefficients of a collocation method, including those for displacements."""
 
     def __init__(self, c: NDArray, b: NDArray, a: NDArray) -> None:
         self.c, self.b, self.a, self.aa, self.ba = c, b, a, a @ a, b @ a
@@ -54,8 +54,8 @@ RADAU = Tableau(
     ),
 )
 ITERATIONS = 30
-SETTLED = 1e-10  # of the acceleration: the last step of Newton's method within a step
-STUCK = 0.5  # of the step before, at which rounding is reached
+SETTLED = 1e-10  # of the acceleration: last Newton step within a time step
+STUCK = 0.5  # of the previous step: a larger one means that round-off is reached
 
 
 def stage_phases(steps: int, tableau: Tableau = GAUSS) -> NDArray:
@@ -64,7 +64,7 @@ def stage_phases(steps: int, tableau: Tableau = GAUSS) -> NDArray:
 
 
 class Stages:
-    """Matrices of steps of one length in a linear equation of k unknowns."""
+    """Matrices of steps of one length for a linear equation of k unknowns."""
 
     def __init__(self, mass: NDArray, damping: NDArray, h: float, tableau: Tableau) -> None:
         self.mass, self.damping, self.h, self.tableau, k = mass, damping, h, tableau, len(mass)
@@ -78,7 +78,7 @@ class Stages:
         return lu_factor((self._fixed + added).reshape(self._size, self._size))
 
     def tangent_step(self, factors, stiffness: NDArray, motion: NDArray) -> NDArray:
-        """Motions (2k, n), displacements over velocities, a step later."""
+        """Motions (2k, n), displacements over velocities, one step later."""
         h, k, tableau = self.h, len(self.mass), self.tableau
         x, v = motion[:k], motion[k:]
         ahead = x + h * tableau.c[:, None, None] * v
@@ -91,8 +91,8 @@ class Stages:
 def monodromy(equation: Equation, stiffness: NDArray, w: float, drag: float) -> NDArray:
     """Matrix (2k, 2k) of small motions (x, dx/dtau) over a period, for tangents (steps, 3, k, k).
 
-    w : base frequency, rad/s; drag : 1/s. The factor exp(-drag t / 2) is taken out of the motion
-    before it is integrated, and put back exactly.
+    w : base frequency, rad/s; drag : 1/s. The factor exp(-drag t / 2) is removed from the motion
+    before integration, and restored exactly.
     """
     half = 0.5 * drag
     mass, damping = equation.mass, equation.damping
@@ -107,17 +107,17 @@ def monodromy(equation: Equation, stiffness: NDArray, w: float, drag: float) -> 
 
 
 class Shooting:
-    """A period of the motion from its start (x, dx/dtau), as Newton's method takes it.
+    """A period of the motion as a function of its start (x, dx/dtau), for Newton's method.
 
     Parameters
     ----------
     equation : Equation
     omega : float
-        Of the drive, rad/s.
+        Frequency of the drive, rad/s.
     steps : int
-        In a period of the drive.
+        Steps in a period of the drive.
     multiple : int
-        Periods of the drive in one of the motion.
+        Periods of the drive in one period of the motion.
     """
 
     rounding = 0.0
@@ -134,11 +134,11 @@ class Shooting:
         self._last: tuple[bytes, NDArray, NDArray] | None = None
 
     def residual(self, y: NDArray) -> NDArray:
-        """End of the period less its start (2k,)."""
+        """End of the period minus its start (2k,)."""
         return self.period(y)[0][-1] - y
 
     def jacobian(self, y: NDArray) -> NDArray:
-        """Its derivative: the monodromy less one."""
+        """Derivative of the residual: the monodromy matrix minus the identity."""
         return self.period(y)[1] - np.eye(len(y))
 
     def period(self, y: NDArray) -> tuple[NDArray, NDArray]:
@@ -165,7 +165,7 @@ class Shooting:
                 + at.forces(stage)
                 + driven
             )
-            if iteration and not np.isfinite(left).all():  # through something that it touches
+            if iteration and not np.isfinite(left).all():  # passes through a contact
                 step *= 0.5
                 a = a + step
                 continue

@@ -1,9 +1,9 @@
 """Pseudo-arclength continuation of a family of motions, R(z, p) = 0.
 
-A step goes ahead along the unit tangent and comes back to the curve at right angles to it (Keller,
-in Applications of Bifurcation Theory, ed. Rabinowitz, 1977; Seydel, Practical Bifurcation and
-Stability Analysis, 3rd ed. 2010, chapter 4). Lengths are measured as |dz| over the size of the
-motion there and |dp| over the range of the parameter.
+A step predicts along the unit tangent and corrects at right angles to it (Keller, in Applications
+of Bifurcation Theory, ed. Rabinowitz, 1977; Seydel, Practical Bifurcation and Stability Analysis,
+3rd ed. 2010, chapter 4). Lengths are measured as |dz| over the size of the motion there and |dp|
+over the range of the parameter.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
-ITERATIONS = 8  # of Newton's method in a step
+ITERATIONS = 8  # of Newton's method per step
 EASY = 4  # iterations up to which the next step is longer
 GROWTH, CUT = 1.5, 0.5
-NOISE = 10.0  # times the rounding of the residual: enough where branches cross
-STRAIGHT = np.cos(np.radians(25.0))  # between tangents at both ends of a step
-SMALLEST = 1e-5  # of the longest step: the branch is lost
-LOCATED = 1e-11  # of a step: how exactly special points are found
-MISSES = 8  # points that are not found, in a search for a special one
-NEAR = 0.2  # of a step: how far beside it a point may lie that it passes
+NOISE = 10.0  # times the rounding of the residual: sufficient where branches cross
+STRAIGHT = np.cos(np.radians(25.0))  # least cosine between the tangents at the ends of a step
+SMALLEST = 1e-5  # of the longest step: below it, the branch is lost
+LOCATED = 1e-11  # of a step: accuracy of located points
+MISSES = 8  # points not found in a search for a special one, after which it ends
+NEAR = 0.2  # of a step: largest distance of a point that a step passes
 
 
 class Family(Protocol):
@@ -58,7 +58,7 @@ class Family(Protocol):
         ...
 
     def size(self, z: NDArray) -> float:
-        """Norm of what moves."""
+        """Norm of the varying part of the motion."""
         ...
 
 
@@ -73,7 +73,7 @@ class Point:
     tangent : ndarray, shape (n + 1,)
         Unit tangent of the curve, dz and dp.
     side : float
-        Sign of the determinant of the bordered matrix: it changes where branches cross.
+        Sign of the determinant of the bordered matrix, which changes where branches cross.
     iterations : int
     """
 
@@ -90,7 +90,7 @@ def _weights(family: Family, z: NDArray) -> NDArray:
 
 
 def _bordered(family: Family, z: NDArray, p: float, row: NDArray):
-    """Factors of the derivative with a further row."""
+    """Factors of the derivative, bordered by a further row."""
     n = len(z)
     matrix = np.empty((n + 1, n + 1))
     matrix[:n, :n] = family.jacobian(z, p)
@@ -100,7 +100,7 @@ def _bordered(family: Family, z: NDArray, p: float, row: NDArray):
 
 
 def _side(factors) -> float:
-    """Sign of a determinant."""
+    """Sign of a determinant, from its factors."""
     lu, swaps = factors
     odd = np.count_nonzero(swaps != np.arange(len(swaps))) % 2
     return float(np.prod(np.sign(np.diag(lu))) * (-1.0 if odd else 1.0))
@@ -109,7 +109,7 @@ def _side(factors) -> float:
 def corrected(
     family: Family, z: NDArray, p: float, row: NDArray, most: int = ITERATIONS
 ) -> tuple[NDArray, float, int] | None:
-    """Nearest motion on the plane through (z, p) at right angles to a row (n + 1,), or None."""
+    """Motion near (z, p), on the plane through it normal to a row (n + 1,); None if not found."""
     z, p, last = z.copy(), p, np.inf
     for iteration in range(most):
         residual = family.residual(z, p)
@@ -131,19 +131,19 @@ def corrected(
 
 
 def point_at(family: Family, z: NDArray, p: float, along: NDArray, iterations: int = 0) -> Point:
-    """Point of a motion with the tangent that goes the way of `along` (n + 1,)."""
+    """Point of a motion, with the tangent in the direction of `along` (n + 1,)."""
     weights = _weights(family, z)
     row = weights * along
     factors = _bordered(family, z, p, row / np.abs(row).max())
     right = np.zeros(len(row))
     right[-1] = 1.0
-    tangent = lu_solve(factors, right, check_finite=False)  # goes the way of the row
+    tangent = lu_solve(factors, right, check_finite=False)  # in the direction of the row
     tangent /= np.sqrt(weights @ tangent**2)
     return Point(z, p, tangent, _side(factors), iterations)
 
 
 def ahead(family: Family, point: Point, length: float) -> Point | None:
-    """The point a length further along the curve, or None."""
+    """The point a given length farther along the curve, or None."""
     z, p = point.z + length * point.tangent[:-1], point.p + length * float(point.tangent[-1])
     row = _weights(family, point.z) * point.tangent
     found = corrected(family, z, p, row / np.abs(row).max())
@@ -153,9 +153,9 @@ def ahead(family: Family, point: Point, length: float) -> Point | None:
 def located(
     family: Family, point: Point, other: Point, length: float, value: Callable[[Point], float]
 ) -> Point:
-    """The point between two, a length apart, at which a function of points changes its sign.
+    """The point between two, `length` apart, at which a function of points changes its sign.
 
-    Where branches cross, Newton's method fails very near to the point: the nearest found counts.
+    Newton's method fails very close to crossing branches: the closest point found is returned.
     """
     from scipy.optimize import brentq
 
@@ -167,7 +167,7 @@ def located(
         reached = found[ahead_by]
         if list(found.values()).count(None) > MISSES:
             raise ArithmeticError
-        return value(other if reached is None else reached)  # look before what fails
+        return value(other if reached is None else reached)  # stay before a failure
 
     with suppress(ArithmeticError, ValueError):
         brentq(at, 0.0, length, xtol=LOCATED * length, rtol=1e-14, maxiter=60)
@@ -176,7 +176,7 @@ def located(
 
 @dataclass(frozen=True)
 class Stride:
-    """How long steps are."""
+    """Step length control."""
 
     first: float
     longest: float
@@ -185,7 +185,7 @@ class Stride:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A step along a family: its ends, its length, and whether it leaves what is asked for."""
+    """A step along a family: its ends, its length, and whether it reaches the end of the range."""
 
     before: Point
     after: Point
@@ -199,15 +199,15 @@ LOST, LONG = "lost", "long"
 def steps(
     family: Family, first: Point, stride: Stride, outside: Callable[[Point], float]
 ) -> Iterator[Step | str]:
-    """Follow a family until a function of points is above 0, and stop there exactly.
+    """Follow a family until a function of points exceeds 0, and stop there exactly.
 
-    A closed curve ends before it comes back to where it began.
+    A closed curve ends before it returns to its start.
 
     Yields
     ------
     Step or str
-        At last, instead of a step, LOST where no further point is found, LONG after the most
-        points.
+        Finally, instead of a step, LOST if no further point is found, or LONG after the maximum
+        number of points.
     """
     point, length = first, stride.first
     for taken in range(stride.most):
@@ -236,7 +236,7 @@ def steps(
 
 
 def _along(family: Family, one: Point, other: Point) -> float:
-    """How far one point is from another along the tangent there."""
+    """Distance of one point from another along the tangent at the latter."""
     apart = np.append(other.z - one.z, other.p - one.p)
     return float((_weights(family, one.z) * one.tangent) @ apart)
 
@@ -252,7 +252,7 @@ def _passes(family: Family, step: Step, first: Point) -> bool:
 
 
 def _turns(family: Family, one: Point, other: Point) -> bool:
-    """Whether the curve turns too far from one point to the other, or jumps to another curve."""
+    """Whether the curve turns too far between two points, or jumps to another curve."""
     weights = _weights(family, one.z)
     apart = np.append(other.z - one.z, other.p - one.p)
     if _along(family, one, other) < STRAIGHT * np.sqrt(weights @ apart**2):

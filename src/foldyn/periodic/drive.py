@@ -1,7 +1,7 @@
-"""What drives a case periodically: its histories as functions of the phase of the drive.
+"""The periodic drive of a case: its histories as functions of the phase of the drive.
 
 The phase is theta = 2 pi f t with f the lowest frequency of the `Harmonic` histories; the others
-have multiples of it. A level scales all that varies, and leaves what is constant.
+have multiples of it. A level scales all varying terms, and leaves constant ones.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ Terms = list[tuple[Any, Any]]
 
 
 def check_smooth(case: Case, name: str) -> None:
-    """Refuse what `name` cannot follow exactly.
+    """Refuse parts of a case that the analysis `name` cannot treat exactly.
 
     Raises
     ------
     InputError
-        Friction, laws with memory, unknowns without mass.
+        The case has friction, laws with memory, or unknowns without mass.
     """
     case.check_movable()
     if case.contact is not None and case.contact.rubs:
@@ -53,7 +53,7 @@ def check_smooth(case: Case, name: str) -> None:
 
 
 def check_held(case: Case, name: str) -> None:
-    """Refuse supports that let the whole drift, so that it has no place to come back to."""
+    """Refuse supports that let the whole drift, without a place to return to."""
     nodes, body = case.structure.nodes, case.body
     if free_rigid_motions(nodes, case.constraints, body.holds(np.zeros(body.size))).shape[1]:
         raise InputError(
@@ -73,17 +73,17 @@ def check_damping(terms: list[Term], name: str) -> None:
 
 
 class Drive:
-    """The histories of a case.
+    """Histories of the loads and supports of a case.
 
     Attributes
     ----------
     frequency : float
-        Lowest one of the harmonic histories (Hz); 0.0 without any.
+        Lowest frequency of the harmonic histories (Hz); 0.0 without any.
     highest : int
-        The highest one, as a multiple of it.
+        Highest of their frequencies, as a multiple of the lowest.
     loads, moves, turns, planes : list of (ndarray, Constant or Harmonic)
-        Forces (n, 3), N; displacements (n, 3) of supports and of what they carry, m; changes (nr,)
-        of rest angles, rad; displacements (p, 3) of planes of contact, m: each at factor 1.
+        Forces (n, 3), N; displacements (n, 3) of supports and of nodes tied to them, m; changes
+        (nr,) of rest angles, rad; displacements (p, 3) of contact planes, m: each at factor 1.
     """
 
     def __init__(self, case: Case) -> None:
@@ -104,7 +104,7 @@ class Drive:
         return self.frequency > 0.0
 
     def factors(self, terms: Terms, phase: NDArray, level: float) -> NDArray:
-        """Factors (3, s, k) of some terms, and their two derivatives, at phases (s,)."""
+        """Factors (3, s, k) of some terms, and their first two derivatives, at phases (s,)."""
         out = np.zeros((3, len(phase), len(terms)))
         for k, (_, history) in enumerate(terms):
             if isinstance(history, Constant):
@@ -118,7 +118,7 @@ class Drive:
         return out
 
     def sums(self, terms: Terms, phase: NDArray, level: float, size: int) -> NDArray:
-        """Sums (3, s, size) of some terms and their two derivatives at phases (s,)."""
+        """Sums (3, s, size) of some terms, and their first two derivatives, at phases (s,)."""
         shapes = np.zeros((len(terms), size))
         for shape, (vector, _) in zip(shapes, terms, strict=True):
             shape[: vector.size] = vector.ravel()
@@ -126,7 +126,7 @@ class Drive:
 
 
 def _plane(case: Case, number: int, history: Any) -> tuple[NDArray, Any]:
-    """Displacements (p, 3) of the planes when one of them moves, m, and its history."""
+    """Displacements (p, 3), m, of the contact planes as one of them moves, and its history."""
     assert case.contact is not None
     moved = np.zeros((len(case.contact.planes), 3))
     moved[number] = case.contact.planes[number].motion

@@ -1,10 +1,11 @@
-"""The equation of motion of a driven case on its unknowns x, in the phase of its drive.
+"""Equation of motion of a driven case for its unknowns x, in the phase of its drive.
 
     M x'' + C x' + f(x, theta) + W^2 s2(theta) + W s1(theta) = 0
 
-f holds the internal forces less the loads, W = 2 pi times the frequency of the drive, and s2, s1
-what supports do that move: M and C times the derivatives of their motion with respect to theta.
-Displacements of all dofs are u = u0 + B x + U(theta), forces on the unknowns B' times those on all.
+f contains the internal forces minus the loads, W = 2 pi times the frequency of the drive, and s2,
+s1 are the effect of moving supports: M and C times the derivatives of their motion with respect to
+theta. Displacements of all dofs are u = u0 + B x + U(theta), forces on the unknowns B' times the
+forces on all dofs.
 """
 
 from __future__ import annotations
@@ -33,11 +34,11 @@ class Equation:
     ----------
     case : Case
     name : str
-        Who asks, for messages.
+        Name of the analysis, for messages.
     driven : bool
-        False leaves out all that varies, and the damping.
+        False leaves out all varying terms, and the damping.
     origin : Origin, optional
-        About which damping has its ``state = "start"``; rest by default.
+        State of damping with ``state = "start"``; rest by default.
 
     Attributes
     ----------
@@ -46,11 +47,11 @@ class Equation:
     basis : sparse or dense (m, k)
         B.
     offset : (m,)
-        Displacements where all unknowns and the drive are zero, m.
+        Displacements with zero unknowns and drive, m.
     whole : Equation
-        That of which this is a reduction; itself if it is none.
+        The equation from which this one is reduced, or itself.
     tangents : Tangents
-        Of the body on the unknowns.
+        Tangents of the body with respect to the unknowns.
     mass, damping : (k, k)
         M (kg) and C (N s/m).
     alpha : float
@@ -81,7 +82,7 @@ class Equation:
             drag = drag + term.damping(np.zeros(total))
         self.damping = self.projected(drag)
         self._moved = sparse.csr_array(self.basis.T @ nodal), sparse.csr_array(self.basis.T @ drag)
-        self._back = np.zeros((0, 0))  # of a reduced equation: its unknowns per those of the whole
+        self._back = np.zeros((0, 0))  # of a reduced equation: from the unknowns of the whole
         parts = [(part, k) for k, (part, _) in enumerate(self.drive.following)]
         self._following = joined(parts)
 
@@ -92,11 +93,11 @@ class Equation:
 
     @cached_property
     def length(self) -> float:
-        """Size of the sheet, m: what a length is compared with."""
+        """Size of the sheet, m, as the scale of lengths."""
         return float(np.ptp(self.case.structure.nodes, axis=0).max())
 
     def at(self, phase: NDArray, level: float = 1.0) -> Instants:
-        """The equation at phases (s,) of the drive, all that varies times a level."""
+        """The equation at phases (s,) of the drive, with all varying terms times a level."""
         return Instants(self, phase, level * self.level)
 
     def projected(self, matrix: sparse.csr_array) -> NDArray:
@@ -120,11 +121,11 @@ class Instants:
     moved : (s, m)
         U, m.
     inertia, drag : (s, k)
-        s2 and s1 of the module's text.
+        s2 and s1 of the module docstring.
     planes : (s, p, 3)
-        How far planes of contact have moved, m.
+        Displacements of contact planes, m.
     bodies : sequence of Assembly
-        With the rest angles and planes of each instant.
+        Body at each instant, with its rest angles and planes.
     """
 
     def __init__(self, equation: Equation, phase: NDArray, level: float) -> None:
@@ -147,7 +148,7 @@ class Instants:
         self._factor = np.stack([factor, np.zeros_like(factor), np.zeros_like(factor)], axis=-1)
 
     def displacements(self, x: NDArray) -> NDArray:
-        """Of all dofs (s, m) from unknowns (s, k), m."""
+        """Displacements of all dofs (s, m), m, from unknowns (s, k)."""
         return x @ self.equation.basis.T + self.moved + self.equation.offset
 
     def _each(self, x: NDArray):
@@ -161,7 +162,7 @@ class Instants:
             force[j] = body.internal(u)
             if following.acts:
                 force[j] -= following_force(following, u, self._factor[j])
-        with np.errstate(invalid="ignore"):  # within what it touches
+        with np.errstate(invalid="ignore"):  # inside a contact
             return force @ self.equation.basis - self.loads
 
     def tangents(self, x: NDArray) -> NDArray:
@@ -176,7 +177,7 @@ class Instants:
         return out
 
     def driving(self, omega: float) -> NDArray:
-        """What moving supports add to f (s, k), N, at a drive of omega rad/s."""
+        """Force (s, k), N, added to f by moving supports, at a drive of omega rad/s."""
         return omega**2 * self.inertia + omega * self.drag
 
     def energies(self, x: NDArray) -> NDArray:

@@ -11,13 +11,13 @@ from foldyn.periodic.equation import Instants
 from foldyn.periodic.orbit import Orbit
 
 TURN = 2.0 * np.pi
-PROBE = 1e-4  # of the level, or of the frequency: for derivatives that have no formula
-LITTLE = 1e-4  # level of a drive whose forces are proportional to it
-LEAST = 1e-12  # of the sheet's length: a motion is never taken as smaller
+PROBE = 1e-4  # of the level, or of the frequency: step of central differences
+LITTLE = 1e-4  # level at which forces of a drive are proportional to it
+LEAST = 1e-12  # of the sheet's length: least size of a motion
 
 
 class _OfBalance:
-    """What families of a balance have in common."""
+    """Common base of the families of a balance."""
 
     def __init__(self, balance: Balance, span: float, tolerance: float) -> None:
         self.balance, self.span, self.tolerance = balance, span, tolerance
@@ -25,17 +25,17 @@ class _OfBalance:
         self._kept: tuple[float, Instants] | None = None
 
     def coefficients(self, z: NDArray) -> NDArray:
-        """Of the motion (c, k)."""
+        """Coefficients (c, k) of the motion."""
         return z[: self.balance.shape[0] * self.balance.shape[1]].reshape(self.balance.shape)
 
     def instants(self, level: float) -> Instants:
-        """The equation at the samples; that of the last level is kept."""
+        """The equation at the samples; the one of the last level is kept."""
         if self._kept is None or self._kept[0] != level:
             self._kept = level, self.balance.instants(level)
         return self._kept[1]
 
     def size(self, z: NDArray) -> float:
-        """Norm of what moves."""
+        """Norm of the varying part of the motion."""
         moving = float(np.linalg.norm(self.coefficients(z)[1:]))
         return max(moving, LEAST * self.balance.equation.length)
 
@@ -86,7 +86,7 @@ class ByLevel(_OfBalance):
         return self.balance.jacobian(self.coefficients(z), self.omega, self.instants(p))
 
     def slope(self, z: NDArray, p: float) -> NDArray:
-        """See `Family`; by differences, exact where loads are proportional to the level."""
+        """See `Family`; by differences, exact if loads are proportional to the level."""
         x, (up, down) = (
             self.coefficients(z),
             (self.balance.instants(p + d) for d in (PROBE, -PROBE)),
@@ -102,14 +102,14 @@ class ByLevel(_OfBalance):
 
 
 class Free(ByFrequency):
-    """Motions of an undamped sheet that nothing drives, along their frequency (Hz).
+    """Free motions of an undamped sheet, along their frequency (Hz).
 
-    An even series leaves their phase no freedom: they begin at rest, and come back to it.
+    An even series fixes their phase: they begin at rest, and return to it.
 
     Parameters
     ----------
     place : ndarray, shape (k,)
-        The equilibrium about which they go.
+        The equilibrium about which they vibrate.
     """
 
     level = 0.0
@@ -127,8 +127,8 @@ class Free(ByFrequency):
 class InResonance(_OfBalance):
     """Forced motions in phase resonance, along the logarithm of the level of the drive.
 
-    Their frequency is that at which the drive does no reactive work: the mean over a period of its
-    force, as a small one acts on the sheet in its state, times the displacement vanishes (Peeters,
+    At their frequency the drive does no reactive work: the mean over a period of its force times
+    the displacement vanishes, with the force of a small drive on the sheet in its state (Peeters,
     Kerschen and Golinval, Mech. Syst. Signal Process. 25, 2011). The last unknown is the frequency
     over `unit`, so that it counts as much as displacements of the sheet's size.
 
@@ -137,7 +137,7 @@ class InResonance(_OfBalance):
     place : ndarray, shape (k,)
         Unknowns of the state.
     frequency : float
-        About that of the resonance, Hz.
+        Approximate frequency of the resonance, Hz.
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class InResonance(_OfBalance):
         self._force = [fourier.fit @ part / LITTLE for part in (still, at.drag, at.inertia)]
 
     def frequency(self, z: NDArray) -> float:
-        """Of a motion, Hz."""
+        """Frequency of a motion, Hz."""
         return float(z[-1]) * self.unit
 
     def _reactive(self, z: NDArray) -> tuple[float, NDArray]:

@@ -1,7 +1,7 @@
-"""Floquet multipliers: by what factor small deviations from a periodic motion grow in a period.
+"""Floquet multipliers: growth factors of small deviations from a periodic motion, per period.
 
 They are the eigenvalues of the monodromy matrix, which integrates the equation linearized about the
-motion, M y'' + C y' + K(t) y = 0, over one period. The motion is unstable if one is larger than 1
+motion, M y'' + C y' + K(t) y = 0, over one period. The motion is unstable if one of them exceeds 1
 in modulus (Nayfeh and Balachandran, Applied Nonlinear Dynamics, 1995, chapter 3).
 """
 
@@ -16,7 +16,7 @@ from foldyn.periodic.fourier import values_of
 from foldyn.threads import one_thread
 
 STEPS = 64  # in a period of the drive
-NEUTRAL = 1e-6  # above 1: what is rounding in an undamped motion
+NEUTRAL = 1e-6  # above 1: round-off in an undamped motion
 
 
 def multipliers(
@@ -31,13 +31,13 @@ def multipliers(
     amplitudes : ndarray, shape (h + 1, k)
         Complex amplitudes of the unknowns.
     omega : float
-        Of the drive, rad/s.
+        Frequency of the drive, rad/s.
     multiple : int
-        Periods of the drive in one of the motion.
+        Periods of the drive in one period of the motion.
     level : float
-        Factor on all that varies.
+        Factor on all varying terms.
     steps : int
-        Of the integration, in a period of the drive.
+        Integration steps in a period of the drive.
     """
     phase = stage_phases(multiple * steps)
     at = equation.at(multiple * phase.ravel(), level)

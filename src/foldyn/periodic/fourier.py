@@ -1,7 +1,7 @@
 """Fourier series with real coefficients, in the phase tau of the base frequency.
 
 x(tau) = a_0 + sum_k (a_k cos k tau + b_k sin k tau) has the coefficients a_0, a_1, b_1, a_2, ...;
-an even series has cosines alone.
+an even series has only cosines.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ OVER = 8  # samples per harmonic and period
 
 
 class Fourier:
-    """A series of some harmonics, and the samples through which forces see it.
+    """A truncated series, and the samples at which forces are evaluated.
 
     Parameters
     ----------
     harmonics : int
     even : bool
-        Cosines alone, sampled over half the period: motions that come back the way they went.
+        Only cosines, sampled over half the period: motions that retrace their path.
     samples : int, optional
-        In a period; `OVER` per harmonic by default.
+        Samples in a period; `OVER` per harmonic by default.
     """
 
     def __init__(self, harmonics: int, even: bool = False, samples: int | None = None) -> None:
@@ -31,7 +31,7 @@ class Fourier:
         self.samples = max(OVER * harmonics, 4 * OVER) if samples is None else samples
 
     def memory(self, unknowns: int) -> float:
-        """Bytes of a balance of so many unknowns: its derivative, and all of which it is made."""
+        """Bytes of a balance with this number of unknowns, its derivative and their parts."""
         h, s = float(self.harmonics), self.samples
         c, s = (h + 1.0, s // 2 + 1) if self.even else (2.0 * h + 1.0, s)
         return 24.0 * (c * unknowns) ** 2 + 8.0 * s * (c**2 + unknowns**2)
@@ -95,7 +95,7 @@ class Fourier:
         return out
 
     def real_of(self, amplitudes: NDArray[np.complex128]) -> NDArray:
-        """Coefficients (c, ...) of amplitudes (any number, ...); others are zero or left out."""
+        """Coefficients (c, ...) of any number of amplitudes; others are zero or dropped."""
         kept = min(len(amplitudes), self.harmonics + 1)
         out = np.zeros((len(self.order), *amplitudes.shape[1:]))
         out[0] = amplitudes[0].real

@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     import xarray
 
 METHODS = ("harmonic_balance", "shooting")
-TRUNCATED = 1e-3  # of the motion: what twice as many harmonics would add, above which to warn
-REDUCED = 0.05  # of the motion: what the dofs left out would add, above which to warn
-NAMED = 5  # frequencies that a warning lists
+TRUNCATED = 1e-3  # of the motion: effect of twice as many harmonics above which to warn
+REDUCED = 0.05  # of the motion: effect of the omitted dofs above which to warn
+NAMED = 5  # frequencies listed in a warning
 FEW = 3  # harmonics of the motion from which shooting starts
-ROUNDING = 1e-14  # of the motion: harmonics of what shooting finds that are none
+ROUNDING = 1e-14  # of the motion: harmonics of a shooting result that count as zero
 TURN = 2.0 * math.pi
 
 
@@ -49,36 +49,36 @@ def periodic_motion(
     steps: int = STEPS,
     tolerance: float = 1e-9,
 ) -> xarray.Dataset:
-    """Periodic motion of a case under its harmonic histories, and whether it is stable.
+    """Periodic motion of a case under its harmonic histories, and its stability.
 
     Solves M u'' + C u' + F(u, t) = p(t) with the exact internal forces F. Several motions may exist
-    at a frequency: `start` chooses one, `response_curve` finds those that hang together.
+    at a frequency: `start` selects one, `response_curve` finds connected ones.
 
     Parameters
     ----------
     case : Case
-        With `Harmonic` histories of forces, base motions, imposed displacements or actuated
+        Case with `Harmonic` histories of forces, base motions, imposed displacements or actuated
         creases; other histories are constant.
     frequency : float, optional
-        Of the slowest of these histories (Hz); others keep their ratio to it, all their phases.
-        That of the case by default.
+        Frequency (Hz) of the slowest of these histories; others keep their ratio to it, and all
+        keep their phases. By default the frequency of the case.
     harmonics : int
-        Of the motion's own frequency.
+        Number of harmonics of the motion's own frequency.
     method : {"harmonic_balance", "shooting"}
-        A Fourier series whose equation holds in the mean over each harmonic, or the start from
-        which integration over a period (Radau's method of order 5) comes back to itself.
+        A Fourier series whose equation is satisfied in the mean over each harmonic, or the initial
+        state to which integration over a period (Radau's method of order 5) returns.
     start : State or xarray.Dataset, optional
-        Where to begin: small motions about a state, or a result of `periodic_motion` or a point of
-        one of `response_curve`. The equilibrium under the constant loads by default. Damping with
-        ``state = "start"`` is about this state, and goes on from a result as it was.
+        Start of the search: small motions about a state, or a result of `periodic_motion` or a
+        point of a `response_curve`. By default the equilibrium under the constant loads. Damping
+        with ``state = "start"`` is taken about this state, or continued from a result.
     periods : int
-        Periods of the drive in one of the motion: 2 after a period doubling.
+        Periods of the drive in one period of the motion: 2 after a period doubling.
     modes : int, optional
-        Compute in the span of so many modes about the start (about the equilibrium, if it is a
-        motion), their derivatives and the static response to the drive, in place of all free
-        dofs: for big sheets.
+        For large sheets: instead of all free dofs, use the span of this many modes about the start
+        (about the equilibrium, if it is a motion), their derivatives and the static response to the
+        drive.
     steps : int
-        Of integration in a period of the drive, for shooting and for the multipliers.
+        Integration steps in a period of the drive, for shooting and the multipliers.
     tolerance : float
         Last step of Newton's method, as a fraction of the motion.
 
@@ -88,10 +88,10 @@ def periodic_motion(
         Over one period `displacement`, `velocity` (time, node, axis); `coefficient` (harmonic,
         node, axis), complex amplitudes c_j of the motion Re sum c_j exp(2 pi i j t / T); `floquet`
         (multiplier), the largest first, eigenvalues of the monodromy matrix that integrates the
-        variational equation; `stable`; `periods`. Attributes: `frequency`, `truncation` (what
-        twice as many harmonics would add, as a fraction of the motion, estimated from the residual
-        there), with `modes` also `reduction` (what the dofs left out would add, likewise) and
-        facts about the run.
+        variational equation; `stable`; `periods`. Attributes: `frequency`, `truncation` (effect
+        of twice as many harmonics, as a fraction of the motion, estimated from the residual
+        there), with `modes` also `reduction` (effect of the omitted dofs, likewise) and facts
+        about the run.
 
     Raises
     ------
@@ -108,9 +108,9 @@ def periodic_motion(
 
     Notes
     -----
-    Bases swing about where they stand at rest. Motions with few harmonics of stiff sheets are
-    smooth, so that the multipliers of vibrations faster than the steps resolve tell the decay of
-    alpha M, but no phase.
+    Bases swing about their rest positions. Motions with few harmonics of stiff sheets are smooth,
+    so that multipliers of vibrations too fast for the steps show the decay by alpha M, but no
+    phase.
 
     Examples
     --------
@@ -168,7 +168,7 @@ def balance_of(
     case: Case, name: str, harmonics: int, periods: int = 1, modes: int | None = None,
     start: Any = None, steps: int = STEPS,
 ) -> Balance:  # fmt: skip
-    """Balance of a driven case; InputError without a drive, or where it does not fit in memory."""
+    """Balance of a driven case; raises `InputError` without a drive, or if memory is too small."""
     harmonics = whole("harmonics", harmonics, least=1)
     equation = Equation(case, name, origin=origin_of(case, start))
     if not equation.drive.varies:
@@ -187,7 +187,7 @@ def balance_of(
 
 
 def on_modes(equation: Equation, modes: int | None, start: Any) -> Equation:
-    """The equation reduced to some modes about a start, or itself without a number of them."""
+    """The equation reduced to modes about a start; itself if `modes` is None."""
     if modes is None:
         return equation
     count, case = whole("modes", modes, least=1), equation.case
@@ -197,13 +197,13 @@ def on_modes(equation: Equation, modes: int | None, start: Any) -> Equation:
 
 
 def frequency_of(balance: Balance, given: float | None) -> float:
-    """Frequency (Hz) of the drive: the given one, or that of the case."""
+    """Frequency (Hz) of the drive: given, or of the case."""
     own = balance.equation.drive.frequency
     return own if given is None else number("frequency", given, above=0.0, unit="Hz")
 
 
 def warn_of_truncation(truncation: float, harmonics: int, field: str) -> None:
-    """Warn where a motion needs more harmonics."""
+    """Warn if a motion needs more harmonics."""
     if truncation > TRUNCATED:
         warn(
             f"{field} = {harmonics}: twice as many would change the motion by about "
@@ -213,7 +213,7 @@ def warn_of_truncation(truncation: float, harmonics: int, field: str) -> None:
 
 
 def warn_of_reduction(reduction: Any) -> None:
-    """Warn where modes leave out much of the motions; their `reduction`, or None."""
+    """Warn if modes omit much of the motions, given their `reduction` or None."""
     most = 0.0 if reduction is None else float(np.max(reduction))
     if most > REDUCED:
         warn(
@@ -224,7 +224,7 @@ def warn_of_reduction(reduction: Any) -> None:
 
 
 def warn_of_crossing(orbits: Sequence[Orbit]) -> None:
-    """Warn of motions through what touches."""
+    """Warn of motions that pass through contacts."""
     crossed = [f"{orbit.omega / TURN:.6g} Hz" for orbit in orbits if orbit.crosses()]
     if crossed:
         warn(
@@ -237,7 +237,7 @@ def warn_of_crossing(orbits: Sequence[Orbit]) -> None:
 def _shot(
     balance: Balance, start: Any, omega: float, steps: int, tolerance: float
 ) -> tuple[Orbit, NDArray, int]:
-    """Motion by shooting from one of few harmonics, its multipliers, and iterations spent."""
+    """Motion by shooting from one of few harmonics, its multipliers, and the iterations spent."""
     equation, longer = balance.equation, balance.multiple
     few = Balance(equation, Fourier(min(balance.fourier.harmonics, FEW * longer)), longer)
     near = orbit_of(few, balanced(few, coefficients(few, start, omega), omega, 1e-3).x, omega)
@@ -254,7 +254,7 @@ def _shot(
     amplitudes = np.fft.rfft(states[:-1, : equation.size], axis=0)[: (count + 1) // 2] / count
     amplitudes[1:] *= 2.0
     size = np.linalg.norm(amplitudes, axis=1)
-    tail = np.sqrt(np.cumsum(size[::-1] ** 2)[::-1])  # of the harmonics from each on
+    tail = np.sqrt(np.cumsum(size[::-1] ** 2)[::-1])  # norm of each harmonic and all higher ones
     kept = max(int((tail > ROUNDING * tail[0]).sum()), 2)
     orbit = Orbit(equation, amplitudes[:kept], omega, longer)
     floquet = multipliers(equation, orbit.amplitudes, omega, longer, steps=steps)

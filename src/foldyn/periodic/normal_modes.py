@@ -1,4 +1,4 @@
-"""`backbone`: how the frequency of a vibration changes with its amplitude."""
+"""`backbone`: frequency of a vibration as a function of its amplitude."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ if TYPE_CHECKING:
 
 FIRST = 0.3  # of the longest step
 TURN = 2.0 * np.pi
-SAMPLES = 16  # of half a period, at which the energy is compared
-CONSTANT = 1e-10  # change of the energy along a normal mode, as a fraction, that is wanted
-RAISE, RAISES = 1.5, 3  # of the number of harmonics
-WORTH = 30.0  # by what a raise must lessen the change, for another one
+SAMPLES = 16  # of half a period, at which energies are compared
+CONSTANT = 1e-10  # largest relative change wanted of the energy along a normal mode
+RAISE, RAISES = 1.5, 3  # factor on the number of harmonics, and most increases
+WORTH = 30.0  # factor by which an increase must reduce the change to try another one
 LOOSE = 1e-2  # change of the energy above which to warn
 
 
@@ -63,34 +63,34 @@ def backbone(
     tolerance: float = 1e-9,
     progress: bool | Reporter | None = None,
 ) -> xarray.Dataset:
-    """Frequency of the vibration that begins as a linear mode, as its amplitude grows.
+    """Frequency of the vibration that starts as a linear mode, as its amplitude grows.
 
-    Nonlinear normal modes are the periodic motions of the undamped sheet that nothing drives
-    (Kerschen, Peeters, Golinval and Vakakis, Mech. Syst. Signal Process. 23, 2009).
+    Nonlinear normal modes are the periodic motions of the undamped sheet without drive (Kerschen,
+    Peeters, Golinval and Vakakis, Mech. Syst. Signal Process. 23, 2009).
 
     Parameters
     ----------
     case : Case
-        As for `periodic_motion`. Without `damped` its damping and harmonic histories play no part.
+        As for `periodic_motion`. Without `damped` its damping and harmonic histories are ignored.
     mode : int
         Number of the mode, from 1, as in `modes`.
     amplitudes : (float, float)
         First and last amplitude: the largest displacement of any node from the equilibrium, m.
     harmonics : int
-        Of the motion's frequency; of normal modes as many more as keep the energy constant.
+        Number of harmonics; for normal modes raised as needed to keep the energy constant.
     damped : bool
-        The damped case under its harmonic histories in phase resonance, where a force and the
-        displacement it works on are a quarter of a period apart, instead of the undamped one: what
-        the peaks of response curves follow.
+        Follow the damped case under its harmonic histories in phase resonance, where force and
+        displacement are a quarter of a period apart, instead of the undamped case: the path of the
+        peaks of response curves.
     state : State, optional
-        Near which the equilibrium lies about which it vibrates; rest by default. Constant loads
+        State near the equilibrium about which the sheet vibrates; rest by default. Constant loads
         act.
     modes : int, optional
         As for `periodic_motion`, about this state.
     longest_step : float
-        Length of a step, of which a growth of the motion by its own size counts 1.
+        Length of a step; a growth of the motion by its own size counts as 1.
     most_points : int
-        At most.
+        Largest number of points.
     tolerance : float
         Last step of Newton's method, as a fraction of the motion.
     progress : bool or callable, optional
@@ -100,31 +100,31 @@ def backbone(
     -------
     xarray.Dataset
         Along `point`: `frequency` (Hz, coordinate), `amplitude` (m), `coefficient` (harmonic, node,
-        axis) as in `periodic_motion`, `truncation`, with `modes` also `reduction`. Of the undamped
-        case `energy` (J) above that of the equilibrium and `energy_drift`, its largest change along
-        the motion as a fraction; of the damped one `level`, the factor on the drive, `floquet` and
-        `stable`. Attributes:
-        `linear_frequency` (Hz), `complete`, 1 if the last amplitude is reached, and facts.
+        axis) as in `periodic_motion`, `truncation`, with `modes` also `reduction`. For the undamped
+        case `energy` (J) above the equilibrium and `energy_drift`, its largest relative change
+        along the motion; for the damped one `level`, the factor on the drive, `floquet` and
+        `stable`. Attributes: `linear_frequency` (Hz), `complete`, 1 if the last amplitude is
+        reached, and facts.
 
     Raises
     ------
     InputError
-        As of `periodic_motion`.
+        As from `periodic_motion`.
     ComputationError
         The equilibrium is unstable, or the first motion is not found.
     MotionInterrupted
-        From the keyboard (Ctrl-C); its `partial` has the points until then.
+        From the keyboard (Ctrl-C); its `partial` holds the points so far.
 
     Warns
     -----
     FoldynWarning
         The backbone is lost before the last amplitude (the points found are kept); too few
-        harmonics or modes; motions that pass through what they touch.
+        harmonics or modes; motions that pass through contacts.
 
     Notes
     -----
-    Normal modes are sought among motions that come to rest twice in a period, cosines alone. Where
-    one resonates with another, the backbone turns back and goes on as that of both.
+    Normal modes are sought among motions that come to rest twice in a period, with only cosines. If
+    one resonates with another, the backbone turns back and continues as a motion of both.
 
     Examples
     --------
@@ -209,7 +209,7 @@ def _undamped(case: Case, harmonics: int, modes: int | None, state: Any) -> Bala
 
 
 def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, NDArray]:
-    """Equilibrium (k,), frequency (Hz) and shape (k,) of a mode: its largest node moves by 1."""
+    """Equilibrium (k,), frequency (Hz) and shape (k,) of a mode, its largest node moving by 1."""
     case = equation.case
     if state is None:
         displacement = equilibrium(case)
@@ -222,7 +222,7 @@ def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, ND
     if mode > equation.size:
         raise InputError(f" = {mode}: there are {equation.size} modes", "mode")
     soft = equation.body.sheet.soft_hinges(at.displacements(place[None])[0])
-    if len(soft.offset):  # the slope at rest is none
+    if len(soft.offset):  # the slope at rest is zero
         floored = equation.body.tangent(at.displacements(place[None])[0], FLOOR)
         stiffness = equation.projected(floored)
     value, vector = eigh(stiffness, equation.mass, subset_by_index=[mode - 1, mode - 1])
@@ -237,7 +237,7 @@ def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, ND
 
 
 def _settled(equation: Equation, at: Any, place: NDArray) -> NDArray:
-    """Move unknowns (k,) into equilibrium, and give the stiffness (k, k) there."""
+    """Move unknowns (k,) into equilibrium, and return the stiffness (k, k) there."""
     for _ in range(20):
         stiffness = at.tangents(place[None])[0]
         force = at.forces(place[None])[0]
@@ -253,7 +253,7 @@ def _settled(equation: Equation, at: Any, place: NDArray) -> NDArray:
 def _free(
     balance: Balance, place: NDArray, frequency: float, motion: NDArray, tolerance: float
 ) -> tuple[Free, Point]:
-    """Family of normal modes, and the one that is nearly a linear mode of a motion (k,)."""
+    """Family of normal modes, and its member closest to a linear mode of motion (k,)."""
     family = Free(balance, frequency, tolerance, place)
     x = np.zeros(balance.shape)
     x[0], x[1] = place, motion
@@ -270,7 +270,7 @@ def _free(
 def _resonant(
     balance: Balance, place: NDArray, frequency: float, motion: NDArray, tolerance: float
 ) -> tuple[InResonance, Point]:
-    """Family of motions in phase resonance, and that whose amplitude is about that of a mode."""
+    """Family of motions in phase resonance, and a member with about the amplitude of a mode."""
     equation, omega = balance.equation, TURN * frequency
     x = np.zeros(balance.shape)
     x[0] = place
@@ -294,9 +294,9 @@ def _resonant(
 
 
 def _sharpened(family: Free, orbit: Orbit) -> Orbit:
-    """A normal mode with as many harmonics as its energy takes to be constant.
+    """A normal mode with enough harmonics to keep its energy constant.
 
-    None are added where they gain little, as where laws bend.
+    None are added if they gain little, as where laws bend.
     """
     drift = _energy(orbit, family.place)[1]
     for _ in range(RAISES):
@@ -310,7 +310,7 @@ def _sharpened(family: Free, orbit: Orbit) -> Orbit:
             break
         finer = Free(Balance(equation, fourier), family.span, family.tolerance, family.place)
         x = fourier.real_of(orbit.amplitudes)
-        row = np.append(x.ravel(), 0.0)  # the size stays
+        row = np.append(x.ravel(), 0.0)  # fixes the size
         row[: equation.size] = 0.0
         found = corrected(finer, x.ravel(), orbit.omega / TURN, row / np.abs(row).max(), 30)
         if found is None:
@@ -335,7 +335,7 @@ def _follow(
     family: Any, kept: list[Point], stride: Stride, reached: Callable[[Point], float],
     ends: NDArray, report: Reporter,
 ) -> bool:  # fmt: skip
-    """Add points from the first to the last amplitude; whether it is reached."""
+    """Add points from the first to the last amplitude; returns whether it is reached."""
     whole_way = math.log(ends[1] / ends[0])
     for step in steps(family, kept[0], stride, lambda point: reached(point) / ends[1] - 1.0):
         if not isinstance(step, Step):

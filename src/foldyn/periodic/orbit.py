@@ -1,4 +1,4 @@
-"""A periodic motion on the unknowns of an equation, and what is made of it."""
+"""A periodic motion on the unknowns of an equation, and quantities derived from it."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from foldyn.periodic.fourier import Fourier, values_of
 from foldyn.results import Quantity
 from foldyn.results.crossings import crossings_of
 
-SHOWN = 128  # samples of a period in results, and of those among which extremes are sought
-BARELY = 1e-3  # of a gap, which is left between two samples of motions that do not cross
+SHOWN = 128  # samples of a period in results and for extremes
+BARELY = 1e-3  # of a gap: share that remains between two samples of motions that do not cross
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,13 +27,13 @@ class Orbit:
     ----------
     equation : Equation
     amplitudes : ndarray, complex, shape (h + 1, k)
-        Of exp(i j tau) in the unknowns, m; tau is the phase of the motion's own period.
+        Amplitudes of exp(i j tau) of the unknowns, m; tau is the phase in the motion's period.
     omega : float
-        Of the drive, rad/s; of the motion itself where nothing drives it.
+        Frequency of the drive, rad/s; of the motion itself without a drive.
     multiple : int
-        Periods of the drive in one of the motion.
+        Periods of the drive in one period of the motion.
     level : float
-        Factor on all that varies.
+        Factor on all varying terms.
     """
 
     equation: Equation
@@ -44,16 +44,16 @@ class Orbit:
 
     @property
     def period(self) -> float:
-        """Of the motion, s."""
+        """Period of the motion, s."""
         return 2.0 * np.pi * self.multiple / self.omega
 
     def displacement(self, phase: NDArray) -> NDArray:
-        """Of all nodes (s, n, 3) at phases (s,) of the motion, m."""
+        """Displacements (s, n, 3), m, of all nodes at phases (s,) of the motion."""
         at = self.equation.at(self.multiple * phase, self.level)
         return at.displacements(values_of(self.amplitudes, phase)).reshape(len(phase), -1, 3)
 
     def velocity(self, phase: NDArray) -> NDArray:
-        """The same of the velocity, m/s."""
+        """Velocities (s, n, 3), m/s, of all nodes at phases (s,) of the motion."""
         drive, size = self.equation.drive, self.equation.body.size
         level = self.level * self.equation.level
         moved = drive.sums(drive.moves, self.multiple * phase, level, size)[1]
@@ -61,7 +61,7 @@ class Orbit:
         return self.omega * (own + moved).reshape(len(phase), -1, 3)
 
     def node_amplitudes(self) -> NDArray:
-        """Amplitudes (h + 1, n, 3) of all nodes, with what supports do, m."""
+        """Amplitudes (h + 1, n, 3), m, of all nodes, including the motion of supports."""
         most = max(len(self.amplitudes) - 1, self.multiple * self.equation.drive.highest)
         count = 2 * most + 2
         values = self.displacement(2.0 * np.pi * np.arange(count) / count)
@@ -70,7 +70,7 @@ class Orbit:
         return found
 
     def crosses(self) -> bool:
-        """Whether in the motion something passes through what it should touch."""
+        """Whether the motion passes through a contact."""
         case, body = self.equation.case, self.equation.body
         if case.contact is None:
             return False
@@ -86,16 +86,16 @@ class Orbit:
         )
 
     def truncation(self) -> float:
-        """What twice as many harmonics would add, as a fraction of the motion, estimated.
+        """Estimated effect of twice as many harmonics, as a fraction of the motion.
 
-        The residual at the further harmonics over the mean dynamic stiffness there.
+        The residual at the additional harmonics over the mean dynamic stiffness there.
         """
         kept, equation = len(self.amplitudes) - 1, self.equation
         fourier = Fourier(2 * kept + 1)  # even ones alone may vanish by symmetry
         balance = Balance(equation, fourier, self.multiple)
         x, at = fourier.real_of(self.amplitudes), balance.instants(self.level)
         left = balance.residual(x, self.omega, at)
-        if not np.isfinite(left).all():  # between its own samples it goes through what it touches
+        if not np.isfinite(left).all():  # passes through a contact between its samples
             return np.inf
         missing = fourier.complex_of(left)[kept + 1 :]
         few = equation.at(self.multiple * fourier.phase[::4], self.level)
@@ -108,9 +108,9 @@ class Orbit:
         return np.sqrt(added) / size if size else 0.0
 
     def reduction(self) -> float:
-        """What the unknowns left out would add, as a fraction of the motion, estimated likewise.
+        """Estimated effect of the omitted unknowns, as a fraction of the motion; see `truncation`.
 
-        0 of an equation that is whole.
+        0 for an equation that is not reduced.
         """
         whole = self.equation.whole
         if whole is self.equation:
@@ -133,7 +133,7 @@ class Orbit:
 
 
 def along(orbits: list[Orbit]) -> dict[str, NDArray]:
-    """What the points of a curve or a backbone have: amplitudes of all nodes, and errors."""
+    """Variables of the points of a curve or backbone: amplitudes of all nodes, and errors."""
     nodes = [orbit.node_amplitudes() for orbit in orbits]
     coefficient = np.zeros((len(nodes), max(map(len, nodes)), *nodes[0].shape[1:]), complex)
     for row, own in zip(coefficient, nodes, strict=True):
@@ -158,10 +158,10 @@ def amplitude(orbit: Orbit, measure: Quantity | None) -> float:
 
 
 def amplitudes_of(coefficient: NDArray) -> NDArray[np.float64]:
-    """The same (p,) of the nodes of motions with some coefficients (p, h + 1, n, 3), m."""
+    """Largest nodal amplitudes (p,), m, of motions with coefficients (p, h + 1, n, 3)."""
     return np.array([swing(values_of(one, _phases())).max() for one in coefficient])
 
 
 def _phases() -> NDArray[np.float64]:
-    """Of a period, and one beyond its end."""
+    """Phases of a period, and one beyond its end."""
     return 2.0 * np.pi * np.arange(SHOWN + 2) / SHOWN

@@ -1,4 +1,4 @@
-"""Few unknowns for big sheets: modes, and how they change as the sheet moves along them.
+"""Few unknowns for large sheets: modes, and how they change as the sheet moves along them.
 
 A folded sheet moves along curves: bars and panels that hardly stretch make nodes follow arcs, which
 no sum of modes does. Modal derivatives add the second order (Idelsohn and Cardona, Comput. Methods
@@ -6,8 +6,8 @@ Appl. Mech. Eng. 49, 1985): with K the tangent and dK/dq_i its change along mode
 
     theta_ij = -K^-1 (dK/dq_j) phi_i.
 
-The static responses to the drive complete them. Moving supports carry the sheet along as they would
-slowly.
+The static responses to the drive complete them. Moving supports carry the sheet along
+quasi-statically.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from foldyn.errors import ComputationError, InputError
 from foldyn.periodic.equation import Equation, Instants
 from foldyn.periodic.tangents import Tangents
 
-PROBE = 1e-3  # of the sheet's size: how far the largest node moves to find a derivative
+PROBE = 1e-3  # of the sheet's size: step of the largest node for derivatives
 LITTLE = 1e-4  # of the drive, for its static response
-DEPENDENT = 1e-6  # singular value, over the largest, of vectors that add nothing
+DEPENDENT = 1e-6  # relative singular value below which vectors are dependent
 
 
 def reduced(equation: Equation, modes: int, displacement: NDArray) -> Equation:
@@ -41,7 +41,7 @@ def reduced(equation: Equation, modes: int, displacement: NDArray) -> Equation:
     Returns
     -------
     Equation
-        `whole` is the one that is given.
+        Its `whole` is the given equation.
     """
     still = equation.at(np.zeros(1), 0.0)
     check_contact(equation.case, displacement, still.planes[0])
@@ -79,7 +79,7 @@ def _derivatives(
 
 
 def _static(equation: Equation, place: NDArray, factors) -> list[NDArray]:
-    """Responses to small drives that stand still, at two phases a quarter apart."""
+    """Static responses to small drives, at two phases a quarter period apart."""
     phase = np.array([0.0, 0.5 * np.pi])
     there = np.tile(place, (2, 1))
     none, little = (equation.at(phase, level).forces(there) for level in (0.0, LITTLE))
@@ -87,7 +87,7 @@ def _static(equation: Equation, place: NDArray, factors) -> list[NDArray]:
 
 
 def _independent(mass: NDArray, vectors: NDArray) -> NDArray:
-    """M-orthonormal vectors (k, r) that span others, without those that add nothing."""
+    """M-orthonormal basis (k, r) of the span of vectors, without dependent ones."""
     vectors = vectors / np.sqrt(np.einsum("ij,ik,kj->j", vectors, mass, vectors))
     value, turned = np.linalg.eigh(vectors.T @ mass @ vectors)
     kept = value > DEPENDENT**2 * value[-1]
@@ -98,7 +98,7 @@ def _projected(
     equation: Equation, place: NDArray, basis: NDArray, stiffness: NDArray, factors
 ) -> Equation:
     out = copy.copy(equation)
-    for name in ("rounding", "length"):  # what was found for the whole one
+    for name in ("rounding", "length"):  # cached for the whole equation
         out.__dict__.pop(name, None)
     out.whole, out.drive = equation, copy.copy(equation.drive)
     out.drive.moves = [
@@ -117,7 +117,7 @@ def _projected(
 
 
 def _carried(equation: Equation, place: NDArray, shape: NDArray, factors) -> NDArray:
-    """Displacements (m,) when supports move slowly by a shape (m,), whatever follows them."""
+    """Displacements (m,) when supports move quasi-statically by a shape (m,)."""
     tangent = equation.body.tangent(equation.basis @ place)
     full = np.zeros(tangent.shape[0])
     full[: len(shape)] = shape

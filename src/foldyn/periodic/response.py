@@ -47,15 +47,15 @@ if TYPE_CHECKING:
     import xarray
 
 FIRST = 0.2  # of the longest step
-AWAY = 0.05  # of the motion: how far a branch is entered
-APART = 1e-2  # from 1: multiplier of a fold that is none
-LARGEST = "largest displacement"  # of any node along an axis: what is shown without a measure
-MEETS = 1e-4  # of the range of the parameter: where branches meet at one point
+AWAY = 0.05  # of the motion: distance at which a branch is entered
+APART = 1e-2  # least distance from 1 of the multipliers at a spurious fold
+LARGEST = "largest displacement"  # of any node along an axis: shown without a measure
+MEETS = 1e-4  # of the range of the parameter: distance below which branches meet at one point
 
 
 @dataclass(eq=False)
 class _Found:
-    """A point of the curve, as it is kept."""
+    """A recorded point of the curve."""
 
     family: Any
     point: Point
@@ -83,38 +83,38 @@ def response_curve(
 ) -> xarray.Dataset:
     """Periodic motions of a case along the frequency or the amplitude of its harmonic histories.
 
-    Continuation by pseudo-arclength from the first end to the second, through folds, with the
-    stability of each motion, and with the branches that fork off.
+    Pseudo-arclength continuation from the first end to the second, through folds, with the
+    stability of each motion and the branches that fork off.
 
     Parameters
     ----------
     case : Case
         As for `periodic_motion`.
     frequencies : (float, float)
-        Both ends (Hz); the curve begins at the first. Sizes and phases of the drive stay.
+        Both ends (Hz); the curve begins at the first. Sizes and phases of the drive are kept.
     harmonics : int
-        Of the drive's frequency.
+        Number of harmonics of the drive frequency.
     measure : Quantity, optional
-        Whose `function` of displacement (n, 3), m, velocity (n, 3), m/s, and time, s, the curve
-        shows: half the distance between its extremes in a period. By default the displacement of
-        the node and along the axis where it is largest.
+        Quantity whose `function` of displacement (n, 3), m, velocity (n, 3), m/s, and time, s, the
+        curve shows: half the distance between its extremes in a period. By default the displacement
+        of the node and along the axis with the largest one.
     amplitudes : (float, float), optional
         Instead of frequencies: both ends of a factor on all harmonic histories, at the case's own
         frequency.
     start : State or xarray.Dataset, optional
-        Where to begin at the first end; see `periodic_motion`.
+        Start of the search at the first end; see `periodic_motion`.
     periods : int
-        Periods of the drive in one of the motion.
+        Periods of the drive in one period of the motion.
     modes : int, optional
         As for `periodic_motion`.
     branches : int
-        How many times branches are followed that fork off at a pitchfork (both) or a period
-        doubling: 0 none, 1 those of the curve, 2 theirs too.
+        Depth to which branches that fork off at a pitchfork (both) or a period doubling are
+        followed: 0 none, 1 branches of the curve, 2 also their branches.
     longest_step : float
-        Length of a step, of which a change of the whole motion by itself counts 1, and the range
-        of the frequencies 1.
+        Length of a step; a change of the whole motion by its own size counts as 1, and so does the
+        range of the frequencies.
     most_points : int
-        On one branch.
+        Largest number of points on one branch.
     steps, tolerance
         As for `periodic_motion`.
     progress : bool or callable, optional
@@ -127,25 +127,25 @@ def response_curve(
         measure, `stable`, `bifurcation` ("fold", "pitchfork", "period doubling", "Neimark-Sacker"
         or ""), `branch` (0 for the curve itself), `periods`, `floquet` (multiplier), `coefficient`
         (harmonic, node, axis) as in `periodic_motion`, of the motion's own frequency, `truncation`,
-        with `modes` also `reduction`. Of a point,
-        ``periodic_motion(case, f, start=curve.isel(point=3))`` gives the motion.
-        Attributes: `complete`, 1 if every branch came to an end of the range, and facts.
+        with `modes` also `reduction`. The motion at a point is
+        ``periodic_motion(case, f, start=curve.isel(point=3))``.
+        Attributes: `complete`, 1 if every branch reached an end of the range, and facts.
 
     Raises
     ------
     InputError
-        As of `periodic_motion`.
+        As from `periodic_motion`.
     ComputationError
         No motion is found at the first end.
     MotionInterrupted
-        From the keyboard (Ctrl-C); its `partial` has the points until then.
+        From the keyboard (Ctrl-C); its `partial` holds the points so far.
 
     Warns
     -----
     FoldynWarning
-        A branch is lost, or has too many points (those found are kept); too few harmonics: what
-        twice as many would add, folds at which no multiplier is 1, or forks without branches;
-        motions that pass through what they touch; too few modes.
+        A branch is lost, or has too many points (the points found are kept); too few harmonics, as
+        shown by the truncation, folds at which no multiplier is 1, or forks without branches;
+        motions that pass through contacts; too few modes.
     """
     began = time.perf_counter()
     of_kind("case", case, Case)
@@ -176,7 +176,7 @@ def response_curve(
 
 
 def _range(frequencies: Any, amplitudes: Any) -> tuple[str, tuple[float, float]]:
-    """What varies, and its ends."""
+    """The varied parameter, and its ends."""
     if (frequencies is None) == (amplitudes is None):
         raise InputError(": give frequencies (Hz) or amplitudes, one of the two", "frequencies")
     by, given = ("frequencies", frequencies) if amplitudes is None else ("amplitudes", amplitudes)
@@ -187,7 +187,7 @@ def _range(frequencies: Any, amplitudes: Any) -> tuple[str, tuple[float, float]]
 
 
 class _Tracer:
-    """Follows a curve and its branches, and keeps what it finds."""
+    """Follows a curve and its branches, and records the points."""
 
     def __init__(
         self, by: str, ends: tuple[float, float], stride: Stride, count: int, tolerance: float
@@ -197,18 +197,18 @@ class _Tracer:
         self.span, self.count = self.high - self.low, count
         self.found: list[_Found] = []
         self.forks: list[Event] = []  # at which branches cross or begin
-        self.met: list[Event] = []  # those to which a branch has come back
+        self.met: list[Event] = []  # forks that a branch has returned to
         self.branch, self.complete = 0, True
 
     def family(self, balance: Balance) -> Any:
-        """Motions of a balance along what varies."""
+        """Family of motions of a balance along the varied parameter."""
         if self.by == "frequencies":
             return ByFrequency(balance, self.span, self.tolerance)
         frequency = balance.equation.drive.frequency
         return ByLevel(balance, self.span, self.tolerance, frequency)
 
     def first(self, family: Any, start: Any) -> Point:
-        """Point at the first end, looking to the second."""
+        """Point at the first end, with the tangent toward the second."""
         balance, p = family.balance, self.ends[0]
         if self.by == "frequencies":
             omega, level = 2.0 * np.pi * p, 1.0
@@ -220,7 +220,7 @@ class _Tracer:
         return point_at(family, z, p, ahead)
 
     def multipliers(self, family: Any, point: Point) -> NDArray:
-        """Of a point."""
+        """Floquet multipliers of a point."""
         orbit = family.orbit(point.z, point.p)
         return multipliers(
             orbit.equation, orbit.amplitudes, orbit.omega, orbit.multiple, orbit.level, self.count
@@ -229,9 +229,9 @@ class _Tracer:
     def follow(
         self, family: Any, first: Point, depth: int, report: Reporter, origin: Point | None = None
     ) -> None:
-        """Follow a branch from its first point, then those that fork off, to a depth.
+        """Follow a branch from its first point, then the branches that fork off, to a depth.
 
-        origin : the bifurcation, of this family, from which it comes.
+        origin : the bifurcation, of this family, from which the branch comes.
         """
         branch, forks = self.branch, []
         known: dict[int, tuple[Point, NDArray]] = {}
@@ -259,7 +259,7 @@ class _Tracer:
                 keep(event.point, "" if back else event.name)
                 if event.name in (PITCHFORK, DOUBLING) and not back:
                     forks.append(event)
-            if back:  # on the curve from which it came
+            if back:  # back on the curve from which it came
                 self.met.append(back)
                 break
             keep(step.after)
@@ -272,7 +272,7 @@ class _Tracer:
                 self._fork(family, event, depth - 1, report)
 
     def _known(self, event: Event, branch: int) -> Event | None:
-        """The bifurcation of another branch at which a branch ends."""
+        """The bifurcation on another branch at which this branch ends."""
         near = MEETS * self.span
         same = (one for one in self.forks if abs(one.point.p - event.point.p) <= near)
         return next(same, None) if branch and event.name == PITCHFORK else None
@@ -308,10 +308,10 @@ class _Tracer:
             point = Point(fourier.real_of(spread).ravel(), point.p, ahead, 0.0)
         jacobian, across = family.jacobian(point.z, point.p), np.zeros(len(point.z))
         mode = np.ones(len(across), bool)
-        if event.name == DOUBLING:  # every second harmonic is new, and none of them couples
+        if event.name == DOUBLING:  # odd harmonics are new, and decoupled from the even ones
             mode = np.repeat(family.balance.fourier.order % 2 == 1, old.shape[1])
         across[mode] = np.linalg.svd(jacobian[np.ix_(mode, mode)])[2][-1] * family.size(point.z)
-        # a period doubling has one branch, whose two sides differ in phase alone
+        # the two sides of a period doubling differ only in phase
         for side in (1.0, -1.0) if event.name == PITCHFORK else (1.0,):
             first = branch_point(family, point.z, point.p, side * across, AWAY)
             if first is None:
@@ -326,7 +326,7 @@ class _Tracer:
 
 
 def _warn_of_folds(found: list[_Found]) -> None:
-    """Warn of folds of the Fourier series alone, at which no multiplier is 1."""
+    """Warn of spurious folds of the Fourier series, at which no multiplier is 1."""
     at = [
         f"{one.point.p:.6g}"
         for one in found

@@ -1,4 +1,4 @@
-"""Where the search for a periodic motion begins, and how it gets to the motion."""
+"""Start of the search for a periodic motion, and the ways from there to the motion."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from foldyn.statics.equilibrium import drives
 from foldyn.statics.tracing import displacement_of
 
 FLOOR = float(equivalent_slope(0.0, np.radians(1.0)))
-"""Slope of superlinear hinges at rest in a first guess: that of a swing of one degree."""
+"""Slope of superlinear hinges at rest in a first guess, for a swing of one degree."""
 LITTLE = 1e-4  # of the drive, whose forces are proportional to it
-SMALL = 0.05  # of the drive, from which a motion is followed to the whole one
+SMALL = 0.05  # of the drive: level from which a motion is followed to the full drive
 GROWING = Stride(0.05, 0.5, 200)
 TURN = 2.0 * np.pi
 PLACES = "None, a State, or a result of periodic_motion or response_curve"
 
 
 def still_case(case: Case) -> Case:
-    """The same without all that varies; what supports swing is held in its place."""
+    """The case without varying loads, its swinging supports held in place."""
     loads = [load for load in case.loads if load.history == Constant()]
     supports = []
     for support in case.supports:
@@ -54,7 +54,7 @@ def still_case(case: Case) -> Case:
 
 
 def equilibrium(case: Case) -> NDArray:
-    """Displacement (n, 3) under the constant loads, near rest."""
+    """Displacement (n, 3), m, under the constant loads, near rest."""
     still = still_case(case)
     if not drives(still, ()):
         return np.zeros_like(case.structure.nodes)
@@ -62,9 +62,9 @@ def equilibrium(case: Case) -> NDArray:
 
 
 def origin_of(case: Case, start: Any) -> Origin | None:
-    """About what damping has its start; None where none has.
+    """State of damping that is defined at the start; None without such damping.
 
-    That of the state or the result with which the search begins, or the equilibrium.
+    It is the state or the result from which the search begins, or the equilibrium.
     """
     if not case.damped_at_start:
         return None
@@ -75,7 +75,7 @@ def origin_of(case: Case, start: Any) -> Origin | None:
 
 
 def coefficients(balance: Balance, start: Any, omega: float, level: float = 1.0) -> NDArray:
-    """Coefficients (c, k) to begin with: of a motion, or of small ones about a state."""
+    """Initial coefficients (c, k): from a given motion, or of small motions about a state."""
     equation = balance.equation
     if isinstance(start, xr.Dataset):
         return _of_result(balance, start, level)
@@ -91,7 +91,7 @@ def coefficients(balance: Balance, start: Any, omega: float, level: float = 1.0)
 
 
 def linear_response(balance: Balance, x: NDArray, omega: float, level: float) -> NDArray:
-    """First step (c, k) of small motions about a state, with slopes where hinges have none."""
+    """First Newton step (c, k) of small motions about a state, with slopes for soft hinges."""
     equation, fourier = balance.equation, balance.fourier
     still, little = (
         balance.residual(x, omega, balance.instants(share * level)) for share in (0.0, LITTLE)
@@ -135,7 +135,7 @@ def _of_result(balance: Balance, start: xr.Dataset, level: float) -> NDArray:
 def balanced(
     balance: Balance, x: NDArray, omega: float, tolerance: float, level: float = 1.0
 ) -> Converged:
-    """The motion near coefficients (c, k), or the one that grows with the drive from none.
+    """The motion near coefficients (c, k), or the one that grows with the drive from rest.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def balanced(
 
 
 def _grown(balance: Balance, x: NDArray, omega: float, tolerance: float, level: float) -> Converged:
-    """Follow the motion from a small drive to the whole one, around folds."""
+    """Follow the motion from a small drive to the full one, around folds."""
     family = ByLevel(balance, level, tolerance, omega / TURN)
     still = np.zeros(balance.shape)
     still[0] = x[0]
@@ -155,7 +155,7 @@ def _grown(balance: Balance, x: NDArray, omega: float, tolerance: float, level: 
     first, share = newton(AtFrequency(balance, omega, SMALL * level), begin, tolerance), 0.0
     if first is not None:
         spent, ahead = first.iterations, np.append(np.zeros(x.size), 1.0)
-        top = point_at(family, first.x, SMALL * level, ahead)  # of the largest drive
+        top = point_at(family, first.x, SMALL * level, ahead)  # point of the largest drive
         for step in steps(family, top, GROWING, lambda point: point.p / level - 1.0):
             if not isinstance(step, Step) or step.after.p < 0.0:
                 break

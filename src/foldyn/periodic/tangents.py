@@ -1,4 +1,4 @@
-"""Tangents at many states as dense matrices, without a sparse one for each term and state."""
+"""Tangents at many states as dense matrices, without a sparse matrix per term and state."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from foldyn.structures.bars_hinges import BarsHingesTerm
 
 
 class Tangents:
-    """Tangents of a body on the unknowns, or on vectors of them.
+    """Tangents of a body with respect to the unknowns, or along vectors of them.
 
-    Entries go straight to their places; those of terms that know none, as contact, and of other
-    sheets than bars and hinges take the way of sparse matrices.
+    Entries are added directly in their places; terms with unknown places, such as contact, and
+    sheets other than bars and hinges go through sparse matrices.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class Tangents:
     basis : sparse (m, k)
         Displacements of all dofs per unknown.
     vectors : ndarray, shape (k, r), optional
-        On which tangents are projected.
+        Vectors on which tangents are projected.
     """
 
     def __init__(
@@ -52,11 +52,11 @@ class Tangents:
         self._matrix = sparse.csr_array((zeros, column, ends), (size, size))
 
     def of(self, body: Assembly) -> Tangents:
-        """Those of another body on the same unknowns."""
+        """Tangents of another body with respect to the same unknowns."""
         return Tangents(body, self._basis, self._vectors)
 
     def put(self, body: Assembly, u: NDArray, out: NDArray) -> None:
-        """Put the tangent at displacements u (m,) into `out`."""
+        """Write the tangent at displacements u (m,) into `out`."""
         data, sheet, rest = np.zeros(len(self._union)), body.sheet, None
         if -1 in self._own and isinstance(sheet, BarsHingesTerm):
             blocks = np.zeros((len(sheet.sparsity.indices), 3, 3))
@@ -69,7 +69,7 @@ class Tangents:
                 data += self._own[k] @ term.entries(u)
             else:
                 found = term.tangent(u)
-                if found.nnz:  # what touches nothing has no stiffness
+                if found.nnz:  # without contact there is no stiffness
                     rest = found if rest is None else rest + found
         if self._vectors is None:
             out[:] = 0.0
@@ -96,9 +96,9 @@ def _of_blocks(sheet: BarsHingesTerm) -> tuple[NDArray, NDArray]:
 def _spread(
     basis: sparse.csr_array, row: NDArray, column: NDArray
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """What entries at rows and columns (e,) add to a matrix of the unknowns.
+    """Contributions of entries at rows and columns (e,) to a matrix of the k unknowns.
 
-    Places k row + column there, numbers of entries, and the factors of these.
+    Returns their places k row + column in it, the numbers of the entries, and factors on these.
     """
     one, other = basis[row], basis[column]
     width = np.diff(other.indptr)
