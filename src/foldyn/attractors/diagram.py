@@ -1,4 +1,4 @@
-"""`bifurcation_diagram`: steady motions, frequency after frequency or amplitude after amplitude."""
+"""`bifurcation_diagram`: steady motions at successive frequencies or amplitudes."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 SWEEPS = ("up", "down", "both")
 RESOLUTION = 1e-3  # relative width to which jumps are bracketed
-SAME = 1e-9  # relative difference of values that are one
-REPEATS = 1e-3  # of the size of a motion: states as near as that are one
+SAME = 1e-9  # relative difference below which values are equal
+REPEATS = 1e-3  # of the size of a motion: distance below which states are equal
 FREQUENCY = Quantity("Hz", "frequency of the drive")
 LEVEL = Quantity("1", "factor on the drive")
 
@@ -54,36 +54,36 @@ def bifurcation_diagram(
     tolerance: float | None = None,
     progress: bool | Reporter | None = None,
 ) -> xarray.Dataset:
-    """Steady motions at one frequency, or amplitude, of the drive after another: a stepped sine.
+    """Steady motions at successive frequencies, or amplitudes, of the drive: a stepped sine.
 
-    Each motion starts where the one before has ended, settles, and is recorded: its amplitude, and
-    what it looks like once in each period of the drive. Jumps are bracketed by bisection, from the
+    Each motion starts at the end of the previous one, settles, and is recorded: its amplitude, and
+    the measure once per period of the drive. Jumps are bracketed by bisection, starting from the
     motion before them.
 
     Parameters
     ----------
     case : Case
-        With `Harmonic` histories of loads, supports, planes or wind; they set the period. Others
-        must be constant.
+        Case with `Harmonic` histories of loads, supports, planes or wind, which set the period.
+        Other histories must be constant.
     measure : Quantity
-        With the `function` of displacement (n, 3), m, velocity (n, 3), m/s, and time, s, that the
-        diagram shows: a number.
+        Quantity to show; its `function` of displacement (n, 3), m, velocity (n, 3), m/s, and time,
+        s, must return a number.
     frequencies : array_like, shape (k,)
-        Increasing (Hz), of the slowest of these histories: others keep their ratio to it, all their
-        phases.
+        Increasing frequencies (Hz) of the slowest of these histories: others keep their ratio to
+        it, and all keep their phases.
     amplitudes : array_like, shape (k,)
-        Instead: increasing factors on all that has such a history, at the case's own frequency.
+        Alternatively, increasing factors on everything harmonic, at the case's own frequency.
     sweep : {"up", "down", "both"}
-        Which way; "both" goes up first, and down from there.
+        Direction; "both" goes up first, and down from there.
     settle, record : int
-        Periods of the drive that are left out, and that are recorded (at least 4), at each value.
+        Periods of the drive that are skipped, and recorded (at least 4), at each value.
     resolution : float
-        Relative width to which a jump is bracketed. What is a large change (over 20 % of the larger
-        amplitude) between neighbors, but not within this width, is a steep curve and no jump.
+        Relative width to which a jump is bracketed. A large change (over 20 % of the larger
+        amplitude) between neighbors that is not reached within this width is a steep curve.
     initial : State, optional
         Where the first motion starts; rest by default.
     method, dt, tolerance :
-        As of `simulate`; `dt` is the largest step (s), without it at most a 64th of the period.
+        As in `simulate`; `dt` is the largest step (s), by default at most a 64th of the period.
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress` of the number of values.
 
@@ -91,31 +91,31 @@ def bifurcation_diagram(
     -------
     xarray.Dataset
         Along `sweep` and `frequency` (Hz) or `level` (the factor): `section` (record), the measure
-        at the start of each period of the drive; `amplitude`, half the distance of its extremes
-        while it was recorded; `periods`, of the drive after which the motion repeats to 0.1 %, and
-        0 where it does not within half of the record (quasi-periodic or chaotic, or not settled).
-        Along `jump`: `jump_sweep`, `jump_between` and `jump_amplitude` (side), before and after.
-        Attribute `complete`: 1 if every sweep came to its end.
+        at the start of each period of the drive; `amplitude`, half the distance between its
+        extremes while recorded; `periods`, the number of drive periods after which the motion
+        repeats to 0.1 %, 0 if it does not within half the record (quasi-periodic, chaotic or not
+        settled). Along `jump`: `jump_sweep`, `jump_between` and `jump_amplitude` (side), before and
+        after. Attribute `complete`: 1 if every sweep reached its end.
 
     Raises
     ------
     InputError
-        An argument out of range, or nothing that drives the case.
+        An argument out of range, or a case without drive.
     ComputationError
         The first motion fails.
     MotionInterrupted
-        From the keyboard (Ctrl-C); its `partial` has the points until then.
+        From the keyboard (Ctrl-C); its `partial` holds the points so far.
 
     Warns
     -----
     FoldynWarning
-        A later one fails, which ends its sweep: what comes after is nan.
+        A later motion fails, which ends its sweep: the remaining values are nan.
 
     Notes
     -----
-    Close to a fold a motion lingers before it falls, and jumps come late: give `settle` some
-    hundred periods where damping is light. Points that a long step has kicked off before a jump are
-    replaced by motions that came there slowly.
+    Close to a fold a motion lingers before it falls, and jumps come late: give `settle` a few
+    hundred periods if damping is light. Points from which a long step has dislodged the motion too
+    early are replaced by motions that arrived there slowly.
 
     Examples
     --------
@@ -150,7 +150,7 @@ def bifurcation_diagram(
         with told_once():
             for way in ways:
                 here = values if way == "up" else values[::-1]
-                if points:  # from where the sweep up has ended
+                if points:  # from the end of the upward sweep
                     here = here[len(values) - len(points[0]) :]
                 found: list[Point] = []
                 points.append(found)
@@ -187,9 +187,9 @@ def bifurcation_diagram(
 
 
 class Swept(NamedTuple):
-    """What varies."""
+    """The swept parameter."""
 
-    name: str  # of its dimension
+    name: str  # name of its dimension
     quantity: Quantity
     values: NDArray[np.float64]
     case_at: Callable[[float], Case]
@@ -212,7 +212,7 @@ def _swept(case: Case, frequencies: ArrayLike | None, amplitudes: ArrayLike | No
 class Point(NamedTuple):
     """A steady motion."""
 
-    value: float  # of what is swept
+    value: float  # of the swept parameter
     amplitude: float
     section: NDArray[np.float64]  # (record,)
     periods: int
@@ -220,7 +220,7 @@ class Point(NamedTuple):
 
 
 class Steady(NamedTuple):
-    """How steady motions are found."""
+    """Finds steady motions."""
 
     case_at: Callable[[float], Case]
     frequency_at: Callable[[float], float]
@@ -229,9 +229,9 @@ class Steady(NamedTuple):
     record: int
 
     def point(self, run: Run, value: float, begun: float = 0.0) -> Point:
-        """The motion at a value of what is swept, from where another one stands.
+        """The motion at a value of the swept parameter, started from a previous motion.
 
-        begun : what has passed of its first period (s).
+        begun : elapsed part of its first period (s).
         """
         case, period = self.case_at(value), 1.0 / self.frequency_at(value)
         interval, transient = period / PER_PERIOD, self.settle * period
@@ -246,17 +246,17 @@ class Steady(NamedTuple):
 
 
 def states(stretch: Stretch, period: float) -> NDArray[np.float64]:
-    """States (k, 6 n) of a stretch in m: velocities times period / (2 pi)."""
+    """States (k, 6 n), m, of a stretch: velocities are scaled by period / (2 pi)."""
     count = len(stretch.time)
     u, v = stretch.displacement.reshape(count, -1), stretch.velocity.reshape(count, -1)
     return np.hstack([u, period / (2.0 * np.pi) * v])
 
 
 def repeats_after(section: NDArray[np.float64], near: float) -> int:
-    """Periods after which a motion repeats: the fewest, at most half of them all; 0: it does not.
+    """Least number of periods after which a motion repeats, up to half of them; 0 if none.
 
-    section : states (k, m), one a period.
-    near : distance of states that are the same.
+    section : states (k, m), one per period.
+    near : distance below which states are equal.
     """
     for periods in range(1, len(section) // 2 + 1):
         if np.abs(section[periods:] - section[:-periods]).max() <= near:
@@ -267,9 +267,9 @@ def repeats_after(section: NDArray[np.float64], near: float) -> int:
 def bracketed(steady: Steady, way: str, points: list[Point], resolution: float) -> list[Jump]:
     """Jumps between points in the order of a sweep, bracketed to a relative width.
 
-    A long step may kick a motion off before its fold: from the motion before a jump the sweep goes
-    on in halved steps, and past the point where it fell, until it falls again. Points that it
-    passes are replaced.
+    A long step may dislodge a motion before its fold. From the motion before a jump, the sweep
+    therefore continues in halved steps, past the point where it fell, until it falls again. Points
+    passed on the way are replaced.
     """
     found, k = [], 0
     while k < len(points) - 1:
@@ -288,7 +288,7 @@ def bracketed(steady: Steady, way: str, points: list[Point], resolution: float) 
             while (points[-1].value - passed[-1].value) / step > 0.5:
                 try:
                     ahead = steady.point(passed[-1].run, passed[-1].value + step)
-                except ComputationError:  # it fails there: nearer to the jump it may not
+                except ComputationError:  # may succeed closer to the jump
                     break
                 to_fallen = ahead.amplitude - float(np.interp(ahead.value, *fallen))
                 if abs(ahead.amplitude - passed[-1].amplitude) > abs(to_fallen):
@@ -296,12 +296,12 @@ def bracketed(steady: Steady, way: str, points: list[Point], resolution: float) 
                     break
                 passed.append(ahead)
             else:
-                break  # it does not fall when it is not kicked
+                break  # it does not fall without the long step
     return found
 
 
 def _replace(steady: Steady, points: list[Point], k: int, passed: list[Point]) -> int:
-    """Replace points from number k on by motions that were not kicked; the number after them."""
+    """Replace points from number k on by motions in small steps; returns the next number."""
     way = np.sign(passed[-1].value - passed[0].value)
     while k < len(points) and way:
         value = points[k].value

@@ -1,4 +1,4 @@
-"""The harmonic drive of a case: its frequency, and the case with another history or size of it."""
+"""The harmonic drive of a case: its frequency, and the case with other histories or levels."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from foldyn.cases import (
 )
 from foldyn.errors import InputError
 
-WHOLE = 1e-9  # relative distance of a ratio of frequencies from a whole number
+WHOLE = 1e-9  # relative tolerance for integer ratios of frequencies
 HARMONIC = (
     'fd.Harmonic(frequency=...) (in a case file, history = { kind = "harmonic", frequency = ... })'
 )
@@ -45,22 +45,22 @@ SIZES: Mapping[type, str] = {
     Plane: "motion",
     Air: "velocity",
 }
-"""Fields that say how much a load acts, a support or plane moves, or the air blows."""
+"""Fields with the size of a load, of the motion of a support or plane, or of the wind."""
 
 
 def drive_frequency(case: Case) -> float:
-    """Lowest frequency (Hz) of the harmonic histories of a case; 0.0 where it has none.
+    """Lowest frequency (Hz) of the harmonic histories of a case; 0.0 without any.
 
     Raises
     ------
     InputError
-        The others are no multiples of it, so that the drive has no period.
+        The others are not multiples of it, so that the drive has no period.
     """
     return lowest_frequency([part.history.frequency for part in _driven_parts(case)])
 
 
 def lowest_frequency(frequencies: Sequence[float]) -> float:
-    """The lowest of some (Hz), of which all others must be multiples; 0.0 where there are none."""
+    """The lowest frequency (Hz), of which all others must be multiples; 0.0 without any."""
     lowest = min(frequencies, default=0.0)
     for frequency in frequencies:
         ratio = frequency / lowest
@@ -73,7 +73,7 @@ def lowest_frequency(frequencies: Sequence[float]) -> float:
 
 
 def driven_frequency(case: Case, name: str) -> float:
-    """The same, refused where nothing, or something not harmonic, drives the case for `name`."""
+    """`drive_frequency`, refused if `case` has no drive, or one that is not harmonic."""
     check_harmonic(case, name)
     if frequency := drive_frequency(case):
         return frequency
@@ -104,12 +104,12 @@ def at_frequency(case: Case, frequency: float) -> Case:
 
 
 def at_level(case: Case, level: float) -> Case:
-    """The case with its harmonic loads and gusts, and moving supports and planes, times a level.
+    """The case with its harmonic loads, gusts and moving supports and planes scaled by a level.
 
     Raises
     ------
     InputError
-        Actuated creases swing, whose angles are no multiples.
+        Swinging actuated creases, whose angles cannot be scaled.
     """
 
     def scaled(part: Any) -> Any:
@@ -126,7 +126,7 @@ def at_level(case: Case, level: float) -> Case:
 
 
 def _altered(case: Case, change: Callable[[Any], Any]) -> Case:
-    """The case with what has a harmonic history changed."""
+    """The case with a change of each part that has a harmonic history."""
 
     def changed(parts: Sequence[Any]) -> list[Any]:
         return [change(part) if _is_driven(part) else part for part in parts]
@@ -146,7 +146,7 @@ def _driven_parts(case: Case) -> list[Any]:
 
 
 def _parts(case: Case) -> Iterator[tuple[str, Any]]:
-    """What may have a history that counts, with its place for messages."""
+    """Parts that may have an active history, with their fields for messages."""
     planes = () if case.contact is None else case.contact.planes
     listed = {"loads": case.loads, "supports": case.supports, "contact.planes": planes}
     for name, parts in listed.items():
@@ -156,4 +156,4 @@ def _parts(case: Case) -> Iterator[tuple[str, Any]]:
 
 
 def _is_driven(part: Any) -> bool:
-    return isinstance(getattr(part, "history", None), Harmonic)  # of still air, it changes nothing
+    return isinstance(getattr(part, "history", None), Harmonic)  # in still air it has no effect

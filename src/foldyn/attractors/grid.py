@@ -32,15 +32,15 @@ if TYPE_CHECKING:
     import xarray
 
 AT_ONCE = 256  # motions
-LOOKED_AT = 64  # starts
-LEAST = 1e-6  # of the longest bar: the least length by which states are compared
-BYTES = 600.0  # of a start and of where it ends, for each node
+LOOKED_AT = 64  # starts used to choose the step
+LEAST = 1e-6  # of the longest bar: least length scale for comparing states
+BYTES = 600.0  # memory of a start and its end, per node
 TAKEN = (
     "attractor", "record", *PLACE, "basin", "periods", "share", "displacement", "velocity",
     "support",
 )  # fmt: skip
-"""Names in the result."""
-UNDRIVEN = 0.02  # of the duration: between the states of a motion without a drive
+"""Names used in the result."""
+UNDRIVEN = 0.02  # of the duration: interval between recorded states without a drive
 
 
 def basins(
@@ -58,57 +58,57 @@ def basins(
     folder: str | os.PathLike[str] | None = None,
     progress: bool | Reporter | None = None,
 ) -> xarray.Dataset:
-    """Basins of attraction: the motion, or the equilibrium, that each start of a grid ends in.
+    """Basins of attraction: the motion, or equilibrium, in which each start of a grid ends.
 
-    All motions are computed side by side (`simulate_many`). Those that end in the same states, once
-    a period of the drive, have the same attractor.
+    All motions are computed together (`simulate_many`). Motions that end in the same states, once
+    per period of the drive, have the same attractor.
 
     Parameters
     ----------
     case : Case
-        Without hinges that yield or creep. Its `Harmonic` histories set the period; without any,
-        attractors are equilibria.
+        Case without hinges that yield or creep. Its `Harmonic` histories set the period; without
+        any, attractors are equilibria.
     initial : callable
-        Gives the `State` at a point of the grid, called with its values by their names.
+        Returns the `State` at a point of the grid, whose values are its keyword arguments.
     grid : mapping of str to array_like
         Values of each parameter of `initial`: {"height": ..., "speed": ...}.
     duration : float
-        Of each motion before it is looked at (s), rounded up to whole periods.
+        Duration (s) of each motion before it is recorded, rounded up to whole periods.
     record : int
-        States that are looked at then, one a period, at least 4: attractors of up to half as many
-        periods are told apart.
+        States then recorded, one per period, at least 4: attractors of up to half as many periods
+        are distinguished.
     same : float
-        Relative distance of states that are the same, of the range of all states.
+        Distance below which states are equal, as a fraction of the range of all states.
     dt : float, optional
         Largest step (s), shortened to divide the period. By default half the least critical step of
         64 of the starts, and with a drive at most a 64th of its period.
     method, threads, device :
-        As of `simulate_many`.
+        As in `simulate_many`.
     folder : path, optional
-        Keeps where motions end, 256 at a time, so that a grid that was cut off, or one with more
-        starts after the same first ones, goes on there.
+        Stores where motions end, 256 at a time, so that an interrupted grid, or one with more
+        starts after the same first ones, continues there.
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress` of the number of motions.
 
     Returns
     -------
     xarray.Dataset
-        Along the names of the grid: `basin`, the number of the attractor, from 0 in the order in
-        which they are met, or -1 where the motion does not repeat: it is chaotic or has not settled
-        yet, or has failed. Along `attractor`: `periods`, of the drive after which it repeats (an
-        equilibrium counts 1), `share` of the starts, and along `record` the states `displacement`
-        (m) and `velocity` (m/s). The attribute `device` says where they were computed.
+        Along the names of the grid: `basin`, the number of the attractor, from 0 in order of
+        appearance, or -1 if the motion does not repeat: it is chaotic, has not settled yet, or has
+        failed. Along `attractor`: `periods`, the number of drive periods after which it repeats (1
+        for an equilibrium), `share` of the starts, and along `record` the states `displacement` (m)
+        and `velocity` (m/s). The attribute `device` names the device that computed them.
 
     Raises
     ------
     InputError
-        An argument out of range, what `simulate_many` refuses, friction, or hinges that yield or
-        creep.
+        An argument out of range, a case that `simulate_many` refuses, friction, or hinges that
+        yield or creep.
 
     Warns
     -----
     FoldynWarning
-        Motions that do not repeat; what `simulate_many` warns of.
+        Motions that do not repeat; warnings of `simulate_many`.
 
     Examples
     --------
@@ -167,7 +167,7 @@ def basins(
     if lost:
         warn(
             f"{lost} of {len(label)} motions do not repeat in {record // 2} periods (basin -1): "
-            "chaotic, or not settled yet; a longer duration or record tells",
+            "chaotic, or not settled yet; a longer duration or record shows which",
             "long-motions.md#basins-of-attraction",
         )
     about |= {"same": same, "wall_seconds": time.perf_counter() - began, **used}
@@ -197,7 +197,7 @@ def _dataset(
 
 
 def _grid(grid: Any, nodes: int) -> tuple[tuple[str, ...], list[NDArray[np.float64]]]:
-    """Names of the parameters, and the values of each, for starts of some nodes."""
+    """Names of the parameters, and the values of each; checks the memory for the starts."""
     if not isinstance(grid, Mapping) or not grid:
         raise InputError(f" = {show(grid)}: give values by name, {{'height': [0.0, 0.1]}}", "grid")
     places = []
@@ -220,7 +220,7 @@ def _grid(grid: Any, nodes: int) -> tuple[tuple[str, ...], list[NDArray[np.float
 def _starts(
     case: Case, initial: Any, names: tuple[str, ...], places: Sequence[NDArray]
 ) -> list[State]:
-    """State at each point of the grid, the last parameter running first."""
+    """State at each point of the grid, the last parameter running fastest."""
     if not callable(initial):
         raise InputError(f" = {show(initial)}: must be a function that gives a State", "initial")
     starts = []
@@ -255,9 +255,9 @@ def _ends(
     case: Case, settled: float, period: float, record: int, how: Mapping[str, Any],
     used: dict[str, str], starts: Sequence[State],
 ) -> NDArray[np.float64]:  # fmt: skip
-    """States (m, record, 2, n, 3) of motions after they have settled, one a period.
+    """States (m, record, 2, n, 3) of settled motions, one per period.
 
-    used : gets the device on which they have settled.
+    used : receives the device on which they have settled.
     """
     count = len(starts)
     before = simulate_many([case] * count, settled, interval=settled, initial=starts, **how)
@@ -279,9 +279,9 @@ def _ends(
 def _size(
     case: Case, starts: Sequence[State], ends: NDArray, weights: NDArray, same: float, driven: bool
 ) -> float:
-    """Length (m) by which states are compared: the range of where motions end.
+    """Length scale (m) for comparing states: the range of the end states.
 
-    All may end in one attractor: then the starts set the scale too.
+    If all end in one attractor, the starts also set the scale.
     """
     shape = case.structure.nodes.shape
     first = [
@@ -303,9 +303,9 @@ def told_apart(
 ) -> tuple[NDArray[np.int64], list[int], list[int]]:
     """Attractor of each motion (m,), one motion of each attractor, and its periods.
 
-    ends : states (m, record, 2, n, 3), one a period.
+    ends : states (m, record, 2, n, 3), one per period.
     weights : of displacement and velocity in a distance.
-    same : distance of states that are the same, relative to `size` (m).
+    same : distance below which states are equal, relative to `size` (m).
     """
     states = (ends * weights[:, None, None]).reshape(*ends.shape[:2], -1)
     label = np.full(len(states), -1)

@@ -1,4 +1,4 @@
-"""Jumps of an amplitude: changes within so small a change of the drive that no curve explains."""
+"""Jumps of an amplitude: changes too large for the small change of the drive."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Jump(NamedTuple):
     place : float
         Last frequency (Hz), or level, before it.
     after : float
-        The first one after it.
+        First frequency, or level, after it.
     amplitudes : tuple of float
         Before and after.
     """
@@ -43,14 +43,14 @@ def is_jump(before: ArrayLike, after: ArrayLike) -> NDArray[np.bool_]:
 def jumps_between(
     sweep: str, place: NDArray[np.float64], amplitude: NDArray[np.float64], width: float
 ) -> list[Jump]:
-    """Jumps of amplitudes (k,) at places (k,) in their order: large changes within a width.
+    """Jumps of amplitudes (k,) at successive places (k,): large changes within a width.
 
-    The width is relative to the place. Of changes less than two widths apart the largest one is
-    taken: after a jump the amplitude swings until the vibration about the new motion has decayed.
+    The width is relative to the place. Among changes less than two widths apart only the largest
+    one counts: after a jump the amplitude swings until the transient has decayed.
     """
     last = len(place) - 1
     ends = np.arange(last) + 1
-    for k in range(last):  # the furthest place within the width, or the next one
+    for k in range(last):  # the farthest place within the width, or the next one
         while ends[k] < last and abs(place[ends[k] + 1] - place[k]) <= width * place[k]:
             ends[k] += 1
     change = np.abs(amplitude[ends] - amplitude[:-1])
@@ -70,7 +70,7 @@ def jump_variables(
 ) -> Mapping[str, tuple[Any, ...]]:
     """Variables of a dataset along the dimension jump.
 
-    along : what is swept.
+    along : swept parameter.
     """
     sweeps = np.array([jump.sweep for jump in jumps], "<U4")
     places = np.reshape([(jump.place, jump.after) for jump in jumps], (-1, 2))

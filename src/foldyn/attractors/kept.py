@@ -1,4 +1,4 @@
-"""Ends of motions that are kept in a folder, so that a grid that was cut off goes on."""
+"""Ends of motions stored in a folder, so that an interrupted grid can continue."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from foldyn.writing import made_folder, whole
 
 
 class KeptEnds:
-    """Ends of motions, some at a time, each time in a file of its own.
+    """Ends of motions, each batch stored in a file of its own.
 
     Parameters
     ----------
     folder : path or None
-        Keeps nothing without one.
+        Folder of the files; None stores nothing.
     case : Case
     how : mapping
-        All else that ends depend on, as JSON holds it.
+        All else that the ends depend on, as JSON data.
 
     Raises
     ------
     InputError
-        What the case consists of cannot be told, so that what is kept might be of another.
+        The case cannot be written down, so that stored ends might belong to another one.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class KeptEnds:
         self._folder = made_folder(folder)
 
     def of(self, starts: Sequence[State], compute: Callable[[], NDArray]) -> NDArray[np.float64]:
-        """Ends of motions from some starts: kept ones, or those that are computed."""
+        """Ends of motions from some starts, stored or computed."""
         if self._folder is None:
             return compute()
         numbers = [

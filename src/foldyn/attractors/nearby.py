@@ -1,4 +1,4 @@
-"""`lyapunov_exponent`: how fast a motion and one that starts beside it come apart."""
+"""`lyapunov_exponent`: how fast two motions with close starts separate."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     import xarray
 
 APART = 1e-7  # distance of the second motion, relative to the size of the first
-SMALL = 1e-4  # of the longest bar: the least size, that of a motion at rest
-MOST = 11.0  # change of the logarithm of the distance in an interval
-BLOCKS = 16  # of the record, from whose means the error is estimated
+SMALL = 1e-4  # of the longest bar: least size, for a motion at rest
+MOST = 11.0  # largest change of the logarithm of the distance in an interval
+BLOCKS = 16  # blocks of the record, for the error estimate
 SEED = 20
-"""Of the direction in which the second motion starts."""
+"""Seed for the direction in which the second motion starts."""
 
 
 def lyapunov_exponent(
@@ -46,24 +46,24 @@ def lyapunov_exponent(
     dt: float | None = None,
     progress: bool | Reporter | None = None,
 ) -> xarray.Dataset:
-    """Largest Lyapunov exponent of a motion: above 0 where it is chaotic.
+    """Largest Lyapunov exponent of a motion, positive if it is chaotic.
 
-    By Benettin's method: a second motion starts at a small distance and is brought back to it along
-    the line between both after each interval; the exponent is the mean rate at which the logarithm
-    of the distance grows.
+    Benettin's method: a second motion starts at a small distance, and is brought back to this
+    distance along the line between the two after each interval; the exponent is the mean growth
+    rate of the logarithm of the distance.
 
     Parameters
     ----------
     case : Case
-        Without contact, and hinges that yield or creep.
+        Case without contact or hinges that yield or creep.
     duration : float
-        How long the rate is averaged (s).
+        Time over which the rate is averaged (s).
     settle : float
-        Time before that (s), in which the motion comes to its attractor, and the distance to its
-        most unstable direction.
+        Time before that (s), in which the motion reaches its attractor, and the separation turns to
+        its most unstable direction.
     interval : float, optional
-        Between corrections of the distance (s); by default the period of the drive, without a drive
-        a hundredth of the duration.
+        Time between corrections of the distance (s); by default the period of the drive, or a
+        hundredth of the duration without a drive.
     initial : State, optional
         Where the motion starts; rest by default.
     method : {"rk4", "central_difference"}
@@ -78,8 +78,8 @@ def lyapunov_exponent(
     -------
     xarray.Dataset
         `exponent` (1/s), its standard `error` from the means of 16 blocks of the record, and, along
-        `time`, the end of each interval after `settle`, `estimate`: the mean until then, which
-        shows how it converges.
+        `time`, the end of each interval after `settle`, `estimate`: the running mean, which shows
+        the convergence.
 
     Raises
     ------
@@ -89,14 +89,13 @@ def lyapunov_exponent(
     InstabilityError
         A motion grew without bound.
     MotionInterrupted
-        From the keyboard (Ctrl-C); its `partial` has the estimate until then.
+        From the keyboard (Ctrl-C); its `partial` holds the estimate so far.
 
     Notes
     -----
-    The distance is 1e-7 of the motion's size, so that what is not linear in it is as small. It is
-    that of the displacements (m) and of the velocities times interval / (2 pi). The mean converges
-    like one over the duration where the motion is periodic, and like one over its root where it is
-    chaotic.
+    The distance is 1e-7 of the motion's size, so that nonlinear terms are as small. It combines
+    displacements (m) and velocities times interval / (2 pi). The mean converges like one over the
+    duration for a periodic motion, and like one over its square root for a chaotic one.
 
     Benettin, Galgani, Giorgilli, Strelcyn (1980), Meccanica 15, 9-30.
 
@@ -186,12 +185,12 @@ def _check(case: Case, method: str, initial: State | None) -> None:
 
 
 class Pair:
-    """Two motions beside each other.
+    """Two motions with close starts.
 
     Parameters
     ----------
     case, initial, method, dt :
-        As of `lyapunov_exponent`.
+        As in `lyapunov_exponent`.
     duration, interval : float
         s.
     """
@@ -209,7 +208,7 @@ class Pair:
         self._aside = self._tied(self._numbering.inward(chance))
 
     def growth(self, intervals: int, report: Reporter) -> Iterator[float]:
-        """Growth of the logarithm of the distance in one interval after the other."""
+        """Growth of the logarithm of the distance in each interval."""
         first, second = self._motions
         engines = []
         for motion in self._motions:
@@ -254,13 +253,13 @@ class Pair:
             raise error
 
     def _tied(self, values: NDArray) -> NDArray:
-        """What supports and ties allow of values (rows, 3) in memory: rounding would not decay."""
+        """Values (rows, 3) in memory that supports and ties allow: round-off would not decay."""
         x = self._numbering.outward(values)
         x[self._ties.determined] = 0.0
         return self._numbering.inward(self._ties.displacement(x.ravel()).reshape(x.shape))
 
     def _look(self, motion: Motion) -> None:
-        """Stop where energies do not balance, or the step has become too long."""
+        """Stop if energies do not balance, or the step has become too long."""
         motion.audit()
         motion.recheck(motion.packed.numbering.outward(motion.course.u))
 
@@ -272,7 +271,7 @@ class Pair:
 
 
 def _arrays(motion: Motion) -> list[NDArray]:
-    """What a motion goes on from: displacement, velocity, acceleration, what hinges remember."""
+    """State of a motion: displacement, velocity, acceleration, and memory of hinges."""
     course, memory = motion.course, motion.packed.body.find(HingeMemory)
     remembered = [] if memory is None else [memory.own.angle, memory.own.state]
     return [course.u, course.v, course.carry, *remembered]

@@ -1,4 +1,4 @@
-"""A motion that goes on from stretch to stretch, while what drives it changes."""
+"""A motion that continues in stretches while its drive changes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from foldyn.errors import InputError
 from foldyn.results import Quantity
 from foldyn.values import choice, number, of_kind, show
 
-PER_PERIOD = 64  # samples in a period of the drive, from which amplitudes are read
+PER_PERIOD = 64  # samples per period of the drive, for amplitudes
 
 
 class Stretch(NamedTuple):
@@ -28,19 +28,19 @@ class Stretch(NamedTuple):
     time: NDArray[np.float64]  # (k,) s
     displacement: NDArray[np.float64]  # (k, n, 3) m
     velocity: NDArray[np.float64]  # (k, n, 3) m/s
-    memory: NDArray[np.float64] | None = None  # (k, b, 2) of laws that have one
+    memory: NDArray[np.float64] | None = None  # (k, b, 2) of laws with memory
 
 
 @dataclass(frozen=True)
 class Run:
-    """Where a motion stands, and how it is integrated.
+    """Current state of a motion, and its integration method.
 
     Parameters
     ----------
     method, dt, tolerance :
-        As of `simulate`, `dt` the largest step (s), shortened to divide the sampling interval.
+        As in `simulate`, `dt` the largest step (s), shortened to divide the sampling interval.
     state : State, optional
-        Where it stands; rest by default.
+        Current state; rest by default.
     """
 
     method: str
@@ -49,7 +49,7 @@ class Run:
     state: State | None
 
     def __post_init__(self) -> None:
-        """Check what every stretch takes."""
+        """Check the arguments of every stretch."""
         choice("method", self.method, METHODS)
         if self.state is not None:
             of_kind("initial", self.state, State)
@@ -58,9 +58,9 @@ class Run:
         self, case: Case, duration: float, interval: float, longest: float, start: float = 0.0,
         report: Reporter | None = None,
     ) -> tuple[Stretch, Run]:  # fmt: skip
-        """Go on with a case for a duration (s), with a sample at every `interval` (s).
+        """Continue with a case for a duration (s), with a sample every `interval` (s).
 
-        longest : step (s) of methods with fixed steps where the user gives none.
+        longest : step (s) of methods with fixed steps if the user gives none.
         """
         dt, method = self.dt, METHODS[self.method]
         if dt is None and not (method.implicit or method.adaptive):
@@ -78,7 +78,7 @@ class Run:
 
 
 def step_of(case: Case, method: str, state: State | None, longest: float) -> float:
-    """Step (s) of a method with fixed steps: half the critical one about a state, or `longest`."""
+    """Step (s) of a fixed-step method: half the critical step about a state, at most `longest`."""
     shape, chosen = case.structure.nodes.shape, suited(method, case)
     case, at = with_mass(chosen, case), state or State()
     modal = modal_rows(case, at.origin_of(shape))
@@ -101,7 +101,7 @@ def check_relaxing(case: Case, why: str) -> None:
 
 
 def check_measure(measure: Any, nodes: int, name: str = "measure") -> Quantity:
-    """Refuse what gives no number of a state of some nodes, of which that at rest is tried."""
+    """Refuse a measure that does not return a number, as tried on the rest state."""
     of_kind(name, measure, Quantity)
     if measure.function is None or measure.dims:
         raise InputError(
@@ -129,9 +129,9 @@ def measured(measure: Quantity, stretch: Stretch, name: str = "measure") -> NDAr
 
 
 def extremes(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Largest and smallest values (k, ...) about each evenly spaced sample (k, ...).
+    """Upper and lower values (k, ...) of evenly spaced samples (k, ...), refined at extremes.
 
-    At a turning point the top of the parabola through three samples, else the sample itself.
+    At a turning point, the vertex of the parabola through three samples; else the sample.
     """
     top = values.copy()
     before, now, after = values[:-2], values[1:-1], values[2:]

@@ -19,8 +19,8 @@ from foldyn.values import choice, number, show
 if TYPE_CHECKING:
     import xarray
 
-ITERATIONS = 60  # of the bisection for the time at which a level is passed
-ROUNDING = 1e-9  # of a period
+ITERATIONS = 60  # of the bisection for the time of a crossing
+ROUNDING = 1e-9  # tolerance, as a fraction of a period
 
 
 def poincare_section(
@@ -33,7 +33,7 @@ def poincare_section(
     phase: float = 0.0,
     after: float = 0.0,
 ) -> xarray.Dataset:
-    """States in which a motion passes a section of its phase space.
+    """States at which a motion crosses a section of its phase space.
 
     Parameters
     ----------
@@ -43,16 +43,16 @@ def poincare_section(
         Time between the states (s): a stroboscopic section. Without it, and without a plane, the
         period of the drive of the motion's case.
     plane : Quantity, optional
-        Instead: with the `function` of displacement (n, 3), m, velocity (n, 3), m/s, and time, s,
-        that passes the level.
+        Alternatively, a quantity whose `function` of displacement (n, 3), m, velocity (n, 3), m/s,
+        and time, s, crosses the level.
     level : float
-        In the unit of the quantity.
+        Level, in the unit of the quantity.
     direction : {"up", "down", "both"}
-        How it passes.
+        Direction of the crossing.
     phase : float
-        Where in a period the states are (degrees): at (n + phase / 360) periods.
+        Phase of the states in a period (degrees): they are at (n + phase / 360) periods.
     after : float
-        Time (s) before which they are left out: that of the transient.
+        Time (s) before which states are skipped: the transient.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def poincare_section(
     Raises
     ------
     InputError
-        No motion; nothing that sets the period; neither a period nor a plane alone.
+        Not a motion; no period; both a period and a plane.
 
     Warns
     -----
@@ -71,9 +71,9 @@ def poincare_section(
 
     Notes
     -----
-    Between the samples a motion is the cubic with their displacements and velocities: its error is
-    of the order h^4 in displacement and h^3 in velocity, h the sampling interval. With
-    ``interval = period / k`` samples are the states themselves.
+    Between samples a motion is interpolated by the cubic through displacements and velocities: its
+    error is of order h^4 in displacement and h^3 in velocity, h the sampling interval. With
+    ``interval = period / k`` the states are samples themselves.
 
     Examples
     --------
@@ -118,7 +118,7 @@ def poincare_section(
 
 
 def _missed(stretch: Stretch, after: float, period: float | None, level: float) -> str:
-    """What a section says that has no states."""
+    """Warning for a section without states."""
     wanted = f"a whole period of {period:g} s" if period else f"the plane passes {level:g}"
     last = float(stretch.time[-1])
     return f"the motion lasts until {last:g} s, and at no time from after = {after:g} s {wanted}"
@@ -135,7 +135,7 @@ def _stretch(motion: xarray.Dataset) -> Stretch:
 
 
 def _period(motion: xarray.Dataset, given: float | None) -> float:
-    """The period given, or that of the drive of a motion's case."""
+    """The given period, or the drive period of a motion's case."""
     if given is not None:
         return number("period", given, above=0.0, unit="s")
     try:
@@ -148,7 +148,7 @@ def _period(motion: xarray.Dataset, given: float | None) -> float:
 
 
 def at_times(stretch: Stretch, times: NDArray[np.float64]) -> Stretch:
-    """States at some times (k,) by the cubics between samples."""
+    """States at some times (k,), interpolated by cubics between samples."""
     t = stretch.time
     i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
     h = (t[i + 1] - t[i])[:, None, None]
@@ -166,7 +166,7 @@ def at_times(stretch: Stretch, times: NDArray[np.float64]) -> Stretch:
 def _passages(
     stretch: Stretch, plane: Quantity, level: float, direction: str
 ) -> NDArray[np.float64]:
-    """Times at which a quantity passes a level, by bisection between samples."""
+    """Times at which a quantity crosses a level, by bisection between samples."""
     above = measured(plane, stretch, "plane") > level
     passes = above[1:] != above[:-1]
     if direction != "both":

@@ -1,4 +1,4 @@
-"""`swept_sine`: the motion under a sine whose frequency changes all the time."""
+"""`swept_sine`: the motion under a sine with continuously changing frequency."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     import xarray
 
 PER_CYCLE = 48  # samples in a cycle of the highest frequency
-FEWEST = 10  # cycles in a sweep
-HELD, FEWEST_RECORDED = 50, 4  # cycles at a frequency that is held: to settle, and looked at
+FEWEST = 10  # least cycles in a sweep
+HELD, FEWEST_RECORDED = 50, 4  # cycles at a held frequency: to settle, and recorded
 
 
 def swept_sine(
@@ -48,55 +48,55 @@ def swept_sine(
     tolerance: float | None = None,
     progress: bool | Reporter | None = None,
 ) -> xarray.Dataset:
-    """Motion while the frequency of the drive goes slowly up, or down, and its amplitude by cycle.
+    """Motion under a slow frequency sweep of the drive, up or down, and its amplitude by cycle.
 
-    The harmonic histories of the case become chirps, whose frequency changes in a straight line.
+    The harmonic histories of the case become chirps with linearly changing frequency.
 
     Parameters
     ----------
     case : Case
-        As of `bifurcation_diagram`.
+        As in `bifurcation_diagram`.
     measure : Quantity
-        As of `bifurcation_diagram`.
+        As in `bifurcation_diagram`.
     frequencies : (float, float)
-        The lower and the higher one (Hz), of the slowest of these histories: others keep their
-        ratio to it, all their phases.
+        Lower and upper frequency (Hz) of the slowest of these histories: others keep their ratio
+        to it, and all keep their phases.
     duration : float
-        Of a sweep from one to the other (s).
+        Duration of a sweep from one to the other (s).
     sweep : {"up", "down", "both"}
-        Which way; "both" goes up first, and down from there.
+        Direction; "both" goes up first, and down from there.
     settle : int
-        Cycles at the first frequency before each sweep, and (50 at least) at each that tells a jump
-        from a steep curve.
+        Cycles at the first frequency before each sweep, and (at least 50) at each frequency that is
+        held to tell a jump from a steep curve.
     resolution : float
         Relative width in frequency within which a change of the amplitude by over 20 % of the
-        larger one may be a jump: it is if motions at steps between the frequencies, from before
-        it, jump too, as in `bifurcation_diagram`. A sweep that is so slow that a vibration decays
-        within it shows jumps.
+        larger one may be a jump. It is one if stepped motions between these frequencies, started
+        before it, also jump, as in `bifurcation_diagram`. Jumps show in a sweep slow enough for a
+        vibration to decay within this width.
     initial : State, optional
         Where the motion starts; rest by default.
     method, dt, tolerance :
-        As of `simulate`, `dt` the largest step (s).
+        As in `simulate`, `dt` the largest step (s).
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress`.
 
     Returns
     -------
     xarray.Dataset
-        Along `sweep` and `cycle`: `frequency` (Hz), one over the time that the cycle takes, and
-        `amplitude`, half the distance of the measure's extremes in it. Cycles are numbered along
-        the frequency, upward. Along `jump` as of `bifurcation_diagram`.
+        Along `sweep` and `cycle`: `frequency` (Hz), the inverse duration of the cycle, and
+        `amplitude`, half the distance between the measure's extremes in it. Cycles are numbered by
+        increasing frequency. Along `jump` as in `bifurcation_diagram`.
 
     Raises
     ------
     InputError
-        An argument out of range, nothing that drives the case, a sweep of fewer than ten cycles.
+        An argument out of range, a case without drive, a sweep of fewer than ten cycles.
     ComputationError
         The motion fails.
 
     Notes
     -----
-    A sweep runs past a fold before it jumps, the further the faster it is; `bifurcation_diagram`
+    A sweep overshoots a fold before it jumps, the farther the faster it is; `bifurcation_diagram`
     waits at each frequency.
 
     Examples
@@ -169,7 +169,7 @@ def swept_sine(
 
 
 class Line(NamedTuple):
-    """A frequency (Hz) that goes in a straight line from `start` to `end` in `duration` (s)."""
+    """A frequency (Hz) that changes linearly from `start` to `end` in `duration` (s)."""
 
     start: float
     end: float
@@ -177,21 +177,21 @@ class Line(NamedTuple):
 
     @property
     def slope(self) -> float:
-        """Change of the frequency (Hz/s)."""
+        """Rate of change of the frequency (Hz/s)."""
         return (self.end - self.start) / self.duration
 
     @property
     def cycles(self) -> NDArray[np.float64]:
-        """Times (s) at which a cycle begins, and at which the last one ends."""
+        """Times (s) at which each cycle begins, and at which the last one ends."""
         count = int(0.5 * (self.start + self.end) * self.duration * (1.0 + 1e-12))
         turns = np.arange(count + 1)
         root = np.sqrt(self.start**2 + 2.0 * self.slope * turns)
         return 2.0 * turns / (self.start + root)
 
     def chirp(self, lowest: float) -> Callable[[Harmonic], Chirp]:
-        """Turn a harmonic history into one along this line, the lowest of its frequencies (Hz).
+        """Map harmonic histories to chirps along this line, for a `lowest` drive frequency (Hz).
 
-        It goes on for a cycle after the end, so that nothing jumps there.
+        They continue for a cycle beyond the end, so that nothing jumps there.
         """
         more = 1.0 / max(self.start, self.end)
         length, end = self.duration + more, self.end + self.slope * more
@@ -216,9 +216,10 @@ class Glide(NamedTuple):
     run: Run
 
     def folds(self, jump: Jump, width: float) -> bool:
-        """Whether motions at steps of the frequency jump there, too, or the curve is but steep.
+        """Whether motions at steps of the frequency also jump, or the curve is merely steep.
 
-        The sweep runs past a fold: steps begin before, where the amplitude stays if it is held.
+        The sweep overshoots a fold, so steps begin earlier, where the amplitude holds at a fixed
+        frequency.
         """
         steady = Steady(
             lambda f: at_frequency(self.case, f), lambda f: f, self.measure,
@@ -236,11 +237,11 @@ class Glide(NamedTuple):
                 first = int(np.flatnonzero(apart)[-1]) if apart.any() else 0
             after = steady.point(before.run, jump.after)
             return bool(bracketed(steady, jump.sweep, [before, after], RESOLUTION))
-        except ComputationError:  # it does not stay where it is
+        except ComputationError:  # it does not stay there
             return True
 
     def _at(self, cycle: int) -> tuple[Run, float, float]:
-        """The motion in a cycle, the cycle's frequency (Hz), and what has passed of it (s)."""
+        """The motion in a cycle, its frequency (Hz), and the elapsed part of the cycle (s)."""
         k = int(np.searchsorted(self.stretch.time, self.line.cycles[cycle]))
         t, frequency, state = self.stretch.time[k], float(self.rates[cycle]), self.run.state
         turns = (self.line.start + 0.5 * self.line.slope * t) * t
@@ -256,7 +257,7 @@ def _glide(
 ) -> tuple[Stretch, Run]:
     """Motion along a line of frequencies, after `settle` cycles at the first one.
 
-    longest : between samples, and step where the user gives none (s).
+    longest : largest sampling interval (s), and step if the user gives none.
     """
     if settle:
         wait = settle / line.start
@@ -270,7 +271,7 @@ def _glide(
 def _amplitudes(
     times: NDArray[np.float64], values: NDArray[np.float64], cycles: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Half the distance of the extremes in each cycle."""
+    """Half the distance between the extremes in each cycle."""
     top, bottom = extremes(values)
     first = np.searchsorted(times, cycles[:-1] * (1.0 - 1e-12))
     return 0.5 * (np.maximum.reduceat(top, first) - np.minimum.reduceat(bottom, first))
