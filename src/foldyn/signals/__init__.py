@@ -1,4 +1,4 @@
-"""Signals: arrays in, arrays out; nothing here knows of origami."""
+"""Signals: arrays in, arrays out, independent of origami."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Circle fit: modes from the Nyquist plot of their mobility."""
+"""Circle fit: modes from the Nyquist plot of the mobility."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from foldyn.signals import records
 from foldyn.signals.conversions import convert_response
 from foldyn.values import choice
 
-_FEWEST = 5  # points in a band: six real unknowns against ten real numbers
-_LARGEST_ERROR = 1.0 / 3.0  # of the damping ratio: mere noise gives circles with errors above 0.4
+_FEWEST = 5  # points in a band: six real unknowns, ten real numbers
+_LARGEST_ERROR = 1.0 / 3.0  # of the damping ratio: pure noise gives circles with errors above 0.4
 _SWEEPS = 200
 _SETTLED = 1e-10
 
@@ -31,15 +31,14 @@ class CircleFit:
         A, the product of the mass-normalized amplitudes at response and force (1/kg for a
         receptance in m/N); real for a mode whose parts move in phase.
     residual : complex
-        What modes that were not fitted add to the mobility, taken as constant in the band.
+        Contribution of modes not fitted to the mobility, taken as constant in the band.
     center, radius : complex, float
         The circle in the plane of the mobility; it begins and ends at `residual`.
     misfit : float
-        Root mean square distance between the points and the fit, as a part of the radius.
+        Root mean square distance between the points and the fit, as a fraction of the radius.
     frequency_error, damping_error : float
         Standard errors of natural frequency (Hz) and damping ratio from the scatter about the fit:
-        right for noise independent from line to line, blind to what other modes do beyond a
-        constant.
+        valid for noise independent from line to line; other modes are only seen as a constant.
     points : int
         Number of points fitted.
     """
@@ -69,7 +68,7 @@ def circle_fit(
     band: tuple[float, float] | None = None,
     quantity: str = "receptance",
 ) -> CircleFit:
-    """Fit one mode of a frequency response by the circle that its mobility makes.
+    """Fit one mode of a frequency response by a circle through its mobility.
 
     Parameters
     ----------
@@ -81,12 +80,12 @@ def circle_fit(
         Lowest and highest frequency (Hz) to fit, where this mode dominates: two to three times
         the half-power width. None takes all.
     quantity : {"receptance", "mobility", "accelerance"}
-        What the response is.
+        Quantity of the response.
 
     Returns
     -------
     CircleFit
-        Natural frequency, damping ratio, modal constant, residual, and how well they fit.
+        Natural frequency, damping ratio, modal constant, residual, and quality of the fit.
 
     Raises
     ------
@@ -103,8 +102,8 @@ def circle_fit(
     resonance, seen from the center: Kennelly and Pancu, Journal of the Aeronautical Sciences 14,
     1947; Ewins, Modal Testing, 2nd ed. 2000, chapter 4 (circle fit). The algebraic circle and the
     angles give the start; all six parameters are then fitted by least squares of the distance in
-    the plane, which is the most likely circle for noise of equal size at all points. The mobility
-    is taken because viscous damping makes it exactly a circle.
+    the plane, which is the maximum likelihood estimate for noise of equal size at all points. The
+    mobility is used because viscous damping makes it exactly a circle.
 
     Examples
     --------
@@ -126,11 +125,11 @@ def circle_fits(
     bands: Sequence[tuple[float, float]],
     quantity: str = "receptance",
 ) -> tuple[CircleFit, ...]:
-    """Fit several modes, one in each band, each with the others taken off.
+    """Fit several modes, one in each band, each with the others subtracted.
 
-    The circle fits are repeated, each on the response less the other modes as fitted last, until
-    nothing changes: modes near each other then cost no accuracy, and the residuals are what modes
-    outside the bands add.
+    The circle fits are iterated, each on the response minus the other modes as last fitted, until
+    they converge: close modes then do not reduce accuracy, and the residuals are the contributions
+    of modes outside the bands.
 
     Parameters
     ----------
@@ -149,7 +148,7 @@ def circle_fits(
     InputError
         As in `circle_fit`, or no bands.
     ComputationError
-        As in `circle_fit`, or fits that go on changing: modes too close for their bands.
+        As in `circle_fit`, or fits that do not converge: modes too close for their bands.
     """
     if len(bands) == 0:
         raise InputError("bands: empty; give one band (Hz) for each mode")
@@ -174,7 +173,7 @@ def circle_fits(
 def _mobility(
     frequency: ArrayLike, response: ArrayLike, quantity: str
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Frequencies above 0 and the mobility there; NaN may stand outside the bands."""
+    """Frequencies above 0 and the mobility there; NaN is allowed outside the bands."""
     choice("quantity", quantity, records.DERIVATIVES)
     f = records.checked_frequencies(frequency, fewest=_FEWEST)
     Y = np.asarray(response)
@@ -206,7 +205,7 @@ def _fit(f: NDArray[np.float64], Y: NDArray[np.complex128]) -> CircleFit:
     from scipy.optimize import least_squares  # slow to import
 
     def solved(p: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-        """Resonance curve, diameter and residual of best fit, misfit, projection."""
+        """Resonance curve, best diameter and residual, misfit, projection."""
         curve = 1.0 / (1.0 + 1j * _detuning(f, *np.exp(p)))
         q, r = np.linalg.qr(np.column_stack([curve, np.ones(f.size)]))
         inner = np.conj(q.T) @ Y
@@ -216,7 +215,7 @@ def _fit(f: NDArray[np.float64], Y: NDArray[np.complex128]) -> CircleFit:
         return solved(p)[2].view(np.float64)
 
     def slope(p: NDArray) -> NDArray[np.float64]:
-        # variable projection: of each parameter's effect only what D and B cannot follow
+        # variable projection: the part of each parameter's effect that D and B cannot follow
         curve, linear, _, q = solved(p)
         f0, z = np.exp(p)
         x_slopes = [-(f / f0 + f0 / f) / (2.0 * z), -_detuning(f, f0, z)]
@@ -235,7 +234,7 @@ def _fit(f: NDArray[np.float64], Y: NDArray[np.complex128]) -> CircleFit:
     _, (diameter, residual), left, _ = solved(solution.x)
     J = slope(solution.x)
     variance = np.sum(np.abs(left) ** 2) / (2 * f.size - 6)
-    # by singular values: a spike of one point leaves the two columns parallel
+    # by singular values: a spike of one point makes the two columns parallel
     _, size, axes = np.linalg.svd(J, full_matrices=False)
     with np.errstate(divide="ignore", invalid="ignore"):
         errors = np.sqrt(variance * np.sum((axes / size[:, np.newaxis]) ** 2, axis=0))
@@ -255,7 +254,7 @@ def _fit(f: NDArray[np.float64], Y: NDArray[np.complex128]) -> CircleFit:
 
 
 def _certain(fit: CircleFit) -> CircleFit:
-    """The fit, where its points determine the damping."""
+    """The fit; raises if its points do not determine the damping."""
     if not fit.damping_error < _LARGEST_ERROR * fit.damping_ratio:
         raise ComputationError(
             f"circle fit: at {fit.natural_frequency:.6g} Hz the damping ratio is "
@@ -284,7 +283,7 @@ def _start(f: NDArray[np.float64], Y: NDArray[np.complex128]) -> tuple[float, fl
     # the band's ends lie next to the residual, the resonance opposite
     top = int(np.argmax(np.abs(w - 0.5 * (w[0] + w[-1]))))
     angle = np.angle((w[top] - center) / (w - center))
-    # tan(angle / 2) = f / (2 z f0) - f0 / (2 z f), less weight where the tangent exaggerates noise
+    # tan(angle / 2) = f / (2 z f0) - f0 / (2 z f), weighted down where the tangent amplifies noise
     weight = np.cos(0.5 * angle) ** 2
     sides = np.column_stack([f, -1.0 / f]) * weight[:, np.newaxis]
     (a, b), *_ = np.linalg.lstsq(sides, np.tan(0.5 * angle) * weight, rcond=None)

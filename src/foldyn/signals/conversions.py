@@ -1,4 +1,4 @@
-"""Receptance, mobility and accelerance into each other; transmissibility."""
+"""Conversions between receptance, mobility and accelerance; transmissibility."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def convert_response(
     frequency : array_like, shape (m,)
         Frequencies (Hz), increasing, from 0 on.
     response : array_like, shape (m, ...), complex
-        Response per force (m/N, m/(N s) or m/(N s^2)), or of any motion per anything.
+        Response per force (m/N, m/(N s) or m/(N s^2)), or any motion per any input.
     source, target : {"receptance", "mobility", "accelerance"}
-        What is given, and what is wanted.
+        Given and wanted quantity.
 
     Returns
     -------
     ndarray, shape (m, ...), complex
-        NaN at 0 Hz where a division by i w would be needed.
+        The response; NaN at 0 Hz if a division by i w would be needed.
 
     Raises
     ------
@@ -61,12 +61,12 @@ def transmissibility(response: ArrayLike, reference: ArrayLike) -> NDArray[np.co
     response : array_like, shape (m, ...), complex
         Frequency response of the points of interest.
     reference : array_like, shape (m,), complex
-        That of the reference, of the same quantity and excitation.
+        Response of the reference, of the same quantity and excitation.
 
     Returns
     -------
     ndarray, shape (m, ...), complex
-        Quotient; NaN where the reference stands still.
+        Quotient; NaN where the reference is zero.
     """
     H = np.asarray(response, dtype=np.complex128)
     R = np.asarray(reference, dtype=np.complex128)

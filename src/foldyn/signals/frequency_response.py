@@ -1,7 +1,7 @@
 """Frequency response from records of force and response: H1, H2 and coherence.
 
-Records that have not died away at their end take an exponential window, whose known damping is
-taken off again.
+Records that have not decayed at their end get an exponential window, whose known damping is
+subtracted again.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from foldyn.values import choice, number, whole
 
 ESTIMATORS = ("h1", "h2")
 _FEWEST = 4  # samples of a segment
-# Lines where the force's amplitude is below this part of its largest one hold rounding alone.
+# Lines with a force amplitude below this fraction of the largest hold only round-off.
 _SILENCE = 1e-12
 
 
@@ -36,11 +36,11 @@ class FrequencyResponse:
         Response per force, in the unit of the response over that of the force, for the time
         dependence exp(+i w t): a lag is a negative phase. NaN at lines without force.
     coherence : ndarray, shape (m, ...)
-        Part of the response's power that is linear in the force, 0 ... 1. NaN from a single
-        segment, for which it is 1 by construction and says nothing.
+        Fraction of the response's power that is linear in the force, 0 ... 1. NaN for a single
+        segment, for which it is 1 by construction.
     force_density : ndarray, shape (m,)
         One-sided power density of the force (unit of the force squared per Hz): where it is
-        small against its maximum, the response is a quotient of small numbers.
+        small compared to its maximum, the response is a quotient of small numbers.
     segments : int
         Number of segments averaged, over all records.
     """
@@ -78,12 +78,12 @@ def frequency_response(
     With F and X the transforms of a windowed segment and averages over all segments,
     H1 = <F* X> / <F* F> has no bias from noise in the response, and H2 = <X* X> / <X* F> none
     from noise in the force; H1 is too small by 1 + (noise / force) with noise in the force, H2 too
-    large by 1 + (noise / response) with noise in the response, powers meant. The coherence
+    large by 1 + (noise / response) with noise in the response, in powers. The coherence
     ``|<F* X>|^2 / (<F* F> <X* X>)`` is H1 / H2.
 
-    Burst random, impulse and sweep: give each record whole (`segment=None`, no window), long enough
-    that the response has died away within it, or periodic. Where it has not, multiply with an
-    `exponential_window`. Unending noise: segments with ``window="hann"`` and ``overlap=0.5``.
+    Burst random, impulse and sweep: use each record whole (`segment=None`, no window), long enough
+    for the response to decay within it, or periodic. If it does not decay, multiply by an
+    `exponential_window`. Stationary noise: segments with ``window="hann"`` and ``overlap=0.5``.
 
     Parameters
     ----------
@@ -94,15 +94,15 @@ def frequency_response(
     dt : float
         Sampling interval (s); `foldyn.signals.sampling_interval` finds and checks it.
     estimator : {"h1", "h2"}
-        Which quotient; the same without noise, and with a single segment.
+        Quotient to use; both agree without noise, and for a single segment.
     segment : int or None
-        Samples of a segment; None is the whole record. What is left at a record's end is unused.
+        Samples of a segment; None is the whole record. The rest at the end of a record is unused.
     overlap : float
-        Part of a segment that the next one shares, 0 <= overlap < 1.
+        Fraction of a segment that the next one shares, 0 <= overlap < 1.
     window : str, tuple, array_like of shape (segment,), or None
-        As in `spectrum`, for force and response alike.
+        As in `spectrum`, for both force and response.
     detrend : {None, "constant", "linear"}
-        What is taken off each segment, force and response, before windowing.
+        Trend removed from each segment, force and response, before windowing.
 
     Returns
     -------
@@ -113,7 +113,7 @@ def frequency_response(
     ------
     InputError
         Records of different length, a segment longer than the record, a force without content,
-        and what `spectrum` refuses.
+        or input that `spectrum` refuses.
 
     Notes
     -----
@@ -209,10 +209,10 @@ def _transform(
 
 
 def exponential_window(n: int, dt: float, *, rate: float) -> NDArray[np.float64]:
-    """Window exp(-rate t) for records that have not died away at their end.
+    """Window exp(-rate t) for records that have not decayed at their end.
 
-    On force and response alike it moves every pole by -rate along the real axis, exactly: what
-    is then estimated is H(i w + rate). `without_window` takes the added damping off again.
+    Applied to both force and response, it moves every pole by -rate along the real axis, exactly:
+    the estimate is then H(i w + rate). `without_window` subtracts the added damping again.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def without_window(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Natural frequencies and damping ratios without the damping of an exponential window.
 
-    The damped frequency stays, and the real part of the pole moves: -z w + rate.
+    The damped frequency is unchanged, and the real part of the pole becomes -z w + rate.
 
     Parameters
     ----------
@@ -249,7 +249,7 @@ def without_window(
     Returns
     -------
     frequency, damping_ratio : ndarray
-        Those of the system; a damping ratio below 0 is more noise than damping.
+        Values of the system; a damping ratio below 0 is dominated by noise.
 
     Examples
     --------

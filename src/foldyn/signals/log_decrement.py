@@ -15,7 +15,7 @@ from foldyn.signals.spectrum import spectrum
 from foldyn.values import number
 
 _FEWEST = 16
-_PADDING = 8  # the period need only be known to a tenth
+_PADDING = 8  # the period is only needed to a tenth
 _FEWEST_PER_CYCLE = 8.0
 _DEGREE = 6  # of the polynomial through the samples around a maximum
 
@@ -30,15 +30,15 @@ class LogDecrement:
     decrement : float
         Natural logarithm of the ratio of successive maxima, by least squares over all of them.
     standard_error : float
-        Of the decrement, from the scatter of the maxima about the fit; NaN with two maxima.
+        Standard error of the decrement, from the scatter about the fit; NaN with two maxima.
     damping_ratio : float
         decrement / sqrt(4 pi^2 + decrement^2).
     damped_frequency, natural_frequency : float
-        Cycles per second between the maxima (Hz), and that over sqrt(1 - damping_ratio^2).
+        Cycles per second between the maxima (Hz), and this over sqrt(1 - damping_ratio^2).
     time, height : ndarray, shape (k,)
         The maxima (s, unit of the record), above the rest position.
     successive : ndarray, shape (k - 1,)
-        Logarithm of the ratio of each pair: a trend shows damping that depends on the amplitude.
+        Logarithm of the ratio of each pair; a trend shows amplitude-dependent damping.
     """
 
     decrement: float
@@ -62,8 +62,8 @@ def log_decrement(
     """Estimate the logarithmic decrement from the successive maxima of a free vibration.
 
     Each maximum is read from a polynomial of degree 6, fitted over two thirds of the period around
-    it; the heights are fitted by height exp(-decrement k), weighted for noise that does not decay.
-    The count begins with the highest maximum; those within a third of a period of the record's ends
+    it; the heights are fitted by height exp(-decrement k), weighted for noise of constant size. The
+    count starts with the highest maximum; maxima within a third of a period of the record's ends
     are unused.
 
     Parameters
@@ -73,11 +73,11 @@ def log_decrement(
     dt : float
         Sampling interval (s), at most an eighth of the period.
     rest : float or None
-        Rest position, in the unit of `x`. None: heights are counted from the straight line
-        between the minima before and after, so that an unknown offset and a slow drift drop out;
+        Rest position, in the unit of `x`. None: heights are measured from the straight line
+        between the minima before and after, which eliminates an unknown offset and a slow drift;
         a maximum without a minimum on each side is then unused.
     floor : float
-        Maxima below this part of the highest one end the count: noise takes over.
+        Maxima below this fraction of the highest end the count, since noise dominates.
     frequency : float or None
         Approximate damped frequency (Hz); None takes the highest line of the spectrum.
 
@@ -94,12 +94,12 @@ def log_decrement(
     Notes
     -----
     Successive maxima of exp(-z w t) cos(w_d t) lie at the same phase of each cycle, so that their
-    ratio is exp(2 pi z / sqrt(1 - z^2)) exactly, and so is that of their distances from the chords
-    between minima (Thomson, Theory of Vibration with Applications, chapter 2). Of samples only the
-    phase within the interval changes from maximum to maximum: the polynomial leaves up to 5e-5 of
-    the decrement at 12 samples per period or more, and 2e-4 at 8. Noise lifts the low maxima more
-    than the high ones: noise of 1 % at 25 samples per period lowers the decrement by 0.2 % at
-    z = 0.0255 and by 1.7 % at z = 0.135.
+    ratio is exp(2 pi z / sqrt(1 - z^2)) exactly, and so is the ratio of their distances from the
+    chords between minima (Thomson, Theory of Vibration with Applications, chapter 2). In samples,
+    only the phase within the interval changes from maximum to maximum: the polynomial leaves errors
+    up to 5e-5 of the decrement at 12 samples per period or more, and 2e-4 at 8. Noise raises low
+    maxima more than high ones: noise of 1 % at 25 samples per period lowers the decrement by 0.2 %
+    at z = 0.0255 and by 1.7 % at z = 0.135.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def log_decrement(
 
     apart = np.maximum(np.rint(np.diff(place) / per_cycle), 1.0)  # 2 where noise hid a maximum
     cycle = np.concatenate([[0.0], np.cumsum(apart)])
-    # noise of one size in the heights is noise / height in their logarithms
+    # constant noise in the heights is noise / height in their logarithms
     decrement, error = _slope(cycle, -np.log(height), weight=height**2)
     ratio = decrement / np.hypot(2.0 * np.pi, decrement)
     damped = cycle[-1] / ((place[-1] - place[0]) * interval)
@@ -174,7 +174,7 @@ def _heights(
 def _maxima(
     x: NDArray[np.float64], per_cycle: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Places (in samples) and values of one maximum per cycle, refined between the samples."""
+    """Places (in samples) and values of one maximum per cycle, interpolated between samples."""
     from scipy.signal import find_peaks  # slow to import
 
     half = max(_DEGREE // 2, round(per_cycle / 3.0))
@@ -185,7 +185,7 @@ def _maxima(
 
 
 def _refined(x: NDArray[np.float64], index: int, half: int) -> tuple[float, float]:
-    """Place and value of the maximum of the polynomial through samples around an index."""
+    """Place and value of the maximum of the polynomial through the samples around an index."""
     s = np.arange(-half, half + 1) / half
     curve = np.polynomial.Polynomial.fit(s, x[index - half : index + half + 1], _DEGREE, [-1, 1])
     roots = curve.deriv().roots()
@@ -199,7 +199,7 @@ def _refined(x: NDArray[np.float64], index: int, half: int) -> tuple[float, floa
 def _decaying(
     place: NDArray[np.float64], height: NDArray[np.float64], floor: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The maxima from the highest on, up to the first one below the floor."""
+    """The maxima from the highest one to the last above the floor."""
     if height.size == 0 or height.max() <= 0.0:
         return place[:0], height[:0]
     first = int(np.argmax(height))

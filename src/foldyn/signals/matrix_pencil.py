@@ -13,8 +13,8 @@ from foldyn.signals.records import checked_interval, real_array
 from foldyn.values import number, whole
 
 _FEWEST = 8
-_WIDEST = 500  # of a window: the singular value decomposition costs n width^2
-_ROWS = 4096  # windows taken into the factorization at a time
+_WIDEST = 500  # most samples of a window: the singular value decomposition costs n width^2
+_ROWS = 4096  # windows factorized at a time
 # Singular values of white noise: the largest is 2.5 to 4 times the lower quartile (measured for
 # windows of a third of the record, 40 to 1500 samples).
 _ABOVE_NOISE = 4.5
@@ -32,15 +32,15 @@ class DecayingModes:
     Attributes
     ----------
     natural_frequency, damping_ratio, damped_frequency : ndarray, shape (k,)
-        Frequencies in Hz; a negative damping ratio is a part that grows: often noise.
+        Frequencies in Hz; a negative damping ratio is a growing part, often noise.
     pole : ndarray, shape (k,), complex
-        -z w + i w_d (1/s), the one of each pair above the real axis.
+        -z w + i w_d (1/s), the pole of each pair above the real axis.
     amplitude, phase : ndarray, shape (k, ...)
         At t = 0, the first sample, in the unit of the record and in rad, for each channel.
     rest : ndarray, shape (...)
-        Root mean square of what the sum leaves, relative to that of the record.
+        Root mean square of the remainder, relative to the record.
     singular_values : ndarray
-        Of the Hankel matrix, falling: `order` of them stand above the noise.
+        Singular values of the Hankel matrix, decreasing: `order` of them exceed the noise.
     order : int
         Number of poles: two for each oscillating mode.
     """
@@ -56,7 +56,7 @@ class DecayingModes:
     order: int
 
     def at(self, time: ArrayLike) -> NDArray[np.float64]:
-        """The sum at times (s) from the first sample on, shape (n, ...)."""
+        """The sum at times (s) from the first sample, shape (n, ...)."""
         t = np.asarray(time, dtype=np.float64)
         parts = self.amplitude * np.exp(1j * self.phase)
         return np.real(np.tensordot(np.exp(np.outer(t, self.pole)), parts, axes=1))
@@ -72,32 +72,32 @@ def matrix_pencil(
 ) -> DecayingModes:
     """Fit a free vibration by decaying cosines: frequencies, damping ratios, amplitudes, phases.
 
-    The rows of a Hankel matrix are windows of the record; each window is a combination of as
-    many vectors as there are poles, and moving on by a sample multiplies them by exp(s dt). All
-    channels share the poles.
+    The rows of a Hankel matrix are windows of the record. Each window is a combination of as many
+    vectors as there are poles, and a shift by one sample multiplies them by exp(s dt). All channels
+    share the poles.
 
     Parameters
     ----------
     x : array_like, shape (n,) or (n, ...)
         Free vibration, after all loads have ended, with any further axes for channels; scale
-        channels of different units to like size. An offset or a slow drift comes out as a pole near
-        0: no detrending is needed, and taking off the mean of a decaying record would add to it.
+        channels of different units to similar size. An offset or a slow drift appears as a pole
+        near 0: detrending is not needed; subtracting the mean of a decaying record would add one.
     dt : float
         Sampling interval (s).
     order : int or None
         Number of poles: two for each mode, one for an offset.
     threshold : float or None
-        Without `order`: singular values above this part of the largest one count. None takes
-        the lower quartile for noise and counts what is above 4.5 times that: right for white noise,
-        too many poles where the noise has a color. Look at `singular_values`.
+        Without `order`: singular values above this fraction of the largest one count. None takes
+        the lower quartile as noise and counts values above 4.5 times that: correct for white noise,
+        too many poles for colored noise. Check `singular_values`.
     width : int or None
         Length of a window less one (the pencil parameter), from the order to n - order; None takes
-        a third of the record, which withstands noise best, at most 500.
+        a third of the record, which is least sensitive to noise, at most 500.
 
     Returns
     -------
     DecayingModes
-        The modes; those of small amplitude or negative damping may be noise.
+        The modes; ones of small amplitude or negative damping may be noise.
 
     Raises
     ------
@@ -108,10 +108,10 @@ def matrix_pencil(
     -----
     Hua and Sarkar, IEEE Transactions on Acoustics, Speech, and Signal Processing 38, 1990, 814-824;
     Sarkar and Pereira, IEEE Antennas and Propagation Magazine 37(1), 1995, 48-55; for several
-    channels the same as the eigensystem realization algorithm without input (Juang and Pappa,
-    Journal of Guidance, Control, and Dynamics 8, 1985, 620-627). Amplitudes by least squares over
-    the whole record. Sample at 4 to 20 times the highest frequency: far finer sampling makes the
-    poles crowd at exp(s dt) = 1 and costs accuracy; thin such a record.
+    channels equivalent to the eigensystem realization algorithm without input (Juang and Pappa,
+    Journal of Guidance, Control, and Dynamics 8, 1985, 620-627). Amplitudes are fitted by least
+    squares over the whole record. Sample at 4 to 20 times the highest frequency: much finer
+    sampling crowds the poles at exp(s dt) = 1 and costs accuracy; decimate such a record.
 
     Examples
     --------
@@ -171,7 +171,7 @@ def _windows(x: NDArray[np.float64], span: int) -> tuple[NDArray, NDArray]:
     for channel in x.T:
         windows = np.lib.stride_tricks.sliding_window_view(channel, span + 1)
         for start in range(0, len(windows), _ROWS):
-            # piece by piece: the windows of a long record together would fill the memory
+            # in blocks, to limit memory
             block = np.vstack([triangle, windows[start : start + _ROWS]])
             triangle = np.linalg.qr(block, mode="r")
     _, values, vectors = np.linalg.svd(triangle, full_matrices=False)
@@ -197,9 +197,9 @@ def _order(values: NDArray[np.float64], n: int, threshold: float | None) -> int:
 def _amplitudes(
     x: NDArray[np.float64], exponent: NDArray[np.complex128]
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
-    """Complex amplitudes (modes, channels) of Re(C exp(exponent k)), and what they leave."""
+    """Complex amplitudes (modes, channels) of Re(C exp(exponent k)), and the remainder."""
     n = x.shape[0]
-    # parts that grow are counted from their end, lest they overflow
+    # growing parts are counted from their end, to avoid overflow
     origin = np.where(exponent.real > 0.0, n - 1, 0)
     waves = np.exp((np.arange(n)[:, np.newaxis] - origin) * exponent)
     turning = (exponent.imag > 0.0) & (exponent.imag < np.pi * (1.0 - 1e-12))

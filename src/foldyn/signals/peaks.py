@@ -14,7 +14,7 @@ from foldyn.signals import records
 from foldyn.values import choice, number, whole
 
 _LOPSIDED = 0.1
-LOWEST = 1e-4  # of the maximum: what lies below may be the error of a simulation
+LOWEST = 1e-4  # of the maximum: smaller values may be simulation errors
 
 
 @brief
@@ -25,9 +25,9 @@ class Peaks:
     Attributes
     ----------
     frequency : ndarray, shape (p,)
-        Frequencies (Hz), refined between the samples.
+        Frequencies (Hz), interpolated between samples.
     height : ndarray, shape (p,)
-        Heights in the unit of the curve, refined.
+        Heights in the unit of the curve, interpolated.
     prominence : ndarray, shape (p,)
         Height above the higher of the two lowest points on the way to higher ground left and
         right, or to the curve's ends; in the unit of the curve, from its samples.
@@ -52,9 +52,9 @@ def find_peaks(
 ) -> Peaks:
     """Find the peaks of a magnitude curve: a frequency response, or an amplitude spectrum.
 
-    Between samples the curve is taken as that of one viscously damped mode, through three points:
-    the square of its inverse, as a receptance, is a parabola over the squared frequency. For a
-    single mode the refined peak is exact at any spacing.
+    Between samples the curve is interpolated as one viscously damped mode, through three points:
+    its inverse square, as a receptance, is a parabola in the squared frequency. For a single mode
+    the interpolated peak is exact at any spacing.
 
     Parameters
     ----------
@@ -63,19 +63,19 @@ def find_peaks(
     magnitude : array_like, shape (m,)
         Magnitudes; of complex values the modulus is taken.
     prominence : float
-        Least prominence, as a part of the curve's maximum.
+        Least prominence, as a fraction of the curve's maximum.
     count : int or None
-        Keep only the so many most prominent ones.
+        Number of peaks to keep, the most prominent ones.
     quantity : {"receptance", "mobility", "accelerance"}
-        What the curve is; for the spectrum of a displacement "receptance".
+        Quantity of the curve; "receptance" for the spectrum of a displacement.
     rise : float or None
-        Also keep lower peaks that stand out by this factor from the lowest points on the way to
-        higher ground: on a logarithmic axis they are as good as high ones.
+        Also keep lower peaks that exceed the lowest points on the way to higher ground by this
+        factor: on a logarithmic axis they are as clear as high ones.
 
     Returns
     -------
     Peaks
-        None found: arrays of length 0. A maximum at an end of the curve is no peak.
+        Arrays of length 0 if none is found. A maximum at an end of the curve does not count.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def find_peaks(
     from scipy.signal import find_peaks as search  # slow to import
     from scipy.signal import peak_prominences
 
-    # an absolute floor of 0 would keep rounding on flat stretches
+    # an absolute floor of 0 would keep round-off on flat stretches
     least = max(share, np.finfo(np.float64).eps) * curve.size.max()
     index, _ = search(curve.size, prominence=least)
     if rise is not None and curve.size.any():
@@ -138,7 +138,7 @@ class Curve(NamedTuple):
         return float(center * np.sqrt(1.0 + v)), float(height)
 
     def _top(self, index: int) -> float | None:
-        """Where the peak is, in v; None for one that is not shaped like a mode's."""
+        """Place of the peak, in v; None if it is not shaped like a mode."""
         f, order = self.f, self.order
         a, b, c, center = self.stiffness_parabola(index)
         # stationary p(v) / (1 + v)^order, p = a v^2 + b v + c and 1 + v the squared frequency
@@ -156,9 +156,9 @@ class Curve(NamedTuple):
     def peak_slopes(self, index: int) -> PeakSlopes | None:
         """Derivatives of the peak at a sample by it and its two neighbors.
 
-        None for a peak that is not shaped like a mode's. With p the parabola through the squared
-        stiffnesses p_i of the three, sum p_i L_i(v), the peak's v is where
-        g = (1 + v) p' - order p = 0; the height, stationary there, feels the change of p alone.
+        None if the peak is not shaped like a mode. With p the parabola through the squared
+        stiffnesses p_i of the three, sum p_i L_i(v), the peak is at the v with g = (1 + v) p' -
+        order p = 0; its height is stationary there, so only the change of p affects it.
         """
         v = self._top(index)
         if v is None:
@@ -167,7 +167,7 @@ class Curve(NamedTuple):
         a, b, c, center = self.stiffness_parabola(index)
         at = (self.f[near] / center) ** 2 - 1.0
         own = (self.size[index] / self.size[near]) ** 2 * (1.0 + at) ** self.order
-        shape = np.stack([np.roll(at, -k) for k in range(3)])  # of each: its place, the others'
+        shape = np.stack([np.roll(at, -k) for k in range(3)])  # of each: its place, then the others
         one, other = v - shape[:, 1], v - shape[:, 2]
         scale = (shape[:, 0] - shape[:, 1]) * (shape[:, 0] - shape[:, 2])
         part, slope = one * other / scale, (one + other) / scale  # L_i and L_i'
@@ -208,7 +208,7 @@ class PeakSlopes(NamedTuple):
 
 
 def magnitude_curve(frequency: ArrayLike, magnitude: ArrayLike, quantity: str) -> Curve:
-    """Curve of a quantity, at least three points, checked."""
+    """Checked curve of a quantity with at least three points."""
     order = records.DERIVATIVES[choice("quantity", quantity, records.DERIVATIVES)]
     f = records.checked_frequencies(frequency, fewest=3)
     curve = records.checked_curve("magnitude", magnitude, f)
@@ -228,14 +228,14 @@ class HalfPower:
     lower, upper : float
         Frequencies (Hz) left and right at which the curve has fallen to height / sqrt(2).
     textbook_damping_ratio : float
-        (upper - lower) / (2 peak), as most publications mean it: exact for a mobility, too large
+        (upper - lower) / (2 peak), as in most publications: exact for a mobility, too large
         by about 2 z^2 relative for a receptance (4 % at 0.135), growing with damping.
     damping_ratio, natural_frequency : float
-        Those of the single viscously damped mode with these half-power points (frequency in Hz):
+        Values of the single viscously damped mode with these half-power points (frequency in Hz):
         exact for it at any damping.
     asymmetry : float
-        0 for a single viscously damped mode: how far off the middle of the half-power points the
-        peak lies, as a part of their distance. Neighbors, noise and nonlinearity raise it.
+        Distance of the peak from the middle of the half-power points, as a fraction of their
+        distance: 0 for a single viscously damped mode; raised by neighbors, noise and nonlinearity.
     """
 
     peak: float
@@ -267,13 +267,13 @@ def half_power(
     magnitude : array_like, shape (m,)
         Magnitudes; of complex values the modulus is taken.
     near : float or None
-        The peak nearest to this frequency (Hz), bumps below `ripple` left out; None takes the
-        highest.
+        Take the peak nearest to this frequency (Hz), ignoring bumps below `ripple`; None takes the
+        highest peak.
     quantity : {"receptance", "mobility", "accelerance"}
-        What the curve is.
+        Quantity of the curve.
     ripple : float
-        On its way down to the half-power points the curve may rise again by this part of its
-        least value so far (noise); more is taken for a neighbor.
+        On its way down to the half-power points the curve may rise again by this fraction of its
+        least value so far (noise); more counts as a neighbor.
 
     Returns
     -------
@@ -284,12 +284,12 @@ def half_power(
     ------
     InputError
         No peak; a curve that ends before it has fallen by 3 dB, or rises again before: overlapping
-        neighbors, for which `circle_fit` or `matrix_pencil` serve.
+        neighbors, for which to use `circle_fit` or `matrix_pencil`.
 
     Warns
     -----
     FoldynWarning
-        Where the asymmetry is above 0.1.
+        The asymmetry is above 0.1.
 
     Notes
     -----
@@ -298,7 +298,7 @@ def half_power(
     quotient of difference and sum of the squared points is tan 2 a, and
     z = sin(atan((upper^2 - lower^2) / (upper^2 + lower^2)) / 2). An accelerance has the reciprocal
     roots and the same quotient; for a mobility upper lower = f0^2 and upper - lower = 2 z f0. A
-    receptance falls by 3 dB towards 0 Hz only if z < sin(pi / 8) = 0.383. The textbook formula:
+    receptance falls by 3 dB toward 0 Hz only if z < sin(pi / 8) = 0.383. The textbook formula:
     Ewins, Modal Testing, 2nd ed. 2000, chapter 4 (peak amplitude method).
 
     Examples
@@ -328,7 +328,7 @@ def half_power(
     else:
         double = np.arctan((upper**2 - lower**2) / (upper**2 + lower**2))
         damping = np.sin(0.5 * double)
-        power = 2 - 2 * curve.order  # of the frequency in which the points lie evenly: 2, or -2
+        power = 2 - 2 * curve.order  # of the frequency, in which the points are even: 2 or -2
         middle = (0.5 * (lower**power + upper**power)) ** (1.0 / power)
         natural = middle * np.cos(double) ** (-1.0 / power)
     asymmetry = float(abs(peak - middle) / (upper - lower))
@@ -396,7 +396,7 @@ def _between(curve: Curve, inner: int, outer: int, level: float) -> float:
     f, size, order = curve
     middle = min(max(inner, 1), f.size - 2)
     a, b, c, center = curve.stiffness_parabola(middle)
-    # (height / level)^2 (1 + v)^order = a v^2 + b v + c, heights counted in that at `middle`
+    # (height / level)^2 (1 + v)^order = a v^2 + b v + c, heights relative to `middle`
     ratio = (size[middle] / level) ** 2
     a, b, c = np.array([a, b, c]) - ratio * np.array([[0, 0, 1], [0, 1, 1], [1, 2, 1]][order])
     ends = np.sort((f[[inner, outer]] / center) ** 2 - 1.0)
@@ -408,6 +408,6 @@ def _between(curve: Curve, inner: int, outer: int, level: float) -> float:
         inside = candidates[(candidates >= ends[0]) & (candidates <= ends[1])]
         if inside.size == 1:
             return float(center * np.sqrt(1.0 + inside[0]))
-    # noise or a zero: a straight line of the magnitude
+    # noise or a zero: linear interpolation of the magnitude
     part = (size[inner] - level) / (size[inner] - size[outer])
     return float(f[inner] + part * (f[outer] - f[inner]))

@@ -1,7 +1,7 @@
 """From a measured history to a free vibration: window, start, rest position, trend.
 
 The steps of Herkal, Nagarajaiah and Paulino (Dynamic Behavior of Origami Structures: Computational
-and Experimental Study) between camera tracking and spectra, in their order, each on its own.
+and Experimental Study) between camera tracking and spectra, in order, as separate functions.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ _FEWEST = 4
 
 
 def fill_gaps(x: ArrayLike, longest: int = 5) -> NDArray[np.float64]:
-    """Fill short gaps (NaN) of a record between the samples around them.
+    """Fill short gaps (NaN) of a record by interpolation.
 
-    By a cubic spline, which follows a vibration sampled eight times a period or more. A gap that is
-    longer stays an error: what was not measured must not be invented.
+    Uses a cubic spline, which follows a vibration sampled at least eight times per period. A longer
+    gap remains an error: unmeasured data must not be invented.
 
     Parameters
     ----------
     x : array_like, shape (n,)
     longest : int
-        Most samples of a gap.
+        Largest number of samples in a gap.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def choose_window(
     Raises
     ------
     InputError
-        Fewer than four samples lie there.
+        Fewer than four samples lie in this range.
     """
     t = records.checked_record("time", time, 1)
     values = records.real_numbers("x", x)
@@ -84,13 +84,13 @@ def choose_window(
 
 
 def first_turning_point(x: ArrayLike, least: float = 0.1) -> int:
-    """Index of the first maximum or minimum from which a record swings back.
+    """Index of the first maximum or minimum at which a record turns back.
 
     Parameters
     ----------
     x : array_like, shape (n,)
     least : float
-        Part of the record's range by which it must come and go: smaller turns are noise.
+        Fraction of the record's range by which it must rise and fall: smaller turns are noise.
 
     Raises
     ------
@@ -115,13 +115,13 @@ def first_turning_point(x: ArrayLike, least: float = 0.1) -> int:
 
 
 def subtract_final(x: ArrayLike, part: float = 0.1) -> NDArray[np.float64]:
-    """Record relative to where it comes to rest: the mean of its last part.
+    """Record relative to its final rest position, the mean of its last part.
 
     Parameters
     ----------
     x : array_like, shape (n,)
     part : float
-        Share of the record whose mean is the final position.
+        Fraction of the record whose mean is the final position.
     """
     values = records.checked_record("x", x, _FEWEST)
     share = number("part", part, above=0.0, below=1.0)
@@ -130,5 +130,5 @@ def subtract_final(x: ArrayLike, part: float = 0.1) -> NDArray[np.float64]:
 
 
 def remove_trend(x: ArrayLike, kind: str = "linear") -> NDArray[np.float64]:
-    """Record without its line of best fit ("linear") or its mean ("constant")."""
+    """Record minus its line of best fit ("linear") or its mean ("constant")."""
     return records.detrended(records.checked_record("x", x, _FEWEST), kind)

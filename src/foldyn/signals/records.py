@@ -1,4 +1,4 @@
-"""Checks of records, their sampling, windows and curves that the estimators share."""
+"""Checks of records, their sampling, windows and curves, shared by the estimators."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from foldyn.values import number
 
 Window: TypeAlias = str | tuple | ArrayLike | None
 
-# time derivatives of the displacement that a frequency response holds, per force
+# order of time derivative of the displacement per force
 DERIVATIVES: dict[str, int] = {"receptance": 0, "mobility": 1, "accelerance": 2}
 DETRENDS = (None, "constant", "linear")
 
@@ -34,7 +34,7 @@ def real_numbers(name: str, x: ArrayLike) -> NDArray[np.float64]:
 
 
 def finite(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return `values`, time along axis 0, where all of them are finite."""
+    """Return `values`, time along axis 0; raises if any is not finite."""
     bad = ~np.isfinite(values)
     if bad.any():
         raise InputError(
@@ -67,7 +67,7 @@ def checked_interval(dt: float) -> float:
 
 
 def checked_window(window: Window, n: int) -> NDArray[np.float64]:
-    """Return the n samples of a window, by name or as given; None is a window of ones."""
+    """Return the n samples of a window, named or given; None is a window of ones."""
     if window is None:
         return np.ones(n)
     if isinstance(window, str | tuple):
@@ -87,7 +87,7 @@ def checked_window(window: Window, n: int) -> NDArray[np.float64]:
 
 
 def detrended(x: NDArray[np.float64], kind: str | None, axis: int = 0) -> NDArray[np.float64]:
-    """Return `x` without its mean ("constant") or its line of best fit ("linear")."""
+    """Return `x` minus its mean ("constant") or its line of best fit ("linear")."""
     if kind not in DETRENDS:
         raise InputError(f'detrend: {kind!r} is unknown; use None, "constant" or "linear"')
     if kind is None:
@@ -137,12 +137,12 @@ def _first(bad: NDArray[np.bool_]) -> int:
 
 
 def beside(row: NDArray, other: NDArray) -> NDArray:
-    """A row over the first axis, shaped to multiply an array with channels behind it."""
+    """Row along the first axis, shaped to multiply an array with channels after it."""
     return row.reshape(row.shape + (1,) * (other.ndim - 1))
 
 
 def is_uniform(time: ArrayLike, rtol: float = _RELATIVE_SLACK) -> bool:
-    """Tell whether sample times are evenly spaced and increasing.
+    """Return whether sample times are evenly spaced and increasing.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def is_uniform(time: ArrayLike, rtol: float = _RELATIVE_SLACK) -> bool:
     step = (t[-1] - t[0]) / (t.size - 1)
     if step <= 0.0:
         return False
-    # Compared with the grid and not step by step: rounding then does not add up, drift shows.
+    # Compared with the grid, not step by step: rounding then does not add up, but drift shows.
     grid = t[0] + step * np.arange(t.size)
     slack = rtol * step + _ROUNDING_UNITS * np.finfo(np.float64).eps * np.abs(t).max()
     return bool(np.abs(t - grid).max() <= min(slack, 0.5 * step))
@@ -186,7 +186,7 @@ def sampling_interval(time: ArrayLike) -> float:
     Raises
     ------
     InputError
-        Where the times are not evenly spaced and increasing.
+        The times are not evenly spaced and increasing.
     """
     t = np.asarray(time, dtype=np.float64)
     if t.ndim != 1 or t.size < 2:

@@ -40,7 +40,7 @@ def spectrum(
         None leaves the record as it is; a name or a (name, parameter) tuple as
         `scipy.signal.get_window` takes it (its periodic form); or the window's own samples.
     detrend : {None, "constant", "linear"}
-        What is taken off before windowing: nothing, the mean, or the straight line of best fit.
+        Trend removed before windowing: nothing, the mean, or the straight line of best fit.
     pad : int
         Zeros are appended up to `pad` times the length: a finer grid, not a finer resolution,
         which stays 1/(n dt).

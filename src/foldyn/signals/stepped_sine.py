@@ -17,7 +17,7 @@ from foldyn.values import number, whole
 @brief
 @dataclass(frozen=True)
 class SineFit:
-    """The sine of a known frequency in a record, with its harmonics.
+    """Fit of a sine of known frequency to a record, with its harmonics.
 
     x(t) = offset + slope (t - t_mid) + sum over k of Re(amplitude[k - 1] exp(2 pi i k f t)) + rest.
 
@@ -26,15 +26,15 @@ class SineFit:
     frequency : float
         f (Hz), as given.
     amplitude : ndarray, shape (harmonics, ...), complex
-        Complex amplitudes of f, 2 f, ... in the unit of the record; the phase is that of a cosine
-        at t = 0 of the times given.
+        Complex amplitudes of f, 2 f, ... in the unit of the record; phases refer to a cosine at
+        t = 0 of the given times.
     offset, slope : ndarray, shape (...)
-        Value at the middle of the part fitted, and trend per second.
+        Value at the middle of the fitted part, and trend per second.
     rest : ndarray, shape (...)
-        Root mean square of what is left.
+        Root mean square of the remainder.
     unsteadiness : ndarray, shape (...)
         Difference of the amplitudes of f in the two halves of the part, relative to the amplitude:
-        what is left of a transient, or of noise.
+        a measure of transients, or of noise.
     samples : int
         Number of samples fitted.
     """
@@ -58,7 +58,7 @@ def fit_sine(
 ) -> SineFit:
     """Fit the steady part of a record by a sine of known frequency, an offset and a trend.
 
-    Linear least squares; the times need not be evenly spaced, nor the part hold whole cycles.
+    Linear least squares; times need not be evenly spaced, nor cycles complete.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def fit_sine(
     frequency : float
         Frequency of the excitation (Hz).
     cycles : int or None
-        Fit the last so many cycles, at least 2, where the transient has died away; None fits the
+        Number of last cycles to fit, at least 2, after the transient has decayed; None fits the
         whole record.
     harmonics : int
         Multiples of the frequency to fit, from 1: more than 1 for the distortion of a nonlinear
@@ -111,7 +111,7 @@ def fit_sine(
     basis = _basis(t, f, count)
     coefficients = np.linalg.lstsq(basis, samples, rcond=None)[0]
     left = samples - basis @ coefficients
-    # halves share the offset and the trend of the whole: short ones cannot tell them from the sine
+    # halves share offset and trend of the whole: short ones cannot separate them from the sine
     waves = basis[:, 2:] @ coefficients[2:] + left
     first, second = (
         _amplitudes(np.linalg.lstsq(basis[half, 2:], waves[half], rcond=None)[0])[0]
@@ -144,7 +144,7 @@ def stepped_sine(
 ) -> NDArray[np.complex128]:
     """Response per force at the frequency of a sine excitation, from the steady part of records.
 
-    The quotient of the complex amplitudes at that frequency: for a nonlinear structure the
+    The quotient of the complex amplitudes at this frequency: for a nonlinear structure, the
     describing function at the amplitude reached. One call per frequency (and amplitude).
 
     Parameters
@@ -156,7 +156,7 @@ def stepped_sine(
     response : array_like, shape (n, ...)
         Response, with any further axes for channels.
     frequency, cycles, harmonics
-        As in `fit_sine`, which tells more of each record.
+        As in `fit_sine`, which returns more about each record.
 
     Returns
     -------
@@ -166,7 +166,7 @@ def stepped_sine(
     Raises
     ------
     InputError
-        What `fit_sine` refuses, or a force without content at the frequency.
+        Input that `fit_sine` refuses, or a force without content at the frequency.
     """
     if np.ndim(force) != 1:
         raise InputError(f"force: shape {np.shape(force)}; give one record, shape (n,)")
@@ -192,7 +192,7 @@ def _steady_part(
         raise InputError("time: increasing sample times in one row are needed")
     if samples.ndim == 0 or samples.shape[0] != t.size:
         raise InputError(f"x: shape {samples.shape}, but there are {t.size} times")
-    # the last sample stands for the interval before it: n intervals are n dt long, not (n - 1) dt
+    # the last sample includes the interval before it: n intervals are n dt long, not (n - 1) dt
     there = (t[-1] - t[0]) * t.size / (t.size - 1) * f
     wanted = 2 if cycles is None else whole("cycles", cycles, least=2)
     if there < wanted * (1.0 - 1e-9):
@@ -200,7 +200,7 @@ def _steady_part(
             f"time: the record holds {there:.3g} cycles of {f:g} Hz, and {wanted} are needed; "
             f"record longer{'' if cycles is None else ', or fit fewer cycles'}"
         )
-    # half an interval of slack: the same part whichever way the times are rounded
+    # half an interval of slack: the part does not depend on the rounding of times
     start = 0 if cycles is None else np.searchsorted(t, t[-1] - cycles / f + 0.5 * np.diff(t)[-1])
     return t[start:], samples.reshape(t.size, -1)[start:]
 
@@ -214,5 +214,5 @@ def _basis(t: NDArray[np.float64], f: float, harmonics: int) -> NDArray[np.float
 
 
 def _amplitudes(coefficients: NDArray) -> NDArray[np.complex128]:
-    """Complex amplitudes from those of cosines and sines: a cos + b sin = Re((a - i b) e^...)."""
+    """Complex amplitudes from cosine and sine coefficients: a cos + b sin = Re((a - i b) e^...)."""
     return coefficients[0::2] - 1j * coefficients[1::2]

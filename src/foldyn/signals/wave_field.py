@@ -1,4 +1,4 @@
-"""Waves in a chain of cells: their spectrum over phase and frequency, and pulses on their way."""
+"""Waves in a chain of cells: their spectrum over phase and frequency, and traveling pulses."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from foldyn.errors import InputError
 from foldyn.signals import records
 from foldyn.values import number
 
-FEWEST = 4  # cells, and samples, of a field
+FEWEST = 4  # least number of cells, and of samples, of a field
 
 
 class WavenumberSpectrum(NamedTuple):
-    """How strong waves exp(i (omega t - kappa n)) are in a field; see `wavenumber_spectrum`.
+    """Amplitudes of waves exp(i (omega t - kappa n)) in a field; see `wavenumber_spectrum`.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class WavenumberSpectrum(NamedTuple):
     frequency : ndarray, shape (f,)
         Hz, from 0 in steps of 1/(m dt) for m samples.
     amplitude : ndarray, shape (p, f)
-        In the unit of the field; the root of the sum of squares over components.
+        In the unit of the field; the root of the sum of squares over the components.
     """
 
     phase: NDArray[np.float64]
@@ -36,7 +36,7 @@ class WavenumberSpectrum(NamedTuple):
 def wavenumber_spectrum(
     values: ArrayLike, dt: float, *, window: records.Window = "hann"
 ) -> WavenumberSpectrum:
-    """Two-dimensional spectrum of what moves in a chain of cells.
+    """Two-dimensional spectrum of a motion of a chain of cells.
 
     The transform over time and cells, divided by the sums of the windows and doubled for negative
     frequencies: a traveling wave of amplitude A on a bin gives a peak of height A.
@@ -44,12 +44,12 @@ def wavenumber_spectrum(
     Parameters
     ----------
     values : array_like, shape (m, n, ...)
-        Over m times, evenly spaced, and n cells; further axes are components of a cell.
+        Values at m evenly spaced times in n cells; further axes are components of a cell.
     dt : float
         Sampling interval (s).
     window : str, tuple, array_like, or None
-        Over time and over cells, as `spectrum` takes it (an array is one over time); None leaves
-        both as they are.
+        Over time and over cells, as in `spectrum` (an array is a window over time); None applies
+        none.
 
     Returns
     -------
@@ -92,16 +92,16 @@ def wavenumber_spectrum(
 
 
 class Pulse(NamedTuple):
-    """A pulse on its way along cells; see `pulse`.
+    """A pulse traveling along cells; see `pulse`.
 
     Attributes
     ----------
     arrival : ndarray, shape (n,)
-        Time of its peak in each cell; nan where it does not come.
+        Time of its peak in each cell; nan if it does not arrive.
     peak : ndarray, shape (n,)
-        Value at its peak, with its sign.
+        Signed value at its peak.
     width : ndarray, shape (n,)
-        Time for which it exceeds half of that around the peak; nan if the record ends before.
+        Full width at half maximum, in time; nan if the record ends before.
     speed : float
         Cells per time, from the slopes between all pairs of arrivals (their median); nan with
         fewer than three.
@@ -116,19 +116,19 @@ class Pulse(NamedTuple):
 def pulse(time: ArrayLike, values: ArrayLike, *, sign: int = 1, share: float = 0.5) -> Pulse:
     """Follow the first pulse of one sign along a chain of cells.
 
-    It arrives in a cell with the first maximum that has at least a share of the largest value of
-    this sign that the cell ever sees.
+    It arrives in a cell with the first maximum of at least a share of the largest value of this
+    sign in the cell.
 
     Parameters
     ----------
     time : array_like, shape (m,)
         s, increasing.
     values : array_like, shape (m, n)
-        Of n cells, such as their strain: a rarefaction is a pulse of sign 1, a compression of -1.
+        Values in n cells, such as strains: a rarefaction has the sign 1, a compression -1.
     sign : {1, -1}
-        Of the pulse.
+        Sign of the pulse.
     share : float
-        From 0 to 1: which maxima count.
+        Least height of a maximum, from 0 to 1 of the largest value.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def pulse(time: ArrayLike, values: ArrayLike, *, sign: int = 1, share: float = 0
 
 
 def _first_peak(time: NDArray, values: NDArray, share: float) -> tuple[float, float, float]:
-    """Time, height and width at half of it of the first high maximum (inside the record)."""
+    """Time, height and full width at half maximum of the first high maximum inside the record."""
     inner = values[1:-1]
     high = (inner >= values[:-2]) & (inner > values[2:]) & (inner > 0.0)
     peaks = np.flatnonzero(high & (inner >= share * values.max())) + 1
