@@ -197,6 +197,7 @@ class Swept(NamedTuple):
 
 
 def _swept(case: Case, frequencies: ArrayLike | None, amplitudes: ArrayLike | None) -> Swept:
+    """The swept parameter, from frequencies or amplitudes."""
     if (frequencies is None) == (amplitudes is None):
         raise InputError(": give frequencies (Hz) or amplitudes, one of the two", "frequencies")
     own = driven_frequency(case, "fd.bifurcation_diagram")
@@ -318,6 +319,7 @@ def _dataset(
     case: Case, measure: Quantity, swept: Swept, ways: list[str], points: list[list[Point]],
     jumps: list[Jump], facts: dict[str, Any],
 ) -> xarray.Dataset:  # fmt: skip
+    """Dataset of the points and jumps of all sweeps."""
     along, text, units = ("sweep", swept.name), measure.text or "measure", measure.units
     shape = len(ways), len(swept.values)
     section = np.full((*shape, points[0][0].section.size), np.nan)

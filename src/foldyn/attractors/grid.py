@@ -125,7 +125,7 @@ def basins(
     """
     began = time.perf_counter()
     of_kind("case", case, Case)
-    check_relaxing(case, "what they keep is no part of the grid")
+    check_relaxing(case, "their memory is not part of the grid")
     if case.contact is not None and case.contact.rubs:
         raise InputError(
             ": motions go on from the states in which they have settled, without what friction "

@@ -164,6 +164,7 @@ def lyapunov_exponent(
 
 
 def _check(case: Case, method: str, initial: State | None) -> None:
+    """Refuse cases and methods that the exponent does not cover."""
     of_kind("case", case, Case)
     if initial is not None:
         of_kind("initial", initial, State)
@@ -244,6 +245,7 @@ class Pair:
         self._look(first)
 
     def _advance(self, motion: Motion, engine: Any, steps: int) -> None:
+        """Advance a motion by a number of steps; raises if it fails."""
         code, hinge = engine.advance(motion.output.window, steps)
         if code != Outcome.DONE:
             kind, why = failure(motion, code, hinge)
@@ -264,9 +266,11 @@ class Pair:
         motion.recheck(motion.packed.numbering.outward(motion.course.u))
 
     def _size(self, motion: Motion) -> float:
+        """Norm of a motion's state, m."""
         return self._distance(motion.course.u, motion.course.v)
 
     def _distance(self, u: NDArray, v: NDArray) -> float:
+        """Norm (m) of displacements, and velocities scaled to a length."""
         return math.hypot(float(np.linalg.norm(u)), self._speed * float(np.linalg.norm(v)))
 
 

@@ -74,7 +74,7 @@ class Balance:
     def add_seen(
         self, by_state: NDArray, pullback: Pullback, total: dict[str, NDArray], factor: float = 1.0
     ) -> None:
-        """Add the gradient through the state, under loads times a factor.
+        """Add to a gradient the part due to the change of the state, with loads times a factor.
 
         by_state : derivatives (m,) of the quantity by the dofs with the numbers fixed.
         """

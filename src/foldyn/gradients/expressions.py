@@ -137,6 +137,7 @@ def _check(node: ast.expr, text: str, found: dict[str, None]) -> None:
 
 
 def _check_call(node: ast.Call, text: str, found: dict[str, None]) -> None:
+    """Refuse unknown functions and wrong arguments, and collect the measures."""
     name = ast.unparse(node.func)
     known = ", ".join([*_SEVERAL, *_FUNCTIONS])
     if name not in (*_SEVERAL, *_FUNCTIONS):
@@ -153,6 +154,7 @@ def _check_call(node: ast.Call, text: str, found: dict[str, None]) -> None:
 
 
 def _refuse(text: str, node: ast.expr, why: str) -> NoReturn:
+    """Raise an error about a part of an expression."""
     place = f"{trees.written(node)} (character {node.col_offset + 1})"
     raise InputError(f" = {show(text)}: {place}: {why}")
 
@@ -195,6 +197,7 @@ def _divided(one: _Number, other: _Number) -> _Number:
 
 
 def _power(one: _Number, other: _Number) -> _Number:
+    """Power of two numbers, with its derivatives."""
     a, b = one.value, other.value
     if (a == 0.0 and b < 0.0) or (a < 0.0 and b % 1.0):
         return _Number(math.nan, one.slope)
@@ -226,6 +229,7 @@ def _rounding(node: ast.expr, known: Mapping[str, _Number]) -> float:
 
 
 def _of_one(name: str, one: _Number, text: str, rounding: float) -> _Number:
+    """Function of one number, with its derivatives."""
     function, derivative = _FUNCTIONS[name]
     value = float(function(one.value))
     if not one.slope.any():

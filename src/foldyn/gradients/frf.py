@@ -71,8 +71,8 @@ class FrfGradient:
         self._axis = None if self._drive.axis is None else AXES.index(self._drive.axis)
         if self._axis is not None and self._linear.ground[:, self._axis].any():
             raise InputError(
-                "there are no gradients of transmissibilities where springs stand on the ground "
-                "beside the base; hold their ends by nodes that are fixed"
+                "there are no gradients of transmissibilities if springs are attached to the "
+                "ground, not the base; attach their ends to fixed nodes"
             )
         self._products = Products(self._linear, equilibrium)
 

@@ -37,9 +37,9 @@ class Derivative(NamedTuple):
     """The derivative of a measure.
 
     seeds : function of a result, a case and the measure's arguments.
-    frozen : for a measure that also depends on the case directly: function of the result (or the
-        measure's intermediate result), the case and the arguments that returns the measure as a
-        function of another case, with the result fixed. It is differenced, so it must be smooth.
+    frozen : for a measure that also depends on the case directly. From the result (or the measure's
+        intermediate result), the case and the arguments it makes the measure as a function of
+        another case, with the result fixed. Differences are taken, so that must be smooth.
     numbers : with the same arguments, derivatives of such a measure by numbers of the case.
     places : with the same arguments, for an extreme: all places where it is reached; `seeds` and
         `frozen` take one as `at`. The measure has a derivative if they all agree.
@@ -62,6 +62,8 @@ def _largest(numbers: NDArray) -> list[tuple[int, ...]]:
 
 
 def _of_mode(variable: str) -> Derivative:
+    """Derivative of a measure that is one entry of a variable of modes."""
+
     def seeds(result: xr.Dataset, case: Case, mode: int, **axis: str) -> Seeds:
         chosen = {"mode": mode, **axis}
         return _at(result, variable, {name: [value] for name, value in chosen.items()}, 1.0)
@@ -151,6 +153,7 @@ def _mean_square(result: xr.Dataset, case: Case, node: int, axis: str) -> Seeds:
 def _moved_farthest(
     result: xr.Dataset, case: Case, node: int | None = None
 ) -> list[tuple[int, ...]]:
+    """Samples and nodes with the largest displacement, of all nodes or of one."""
     size = np.linalg.norm(_all_moved(result), axis=-1)
     if node is not None:
         size = np.where(np.arange(size.shape[1]) == node, size, -1.0)
@@ -189,6 +192,7 @@ class _Bar(NamedTuple):
 
 
 def _bar(result: xr.Dataset, case: Case, at: tuple[int, int]) -> _Bar:
+    """The bar at a place, with its elongation and sign."""
     sample, bar = at
     ends, moved = case.structure.bars[bar], _all_moved(result)[sample]
     one = _Bar(ends, moved[ends[1]] - moved[ends[0]], 1.0)
@@ -196,6 +200,7 @@ def _bar(result: xr.Dataset, case: Case, at: tuple[int, int]) -> _Bar:
 
 
 def _strain(result: xr.Dataset, case: Case, at: tuple[int, int]) -> Seeds:
+    """Seeds of the strain of a bar."""
     one = _bar(result, case, at)
     rest, _ = one.strain(case)
     present = rest + one.apart
@@ -257,6 +262,7 @@ def _clearance_of(result: xr.Dataset, case: Case, at: _Apart) -> Callable[[Case]
 
 
 def _reaction(result: xr.Dataset, case: Case, axis: str) -> Seeds:
+    """Seeds of the sum of reactions along an axis at the last step."""
     out = np.zeros((result.sizes["step"], len(case.reaction_dofs)))
     out[-1, (result["support_axis"] == axis).values] = 1.0
     return {"reaction": out}
@@ -272,6 +278,7 @@ def _tensest(result: xr.Dataset, case: Case) -> list[tuple[int, ...]]:
 
 
 def _strain_energy(result: xr.Dataset, case: Case, at: tuple[int]) -> Seeds:
+    """Seeds of the strain energy of a sample."""
     if case.swellings:
         raise InputError("has no derivative here where panels are warm; leave it out")
     u, energy = _all_moved(result), _strain_energies(result, case)[at]
@@ -299,6 +306,7 @@ def _energy(case: Case, u: NDArray) -> float:
 
 
 def _limit_load(result: xr.Dataset, case: Case) -> Seeds:
+    """Seeds of the load factor at the first limit point."""
     at = np.flatnonzero(result["point"].values == "limit")
     if not len(at):
         raise InputError("the path has no limit point; trace it by arc_length, and farther")

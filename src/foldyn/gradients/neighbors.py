@@ -126,6 +126,7 @@ def equilibria(one: Asked, result: xarray.Dataset, others: Sequence[Asked]) -> l
 
 
 def _problem(one: Asked) -> OrigamiProblem:
+    """Equilibrium problem of a case; refuses contact, memory and constant loads."""
     case, given = one.case, one.arguments
     lacks = (
         case.contact, case.remembering, given.get("inertia_relief"), given.get("duration"),

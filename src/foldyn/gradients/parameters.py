@@ -137,6 +137,7 @@ class Parameters:
     def _slope(
         self, name: str, numbers_of: Callable[[Any], Arrays], here: Arrays, steps: Sequence[float]
     ) -> Any:
+        """Derivatives of the numbers of a case by one parameter."""
         value, size = self.values[name], self.size(name)
 
         def at(direction: NDArray, by: float) -> Mapping[str, NDArray]:
@@ -195,6 +196,7 @@ class Parameters:
     def _one_by_one(
         self, change: Callable[[NDArray], dict[str, NDArray]], size: NDArray
     ) -> Columns:
+        """Derivatives of the numbers by each entry, changed one at a time."""
         columns = []
         for k in range(len(size)):
             alone = np.zeros_like(size)

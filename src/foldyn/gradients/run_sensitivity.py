@@ -330,6 +330,7 @@ def _of_file(
 
 # ------------------------------------------------------------------ measures
 def _wanted(measures: Any, kind: str) -> list[Wanted]:
+    """Quantities to differentiate, from the argument `measures`."""
     if isinstance(measures, Mapping):
         return [_own(name, pair) for name, pair in measures.items()]
     texts = [measures] if isinstance(measures, str) else listed("measures", measures, "measures")
@@ -353,6 +354,7 @@ def _of_registry(text: str, kind: str) -> Wanted:
 
 
 def _own(name: str, pair: Any) -> Wanted:
+    """A user's quantity: a function and its derivative."""
     if not isinstance(pair, tuple) or len(pair) != 2 or not all(map(callable, pair)):
         raise InputError(
             f" = {show(pair)}: give a pair of a function and its derivative", f"measures.{name}"

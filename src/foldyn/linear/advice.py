@@ -54,6 +54,7 @@ def size(value: float) -> str:
 
 
 def _sentences(result: xarray.Dataset) -> Iterator[str]:
+    """Sentences of the advice, in order."""
     frequency, limit = result["frequency"].values, float(result.attrs["limit"])
     below = int((frequency < limit).sum())
     reaches = [reach(result, model, below) for model in result["model"].values.tolist()]
@@ -75,6 +76,7 @@ def _sentences(result: xarray.Dataset) -> Iterator[str]:
 
 
 def _vibrations(result: xarray.Dataset, below: int, best: Reach) -> Iterator[str]:
+    """Sentences on the modes below the limit, for the recommended model."""
     frequency, limit = result["frequency"].values, float(result.attrs["limit"])
     if not best.count:
         yield (
@@ -129,7 +131,7 @@ def _statics(result: xarray.Dataset, best: Reach) -> str:
         for model, error in told.items()
     )
     mesh = np.isnan(result["deflection_mesh_error"])
-    uncertain = "; those of the shell have not converged" if mesh else ""
+    uncertain = "; the shell's have not converged" if mesh else ""
     return f"Displacements under its forces, if those are small: {', '.join(texts)}{uncertain}."
 
 

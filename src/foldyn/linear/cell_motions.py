@@ -240,9 +240,9 @@ def transmission(response: xarray.Dataset, cell: UnitCell, *, along: int = 0) ->
         Dimensions frequency and cell: `amplitude`, the root mean square response over the nodes of
         a cell (in its unit); `ratio` (frequency), the amplitude of the last cell over the first;
         and `decay` (frequency), nepers per cell, the slope of the logarithmic amplitude over the
-        cells (median over all pairs), without a fifth at each end and amplitudes at round-off: in
-        a gap the imaginary phase of the slowest-decaying wave that the drive excites; near zero in
-        a band.
+        cells (median over all pairs). A fifth of the cells at each end, and amplitudes at
+        round-off, are left out. In a gap this is the imaginary phase of the slowest-decaying wave
+        that the drive excites; in a band it is near zero.
 
     Raises
     ------

@@ -128,6 +128,7 @@ def _numbered(
 
 
 def _check(case: Case) -> None:
+    """Refuse a case that cannot be repeated from cell to cell."""
     structure = case.structure
     if not structure.as_made:
         raise InputError(
@@ -152,8 +153,8 @@ def _check(case: Case) -> None:
         law = getattr(structure, name, None)
         if law is not None and memory_of(law) is not None:
             raise InputError(
-                f' = "{law.name}": remembers, so that waves of each frequency have a stiffness of '
-                "their own; take an elastic law",
+                f' = "{law.name}": remembers, so that its stiffness depends on the '
+                "frequency; take an elastic law",
                 name,
             )
 

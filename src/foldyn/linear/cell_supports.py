@@ -124,6 +124,7 @@ class Repeated:
         return any(motion.turns for motion in self.lattice.cell.motions)
 
     def _supports(self, part: Any, field: str) -> list[Any]:
+        """Copies of a support for all cells of the patch."""
         if isinstance(part, BaseMotion):  # a base at rest
             return []
         if isinstance(part, Impose):  # holds its nodes where the state puts them
@@ -159,6 +160,7 @@ class Repeated:
         return replace(part, direction=tuple(way.tolist()), **changes)
 
     def _links(self, part: Link, field: str) -> list[Any]:
+        """Copies of a link for all cells of the patch."""
         nodes, corners = self._resolved(part.nodes, f"{field}.nodes"), list(part.to or ())
         if part.axes is not None:
             self._check_axes(part.axes, field)

@@ -220,6 +220,7 @@ def frf(
 
 
 def _warn_of_instability(system: Linearized) -> None:
+    """Warn if the state is an unstable equilibrium."""
     pencil = Pencil(system.stiffness, system.mass)
     unstable = pencil.below(-SHIFT * pencil.scale)
     if unstable:
@@ -253,6 +254,7 @@ def _warn_of_stretch(system: Linearized, frequency: NDArray, response: NDArray) 
 
 
 def _options(way: ResponseMethod, given: Mapping[str, Any]) -> Any:
+    """Options of a method, from keyword arguments; refuses unknown ones."""
     known = [field.name for field in fields(way.options)]
     for name in given:
         if name not in known:
@@ -264,6 +266,7 @@ def _options(way: ResponseMethod, given: Mapping[str, Any]) -> Any:
 
 
 def _frequencies(given: ArrayLike, way: ResponseMethod) -> NDArray:
+    """Checked frequencies (m,), Hz, that the method can compute."""
     frequency = np.atleast_1d(numbers("frequencies", given))
     if frequency.ndim != 1 or not frequency.size:
         raise InputError(

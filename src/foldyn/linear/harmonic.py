@@ -206,6 +206,7 @@ class _Balance:
         return None, start
 
     def _iterate(self, slope: NDArray, accelerated: bool) -> tuple[NDArray | None, NDArray]:
+        """Iterate slopes to a motion, accelerated or slowly; None without convergence."""
         most = PATIENCE if accelerated else self.options.iterations
         slopes: list[NDArray] = []
         misses: list[NDArray] = []

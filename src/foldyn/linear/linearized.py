@@ -389,6 +389,7 @@ def _reference(case: Case, exact: sparse.csr_array, internal: int) -> sparse.csr
 
 
 def _block(matrix: sparse.sparray, free: NDArray) -> sparse.csc_array:
+    """Block (nf, nf) of a matrix on the free dofs, with sorted indices."""
     block = sparse.csc_array(sparse.csr_array(matrix)[free][:, free])
     block.sort_indices()
     return block

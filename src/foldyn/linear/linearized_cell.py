@@ -210,7 +210,7 @@ def deformed_motions(cell: UnitCell, patch: Patch, displacement: NDArray) -> tup
         if not len(one):
             raise InputError(
                 f": no two nodes of the cell are partners under motion {k} alone, so that a state "
-                "does not say what becomes of it",
+                "does not determine it",
                 "state",
             )
         change = displacement[one] @ motion.rotation().T - displacement[two]

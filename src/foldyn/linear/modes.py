@@ -181,6 +181,7 @@ def spectrum_of(
 def _variables(
     linear: Linearized, spectrum: Spectrum, space: NDArray, along: NDArray
 ) -> dict[str, Any]:
+    """Variables of the dataset of modes."""
     values, shapes, remembered = spectrum.values, oriented(spectrum.shapes), 0.0
     if linear.branches is not None:
         values, shapes, remembered = _remembered(linear, linear.branches, values, shapes)
@@ -230,7 +231,7 @@ def _warn_of_twins(linear: Linearized, values: NDArray, shapes: NDArray) -> None
         if near and abs(shapes[:, k] @ (linear.mass @ shapes[:, k - 1])) > RIGID:
             warn(
                 f"the memory of the creases makes two modes one ({np.sqrt(values[k]) / TURN:.4g} "
-                "Hz): another one near it is missing; frequency responses are not concerned",
+                "Hz): another one near it is missing; frequency responses are not affected",
                 "laws.md#in-other-analyses",
             )
 
@@ -288,6 +289,7 @@ def _rounding(pencil: Pencil, spectrum: Spectrum) -> float:
 
 
 def _warn(spectrum: Spectrum) -> None:
+    """Warn about unstable and missed modes."""
     unstable = int((spectrum.values < 0.0).sum())
     if unstable:
         warn(
@@ -304,6 +306,7 @@ def _warn(spectrum: Spectrum) -> None:
 
 
 def _warn_of_stretch(linear: Linearized, spectrum: Spectrum) -> None:
+    """Warn about modes in which stretching holds much of the strain energy."""
     structure = linear.case.structure
     limit = most(structure)
     if not np.isfinite(limit):
@@ -354,6 +357,7 @@ def _orthonormal(linear: Linearized, motions: NDArray) -> NDArray:
 
 
 def _size(linear: Linearized, motion: NDArray) -> float:
+    """Norm of a motion (nf,), weighted by mass."""
     return float(np.sqrt(motion @ (linear.mass @ motion)))
 
 

@@ -142,6 +142,7 @@ def _load_vectors(case: Case, body: Assembly) -> NDArray:
 
 
 def _imbalance(point: OperatingPoint, case: Case) -> str:
+    """Warning that a state is not an equilibrium, with a remedy."""
     driven = "actuated folds" if is_actuated(case) else ""
     driven = "pressure and moments of creases" if case.following_terms else driven
     remedy = {

@@ -106,6 +106,7 @@ def _meshes(divisions: int) -> tuple[int, ...]:
 
 
 def _modes(case: Case, structure: Any, count: int) -> MeshModes:
+    """Elastic modes of a case on another mesh, without loads, contact and air."""
     if structure.sheet.density is None:
         structure = replace(structure, sheet=replace(structure.sheet, density=1.0))
     bare = replace(case, structure=structure, loads=(), contact=None, air=None)

@@ -266,8 +266,8 @@ def common_spacing(frequency: NDArray) -> float:
             return float(frequency[-1] / np.rint(multiple[-1]))
     near = max(float(f"{step:.1g}"), 1e-300)
     raise InputError(
-        ": the lines of a record are multiples of one spacing, and these are of none "
-        f"above {step / MOST_LINES:.3g} Hz; give multiples, as numpy.arange({near:g}, "
+        ": the lines of a record are multiples of one spacing, but these have no common "
+        f"spacing above {step / MOST_LINES:.3g} Hz; give multiples, as numpy.arange({near:g}, "
         f"{frequency[-1]:g}, {near:g})",
         "frequencies",
     )

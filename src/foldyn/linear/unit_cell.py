@@ -180,7 +180,7 @@ class UnitCell:
             found.append((rows, len(motions)))
             motions.append(motion)
         if not motions:
-            raise InputError(": the pattern closes, and does not go on anywhere", "case")
+            raise InputError(": the pattern closes on itself, and has no period", "case")
         pairs = [
             (v, w, tuple(int(j == k) for j in range(len(motions))))
             for rows, k in found

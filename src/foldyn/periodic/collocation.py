@@ -153,6 +153,7 @@ class Shooting:
         return self._last[1], self._last[2]
 
     def _step(self, y: NDArray, motion: NDArray, a: NDArray, at) -> tuple:
+        """State, derivative and stage accelerations after one step of Radau's method."""
         stages, h, k = self._stages, self._stages.h, self.equation.size
         x, v, driven = y[:k], y[k:], at.driving(self.omega)
         ahead, last, step = x + h * RADAU.c[:, None] * v, np.inf, np.zeros_like(a)

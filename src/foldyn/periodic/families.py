@@ -51,17 +51,17 @@ class ByFrequency(_OfBalance):
     level = 1.0
 
     def residual(self, z: NDArray, p: float) -> NDArray:
-        """See `Family`."""
+        """Residual R (n,); see `Family`."""
         x, at = self.coefficients(z), self.instants(self.level)
         return self.balance.residual(x, TURN * p, at).ravel()
 
     def jacobian(self, z: NDArray, p: float) -> NDArray:
-        """See `Family`."""
+        """Derivative (n, n) of R by z; see `Family`."""
         x, at = self.coefficients(z), self.instants(self.level)
         return self.balance.jacobian(x, TURN * p, at)
 
     def slope(self, z: NDArray, p: float) -> NDArray:
-        """See `Family`."""
+        """Derivative (n,) of R by p; see `Family`."""
         x, at = self.coefficients(z), self.instants(self.level)
         return TURN * self.balance.frequency_slope(x, TURN * p, at).ravel()
 
@@ -78,15 +78,15 @@ class ByLevel(_OfBalance):
         self.omega = TURN * frequency
 
     def residual(self, z: NDArray, p: float) -> NDArray:
-        """See `Family`."""
+        """Residual R (n,); see `Family`."""
         return self.balance.residual(self.coefficients(z), self.omega, self.instants(p)).ravel()
 
     def jacobian(self, z: NDArray, p: float) -> NDArray:
-        """See `Family`."""
+        """Derivative (n, n) of R by z; see `Family`."""
         return self.balance.jacobian(self.coefficients(z), self.omega, self.instants(p))
 
     def slope(self, z: NDArray, p: float) -> NDArray:
-        """See `Family`; by differences, exact if loads are proportional to the level."""
+        """Derivative (n,) of R by p; from differences, exact for loads proportional to it."""
         x, (up, down) = (
             self.coefficients(z),
             (self.balance.instants(p + d) for d in (PROBE, -PROBE)),
@@ -120,7 +120,7 @@ class Free(ByFrequency):
         self._about = AboutRest(balance.equation, balance.fourier.phase, place)
 
     def instants(self, level: float) -> Instants:
-        """See `_OfBalance`."""
+        """The equation about the equilibrium, without drive."""
         return self._about
 
 
@@ -168,12 +168,12 @@ class InResonance(_OfBalance):
         return self.coefficients(z), TURN * self.frequency(z), self.instants(level)
 
     def residual(self, z: NDArray, p: float) -> NDArray:
-        """See `Family`."""
+        """Residual R (n,); see `Family`."""
         left = self.balance.residual(*self._own(z, np.exp(p)))
         return np.append(left.ravel(), self._heavy * self._reactive(z)[0])
 
     def jacobian(self, z: NDArray, p: float) -> NDArray:
-        """See `Family`."""
+        """Derivative (n, n) of R by z; see `Family`."""
         own, n = self._own(z, np.exp(p)), len(z) - 1
         out = np.empty((n + 1, n + 1))
         out[:n, :n] = self.balance.jacobian(*own)
@@ -186,7 +186,7 @@ class InResonance(_OfBalance):
         return out
 
     def slope(self, z: NDArray, p: float) -> NDArray:
-        """See `Family`."""
+        """Derivative (n,) of R by p; see `Family`."""
         x, omega, _ = self._own(z, np.exp(p))
         up, down = (
             self.balance.residual(x, omega, self.balance.instants(np.exp(p + d)))

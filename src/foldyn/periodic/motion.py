@@ -104,7 +104,7 @@ def periodic_motion(
     Warns
     -----
     FoldynWarning
-        There are too few harmonics, or modes; the motion passes through what it touches.
+        There are too few harmonics, or modes; the motion passes through a contact.
 
     Notes
     -----
@@ -229,7 +229,7 @@ def warn_of_crossing(orbits: Sequence[Orbit]) -> None:
     if crossed:
         warn(
             f"contact: the motion at {', '.join(crossed[:NAMED])} passes through what it touches, "
-            "so that it is none; start elsewhere, or give more harmonics",
+            "so that it is not valid; start elsewhere, or give more harmonics",
             "nonlinear-vibration.md#one-motion",
         )
 

@@ -201,6 +201,7 @@ def backbone(
 
 
 def _undamped(case: Case, harmonics: int, modes: int | None, state: Any) -> Balance:
+    """Balance of the undamped case without drive, with an even series."""
     equation = on_modes(Equation(case, "fd.backbone", driven=False), modes, state)
     fourier, size = Fourier(harmonics, even=True), (harmonics + 1) * equation.size
     needed = fourier.memory(equation.size)
@@ -360,6 +361,7 @@ def _largest(orbit: Orbit, place: NDArray) -> float:
 
 
 def _values(orbits: list[Orbit], place: NDArray) -> dict[str, Any]:
+    """Energies of normal modes and their drift; warns if the drift is large."""
     energies = np.array([_energy(orbit, place) for orbit in orbits])
     worst = float(energies[:, 1].max())
     if worst > LOOSE:
@@ -372,6 +374,7 @@ def _values(orbits: list[Orbit], place: NDArray) -> dict[str, Any]:
 
 
 def _damped_values(orbits: list[Orbit]) -> dict[str, Any]:
+    """Levels, multipliers and stability of motions in phase resonance."""
     floquet = np.array(
         [
             multipliers(one.equation, one.amplitudes, one.omega, level=one.level, steps=STEPS)

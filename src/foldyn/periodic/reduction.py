@@ -68,6 +68,7 @@ def reduced(equation: Equation, modes: int, displacement: NDArray) -> Equation:
 def _derivatives(
     equation: Equation, still: Instants, place: NDArray, shapes: NDArray, factors
 ) -> list[NDArray]:
+    """Modal derivatives (k,) of all pairs of shapes (k, r)."""
     found = []
     for j, shape in enumerate(shapes.T):
         nodes = (equation.basis @ shape).reshape(-1, 3)
@@ -97,6 +98,7 @@ def _independent(mass: NDArray, vectors: NDArray) -> NDArray:
 def _projected(
     equation: Equation, place: NDArray, basis: NDArray, stiffness: NDArray, factors
 ) -> Equation:
+    """The equation projected on a basis (k, r) about a place (k,)."""
     out = copy.copy(equation)
     for name in ("rounding", "length"):  # cached for the whole equation
         out.__dict__.pop(name, None)

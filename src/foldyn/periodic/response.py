@@ -278,6 +278,7 @@ class _Tracer:
         return next(same, None) if branch and event.name == PITCHFORK else None
 
     def _warn(self, why: str) -> None:
+        """Warn that a branch ends early, and why."""
         self.complete, last = False, self.found[-1]
         texts = {
             LOST: "is lost: no further motion is found; the points before are kept. Remedies: a "
@@ -341,6 +342,7 @@ def _warn_of_folds(found: list[_Found]) -> None:
 
 
 def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
+    """Dataset of the points found; warns about its accuracy."""
     orbits = [found.family.orbit(found.point.z, found.point.p) for found in tracer.found]
     names = np.array([found.bifurcation for found in tracer.found], dtype="<U15")
     values = {

@@ -108,6 +108,7 @@ def linear_response(balance: Balance, x: NDArray, omega: float, level: float) ->
 
 
 def _of_result(balance: Balance, start: xr.Dataset, level: float) -> NDArray:
+    """Coefficients (c, k) of a motion from an earlier result."""
     found = start.variables.get("coefficient")
     n = len(balance.equation.case.structure.nodes)
     if found is None or found.dims != ("harmonic", "node", "axis") or found.shape[1:] != (n, 3):

@@ -191,6 +191,7 @@ def _mobility(
 def _in_band(
     f: NDArray[np.float64], Y: NDArray[np.complex128], band: tuple[float, float] | None
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+    """Frequencies and mobility in a band, at least five points."""
     low, high = (0.0, np.inf) if band is None else band
     inside = (f >= low) & (f <= high)
     if inside.sum() < _FEWEST:
@@ -202,6 +203,7 @@ def _in_band(
 
 
 def _fit(f: NDArray[np.float64], Y: NDArray[np.complex128]) -> CircleFit:
+    """Least-squares fit of one mode to a mobility."""
     from scipy.optimize import least_squares  # slow to import
 
     def solved(p: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:

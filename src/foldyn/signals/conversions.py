@@ -106,6 +106,7 @@ def base_transmissibility(frequency: ArrayLike, relative: ArrayLike) -> NDArray[
 def _over_frequency(
     frequency: ArrayLike, response: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+    """Checked frequencies (m,) and a response (m, ...)."""
     f = checked_frequencies(frequency, fewest=1)
     H = np.asarray(response, dtype=np.complex128)
     if H.shape[:1] != f.shape:

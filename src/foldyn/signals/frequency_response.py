@@ -203,6 +203,7 @@ def _records(
 def _transform(
     x: NDArray[np.float64], weights: NDArray[np.float64], detrend: str | None
 ) -> NDArray[np.complex128]:
+    """Fourier transform of a detrended and windowed segment, along axis 0."""
     import scipy.fft
 
     return scipy.fft.rfft(records.detrended(x, detrend) * records.beside(weights, x), axis=0)

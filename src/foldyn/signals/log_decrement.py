@@ -140,6 +140,7 @@ def log_decrement(
 
 
 def _samples_per_cycle(x: NDArray[np.float64], dt: float, frequency: float | None) -> float:
+    """Samples per cycle, from a given frequency or the highest spectral line."""
     if frequency is None:
         lines, amplitude = spectrum(x, dt, detrend="linear", pad=_PADDING)
         f = float(lines[1 + np.argmax(amplitude[1:])])

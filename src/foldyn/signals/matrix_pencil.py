@@ -179,6 +179,7 @@ def _windows(x: NDArray[np.float64], span: int) -> tuple[NDArray, NDArray]:
 
 
 def _order(values: NDArray[np.float64], n: int, threshold: float | None) -> int:
+    """Number of singular values above the noise, or above a threshold."""
     if not values[0] > 0.0:
         raise InputError("x: zero throughout; there is no vibration in it")
     if threshold is None:

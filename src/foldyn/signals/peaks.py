@@ -352,6 +352,7 @@ def half_power(
 
 
 def _peak_index(curve: Curve, quantity: str, near: float | None, ripple: float) -> int:
+    """Index of the highest peak, or of the peak nearest to a frequency."""
     peaks = find_peaks(curve.f, curve.size, prominence=0.0, quantity=quantity)
     if peaks.index.size == 0:
         raise InputError(

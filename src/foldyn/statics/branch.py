@@ -118,6 +118,7 @@ def switch_branch(
 
 
 def _bifurcation(path: xarray.Dataset, at: int | None) -> int:
+    """Step of a bifurcation of a path: the given one, checked, or the first."""
     if "point" not in path:
         raise InputError("path: is not a path from trace")
     steps = np.flatnonzero(path["point"].values == "bifurcation")

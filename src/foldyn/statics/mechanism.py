@@ -68,6 +68,7 @@ def mechanisms(problem: OrigamiProblem, factor: float = 0.0) -> list[str]:
 
 
 def _name(mode: NDArray) -> str:
+    """An internal mechanism (n, 3) in words: its nodes, and its axis if it has one."""
     size = np.linalg.norm(mode, axis=1)
     moving = np.flatnonzero(size > MOVED * size.max())
     moving = moving[np.argsort(-size[moving], kind="stable")]

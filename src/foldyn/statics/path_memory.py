@@ -164,12 +164,12 @@ def _flows(case: Case, flow: str, timed: bool) -> tuple[Remembering, ...]:
             continue
         if part.law.rate_dependent:
             raise InputError(
-                f" = {name!r}: creep goes on for ever, and load factors say nothing of time; give "
+                f" = {name!r}: creep goes on for ever, and load factors have no time scale; give "
                 "fd.trace a duration, simulate the motion, or take an elastic law",
                 field,
             )
         raise InputError(
-            f" = {name!r}: yields, so that its equilibria depend on the way there; fd.simulate "
+            f" = {name!r}: yields, so that its equilibria depend on the path; fd.simulate "
             "and fd.trace take it; elsewhere take an elastic law",
             field,
         )

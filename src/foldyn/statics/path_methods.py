@@ -101,6 +101,7 @@ def plan_path(
 def _driven(
     method: PathMethod, factors: list[float] | None, steps: int | None, duration: Any
 ) -> PathPlan:
+    """Plan of a path driven by the load factor."""
     if factors is not None and steps is not None:
         raise InputError(
             " and steps: give one of them; steps counts equal steps from 0 to 1", "load_factors"
@@ -145,6 +146,7 @@ def along(solver: Solver, start: Station, plan: PathPlan, direction: NDArray | N
 
 
 def _with_critical(solver: Solver, start: Station, way: Walk) -> Walk:
+    """The stations of a path, with the critical points located between them."""
     before = start
     for station in way:
         yield from critical_points(solver, before, station)

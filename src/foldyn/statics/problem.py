@@ -59,7 +59,7 @@ class Problem(Protocol):
         """Sparse (m, m) derivative of the residual, with vanishing slopes floored.
 
         Symmetric, except for loads without potential. Used only for steps and, its symmetric part,
-        for the count of negative eigenvalues; the residual never sees a floor. With `before`, the
+        for the count of negative eigenvalues; the residual has no floor. With `before`, the
         state from which the last step came, it may be another matrix that serves the next step
         better; without, it is the derivative.
         """

@@ -139,6 +139,7 @@ def critical_points(solver: Solver, start: Station, end: Station) -> list[Statio
 
 
 def _crossings(section: Section, low: Mark, high: Mark) -> list[Station]:
+    """Stations at all crossings between two marks, by bisection until each is alone."""
     change = abs(high.negative - low.negative)
     if change == 0:
         return []
@@ -187,6 +188,7 @@ def _interval(section: Section, low: Mark, high: Mark, limit: bool) -> tuple[flo
 
 
 def _zero_of_determinant(section: Section, low: Mark, high: Mark) -> Station:
+    """Station between two marks at which the determinant of the tangent vanishes."""
     scale = _log_determinant(low)
 
     def determinant(mark: Mark) -> float:

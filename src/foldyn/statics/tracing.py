@@ -28,7 +28,7 @@ from foldyn.values import choice, flag, function, indices, of_kind, show, single
 if TYPE_CHECKING:
     import xarray
 
-SHORTEST = 1e-3  # of its rest length: least length of a bar where a path starts
+SHORTEST = 1e-3  # of the rest length of a bar: least length at the start of a path
 LOOKS = 51  # load factors between two given ones at which supports and planes are checked
 COPIES = 8  # of a point's dofs in memory while forces, work and the dataset are computed
 

@@ -139,6 +139,7 @@ class Folding:
 
     @property
     def _where_crossed(self) -> str:
+        """Where panels cross, in words: from which step on, and in the folded state."""
         step, pairs = min(self.first_crossings.items())
         return (
             f"from step {step} of {len(self.path['step']) - 1} on ({pairs_text(pairs)}); in the "
@@ -344,6 +345,7 @@ def _off(energy: FoldEnergy, way: Way, targets: NDArray) -> float:
 
 
 def _unopened(energy: FoldEnergy, way: Way, targets: NDArray) -> NDArray[np.int64]:
+    """Creases that should open on the way and have hardly done so."""
     first, last = (energy.creases(way.shapes[k].turns) for k in (0, -1))
     return unopened(first, last, targets)
 
@@ -399,6 +401,7 @@ def _crossed(pattern: Pattern, energy: FoldEnergy, x: NDArray, turns: NDArray) -
 
 
 def _warn(folding: Folding) -> None:
+    """Warn about creases folded wrong or left closed, and about panels that cross."""
     if folding.wrong:
         said = f"{len(folding.wrong)} mountains or valleys do not turn their way: creases"
         warn(f"{said} {_named(folding, folding.wrong)}", "folding.md#what-the-report-means")

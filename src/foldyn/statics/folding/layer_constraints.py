@@ -1,19 +1,19 @@
 """Conditions on the layer order of a flat-folded sheet under which no panel crosses another.
 
-For each pair of panels that overlap, the order x is 1 where the lower-numbered panel lies above the
-other, and -1 below; x_ba = -x_ab. The conditions are those of J. Justin (Towards a mathematical
+For each pair of overlapping panels, the order x is 1 if the lower-numbered panel lies above the
+other, and -1 if below; x_ba = -x_ab. The conditions are from J. Justin (Towards a mathematical
 theory of origami, 1997), in the form of H. Akitaya, J. Ku and others (Computing flat-folded states,
-8OSME, 2024), with creases (a, b) and (c, d) where they lie upon each other, and a panel c where a
-crease runs through it:
+8OSME, 2024), for creases (a, b) and (c, d) that lie on each other, and a panel c with a crease
+through it:
 
-    valley, a facing up              x_ab = -1      mountain: 1; the reverse where a faces down
+    valley, a facing up              x_ab = -1      mountain: 1; the reverse if a faces down
     crease and panel                 x_ac x_bc = 1
     two folds, same side             x_ac x_ad x_bc x_bd = 1
     fold, and a flat crease          x_ac x_bc = 1, c on the side of the fold
     two flat creases                 x_ac x_bd = 1, a and c on one side
     three panels at a point          not x_ab = x_bc = x_ca
 
-All but the last are products; a fold has both its panels on one side, a flat crease has not.
+All but the last are products; a fold has both panels on one side, a flat crease on two.
 """
 
 from __future__ import annotations
