@@ -68,9 +68,10 @@ def trace(
     steps : int, optional
         Instead of load_factors: equal steps from 0 to 1 (default 10). For "mgdcm" and
         "arc_length": steps after which the path ends (default 100).
-    For "newton" and "displacement" the time (s) from each load factor to the next, one for all
-    or one each: the factor changes at a constant rate, or stays constant if repeated. Creases
-    with memory relax and creep meanwhile; without a duration they are fully relaxed.
+    duration : float or sequence of float, optional
+        For "newton" and "displacement" the time (s) from each load factor to the next, one for all
+        or one each: the factor changes at a constant rate, or stays constant if repeated. Creases
+        with memory relax and creep meanwhile; without a duration they are fully relaxed.
     constant : "gravity", int or sequence of int
         Numbers, each once, of loads in `case.loads` that act in full at every factor.
     initial : State, optional
