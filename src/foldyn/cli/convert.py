@@ -71,25 +71,25 @@ def convert(given: argparse.Namespace) -> None:
 
 
 def _is_result(source: Path) -> bool:
-    """Whether a file is a result, by its suffix or by its first bytes."""
+    """Whether a file is a result, judged by its suffix or its first bytes."""
     if source.suffix.lower() == RESULT:
         return True
     try:
         with source.open("rb") as file:
             return file.read(len(HDF5)) == HDF5
-    except OSError:  # said by who reads it
+    except OSError:  # the reader reports it
         return False
 
 
 def _is_case(name: str) -> bool:
-    """Whether this names a case file, or a shipped one."""
+    """Whether the name ends in .toml or is that of a shipped case."""
     from foldyn.studies import shipped_cases
 
     return name.endswith(".toml") or (name in shipped_cases() and not Path(name).exists())
 
 
 def _case(name: str) -> Case:
-    """The case that a file describes."""
+    """Read the case of a case file."""
     from foldyn.analyses import read_case
     from foldyn.studies import find_case
 
@@ -126,7 +126,7 @@ def _listed(files: Sequence[Path]) -> str:
 
 
 def _convert_pattern(given: argparse.Namespace, source: Path) -> None:
-    """Write a pattern file in another format; its diagnosis is printed, or warned of."""
+    """Write a pattern file in another format; print its diagnosis or warn of it."""
     from foldyn.formats import diagnose, read_pattern, write_pattern
 
     for names, kind in ((RESULTS_ONLY, "results (.nc)"), (DECKS_ONLY, "input decks (.inp, .tcl)")):

@@ -51,7 +51,7 @@ def add_design(commands: Any) -> None:
 
 
 def run_design(given: argparse.Namespace) -> Path:
-    """Search as the arguments of `add_design` ask for; returns the folder of the results."""
+    """Run `foldyn design`; return the results folder."""
     from foldyn.designs.case_files import planned, write_case
     from foldyn.studies import find_case
 
@@ -91,7 +91,7 @@ def run_design(given: argparse.Namespace) -> Path:
 
 
 def _searched(plan: Plan, results: Results, quiet: bool) -> Design:
-    """Search with a bar; every evaluation is kept."""
+    """Run the search with a progress bar; keep every evaluation."""
     from foldyn.designs.run_design import designed
 
     layout = "evaluations: {n_fmt}{postfix} [{elapsed}]"
@@ -110,7 +110,7 @@ def _searched(plan: Plan, results: Results, quiet: bool) -> Design:
 
 
 def _tell(found: Design, say: Any) -> None:
-    """Say what was found."""
+    """Print the outcome of the search."""
     import numpy as np
 
     for name, value in found.parameters.items():

@@ -1,7 +1,7 @@
-"""Small computations that together need every kernel that a run can need.
+"""Small computations that together compile every kernel that a run can need.
 
-Each part of a model is a term of its own, compiled once (`mechanics/term.py`), whatever stands
-beside it. So it is enough that each part takes part in something, once with every kind of method.
+Each part of a model is a term of its own, compiled once (`mechanics/term.py`), whichever other
+parts the model has. So each part needs only one use with every kind of method.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from foldyn.gradients.neighbors import Asked, motions
 from foldyn.materials.series import in_series
 from foldyn.mechanics.contact.clearance import clearance
 
-STEPS, SHORT, LONG = 4, 1e-4, 5e-3  # s, steps of explicit and implicit methods
+STEPS, SHORT, LONG = 4, 1e-4, 5e-3  # s, time steps of explicit and implicit methods
 EXPLICIT = ("rk4", "central_difference", "dormand_prince")
 REMEMBER = ("rk4", "dormand_prince")
 IMPLICIT = ("newmark", "generalized_alpha")
@@ -63,7 +63,7 @@ def case(
 ) -> fd.Case:  # fmt: skip
     """A sheet of four panels of a model, held at one end and pushed at the other."""
     pattern = pattern or fd.patterns.miura()
-    if law is not None:  # made here, as that compiles something
+    if law is not None:  # made here because making it compiles kernels
         options["fold_law"] = law()
     if model == "shell":
         structure: Any = fd.shell(pattern, SHEET, divisions=2, **options)
@@ -77,7 +77,7 @@ def case(
 def moved(
     *methods: str, start: Sequence[float] = (0.0, 0.0, 0.0), steps: int = STEPS, **parts: Any
 ) -> None:
-    """Motions of a few steps."""
+    """Run motions of a few steps."""
     made = case(**parts)
     x = made.structure.nodes[:, :1] - made.structure.nodes[:, 0].min()
     initial = fd.State(velocity=np.where(made.fixed, 0.0, 2.0 * x * start))
@@ -88,44 +88,44 @@ def moved(
 
 
 def adapted() -> None:
-    """An implicit motion whose steps follow the error."""
+    """Run an implicit motion with adaptive steps."""
     fd.simulate(case(), STEPS * LONG, method=IMPLICIT[-1], tolerance=1e-3)
 
 
 def jumped() -> None:
-    """An implicit motion in which a force jumps while the rest angles move."""
+    """Run an implicit motion with a jump in force while the rest angles move."""
     jump = fd.Force("xmax", (1.0, 0.0, 0.0), fd.Step(1.5 * LONG))
     fd.simulate(case(loads=[jump, *TURNING]), STEPS * LONG, method=IMPLICIT[0], dt=LONG)
 
 
 def folded() -> None:
-    """A pattern that is folded, the curve of its law, and a corner in a photograph."""
+    """Fold a pattern, evaluate its law's curve, and find a corner in a photograph."""
     fd.fold(fd.patterns.simple_fold(dihedral=170), 90.0, steps=2)
     in_series(fd.EnhancedLinear(), 1.0, 3.0, 0.5)
     refine(np.zeros((40, 40), np.uint8), [[20.0, 20.0]], reach=8.0, moved=2.0)
 
 
 def moved_at_once() -> None:
-    """Motions of several cases at once."""
+    """Run motions of several cases in one batch."""
     made = case(model="herkal", mass="circumcenter")
     many = [made.altered(masses=[fd.PointMass("xmax", 1.0 + k)]) for k in range(8)]
     fd.simulate_many(many, STEPS * SHORT, dt=SHORT)
 
 
 def traced(factor: float, **parts: Any) -> None:
-    """Paths of a few equilibria."""
+    """Trace paths of a few equilibria."""
     made = case(**parts)
     fd.trace(made, "newton", load_factors=[factor])
     fd.trace(made, "arc_length", first_step=0.5 * factor, steps=2)
 
 
 def waited() -> None:
-    """A path whose step takes time, in which creases relax."""
+    """Trace a path whose steps take time, so that creases relax."""
     fd.trace(case(law=PRONY), "newton", load_factors=[1e-3, 1e-3], duration=0.1)
 
 
 def vibrating(**parts: Any) -> None:
-    """Modes and a frequency response."""
+    """Compute modes and a frequency response."""
     made = case(**parts)
     fd.modes(made, 2)
     fd.frf(made, fd.Force("xmax", (1.0, 0.0, 0.5)), frequencies=[0.1, 0.3])
@@ -136,7 +136,7 @@ TOUCHING: dict[str, Any] = {"pattern": sheets(), "start": (-0.6, 0.2, -1.0)}
 
 
 def differentiated(*methods: str, **parts: Any) -> None:
-    """Gradients of motions, and of a frequency, by the stiffness of the creases."""
+    """Differentiate motions and a frequency with respect to crease stiffness."""
     made, given = case(**parts), {"duration": STEPS * SHORT, "dt": SHORT}
     fd.sensitivity(
         made, ["fold_stiffness"], measures="frequency[2]", analysis={"kind": "modes", "count": 2}
@@ -147,14 +147,14 @@ def differentiated(*methods: str, **parts: Any) -> None:
 
 
 def accompanied() -> None:
-    """An implicit motion with another one beside it, as fits compute them."""
+    """Run an implicit motion and a second one in step with it, as fits do."""
     made, given = case(), {"duration": STEPS * LONG, "dt": LONG, "method": IMPLICIT[0]}
     asked = Asked(made, given)
     motions(prepare(made, **given), asked, [asked], 1e-4)
 
 
 def apart() -> None:
-    """How far panels are from each other."""
+    """Compute the distances between panels."""
     made = case().structure
     clearance(made.nodes, made.triangles, made.triangle_panel)
 
@@ -241,15 +241,15 @@ and all of them those of the stages before."""
 
 @contextmanager
 def count_compiled() -> Iterator[Callable[[], int]]:
-    """Give what returns how many functions have been compiled so far within this context."""
-    from numba.core import event  # Numba itself only after `foldyn.jit` has checked its variables
+    """Yield a function that returns the number of functions compiled so far in this context."""
+    from numba.core import event  # imported only after `foldyn.jit` has checked Numba's variables
 
     with event.install_recorder("numba:compile") as recorder:
         yield lambda: sum(one.is_start for _, one in recorder.buffer)
 
 
 def use(name: str) -> int:
-    """Compute what has a name among `STAGES`; how many functions had to be compiled."""
+    """Run one of `STAGES` by name; return the number of functions it compiled."""
     (uses,) = (stage[name] for stage in STAGES if name in stage)
     with count_compiled() as compiled, warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)

@@ -77,7 +77,7 @@ def add_fit(commands: Any) -> None:
 
 
 def run_fit(given: argparse.Namespace) -> Path:
-    """Fit what the arguments of `add_fit` ask for; returns the folder of the results."""
+    """Run `foldyn fit`; return the results folder."""
     clock = Clock.now()
     if given.figures and given.no_figures:
         raise InputError(BOTH)
@@ -114,7 +114,7 @@ def run_fit(given: argparse.Namespace) -> Path:
 
 
 def _fit(plan: FitFile, results: Results, quiet: bool) -> Fit:
-    """Fit; every evaluation is kept."""
+    """Run the fit; keep every evaluation."""
     from foldyn.experiment import fit
 
     kept = results.folder / KEPT
@@ -147,7 +147,7 @@ def _line(one: Estimate, confidence: float) -> str:
 
 
 def plan_of(given: argparse.Namespace) -> FitFile:
-    """What to fit: from a fit file, or a case file and the other arguments."""
+    """Read the plan of a fit from a fit file, or from a case file and the other arguments."""
     from foldyn.experiment.calibration.fit_file import is_fit_file, read_fit
     from foldyn.studies import find_case
 

@@ -1,4 +1,4 @@
-"""The folder of the results: checked before anything runs, held by one run, written to."""
+"""The results folder: checked before anything runs, locked by one run, written to."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _RESULT = re.compile(r"result(-\w+)?\.nc")
 
 
 def check_folder(folder: Path, out: str | None, names: Sequence[str]) -> None:
-    """Refuse a results folder that cannot be written, by trying; leaves nothing behind."""
+    """Refuse a results folder that cannot be written; test by writing, and leave nothing behind."""
     with _made(folder, out, names):
         pass
 
 
 @contextmanager
 def _made(folder: Path, out: str | None, names: Sequence[str]) -> Iterator[None]:
-    """Make a folder and check that it can be written to; it is removed again if it stays empty."""
+    """Make a folder and check that it is writable; remove it again if it stays empty."""
     if out == "":
         raise InputError("--out: is empty; name a folder")
     made: list[Path] = []
@@ -71,15 +71,15 @@ def _place(folder: Path, out: str | None) -> str:
 
 
 class Results:
-    """Results of one run in a folder that it holds.
+    """Results of one run, in a folder that the run has locked.
 
     Attributes
     ----------
     folder : Path
     kept : list of str
-        What has been saved, where it is.
+        Paths of the saved files.
     resumable : bool
-        Whether the same command would continue from there.
+        Whether the same command can resume from this folder.
     """
 
     def __init__(self, folder: Path, owner: Owner, drawn: Sequence[str], old: list[str]) -> None:
@@ -91,24 +91,24 @@ class Results:
         self._begun = self._cleared = False
 
     def begin(self, name: str) -> None:
-        """Note a folder that collects results one by one, from which the same command continues."""
+        """Record a folder that collects results one by one, from which the same command resumes."""
         self.resumable = True
         self.kept.append(str(self.folder / name))
         self._new.append(name)
         self._stamp("running")
 
     def keep(self, name: str, write: Callable[[Path], None]) -> None:
-        """Save a file; with the first one all that an earlier run left goes.
+        """Save a file; the first one removes all files of an earlier run.
 
         Raises
         ------
         ComputationError
-            It cannot be saved there; then it is saved elsewhere, if that is possible.
+            The file cannot be saved in this folder; it is saved elsewhere if possible.
         """
         file = self.folder / name
         with ENDINGS.saving():
             try:
-                self._stamp("running")  # a kill from here on leaves nothing old for new
+                self._stamp("running")  # from here on no old file passes for a new one
                 write(file)
             except (OSError, InputError) as error:  # the folder has changed since it was checked
                 saved, failure = rescued(file, write, error)
@@ -132,7 +132,7 @@ class Results:
         self._old = []
 
     def end(self, state: str) -> None:
-        """Stamp the folder for the last time, or restore its stamp if nothing was written."""
+        """Write the final stamp, or restore the old one if nothing was written."""
         with suppress(OSError):
             if self._new:
                 self._stamp(state)
@@ -140,7 +140,7 @@ class Results:
                 stamp.restore(self.folder, self._before)
 
     def summary(self) -> str:
-        """What was kept, for the end of a message."""
+        """List what was kept, for the end of a message."""
         if not self.kept:
             return ""
         further = "; the same command goes on from there" if self.resumable else ""
@@ -154,14 +154,14 @@ class Results:
 def rescued(
     file: Path, write: Callable[[Path], None], failure: BaseException
 ) -> tuple[str, ComputationError]:
-    """Save in the system's temporary folder what could not be saved as a file.
+    """Save to the system's temporary folder a file that its own folder cannot take.
 
-    Returns where it is, and what is to be raised.
+    Return its path and the error to raise.
 
     Raises
     ------
     ComputationError
-        Nor can it be saved there.
+        It cannot be saved there either.
     """
     made = None
     place = f"{file}: cannot be written ({reason(failure)})"
@@ -184,22 +184,22 @@ def held(
     folder: Path, out: str | None, names: Sequence[str], owner: Owner, replace: bool = False,
     drawn: Sequence[str] = (), inside: Sequence[str] = (),
 ) -> Iterator[Results]:  # fmt: skip
-    """Hold a folder for one run; what ends the run names what was kept.
+    """Lock the folder for one run; an error that ends the run names what was kept.
 
     Parameters
     ----------
     folder : Path
     out : str or None
-        As it was given.
+        The folder as the user typed it.
     names : sequence of str
-        Files to be written.
+        Files that the run writes.
     owner : Owner
     replace : bool
-        Whether results of another owner are replaced.
+        Whether to replace results of another owner.
     drawn : sequence of str
-        Patterns of the names of figures and pages.
+        Glob patterns for figures and pages.
     inside : sequence of str
-        Folders in it that are written to.
+        Subfolders that the run writes to.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def held(
 
 @contextmanager
 def _naming(results: Results) -> Iterator[None]:
-    """Name what was kept if a run ends early."""
+    """Name what was kept when a run ends early."""
     try:
         yield
     except KeyboardInterrupt as stop:
@@ -242,7 +242,7 @@ def _naming(results: Results) -> Iterator[None]:
 
 
 def _old(folder: Path, place: str, names: Sequence[str], owner: Owner, replace: bool) -> list[str]:
-    """Results in a folder that a run replaces; refuses those of others."""
+    """Return results in the folder that this run replaces; refuse another owner's results."""
     found = stamp.read(folder)
     if found is None:
         there = [path.name for path in folder.iterdir() if _RESULT.fullmatch(path.name)]
@@ -264,7 +264,7 @@ def _old(folder: Path, place: str, names: Sequence[str], owner: Owner, replace: 
 
 @contextmanager
 def drawing(place: object, kept: str = "") -> Iterator[None]:
-    """Report that figures could not be drawn, for whatever reason, and what was kept."""
+    """Turn any failure while figures are drawn into one message that names what was kept."""
     try:
         yield
     except KeyboardInterrupt:
@@ -275,7 +275,7 @@ def drawing(place: object, kept: str = "") -> Iterator[None]:
 
 
 def reason(error: BaseException) -> str:
-    """Message of an error; for one of the system, the file and the reason without its number."""
+    """Return the message of an error; for a system error, file and reason without its number."""
     if isinstance(error, MemoryError):
         return "not enough memory: take fewer cells, divisions, steps or samples"
     if not isinstance(error, OSError) or not error.strerror:

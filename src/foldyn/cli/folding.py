@@ -1,4 +1,4 @@
-"""`foldyn fold`: a pattern file, folded."""
+"""`foldyn fold`: fold the pattern of a file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from foldyn.patterns import Pattern
     from foldyn.statics import Folding
 
-MOST = 8  # MiB, of a file of angles
+MOST = 8  # MiB, largest file of angles
 
 
 def add_fold(commands: Any) -> None:
@@ -73,7 +73,7 @@ def add_fold(commands: Any) -> None:
 
 
 def run_fold(given: Namespace) -> Path:
-    """Run the command; returns the path of the folded pattern."""
+    """Run `foldyn fold`; return the path of the folded pattern."""
     from foldyn.analyses.provenance import Call
     from foldyn.formats import read_pattern
     from foldyn.plots.writers import find_ffmpeg
@@ -113,7 +113,7 @@ def _write(folding: Folding, out: Path, write: Callable[[Folding], None]) -> Non
 
 
 def _folded(pattern: Pattern, source: Path, given: Namespace) -> Folding:
-    """Fold a pattern as it is asked for."""
+    """Fold a pattern as the arguments ask."""
     from foldyn.formats import read_pattern
     from foldyn.statics import fold
 
@@ -139,7 +139,7 @@ def _folded(pattern: Pattern, source: Path, given: Namespace) -> Folding:
 
 
 def _writer(out: Path) -> Callable[[Folding], None]:
-    """What writes a folding to a file of this name."""
+    """Return the function that writes a folding to a file with this name."""
     from foldyn.formats import FORMATS, write_pattern
     from foldyn.results import frames_of, save
 
@@ -155,7 +155,7 @@ def _writer(out: Path) -> Callable[[Folding], None]:
 
 
 def read_angles(path: str) -> dict[Any, float]:
-    """Angles (degrees) by word or pair of vertices, from a text with one on each line."""
+    """Read angles (degrees) by name or pair of vertices from a text, one per line."""
     text = read_text(Path(path), "a file of angles", MOST, "leave out all but the angles")
     found: dict[Any, float] = {}
     for number, line in enumerate(text.splitlines(), start=1):
@@ -183,7 +183,7 @@ def read_angles(path: str) -> dict[Any, float]:
 
 
 def _drawn(folding: Folding, out: Path, name: str, given: Namespace, call: Call) -> list[str]:
-    """Draw the page, and the film where it is asked for; returns the names of their files."""
+    """Draw the page, and the film if asked for; return the names of their files."""
     from foldyn import plots
     from foldyn.analyses.folding_page import write_folding_page
 

@@ -1,4 +1,4 @@
-"""`foldyn info`: versions, threads, optional parts, shipped cases."""
+"""`foldyn info`: versions, threads, optional packages, shipped cases."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ REQUIRED = (
 
 
 def info() -> str:
-    """Text of the command."""
+    """Return the text that `foldyn info` prints."""
     from foldyn.cases.models import MODELS
     from foldyn.dynamics import METHODS, compiled
     from foldyn.dynamics.gpu import card
@@ -88,7 +88,7 @@ def info() -> str:
 
 
 def _part(look: Callable[[], object], package: str) -> str:
-    """Say where a part was found, or how to install it."""
+    """Say where an optional package was found, or how to install it."""
     try:
         return f"found: {look()}"
     except InputError:

@@ -1,7 +1,7 @@
 """The `foldyn` command: its arguments and exit statuses.
 
 0: done; 1: the computation failed; 2: bad input, one message, nothing written; 128 and its number:
-ended by a signal. What was computed until then is kept and named.
+ended by a signal. Results computed before the end are kept, and the message names them.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parser() -> argparse.ArgumentParser:
-    """Arguments of the command."""
+    """Return the parser of the command line."""
     top = _Parser(prog="foldyn", description="Statics and dynamics of origami structures.")
     top.add_argument("--version", action="version", version=f"foldyn {__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -204,7 +204,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _add_case(command: argparse.ArgumentParser, results: str) -> None:
-    """Add what all commands on case files take."""
+    """Add the arguments of all commands on case files."""
     command.add_argument(
         "case", help="case file (TOML), or the name of a shipped one: see foldyn info"
     )
@@ -213,7 +213,7 @@ def _add_case(command: argparse.ArgumentParser, results: str) -> None:
 
 
 def _add_common(command: argparse.ArgumentParser, results: str, film: bool = True) -> None:
-    """Add what commands on case files of either model take."""
+    """Add the arguments of commands on case files of either model."""
     _add_case(command, results)
     if film:
         add_film(command)
@@ -247,7 +247,7 @@ def _add_state(command: argparse.ArgumentParser, internal: bool = True) -> None:
 
 
 def _add_secant(command: argparse.ArgumentParser) -> None:
-    """Add the amplitude of superlinear hinges."""
+    """Add the amplitude at which superlinear hinges are linearized."""
     command.add_argument(
         "--secant",
         type=number,
@@ -258,11 +258,11 @@ def _add_secant(command: argparse.ArgumentParser) -> None:
 
 @contextmanager
 def uncollected_imports() -> Iterator[None]:
-    """Import what lasts as long as the process: nobody looks for garbage in it, then or later.
+    """Import modules without garbage collection and exempt their objects from it for good.
 
-    Modules make some hundred thousand objects, and the collector would look through all of them
-    again and again: a fifth of the time of a short run. Only the first import is treated so; what
-    a process that has worked before may leave as garbage is not kept.
+    Importing makes some hundred thousand objects, which the collector would scan repeatedly: a
+    fifth of the time of a short run. Only the first import is exempt, so garbage that earlier work
+    left in the process can still be freed.
     """
     if not gc.isenabled() or "foldyn.analyses" in sys.modules:
         yield
@@ -282,14 +282,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
-    """Run the command, and say what ended it early."""
+    """Run the command and report an error or signal that ended it."""
     try:
         arguments = sys.argv[1:] if arguments is None else arguments
         given = parser().parse_args(arguments)
         given.typed = shlex.join(["foldyn", *arguments])
         for name, level in SILENT.items():
             os.environ.setdefault(name, level)
-        os.environ["MPLBACKEND"] = "Agg"  # figures go to files alone
+        os.environ["MPLBACKEND"] = "Agg"  # figures only go to files
         with warnings.catch_warnings():
             warnings.simplefilter("always", FoldynWarning)
             warnings.showwarning = _Warnings(getattr(given, "case", ""))
@@ -303,14 +303,14 @@ def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
         return _say(str(error), FAILED)
     except MemoryError as error:
         return _say(reason(error), BAD_INPUT)
-    except OSError as error:  # a full disk, a folder that vanished during the run
+    except OSError as error:  # a full disk, or a folder that vanished during the run
         return _say(f"cannot write the results: {reason(error)}", FAILED)
     except KeyboardInterrupt as stop:
         return _say(str(stop) or "interrupted", ENDINGS.status)
     out.flush()
     if out.failure is None:
         return DONE
-    if isinstance(out.failure, BrokenPipeError):  # who read our output has left, as `head` does
+    if isinstance(out.failure, BrokenPipeError):  # the reader has closed it, like `head`
         return FAILED
     return _say(f"cannot write to standard output: {reason(out.failure)}", FAILED)
 
@@ -321,7 +321,7 @@ def _say(message: str, status: int) -> int:
 
 
 def _call(given: argparse.Namespace) -> None:
-    """Run the command that was named."""
+    """Call the function of the chosen command."""
     if given.command == "info":
         from foldyn.cli.info import info
 
@@ -340,7 +340,7 @@ def _call(given: argparse.Namespace) -> None:
 
 
 class _Warnings:
-    """Writes each warning once, as a line of the command, which names the case file."""
+    """Prints each warning once, prefixed with the case file's name."""
 
     def __init__(self, case: str) -> None:
         self.shown, self.place = Told(), f"{case}: " if case else ""

@@ -1,4 +1,4 @@
-"""Options that several commands share."""
+"""Options shared by several commands."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from foldyn.values import parsed
 
 
 def number(text: str) -> float:
-    """Number of an option; its name stands in argparse's message."""
+    """Parse a number; the function's name appears in argparse's message."""
     return parsed(text)
 
 
 def integer(text: str) -> int:
-    """Whole number of an option."""
+    """Parse a whole number."""
     return parsed(text, int)
 
 
 def flag(command: argparse.ArgumentParser, name: str, text: str) -> None:
-    """Add an option without a value."""
+    """Add a switch, an option without a value."""
     command.add_argument(name, action="store_true", help=text)
 
 
 def add_results(command: argparse.ArgumentParser, default: str, figures: bool = True) -> None:
-    """Add what all commands take that write a folder of results, `default` unless it is given."""
+    """Add options for writing a results folder, `default` unless given."""
     command.add_argument("--out", help=f"folder of the results (default: {default})")
     flag(command, "--replace", "replace results of another file or command that the folder holds")
     add_switches(command, figures)
@@ -34,7 +34,7 @@ def add_results(command: argparse.ArgumentParser, default: str, figures: bool = 
 def add_reading(
     command: argparse.ArgumentParser, frame: str, scale: str = "factor on all lengths"
 ) -> None:
-    """Add how a pattern file is read; `frame` and `scale` say what these are for."""
+    """Add options for reading a pattern file; `frame` and `scale` are their help texts."""
     command.add_argument("--scale", type=number, help=scale)
     command.add_argument("--unit", help="unit of the coordinates of the file: mm, cm, m, in, ...")
     command.add_argument("--frame", help=frame)
@@ -45,7 +45,7 @@ def add_reading(
 
 
 def reading_of(given: argparse.Namespace) -> dict[str, Any]:
-    """Arguments of `read_pattern` that `add_reading` takes."""
+    """Return the arguments for `read_pattern` from the options of `add_reading`."""
     return {
         "scale": given.scale, "unit": given.unit, "frame": frame_of(given.frame),
         "tolerance": given.tolerance, "flat_foldable": given.flat_foldable,
@@ -53,7 +53,7 @@ def reading_of(given: argparse.Namespace) -> dict[str, Any]:
 
 
 def frame_of(given: str | None) -> int | str | None:
-    """Number or title of a frame."""
+    """Parse the number or title of a frame."""
     if given is None or not (given.isascii() and given.isdecimal()):
         return given
     return int(given)
@@ -64,19 +64,19 @@ BOTH = "--figures: draws figures; leave out --no-figures"
 
 
 def add_figures(command: argparse.ArgumentParser) -> None:
-    """Add the figures for papers."""
+    """Add options for figures in publication formats."""
     command.add_argument("--figures", choices=FIGURES, help="draw figures too, beside the page")
 
 
 def add_film(command: argparse.ArgumentParser) -> None:
-    """Add the film of what moves."""
+    """Add the option for a film of the motion."""
     command.add_argument(
         "--film", choices=ANIMATIONS, help="write the motion as a film too, beside its page"
     )
 
 
 def add_switches(command: argparse.ArgumentParser, figures: bool = True) -> None:
-    """Add what all commands take that compute; `main` acts on `--force`."""
+    """Add options of all commands that compute; `main` handles `--force`."""
     if figures:
         flag(command, "--no-figures", "write data only: no figures and no report")
     flag(command, "--quiet", "no progress bar and no summary")

@@ -43,11 +43,11 @@ DRAWN = [
 
 
 def run(given: Namespace) -> Path:
-    """Run a case file and write its results; returns their folder.
+    """Run a case file, write its results, and return their folder.
 
     Everything is checked before the first step is computed and before anything is written. The
-    folder is stamped with the command and the case file: others' results in it are refused, or
-    replaced where that is asked for.
+    folder is stamped with the command and the case file. A folder with results of another command
+    or case file is refused, unless --replace is given.
     """
     clock = Clock.now()
     path, page = find_case(given.case), not given.no_figures
@@ -58,7 +58,7 @@ def run(given: Namespace) -> Path:
         command, suffix = f"{command} --model {given.model}", f"{given.model}-{suffix}"
     folder = Path(f"{path.stem}-{suffix}" if given.out is None else given.out)
     told = Told()
-    with told.noting():  # bad input gets its one message only
+    with told.noting():  # warnings would distract from the one message on bad input
         case_file = _read(path, given)
         if getattr(given, "film", None):
             output = replace(case_file.output, animation=given.film)
@@ -89,7 +89,7 @@ def run(given: Namespace) -> Path:
         say(f"wrote {', '.join(kept.kept)}")
         if page:
             drawn = given.figures or case_file.output.animation
-            with drawing(case_file.path):  # whatever keeps them from it, the results are there
+            with drawing(case_file.path):  # whatever the error, the results are already saved
                 if drawn:
                     say("drawing figures")
                 written = case_file.analysis.page(case_file, done, folder, call, given.figures)
@@ -99,7 +99,7 @@ def run(given: Namespace) -> Path:
 
 @contextmanager
 def _held_results(task: list[Computation]) -> Iterator[None]:
-    """Let no other process keep motions in the files of these, as a script may that stores one."""
+    """Lock the result files of motions, so that no other process stores to them."""
     with ExitStack() as stack:
         for one in task:
             if isinstance(one.compute, Kept) and one.compute.kept:
@@ -108,7 +108,7 @@ def _held_results(task: list[Computation]) -> Iterator[None]:
 
 
 def _keep(task: list[Computation], folder: Path, given: Namespace) -> None:
-    """Have motions kept in the folder while they run."""
+    """Set up checkpoints in the folder for motions while they run."""
     resume, seconds = getattr(given, "resume", False), getattr(given, "checkpoint", None)
     if resume and given.replace:
         raise InputError("--resume: goes on with what is there; leave out --replace")
@@ -125,7 +125,7 @@ def _keep(task: list[Computation], folder: Path, given: Namespace) -> None:
 
 
 def _device(case_file: CaseFile, device: str | None) -> dict[str, str]:
-    """Argument of the device that was asked for."""
+    """Parse the device option."""
     if device is None:
         return {}
     if "device" not in case_file.analysis.takes:
@@ -134,7 +134,7 @@ def _device(case_file: CaseFile, device: str | None) -> dict[str, str]:
 
 
 def _read(path: Path, given: Namespace) -> CaseFile:
-    """Read a case file, for commands that are no `run` as one of their kind."""
+    """Read a case file as the kind of analysis that the command stands for."""
     if given.command == "fidelity":
         names = ("count", "divisions", "models", "secant", "vertex_radius")
         keys = {key: getattr(given, key) for key in names}
@@ -159,7 +159,7 @@ def _computed(
     task: list[Computation], results: Results, introduction: Callable[[], None], progress: bool,
     say: Callable[[str], None],
 ) -> dict[str, xarray.Dataset]:  # fmt: skip
-    """Compute all there is, and save each result as soon as it is there."""
+    """Run all computations; save each result as soon as it is ready."""
     from foldyn.results import save
 
     done: dict[str, xarray.Dataset] = {}
@@ -191,7 +191,7 @@ def _computed(
 
 
 def _saved(one: Computation, result: xarray.Dataset) -> xarray.Dataset:
-    """The result of a motion from its file, if it was kept on the disk, where it is no more."""
+    """Reopen a motion's result from its final file if checkpoints kept it on disk."""
     from foldyn.results import load
 
     keeping = one.compute.kept if isinstance(one.compute, Kept) else None
@@ -202,7 +202,7 @@ def _saved(one: Computation, result: xarray.Dataset) -> xarray.Dataset:
 
 
 def _tell_missing(place: str, result: xarray.Dataset, say: Callable[[str], None]) -> None:
-    """Say which values a result lacks; raise if it should not lack them."""
+    """Say which values a result lacks; raise unless a known reason explains it."""
     from foldyn.results.quantities import REASONS, missing_values
 
     for name, text in missing_values(result).items():
@@ -212,7 +212,7 @@ def _tell_missing(place: str, result: xarray.Dataset, say: Callable[[str], None]
 
 
 def _check_video(case_file: CaseFile) -> None:
-    """Refuse an animation in MP4 before anything is computed, if there is no ffmpeg to make it."""
+    """Refuse an MP4 animation without ffmpeg, before anything is computed."""
     if case_file.output.animation != "mp4":
         return
     from foldyn.plots.writers import find_ffmpeg
@@ -226,8 +226,8 @@ def _check_video(case_file: CaseFile) -> None:
 def _introduction(
     case_file: CaseFile, told: Told, say: Callable[[str], None]
 ) -> Callable[[], None]:
-    """Return a function that announces the run, once, when nothing is left to be refused."""
-    show = warnings.showwarning  # even where warnings are noted at that time
+    """Return a function that announces the run once, after all checks."""
+    show = warnings.showwarning  # the original, even while warnings are being collected
 
     @cache
     def introduce() -> None:

@@ -1,7 +1,7 @@
-"""What ends a run from outside: Ctrl-C, and the signals of batch systems and closed terminals.
+"""Signals that end a run: Ctrl-C, and the signals of batch systems and closed terminals.
 
-Each raises KeyboardInterrupt, on which what was computed is kept, but not while something is saved:
-then it waits. A second Ctrl-C does not.
+Each raises KeyboardInterrupt, and the run keeps what it has computed. A signal during a save waits
+until the save is done; a second Ctrl-C does not wait.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ class Endings:
 
     @property
     def status(self) -> int:
-        """Exit status of a process that was ended: 128 and the signal's number."""
+        """Exit status of a process that a signal ended: 128 plus the signal's number."""
         return 128 + (self.first or signal.SIGINT)
 
     @property
     def by_hand(self) -> bool:
-        """Whether Ctrl-C came, and not what ends a job."""
+        """Whether the signal was Ctrl-C and not one that ends a job."""
         return self.first in (None, signal.SIGINT)
 
     @contextmanager
     def heeded(self) -> Iterator[None]:
-        """Handle signals within the block; those that are ignored, as under nohup, stay ignored."""
+        """Handle signals within the block; signals ignored before, as under nohup, stay ignored."""
         self.first, self._due = None, False
         before = {}
         if threading.current_thread() is threading.main_thread():
@@ -56,7 +56,7 @@ class Endings:
 
     @contextmanager
     def saving(self) -> Iterator[None]:
-        """Let the first signal wait until the end of the block."""
+        """Delay the first signal until the end of the block."""
         self._saving = True
         try:
             yield
@@ -68,7 +68,7 @@ class Endings:
 
     def _receive(self, number: int, _: FrameType | None) -> None:
         again, self.first = self.first is not None, self.first or number
-        if again and number != signal.SIGINT:  # some send it to a process and to its group
+        if again and number != signal.SIGINT:  # some send it to the process and to its group
             return
         if self._saving and not again:
             self._due = True
@@ -78,11 +78,11 @@ class Endings:
 
 
 def _forget_interrupt() -> None:
-    """Let the exit status be ours.
+    """Keep CPython from overriding our exit status after an interrupt.
 
-    CPython notes that KeyboardInterrupt ended a piece of code given as text, as dataclasses and
-    named tuples are made of, and `python -m` then ends by SIGINT even where the exception was
-    caught. The next piece of text that is run to its end clears the note.
+    CPython sets a flag when KeyboardInterrupt ends code run from a string, as dataclasses and named
+    tuples do, and `python -m` then ends by SIGINT even if the exception was caught. The next string
+    that runs to its end clears the flag.
     """
     eval("None")
 

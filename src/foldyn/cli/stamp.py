@@ -1,4 +1,4 @@
-"""The stamp of a results folder: what it belongs to, and which of its files are of the last run."""
+"""The stamp of a results folder: its owner, and which of its files belong to the last run."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ NAME = ".foldyn.json"
 
 @dataclass(frozen=True)
 class Owner:
-    """What a folder of results belongs to.
+    """The command and source file that a results folder belongs to.
 
     Attributes
     ----------
     command : str
-        That makes them, "run" or "run --model shell".
+        The command that makes the results, "run" or "run --model shell".
     source : str
-        Of what: the name of a shipped case, or a file as it is found from the folder.
+        The name of a shipped case, or the path of the file relative to the folder.
     digest : str
-        Of the file's content.
+        Digest of the file's content.
     """
 
     command: str
@@ -38,21 +38,21 @@ class Owner:
 
     @classmethod
     def of(cls, command: str, file: Path, folder: Path) -> Owner:
-        """Owner of a folder of results of a file."""
+        """Return the owner of a results folder for a file."""
         shipped = [name for name, path in shipped_cases().items() if path == file]
         digest = file_digest(file)
-        with suppress(ValueError, OSError):  # on another drive; where there is no such place
+        with suppress(ValueError, OSError):  # on another drive, where no relative path exists
             file = Path(os.path.relpath(os.path.realpath(file), os.path.realpath(folder)))
         source = shipped[0] if shipped else file.as_posix()
         return cls(command, source, digest)
 
     def same(self, stamp: dict[str, Any]) -> bool:
-        """Whether a stamp is of this owner; the content of its file may have changed."""
+        """Whether a stamp names this owner; the file's content may have changed."""
         return (stamp["command"], stamp["source"]) == (self.command, self.source)
 
 
 def read(folder: Path) -> dict[str, Any] | None:
-    """Stamp of a folder; None if it has none, or an unreadable one."""
+    """Read the stamp of a folder; None if missing or unreadable."""
     try:
         found = json.loads(raw(folder) or b"")
         texts = [found[key] for key in ("command", "source", "state")]
@@ -64,7 +64,7 @@ def read(folder: Path) -> dict[str, Any] | None:
 
 
 def raw(folder: Path) -> bytes | None:
-    """Content of the stamp; None if there is none."""
+    """Return the raw content of the stamp; None if there is none."""
     try:
         return (folder / NAME).read_bytes()
     except OSError:
@@ -72,7 +72,7 @@ def raw(folder: Path) -> bytes | None:
 
 
 def restore(folder: Path, content: bytes | None) -> None:
-    """Put back a stamp as it was."""
+    """Restore an earlier stamp."""
     if content is None:
         (folder / NAME).unlink(missing_ok=True)
     else:
@@ -89,9 +89,10 @@ def write(
     folder : Path
     owner : Owner
     state : {"running", "stopped", "complete"}
-        A run that is not there any more and still "running" was cut off.
+        "running" without a live process means that the run was cut off.
     results, outdated : sequence of str
-        Files of this run, and of one before, which go when the first of this one is there.
+        Files of this run, and files of an earlier run, which are removed once this run saves its
+        first.
     """
     stamp = {"foldyn_version": __version__, **asdict(owner), "state": state}
     stamp |= {"results": list(results), "outdated": list(outdated)}
@@ -99,7 +100,7 @@ def write(
 
 
 def named(stamp: dict[str, Any], folder: Path) -> str:
-    """What a stamp is of, as a person would type it."""
+    """Name the owner in a stamp as a user would type it."""
     source = stamp["source"]
     if source.startswith("..") or source.endswith(".toml"):
         source = os.path.normpath(folder / source)

@@ -1,6 +1,6 @@
-"""Output of a command and the time it takes.
+"""Output of a command, and its running time.
 
-Standard output and error may be closed, full or short of letters.
+Standard output and error may be closed, full, or unable to encode some characters.
 """
 
 from __future__ import annotations
@@ -19,36 +19,36 @@ from foldyn.errors import OF_MODELS, Told
 
 
 class Outlet:
-    """A stream that loses what it cannot write.
+    """A stream that drops what it cannot write.
 
     Attributes
     ----------
     failure : OSError or None
-        Why something was lost.
+        Why output was lost.
     """
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self.failure: OSError | None = None
-        with suppress(AttributeError, OSError, ValueError):  # letters that its encoding lacks
+        with suppress(AttributeError, OSError, ValueError):  # characters that its encoding lacks
             stream.reconfigure(errors="backslashreplace")  # type: ignore[attr-defined]
 
     def write(self, text: str) -> int:
-        """Write, or lose it."""
+        """Write, or drop the text."""
         try:
             return self._stream.write(text)
         except OSError as failure:
             return self._lose(failure, len(text))
 
     def flush(self) -> None:
-        """Flush, or lose it."""
+        """Flush, or drop the buffer."""
         try:
             self._stream.flush()
         except OSError as failure:
             self._lose(failure, 0)
 
     def _lose(self, failure: OSError, size: int) -> int:
-        """Write nothing from now on; drop what waits in the buffer."""
+        """Discard the buffer and all further output."""
         self.failure = failure
         with suppress(OSError, ValueError):
             place = os.open(os.devnull, os.O_WRONLY)
@@ -65,7 +65,7 @@ def steady_streams() -> Iterator[Outlet]:
     """Make both streams reliable within the block; yields standard output."""
     _fill_closed()
     before = sys.stdout, sys.stderr
-    with open(os.devnull, "w", encoding="utf-8") as nowhere:  # for one that was closed before
+    with open(os.devnull, "w", encoding="utf-8") as nowhere:  # for a stream closed before
         out, err = Outlet(sys.stdout or nowhere), Outlet(sys.stderr or nowhere)
         sys.stdout, sys.stderr = out, err  # type: ignore[assignment]
         try:
@@ -77,7 +77,7 @@ def steady_streams() -> Iterator[Outlet]:
 
 
 def _fill_closed() -> None:
-    """Occupy the numbers of closed streams: output would go to any file that got one."""
+    """Occupy the numbers of closed streams; a file opened with one would receive the output."""
     while True:
         place = os.open(os.devnull, os.O_RDWR)
         if place > 2:
@@ -86,25 +86,25 @@ def _fill_closed() -> None:
 
 
 def speech(quiet: bool) -> Callable[[str], None]:
-    """Return what prints a line at once, or nothing if the command is to be quiet."""
+    """Return a function that prints a line at once, or nothing if quiet."""
     return (lambda text: None) if quiet else partial(print, flush=True)
 
 
 def noticed(quiet: bool) -> AbstractContextManager[None]:
-    """Print what is told while kernels are compiled, unless the command is to be quiet."""
+    """Print messages about kernels being compiled, unless quiet."""
     from foldyn.notice import NOTICE
 
     def tell(text: str) -> None:
         from tqdm import tqdm
 
-        tqdm.write(text)  # above a bar, if there is one
+        tqdm.write(text)  # above the progress bar, if any
         sys.stdout.flush()
 
     return NOTICE.telling(speech(True) if quiet else tell)
 
 
 def progress_bar(quiet: bool, **options: Any) -> Any:
-    """Progress bar of tqdm, hidden if the command is to be quiet or nobody watches."""
+    """Return a tqdm progress bar, hidden if quiet or not on a terminal."""
     from tqdm import tqdm
 
     return tqdm(disable=quiet or not sys.stderr.isatty(), leave=False, **options)
@@ -112,10 +112,10 @@ def progress_bar(quiet: bool, **options: Any) -> Any:
 
 @contextmanager
 def noted_warnings(page_of: Path | None = None) -> Iterator[Told]:
-    """Note warnings, which are shown all the same.
+    """Collect warnings and still show them.
 
-    page_of : case file that gets a page. A shipped one has its model on purpose: what that gets
-        only roughly is said there alone.
+    page_of : case file that gets a page. A shipped case chose its model on purpose, so warnings
+    about the model's accuracy appear only on the page.
     """
     from foldyn.studies import shipped_cases
 
@@ -133,16 +133,16 @@ def noted_warnings(page_of: Path | None = None) -> Iterator[Told]:
 
 
 class Clock(NamedTuple):
-    """When a command began, by the wall and by the processor (s)."""
+    """Wall and processor time (s) at which a command began."""
 
     wall: float
     cpu: float
 
     @classmethod
     def now(cls) -> Clock:
-        """Both clocks at this moment."""
+        """Read both clocks."""
         return cls(time.perf_counter(), time.process_time())
 
     def spent(self) -> dict[str, float]:
-        """Time (s) since then: `wall` and `cpu`."""
+        """Return the time (s) since then as `wall` and `cpu`."""
         return {name: b - a for name, a, b in zip(self._fields, self, self.now(), strict=True)}

@@ -1,4 +1,4 @@
-"""`foldyn study`: the study of a paper, from its computations to the page."""
+"""`foldyn study`: run the study of a paper and write its page."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Say = Callable[[str], None]
 PROCESSES = 2
-INSIDE = ("runs", "runs/specimen", "sensitivity")  # folders that are written to
+INSIDE = ("runs", "runs/specimen", "sensitivity")  # subfolders that the study writes to
 
 
 def add_study(commands: Any) -> None:
@@ -50,14 +50,14 @@ def add_study(commands: Any) -> None:
 
 
 def study(given: Namespace) -> Path:
-    """Compute what a study has not computed yet and write its page; returns its path.
+    """Compute the missing parts of a study and write its page; return the page's path.
 
     Raises
     ------
     InputError
         The folder cannot be written, or the data cannot be used.
     ComputationError
-        Computations failed; the page is that of the others.
+        Some computations failed; the page shows the others.
     """
     from tqdm import tqdm
 
@@ -85,7 +85,7 @@ def study(given: Namespace) -> Path:
 
 
 def _data(names: Sequence[str] | None, say: Say) -> Data | None:
-    """What was measured of the specimen; None where it must be left out."""
+    """Return the data measured on the specimen; None if it must be left out."""
     from foldyn.experiment import opencv
     from foldyn.studies.herkal.specimen.measured import data_of
 
@@ -160,7 +160,7 @@ def _computed(
     compute: Callable[[Callable[[Done], None], int], list[Done]], count: int, results: Results,
     inside: str, say: Say, quiet: bool,
 ) -> list[Done]:  # fmt: skip
-    """Compute with a progress bar, and say what took long, failed or was skipped."""
+    """Compute with a progress bar; report what took long, failed or was skipped."""
     told = Told()
     with progress_bar(quiet, total=count, unit="run") as bar:
 

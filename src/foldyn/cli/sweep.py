@@ -1,4 +1,4 @@
-"""`foldyn sweep`: a case file at many values of its keys, from reading to report."""
+"""`foldyn sweep`: run a case file at many values of its keys."""
 
 from __future__ import annotations
 
@@ -95,12 +95,12 @@ def add_sweep(commands: Any) -> None:
 
 
 def run_sweep(given: argparse.Namespace) -> Path:
-    """Sweep what the arguments of `add_sweep` ask for; returns the folder of the results.
+    """Run `foldyn sweep`; return the results folder.
 
     Raises
     ------
     InputError
-        Something cannot be used; nothing was written.
+        An argument cannot be used; nothing was written.
     ComputationError
         No point has a value; the reasons are kept.
     """
@@ -142,7 +142,7 @@ def run_sweep(given: argparse.Namespace) -> Path:
 
 
 def _plan(path: Path, given: argparse.Namespace) -> Plan:
-    """What to sweep, checked whole."""
+    """Build and check the plan of the sweep."""
     from foldyn.sweeps.measure import own_measure
     from foldyn.sweeps.plan import plan_of
 
@@ -152,7 +152,7 @@ def _plan(path: Path, given: argparse.Namespace) -> Plan:
     if given.measure is not None:
         here = Path.cwd()
         if str(here) not in sys.path:
-            sys.path.insert(0, str(here))  # as `python -m` has it: for modules of the user
+            sys.path.insert(0, str(here))  # as with `python -m`: for the user's modules
         measures = []
         for text in given.measure:
             try:
@@ -164,7 +164,7 @@ def _plan(path: Path, given: argparse.Namespace) -> Plan:
 
 
 def _table(texts: Sequence[str], option: str) -> dict[str, str]:
-    """Keys and what follows their "="."""
+    """Parse keys and the text after their "="."""
     table: dict[str, str] = {}
     for text in texts:
         key, equals, rest = text.partition("=")
@@ -189,7 +189,7 @@ def _introduction(plan: Plan) -> str:
 def _swept(
     plan: Plan, given: argparse.Namespace, results: Results, say: Callable[[str], None]
 ) -> xarray.Dataset:
-    """Compute with a bar, or with a line now and then."""
+    """Run the sweep with a progress bar, or with a line from time to time."""
     from foldyn.sweeps.run_sweep import swept
 
     total = len(set(plan.points))
@@ -203,7 +203,7 @@ def _swept(
             if course.failed:
                 bar.set_postfix_str(f"{course.failed} failed", refresh=False)
             if course.done == course.found:
-                bar.initial = course.found  # the pace is that of points that are computed
+                bar.initial = course.found  # stored points do not count
             bar.update(course.done - bar.n)
             if bar.disable and course.done < total and time.monotonic() - told > OFTEN:
                 told = time.monotonic()
@@ -216,7 +216,7 @@ def _swept(
 
 
 def _left(seconds: float) -> str:
-    """Time left, in words."""
+    """Remaining time in words."""
     if not seconds >= 0.0:
         return "time left unknown"
     if seconds < 100.0:
@@ -227,7 +227,7 @@ def _left(seconds: float) -> str:
 
 
 def _tell_failed(found: xarray.Dataset, say: Callable[[str], None]) -> None:
-    """Say at how many points values are missing, and why."""
+    """Say how many points lack values, and why."""
     failed = found.attrs["failed"]
     if not failed:
         return

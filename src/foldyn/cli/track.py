@@ -1,4 +1,4 @@
-"""`foldyn track`: a film, or photographs, to histories of corners and nodes."""
+"""`foldyn track`: track corners and nodes in a film or photographs."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def add_track(commands: Any) -> None:
 
 
 def track(given: Namespace) -> Path:
-    """Run the command; returns the path of the tracks."""
+    """Run `foldyn track`; return the path of the tracks."""
     from foldyn import experiment
     from foldyn.analyses.provenance import Call
     from foldyn.experiment.tracking.tracks_page import write_tracks_page
@@ -85,7 +85,7 @@ def track(given: Namespace) -> Path:
     clock = Clock.now()
     if given.figures and given.no_figures:
         raise InputError(BOTH)
-    experiment.opencv()  # nothing else is worth a look without it
+    experiment.opencv()  # fail first if OpenCV is missing
     out = Path(given.out)
     if out.suffix != ".nc":
         raise InputError(f"--out {given.out}: name a file that ends in .nc")
@@ -123,7 +123,7 @@ def track(given: Namespace) -> Path:
     say(f"wrote {out}, {out.with_suffix('.csv')}")
     if not given.no_figures:
         with drawing(out, f"{_KEPT}{out}"):
-            # without a model nothing else shows what was tracked
+            # without a model only the figures show what was tracked
             form = given.figures or (None if "displacement" in ds else "png")
             written = [] if form is None else _figures(ds, out, given.inputs, film, form)
             call = Call(given.typed, tuple(noted), **clock.spent())
@@ -134,7 +134,7 @@ def track(given: Namespace) -> Path:
 
 
 def _save(ds: xarray.Dataset, out: Path) -> None:
-    """Save the tracks and their table; without room for them, save the tracks elsewhere."""
+    """Save the tracks and their table; if the disk is full, save the tracks elsewhere."""
     from foldyn import experiment
 
     try:
@@ -149,19 +149,19 @@ def _save(ds: xarray.Dataset, out: Path) -> None:
 
 
 def numbers(given: Namespace, name: str, count: int | None = None) -> list[float] | None:
-    """Numbers of an option, separated by commas; None if it was not given."""
+    """Parse an option's numbers, separated by commas; None if not given."""
     text = getattr(given, name)
     return None if text is None else _numbers(f"--{name}", text, count)
 
 
 def one_number(given: Namespace, name: str) -> float | None:
-    """Number of an option; None if it was not given."""
+    """Parse an option's number; None if not given."""
     found = numbers(given, name, 1)
     return None if found is None else found[0]
 
 
 def whole_numbers(given: Namespace, name: str, count: int | None = None) -> tuple[int, ...] | None:
-    """Whole numbers of an option, separated by commas; None if it was not given."""
+    """Parse an option's whole numbers, separated by commas; None if not given."""
     values = numbers(given, name, count)
     if values is None:
         return None
@@ -184,7 +184,7 @@ def _numbers(option: str, text: str, count: int | None) -> list[float]:
 
 
 def modeled(name: str) -> Case | xarray.Dataset:
-    """Model as a result, as a case at rest, or as a static case's path with all its states."""
+    """Read the model: a result, a case at rest, or the path of a static case."""
     import foldyn as fd
 
     if name.endswith(".nc"):
@@ -195,7 +195,7 @@ def modeled(name: str) -> Case | xarray.Dataset:
 
 
 def summary(ds: xarray.Dataset) -> str:
-    """Summary of what was tracked."""
+    """Summarize what was tracked."""
     import numpy as np
 
     along = "photo" if "photo" in ds.dims else "time"
@@ -213,7 +213,7 @@ def summary(ds: xarray.Dataset) -> str:
 
 
 def _are_photos(inputs: Sequence[str]) -> bool:
-    """Whether the inputs are photographs; refuses a mixture, and several films."""
+    """Whether the inputs are photographs; refuse a mixture, and several films."""
     from foldyn.experiment.tracking.films import PHOTOS
 
     photos = [Path(name).suffix.lower() in PHOTOS for name in inputs]
@@ -256,7 +256,7 @@ def _tracking(given: Namespace) -> Tracking:
 def _figures(
     ds: xarray.Dataset, out: Path, inputs: Sequence[str], film: Any, form: str
 ) -> list[str]:
-    """Draw the overlays and histories; returns the names of their files."""
+    """Draw overlays and histories; return the names of their files."""
     from foldyn import plots
     from foldyn.experiment import read_photo
     from foldyn.experiment.tracking.tracks_page import most_moved
@@ -284,7 +284,7 @@ def _footage(
     given: Namespace, written: Sequence[str], thing: Case | xarray.Dataset | None, film: Any,
     tracks: xarray.Dataset,
 ) -> Footage:  # fmt: skip
-    """What tracks were found in, for their page."""
+    """Describe the film or photographs of the tracks, for their page."""
     from foldyn.cases import Case
     from foldyn.experiment import read_photo
     from foldyn.experiment.tracking.tracks_page import Footage, spread
@@ -304,7 +304,7 @@ def _footage(
 
 
 def _jpeg(picture: Any) -> bytes:
-    """A gray picture as a file, for a page."""
+    """Encode a gray picture as JPEG, for a page."""
     from foldyn.experiment import opencv
 
     cv2 = opencv()

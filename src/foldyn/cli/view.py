@@ -1,4 +1,4 @@
-"""`foldyn view`: a case file with sliders, results or a pattern in the browser."""
+"""`foldyn view`: show a case file with sliders, results or a pattern in the browser."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def run_view(given: Namespace) -> None:
 
     say = speech(given.quiet)
     server, title = served([find_case(name) for name in given.files], given.port)
-    with server, one_thread():  # small matrices
+    with server, one_thread():  # its matrices are small
         try:
             print(server.address, flush=True)
             say(f"{title}: the page is at this address until Ctrl-C")

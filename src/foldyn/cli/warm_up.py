@@ -1,4 +1,4 @@
-"""`foldyn warm-up`: kernels compiled before they are needed."""
+"""`foldyn warm-up`: compile kernels ahead of their first use."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def add_warm_up(commands: Any) -> None:
 
 
 def run_warm_up(given: Namespace) -> None:
-    """Run the command."""
+    """Run `foldyn warm-up`."""
     from foldyn.cli.first_uses import STAGES, use
     from foldyn.threads import processors
     from foldyn.workers import Workers
