@@ -1,4 +1,4 @@
-"""Attributes of results: what every one has, and what is known of its computation."""
+"""Attributes of results: the common ones, and facts about the computation."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ OWN = ("foldyn_result", "foldyn_format", "foldyn_version", "rerunnable", "not_re
 
 
 def own_attributes(kind: str, obstacles: tuple[str, ...]) -> dict[str, Any]:
-    """Attributes of every result."""
+    """Attributes that every result has."""
     reason = {"not_rerunnable_because": "; ".join(obstacles)} if obstacles else {}
     return {
         "foldyn_result": kind,
@@ -29,7 +29,7 @@ def own_attributes(kind: str, obstacles: tuple[str, ...]) -> dict[str, Any]:
 
 
 def facts(statistics: Mapping[str, Any]) -> dict[str, Any]:
-    """Statistics as NetCDF holds them: numbers, text and lists of numbers."""
+    """Convert statistics to NetCDF attributes: numbers, text and lists of numbers."""
     attributes: dict[str, Any] = {}
     for name, value in statistics.items():
         if name in OWN:

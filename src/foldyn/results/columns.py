@@ -1,6 +1,6 @@
-"""Columns of numbers that grow in files, one file each, and are read only where they are used.
+"""Columns of numbers that grow in files, one file each, and are read only on access.
 
-A checksum of each column grows with it, over what is written and not over what the disk then holds.
+A running checksum of each column covers the rows as written, not as read back from the disk.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ NUMBER = np.dtype("<f8")
 
 
 class Column:
-    """Rows of numbers in a file, the first of them there.
+    """Rows of numbers in a file, from its beginning.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Column:
         return self._count
 
     def __getitem__(self, rows: int | slice) -> NDArray:
-        """One row, or a copy of those of a slice."""
+        """Read one row, or a copy of a slice of rows."""
         if not isinstance(rows, slice):
             number = range(self._count)[rows]
             return self._read(number, number + 1)[0]
@@ -63,7 +63,7 @@ class Column:
 
 
 class _Lazy(BackendArray):
-    """A column as xarray takes it."""
+    """Adapter of a column to xarray's lazy arrays."""
 
     def __init__(self, column: Column) -> None:
         self.column, self.shape, self.dtype = column, column.shape, column.dtype
@@ -80,16 +80,16 @@ class _Lazy(BackendArray):
 
 
 class Columns:
-    """Columns of one length, each in a file of its own in a folder.
+    """Columns of equal length, each in its own file in one folder.
 
     Parameters
     ----------
     folder : Path
-        It exists.
+        An existing folder.
     rows : mapping of str to tuple of int
         Shape of a row of each column, by name.
     count : int
-        Rows that are there already; the files may hold more.
+        Number of rows already stored; the files may hold more.
     sums : mapping of str to int, optional
         Checksums of these rows, by name.
 
@@ -134,28 +134,28 @@ class Columns:
         self.count, self.sums = self.count + added, sums
 
     def settle(self) -> None:
-        """Wait until all rows are on the disk."""
+        """Flush all rows to the disk."""
         for name in self._rows:
             with self._path(name).open("r+b") as file:
                 os.fsync(file.fileno())
 
     def cut(self, count: int) -> None:
-        """Keep the first rows only. The files lose the others when rows are added."""
+        """Keep only the first rows. The files drop the others when rows are next added."""
         self.count, self.sums = count, {name: self._sum(name, count) for name in self._rows}
 
     def damaged(self) -> Path | None:
-        """A file that does not hold the rows that were written; None where all do."""
+        """Return a file that does not hold the rows as written; None if all do."""
         for name, wanted in self.sums.items():
             try:
                 if self._sum(name, self.count) == wanted:
                     continue
-            except OSError:  # it is gone, or cannot be read
+            except OSError:  # missing or unreadable
                 pass
             return self._path(name)
         return None
 
     def _sum(self, name: str, count: int) -> int:
-        """Checksum of the first rows of a file; -1 where it has fewer."""
+        """Checksum of the first rows of a file; -1 if it has fewer."""
         left, found = self._bytes(name) * count, 0
         with self._path(name).open("rb") as file:
             while left > 0 and (piece := file.read(min(left, SUMMED))):
@@ -167,7 +167,7 @@ class Columns:
         return Column(self._path(name), self._rows[name], self.count)
 
     def variable(self, name: str, dims: tuple[str, ...]) -> xr.Variable:
-        """A column as a variable that is read where it is used."""
+        """A column as a lazily read variable."""
         return xr.Variable(dims, indexing.LazilyIndexedArray(_Lazy(self[name])))
 
     def _bytes(self, name: str) -> int:
@@ -178,14 +178,14 @@ class Columns:
 
 
 def pieces(length: int, row_bytes: int) -> Iterator[slice]:
-    """Slices of rows, in order, none larger than `PIECE`."""
+    """Split rows into consecutive slices, each at most `PIECE` in size."""
     step = max(1, PIECE // max(1, row_bytes))
     for first in range(0, length, step):
         yield slice(first, min(first + step, length))
 
 
 def pieces_of(variable: xr.Variable) -> Iterator[NDArray]:
-    """Values of a variable, piece by piece along its first dimension."""
+    """Values of a variable, in pieces along its first dimension."""
     if not variable.ndim or variable.nbytes <= PIECE:
         yield variable.values
         return

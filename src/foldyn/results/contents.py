@@ -1,4 +1,4 @@
-"""Contents of a stored dataset: checks, its case, its pattern, selected nodes."""
+"""Contents of a stored dataset: checks, case, pattern, selected nodes."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _KINDS = {NUMBERS: "numbers", WHOLES: "whole numbers", TEXTS: "texts"}
 def check_variable(
     ds: xr.Dataset, name: str, dims: tuple[str, ...], kind: str = NUMBERS, place: str = ""
 ) -> xr.DataArray:
-    """Return a variable that a dataset must have, over these dimensions and of this kind.
+    """Return a variable that a dataset must have, with these dimensions and this type.
 
     Raises
     ------
     InputError
-        It is another, or there is none.
+        The variable is missing or has other dimensions or another type.
     """
     found = ds.variables.get(name)
     if found is not None and found.dims == dims and found.dtype.kind in kind:
@@ -45,7 +45,7 @@ def check_variable(
 
 
 def whole_attribute(ds: xr.Dataset, name: str) -> int:
-    """Attribute that is a whole number; 0 where there is none."""
+    """Return an attribute that is a whole number; 0 if there is none."""
     value = ds.attrs.get(name, 0)
     if not isinstance(value, int | np.integer):
         raise InputError(f"its attribute {name} must be a whole number: the result is damaged")
@@ -68,7 +68,7 @@ def case_of(ds: xr.Dataset) -> Case:
     Raises
     ------
     InputError
-        Not a result, or one that cannot be run again from itself (user's laws).
+        Not a result, or one from which the case cannot be rebuilt (user's laws).
     """
     check_result(ds)
     if not whole_attribute(ds, "rerunnable"):
@@ -80,7 +80,7 @@ def case_of(ds: xr.Dataset) -> Case:
 
 
 def pattern_of(ds: xr.Dataset) -> Pattern:
-    """Pattern of a result, also of one that cannot be run again from itself.
+    """Pattern of a result, even if its case cannot be rebuilt.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def pattern_of(ds: xr.Dataset) -> Pattern:
 
 
 def _document(ds: xr.Dataset) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The case of a result: its sections, and what they may refer to."""
+    """Return the sections of a result's case and the arrays that they refer to."""
     try:
         sections = from_toml(str(ds["case"].values[()]))
     except InputError as error:
@@ -117,20 +117,20 @@ def check_result(ds: xr.Dataset, place: str = "") -> None:
 def nodes_of(
     result: xr.Dataset, nodes: int | str | Sequence[int], name: str = "the result"
 ) -> list[int]:
-    """Numbers of nodes: those given, or those that a selection ("xmax") of the pattern means.
+    """Return node numbers, given directly or as a selection of the pattern's vertices ("xmax").
 
     Parameters
     ----------
     result : xarray.Dataset
     nodes : int, sequence of int, or str
-        In any order; one may be there twice.
+        In any order; repeats are allowed.
     name : str
         What a message calls the result.
 
     Raises
     ------
     InputError
-        None, something else, one that the result does not have, or a selection of none.
+        No node, not node numbers, a node that the result lacks, or an empty selection.
     """
     stored = result["node"].values
     for node in (numbers := _numbers(result, nodes, name)):

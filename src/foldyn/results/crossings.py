@@ -1,7 +1,7 @@
-"""Panels that pass through each other at the samples of a result: looked for, said and recorded.
+"""Panels that pass through each other at the samples of a result: search, message, record.
 
-Without contact nothing keeps panels apart. Those that cross in the pattern as it was drawn are left
-out, and so are boards (thick panels), which are not where the pattern's panels are.
+Without contact nothing keeps panels apart. Pairs that cross in the pattern at rest are left out,
+and so are boards (thick panels), which lie off the pattern's panels.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from foldyn.results.quantities import CROSSINGS, variable
 
 
 class Crossings(NamedTuple):
-    """What was seen.
+    """Crossings found in a result.
 
     Attributes
     ----------
     looked : (l,)
-        Samples that were looked at.
+        Samples that were checked.
     crossed : (k,)
-        Those among them at which panels cross.
+        Checked samples at which panels cross.
     panels, first : (p, 2), (p,)
-        Pairs of panels that cross at any of these, in the order of the samples at which they were
-        seen first, and these samples.
+        Pairs of panels that cross at any of these samples, ordered by the first such sample, and
+        that sample.
     """
 
     looked: NDArray[np.int64]
@@ -38,7 +38,7 @@ class Crossings(NamedTuple):
     first: NDArray[np.int64]
 
     def recorded(self, result: xr.Dataset) -> xr.Dataset:
-        """The result with what was seen."""
+        """Add the crossings to the result."""
         counts = {"crossing_looks": len(self.looked), "crossing_samples": len(self.crossed)}
         if not len(self.crossed):
             return result.assign_attrs(counts)
@@ -50,7 +50,7 @@ class Crossings(NamedTuple):
         return result.assign(known).assign_attrs(counts)
 
     def text(self, when: str, samples: int) -> str:
-        """Say what was seen, in words; empty where nothing was.
+        """Describe the crossings in words; empty if there are none.
 
         when : the first sample with a crossing, "t = 0.1 s".
         samples : how many the result has.
@@ -73,19 +73,19 @@ def crossings_of(case: Case, displacement: NDArray | Column, stride: int = 1) ->
     ----------
     case : Case
     displacement : ndarray or Column, shape (k, n, 3)
-        Of the nodes at each sample, m. Samples that are not finite are not looked at.
+        Of the nodes at each sample, m. Samples that are not finite are skipped.
     stride : int
-        Every so manieth sample is looked at, so that the last one is; where panels cross, also
-        those between the first such sample and the one before it.
+        Check every `stride`-th sample, counted back from the last. If panels cross, also check the
+        samples between the first crossing and the checked sample before it.
     """
     structure, count = case.structure, len(displacement)
-    panels = getattr(structure, "triangle_panel", np.zeros(0, int))  # models of nets have none
+    panels = getattr(structure, "triangle_panel", np.zeros(0, int))  # net models have no triangles
     if not len(panels) or (structure.pattern is not None and structure.pattern.boards is not None):
         return _found({}, 1)
     many = int(panels.max()) + 1
 
     def keys(u: NDArray) -> NDArray[np.int64]:
-        """Numbers of the pairs that cross, first * many + second."""
+        """Keys of the pairs that cross, first * many + second."""
         return crossing_panels(structure.nodes + u, structure.triangles, panels) @ [many, 1]
 
     at_rest = keys(np.zeros_like(structure.nodes))
@@ -101,7 +101,7 @@ def crossings_of(case: Case, displacement: NDArray | Column, stride: int = 1) ->
 
 
 def _found(seen: dict[int, NDArray[np.int64]], many: int) -> Crossings:
-    """What was seen, from the numbers of the pairs that cross at each sample."""
+    """Collect crossings from the keys of the pairs that cross at each sample."""
     looked = sorted(seen)
     crossed = [k for k in looked if len(seen[k])]
     keys = np.concatenate([np.zeros(0, np.int64), *(seen[k] for k in crossed)])

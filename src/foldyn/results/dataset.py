@@ -1,4 +1,4 @@
-"""Result datasets: labelled arrays that carry their own case."""
+"""Result datasets: labeled arrays that carry their own case."""
 
 from __future__ import annotations
 
@@ -83,9 +83,8 @@ def trajectory_dataset(
     case : Case
         What moved.
     time : array_like, shape (nt,)
-        Times of the samples (s).
-    displacement, velocity : array_like, shape (nt, n, 3)
-        Displacement (m) and velocity (m/s) of every node.
+        Times of the samples (s). displacement, velocity : array_like, shape (nt, n, 3) Displacement
+        (m) and velocity (m/s) of every node.
     reaction : array_like, shape (nt, ns)
         Forces of the supports (N) on the dofs `case.reaction_dofs`, in that order.
     energies : mapping of str to array_like, shape (nt,)
@@ -94,14 +93,15 @@ def trajectory_dataset(
         Facts about the run, each stored as an attribute. `start`, `dt` (s) and `steps` give the
         stage times t_n and t_n + dt/2 at which functions of time are sampled.
     sampled : mapping of str to (Quantity, array_like of shape (nt, ...)), optional
-        What the user has added.
+        Quantities that the user added.
     memory : array_like, shape (nt, b, 2), optional
         State of the branches of laws with memory.
     continuations : mapping of str to (float, Continuation), optional
-        Time (s) of the last sample and what the method needs to go on from there, `continuation`;
-        the same of the first sample and what it had there, `continued_from`.
+        Time (s) of the last sample and the state that the method needs to continue from it,
+        `continuation`; the same for the first sample, `continued_from`.
     origin : (float, Origin), optional
-        Time (s) of the last sample, and where the motion began, if anything depends on it.
+        Time (s) of the last sample, and the state in which the motion began, if a term depends on
+        it.
 
     Returns
     -------
@@ -133,7 +133,7 @@ def trajectory_dataset(
 
 
 def origin_variables(origin: Origin, time: float = math.nan) -> dict[str, Any]:
-    """Variables that say where a motion began that goes on at a time (s)."""
+    """Variables of the state in which a motion began, needed to continue it at a time (s)."""
     begun = math.nan if origin.time is None else origin.time
     values: dict[str, Any] = {"origin": origin.displacement, "origin_time": begun}
     if origin.flow is not None:
@@ -174,7 +174,7 @@ def path_dataset(
     statistics : mapping
         Facts about the run, each stored as an attribute.
     obstacles : tuple of str
-        Why the path cannot be run again from itself, beside what the case says.
+        Reasons why the path cannot be rerun from the dataset, apart from those in the case.
 
     Returns
     -------
@@ -182,7 +182,7 @@ def path_dataset(
         As `trajectory_dataset`, with the dimension step and the coordinate `load_factor`.
     """
     factor = np.array(load_factor, dtype=np.float64)
-    kinds = np.array(solution["point"], dtype="<U11")  # of the longest, "bifurcation"
+    kinds = np.array(solution["point"], dtype="<U11")  # the longest value, "bifurcation"
     values = {"displacement": displacement, "reaction": reaction, **energies, **solution}
     data = variables({**PATH, **energies_of(case)}, "step", values | {"point": kinds})
     along = {"load_factor": ("step", factor, {"long_name": "load factor"})}
@@ -199,7 +199,7 @@ def modes_dataset(
     case : Case
         What vibrates.
     values : mapping of str to array_like
-        The variables of `quantities.MODES`, maybe those of `quantities.INTERNAL`, and the
+        The variables of `quantities.MODES`, optionally of `quantities.INTERNAL`, and the
         `displacement` (n, 3) of the state, m.
     statistics : mapping
         Facts about the computation, each stored as an attribute.
@@ -237,7 +237,7 @@ def frf_dataset(
     Parameters
     ----------
     case : Case
-        What responds; without the drive.
+        The case that responds, without the drive.
     frequency : array_like, shape (m,)
         Frequencies (Hz).
     quantity : {"receptance", "transmissibility"}
@@ -282,7 +282,7 @@ def bands_dataset(
     case : Case
         A cell.
     values : mapping of str to array_like
-        Variables of `quantities.BANDS`, with the states for a first dimension where `along` has the
+        Variables of `quantities.BANDS`; the first dimension is the state if `along` has the
         coordinate "state".
     gaps : mapping of str to array_like
         Variables of `quantities.GAPS`.
@@ -337,14 +337,14 @@ def folding_dataset(
     values: Mapping[str, ArrayLike],
     statistics: Mapping[str, Any],
 ) -> xr.Dataset:
-    """Dataset of the states in which a pattern folds, which carries the pattern.
+    """Dataset of the states of a folding pattern, which carries the pattern.
 
     Parameters
     ----------
     pattern : Pattern
         What is folded.
     share : array_like, shape (ns,)
-        How far along the way each state is, from 0 to 1.
+        Position of each state along the folding motion, from 0 to 1.
     values : mapping of str to array_like
         Variables of `quantities.FOLDING`.
     statistics : mapping
@@ -378,7 +378,7 @@ def result_dataset(
     times: NDArray[np.float64] | None = None,
     obstacles: tuple[str, ...] = (),
 ) -> xr.Dataset:
-    """Variables of a result, with its case and the facts about its run.
+    """Variables of a result, with its case and facts about its run.
 
     Parameters
     ----------
@@ -392,7 +392,7 @@ def result_dataset(
     times : ndarray, optional
         Times (s) at which functions of time are sampled.
     obstacles : tuple of str
-        Why the result cannot be run again from itself, beside what the case says.
+        Reasons why the result cannot be rerun from the dataset, apart from those in the case.
     """
     support = case.reaction_dofs
     document = to_document(case, times)
@@ -421,7 +421,7 @@ def stage_times(statistics: Mapping[str, Any]) -> NDArray[np.float64] | None:
 
 
 def case_variables(document: Document) -> dict[str, Any]:
-    """Variables of a case, as it was written down."""
+    """Variables that store a case as written down."""
     variables: dict[str, Any] = {
         "case": (
             DOCUMENT["case"],
@@ -430,7 +430,7 @@ def case_variables(document: Document) -> dict[str, Any]:
         )
     }
     for name, array in document.arrays.items():
-        # the times and values of one table share a dimension
+        # the times and values of a table share a dimension
         own = (f"{name.rsplit('_', 1)[0]}_point",)
         unit = "m" if name in LENGTHS else "rad" if name == "fold_angles" else ""
         attributes = {"units": unit} if unit else {}

@@ -1,4 +1,4 @@
-"""Shapes that results go through: as frames of a pattern file, as a pattern, or of all nodes."""
+"""Shapes in a result: as frames of a pattern file, as a pattern, or at all nodes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LARGEST = 1e6
 
 
 class Shapes(NamedTuple):
-    """Shapes of all nodes of a result, one after the other.
+    """Shapes of all nodes of a result, in order.
 
     Attributes
     ----------
@@ -40,9 +40,10 @@ class Shapes(NamedTuple):
     titles : list of str
         "t = 0.1 s", "load factor 1", "mode 2: 1.05 Hz".
     nodes : ndarray, shape (n, 3)
-        Where displacements start from, m: at rest; for modes, in the state about which they swing.
+        Reference positions of the displacements, m: at rest, or for modes the state of the
+        oscillation.
     displacement : ndarray, shape (k, n, 3)
-        m, with the factor that was asked for. Of modes, the largest is `SWING` times that.
+        m, times the requested factor. For modes the largest is `SWING` times that factor.
     """
 
     samples: NDArray[np.int64]
@@ -55,16 +56,16 @@ class Shapes(NamedTuple):
 def shapes_of(
     result: xr.Dataset, every: int | None = None, *, frames: int | None = None, scale: float = 1.0
 ) -> Shapes:
-    """Shapes of all nodes that a motion, a path or modes go through.
+    """Shapes of all nodes in a motion, path, modes or folding.
 
     Parameters
     ----------
     result : xarray.Dataset
         A motion, an equilibrium path, modes, or `Folding.path`.
     every : int, optional
-        Take every such sample; the last one is always taken.
+        Take every n-th sample, and always the last.
     frames : int, optional
-        Take so many samples, spread evenly, the first and the last among them.
+        Take this many samples, evenly spread, including the first and the last.
     scale : float
         Factor on all displacements.
 
@@ -76,8 +77,8 @@ def shapes_of(
     Raises
     ------
     InputError
-        Another kind of result, one with displacements that are not finite, or a number of samples
-        that makes no sense.
+        Another kind of result, displacements that are not finite, or an impossible number of
+        samples.
     """
     check_result(result, "result: ")
     count = result.sizes[_along(result)[0]]
@@ -95,7 +96,7 @@ def _along(result: xr.Dataset) -> tuple[str, str, str, str]:
 
 
 def chosen_samples(count: int, every: int | None, frames: int | None) -> NDArray[np.int64]:
-    """Numbers of the samples to take of so many."""
+    """Numbers of the samples to take from a count."""
     if count == 0:
         raise InputError(": has no samples; compute it again", "result")
     if every is not None and frames is not None:
@@ -153,7 +154,7 @@ def frames_of(
     -------
     States
         The `pattern` at rest, and its `frames`: coordinates (m) of its vertices in each state,
-        titled by the time, the load factor, the mode or the share of the way.
+        titled by the time, the load factor, the mode or the share of the folding motion.
 
     Raises
     ------

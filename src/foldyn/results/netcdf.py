@@ -1,7 +1,7 @@
-"""Results, and other datasets, in NetCDF files: written and read whole or not at all.
+"""Results and other datasets in NetCDF files, written and read completely or not at all.
 
-A seal at the end of a file shows damage. HDF5 ignores what follows its own end, and cuts it off
-when another program changes the file: such a file has no seal, like those of older programs, and is
+A seal at the end of a file reveals damage. HDF5 ignores bytes after its own end, and cuts them off
+when another program changes the file. Such a file has no seal, like files of older programs, and is
 read without this check.
 
 NetCDF has no complex numbers: a complex variable of a result is stored as two, its real and its
@@ -41,7 +41,7 @@ OTHERS = (
 )  # fmt: skip
 """Suffixes that promise another kind of file."""
 _PARTS = ("real", "imag")
-_WHOLE = "part_of_complex"  # attribute of both parts: the name of the variable
+_WHOLE = "part_of_complex"  # attribute of both parts: the name of the complex variable
 MOST_PACKED = 1100
 """Bytes that one byte of a file may stand for: deflate packs no more than 1032."""
 ALONG = "time"
@@ -69,8 +69,8 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        Not a result, the path cannot be written, or its name is that of another kind of file, as
-        ``run.csv``.
+        Not a result, the path cannot be written, or its suffix belongs to another kind of file,
+        such as ``run.csv``.
     """
     check_result(ds, "cannot save: the dataset ")
     write(_split(ds), path)
@@ -84,9 +84,8 @@ def load(path: str | os.PathLike[str], whole: bool = True) -> xr.Dataset:
     path : path
         A file that `save` wrote.
     whole : bool, default True
-        Whether all of it is read into memory. Otherwise variables are read from the file where they
-        are used, each time, as far as they are: for results that are larger than memory. The file
-        must stay where it is meanwhile.
+        Read everything into memory. Otherwise each access reads the part it needs from the file,
+        for results larger than memory; the file must then stay in place.
 
     Returns
     -------
@@ -119,12 +118,12 @@ def load(path: str | os.PathLike[str], whole: bool = True) -> xr.Dataset:
 
 
 def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write a dataset to a file, which appears only when it is complete.
+    """Write a dataset to a file, which appears only once it is complete.
 
     Raises
     ------
     InputError
-        The path cannot be written, or its name is that of another kind of file.
+        The path cannot be written, or its suffix belongs to another kind of file.
     OSError
         The disk is full, or fails.
     """
@@ -138,12 +137,12 @@ def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
 
 
 def check_target(path: str | os.PathLike[str]) -> Path:
-    """Path of a file to be written; refuses one that cannot be.
+    """Return the path of a file to be written; refuse one that cannot be written.
 
     Raises
     ------
     InputError
-        It is a folder, there is no folder for it, or its name is that of another kind of file.
+        It is a folder, its folder does not exist, or its suffix belongs to another kind of file.
     """
     path = path_of(path)
     if path.is_dir():
@@ -159,7 +158,7 @@ def check_target(path: str | os.PathLike[str]) -> Path:
 
 
 def fill(path: Path, write_to: Callable[[Sink], Any]) -> None:
-    """Write an HDF5 file; a failure of the file takes precedence over what HDF5 makes of it."""
+    """Write an HDF5 file; report a failure of the file rather than HDF5's error about it."""
     with Sink(path, "w+") as sink:
         try:
             write_to(sink)
@@ -171,12 +170,12 @@ def fill(path: Path, write_to: Callable[[Sink], Any]) -> None:
 
 
 def read(path: str | os.PathLike[str], unreadable: str, into_memory: bool = True) -> xr.Dataset:
-    """Read a dataset, whole into memory unless a file with a seal is to be read as it is used.
+    """Read a dataset into memory, or lazily if that is asked for and the file has a seal.
 
     Raises
     ------
     InputError
-        There is no such file, or it is damaged, or it is no NetCDF: the message then says
+        There is no such file, it is damaged, or it is not NetCDF; the message then contains
         `unreadable`.
     """
     path = check_file(path, "a NetCDF file")
@@ -189,15 +188,15 @@ def read(path: str | os.PathLike[str], unreadable: str, into_memory: bool = True
             )
         if sealed:
             return _load(path) if into_memory else _opened(path)
-        size = path.stat().st_size  # HDF5 may crash on what is damaged
-        list_engines()  # once, and not in each of the processes
+        size = path.stat().st_size  # HDF5 may crash on a damaged file
+        list_engines()  # here, so that each forked process need not do it
         seconds, memory = LEAST_SECONDS + size // PER_SECOND, LEAST_MEMORY + 3 * MOST_PACKED * size
         return apart(lambda: _load(path), seconds, memory)
     except InputError:
         raise
     except PermissionError:
         raise InputError(f"{path}: may not be read") from None
-    except Exception as error:  # what libraries raise on damaged files is of any kind
+    except Exception as error:  # libraries raise any kind of error on damaged files
         raise InputError(
             f"{path}: {unreadable}; if it was one, it is damaged: restore it from a copy, or "
             "compute it again"
@@ -206,7 +205,7 @@ def read(path: str | os.PathLike[str], unreadable: str, into_memory: bool = True
 
 def _load(path: Path) -> xr.Dataset:
     _check_header(path)
-    with warnings.catch_warnings():  # of xarray, on what it finds odd
+    with warnings.catch_warnings():  # xarray's warnings about odd content
         warnings.simplefilter("ignore")
         ds = xr.load_dataset(path, engine=ENGINE, decode_times=False, decode_timedelta=False)
     return _fitting(ds)
@@ -228,9 +227,10 @@ def _fitting(ds: xr.Dataset) -> xr.Dataset:
 
 
 def _check_header(path: Path) -> None:
-    """Refuse a file that is not all there is, or declares more than it can hold.
+    """Refuse a file with missing parts, or one that declares more than it can hold.
 
-    Before anything is read: a link may lead to a file that has no end, and a size take all memory.
+    Done before anything is read: a link may lead to an endless file, and a declared size may exceed
+    the memory.
     """
     declared = 0
     with h5py.File(path) as file:
@@ -250,28 +250,28 @@ def _check_header(path: Path) -> None:
 
 
 def _is_bare(item: h5py.Dataset) -> bool:
-    """Whether this is only a dimension, without numbers."""
+    """Whether this is only a dimension, without values."""
     name = item.attrs.get("NAME")
     return isinstance(name, bytes) and name.startswith(b"This is a netCDF dimension but not a")
 
 
 class Sink(io.FileIO):
-    """A new file, open for reading and writing, whose failures are noted and not raised.
+    """A new file, open for reading and writing, which records failures instead of raising them.
 
-    Where the disk is full, HDF5 cannot close its file, and the process ends in a segmentation
-    fault. So it writes through this, which takes the rest for written; the failure is raised at the
-    end. Nothing but the dataset itself is held in memory.
+    When the disk is full, HDF5 cannot close its file, and the process ends in a segmentation fault.
+    So HDF5 writes through this class, which pretends that writes succeed after the first failure;
+    the failure is raised at the end. Only the dataset itself is held in memory.
 
     Attributes
     ----------
     failure : BaseException or None
-        What ended the writing: a full disk, or an interruption that came meanwhile.
+        What ended the writing: a full disk, or an interruption.
     """
 
     failure: BaseException | None = None
 
     def write(self, data: Any, /) -> int:
-        """Write all of it, or note why not."""
+        """Write all of it, or record the failure."""
         left = memoryview(data).cast("B")
         size, end = len(left), self.tell() + len(left)
         try:
@@ -283,7 +283,7 @@ class Sink(io.FileIO):
         return size
 
     def truncate(self, size: int | None = None, /) -> int:
-        """Set the size, or note why not."""
+        """Set the size, or record the failure."""
         try:
             if self.failure is None:
                 return super().truncate(size)
@@ -292,7 +292,7 @@ class Sink(io.FileIO):
         return self.tell() if size is None else size
 
     def readinto(self, buffer: Any, /) -> int:
-        """Read; zeros for what could not be written."""
+        """Read; return zeros for bytes that could not be written."""
         room = memoryview(buffer).cast("B")
         found = 0
         if self.failure is None:
@@ -307,7 +307,7 @@ class Sink(io.FileIO):
 
 
 def _split(ds: xr.Dataset) -> xr.Dataset:
-    """Dataset with the two parts of each complex variable instead of it."""
+    """Replace each complex variable by its real and imaginary parts."""
     split = ds
     for name, variable in ds.data_vars.items():
         if np.issubdtype(variable.dtype, np.complexfloating):
@@ -318,7 +318,7 @@ def _split(ds: xr.Dataset) -> xr.Dataset:
 
 
 def _joined(ds: xr.Dataset) -> xr.Dataset:
-    """Dataset with complex variables put together from their parts."""
+    """Rejoin complex variables from their parts."""
     names = dict.fromkeys(part.attrs.get(_WHOLE) for part in ds.data_vars.values())
     for name in names:
         if name is None:
@@ -326,7 +326,7 @@ def _joined(ds: xr.Dataset) -> xr.Dataset:
         real, imag = (ds[f"{name}_{part}"] for part in _PARTS)
         if real.dims != imag.dims or {real.dtype.kind, imag.dtype.kind} != {"f"}:
             raise TypeError(name)
-        # not real + 1j * imag: an infinite part would make the other one nan
+        # not real + 1j * imag: an infinite part would turn the other into nan
         whole = np.empty(real.shape, np.complex128)
         whole.real, whole.imag = real.values, imag.values
         own = {key: value for key, value in real.attrs.items() if key != _WHOLE}
@@ -336,7 +336,7 @@ def _joined(ds: xr.Dataset) -> xr.Dataset:
 
 
 def _write_pieces(ds: xr.Dataset, sink: Any, engine: Literal["h5netcdf"]) -> None:
-    """Write a dataset to a file that is open; what is long along `ALONG`, piece by piece."""
+    """Write a dataset to an open file; long variables along `ALONG` are written in pieces."""
     along = {name: v for name, v in ds.variables.items() if v.dims[:1] == (ALONG,)}
     if all(variable.nbytes <= PIECE for variable in along.values()):
         ds.to_netcdf(sink, engine=engine)

@@ -1,4 +1,4 @@
-"""Datasets of periodic motions: one, those along a response curve, and along a backbone."""
+"""Datasets of periodic motions: a single one, a response curve, and a backbone."""
 
 from __future__ import annotations
 
@@ -55,11 +55,11 @@ def periodic_dataset(
     floquet : array_like, complex, shape (2k,)
     stable : bool
     periods : int
-        Periods of the drive in one of the motion.
+        Drive periods per period of the motion.
     statistics : mapping
         Facts about the computation, each stored as an attribute.
     origin : Origin, optional
-        About which damping has its start.
+        The reference state of damping.
     """
     data = variables(MOTION, "time", motion)
     data |= {} if origin is None else origin_variables(origin)
@@ -87,13 +87,13 @@ def points_dataset(
     kind : {"response_curve", "backbone"}
     case : Case
     values : mapping of str to array_like, shape (points, ...)
-        Of `POINTS`; `frequency` is a coordinate.
+        Variables of `POINTS`; `frequency` is a coordinate.
     statistics : mapping
         Facts about the computation, each stored as an attribute.
     units : str
-        Of the amplitude.
+        Unit of the amplitude.
     origin : Origin, optional
-        As of `periodic_dataset`.
+        See `periodic_dataset`.
     """
     size = POINTS["amplitude"]._replace(units=units)
     if kind == "backbone":

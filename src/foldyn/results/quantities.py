@@ -1,6 +1,6 @@
-"""What results hold: each variable with its unit, its meaning and its dimensions, once.
+"""Registry of result variables: unit, meaning and dimensions of each.
 
-A quantity that is a function of the state can be added to a motion by its user:
+Users can add a quantity that is a function of the state to a motion:
 ``simulate(..., sample={"tip": Quantity("m", "height of the tip", function=height)})``.
 """
 
@@ -22,14 +22,14 @@ class Quantity(NamedTuple):
     Parameters
     ----------
     units : str
-        Its unit, "m/s"; "1" or nothing where it has none.
+        Unit, "m/s"; "1" or empty if dimensionless.
     text : str
-        What it is, as labels of figures say it.
+        Meaning, as labels of figures show it.
     dims : tuple of str
-        Its dimensions beside that along which the result runs: "node", "axis", or others.
+        Dimensions in addition to the result's own, such as time: "node", "axis", or others.
     function : callable, optional
-        Its value, a number or an array with these dimensions, from displacement (n, 3), m, velocity
-        (n, 3), m/s, and time, s. What is known without it is computed along with the motion.
+        Returns the value, a number or an array with these dimensions, from displacement (n, 3), m,
+        velocity (n, 3), m/s, and time, s. Built-in quantities need none.
     """
 
     units: str = ""
@@ -187,7 +187,7 @@ FIDELITY: Mapping[str, Quantity] = {
 def variables(
     known: Mapping[str, Quantity], along: str, values: Mapping[str, ArrayLike]
 ) -> dict[str, Any]:
-    """Variables of a dataset from values along a dimension."""
+    """Dataset variables from values along a dimension."""
     return {
         name: variable((along, *known[name].dims), array, known[name].units, known[name].text)
         for name, array in values.items()
@@ -195,13 +195,13 @@ def variables(
 
 
 def variable(dims: tuple[str, ...], values: ArrayLike, units: str, text: str) -> tuple:
-    """Variable of a dataset with its unit, if it has one, and a text for axes of figures."""
+    """Dataset variable with its unit, if any, and a label for figures."""
     attributes = {"units": units, "long_name": text}
     return dims, np.asarray(values), {key: word for key, word in attributes.items() if word}
 
 
 def energies_of(case: Any) -> dict[str, Quantity]:
-    """Parts of the strain energy of a case's structure."""
+    """Strain energies of a case's structure, by part."""
     return {name: Quantity("J", text) for name, text in case.energy_groups.items()}
 
 
@@ -224,7 +224,7 @@ UNEXPECTED = "the computation was no longer finite"
 
 
 def with_reason(name: str, variable: tuple) -> tuple:
-    """Variable (dimensions, values, attributes) with the reason if it lacks values."""
+    """Add the reason for missing values, if any, to a variable (dimensions, values, attributes)."""
     dimensions, values, attributes = variable
     if not _missing(values):
         return variable
@@ -238,7 +238,7 @@ def _missing(values: Any) -> int:
 
 
 def missing_values(ds: xr.Dataset) -> dict[str, str]:
-    """Say how many values each incomplete variable of a result lacks, and why, by name."""
+    """For each incomplete variable, by name, say how many values are missing and why."""
     missing = {
         name: sum(map(_missing, pieces_of(ds[name].variable)))
         for name in ds.data_vars

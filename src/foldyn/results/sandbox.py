@@ -1,4 +1,4 @@
-"""A call in a separate process: if a library crashes on damaged bytes, only that process ends."""
+"""Calls in a separate process, so that a library's crash on damaged data ends only that process."""
 
 from __future__ import annotations
 
@@ -20,31 +20,30 @@ IDLE = 4
 
 
 def apart(make: Callable[[], T], seconds: int, memory: int) -> T:
-    """Return what a function makes, called in a fork of this process.
+    """Return a function's result, computed in a fork of this process.
 
-    Elsewhere than on Linux, where a fork is not safe, it is called here.
+    Except on Linux a fork is not safe; there the function is called in this process.
 
     Parameters
     ----------
     make : callable
-        Without arguments; what it returns can be pickled.
+        Takes no arguments; its result can be pickled.
     seconds : int
-        Of computing, after which its process is ended; by the clock it may take `IDLE` times as
-        many.
+        CPU time after which the process is ended; wall time may be `IDLE` times that.
     memory : int
-        Bytes that it may take beside what this process has.
+        Bytes that it may allocate on top of this process's own.
 
     Raises
     ------
     FoldynError
         The function raised it.
     OSError
-        The function failed in another way, or its process crashed or took too much.
+        The function failed in another way, or its process crashed or exceeded a limit.
     """
     if sys.platform != "linux":
         return make()
     reading, writing = os.pipe()
-    with warnings.catch_warnings():  # of threads, which the fork does not have and does not need
+    with warnings.catch_warnings():  # about threads, which the child does not need
         warnings.simplefilter("ignore", DeprecationWarning)
         child = os.fork()
     if child == 0:
@@ -65,7 +64,7 @@ def apart(make: Callable[[], T], seconds: int, memory: int) -> T:
 
 
 def _answer(make: Callable[[], Any], seconds: int, memory: int, writing: int) -> None:
-    """Send what a function returns, and end this process, whatever happens."""
+    """Send the function's result and end this process in any case."""
     try:
         for number in (signal.SIGALRM, signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_DFL)
@@ -88,7 +87,7 @@ def _answer(make: Callable[[], Any], seconds: int, memory: int, writing: int) ->
 
 
 def _limit(seconds: int, memory: int) -> None:
-    import resource  # there is none on Windows
+    import resource  # not available on Windows
 
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
     pages = int(Path("/proc/self/statm").read_text().split()[0])

@@ -1,4 +1,4 @@
-"""Seals: at the end of a file the digest of all that comes before it, which shows damage."""
+"""Seals: a digest of all preceding bytes at the end of a file, which reveals damage."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ _PIECE = 1 << 20
 
 
 def seal(path: Path) -> None:
-    """Put a seal at the end of a file."""
+    """Append a seal to a file."""
     with path.open("rb+") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         file.write(_MARK + digest.encode() + b"\n")
 
 
 def sound(path: Path) -> bool | None:
-    """Whether the seal of a file matches what comes before it; None where it has none."""
+    """Whether the seal of a file matches its content; None if it has no seal."""
     left = path.stat().st_size - _LENGTH
     if left < 0:
         return None

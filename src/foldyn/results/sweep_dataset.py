@@ -1,4 +1,4 @@
-"""Datasets of sweeps: made, and read for figures, main effects and Sobol indices."""
+"""Datasets of sweeps: creation, and reading for figures, main effects and Sobol indices."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ def sweep_dataset(
     coordinates: Mapping[str, Any],
     statistics: Mapping[str, Any],
 ) -> xr.Dataset:
-    """Dataset of a sweep, which carries the case of the file that was varied.
+    """Dataset of a sweep, which carries the case of the original case file.
 
     Parameters
     ----------
     case : Case
-        Of the case file as it is.
+        Case of the unchanged case file.
     data, coordinates : mapping
-        Variables, and the values of what was varied.
+        Variables, and the values of the varied keys.
     statistics : mapping
         Facts about the sweep, each stored as an attribute.
     """
@@ -52,26 +52,26 @@ def sweep_dataset(
 
 
 def check_sweep(ds: xr.Dataset) -> None:
-    """Refuse what is no result of a sweep."""
+    """Refuse a dataset that is not the result of a sweep."""
     check_result(ds, "sweep: ")
     if ds.attrs["foldyn_result"] != "sweep" or "failure" not in ds:
         raise InputError("sweep: give a result of foldyn.sweep")
 
 
 def keys_of(ds: xr.Dataset) -> list[str]:
-    """Names of all keys of a sweep, in its order, those with one value too."""
+    """Names of all keys of a sweep, in order, including keys with one value."""
     check_sweep(ds)
     return [str(name) for name, one in ds.coords.items() if "key" in one.attrs]
 
 
 def parameters_of(ds: xr.Dataset) -> list[str]:
-    """Names of what a sweep varied: keys with several values, or all where none has."""
+    """Names of the varied parameters: keys with several values, or all keys if none has several."""
     names = keys_of(ds)
     return [name for name in names if np.unique(ds[name].values).size > 1] or names
 
 
 def measures_of(ds: xr.Dataset) -> list[str]:
-    """Names of what a sweep measured."""
+    """Names of the measures of a sweep."""
     check_sweep(ds)
     return [str(name) for name, one in ds.data_vars.items() if "measure" in one.attrs]
 
@@ -82,12 +82,12 @@ def has_values(ds: xr.Dataset) -> bool:
 
 
 def is_grid(ds: xr.Dataset) -> bool:
-    """Whether a sweep went over all combinations of values."""
+    """Whether a sweep covered all combinations of values."""
     return POINT not in ds.dims
 
 
 def label(one: xr.DataArray, own: str = "") -> str:
-    """What a variable or coordinate is, with its unit, for an axis of a figure."""
+    """Axis label of a variable or coordinate, with its unit."""
     units, text = one.attrs.get("units", ""), own or one.attrs.get("long_name", str(one.name))
     return f"{text} ({units})" if units not in ("", "1") else str(text)
 
@@ -100,8 +100,8 @@ def measured(ds: xr.Dataset, measure: str, at: Mapping[str, Any] | None = None) 
     ds : xarray.Dataset
     measure : str
     at : mapping, optional
-        Where along its own dimensions, {"mode": 2}, by values of their coordinates, the first
-        unless given; and at which values of parameters of a grid, all unless given.
+        Coordinates along the measure's own dimensions, {"mode": 2}, by default the first; and
+        values of the grid's parameters, by default all.
 
     Raises
     ------
@@ -129,14 +129,14 @@ def measured(ds: xr.Dataset, measure: str, at: Mapping[str, Any] | None = None) 
 @brief
 @dataclass(frozen=True, eq=False)
 class MainEffect:
-    """Mean of a measure over everything else, at values of one parameter.
+    """Mean of a measure over all other parameters, at values of one parameter.
 
     Attributes
     ----------
     name : str
         The parameter.
     values : ndarray, shape (k,)
-        Its values, or the means of its ranges where points were sampled.
+        Its values, or for sampled points the means of its ranges.
     mean, deviation : ndarray, shape (k,)
         Mean of the measure there, and its standard deviation.
     """
@@ -150,19 +150,17 @@ class MainEffect:
 def main_effects(
     ds: xr.Dataset, measure: str, *, at: Mapping[str, Any] | None = None
 ) -> tuple[MainEffect, ...]:
-    """Main effects of all parameters of a sweep on a measure; points that failed are left out.
+    """Main effects of all parameters of a sweep on a measure; failed points are left out.
 
     Parameters
     ----------
     ds : xarray.Dataset
         A result of `foldyn.sweep`.
     measure, at
-        As of `measured`.
-
-    Returns
+        As in `measured`. Returns
     -------
     tuple of MainEffect
-        In the order of the parameters. Of samples the means are over 8 ranges of equally many
+        In the order of the parameters. For samples, means are over 8 ranges with equal numbers of
         points, or over the values of a list.
 
     Raises
@@ -205,11 +203,11 @@ class SobolIndices:
     names : tuple of str
         The parameters.
     first, total : ndarray, shape (d,)
-        Share that each explains alone, and with all its interactions.
+        Share of each parameter alone, and with all its interactions.
     first_interval, total_interval : ndarray, shape (d, 2)
         Percentiles of both over resampled points.
     points : int
-        Points of the design, of each kind, that were used; those that failed are left out.
+        Number of design points of each kind that were used; failed points are left out.
     """
 
     names: tuple[str, ...]
@@ -238,25 +236,22 @@ def sobol_indices(
     measure, at
         As of `measured`.
     confidence : float
-        Of the intervals, which are percentiles of the bootstrap.
+        Confidence level of the intervals, which are bootstrap percentiles.
     resamples, seed : int
-        Of the bootstrap.
-
-    Returns
+        Number of bootstrap resamples, and the random seed. Returns
     -------
     SobolIndices
 
     Raises
     ------
     InputError
-        Another design, fewer than 8 points of it that did not fail, or a measure that does not
-        vary.
+        Another design, fewer than 8 successful points, or a measure that does not vary.
 
     Notes
     -----
     First-order indices by Saltelli et al. (Comput. Phys. Commun. 181, 2010, table 2 (b)), total
-    ones by Jansen (table 2 (f)), as `scipy.stats.sobol_indices` has them; a row of the design of
-    which any point failed is left out.
+    ones by Jansen (table 2 (f)), as in `scipy.stats.sobol_indices`; a row of the design with any
+    failed point is left out.
     """
     found = measured(ds, measure, at)
     if ds.attrs["method"] != SALTELLI:
@@ -285,7 +280,7 @@ def _indices(rows: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """First-order and total indices from the rows A, B, AB_1, ..., AB_d of a design."""
     a, b, *mixed = rows - rows[:2].mean()
     variance = np.var([a, b])
-    with np.errstate(divide="ignore", invalid="ignore"):  # a resample may have no variance
+    with np.errstate(divide="ignore", invalid="ignore"):  # a resample may have zero variance
         first = np.array([np.mean(b * (one - a)) for one in mixed]) / variance
         total = np.array([0.5 * np.mean((a - one) ** 2) for one in mixed]) / variance
     return first, total
