@@ -1,4 +1,4 @@
-"""What the pages of analyses share: figures in a folder, the structure, tables of computations."""
+"""Shared parts of analysis pages: figures in a folder, the structure, tables of results."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Album:
     ----------
     folder : path
     form : {"png", "svg", "pdf"} or None
-        What figures are written as; None: none are drawn. A page shows those in PNG.
+        File format of the figures; None draws none. A page shows only PNG figures.
     """
 
     def __init__(self, folder: str | Path, form: str | None = "png") -> None:
@@ -42,9 +42,9 @@ class Album:
     def figure(
         self, name: str, caption: str, draw: Callable[[], Any], *otherwise: Section
     ) -> list[Section]:
-        """Draw a figure and write it as a file, if figures are asked for.
+        """Draw a figure and write it to a file, if figures are asked for.
 
-        Returns it for the page, or else what stands there instead.
+        Return its section for the page, or `otherwise` if the page cannot show it.
         """
         if self.form is None:
             return list(otherwise)
@@ -77,7 +77,7 @@ class Album:
 
 
 def filled(sections: Iterable[Section]) -> list[Section]:
-    """The sections without headings that have nothing below them."""
+    """Drop headings that have no content below them."""
     listed = list(sections)
     return [
         section
@@ -87,7 +87,7 @@ def filled(sections: Iterable[Section]) -> list[Section]:
 
 
 def described_shell(shell: Shell) -> str:
-    """Notes on a shell."""
+    """Describe a shell in words."""
     return (
         "A shell: panels that stretch and bend as thin sheets, in "
         f"{len(shell.triangles)} triangles ({shell.options.divisions} divisions of every edge), "
@@ -97,13 +97,13 @@ def described_shell(shell: Shell) -> str:
 
 
 def shown_nodes(chosen: list[int], most: int = MOST_NODES) -> tuple[list[int], str]:
-    """Nodes that a figure shows, and a remark where there are more."""
+    """Nodes for a figure, and a remark if some are left out."""
     nodes = chosen[:most]
     return nodes, f" (the first {len(nodes)} of {len(chosen)})" if len(chosen) > len(nodes) else ""
 
 
 def visible_scale(case: Case, result: xarray.Dataset) -> tuple[float, str]:
-    """Enlargement that makes a small motion visible, at most 1000, and a remark on it."""
+    """Scale that makes a small motion visible, at most 1000, and a remark on it."""
     largest = float(np.abs(result["displacement"].to_numpy()).max())
     wanted = 0.1 * case.structure.pattern.size / max(largest, 1e-30)
     steps = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0]
@@ -112,13 +112,13 @@ def visible_scale(case: Case, result: xarray.Dataset) -> tuple[float, str]:
 
 
 def listed(noun: str, numbers: Iterable[Any]) -> str:
-    """Write numbers with their noun: "node 1", "nodes 1, 2"."""
+    """Write numbers after their noun: "node 1", "nodes 1, 2"."""
     words = [str(number) for number in numbers]
     return f"{noun}{'' if len(words) == 1 else 's'} {', '.join(words)}"
 
 
 def rules(results: ByRule) -> str:
-    """The mass rules of results, for a caption."""
+    """Name the mass rules of results, for a caption."""
     return "all mass rules" if len(results) > 1 else f"mass rule {next(iter(results))}"
 
 
@@ -127,7 +127,7 @@ def by_mass_rule(
     columns: Mapping[str, str | Callable[[xarray.Dataset], Any]],
     caption: str,
 ) -> Table:
-    """Table with a row for each mass rule; columns are attributes or functions of its result."""
+    """Table with a row per mass rule; columns are attributes or functions of its result."""
     rows = []
     for rule, result in results.items():
         cells = (
@@ -138,7 +138,7 @@ def by_mass_rule(
 
 
 def crossing_panels(results: ByRule) -> list[Section]:
-    """Table of the panels that pass through each other in motions or paths, if any do."""
+    """Table of panels that pass through each other in motions or paths; empty if none do."""
     rows, along = [], "time"
     for rule, result in results.items():
         if "crossing_panels" not in result:

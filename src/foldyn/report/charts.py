@@ -1,4 +1,4 @@
-"""Charts of a page, which its reader can point into: curves as numbers, drawn by the page."""
+"""Interactive charts of a page: curves as numbers, drawn by the page's script."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from foldyn.plots.charts import Chart
 
 @dataclass(frozen=True)
 class Charts:
-    """Charts beside each other, with a caption below them."""
+    """Charts side by side, with a caption below them."""
 
     charts: Sequence[Chart]
     caption: str = ""

@@ -1,4 +1,4 @@
-"""The page of a report: one HTML file that needs no other."""
+"""The page of a report: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def write_report(
     Returns
     -------
     pathlib.Path
-        The file written; nothing is written where a section is wrong.
+        The file written; nothing is written if a section is wrong.
 
     Raises
     ------
@@ -155,11 +155,11 @@ def report_html(title: str, sections: Iterable[Section | Stage]) -> str:
 
 
 def document(title: str, main: str, css: str, code: str, allowed: str = "") -> str:
-    """Text of a page with one style and one script.
+    """Text of an HTML page with one style and one script.
 
-    Its policy lets the browser take nothing but what is in the page.
+    Its content security policy allows the browser to load nothing from outside the page.
 
-    allowed : what more the policy allows, as "; connect-src 'self'".
+    allowed : additions to the policy, such as "; connect-src 'self'".
     """
     policy = (
         f"default-src 'none'; style-src {scripts.digest(css)}; "

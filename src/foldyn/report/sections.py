@@ -1,4 +1,4 @@
-"""What a report is made of: headings, text, tables and pictures, each written as HTML."""
+"""Sections of a report: headings, text, tables and pictures, each written as HTML."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from typing import Any
 from foldyn.errors import InputError
 from foldyn.report.charts import Charts
 
-_WIDE = 1200  # pixels; wider pictures are scrolled on a phone, as they would be too small to read
+_WIDE = 1200  # pixels; wider pictures scroll on a phone, where they would be too small to read
 
 
 @dataclass(frozen=True)
 class Heading:
-    """A heading of a part (level 2) or of what is in it (level 3).
+    """A heading of a part (level 2) or of a section within one (level 3).
 
     Headings of level 2 are listed at the top of the page.
     """
@@ -62,14 +62,14 @@ class Table:
     header : sequence of str
         Titles of the columns, with units.
     rows : sequence of sequences
-        Cells: text as it is, numbers to `digits` digits, None as an empty cell, True and False as
+        Cells: text unchanged, numbers to `digits` digits, None as an empty cell, True and False as
         yes and no.
     caption : str
         Written above the table.
     digits : int
         Significant digits of numbers that are not integers.
     sorts : bool
-        Whether a click on a title puts the rows in the order of its column.
+        Whether a click on a title sorts the rows by that column.
     """
 
     header: Sequence[str]
@@ -113,7 +113,7 @@ class Table:
     def _cell(self, value: Any) -> str:
         if value is None:
             return ""
-        if isinstance(value, bool) or type(value).__name__ == "bool":  # numpy's too
+        if isinstance(value, bool) or type(value).__name__ == "bool":  # including numpy's
             return "yes" if value else "no"
         if isinstance(value, Integral):
             return str(int(value))
@@ -124,7 +124,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Listing:
-    """A text as it is, such as an input file; it is shown when its title is clicked."""
+    """Verbatim text, such as an input file; a click on the title shows it."""
 
     title: str
     text: str
@@ -207,7 +207,7 @@ Section = Heading | Text | Table | Listing | Picture | Charts
 
 
 def rounded(value: float, digits: int) -> str:
-    """Write a number with some significant digits, with an exponent only where it is far from 1."""
+    """Write a number with some significant digits, with an exponent only if very small or large."""
     text = f"{value:.{digits}g}"
     if 1e-4 <= abs(value) < 1e6 and "e" in text:
         return f"{float(text):.0f}"
@@ -215,10 +215,10 @@ def rounded(value: float, digits: int) -> str:
 
 
 def _aligned(cells: Sequence[str]) -> list[str]:
-    """Cells of a column of numbers, whose points the page's style puts below each other.
+    """Table cells of a column of numbers, which the page's style aligns at the decimal point.
 
-    It needs to know what each lacks behind the point of what the longest has there: that is as wide
-    as the room that it leaves free. An exponent counts as what follows the point.
+    Each cell carries the characters that it lacks after the point compared with the longest number;
+    their width is the space left free. An exponent counts as characters after the point.
     """
     tails = [re.search(r"[.e].*", text) for text in cells]
     found = ["" if tail is None else tail[0] for tail in tails]
@@ -232,7 +232,7 @@ def _aligned(cells: Sequence[str]) -> list[str]:
 
 
 def cell(value: float) -> float | None:
-    """A number for a cell of a table; None, an empty cell, for what is not finite."""
+    """A number for a table cell; None, an empty cell, if it is not finite."""
     return float(value) if math.isfinite(value) else None
 
 
