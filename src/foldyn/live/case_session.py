@@ -1,4 +1,4 @@
-"""A case file whose numbers change: answers to what its page wishes."""
+"""The session of a case file in the viewer: numbers that change, and answers to requests."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ Message = dict[str, Any]
 
 
 class CaseSession:
-    """What the page of a case file asks for.
+    """Answers the requests of a case file's page.
 
     Parameters
     ----------
     path : Path
-        The file, which is read once; a case file that is wrong is refused.
+        The file, which is read once; an invalid case file is refused.
 
     Attributes
     ----------
     title : str
     about : dict
-        What the page must know: its "controls" and what it "offers" to compute.
+        Data for the page: its "controls", and the analyses that it "offers".
     """
 
     def __init__(self, path: Path) -> None:
@@ -47,15 +47,15 @@ class CaseSession:
         self._newest: Newest[Any, Message] = Newest(self._computed)
 
     def compute(self, wish: Any) -> Message:
-        """The stage for a wish {"numbers": ..., "compute": ...}, or why there is none.
+        """Answer a request {"numbers": ..., "compute": ...} with a stage, or with an error message.
 
-        "superseded" where a newer wish came before it was ready.
+        The answer is "superseded" if a newer request came before it was ready.
         """
         answer = self._newest.answer(wish)
         return {"superseded": True} if answer is None else answer
 
     def case_file(self, wish: Any) -> Message:
-        """Text of the case file with the numbers of a wish."""
+        """Text of the case file with the numbers of a request."""
         return told(self.path, lambda: {"text": tomli_w.dumps(self._document(wish))})
 
     def _document(self, wish: Any) -> dict[str, Any]:
@@ -85,12 +85,12 @@ class CaseSession:
 
 
 def told(path: Path, answer: Callable[[], Message]) -> Message:
-    """The answer of a function, or the message of its error without the path of the file."""
+    """Return a function's answer, or its error message without the path of the file."""
     try:
         return answer()
     except FoldynError as error:
         return {"error": str(error).removeprefix(f"{path}: ")}
     except MemoryError:
         return {"error": "this needs more memory than there is: take a smaller sheet"}
-    except Exception as error:  # a defect of ours: the page stays, and says so
+    except Exception as error:  # a defect of ours: the page stays open and reports it
         return {"error": f"this could not be computed ({type(error).__name__}: {error})"}

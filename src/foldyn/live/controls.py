@@ -1,4 +1,4 @@
-"""The numbers of a case file that a reader can change, and how far."""
+"""The numbers of a case file that a reader can change, and their ranges."""
 
 from __future__ import annotations
 
@@ -34,21 +34,21 @@ at most in all: it is to be computed anew for each picture."""
 
 @dataclass(frozen=True)
 class Control:
-    """A number that can be changed.
+    """A number that the reader can change.
 
     Attributes
     ----------
     place : tuple of str and int
-        Where it stands in the case file: ("pattern", "cells", 0).
+        Its place in the case file: ("pattern", "cells", 0).
     value : float
-        What the file says, or means where it says nothing.
+        The value in the file, or the default.
     low, high : float
-        Ends of its slider; a number that is typed may lie beyond.
+        Ends of its slider; a typed number may lie outside.
     unit : str
     counts : bool
         Whether it is a whole number.
     relative : bool
-        Whether the slider changes it by factors.
+        Whether the slider is logarithmic.
     """
 
     place: tuple[str | int, ...]
@@ -65,7 +65,7 @@ class Control:
         return dotted(self.place)
 
     def described(self) -> dict[str, Any]:
-        """What the page must know of it."""
+        """Description for the page."""
         return {
             "name": self.name, "group": self.place[0], "label": dotted(self.place[1:]),
             "value": self.value, "low": self.low, "high": self.high, "unit": self.unit,
@@ -74,9 +74,9 @@ class Control:
 
 
 def controls(document: Mapping[str, Any]) -> list[Control]:
-    """Numbers of [pattern], [sheet] and [damping] of a sound case file, in the order of their keys.
+    """Numbers of [pattern], [sheet] and [damping] of a valid case file, in the order of their keys.
 
-    Those that it leaves to their default are among them, others without a value are not.
+    Keys left at their default are included; keys without any value are not.
     """
     return [
         *_of_pattern(document["pattern"]),
@@ -88,13 +88,12 @@ def controls(document: Mapping[str, Any]) -> list[Control]:
 def changed(
     document: Mapping[str, Any], known: Sequence[Control], wanted: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """The case file with numbers by the names of their controls; others stay.
+    """Return the case file with new numbers for some controls; the others keep theirs.
 
     Raises
     ------
     InputError
-        No such control, no such number, or a pattern that is too large to be computed anew for
-        each picture.
+        No such control, not a valid number, or a pattern too large to recompute for each picture.
     """
     by_name = {control.name: control for control in known}
     given: dict[str, Any] = deepcopy(dict(document))
@@ -116,7 +115,7 @@ def changed(
 def _put(
     document: dict[str, Any], place: tuple[str | int, ...], value: float, known: Sequence[Control]
 ) -> None:
-    """Set a number, with its table or list where the file leaves these to their default."""
+    """Set a number, and create its table or list if the file leaves it at the default."""
     table: Any = document.setdefault(str(place[0]), {})
     *between, last = place[1:]
     for key in between:
@@ -149,7 +148,7 @@ def _of_pattern(table: Mapping[str, Any]) -> Iterator[Control]:
 
 
 def _counted(annotation: Any) -> bool:
-    """Whether an argument of a generator is whole: its annotation is text."""
+    """Whether a generator's argument is an integer; its annotation is a string."""
     return "int" in str(annotation)
 
 
@@ -178,7 +177,7 @@ def _of_damping(document: Mapping[str, Any]) -> Iterator[Control]:
 
 
 def _positive(place: tuple[str | int, ...], value: float, unit: str = "") -> Control:
-    """Control of a number above 0, which changes by factors; of others, such as 0, by steps."""
+    """A logarithmic control for a positive number, a linear one for others."""
     span = SPAN[str(place[0])]
     if value > 0.0:
         return Control(place, value, value / span, value * span, unit, relative=True)

@@ -1,4 +1,4 @@
-"""`view`: a result, case or pattern as an interactive page, in a notebook or as a file."""
+"""`view`: a result, case or pattern as an interactive page, in a notebook or a file."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class View:
         return write_report(path, self.title, [self.stage])
 
     def _repr_html_(self) -> str:
-        """The page in a frame that can neither reach the notebook nor load anything."""
+        """The page in a frame that can neither access the notebook nor load anything."""
         return (
             f'<iframe title="{escape(self.title)}" sandbox="allow-scripts allow-downloads" '
             f'style="width: 100%; height: {self.height}px; border: 0" '
@@ -85,10 +85,9 @@ def view(what: Any, title: str = "", *, height: int = HEIGHT) -> View:
     ----------
     what : Dataset, mapping of Datasets, CaseFile, Case, Structure, Shell, Folding or Pattern
         A motion, path, modes or frequency response; several of one kind by name, which play in
-        step; a case with its supports and loads, a structure or a pattern, at rest; or a pattern
-        on its way to the folded state.
+        step; a case with its supports and loads, a structure or a pattern, at rest; or a folding.
     title : str
-        Above the view; by default what is shown.
+        Title above the view; by default it names the object shown.
     height : int
         Of the frame in a notebook (pixels).
 
@@ -115,7 +114,7 @@ def view(what: Any, title: str = "", *, height: int = HEIGHT) -> View:
 
 
 def _maker(what: Any) -> tuple[str, Callable[[str], Stage]]:
-    """What something is called, and what makes its stage with a title."""
+    """Name of an object's kind, and the function that makes its stage from a title."""
     if isinstance(what, CaseFile):
         return what.heading, partial(rest_stage, what.case())
     if isinstance(what, Discretized):
@@ -131,12 +130,12 @@ def _maker(what: Any) -> tuple[str, Callable[[str], Stage]]:
 
 
 def check_results(results: Any) -> str:
-    """What results by name are, all of one kind.
+    """Return the common kind of results given by name.
 
     Raises
     ------
     InputError
-        No results, or of several kinds.
+        No results, or results of several kinds.
     """
     if not isinstance(results, Mapping) or not results:
         raise InputError(
@@ -158,7 +157,7 @@ def check_results(results: Any) -> str:
 
 
 def results_stage(results: Mapping[str, xr.Dataset], title: str) -> Stage:
-    """Stage of results of one kind by name, which carry their cases; foldings have none."""
+    """Stage of results of one kind by name, with their cases; foldings have none."""
     if next(iter(results.values())).attrs["foldyn_result"] == "folding":
         return stage(results, {}, title, [])
     cases = {name: case_of(result) for name, result in results.items()}

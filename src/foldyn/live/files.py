@@ -1,4 +1,4 @@
-"""Files in the viewer: a case file with sliders, results of one kind in step, or a pattern."""
+"""Files in the viewer: a case file with sliders, results of one kind side by side, or a pattern."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ MOST_FOLDED = 300
 
 
 def served(paths: Sequence[Path], port: int = 0) -> tuple[Server, str]:
-    """A server of files, not yet running, and the title of its page.
+    """Return a server of files, not yet running, and the title of its page.
 
     Parameters
     ----------
     paths : sequence of Path
         A case file, a pattern file, or results of one kind.
     port : int
-        0 takes any that is free.
+        0 takes any free port.
 
     Raises
     ------
@@ -67,8 +67,8 @@ def served(paths: Sequence[Path], port: int = 0) -> tuple[Server, str]:
 def live_page(title: str, about: Mapping[str, Any], key: str) -> str:
     """Text of the page.
 
-    about : what its script reads: "controls" and "offers".
-    key : what its requests carry.
+    about : data for its script: "controls" and "offers".
+    key : secret that its requests carry.
     """
     told = scripts.in_page({**about, "key": key})
     main = (
@@ -81,7 +81,7 @@ def live_page(title: str, about: Mapping[str, Any], key: str) -> str:
 
 
 def _results(paths: Sequence[Path]) -> View:
-    """Results by the names of their files, or of their folders where these are the same."""
+    """Results named after their files, or with the folder's name if file names repeat."""
     stems = [path.stem for path in paths]
     if len(set(stems)) < len(stems):
         stems = [f"{path.absolute().parent.name}/{path.stem}" for path in paths]
@@ -93,19 +93,19 @@ def _results(paths: Sequence[Path]) -> View:
 
 
 def _pattern(path: Path) -> View:
-    """A pattern on its way to its fold angles, or as it is where it has none or does not fold."""
+    """A pattern as it folds to its fold angles, or at rest if it has none or does not fold."""
     pattern = read_pattern(path)
     return View(path.stem, folded_stage(pattern, path.stem))
 
 
 def folded_stage(pattern: Pattern, title: str) -> Stage:
-    """Stage of a pattern: on its way to its own fold angles, if that is quick."""
+    """Stage of a pattern as it folds to its own fold angles if that is quick, otherwise at rest."""
     wanted = pattern.fold_angles
     given = np.isfinite(wanted)
     moves = given.any() and float(np.abs(wanted - fold_angles(pattern))[given].max()) > 1e-6
     if moves and len(pattern.faces) <= MOST_FOLDED:
         try:
-            with warnings.catch_warnings():  # what does not fold is for `foldyn fold` to say
+            with warnings.catch_warnings():  # `foldyn fold` reports failures to fold
                 warnings.simplefilter("ignore", FoldynWarning)
                 return results_stage({title: fold(pattern).path}, title)
         except FoldynError:

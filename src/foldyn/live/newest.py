@@ -1,4 +1,4 @@
-"""One worker for many askers, of whom only the newest gets an answer."""
+"""A single worker thread that answers only the newest request."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ Answer = TypeVar("Answer")
 
 
 class Newest(Generic[Wish, Answer]):
-    """A thread that computes the newest wish.
+    """A thread that computes the newest request.
 
-    There is no queue: a wish that has not begun is forgotten when another one comes, and what is
-    being computed then is dropped when it is ready.
+    There is no queue: a newer request replaces one that has not begun, and discards the result of
+    one being computed.
 
     Parameters
     ----------
     compute : callable
-        Gives the answer to a wish; it runs in the one thread alone and raises nothing.
+        Returns the answer to a request; it runs only in this thread and raises nothing.
     """
 
     def __init__(self, compute: Callable[[Wish], Answer]) -> None:
@@ -33,7 +33,7 @@ class Newest(Generic[Wish, Answer]):
         threading.Thread(target=run, args=(self._work,), name="newest wish", daemon=True).start()
 
     def answer(self, wish: Wish) -> Answer | None:
-        """Wait for the answer to a wish; None as soon as a newer one has come."""
+        """Wait for the answer to a request; None as soon as a newer one arrives."""
         with self._changed:
             self._count += 1
             mine = self._count

@@ -1,8 +1,8 @@
-"""The viewer's server: one page for the browser of this machine, and answers to it alone.
+"""The viewer's server: one page, and answers, for browsers on this machine only.
 
-It listens on 127.0.0.1, knows two paths, reads no file that a request names, and answers only what
-names this host and carries the key of this run: pages of other origins, and other users of the
-machine, know neither.
+It listens on 127.0.0.1, serves two paths, and reads no file named by a request. It answers only
+requests that name this host and carry the key of this run, which pages of other origins and other
+users of the machine do not know.
 """
 
 from __future__ import annotations
@@ -42,17 +42,17 @@ Answer = Callable[[Any], dict[str, Any]]
 
 
 class Server(ThreadingHTTPServer):
-    """A server of one page.
+    """A server of a single page.
 
     Parameters
     ----------
     page : callable
-        Text of the page, from the key that its requests carry.
+        Returns the text of the page, given the key that its requests carry.
     answers : mapping of callables, optional
-        Tables that answer tables, by the path of the request: {"/compute": ...}. They are called
-        in threads of their own, and raise nothing.
+        Functions from a table to a table, by the path of the request: {"/compute": ...}. They run
+        in their own threads and raise nothing.
     port : int
-        0 takes any that is free.
+        0 takes any free port.
 
     Raises
     ------
@@ -62,7 +62,7 @@ class Server(ThreadingHTTPServer):
     Attributes
     ----------
     key : str
-        Drawn anew for each server.
+        Random, new for each server.
     """
 
     daemon_threads = True
@@ -81,21 +81,21 @@ class Server(ThreadingHTTPServer):
 
     @property
     def address(self) -> str:
-        """Where the page is; whoever knows this may see it."""
+        """Address of the page; whoever knows it may see the page."""
         return f"http://{HOST}:{self.server_port}/{self.key}"
 
     @property
     def hosts(self) -> tuple[str, ...]:
-        """What a request may call this host: no name that another machine can point here."""
+        """Names of this host that a request may use; no other machine can redirect them here."""
         return tuple(f"{name}:{self.server_port}" for name in (HOST, "localhost"))
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Give a connection its thread, or refuse it where as many as there may be are open."""
+        """Serve a connection in a thread, or refuse it if too many are open."""
         if not self._free.acquire(blocking=False):
             with suppress(OSError):
                 request.settimeout(0.0)
                 request.sendall(TOO_MANY)
-                request.recv(MOST_BYTES)  # what is left unread would take the answer back
+                request.recv(MOST_BYTES)  # unread data would lose the answer
             self.shutdown_request(request)
             return
         super().process_request(request, client_address)
@@ -108,7 +108,7 @@ class Server(ThreadingHTTPServer):
             self._free.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing of browsers that go before they are answered."""
+        """Ignore browsers that close the connection before they are answered."""
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -122,7 +122,7 @@ class _Handler(BaseHTTPRequestHandler):
     disable_nagle_algorithm = True
 
     def do_GET(self) -> None:
-        """Give the page."""
+        """Send the page."""
         if self._is_foreign():
             return
         if not self._is_key(self.path.partition("?")[0].removeprefix("/")):
@@ -131,7 +131,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(HTTPStatus.OK, "text/html; charset=utf-8", self.server.page)
 
     def do_POST(self) -> None:
-        """Answer a table with a table."""
+        """Answer a JSON table with a JSON table."""
         if self._is_foreign():
             return
         if not self._is_key(self.headers.get(KEY_HEADER, "")):
@@ -162,7 +162,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Log nothing."""
 
     def _is_foreign(self) -> bool:
-        """Whether a request names another host or comes from another origin; it is refused then."""
+        """Whether a request names another host or comes from another origin; if so, refuse it."""
         origin = self.headers.get("Origin")
         known = [f"http://{host}" for host in self.server.hosts]
         if self.headers.get("Host") in self.server.hosts and origin in (None, *known):
@@ -174,7 +174,7 @@ class _Handler(BaseHTTPRequestHandler):
         return hmac.compare_digest(given.encode(), self.server.key.encode())
 
     def _refuse(self, status: HTTPStatus, why: str) -> None:
-        self.close_connection = True  # the body may still be on its way
+        self.close_connection = True  # the request's body may still be arriving
         self._send(status, "text/plain; charset=utf-8", f"{why}\n".encode())
 
     def _send(self, status: HTTPStatus, kind: str, content: bytes) -> None:

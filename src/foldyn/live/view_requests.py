@@ -1,4 +1,4 @@
-"""Requests of the viewer: a case file's own analysis, or a quick one of another kind."""
+"""Requests of the viewer: the case file's own analysis, or a quick one of another kind."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ Document = dict[str, Any]
 
 
 def offered(document: Document) -> dict[str, str]:
-    """What can be computed of a case file: its own kind first."""
+    """Kinds of analysis that a case file allows, its own first."""
     own = document["analysis"]["kind"]
     driven = any("force" in load for load in document.get("loads", ())) or "drive" in document
     imposed = any("displacement" in support for support in document.get("supports", ()))
@@ -51,20 +51,20 @@ def offered(document: Document) -> dict[str, str]:
         "frf": driven or based,
         "statics": bool(document.get("loads")) or (imposed and not based),
         "dynamics": bool(document.get("loads")) or imposed or based,
-        "bands": False,  # of files of this kind alone: few patterns repeat
-        "response": False,  # as above: curves take seconds or more
+        "bands": False,  # only for files of this kind: few patterns repeat
+        "response": False,  # likewise: curves take seconds or more
     }
     kinds = [kind for kind in KINDS if kind == own or possible[kind]]
     return {kind: KINDS[kind] for kind in sorted(kinds, key=lambda kind: kind != own)}
 
 
 def computed(path: Path, document: Document, kind: str) -> tuple[CaseFile, xr.Dataset]:
-    """The case file as one of a kind, and its result with its first mass rule.
+    """Return the case file as one of a kind, and its result under its first mass rule.
 
     Raises
     ------
     InputError, ComputationError
-        As `CaseFile.run`; the file does not offer this kind.
+        As in `CaseFile.run`, or the file does not allow this kind.
     """
     choice("compute", kind, offered(document))
     case_file = case_of_document(path, _as_kind(path, document, kind))
@@ -86,7 +86,7 @@ def computed(path: Path, document: Document, kind: str) -> tuple[CaseFile, xr.Da
 
 
 def _curve_of_motions(case_file: CaseFile) -> xr.Dataset:
-    """The response curve, of a big sheet in the span of few modes."""
+    """Response curve; of a large sheet it is reduced to a few modes."""
     free = len(case_file.case().free_dofs)
     if free <= MOST_FREE or case_file.analysis.arguments.get("modes"):
         return case_file.run()
@@ -99,14 +99,14 @@ def _curve_of_motions(case_file: CaseFile) -> xr.Dataset:
 
 
 def _as_kind(path: Path, document: Document, kind: str) -> Document:
-    """The document as one of a kind, quick to compute where the file is of another."""
-    if document["analysis"]["kind"] == kind == "bands":  # one state: sliders make the others
+    """Convert the document to a kind; if it is not its own, with settings that compute quickly."""
+    if document["analysis"]["kind"] == kind == "bands":  # a single state: sliders vary it
         analysis = {k: value for k, value in document["analysis"].items() if k != "vary"}
         return {**document, "analysis": analysis}
     if document["analysis"]["kind"] == kind:
         return document
     make = {"modes": _modes, "frf": _response, "statics": _curve, "dynamics": _motion}[kind]
-    with warnings.catch_warnings():  # what has no place there is left out, as `offered` says
+    with warnings.catch_warnings():  # settings without meaning for this kind are left out
         warnings.simplefilter("ignore", FoldynWarning)
         return make(path, document)
 
@@ -116,7 +116,7 @@ def _modes(path: Path, document: Document) -> Document:
 
 
 def _response(path: Path, document: Document) -> Document:
-    """As the file drives it, about all of its lowest modes."""
+    """Frequency response under the file's drive, over its lowest modes."""
     lowest = _frequencies(path, document)
     out = converted(path, document, "frf", "rest")
     range_ = {"first": 0.3 * lowest[0], "last": 1.2 * lowest[-1], "count": FREQUENCIES}
@@ -124,7 +124,7 @@ def _response(path: Path, document: Document) -> Document:
 
 
 def _curve(_: Path, document: Document) -> Document:
-    """Under the same loads without their histories, on a base at rest."""
+    """Equilibrium path under the same loads without histories, with the base at rest."""
     timeless = {
         name: [
             {key: value for key, value in each.items() if key != "history"}
@@ -141,7 +141,7 @@ def _curve(_: Path, document: Document) -> Document:
 
 
 def _motion(path: Path, document: Document) -> Document:
-    """Under loads and supports as they are: those without a history act from the start."""
+    """Motion under the file's loads and supports; loads without a history act from the start."""
     duration = PERIODS / float(_frequencies(path, document)[0])
     steps = {"method": "generalized_alpha", "dt": duration / (SAMPLES * STEPS_A_SAMPLE)}
     shown = _kept(document)
@@ -153,14 +153,14 @@ def _motion(path: Path, document: Document) -> Document:
 
 
 def _kept(document: Document) -> Document:
-    """What all kinds of analysis share, and the nodes that are shown."""
+    """Sections shared by all kinds of analysis, and the nodes to show."""
     own = {key: value for key, value in document.items() if key not in ("drive", "initial")}
     nodes = document.get("output", {}).get("nodes")
     return {**own, "output": {} if nodes is None else {"nodes": nodes}}
 
 
 def _frequencies(path: Path, document: Document) -> NDArray[np.float64]:
-    """The lowest natural frequencies (Hz) above 0."""
+    """Lowest natural frequencies (Hz) above 0."""
     about = {**_modes(path, document), "analysis": {"kind": "modes", "count": COUNT}}
     found = case_of_document(path, about).run()
     values = found["frequency"].values[~found["rigid"].values]
