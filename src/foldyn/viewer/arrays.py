@@ -1,11 +1,11 @@
-"""Arrays inside a page: whole numbers, their differences over time, deflated.
+"""Arrays in a page: quantized to integers, differenced over time, deflated.
 
-What changes over time is stored as a sum of a few shapes times their histories (a singular value
-decomposition, "proper orthogonal decomposition" in the literature of motions): a page with 20
-shapes of a motion has all of its samples at every node in the space of some pictures. Histories
-change little from sample to sample, so that differences of their rounded values pack well: once or
-twice, whichever is smaller. Bytes of equal weight stand together. The page's `data.js` undoes all
-of this.
+Values over time are stored as a sum of a few shapes times their histories (a singular value
+decomposition; "proper orthogonal decomposition" in the literature of motions). A page with 20
+shapes holds all samples of a motion at every node in the space of some pictures. Histories change
+little from sample to sample, so first or second differences of the rounded values, whichever pack
+smaller, compress well. Bytes of equal significance are grouped. The page's `data.js` decodes all of
+this.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Arrays:
     Attributes
     ----------
     about : dict
-        What the page must know of each: "type", "shape", "differences" and "step".
+        Metadata of each array for the page: "type", "shape", "differences" and "step".
     packed : dict of bytes
         Their content, deflated.
     """
@@ -41,14 +41,14 @@ class Arrays:
     packed: dict[str, bytes] = field(default_factory=dict)
 
     def exact(self, name: str, values: ArrayLike, kind: str) -> str:
-        """Add an array of numbers of a kind, such as "f4" or "u4"; return its name."""
+        """Add an array in a type such as "f4" or "u4"; return its name."""
         return self._add(name, np.asarray(values).astype(kind))
 
     def changing(self, name: str, values: NDArray, tolerance: float) -> dict[str, Any]:
-        """Add values (t, ...) over time, to within a tolerance of their largest; say what they are.
+        """Add values (t, ...) over time, to a relative tolerance; return their description.
 
-        Either "shapes" and "histories", whose product they are, or the "values" themselves where
-        that takes less room.
+        Either "shapes" and "histories", whose product they are, or the "values" if these take less
+        space.
         """
         flat = np.nan_to_num(np.asarray(values, float).reshape(len(values), -1))
         about: dict[str, Any] = {"shape": list(np.shape(values))}
@@ -64,11 +64,11 @@ class Arrays:
         }
 
     def texts(self) -> dict[str, str]:
-        """Their content in letters (base64), by name."""
+        """Base64 text of the arrays, by name."""
         return {name: base64.b64encode(each).decode() for name, each in self.packed.items()}
 
     def html(self, key: str) -> str:
-        """All of them as elements of a page that browsers do not show, named key.name."""
+        """HTML elements that hold the arrays, hidden by browsers, named key.name."""
         return "\n".join(
             f'<script type="text/plain" data-array="{key}.{name}">{text}</script>'
             for name, text in self.texts().items()
@@ -90,12 +90,12 @@ class Arrays:
 
 
 def factors(values: NDArray, error: float) -> tuple[NDArray, NDArray, NDArray]:
-    """Histories (t, r), shapes (r, m) and sizes (r,) whose sum of products is near values (t, m).
+    """Factor values (t, m) into histories (t, r), shapes (r, m) and sizes (r,).
 
-    Whole numbers of 16 bits, those of small parts being small, as all have about the same absolute
-    accuracy.
+    Both are 16-bit integers. All parts have about the same absolute accuracy, so small parts have
+    small integers.
 
-    error : the largest that is allowed.
+    error : largest error allowed.
     """
     left, size, right = np.linalg.svd(values, full_matrices=False)
     reach = np.abs(right).max(axis=1, initial=1e-300)
@@ -115,7 +115,7 @@ def factors(values: NDArray, error: float) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def _differences(values: NDArray, passes: int) -> NDArray:
-    """Differences from sample to sample, which wrap around as the page's sums do."""
+    """Differences from sample to sample, with integer wrap-around like the page's sums."""
     for _ in range(passes):
         after = values.copy()
         after[1:] -= values[:-1]
@@ -124,7 +124,7 @@ def _differences(values: NDArray, passes: int) -> NDArray:
 
 
 def _deflated(values: NDArray) -> bytes:
-    """Columns over time one after the other, their bytes of equal weight together, deflated."""
+    """Deflate columns over time one after the other, with bytes of equal significance grouped."""
     columns = values.reshape(len(values), -1).T if values.ndim > 1 else values
     whole = np.ascontiguousarray(columns).reshape(-1)
     weights = whole.view(np.uint8).reshape(-1, whole.itemsize).T

@@ -1,4 +1,4 @@
-"""Photographs under a sheet, taken by a camera that the page draws it with."""
+"""Photographs behind a sheet, and the camera that took them."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _TYPES = {b"\xff\xd8\xff": "jpeg", b"\x89PNG": "png"}
 
 @dataclass(frozen=True, eq=False)
 class Backdrop:
-    """Photographs of a specimen, and where their camera sees a point of the model.
+    """Photographs of a specimen, and the projection of their camera.
 
     Parameters
     ----------
     pictures : mapping of float to bytes
-        The files (JPEG or PNG) by the moment at which they were taken: s in a motion, the place
-        along the way in a path. The page shows the last one that is not after its moment.
+        The files (JPEG or PNG) by the moment they were taken: s in a motion, the position along a
+        path. The page shows the latest one up to its own moment.
     size : tuple of int
         Their width and height (pixels).
     matrix : ndarray, shape (3, 4)
@@ -33,7 +33,7 @@ class Backdrop:
     Raises
     ------
     InputError
-        No pictures or others, or a matrix of another shape.
+        No pictures, pictures of another type, or a matrix of another shape.
     """
 
     pictures: Mapping[float, bytes]
@@ -52,7 +52,7 @@ class Backdrop:
             )
 
     def about(self) -> dict[str, Any]:
-        """What the page reads."""
+        """Data for the page."""
         return {
             "size": list(self.size),
             "matrix": np.asarray(self.matrix, float).tolist(),
@@ -63,15 +63,15 @@ class Backdrop:
 
 
 def projection(points: NDArray, pixels: NDArray) -> NDArray:
-    """Matrix (3, 4) of a camera that sees points (k, 3), m, at pixels (k, 2), k >= 6.
+    """Camera matrix (3, 4) from points (k, 3), m, seen at pixels (k, 2), k >= 6.
 
-    The least squares of the direct linear transformation (Hartley and Zisserman, Multiple View
+    Least-squares solution of the direct linear transformation (Hartley and Zisserman, Multiple View
     Geometry, 2004, section 7.1), with both sets centered and scaled.
 
     Raises
     ------
     InputError
-        Fewer points, or points in one plane, which leave the camera open.
+        Fewer points, or coplanar points, which do not determine the camera.
     """
     points, pixels = np.asarray(points, float), np.asarray(pixels, float)
     if len(points) < 6 or points.shape[1:] != (3,) or pixels.shape != (len(points), 2):
@@ -93,7 +93,7 @@ def projection(points: NDArray, pixels: NDArray) -> NDArray:
 
 
 def _normed(values: NDArray) -> NDArray:
-    """Matrix that moves homogeneous values to their mean and makes their spread 1."""
+    """Matrix that moves homogeneous points to zero mean and scales their spread to 1."""
     count = values.shape[1]
     out = np.eye(count + 1)
     out[:count, :count] /= float(values.std()) or 1.0

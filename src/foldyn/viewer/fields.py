@@ -1,4 +1,4 @@
-"""Values that color a sheet on a page, at all samples of a motion or path."""
+"""Fields that color a sheet on a page, at all samples of a motion or path."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from foldyn.viewer.states import (
 
 
 class Field(NamedTuple):
-    """Values (samples, elements) with what a legend says of them.
+    """Values (samples, elements) with texts for the legend.
 
     on : "node", "panel", "crease" or "bar".
     signed : whether both signs occur.
@@ -37,10 +37,10 @@ class Field(NamedTuple):
 def fields(case: Case, result: Any, displacement: NDArray) -> dict[str, Field]:
     """Fields of a motion or path with displacements (samples, n, 3), by name.
 
-    What displacements do not tell is left out: moments and energies where laws have memory, and
-    turns as well where panels give way beside such creases or, in motions, beside damped ones, or
-    find no balance.
-    Speeds are not among them: the page takes them from displacements.
+    Fields that displacements do not determine are left out: moments and energies if laws have
+    memory, and also crease angles if panels yield next to such creases or, in motions, next to
+    damped ones, or reach no equilibrium. Speeds are not included: the page computes them from
+    displacements.
     """
     structure, out = case.structure, {}
     if CONTACT_FORCE in result:
@@ -52,7 +52,7 @@ def fields(case: Case, result: Any, displacement: NDArray) -> dict[str, Field]:
         return out
     try:
         found = states(case, result, displacement)
-    except ComputationError:  # a motion that has exploded: its panels balance no more
+    except ComputationError:  # a motion that has diverged: its panels no longer reach equilibrium
         return out
     turn = np.degrees(found.turn)
     out["turn"] = Field("turn of creases from rest", "°", "crease", turn, True)
@@ -64,7 +64,7 @@ def fields(case: Case, result: Any, displacement: NDArray) -> dict[str, Field]:
 
 
 def folding_fields(case: Case, displacement: NDArray, fold_angle: NDArray) -> dict[str, Field]:
-    """Fields of a folding by name, which has fold angles (samples, nc), rad, and no sheet."""
+    """Fields of a folding by name: fold angles (samples, nc), rad; it has no sheet."""
     angle = np.degrees(fold_angle)
     return {
         "bar_strain": _strain_field(bar_strain(case.structure, displacement)),
@@ -77,7 +77,7 @@ def _strain_field(strain: NDArray) -> Field:
 
 
 def energies(case: Case, result: Any) -> dict[str, NDArray]:
-    """Energies of a result (samples), J, by what they are, those that it has."""
+    """Energies of a result (samples), J, by name, as far as it has them."""
     names = {"kinetic": "kinetic", **case.energy_groups, "dissipated": "dissipated"}
     names |= {"air": "lost to the air", "work": "work"}
     return {

@@ -20,7 +20,7 @@ SAMPLES = 64
 
 
 def orbits(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
-    """Description of the motions of one result, whose arrays get names that begin with key.
+    """Describe the motions of one result; its arrays get names that begin with key.
 
     "x" and "y" (point), what varies and the amplitude; "sizes" (point), the largest displacement in
     a period, m; "displacement", a_0, a_1, b_1, a_2, ... (point, coefficient) of every node and
@@ -49,12 +49,12 @@ def orbits(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
 
 
 def _listed(result: xr.Dataset, name: str, otherwise: list[Any]) -> list[Any]:
-    """Values over the points, which a backbone lacks."""
+    """Values over the points, or an empty list for a backbone, which lacks them."""
     return result[name].values.tolist() if name in result else otherwise
 
 
 def points(result: xr.Dataset) -> NDArray[np.int64]:
-    """Numbers of the points that a page shows."""
+    """Numbers of the points shown on a page."""
     count = result.sizes["point"]
     every = -(-2 * result["coefficient"].size // MOST_NUMBERS)
     kept = np.arange(count) % every == 0
@@ -67,18 +67,18 @@ def points(result: xr.Dataset) -> NDArray[np.int64]:
 
 
 def largest(amplitudes: NDArray) -> float:
-    """Largest displacement of any node in a period, of amplitudes (h + 1, n, 3) of exp(i k tau)."""
+    """Largest displacement of any node in a period; amplitudes (h + 1, n, 3) of exp(i k tau)."""
     phase = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
     return float(np.linalg.norm(values_of(amplitudes, phase), axis=-1).max())
 
 
 def along(result: xr.Dataset) -> str:
-    """Name of what varies."""
+    """Name of the varied quantity."""
     return "level" if result.attrs.get("by") == "amplitudes" else "frequency"
 
 
 def about_orbits(result: xr.Dataset) -> dict[str, Any]:
-    """What all results of a page share: the names of the axes of the curve."""
+    """Description shared by all results of a page: the axis names of the curve."""
     driven = "by" in result.attrs
     label = {"frequency": "frequency of the drive (Hz)", "level": "factor on the drive"}
     measure = result.attrs.get("measure", "largest displacement")

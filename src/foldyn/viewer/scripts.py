@@ -1,4 +1,4 @@
-"""The page's script and style: our modules, joined, behind the chart library."""
+"""The page's script and style: our modules, joined, after the chart library."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _text(name: str) -> str:
 
 
 def _module(name: str) -> str:
-    """A module as a function that is called at once, with names of its own."""
+    """Wrap a module in a function called at once, so that it has its own names."""
     text = _text(f"static/{name}.js")
     names = ", ".join(found[1] for found in _EXPORT.findall(text))
     body = _EXPORT.sub(r"\1", _IMPORT.sub(r"const \1 = modules.\2;\n", text))
@@ -35,32 +35,32 @@ def _module(name: str) -> str:
 
 
 def _joined(names: Iterable[str], begin: str) -> str:
-    """Modules as one text, and what begins."""
+    """Join modules and the call that starts them."""
     own = "\n".join(['"use strict";', "const modules = {};", *map(_module, names)])
     return f"(() => {{\n{own}\n{begin}\n}})();"
 
 
 @cache
 def script_of_tables() -> str:
-    """Text of the script for a document whose tables alone are interactive."""
+    """Script of a document with only interactive tables."""
     return _joined(["tables"], "modules.tables.openTables();")
 
 
 @cache
 def script() -> str:
-    """Text of the script, which draws all interactive parts of the document that holds it."""
+    """Script of a document with all interactive parts."""
     begin = "modules.page.openPages();\nmodules.plots.openPlots();\nmodules.tables.openTables();"
     return _with_charts(MODULES, begin)
 
 
 @cache
 def script_of_live() -> str:
-    """Text of the script of a page whose results are computed as its reader wishes."""
+    """Script of a live page, whose results are computed on request."""
     return _with_charts((*MODULES, "live"), "modules.live.openLive();")
 
 
 def _with_charts(names: Iterable[str], begin: str) -> str:
-    """Modules behind the chart library."""
+    """Modules after the chart library."""
     charts = _text("third_party/uplot/uPlot.iife.min.js")
     notice = "/* uPlot 1.6.32, (c) 2022 Leon Sorokin, MIT licence: github.com/leeoniya/uPlot */"
     return f"{notice}\n{charts}\n{_joined(names, begin)}"
@@ -68,16 +68,16 @@ def _with_charts(names: Iterable[str], begin: str) -> str:
 
 @cache
 def style(*more: str) -> str:
-    """Text of the style, and of more styles by name."""
+    """Style, with further styles by name."""
     own = [_text(f"static/{name}.css") for name in ("page", *more)]
     return "\n".join([_text("third_party/uplot/uPlot.min.css"), *own])
 
 
 def in_page(value: Any) -> str:
-    """JSON for a script element: no text in it can end the element, or open a comment."""
+    """JSON for a script element: no text in it can end the element or open a comment."""
     return json.dumps(value).replace("<", "\\u003c")
 
 
 def digest(text: str) -> str:
-    """What a content security policy calls a script or style with this text."""
+    """Digest of a script or style for a content security policy."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

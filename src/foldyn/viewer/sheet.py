@@ -1,4 +1,4 @@
-"""A sheet and what acts on it, as a page draws them."""
+"""A sheet with its supports and loads, as a page draws them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ KINDS = "MVFUB"
 
 
 def sheet(arrays: Arrays, key: str, case: Case) -> dict[str, Any]:
-    """Description of a case's sheet at rest, whose arrays are added with names that begin with key.
+    """Describe a case's sheet at rest; its arrays get names that begin with key.
 
     "nodes" (n, 3), m; "triangles" (t, 3) and the "panel" of each; "edges" (k, 2), pieces of the
     pattern's edges, with their "kind", the "crease" they belong to and how far "along" it they
@@ -33,14 +33,14 @@ def sheet(arrays: Arrays, key: str, case: Case) -> dict[str, Any]:
 
 
 def bare_sheet(arrays: Arrays, key: str, pattern: Pattern) -> dict[str, Any]:
-    """The same of a pattern, whose nodes are its vertices."""
+    """Describe a pattern, whose nodes are its vertices, in the same way."""
     return _surface(arrays, key, pattern, n4b5(pattern), pattern.lines) | {"held": [], "loads": []}
 
 
 def _surface(
     arrays: Arrays, key: str, pattern: Pattern, mesh: Discretized | Mesh, edge_nodes: NDArray
 ) -> dict[str, Any]:
-    """The triangles of a sheet and its edges."""
+    """Describe the triangles and edges of a sheet."""
     pairs, kind, edge, along = edge_pieces(pattern, mesh.nodes, edge_nodes)
     return {
         "nodes": arrays.exact(f"{key}.nodes", mesh.nodes, "f4"),
@@ -58,7 +58,7 @@ def _surface(
 def edge_pieces(
     pattern: Pattern, nodes: NDArray, edge_nodes: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Pieces (k, 2) of the pattern's edges, the kind of each, its edge, and its ends along it.
+    """Pieces (k, 2) of the pattern's edges; kind, edge and ends along the edge of each.
 
     Welds are left out.
     """
@@ -73,14 +73,14 @@ def edge_pieces(
 
 
 def held(case: Case) -> list[list[Any]]:
-    """Nodes that supports hold or move, with their axes: [[4, "xz"], ...]."""
+    """Nodes held or moved by supports, with their axes: [[4, "xz"], ...]."""
     fixed = np.asarray(case.fixed).reshape(-1, 3)
     axes = np.array(["x", "y", "z"])
     return [[int(node), "".join(axes[fixed[node]])] for node in np.flatnonzero(fixed.any(axis=1))]
 
 
 def load_arrows(case: Case) -> list[list[Any]]:
-    """Nodes with forces, and these over the largest: [[7, [1.0, 0.0, 0.0]], ...]; not gravity."""
+    """Nodes with forces, relative to the largest: [[7, [1.0, 0.0, 0.0]], ...]; no gravity."""
     forces = np.zeros_like(case.structure.nodes)
     for vectors, _ in case.force_terms:
         forces += vectors

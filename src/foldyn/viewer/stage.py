@@ -1,4 +1,4 @@
-"""`Stage`: the interactive part of a page, which shows results of each kind or a sheet at rest."""
+"""`Stage`: the interactive part of a page, which shows results of one kind or a sheet at rest."""
 
 from __future__ import annotations
 
@@ -50,20 +50,20 @@ class Stage:
     Parameters
     ----------
     about : mapping
-        What the page's script reads; see `stage`.
+        Data for the page's script; see `stage`.
     arrays : Arrays
-        The arrays that it names.
+        The arrays that `about` names.
     """
 
     about: Mapping[str, Any]
     arrays: Arrays
 
     def whole(self) -> dict[str, Any]:
-        """What the page's script reads, with what it must know of the arrays."""
+        """Data for the page's script, with the description of the arrays."""
         return {**self.about, "arrays": self.arrays.about}
 
     def html(self, key: str = "stage") -> str:
-        """Write as HTML, with names that begin with a key; the page must have the script."""
+        """Write as HTML with element names that begin with a key; the page must have the script."""
         about = in_page(self.whole())
         return (
             f'<div class="foldyn" data-foldyn="{key}">'
@@ -77,10 +77,10 @@ def stage(
     results: Results, cases: Mapping[str, Case], title: str, nodes: list[int],
     backdrop: Backdrop | None = None,
 ) -> Stage:  # fmt: skip
-    """Show results of one kind, by name: motions, paths, modes, bands, and what else moves.
+    """Show results of one kind by name: motions, paths, modes, bands or others that move.
 
-    cases : of the results but for foldings, which have none.
-    nodes : those to begin with; the first is chosen.
+    cases : cases of the results; foldings have none.
+    nodes : nodes listed at the start; the first is selected.
     backdrop : photographs under the sheets.
     """
     arrays, sheets, listed = Arrays(), {}, []
@@ -88,7 +88,7 @@ def stage(
     node = None if kind in ("modes", "bands") or not nodes else nodes[0]
     about = {"title": title, "kind": kind, "version": __version__, "node": node}
     keys: dict[int, str] = {}
-    with one_thread():  # small matrices
+    with one_thread():  # its matrices are small
         for name, result in results.items():
             case = folding_case(result) if kind == "folding" else cases[name]
             key = keys.setdefault(id(case.structure.pattern), f"s{len(keys)}")
@@ -97,7 +97,7 @@ def stage(
             own = {"name": name, "sheet": key, "alone": len(results) == 1}
             listed += _LISTED[kind](arrays, f"r{len(listed)}", case, result, own)
     about |= {"sheets": sheets, "results": listed, **_more(kind, results, cases, nodes)}
-    if listed and "way" in listed[0]:  # along which supports move
+    if listed and "way" in listed[0]:  # axes along which supports move
         about["axis"] = "xyz".index(listed[0]["way"][-1])
     if backdrop:
         about["backdrop"] = backdrop.about()
@@ -160,7 +160,7 @@ def _path(
         stable[[start, stop]] &= good
     about = _changing(arrays, key, case, result, u, way(result))
     about["load"] = arrays.exact(f"{key}.load", result["load_factor"].values, "f4")
-    if (moved := moved_supports(case)) is not None:  # the load factor is their displacement
+    if (moved := moved_supports(case)) is not None:  # the load factor is the supports' displacement
         force = total_reaction(result, moved[0], direction=moved[1])
         about |= {"way": moved[1], "force": arrays.exact(f"{key}.force", force, "f4")}
     return [own | about | {"stable": stable.tolist()}]
@@ -179,7 +179,7 @@ def _changing(
     arrays: Arrays, key: str, case: Case, result: xr.Dataset,
     u: NDArray, moments: NDArray, own_fields: Mapping[str, Field] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """What motions, paths and foldings have in common."""
+    """Shared description of motions, paths and foldings."""
     error = allowed(case.structure.pattern.size, float(np.abs(u).max(initial=0.0)))
     return {
         "displacement": arrays.changing(f"{key}.u", u, error),
@@ -200,7 +200,7 @@ def _changing(
 
 
 def allowed(size: float, largest: float) -> float:
-    """Error of displacements over the largest of them, of a sheet of some size (m)."""
+    """Allowed error of displacements relative to the largest, for a sheet of some size (m)."""
     return min(OF_LARGEST, OF_SIZE * size / (largest or 1.0))
 
 
@@ -216,7 +216,7 @@ def _modes(
             "name": f"{k + 1}" if own["alone"] else f"{own['name']} {k + 1}",
             "of": own["name"],
             "number": k + 1,
-            "frequency": frequency if np.isfinite(frequency) else None,  # none where unstable
+            "frequency": frequency if np.isfinite(frequency) else None,  # nan if unstable
             "damping": damping if np.isfinite(damping) else None,
             "what": str(words.name.values[k]),
             "displacement": arrays.changing(f"{key}.{k}", shapes[k : k + 1], OF_LARGEST),
@@ -258,7 +258,7 @@ _LISTED: Mapping[str, Callable[..., list[dict[str, Any]]]] = {
 
 
 def _moved(kind: str, result: xr.Dataset) -> str:
-    """Name of what says how nodes move."""
+    """Name of the variable that describes how nodes move."""
     if kind == "response":
         return _measured(result)
     return "coefficient" if kind == "periodic" else "displacement"
@@ -272,7 +272,7 @@ def _measured(result: xr.Dataset) -> str:
 def _more(
     kind: str, results: Results, cases: Mapping[str, Case], nodes: list[int]
 ) -> dict[str, Any]:
-    """The axis to begin with, the unit of a response, and how alike modes are."""
+    """Further data: the initial axis, the unit of a response, and the likeness of modes."""
     if kind == "modes":
         return {"axis": 0, "mac": _likeness(results, cases)}
     if kind == "bands":
@@ -290,7 +290,7 @@ def _more(
 
 
 def _likeness(results: Results, cases: Mapping[str, Case]) -> list[list[float | None]] | None:
-    """MAC of all modes with all others, at the vertices; None where patterns differ."""
+    """MAC of all modes with all others, at the vertices; None if patterns differ."""
     counts = {len(case.structure.pattern.vertices) for case in cases.values()}
     if len(counts) > 1:
         return None
@@ -303,10 +303,10 @@ def _likeness(results: Results, cases: Mapping[str, Case]) -> list[list[float | 
 
 
 def folding_case(result: xr.Dataset) -> Case:
-    """Case of the pattern of a folding, with the panels cut at their diagonals.
+    """Case of a folding's pattern, with panels cut along their diagonals.
 
-    Its nodes are the vertices. Its sheet is made up, so that only its geometry counts; creases are
-    taken to rest when flat, as they may be closed.
+    Its nodes are the vertices. Its sheet is arbitrary, as only the geometry counts; creases have
+    flat rest angles, since the pattern's own may be fully folded.
     """
     pattern = pattern_of(result)
     with warnings.catch_warnings():

@@ -1,4 +1,4 @@
-"""How creases turn and which energies panels have, at all samples of a motion or path."""
+"""Crease angles and panel energies at all samples of a motion or path."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from foldyn.structures.mesh import double_areas
 
 
 class States(NamedTuple):
-    """Creases (samples, nf) of k hinges, some of them several in a row, and panels.
+    """States (samples, ...) of creases with k hinges, some several in a row, and of panels.
 
-    turn : from rest, without what the panels beside a crease turn, rad.
+    turn : rotation (samples, nf) from rest, without the rotation of the adjacent panels, rad.
     moment : of the whole crease, N m.
     pairs, energy : ends (k, 2) of the hinges and their energies (samples, k), J.
     plates : energy of each panel as a plate, or of each triangle of a shell (samples, p), J.
-    rest : rest angles as loads turn them (samples, nr), rad.
-    stress, free : with which single warm bars push (samples, nb), over Young's modulus, and Green
-        strains of membranes without stress (samples, .); no columns where no panel is warm.
+    rest : rest angles as loads change them (samples, nr), rad.
+    stress, free : thermal stress of single bars over Young's modulus (samples, nb), and stress-free
+        Green strains of membranes (samples, .); no columns if no panel is warm.
     """
 
     turn: NDArray
@@ -43,15 +43,15 @@ class States(NamedTuple):
 
 
 def memory_acts(case: Case, result: Any) -> bool:
-    """Whether creases had memory: dampers in series with panels have one where time passes."""
+    """Whether creases have memory: dampers in series with panels do, in a motion."""
     passes = "time" in result.sizes or "elapsed" in result
     return any(passes or not isinstance(part.law, CreaseDampers) for part in case.remembering)
 
 
 def creases_known(case: Case, result: Any) -> bool:
-    """Whether displacements tell how creases turn.
+    """Whether displacements determine the rotation of creases.
 
-    They do not where panels give way beside creases that have memory or, in motions, dampers.
+    They do not if panels yield next to creases with memory or, in motions, with dampers.
     """
     sheet = case.body.sheet
     give = len(sheet.hidden) > 0 or bool(sheet.fold_hinges().softness.any())
@@ -60,7 +60,7 @@ def creases_known(case: Case, result: Any) -> bool:
 
 
 def states(case: Case, result: Any, displacement: NDArray) -> States:
-    """States at displacements (samples, n, 3), m, with unknowns without mass in balance."""
+    """States at displacements (samples, n, 3), m, with massless unknowns in equilibrium."""
     body, structure, kind = case.body, case.structure, case.structure.hinge_kinds[0]
     samples = len(displacement)
     acting = list(_acting(case, result, samples))
@@ -71,7 +71,7 @@ def states(case: Case, result: Any, displacement: NDArray) -> States:
     changes, hinges = rest - body.sheet.rest_angles, body.sheet.fold_hinges()
     angle = hinge_angles(structure, hinges.nodes, displacement)
     plates, (stress, free, curl) = np.zeros((samples, 0)), _warm(acting, samples)
-    if len(body.hidden) or not isinstance(structure, Structure):  # also a shell of rigid panels
+    if len(body.hidden) or not isinstance(structure, Structure):  # includes a shell of rigid panels
         parts = (
             (part, k) for k, (load, _) in enumerate(acting) for part, _ in load.following_terms
         )
@@ -139,8 +139,8 @@ def bar_strain(structure: Any, displacement: NDArray) -> NDArray:
 def energy_density(structure: Any, displacement: NDArray, found: States) -> NDArray:
     """Strain energy over the area of each panel (samples, m), J/m2.
 
-    That of a bar or hinge goes in equal parts to the triangles beside it; springs, and clamped
-    edges of models without plates, are left out.
+    The energy of a bar or hinge is split equally between the adjacent triangles; springs, and
+    clamped edges of models without plates, are left out.
 
     displacement : (samples, n, 3), m
     """
@@ -179,7 +179,7 @@ def energy_density(structure: Any, displacement: NDArray, found: States) -> NDAr
 
 
 def shares(pairs: NDArray, triangles: NDArray, panel: NDArray) -> sparse.csr_array:
-    """Parts (k, m) of what lies along pairs of nodes (k, 2) that belong to each panel."""
+    """Share (k, m) of each panel in elements along pairs of nodes (k, 2)."""
     if not len(pairs):
         return sparse.csr_array((0, int(panel.max(initial=-1)) + 1))
     sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)

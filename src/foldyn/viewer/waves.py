@@ -28,7 +28,7 @@ PATH = "take phases of cell.path"
 
 
 def waves(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
-    """Description of the bands of one result, whose arrays get names that begin with key.
+    """Describe the bands of one result; its arrays get names that begin with key.
 
     "frequency" (state, phase, band), Hz; "displacement", Bloch modes of every k-th phase, real and
     imaginary parts (state, band, phase / k, 2, node, axis), the largest displacement of each being
@@ -76,7 +76,7 @@ def waves(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
 
 
 def smooth(shapes: NDArray) -> NDArray:
-    """Shapes (..., phase, node, axis) of the size 1, each in phase with the one before it."""
+    """Normalize shapes (..., phase, node, axis) to size 1, each in phase with the previous one."""
     size = np.linalg.norm(shapes, axis=-1).max(axis=-1)
     out = shapes / np.where(size > 0.0, size, 1.0)[..., None, None]
     for k in range(1, out.shape[-3]):
@@ -87,7 +87,7 @@ def smooth(shapes: NDArray) -> NDArray:
 
 
 def maps(result: xr.Dataset) -> NDArray[np.float64]:
-    """Affine maps (state, period, 3, 4) from a cell to the next: rotation and shift, m."""
+    """Affine maps (state, period, 3, 4) from a cell to the next: rotation and translation, m."""
     shift, axis, point = (
         result[name].transpose("state", "period", "axis").values
         for name in ("vectors", "axes", "points")
@@ -115,7 +115,7 @@ def full_gaps(result: xr.Dataset) -> list[list[float]]:
 
 
 def about_waves(result: xr.Dataset, triangles: int) -> dict[str, Any]:
-    """What all results of a page share: the path, the states, which cells are shown."""
+    """Description shared by all results of a page: the path, the states, the cells shown."""
     periods = result.sizes["period"]
     names = str(result.attrs["tick_labels"]).replace("G", "Γ").split("-")
     along = CELLS[periods]
