@@ -83,8 +83,9 @@ def trajectory_dataset(
     case : Case
         What moved.
     time : array_like, shape (nt,)
-        Times of the samples (s). displacement, velocity : array_like, shape (nt, n, 3) Displacement
-        (m) and velocity (m/s) of every node.
+        Times of the samples (s).
+    displacement, velocity : array_like, shape (nt, n, 3)
+        Displacement (m) and velocity (m/s) of every node.
     reaction : array_like, shape (nt, ns)
         Forces of the supports (N) on the dofs `case.reaction_dofs`, in that order.
     energies : mapping of str to array_like, shape (nt,)

@@ -157,7 +157,9 @@ def main_effects(
     ds : xarray.Dataset
         A result of `foldyn.sweep`.
     measure, at
-        As in `measured`. Returns
+        As in `measured`.
+
+    Returns
     -------
     tuple of MainEffect
         In the order of the parameters. For samples, means are over 8 ranges with equal numbers of
@@ -238,7 +240,9 @@ def sobol_indices(
     confidence : float
         Confidence level of the intervals, which are bootstrap percentiles.
     resamples, seed : int
-        Number of bootstrap resamples, and the random seed. Returns
+        Number of bootstrap resamples, and the random seed.
+
+    Returns
     -------
     SobolIndices
 
