@@ -1,10 +1,10 @@
-"""Abaqus: an input deck of a creased shell, with its frequencies and its statics.
+"""Abaqus: an input deck of a creased shell, for its frequencies and its statics.
 
 Triangles are ``STRI3``, flat facets of thin shells, or ``S3``. Nodes at one place have equal
-displacements by ``*EQUATION``. Their turn against each other about the crease, as it lies at rest,
-is by another equation the first displacement of a node of its own, which a spring ``SPRING1``
-resists: CalculiX reads this too, whose springs know no rotations. Keywords as in the Abaqus
-Keywords Reference Guide; numbers fit its 20 columns.
+displacements by ``*EQUATION``. Another equation makes their relative rotation about the crease, in
+its position at rest, the first displacement of an extra node, which a spring ``SPRING1`` resists.
+CalculiX, whose springs have no rotations, reads this too. Keywords as in the Abaqus Keywords
+Reference Guide; numbers fit its 20 columns.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def write(
     modes: int | None = None,
     element: str | None = None,
 ) -> list[Path]:
-    """Write a deck: a step of frequencies at rest, then one of statics under all loads.
+    """Write a deck: a frequency step at rest, then a static step under all loads.
 
     Parameters
     ----------
@@ -44,11 +44,11 @@ def write(
     path : Path
     case : Case
     divisions : int, optional
-        Pieces of every edge, if the case is no shell; 16 by default.
+        Divisions of every edge, unless the case is a shell already; 16 by default.
     modes : int, optional
         How many frequencies; 6 by default.
     element : {"STRI3", "S3"}, optional
-        Kind of the triangles; the first is thin as those of Foldyn are.
+        Kind of the triangles; STRI3 is a thin shell, like Foldyn's.
     """
     count = 6 if modes is None else whole("modes", modes, least=1)
     kind = ELEMENTS[0] if element is None else choice("element", element, ELEMENTS)
@@ -93,7 +93,7 @@ def _panels(shell: CreasedShell, kind: str) -> Iterator[str]:
 
 
 def _ties(shell: CreasedShell) -> Iterator[str]:
-    """Equal displacements of nodes at one place, along axes that are not held."""
+    """Equal displacements of coincident nodes, along axes that are not held."""
     for first, *others in shell.places:
         for node in others:
             for axis in np.flatnonzero(~shell.held[node]).tolist():
@@ -103,7 +103,7 @@ def _ties(shell: CreasedShell) -> Iterator[str]:
 
 
 def _creases(shell: CreasedShell) -> Iterator[str]:
-    """Nodes that stand for turns, their equations, and springs on them."""
+    """Extra nodes for crease rotations, their equations, and springs on them."""
     pairs = np.concatenate([np.zeros((0, 2), int), *(joint.nodes for joint in shell.joints)])
     node, element = len(shell.nodes), len(shell.triangles)
     if len(pairs):
@@ -126,7 +126,7 @@ def _creases(shell: CreasedShell) -> Iterator[str]:
 
 
 def _turn(turn: int, first: int, second: int, axis: NDArray) -> Iterator[str]:
-    """The turn of the second node against the first about an axis, four terms a line."""
+    """Rotation of the second node relative to the first about an axis, four terms per line."""
     terms = [
         term
         for dof, part in enumerate(axis.tolist(), 4)
@@ -158,7 +158,7 @@ def _supports(shell: CreasedShell) -> Iterator[str]:
 
 
 def _statics(shell: CreasedShell) -> Iterator[str]:
-    """All loads in full, in steps that the program chooses; displacements are printed."""
+    """All loads at full value, in increments that the program chooses; print displacements."""
     yield from ("*STEP, NLGEOM, INC=1000", "*STATIC", _line(0.1, 1.0), "*CLOAD")
     force = np.sum(shell.forces, axis=0)
     for node, axis in np.argwhere(force).tolist():

@@ -1,4 +1,4 @@
-"""What of a result is exported: variables by name, nodes by number."""
+"""Selection of the exported variables, by name, and nodes, by number."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ TABLES = "tables_"
 
 
 def quantities_of(result: xr.Dataset) -> list[str]:
-    """Names of what was computed, and of the rest position; not of what describes the case."""
+    """Names of computed variables and of the rest position, not of those that describe the case."""
     names = map(str, result.data_vars)
     described = {*DOCUMENT} - {"rest_position"}
     return [n for n in names if n not in described and not n.startswith(TABLES)]
 
 
 def chosen_fields(known: Iterable[str], fields: str | Sequence[str] | None) -> list[str]:
-    """Names of variables: those that are asked for, or all that are known.
+    """Names of the requested variables, or of all known ones.
 
     Raises
     ------
     InputError
-        One is not among the known.
+        An unknown variable.
     """
     known = list(known)
     if fields is None:
@@ -56,12 +56,12 @@ def chosen_fields(known: Iterable[str], fields: str | Sequence[str] | None) -> l
 
 
 def chosen_nodes(result: xr.Dataset, nodes: int | str | Sequence[int] | None) -> NDArray[np.int64]:
-    """Numbers of nodes: those that are asked for, or all.
+    """Numbers of the requested nodes, or of all.
 
     Raises
     ------
     InputError
-        No nodes of the result.
+        Not nodes of the result.
     """
     count = result.sizes["node"]
     if nodes is None:

@@ -1,8 +1,8 @@
-"""A creased shell as programs of finite elements take it, whichever writes or runs it.
+"""A creased shell in the form that finite-element programs need, to write a deck or to run it.
 
-Their shells have rotations at nodes, which a crease cannot share. Each panel therefore has nodes of
-its own; those at one place move together, and turn against each other about the crease with their
-share of its stiffness.
+Shells of these programs have rotations at nodes, which panels across a crease cannot share. So each
+panel has its own nodes; coincident nodes move together, and rotate relative to each other about the
+crease against their share of its stiffness.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from foldyn.structures import Sheet
 from foldyn.structures.discretized import Discretized
 from foldyn.values import whole
 
-DIVISIONS = 16  # from which on frequencies of the case studies are right to 1 %
+DIVISIONS = 16  # enough for frequencies of the case studies within 1 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +37,11 @@ class Joint:
     axis : (3,)
         Unit vector from the lower to the higher vertex.
     nodes : (m, 2)
-        Pairs of nodes at one place: of the panel that runs along the axis when it is gone around
-        counter-clockwise from the front, and of the other. The dihedral grows with the turn of
-        the second against the first about the axis.
+        Pairs of coincident nodes: first of the panel whose outline, counter-clockwise from the
+        front, runs along the axis, then of the other panel. The dihedral grows as the second node
+        rotates relative to the first about the axis.
     stiffness : (m,)
-        Of each pair, N m/rad.
+        Stiffness of each pair, N m/rad.
     """
 
     axis: NDArray
@@ -51,7 +51,7 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class CreasedShell:
-    """Panels with nodes of their own, joined along creases, with supports and loads.
+    """Panels with their own nodes, joined along creases, with supports and loads.
 
     Attributes
     ----------
@@ -62,13 +62,13 @@ class CreasedShell:
     sheets : tuple of Sheet
     joints : tuple of Joint
     places : tuple of tuples of int
-        Nodes at one place, for all places with several.
+        Groups of coincident nodes.
     held : (n, 3)
         Whether a node is held along each axis.
     clamped : (n,)
-        Whether it cannot turn either.
+        Whether a node's rotations are held too.
     forces : tuple of (n, 3)
-        N, of one load each.
+        Nodal forces of each load, N.
     masses : (n,)
         Point masses, kg.
     """
@@ -91,7 +91,7 @@ class CreasedShell:
 
     @property
     def loose(self) -> list[tuple[int, int]]:
-        """Pairs of nodes at one place that no chain of joints connects."""
+        """Pairs of coincident nodes that no chain of joints connects."""
         pairs = np.concatenate([np.zeros((0, 2), int), *(joint.nodes for joint in self.joints)])
         part = _components(pairs, len(self.nodes))
         found = []
@@ -110,20 +110,20 @@ def creased_shell(case: Case, divisions: int | None = None) -> CreasedShell:
     Parameters
     ----------
     case : Case
-        A shell, or bars and hinges, of whose pattern and sheet a shell is made.
+        A shell, or bars and hinges, whose pattern and sheet are turned into a shell.
     divisions : int, optional
-        Pieces of every edge of that; 16 by default.
+        Divisions of every edge for that; 16 by default.
 
     Raises
     ------
     InputError
-        The case has what other programs would not compute alike.
+        The case has features that other programs would not compute alike.
 
     Warns
     -----
     FoldynWarning
-        Folds that are not linear about rest get the slope that they have there; dashpots and
-        motions of the base are left out.
+        Folds that are not linear are linearized about rest; dashpots and motions of the base are
+        left out.
     """
     held = _shell_case(case, divisions)
     _check(held)
@@ -150,16 +150,16 @@ def creased_shell(case: Case, divisions: int | None = None) -> CreasedShell:
 
 
 def shares(count: int) -> NDArray:
-    """Shares (count,) of evenly spaced places in a whole: half a share at the ends."""
+    """Shares (count,) of evenly spaced points in a total: half a share at the ends."""
     share = np.full(count, 1.0 / (count - 1))
     share[[0, -1]] *= 0.5
     return share
 
 
 class _Split:
-    """Nodes of a shell (n,), made anew for each part of panels that run on into each other.
+    """Nodes of a shell (n,), duplicated for each group of panels that continue into each other.
 
-    Nodes keep their number in the first part that has them; further ones follow.
+    Nodes keep their number in the first group that uses them; duplicates are numbered after all.
     """
 
     def __init__(self, shell: Discretized, part: NDArray) -> None:
@@ -179,13 +179,13 @@ class _Split:
         self.places = tuple(tuple(nodes.tolist()) for nodes in own if len(nodes) > 1)
 
     def of(self, panel: int, nodes: NDArray) -> list[int]:
-        """New numbers of nodes of a panel."""
+        """New node numbers for a panel."""
         keys = self._part[panel] + nodes * (self._part.max() + 1)
         return [self._number[key] for key in keys.tolist()]
 
 
 def _components(pairs: NDArray, count: int) -> NDArray:
-    """Which part (count,) of a graph with these edges each of its points belongs to."""
+    """Connected component (count,) of each vertex of a graph with these edges."""
     graph = sparse.coo_array((np.ones(len(pairs)), tuple(pairs.T)), (count, count))
     return connected_components(graph, directed=False)[1]
 
@@ -209,12 +209,12 @@ def _joints(shell: Shell, split: _Split) -> tuple[Joint, ...]:
 
 
 def fold_slopes(structure: Discretized) -> NDArray:
-    """Slope (nf,) of the law of the folds at rest, over their stiffness.
+    """Slope (nf,) of the folds' law at rest, relative to their stiffness.
 
     Raises
     ------
     InputError
-        Folds that have no slope at rest, or a moment there.
+        Folds without a slope at rest, or with a moment there.
 
     Warns
     -----
@@ -243,13 +243,13 @@ def fold_slopes(structure: Discretized) -> NDArray:
 
 
 def _panel_at(pattern: Pattern, edge: tuple[int, int]) -> int:
-    """The panel of a boundary edge."""
+    """Panel of a boundary edge."""
     return next(k for k, face in enumerate(pattern.faces) if set(edge) <= set(face))
 
 
 # ------------------------------------------------------------------ what is refused
 def _shell_case(case: Case, divisions: int | None) -> Case:
-    """The case with a shell."""
+    """Convert the case to a shell."""
     if case.structure.kind == Shell.kind:
         if divisions is not None:
             raise InputError(
@@ -264,7 +264,7 @@ def _shell_case(case: Case, divisions: int | None) -> Case:
 
 
 def _check(case: Case) -> None:
-    """Refuse what springs, plain supports and constant forces cannot stand for."""
+    """Refuse anything that springs, plain supports and constant forces cannot represent."""
     structure: Any = case.structure
     wrong = (
         (structure.sheet.density is None, "sheet.density", "is missing; give it (kg/m3)"),

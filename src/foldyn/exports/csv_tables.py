@@ -1,7 +1,7 @@
 """CSV, tidy: a row for each sample and node, a column for each component, units in the header.
 
-``pandas.read_csv`` makes a frame of it. Numbers are written with all their digits: with
-``float_precision="round_trip"`` pandas reads the very same ones.
+``pandas.read_csv`` reads it as a frame. Numbers have all their digits: with
+``float_precision="round_trip"`` pandas reads them exactly.
 """
 
 from __future__ import annotations
@@ -44,16 +44,16 @@ def write(
     case : None
         Not needed.
     rows : str, optional
-        What a row is for, dimensions of the result: "time,node", the default of a motion, has
-        displacements, "time" energies, "time,support" reactions, "node" what does not change.
+        Dimensions of the rows: "time,node", the default for a motion, has displacements, "time"
+        energies, "time,support" reactions, "node" constant quantities.
     fields : str or sequence of str, optional
         Names of variables; by default all that have these rows.
     nodes : int or sequence of int, optional
         Numbers of nodes; by default all.
     every : int, optional
-        Take every such sample, and the last one.
+        Take every n-th sample, and the last one.
     frames : int, optional
-        Take so many samples, spread evenly.
+        Take this many samples, evenly spread.
     """
     tables = tables_of(result)
     asked = _asked(result, rows, tables)
@@ -72,7 +72,7 @@ def write(
 
 
 def tables_of(result: xr.Dataset) -> dict[Rows, list[str]]:
-    """Names of the variables of each table of a result, by what its rows are for."""
+    """Names of the variables of each table of a result, by the dimensions of its rows."""
     found: dict[Rows, list[str]] = {}
     for name in quantities_of(result):
         rows = tuple(str(dim) for dim in result[name].dims if dim != "axis")
@@ -82,7 +82,7 @@ def tables_of(result: xr.Dataset) -> dict[Rows, list[str]]:
 
 
 def _asked(result: xr.Dataset, rows: Any, tables: dict[Rows, list[str]]) -> Rows:
-    """Dimensions of the rows of the table that is asked for."""
+    """Row dimensions of the requested table."""
     along = ALONG[result.attrs["foldyn_result"]]
     if rows is None:
         usual = ((along, "node"), (along, "model"), (along,))
@@ -96,7 +96,7 @@ def _asked(result: xr.Dataset, rows: Any, tables: dict[Rows, list[str]]) -> Rows
 
 
 def _coordinates(result: xr.Dataset, rows: Rows) -> list[str]:
-    """Names of the columns that say which row it is: dimensions, and what else belongs to them."""
+    """Names of the columns that identify a row: dimensions and their coordinates."""
     coords = {str(name): each.dims for name, each in result.coords.items()}
     return [
         name
@@ -106,7 +106,7 @@ def _coordinates(result: xr.Dataset, rows: Rows) -> list[str]:
 
 
 def _titles(column: xr.DataArray) -> list[str]:
-    """Titles of the columns of a variable: name, axis and part, with the unit."""
+    """Titles of a variable's columns: name, axis and part, with the unit."""
     axes = "xyz" if "axis" in column.dims else ("",)
     parts = ("real", "imag") if np.iscomplexobj(column.values) else ("",)
     unit = str(column.attrs.get("units", ""))
@@ -119,7 +119,7 @@ def _titles(column: xr.DataArray) -> list[str]:
 
 
 def _blocks(table: list[xr.DataArray], samples: NDArray[np.int64]) -> Iterator[Iterator[tuple]]:
-    """Rows of the table, those of one sample at a time, so that memory stays small."""
+    """Rows of the table, one sample at a time to save memory."""
     arrays = [column.values for column in table]
     inner = np.broadcast_shapes(*(array.shape[1:-1] for array in arrays))
     for sample in samples.tolist():
@@ -133,12 +133,12 @@ def _blocks(table: list[xr.DataArray], samples: NDArray[np.int64]) -> Iterator[I
 
 
 def _over(column: xr.DataArray, rows: Rows) -> xr.DataArray:
-    """A variable over all dimensions of the rows, of length 1 where it has not them, and axis."""
+    """A variable over all row dimensions, of length 1 where it lacks them, and axis."""
     missing = [dim for dim in (*rows, "axis") if dim not in column.dims]
     return column.expand_dims(missing).transpose(*rows, "axis")
 
 
 def _parts(column: NDArray) -> list[list]:
-    """A column as lists of plain values, two of them where it is complex."""
+    """A column as lists of plain values, two of them if it is complex."""
     parts = (np.real(column), np.imag(column)) if np.iscomplexobj(column) else (column,)
     return [part.tolist() for part in parts]

@@ -1,9 +1,9 @@
 """GLB: a sheet that moves, for Blender and browsers.
 
-The nodes' places at rest, and as morph targets how far they are away from them at each key or in
-each mode. Weights that change linearly in time blend one key into the next. There are no normals:
-a viewer then shades every triangle flat, in each shape. Lengths are meters; the z axis, which
-points up with us, becomes the y axis of the format.
+The file holds node positions at rest and, as morph targets, displacements at each key or in each
+mode. Weights that change linearly in time blend one key into the next. There are no normals, so a
+viewer shades every triangle flat. Lengths are meters; our z axis, which points up, becomes the
+format's y axis.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def write(
     scale: float = 1.0,
     seconds: float | None = None,
 ) -> list[Path]:
-    """Write the sheet of a result with an animation, or one for each mode.
+    """Write the sheet of a result with one animation, or one per mode.
 
     Parameters
     ----------
@@ -64,13 +64,13 @@ def write(
     case : Case
         Of the result.
     every, frames : int, optional
-        Make a key of every such sample and the last one, or so many keys, spread evenly over the
-        samples; by default all samples, but no more than `MOST_KEYS` keys.
+        Make a key of every n-th sample and the last one, or this many keys, evenly spread over the
+        samples; by default all samples, at most `MOST_KEYS` keys.
     scale : float
         Factor on all displacements.
     seconds : float, optional
-        How long the animation takes: by default as long as the motion, `PATH_SECONDS` for a path,
-        and `SWING_SECONDS` for one swing of a mode.
+        Length of the animation: by default that of the motion, `PATH_SECONDS` for a path, and
+        `SWING_SECONDS` for one period of a mode.
     """
     warn_of_boards(case.structure.pattern)
     kind = result.attrs["foldyn_result"]
@@ -93,14 +93,14 @@ def write(
 
 
 def _there_and_back(shapes: Shapes) -> Shapes:
-    """Each mode, and the opposite of each: Blender takes no weights below 0."""
+    """Each mode and its opposite, as Blender allows no negative weights."""
     back = [f"{title}, back" for title in shapes.titles]
     both = np.concatenate([shapes.displacement, -shapes.displacement])
     return shapes._replace(titles=shapes.titles + back, displacement=both)
 
 
 def _swings(titles: list[str], seconds: float) -> list[Animation]:
-    """One swing of each mode, whose shapes there come first and those back last."""
+    """One period of each mode, from shapes as `_there_and_back` orders them."""
     count = len(titles) // 2
     phase = np.linspace(0.0, 2.0 * np.pi, SWING_KEYS + 1)
     there = np.sin(phase)[:, None]

@@ -1,7 +1,7 @@
-"""GLB, the binary form of glTF 2.0: one JSON document, and the arrays that it refers to.
+"""GLB, the binary form of glTF 2.0: one JSON document and the arrays that it refers to.
 
-Source of the format: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html. Written here,
-as the library for it leaves all of this to its caller (decision 7).
+Source of the format: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html. Written by hand, as
+the library for the format leaves all of this to its caller (decision 7).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _VERTICES, _INDICES = 34962, 34963
 
 @dataclass
 class Content:
-    """What a file holds, filled piece by piece.
+    """Content of a file, filled step by step.
 
     Attributes
     ----------
@@ -37,15 +37,15 @@ class Content:
     binary: bytearray = field(default_factory=bytearray)
 
     def positions(self, points: NDArray, name: str = "") -> int:
-        """Add points (n, 3) of vertices, or how far they move; return their number."""
+        """Add points (n, 3) of vertices, or their displacements; return the accessor's number."""
         return self._add(points, "f4", _VERTICES, True, name)
 
     def indices(self, numbers: ArrayLike, name: str = "") -> int:
-        """Add vertex numbers of any shape; return their number."""
+        """Add vertex numbers of any shape; return the accessor's number."""
         return self._add(np.ravel(numbers), "u4", _INDICES, False, name)
 
     def numbers(self, values: ArrayLike, name: str = "") -> int:
-        """Add numbers of an animation; return their number."""
+        """Add numbers of an animation; return the accessor's number."""
         return self._add(np.ravel(values), "f4", None, True, name)
 
     def _add(self, values: NDArray, kind: str, target: int | None, bounds: bool, name: str) -> int:
@@ -66,7 +66,7 @@ class Content:
         return len(self.document["accessors"]) - 1
 
     def glb(self) -> bytes:
-        """Content of the file."""
+        """Return the content of the file."""
         buffers = [{"byteLength": len(self.binary)}]
         text = json.dumps({**self.document, "buffers": buffers}, separators=(",", ":")).encode()
         text += b" " * (-len(text) % 4)
@@ -78,7 +78,7 @@ class Content:
 
 
 def linear(color: str) -> list[float]:
-    """Opaque color "#rrggbb" in linear light, as materials take it (IEC 61966-2-1)."""
+    """Opaque color "#rrggbb" in linear light, as materials need it (IEC 61966-2-1)."""
     parts = [int(color[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]
     light = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
     return [*light, 1.0]

@@ -1,9 +1,9 @@
-"""MAT, version 5, for MATLAB and Octave: ``run = load("run.mat")`` makes a struct of it.
+"""MAT, version 5, for MATLAB and Octave: ``run = load("run.mat")`` reads it as a struct.
 
-Arrays keep their dimensions, complex numbers stay complex. All numbers are doubles; those of nodes,
-vertices and supports count from 1. `faces` has a row for each panel, filled up with NaN, as
-``patch("Vertices", run.vertices, "Faces", run.faces)`` takes it. Units and meanings are in the
-structs `units` and `labels`, facts about the run in `attributes`.
+Arrays keep their dimensions, complex numbers stay complex. All numbers are doubles; nodes, vertices
+and supports count from 1. `faces` has a row for each panel, padded with NaN for ``patch("Vertices",
+run.vertices, "Faces", run.faces)``. Units and meanings are in the structs `units` and `labels`,
+facts about the run in `attributes`.
 """
 
 from __future__ import annotations
@@ -53,17 +53,17 @@ def write(
     case : None
         Not needed.
     fields : str or sequence of str, optional
-        Names of the variables of the result; by default all. Coordinates and the pattern are
-        always there.
+        Names of the variables of the result; by default all. Coordinates and the pattern are always
+        included.
     every : int, optional
-        Take every such sample, and the last one.
+        Take every n-th sample, and the last one.
     frames : int, optional
-        Take so many samples, spread evenly.
+        Take this many samples, evenly spread.
 
     Raises
     ------
     InputError
-        A variable is larger than the 2 GB of the format.
+        A variable exceeds the format's 2 GB.
     """
     from scipy.io import savemat
 
@@ -92,7 +92,7 @@ def write(
 
 
 def _values(variable: xr.DataArray) -> NDArray:
-    """Values as MATLAB has them."""
+    """Convert values to MATLAB types."""
     values = variable.values
     if values.dtype.kind in "UOST":
         return values.astype(object)
@@ -111,7 +111,7 @@ def _check_size(name: str, values: NDArray) -> None:
 
 
 def _faces(faces: Sequence[Sequence[int]]) -> NDArray[np.float64]:
-    """Vertices of each panel, counted from 1 and filled up with nan."""
+    """Vertices of each panel, counted from 1 and padded with nan."""
     rows = np.full((len(faces), max(map(len, faces))), np.nan)
     for row, face in zip(rows, faces, strict=True):
         row[: len(face)] = face
@@ -127,7 +127,7 @@ def _attribute(value: Any) -> Any:
 
 
 def _named(content: dict[str, Any]) -> dict[str, Any]:
-    """The same with names that MATLAB takes, each once."""
+    """Rename variables to unique names that MATLAB allows."""
     out: dict[str, Any] = {}
     for name, value in content.items():
         out[_name(name, out)] = value
@@ -135,7 +135,7 @@ def _named(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _name(text: str, taken: Iterable[str]) -> str:
-    """A name for MATLAB: letters, digits and underscores, beginning with a letter, no keyword."""
+    """A MATLAB name: letters, digits and underscores, starting with a letter, not a keyword."""
     clean = re.sub(r"\W", "_", text, flags=re.ASCII)
     clean = clean if clean[:1].isalpha() and clean not in KEYWORDS else f"x_{clean}"
     choices = (clean[:LONGEST], *(f"{clean[: LONGEST - 6]}_{k}" for k in range(2, 9)))

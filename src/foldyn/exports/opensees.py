@@ -1,8 +1,8 @@
-"""OpenSees: a creased shell as a list of commands, which are run at once or written as Tcl.
+"""OpenSees: a creased shell as a list of commands, to run directly or to write as Tcl.
 
 Triangles are ``ASDShellT3 -corotational``: MITC3 with drilling rotations, a third of their mass at
 each corner. Nodes at one place are tied by stiff springs of a ``zeroLength`` element, whose fourth
-direction is the turn about the crease, as it lies at rest.
+direction is the rotation about the crease, in its position at rest.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from foldyn.writing import write_text
 Command = tuple[Any, ...]
 """Name of a command of OpenSees, and its arguments."""
 
-TIE = 100.0  # stiffness of the springs that tie nodes, in membrane stiffnesses E t (N/m)
-TOLERANCE = 1e-7  # m and rad: norm of the last correction of a step
+TIE = 100.0  # stiffness of the springs that tie nodes, relative to the membrane stiffness E t (N/m)
+TOLERANCE = 1e-7  # m and rad: norm of the last correction in a step
 ITERATIONS = 60
 TIE_MATERIAL = 1
-MOVES, TURN = (1, 2, 3), 4  # directions of a spring: along its three axes, about the first
+MOVES, TURN = (1, 2, 3), 4  # directions of a spring: along its three axes; rotation about the first
 EIGEN = "-genBandArpack"
 
 
@@ -53,7 +53,7 @@ def model(shell: CreasedShell, tie: float = TIE) -> Iterator[Command]:
 
 
 def _springs(shell: CreasedShell) -> Iterator[Command]:
-    """Springs about creases, and those that tie nodes."""
+    """Springs about creases, and springs that tie nodes."""
     material = TIE_MATERIAL
     for joint, first in zip(shell.joints, first_springs(shell), strict=False):
         values, which = np.unique(joint.stiffness, return_inverse=True)
@@ -84,7 +84,7 @@ def _frame(joint: Joint) -> list[float]:
 
 
 def load(number: int, force: NDArray, *series: Any) -> Iterator[Command]:
-    """Forces (n, 3), N, times a series of factors: its kind, and what follows its number."""
+    """Forces (n, 3), N, times a series of factors, given by its kind and arguments."""
     kind, *rest = series
     yield "timeSeries", kind, number, *rest
     yield "pattern", "Plain", number, number
@@ -93,7 +93,7 @@ def load(number: int, force: NDArray, *series: Any) -> Iterator[Command]:
 
 
 def solver(algorithm: str, tolerance: float = TOLERANCE) -> Iterator[Command]:
-    """Constraints that are plain, and an unsymmetric solver: the tangent is not symmetric."""
+    """Plain constraints and an unsymmetric solver, as the tangent is not symmetric."""
     yield "constraints", "Plain"
     yield "numberer", "RCM"
     yield "system", "UmfPack"
@@ -102,7 +102,7 @@ def solver(algorithm: str, tolerance: float = TOLERANCE) -> Iterator[Command]:
 
 
 def run(domain: Any, commands: Iterable[Command]) -> None:
-    """Give commands to a model of OpenSees."""
+    """Execute commands in an OpenSees model."""
     for name, *arguments in commands:
         getattr(domain, name)(*arguments)
 
@@ -111,7 +111,7 @@ def run(domain: Any, commands: Iterable[Command]) -> None:
 def write(
     result: Any, path: Path, case: Case, *, divisions: int | None = None, modes: int | None = None
 ) -> list[Path]:
-    """Write a deck in Tcl: frequencies at rest, then the statics under all loads.
+    """Write a deck in Tcl: frequencies at rest, then statics under all loads.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def write(
     path : Path
     case : Case
     divisions : int, optional
-        Pieces of every edge, if the case is no shell; 16 by default.
+        Divisions of every edge, unless the case is a shell already; 16 by default.
     modes : int, optional
         How many frequencies; 6 by default.
     """

@@ -1,4 +1,4 @@
-"""States of results as patterns: frames of a FOLD file, or a series of OBJ or STL files."""
+"""States of results as patterns: frames of a FOLD file, or series of OBJ or STL files."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ def write(
     frames: int | None = None,
     scale: float = 1.0,
 ) -> list[Path]:
-    """Write all states as frames where the format has them; else the last one, or a series.
+    """Write all states as frames if the format has them; otherwise the last state, or a series.
 
     Parameters
     ----------
     result : xarray.Dataset
         A motion, an equilibrium path or modes.
     path : Path
-        Its suffix is that of a pattern file. Files of a series are run_0000.obj, run_0001.obj, ...
+        Its suffix selects the pattern format. Files of a series are run_0000.obj, run_0001.obj, ...
     case : None
         Not needed.
     frame : int, optional
         Number of the one sample to write.
     every, frames : int, optional
-        Take every such sample and the last one, or so many, spread evenly.
+        Take every n-th sample and the last one, or this many, evenly spread.
     scale : float
         Factor on all displacements.
     """

@@ -1,4 +1,4 @@
-"""Formats of other programs that results are written to, and `export`, which chooses one."""
+"""Export formats for other programs, and `export`, which selects one."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ class Export:
     Parameters
     ----------
     name : str
-        What it is called: "glb".
+        Its name: "glb".
     suffixes : tuple of str
-        Of its files, lower case with the dot.
+        File suffixes, lower case with the dot.
     kinds : tuple of str
-        Kinds of results that it holds, of `chosen.ALONG`.
+        Kinds of results that it can hold, keys of `chosen.ALONG`.
     write : callable
-        ``write(result, path, case, **options)`` makes the file, or several beside it, and returns
-        the paths of all that it made. Its keyword-only arguments are the options of the format.
+        ``write(result, path, case, **options)`` writes the file, or several, and returns their
+        paths. Its keyword-only arguments are the options of the format.
     doc : str
-        What it is for, in a few words.
+        Its purpose, in a few words.
     needs_case : bool
-        Whether `write` gets the case of the result; otherwise it gets None, so that results that
-        cannot be run again from themselves are exported too.
+        Whether `write` needs the case of the result; otherwise it gets None, so that results
+        without a rebuildable case can be exported too.
     of_cases : bool
-        Whether `write` needs nothing but the case, which may then stand in place of a result.
+        Whether `write` needs only the case, which can then be exported without a result.
     in_place_of : tuple of str
-        Suffixes of formats that are not written, whose readers read this one.
+        Suffixes of unsupported formats whose readers accept this one.
     """
 
     name: str
@@ -117,18 +117,18 @@ def export(
     Parameters
     ----------
     result : xarray.Dataset, Case or path-like
-        A result, or the file of one; for input decks a case is enough.
+        A result or its file; for input decks a case is enough.
     path : path-like
         The file to make or to replace; its folder must exist.
     format : str, optional
         Name of a format, one of `foldyn.exports.EXPORTS`; by default the path's suffix chooses it.
     **options
-        Of the format; None stands for its own choice.
+        Options of the format; None selects its default.
 
     Returns
     -------
     list of Path
-        The files that were written: several where the format holds one state each.
+        The files written: several if each file holds a single state.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def export(
 
 
 def _case_for(chosen: Export, result: xr.Dataset | Case) -> Case | None:
-    """The case of what is exported, if the format needs it; other kinds are refused."""
+    """Case of the exported result, if the format needs it; refuse unsupported kinds."""
     if isinstance(result, Case):
         if chosen.of_cases:
             return result
@@ -200,7 +200,7 @@ def _file(path: Any) -> Path:
 
 
 def _format_of(file: Path, name: str | None) -> Export:
-    """Format of this name, or that of the file's suffix."""
+    """Format by name, or by the file's suffix."""
     if name is not None:
         return EXPORTS[choice("format", name, EXPORTS)]
     found = BY_SUFFIX.get(file.suffix.lower())

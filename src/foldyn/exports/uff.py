@@ -31,7 +31,7 @@ NONE = "NONE"
 
 
 class Function(NamedTuple):
-    """What the functions of a variable are in dataset 58."""
+    """Header fields of a variable's functions in dataset 58."""
 
     kind: int  # time response 1, frequency response 4, transmissibility 5, coherence 6
     ordinate: tuple[int, str, str]  # specific data type, label, unit
@@ -72,12 +72,12 @@ def write(
         Of a motion "displacement", the default, and "velocity"; of a response itself, the default,
         and "coherence".
     nodes : int or sequence of int, optional
-        Numbers of nodes with functions or mode shapes, from 0; by default all.
+        Nodes with functions or mode shapes, counted from 0; by default all.
 
     Raises
     ------
     InputError
-        Values are missing, for which the format has no sign.
+        Values are missing, which the format cannot express.
 
     Warns
     -----
@@ -105,7 +105,7 @@ Dataset = tuple[int, Iterable[str]]
 
 
 def _put(file: TextIO, number: int, lines: Iterable[str]) -> None:
-    """Write a dataset between its marks."""
+    """Write a dataset between its delimiters."""
     file.write(f"{-1:6d}\n{number:6d}\n")
     file.writelines(f"{line}\n" for line in lines)
     file.write(f"{-1:6d}\n")
@@ -134,7 +134,7 @@ def _nodes(position: NDArray) -> Iterator[str]:
 
 
 def _trace(number: int, edges: NDArray) -> Iterator[str]:
-    """A line that jumps from edge to edge: 0 lifts the pen."""
+    """A line that jumps from edge to edge; 0 lifts the pen."""
     entries = [entry for a, b in (edges + 1).tolist() for entry in (a, b, 0)][:-1]
     yield f"{number:10d}{len(entries):10d}{0:10d}"
     yield f"{'Edges of panels':<80}"
@@ -142,7 +142,7 @@ def _trace(number: int, edges: NDArray) -> Iterator[str]:
 
 
 def _panels(pattern: Pattern) -> Iterator[str]:
-    """Panels of three and four corners; larger ones as triangles about their first corner."""
+    """Panels with three and four corners; larger ones as triangles from their first corner."""
     for number, piece in enumerate(chain.from_iterable(map(_pieces, pattern.faces)), 1):
         kind = TRIANGLE if len(piece) == 3 else QUADRILATERAL
         yield f"{number:10d}{kind:10d}{1:10d}{1:10d}{7:10d}{len(piece):10d}"
@@ -157,7 +157,7 @@ def _pieces(face: tuple[int, ...]) -> list[tuple[int, ...]]:
 
 # ------------------------------------------------------------------ modes
 def _modes(result: xr.Dataset, nodes: NDArray) -> Iterator[Dataset]:
-    """Dataset 55 of each mode that swings or is rigid: mass 1, viscous damping ratio."""
+    """Dataset 55 of each oscillating or rigid mode: mass 1, viscous damping ratio."""
     frequency, ratio = result["frequency"].values, result["damping_ratio"].values
     unstable = np.flatnonzero(np.isnan(frequency)) + 1
     if len(unstable):
@@ -195,7 +195,7 @@ def _functions(result: xr.Dataset, names: list[str], nodes: NDArray) -> Iterator
         for node in nodes.tolist():
             for axis in range(3):
                 response = values[:, node, axis]
-                if np.isfinite(response).all():  # coherence is not, where nothing moves
+                if np.isfinite(response).all():  # coherence is missing where nothing moves
                     yield 58, _function(name, what, abscissa, response, (node, axis + 1), reference)
 
 
@@ -211,7 +211,7 @@ def _check_finite(name: str, values: NDArray, abscissa: NDArray, along: str) -> 
 
 
 def _reference(result: xr.Dataset) -> tuple[int, int, int]:
-    """Load case, node and direction of the force; a case of its own where several act."""
+    """Load case, node and direction of the force; an extra load case if several act."""
     drive = result["drive"].values if "drive" in result else np.zeros((1, 3))
     driven = np.argwhere(drive)
     if "receptance" not in result or len(driven) != 1:
@@ -250,7 +250,7 @@ def _function(
 
 
 def _even(abscissa: NDArray) -> tuple[float, float]:
-    """First value and spacing with six digits, (0, 0) where they would lose more than values do."""
+    """First value and spacing to six digits, or (0, 0) if that loses accuracy."""
     if len(abscissa) < 2:
         return 0.0, 0.0
     step = (abscissa[-1] - abscissa[0]) / (len(abscissa) - 1)

@@ -1,9 +1,9 @@
 """VTKHDF: all samples of a result with their fields, for ParaView and VTK.
 
-One mesh (`PolyData`) of triangles and lines. What connects the nodes is stored once, where they are
-and all fields at every sample, in single precision. It is one mesh and no collection of panels,
-creases and bars, as VTK 9.3 cannot read a collection that changes in time, and VTK 9.7 shows its
-first sample at all times; what a cell is, is said by the field `kind`.
+One mesh (`PolyData`) of triangles and lines. Connectivity is stored once; positions and all fields
+are stored at every sample, in single precision. It is one mesh and not a collection of panels,
+creases and bars, because VTK 9.3 cannot read a time-dependent collection, and VTK 9.7 shows its
+first sample at all times. The field `kind` names each cell's type.
 
 Source of the format: https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format.
 """
@@ -43,10 +43,10 @@ ROWS = 1 << 14
 
 
 class Mesh(NamedTuple):
-    """Lines (k, 2) and triangles (t, 3) that join nodes, and what each of these cells is.
+    """Lines (k, 2) and triangles (t, 3) between nodes, with the type of each of these cells.
 
     kind : 0 to 4 as in `KINDS`, `BAR` or `PANEL`.
-    crease, bar, panel : its number there, -1 where it is none.
+    crease, bar, panel : number of the cell's crease, bar or panel, -1 if it is none.
     """
 
     lines: NDArray
@@ -70,13 +70,13 @@ def write(
     Parameters
     ----------
     result : xarray.Dataset
-        A motion, a path or a folding, whose nodes move; or modes, whose nodes stay and have a
-        field `shape`.
+        A motion, a path or a folding, whose nodes move; or modes, whose nodes stay in place and
+        have a field `shape`.
     path : Path
     case : Case
         Of the result.
     every, frames : int, optional
-        Take every such sample and the last one, or so many, spread evenly; all by default.
+        Take every n-th sample and the last one, or this many, evenly spread; all by default.
     """
     warn_of_boards(case.structure.pattern)
     shapes = shapes_of(result, every, frames=frames)
@@ -146,7 +146,7 @@ def _cell_fields(mesh: Mesh, known: Mapping[str, Field]) -> dict[str, NDArray]:
 
 
 def _along(result: xr.Dataset, dimension: str, *rest: str) -> dict[str, NDArray]:
-    """Numbers of a result along a dimension, or its numbers and vectors for each of others."""
+    """Scalars and vectors of a result along a dimension and, if given, further ones."""
     shapes = {(dimension, *rest), (dimension, *rest, "axis")} if rest else {(dimension,)}
     return {
         str(name): each.values
@@ -166,7 +166,7 @@ def _put_steps(root: Any, moments: NDArray) -> None:
 
 
 def _put_nodes(root: Any, points: NDArray, values: Mapping[str, NDArray]) -> None:
-    """Put nodes (1 or samples, n, 3) and their fields."""
+    """Write nodes (1 or samples, n, 3) and their fields."""
     root["NumberOfPoints"] = points.shape[1:2]
     _put(root, "Points", points, root["Steps"], "PointOffsets")
     for name, field in values.items():
@@ -174,7 +174,7 @@ def _put_nodes(root: Any, points: NDArray, values: Mapping[str, NDArray]) -> Non
 
 
 def _put_cells(root: Any, mesh: Mesh, values: Mapping[str, NDArray]) -> None:
-    """Put cells, the same at all samples, and their fields (cells,) or (samples, cells)."""
+    """Write cells, constant in time, and their fields (cells,) or (samples, cells)."""
     empty = np.empty((0, 1), int)
     for kind, cells in zip(CELLS, (empty, mesh.lines, mesh.triangles, empty), strict=True):
         count, corners = cells.shape
@@ -188,7 +188,7 @@ def _put_cells(root: Any, mesh: Mesh, values: Mapping[str, NDArray]) -> None:
 
 
 def _put(root: Any, name: str, values: NDArray, steps: Any, offsets: str) -> None:
-    """Put values (1 or samples, k, ...), all samples in a row, and where each begins."""
+    """Write values (1 or samples, k, ...), all samples in sequence, and the offset of each."""
     kind = np.float32 if values.dtype.kind == "f" else np.int32
     rows = values.reshape(-1, *values.shape[2:]).astype(kind)
     chunk = (max(1, min(len(rows), max(ROWS, values.shape[1]))), *rows.shape[1:])
@@ -198,7 +198,7 @@ def _put(root: Any, name: str, values: NDArray, steps: Any, offsets: str) -> Non
 
 
 def _put_numbers(root: Any, values: Mapping[str, NDArray]) -> None:
-    """Put a number for each sample."""
+    """Write a number for each sample."""
     for name, numbers in values.items():
         root[f"FieldData/{name}"] = numbers
         root[f"Steps/FieldDataOffsets/{name}"] = np.arange(len(numbers))
