@@ -1,4 +1,4 @@
-"""What figures read from results: nodes and their directions, and the course of a path."""
+"""Shared readings of results for figures: nodes, directions, and the course of a path."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CRITICAL = {"limit": "limit point", "bifurcation": "bifurcation"}
 def check_nodes_of(
     results: Mapping[str, xr.Dataset], nodes: int | str | Sequence[int]
 ) -> list[int]:
-    """The nodes as a list, a selection by the first pattern, refused where a result lacks one."""
+    """Return nodes as a list; a selection applies to the first pattern. Refuse unknown nodes."""
     for label, result in results.items():
         nodes = nodes_of(result, nodes, repr(label) if label else "the result")
     return list(nodes)  # pyright: ignore[reportArgumentType]
@@ -41,11 +41,11 @@ def directions(
     Parameters
     ----------
     axes : str, sequence of str, or None
-        As the user gives them.
+        As given by the user.
     count : int
         Number of nodes.
     moved : iterable of ndarray, shape (samples, count, 3)
-        What is shown of each result; looked at only where no axes are given.
+        Displacements shown of each result; used only if no axes are given.
     """
     if axes is None:
         largest = np.max([np.abs(values).max(axis=0) for values in moved], axis=0)
@@ -73,7 +73,7 @@ def check_path(path: xr.Dataset, name: str) -> None:
 
 
 def critical_word(path: xr.Dataset, number: int) -> str:
-    """What a point is if it is critical, with the load factors between which that lies."""
+    """Word for a critical point; if it could not be located, with its interval of load factors."""
     word = CRITICAL.get(str(path["point"].values[number]), "")
     if is_loose(path)[number]:
         low, high = path["interval"].transpose("step", "end").values[number]
@@ -82,7 +82,7 @@ def critical_word(path: xr.Dataset, number: int) -> str:
 
 
 def is_loose(path: xr.Dataset) -> NDArray[np.bool_]:
-    """Which points of a path stand for critical ones that could not be located."""
+    """Which points of a path stand for critical points that could not be located."""
     if "interval" not in path:
         return np.zeros(path.sizes["step"], bool)
     return np.ptp(path["interval"].transpose("step", "end").values, axis=1) > 0.0
@@ -94,14 +94,14 @@ def displacements(result: xr.Dataset, dimension: str = "step") -> NDArray[np.flo
 
 
 def way(path: xr.Dataset) -> NDArray[np.float64]:
-    """How far the nodes have moved along the path, on average, at each point (m), never falling."""
+    """Mean distance (m) that the nodes have traveled up to each point, never falling."""
     motion = np.diff(displacements(path), axis=0)
     steps = np.sqrt((motion**2).sum(axis=2).mean(axis=1))
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def evenly(path: xr.Dataset, count: int) -> list[int]:
-    """Numbers of `count` points, the first and the last among them, spread evenly over the way."""
+    """Numbers of `count` points evenly spread over that distance, first and last included."""
     length = way(path)
     wanted = np.linspace(0.0, length[-1], count) if count > 1 else length[-1:]
     return np.unique(np.abs(length[:, None] - wanted).argmin(axis=0)).tolist()
@@ -116,11 +116,11 @@ class Stretch(NamedTuple):
 
 
 def stretches(path: xr.Dataset) -> list[Stretch]:
-    """Stretches of the path that are stable or not.
+    """Stable and unstable stretches of the path.
 
-    A stretch between two points is unstable where the tangent has a negative eigenvalue at either
-    of them; critical points count as the better of their sides. Where eigenvalues were not
-    counted, everything counts as stable.
+    A stretch between two points is unstable if the tangent has a negative eigenvalue at either of
+    them; critical points count as their more stable side. Without counted eigenvalues everything
+    counts as stable.
     """
     negative = path["negative_eigenvalues"].values
     stable = np.maximum(negative[:-1], negative[1:]) <= 0
@@ -136,18 +136,18 @@ def along(path: xr.Dataset, nodes: Sequence[int], direction: str) -> NDArray[np.
     """Mean displacement (m) of nodes in a direction at each point."""
     axis, sign = signed("direction", direction)
     moved = path["displacement"].sel(node=list(nodes), axis=AXES[axis])
-    return sign * moved.mean("node").values + 0.0  # no -0
+    return sign * moved.mean("node").values + 0.0  # avoid -0
 
 
 def farthest(moved: NDArray[np.float64]) -> tuple[float, str]:
-    """The largest component of displacements (..., 3), and its direction."""
+    """Largest component of displacements (..., 3), and its direction."""
     place = np.unravel_index(np.abs(moved).argmax(), moved.shape)
     extreme = float(moved[place])
     return extreme, ("-" if extreme < 0.0 else "") + AXES[place[-1]]
 
 
 def main_direction(paths: Mapping[str, xr.Dataset], nodes: Sequence[int]) -> str:
-    """The direction in which nodes move farthest."""
+    """Direction in which nodes move farthest."""
     moved = [displacements(path[["displacement"]].sel(node=list(nodes))) for path in paths.values()]
     return farthest(np.concatenate(moved))[1]
 
@@ -155,7 +155,7 @@ def main_direction(paths: Mapping[str, xr.Dataset], nodes: Sequence[int]) -> str
 def asked(
     paths: Mapping[str, xr.Dataset], nodes: int | str | Sequence[int], direction: str | None
 ) -> tuple[list[int], str]:
-    """Nodes that all paths have, and the direction, by default that in which they move farthest.
+    """Nodes that all paths have, and the direction, by default the one in which they move farthest.
 
     Raises
     ------

@@ -23,8 +23,8 @@ from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, side_by_si
 from foldyn.plots.writers import checked_file, filmed
 from foldyn.structures import Structure
 
-_TRAVELS = 0.25  # path of the center of mass, in sizes of the sheet, that is worth a line
-_WIDTH, _COLUMNS = 6.0, 2  # inches; narrow, as films cannot be scrolled on a phone
+_TRAVELS = 0.25  # shortest path of the center of mass, in sizes of the sheet, that gets a line
+_WIDTH, _COLUMNS = 6.0, 2  # inches; narrow, as films cannot scroll on a phone
 _PATH: dict[str, Any] = {"color": style.GREEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
 
 
@@ -50,7 +50,7 @@ def animate(
     Parameters
     ----------
     case_or_structure : Case or Structure
-        What moves; left out, it is the case of the result: ``animate(result, "motion.gif")``.
+        What moves; by default the case of the result: ``animate(result, "motion.gif")``.
     result : xarray.Dataset
         Its motion, ``displacement`` (time, node, axis) in m over ``time`` (s), or its equilibrium
         path, ``displacement`` (step, node, axis) with its ``load_factor``.
@@ -58,8 +58,8 @@ def animate(
         File to write, ending in .gif or .mp4. An MP4 needs ffmpeg: on the PATH, or through the
         package imageio-ffmpeg.
     frames : int
-        Number of pictures, evenly spread over the time of a motion or the way of the nodes along
-        a path (linear in between its samples).
+        Number of pictures, evenly spread over the time of a motion or the distance that the nodes
+        travel along a path (linear between samples).
     fps : int
         Pictures per second, 1 to 50 in a GIF and 1 to 60 in an MP4.
     scale : float
@@ -115,13 +115,13 @@ def animate(
 
 
 def _times(times: NDArray[np.float64], rate: float) -> list[str]:
-    """Texts for pictures of a motion: the time, and how fast it runs."""
+    """Texts for pictures of a motion: the time, and the speed of playback."""
     digits, shown = _digits(times), pace(rate * float(times[1] - times[0]))
     return [f"t = {time:.{digits}f} s, {shown}" for time in times]
 
 
 def _factors(places: NDArray[np.float64], path: xr.Dataset) -> list[str]:
-    """Texts for pictures of a path: the load factor, and whether it is unstable there."""
+    """Texts for pictures of a path: the load factor, and whether it is unstable."""
     length = way(path)
     factors = np.interp(places, length, path["load_factor"].values)
     unstable = [(length[a], length[b]) for a, b, stable in stretches(path) if not stable]
@@ -134,13 +134,13 @@ def _factors(places: NDArray[np.float64], path: xr.Dataset) -> list[str]:
 
 
 def _digits(values: NDArray[np.float64]) -> int:
-    """Digits with which texts differ from each other: equal pictures would be stored as one."""
+    """Digits that make texts differ, as equal pictures would be stored as one."""
     step = float(np.ptp(values)) / (len(values) - 1)
     return max(0, int(np.ceil(-np.log10(step)))) if step > 0.0 else 3
 
 
 def pace(seconds: float) -> str:
-    """Say how fast an animation plays that shows this many seconds of motion in a second."""
+    """Say how fast an animation plays that shows this many seconds of motion per second."""
     times = float(f"{max(seconds, 1.0 / seconds):.2g}")
     if times == 1.0:
         return "shown at real speed"
@@ -148,7 +148,7 @@ def pace(seconds: float) -> str:
 
 
 def _center_path(sheet: Sheet3D, moving: Points) -> Points | None:
-    """Return the positions (frames, 3) of a free body's center of mass, None where it stays."""
+    """Positions (frames, 3) of a free body's center of mass; None if it stays."""
     if sheet.case is None or np.asarray(sheet.case.fixed).any():
         return None
     mass = sheet.case.nodal_mass
@@ -157,7 +157,7 @@ def _center_path(sheet: Sheet3D, moving: Points) -> Points | None:
 
 
 def _draw_path(axes: Axes3D, path: Points) -> Any:
-    """Draw the path of the center of mass, and return the dot that moves on it."""
+    """Draw the path of the center of mass; return the dot that moves on it."""
     axes.plot(*path.T, **_PATH, zorder=0.7)
     (dot,) = axes.plot(*path[:1].T, "o", color=style.GREEN, markersize=4.0, zorder=9.0)
     return dot
@@ -166,10 +166,10 @@ def _draw_path(axes: Axes3D, path: Points) -> Any:
 def frame_displacements(
     sheet: Sheet3D, result: xr.Dataset, frames: int
 ) -> tuple[NDArray[np.float64], Points]:
-    """Return evenly spaced times, or places on the way of a path, and displacements (frames, n, 3).
+    """Evenly spaced times, or distances along a path, and displacements (frames, n, 3).
 
-    The way of a path is that of `plots.along`, so that shapes change evenly from picture to
-    picture, whatever the length of its steps.
+    The distance along a path is `plots.along.way`, so that shapes change evenly from picture to
+    picture, whatever the step lengths.
     """
     if "step" in result.sizes:
         check_path(result, "result")
@@ -205,15 +205,15 @@ def animate_modes(
     view: tuple[float, float] = (28.0, -60.0),
     title: str = "",
 ) -> Path:
-    """Write a GIF or an MP4 of modes that swing, one or several side by side.
+    """Write a GIF or an MP4 of oscillating modes, one or several side by side.
 
-    One period that repeats without a seam; all modes swing at the same pace, whatever their
-    frequencies, which stand below them.
+    It shows one period, which repeats seamlessly. All modes swing at the same pace; their
+    frequencies stand below them.
 
     Parameters
     ----------
     case_or_structure : Case or Structure
-        What vibrates; left out, it is the case of the modes: ``animate_modes(modes, "x.gif")``.
+        What vibrates; by default the case of the modes: ``animate_modes(modes, "x.gif")``.
     modes : xarray.Dataset
         Modes of `foldyn.modes`.
     path : path-like

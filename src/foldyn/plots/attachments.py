@@ -1,4 +1,4 @@
-"""Marks of what is attached to a sheet: springs, clamped edges, point masses."""
+"""Marks of attachments to a sheet: springs, clamped edges, point masses."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from foldyn.plots import style
 from foldyn.plots.marks import Mark
 from foldyn.plots.scene import Points, Sheet3D, View
 
-_TURNS = (4, 14)  # of a zigzag, at least and at most
-_LEAD = 0.2  # straight parts of a zigzag at its ends, as a share of its length
-_HATCHES = 8  # of a clamped edge
+_TURNS = (4, 14)  # turns of a zigzag, at least and at most
+_LEAD = 0.2  # straight ends of a zigzag, as a share of its length
+_HATCHES = 8  # hatches of a clamped edge
 
 
 def attachments(
     sheet: Sheet3D, points: Points, size: float, view: View, supports: bool, loads: bool
 ) -> list[Mark]:
-    """Marks of a case at node positions (n, 3).
+    """Marks of a case's attachments at node positions (n, 3).
 
     size : length of a support's mark, m.
     supports, loads : whether springs and clamps, and whether masses are shown.
@@ -61,7 +61,7 @@ def attachments(
 def _of_part(
     sheet: Sheet3D, points: Points, spring: Spring, place: str, size: float, view: View
 ) -> list[Points]:
-    """Zigzags of a part's springs."""
+    """Zigzags of the springs of a support."""
     axes, lines = spring.directions, []
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     for a, b in spring.ends(sheet.structure, place).tolist():
@@ -89,13 +89,13 @@ def _zigzag(start: Points, end: Points, width: float, view: View) -> Points:
 
 
 def _ground(start: Points, foot: Points, size: float, view: View) -> Points:
-    """The line on which a spring stands."""
+    """Ground line of a spring."""
     across = 0.35 * size * view.across(foot - start)
     return np.array([foot - across, foot + across])
 
 
 def _hatched(sheet: Sheet3D, points: Points, edges: Any, size: float) -> Points:
-    """Hatches outside of clamped edges."""
+    """Hatches outside clamped edges."""
     faces = {edge_of(a, b): face for face in sheet.pattern.faces for a, b in around(face)}
     lines = []
     for a, b in edges:

@@ -1,4 +1,4 @@
-"""Long motions: jumps of sweeps, bifurcation diagrams, sections, basins, exponents."""
+"""Long motions: jumps of sweeps, bifurcation diagrams, Poincare sections, basins, exponents."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _WAYS: dict[str, dict[str, Any]] = {
     "down": {"color": style.VERMILLION, "linestyle": style.DASHES[1]},
 }
 """Looks of both sweeps."""
-_MOST = 8  # attractors that the key names
+_MOST = 8  # attractors named in the legend
 _PALE = 0.55  # share of white in the color of a basin
 
 
@@ -33,15 +33,15 @@ def plot_amplitudes(result: xr.Dataset, title: str = "") -> Figure:
     Parameters
     ----------
     result : xarray.Dataset
-        Of `foldyn.bifurcation_diagram` or `foldyn.swept_sine`.
+        From `foldyn.bifurcation_diagram` or `foldyn.swept_sine`.
     title : str
         Title of the figure.
 
     Returns
     -------
     matplotlib.figure.Figure
-        A curve for each sweep; a jump is a vertical line from the amplitude before it to that
-        after it, with an arrow and its place.
+        A curve for each sweep; a jump is a vertical line from the amplitude before to the one
+        after, with an arrow and its frequency or level.
 
     Raises
     ------
@@ -72,20 +72,20 @@ def plot_amplitudes(result: xr.Dataset, title: str = "") -> Figure:
 
 
 def plot_bifurcation_diagram(diagram: xr.Dataset, title: str = "") -> Figure:
-    """Draw what the measure is once a period over the frequency, or the level, of the drive.
+    """Draw the measure once per period over the frequency, or the level, of the drive.
 
     Parameters
     ----------
     diagram : xarray.Dataset
-        Of `foldyn.bifurcation_diagram`.
+        From `foldyn.bifurcation_diagram`.
     title : str
         Title of the figure.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Dots, in the color of their sweep: one for a motion that repeats after each period of the
-        drive, two after a period doubling, a cloud for chaos.
+        Dots, in the color of their sweep: one for a motion with the drive's period, two after a
+        period doubling, a cloud for chaos.
 
     Raises
     ------
@@ -116,9 +116,9 @@ def plot_poincare_section(
     Parameters
     ----------
     section : xarray.Dataset
-        Of `foldyn.poincare_section`.
+        From `foldyn.poincare_section`.
     node : int or str
-        Number, or a selection of one vertex.
+        Node number, or a selection of one vertex.
     axis : {"x", "y", "z"}
     title : str
         Title of the figure.
@@ -158,9 +158,9 @@ def plot_basins(
     Parameters
     ----------
     basins : xarray.Dataset
-        Of `foldyn.basins` over a grid of two parameters.
+        From `foldyn.basins` over a grid of two parameters.
     x, y : str, optional
-        Which of them is along which axis, by default in their order.
+        Parameter along each axis, by default in their order.
     title : str
         Title of the figure.
 
@@ -172,7 +172,7 @@ def plot_basins(
     Raises
     ------
     InputError
-        Another result, a grid of other than two parameters, no such parameter.
+        Another result, a grid without exactly two parameters, no such parameter.
     """
     _check("basins", basins, "basins")
     names = [str(name) for name in basins["basin"].dims]
@@ -206,14 +206,14 @@ def plot_lyapunov_exponent(found: xr.Dataset, title: str = "") -> Figure:
     Parameters
     ----------
     found : xarray.Dataset
-        Of `foldyn.lyapunov_exponent`.
+        From `foldyn.lyapunov_exponent`.
     title : str
         Title of the figure.
 
     Returns
     -------
     matplotlib.figure.Figure
-        The mean until each time, and a band of two standard errors about the last one.
+        Running mean over time, and a band of two standard errors about its last value.
 
     Raises
     ------
@@ -234,7 +234,7 @@ def plot_lyapunov_exponent(found: xr.Dataset, title: str = "") -> Figure:
 
 
 def _with_jumps(one: xr.Dataset, along: str, way: str) -> tuple[NDArray, NDArray]:
-    """A curve of amplitudes; that of a stepped sine goes up to its jumps, and is broken there."""
+    """Curve of amplitudes; for a stepped sine it runs up to its jumps and is broken there."""
     x = np.broadcast_to(one[along].values, one["amplitude"].shape)
     y = one["amplitude"].values
     if one.attrs["foldyn_result"] != "bifurcation_diagram":
@@ -255,7 +255,7 @@ def _check(field: str, result: xr.Dataset, *kinds: str) -> None:
 
 
 def _along(result: xr.Dataset) -> str:
-    """What is swept."""
+    """Name of the swept parameter."""
     return "level" if "level" in result.coords else "frequency"
 
 
@@ -273,6 +273,6 @@ def _pale(number: int) -> tuple[float, float, float]:
 
 
 def _periods(basins: xr.Dataset, number: int) -> str:
-    """What is told of an attractor: that it is not of the drive's own period."""
+    """Remark on an attractor whose period is a multiple of the drive's."""
     count = int(basins["periods"].values[number])
     return f" (repeats after {count} periods)" if count > 1 else ""

@@ -25,20 +25,20 @@ def plot_bands(bands: xr.Dataset, gaps: bool = True, *, title: str = "") -> Figu
     bands : xarray.Dataset
         From `foldyn.bands`, along a path (`UnitCell.path`) or along phases of one period.
     gaps : bool
-        Whether full gaps are shaded.
+        Whether to shade full gaps.
     title : str
         Title of the figure.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Frequencies over the phase, a line for each band; with the share of motion along z as its
-        color, if the bands have a polarization.
+        Frequencies over the phase, a line for each band, colored by the share of motion along z if
+        the bands have a polarization.
 
     Raises
     ------
     InputError
-        Not what `foldyn.bands` returns, or phases of a grid, which lie on no path.
+        Not a result of `foldyn.bands`, or phases of a grid, which lie on no path.
     """
     frequencies_of(bands)
     along, label = _along(bands)
@@ -73,7 +73,7 @@ def plot_bands(bands: xr.Dataset, gaps: bool = True, *, title: str = "") -> Figu
 def plot_iso_frequency(
     bands: xr.Dataset, band: int = 1, *, levels: int = 12, title: str = ""
 ) -> Figure:
-    """Draw lines of one frequency over the Brillouin zone of a sheet.
+    """Draw contours of one band's frequency over the Brillouin zone of a sheet.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def plot_iso_frequency(
     band : int
         Number of the band, from 1, in the order of frequency.
     levels : int
-        How many lines.
+        Number of contours.
     title : str
         Title of the figure.
 
@@ -95,7 +95,7 @@ def plot_iso_frequency(
     Raises
     ------
     InputError
-        Phases that are no grid, or a band that is not there.
+        Phases that are not a grid, or no such band.
     """
     frequency = frequencies_of(bands)
     shape = np.atleast_1d(bands.attrs.get("grid", ()))
@@ -131,7 +131,7 @@ def _colored(along: np.ndarray, values: np.ndarray, shares: np.ndarray) -> LineC
 
 
 def _closed(values: np.ndarray) -> np.ndarray:
-    """Values (n, m) of a grid with those at pi, which are those at -pi."""
+    """Values (n, m) of a grid, closed by repeating the values at -pi at pi."""
     values = np.concatenate([values, values[:1]])
     return np.concatenate([values, values[:, :1]], axis=1)
 

@@ -1,4 +1,4 @@
-"""Picture of thick panels: the boards that a pattern's panels stand for, in their thickness."""
+"""Picture of thick panels as boards with their thickness."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ def draw_boards(
     view: tuple[float, float] = (28.0, -60.0),
     title: str = "",
 ) -> Figure:
-    """Draw thick panels as boards, with the lines on which they are hinged.
+    """Draw thick panels as boards, with their hinge lines.
 
     Boards move with their panels as rigid bodies, by least squares of the corners' distances.
 
     Parameters
     ----------
     case_or_structure : Case, Structure or Pattern, or a result with its case
-        Of a pattern made by `thicken`.
+        With a pattern made by `thicken`.
     displacement : array_like, shape (n, 3) or (k, n, 3), optional
         Node displacements (m) of one state, or of several side by side; at rest by default.
     captions : sequence of str, optional
-        What stands below each state.
+        Text below each state.
     view : tuple of float
         Elevation above the xy plane and azimuth around z (degrees).
     title : str
@@ -77,7 +77,7 @@ def draw_boards(
 
 
 def _solid(pattern: Pattern) -> Sheet3D:
-    """Boards at rest: the pattern's vertices, for the hinge lines, then the corners of each."""
+    """Points of the boards at rest: the pattern's vertices, for hinge lines, then all corners."""
     boards = cast(Boards, pattern.boards)
     nodes, triangles, edges = [pattern.vertices], [], []
     first = len(pattern.vertices)
@@ -104,7 +104,7 @@ def _rows(rows: list) -> Indices:
 
 
 def _placed(solid: Sheet3D, pattern: Pattern, moved: Points) -> Points:
-    """Nodes of the boards where the vertices have moved to (nv, 3)."""
+    """Positions of the boards' points after the vertices have moved to (nv, 3)."""
     out = solid.nodes.copy()
     out[: len(moved)] = moved
     first = len(moved)

@@ -26,7 +26,7 @@ def figure_of(
     legend: int = 3,
     **grid: Any,
 ) -> Figure:
-    """Draw charts in rows of so many, with one legend below them.
+    """Draw charts in rows of `columns`, with one legend below them.
 
     Parameters
     ----------
@@ -38,9 +38,9 @@ def figure_of(
         Title of the figure.
     columns : int
     legend : int
-        Columns of the legend at most; 0: there is none.
+        Most columns of the legend; 0 draws none.
     **grid
-        Of `Figure.subplots`: "sharex", "sharey".
+        Arguments of `Figure.subplots`: "sharex", "sharey".
     """
     figure = style.new_figure(*size, title)
     rows = -(-len(charts) // columns)
@@ -61,7 +61,7 @@ def figure_of(
 
 
 def draw(axes: Axes, chart: Chart, keys: dict[str, Line2D]) -> None:
-    """Draw a chart's curves into axes; keys are the lines so far by name, and get further ones."""
+    """Draw a chart's curves into axes; `keys` holds the lines so far by name, and is extended."""
     alone = not any(curve.dots for curve in chart.curves)
     for curve in chart.curves:
         names = list(keys)

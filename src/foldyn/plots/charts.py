@@ -1,4 +1,4 @@
-"""Charts: curves over their axes, which figures draw for papers and pages for their readers."""
+"""Charts: curves over their axes, drawn by figures for papers and by pages."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ class Curve:
     Parameters
     ----------
     name : str
-        For the key below the chart.
+        Name in the legend below the chart.
     x, y : array_like, shape (m,)
-        Places along the axes; a curve may turn back. What is not finite is left out.
+        Coordinates; a curve may turn back. Points that are not finite are left out.
     dots : bool
-        Whether it is drawn as dots, as measured values are, and not as a line.
+        Whether to draw dots, as for measured values, instead of a line.
     spread : array_like, optional
-        How far y may be off: figures have bars about dots, and a band about a line.
+        Uncertainty of y: figures draw bars about dots, or a band about a line.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Curve:
     spread: ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        """Check that both have one length."""
+        """Check that x and y have one length."""
         if np.shape(self.x) != np.shape(self.y) or np.ndim(self.x) != 1:
             raise InputError(
                 f"curve {self.name!r}: x {np.shape(self.x)} and y {np.shape(self.y)} must be lists "
@@ -48,7 +48,7 @@ class Curve:
             )
 
     def about(self) -> dict[str, Any]:
-        """What a page's script reads."""
+        """Description for a page's script."""
         x, y = np.asarray(self.x, float), np.asarray(self.y, float)
         every = slice(None, None, -(-len(x) // MOST_POINTS) or 1)
         kept = (np.isfinite(x) & np.isfinite(y))[every]
@@ -70,11 +70,11 @@ class Chart:
     note : str
         Written below it.
     reach : float
-        The vertical axis goes from -reach to reach; 0: as far as the curves do.
+        The vertical axis spans -reach to reach; 0 fits the curves.
     words : sequence of str
-        What the numbers 0, 1, 2, ... along the horizontal axis stand for.
+        Labels of the numbers 0, 1, 2, ... along the horizontal axis.
     zero : bool
-        Whether a figure shows where y is 0.
+        Whether a figure shows the line y = 0.
     by_ratio : bool
         Whether the horizontal axis of a figure is logarithmic.
     """
@@ -90,7 +90,7 @@ class Chart:
     by_ratio: bool = False
 
     def about(self) -> dict[str, Any]:
-        """What a page's script reads."""
+        """Description for a page's script."""
         return {
             "xlabel": self.xlabel, "ylabel": self.ylabel, "title": self.title,
             "reach": self.reach, "words": list(self.words),
@@ -99,5 +99,5 @@ class Chart:
 
 
 def _rounded(values: np.ndarray) -> list[float]:
-    """Numbers with as many digits as a reader sees."""
+    """Round numbers to the digits that a reader can see."""
     return [float(f"{value:.{DIGITS}g}") for value in values.tolist()]

@@ -1,4 +1,4 @@
-"""Dashpots in pictures of a structure: a cup and a piston, to another node or to the ground."""
+"""Dashpots in pictures: a cup and a piston, to another node or to the ground."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from foldyn.cases.directions import unit_vector
 from foldyn.mechanics.springs import GROUND
 from foldyn.plots.scene import Points, View
 
-CUP = (-0.5, 0.5)  # beginning and end of the cup along the line, in lengths of it
-PISTON = 0.1  # where the piston is
-SHARE = 0.4  # of the line that the cup takes at most
-HALF = 0.45  # width of the cup over twice its length
-REACH = 1.8  # lengths of the cup from a node to the ground
+CUP = (-0.5, 0.5)  # start and end of the cup along the line, relative to its length
+PISTON = 0.1  # position of the piston
+SHARE = 0.4  # largest part of the line that the cup takes
+HALF = 0.45  # width of the cup, relative to twice its length
+REACH = 1.8  # length of the line from a node to the ground, in cups
 
 
 def dashpot_lines(case: Case, points: Points, size: float, view: View) -> Points:
@@ -31,13 +31,13 @@ def dashpot_lines(case: Case, points: Points, size: float, view: View) -> Points
 
 
 def describe_dashpot(dashpot: Dashpot) -> str:
-    """Say in words how strong a dashpot is, and what it ties."""
+    """Describe a dashpot in words: how strong it is, and what it connects."""
     to = "to the ground" if dashpot.between is None else "between nodes"
     return f"dashpot {dashpot.coefficient:.4g} N s/m {to}"
 
 
 def _ground(dashpot: Dashpot, node: Points, size: float) -> Points:
-    """Where the ground stands: along the direction, or below."""
+    """Position of the ground: along the direction, or below."""
     down = np.array([0.0, 0.0, -1.0])
     along = down if dashpot.direction is None else unit_vector(dashpot.direction)
     return node + REACH * size * along

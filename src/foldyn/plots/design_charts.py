@@ -1,4 +1,4 @@
-"""Charts of a search for a design: objective and violation over the evaluations, and slopes."""
+"""Charts of a design search: objective and violation over the evaluations, and slopes."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def convergence_charts(history: xr.Dataset) -> list[Chart]:
 
 
 def slope_chart(slopes: Mapping[str, ArrayLike], objective: str) -> Chart:
-    """How an objective changes over the whole range of each parameter, arrays by their norms."""
+    """Change of an objective over the whole range of each parameter; for arrays the norm."""
     names: Sequence[str] = list(slopes)
     sizes = np.array(
         [float(np.linalg.norm(one)) if np.ndim(one) else one for one in slopes.values()]

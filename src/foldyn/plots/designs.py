@@ -1,4 +1,4 @@
-"""Figures of a search for a design: how it went, and what its entries matter on the sheet."""
+"""Figures of a design search: its convergence, and the sensitivity of a sheet's entries."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from foldyn.plots.visibility import split_edges
 from foldyn.values import choice, of_kind
 
 COLORS = "coolwarm"
-WIDE, HIDDEN = 3.5, 0.25  # points, and opacity behind panels; of colored creases
-ROWS = 4  # of a legend: room for the color bar
+WIDE, HIDDEN = 3.5, 0.25  # widths of colored creases, points, and their opacity behind panels
+ROWS = 4  # height of a legend: room for the color bar
 
 
 def plot_convergence(history: xr.Dataset) -> Figure:
@@ -32,7 +32,7 @@ def plot_convergence(history: xr.Dataset) -> Figure:
     Parameters
     ----------
     history : xarray.Dataset
-        Of a `foldyn.Design`.
+        History of a `foldyn.Design`.
     """
     of_kind("history", history, xr.Dataset)
     charts = convergence_charts(history)
@@ -48,7 +48,7 @@ def draw_sensitivity(
     view: tuple[float, float] = (28.0, -60.0),
     title: str = "",
 ) -> Figure:
-    """Draw a sheet with a color for each crease or panel, as by the gradient of a frequency.
+    """Color each crease or panel of a sheet, for example by the gradient of a frequency.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def draw_sensitivity(
     label : str
         Title of the color bar, with its unit.
     on : {"crease", "panel"}, optional
-        What is colored; by default what there are so many of, creases first.
+        What to color; by default whichever matches the number of values, creases first.
     view : tuple of float
         Elevation above the xy plane and azimuth around z (degrees).
     title : str
@@ -70,7 +70,7 @@ def draw_sensitivity(
     Raises
     ------
     InputError
-        There is another number of values.
+        The number of values does not match.
     """
     sheet, sight = Sheet3D.of(case_or_structure), View(*view)
     shown = np.asarray(values, float)
@@ -102,7 +102,7 @@ def draw_sensitivity(
 
 
 def _color_creases(axes: Any, sheet: Sheet3D, view: View, colors: NDArray) -> None:
-    """Creases in colors of their own, pale where a panel hides them."""
+    """Draw creases in their own colors, pale if a panel hides them."""
     for crease, color in zip(sheet.edges, colors, strict=False):
         seen, hidden = split_edges(crease[None], sheet.nodes, sheet.triangles, view, sheet.size)
         scene.add_segments(axes, seen, color, WIDE, zorder=3.0)

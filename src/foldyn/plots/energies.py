@@ -69,7 +69,7 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     Raises
     ------
     InputError
-        Where an energy is missing from the trajectory.
+        An energy is missing from the trajectory.
     """
     strain = {
         part: f"strain, {strain_name(part)}" for part in parts_of(alone("trajectory", trajectory))
@@ -102,7 +102,7 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
 
 
 def _table(trajectory: xr.Dataset) -> NDArray[np.float64]:
-    """Return the energies (J) as the audit has them, a column each."""
+    """Return the energies (J) as in the audit, one column each."""
     names = audit.audited(parts_of(trajectory), audit.AIR in trajectory)
     return np.column_stack([trajectory[name].values for name in names])
 
@@ -114,18 +114,18 @@ def plot_path_energies(
     direction: str | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw the parts of the strain energy along a path, stacked: see `energy_shares`.
+    """Draw the parts of the strain energy along a path, stacked; see `energy_shares`.
 
     Parameters
     ----------
     path : xarray.Dataset
         A path of `foldyn.trace`.
     nodes : int, sequence of int, or str, optional
-        Nodes, or a selection ("xmax"), whose mean displacement is the horizontal axis, if it only
-        grows along the path. Without them it is the load factor or, where this turns, the mean
-        distance that the nodes have traveled.
+        Nodes, or a selection ("xmax"), whose mean displacement is the horizontal axis; it must grow
+        monotonically along the path. By default the axis is the load factor or, if that turns back,
+        the mean distance that the nodes have traveled.
     direction : {"x", "y", "z", "-x", "-y", "-z"}, optional
-        Direction of that displacement; by default that in which the nodes move farthest.
+        Direction of that displacement; by default the one in which the nodes move farthest.
     title : str
         Title of the figure.
 
@@ -168,7 +168,7 @@ def plot_path_energies(
 def _abscissa(
     path: xr.Dataset, nodes: int | str | Sequence[int] | None, direction: str | None
 ) -> tuple[NDArray[np.float64], str]:
-    """Return a quantity that only grows along the path, and its name."""
+    """Return a quantity that grows monotonically along the path, and its name."""
     if nodes is not None:
         numbers, direction = asked({"path": path}, nodes, direction)
         moved = along(path, numbers, direction)

@@ -1,4 +1,4 @@
-"""Models beside the shell: errors of frequencies and the likeness of shapes, over frequency."""
+"""Models against the shell: errors of frequencies and likeness of shapes, over frequency."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from foldyn.linear.matched import LEAST
 from foldyn.plots import style
 from foldyn.plots.modes import hertz
 
-NEAR = 0.05  # errors that are shaded as small
-MOST = 1.0  # errors beyond that are drawn at the edge
-WIDE = 12.0  # ratio of frequencies from which their axis is logarithmic
+NEAR = 0.05  # errors shaded as small
+MOST = 1.0  # larger errors are drawn at the edge
+WIDE = 12.0  # largest ratio of frequencies on a linear axis
 MARKERS = "os^DvPX<>*"
 
 
@@ -25,16 +25,16 @@ def plot_fidelity(fidelity: Fidelity, title: str = "") -> Figure:
     Parameters
     ----------
     fidelity : Fidelity
-        Of `foldyn.fidelity`.
+        From `foldyn.fidelity`.
     title : str
         Title of the figure.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Above, the error of each model for each mode, 5 % shaded, what lies beyond 100 % as an arrow
-        at the edge; below, its MAC, and shaded where modes are lost. The dashed line is 0.6 of the
-        plate frequency, where modes become those of plates.
+        Above, the error of each model for each mode, with 5 % shaded and errors beyond 100 % as
+        arrows at the edge; below, the MAC, with the range of lost modes shaded. The dashed line
+        marks 0.6 of the plate frequency, above which panels vibrate as plates.
 
     Raises
     ------
@@ -85,12 +85,12 @@ def _named(model: str) -> str:
 
 
 def _note(axes: Axes, text: str) -> None:
-    """Write into the shaded part at the bottom."""
+    """Write a note into the shaded part at the bottom."""
     axes.text(0.006, 0.06, text, transform=axes.transAxes, ha="left", va="bottom", **style.FINE)
 
 
 def _along(upper: Axes, lower: Axes, frequency: np.ndarray, limit: float) -> None:
-    """Set the axis of frequencies: from zero, or logarithmic where they span more than a decade."""
+    """Set the frequency axis: from zero, or logarithmic for more than a decade."""
     low, high = float(frequency[0]), float(frequency[-1])
     if high > WIDE * low:
         for axes in (upper, lower):

@@ -1,4 +1,4 @@
-"""Pictures of a pattern that folds: states side by side, and an animation."""
+"""Pictures of a folding pattern: states side by side, and an animation."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ def draw_folding(
     view: tuple[float, float] = (28.0, -60.0),
     title: str = "",
 ) -> Figure:
-    """Draw a pattern in states on its way, over the first one in gray.
+    """Draw states of a folding side by side, over the first one in gray.
 
     Parameters
     ----------
     folding : Folding
-        Of `foldyn.fold`.
+        From `foldyn.fold`.
     states : int or sequence of int
-        How many, spread evenly over the steps with the first and the last among them; or their
-        numbers, negative ones from the end.
+        How many, evenly spread over the steps including the first and the last; or their numbers,
+        negative ones from the end.
     view : tuple of float
         Elevation above the xy plane and azimuth around z (degrees).
     title : str
@@ -81,12 +81,12 @@ def animate_folding(
     Parameters
     ----------
     folding : Folding
-        Of `foldyn.fold`.
+        From `foldyn.fold`.
     path : path-like
         File to write, ending in .gif or .mp4. An MP4 needs ffmpeg: on the PATH, or through the
         package imageio-ffmpeg.
     frames : int
-        Number of pictures, evenly spread over the steps, straight in between.
+        Number of pictures, evenly spread over the steps, linear between them.
     fps : int
         Pictures per second, 1 to 50 in a GIF and 1 to 60 in an MP4.
     view, title
@@ -136,7 +136,7 @@ def _sheet(folding: Folding, nodes: NDArray) -> Sheet3D:
 
 
 def _caption(folding: Folding, number: int) -> str:
-    """Text below a state: how far its creases have turned."""
+    """Text below a state: how far its creases are folded."""
     turned = np.abs(np.degrees(folding.path["fold_angle"].values[number]))
     letters = np.array(folding.pattern.assignments)
     folded = turned[(letters == "M") | (letters == "V")]

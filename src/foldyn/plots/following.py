@@ -1,4 +1,4 @@
-"""Loads that follow the sheet, as pictures show them: pressure by panels, moments by creases."""
+"""Loads that follow the sheet: pressure on panels and moments of creases, as pictures show them."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from foldyn.cases.regions import resolve_panels
 if TYPE_CHECKING:
     from foldyn.plots.scene import Points
 
-STEPS = 12  # of an arc
-NEAR, FAR = 0.15, 1.0  # rad, from a panel to the ends of an arc, at most
+STEPS = 12  # radius of an arc
+NEAR, FAR = 0.15, 1.0  # rad, largest angle from a panel to the end of an arc
 
 
 class Share(NamedTuple):
-    """What acts on some panels (Pa, K) or creases (N m), with its history."""
+    """A load on some panels (Pa, K) or creases (N m), with its history."""
 
     numbers: NDArray[np.int64]
     value: NDArray[np.float64]
@@ -27,7 +27,7 @@ class Share(NamedTuple):
 
 
 def on_panels(case: Case, kind: type[Pressure] | type[Temperature]) -> list[Share]:
-    """Pressure (Pa) or changes of temperature (K) of panels, one for each load of a kind."""
+    """Pressure (Pa) or temperature changes (K) of panels, one for each load of a kind."""
     structure, found = case.structure, []
     for place, load in case.loads_of(kind):
         triangles = resolve_panels(structure, load.panels, f"{place}.panels")
@@ -47,13 +47,13 @@ def moments(case: Case) -> list[Share]:
 
 
 def panel_middles(structure: Any, points: Points, share: Share) -> Points:
-    """Middles (k, 3) of panels, by their corners."""
+    """Mean corners (k, 3) of panels."""
     faces = structure.pattern.faces
     return np.array([points[list(faces[panel])].mean(axis=0) for panel in share.numbers])
 
 
 def panel_arrows(case: Case, points: Points, share: Share) -> tuple[Points, Points]:
-    """Middles of panels (k, 3) and the vectors (k, 3), Pa, of the pressure there."""
+    """Mean corners of panels (k, 3) and pressure vectors (k, 3), Pa, there."""
     structure = case.structure
     middles, vectors = [], []
     for panel, pressure in zip(share.numbers, share.value, strict=True):
@@ -69,8 +69,8 @@ def panel_arrows(case: Case, points: Points, share: Share) -> tuple[Points, Poin
 def crease_arcs(case: Case, points: Points, share: Share, radius: float) -> Points:
     """Arcs (m, STEPS, 3) about the middles of creases, two for each, that end at a head.
 
-    They lie on the front. Those of a positive moment point towards the panels, which it opens;
-    those of a negative one away from them.
+    They lie on the front. For a positive moment, which opens the crease, they point towards the
+    panels; for a negative one, away from them.
     """
     pieces, arcs = case.structure.body.sheet.fold_hinges(), []
     for crease, moment in zip(share.numbers, share.value, strict=True):

@@ -1,4 +1,4 @@
-"""Frequency responses: magnitude with its peaks, phase, and coherence where there is one."""
+"""Frequency responses: magnitude with peaks, phase, and coherence if available."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from foldyn.plots.modes import hertz
 from foldyn.plots.readings import along_drive, unit_of
 from foldyn.values import number
 
-_APART = 0.07  # of the frequency axis: peaks nearer than that share one label
-_FEW = 60  # frequencies that are drawn as dots, too
-_DECADES = 5.0  # below the highest value that the magnitude shows at least
+_APART = 0.07  # of the frequency axis: peaks closer than that share one label
+_FEW = 60  # number of frequencies up to which they are drawn as dots too
+_DECADES = 5.0  # least range of the magnitude axis below its highest value
 
 
 def plot_frf(
@@ -48,10 +48,10 @@ def plot_frf(
     nodes : int, sequence of int, or str
         Nodes to show, a curve each; a selection ("xmax") means vertices of the pattern.
     axes : str, sequence of str, or None
-        Direction shown: one of "x", "y", "z", "-x", "-y", "-z" for all nodes, or one for each
-        node. None: the axis along which each node responds most, in the direction of the drive.
+        Direction shown: one of "x", "y", "z", "-x", "-y", "-z" for all nodes, or one for each node.
+        None means the axis along which each node responds most, in the direction of the drive.
     quantity : {"receptance", "mobility", "accelerance"}, optional
-        What is drawn of a response to forces; by default the receptance. A response to a moving
+        Quantity drawn of a response to forces; by default the receptance. A response to a moving
         base is drawn as transmissibility.
     prominence : float, optional
         Which peaks are marked; see `foldyn.linear.peaks_of`.
@@ -158,14 +158,14 @@ def phase_line(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Frequencies and phases (degrees, -180 to 180), broken by NaN where they jump around."""
     degrees = np.degrees(np.angle(np.where(values == 0.0, np.nan, values)))
-    # Without damping the phase is -180 or 180 by rounding: one of them.
+    # Without damping, rounding makes the phase -180 or 180: use one of them.
     degrees = np.where(degrees > 180.0 - 1e-6, -180.0, degrees)
     jumps = np.flatnonzero(np.abs(np.diff(degrees)) > 180.0) + 1
     return np.insert(frequency, jumps, frequency[jumps]), np.insert(degrees, jumps, np.nan)
 
 
 def _label(curve: Curve, models: bool, nodes: bool, axes: bool) -> str:
-    """Legend entry: what tells a curve from the others."""
+    """Legend entry: whatever distinguishes a curve from the others."""
     node = f"node {curve.node}" + (f" along {curve.axis}" if axes else "")
     parts = [*([curve.label] if models else []), *([node] if nodes or axes else [])]
     return ", ".join(parts) or "response"
@@ -203,7 +203,7 @@ def _set_axes(rows: NDArray, curves: list[Curve]) -> None:
 
 
 def _label_peaks(axes: Axes, peaks: NDArray[np.float64]) -> None:
-    """Write frequencies above the peaks, the highest first, where none is written nearby."""
+    """Write frequencies above the peaks, highest first, unless another label is near."""
     low, high = axes.get_xlim()
     written: list[float] = []
     for frequency, height in peaks[np.argsort(-peaks[:, 1], kind="stable")].tolist():

@@ -1,4 +1,4 @@
-"""What figures accept: results alone or by label, and a case or what has one."""
+"""Arguments of figures: results alone or by label, and a case or an object that has one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ R = TypeVar("R", covariant=True)
 
 
 def by_label(field: str, results: xr.Dataset | Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
-    """Results by their labels; one that is given alone has none."""
+    """Results by label; a single result has the label ""."""
     if isinstance(results, xr.Dataset):
         return {"": results}
     if not isinstance(results, Mapping) or not results:
@@ -30,14 +30,14 @@ def by_label(field: str, results: xr.Dataset | Mapping[str, xr.Dataset]) -> dict
 
 
 def alone(field: str, result: Any) -> xr.Dataset:
-    """A result, refused where it is none."""
+    """Return a result; refuse anything else."""
     if not isinstance(result, xr.Dataset):
         raise InputError(f" = {show(result)}: give a result, as fd.load returns it", field)
     return result
 
 
 class OfResult(Protocol[P, R]):
-    """A figure of a result, whose case may be left out."""
+    """A figure of a result, whose case may be omitted."""
 
     @overload
     def __call__(
@@ -52,14 +52,14 @@ class OfResult(Protocol[P, R]):
 def case_from_result(
     draw: Callable[Concatenate[Case | Structure, xr.Dataset, P], R],
 ) -> OfResult[P, R]:
-    """Let a figure take the case from its result where only that is given."""
+    """Make a figure take the case from its result if no case is given."""
     case, result, *others = signature(draw).parameters
 
     @wraps(draw)
     def drawn(*given: Any, **named: Any) -> Any:
         first = given[0] if given else named.get(result)
         if isinstance(first, xr.Dataset) and case not in named:
-            named |= zip(others, given[1:], strict=False)  # they stand one place further on
+            named |= zip(others, given[1:], strict=False)  # positional arguments move up by one
             given = (first, first) if given else (first,)
         return draw(*given, **named)
 

@@ -54,7 +54,7 @@ def plot_history(
     title : str
         Title of the figure.
     window, detrend : str or None
-        Passed to `foldyn.signals.spectrum`; by default the record is transformed as it is.
+        Passed to `foldyn.signals.spectrum`; by default the record is transformed unchanged.
 
     Returns
     -------
@@ -120,7 +120,7 @@ def plot_history(
 def _reach(
     frequencies: NDArray[np.float64], amplitude: NDArray[np.float64], largest: float
 ) -> float:
-    """A round number (Hz) above the frequencies at which an amplitude can be seen; or 0."""
+    """A round number (Hz) above the frequencies with a visible amplitude; or 0."""
     visible = (amplitude >= VISIBLE * largest) & (amplitude > 0.0) & (frequencies > 0.0)
     seen = np.flatnonzero(visible)
     if not seen.size:

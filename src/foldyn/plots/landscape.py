@@ -1,4 +1,4 @@
-"""The energy landscape along a path: energy and force over the stroke, and states without force."""
+"""The energy landscape of a path: energy and force over the stroke, and force-free states."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MARKS: dict[bool, dict[str, Any]] = {
 
 
 def plot_landscape(landscape: Landscape, title: str = "") -> Figure:
-    """Draw energy and force over the stroke of a path, with its states without force.
+    """Draw energy and force over the stroke of a path, with its force-free states.
 
     Stable states are dots, unstable ones (the tops of barriers) rings; ranges of the stroke in
     which the force falls, of negative stiffness, are shaded.
@@ -31,7 +31,7 @@ def plot_landscape(landscape: Landscape, title: str = "") -> Figure:
     Parameters
     ----------
     landscape : Landscape
-        Of `foldyn.landscape`.
+        From `foldyn.landscape`.
     title : str
         Title of the figure.
 
@@ -44,7 +44,7 @@ def plot_landscape(landscape: Landscape, title: str = "") -> Figure:
     Raises
     ------
     InputError
-        Something else.
+        Not a landscape.
 
     Examples
     --------
@@ -79,18 +79,18 @@ def plot_landscape(landscape: Landscape, title: str = "") -> Figure:
 
 
 def with_states(landscape: Landscape) -> tuple[NDArray, NDArray, NDArray]:
-    """Stroke (m), force (N) and energy (J) at the points of the path and, between, its states."""
+    """Stroke (m), force (N) and energy (J) at points of the path, with the states in between."""
     columns = np.stack([landscape.stroke, landscape.force, landscape.energy], axis=1)
     force = landscape.force
     between = np.flatnonzero(force[:-1] * force[1:] < 0.0)
-    after = np.sort([*between + 1, *np.flatnonzero(force == 0.0)])  # of each state, in their order
+    after = np.sort([*between + 1, *np.flatnonzero(force == 0.0)])  # index of each state, in order
     rows = [[state.stroke, 0.0, state.energy] for state in landscape.states]
     kept = [row for row, place in zip(rows, after, strict=True) if force[place] != 0.0]
     return tuple(np.insert(columns, between + 1, np.reshape(kept, (-1, 3)), axis=0).T)
 
 
 def barriers(landscape: Landscape) -> str:
-    """The barriers between neighboring stable states, in words; "" where there are none."""
+    """Barriers between neighboring stable states, in words; "" if there are none."""
     count = len(landscape.stable)
     pairs = [(k, k + 1) for k in range(count - 1)]
     texts = [f"{landscape.barrier(a, b):.3g} J there, {landscape.barrier(b, a):.3g} J back"

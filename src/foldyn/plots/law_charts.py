@@ -16,19 +16,19 @@ from foldyn.structures.discretized import HingeKind
 
 MOST_CURVES = 4
 POINTS = 359
-# A law may grow without bound towards 0 and 360 degrees: the height of the frame is taken from
-# what lies between these.
+# A law may grow without bound towards 0 and 360 degrees: the range between them sets the height of
+# the frame.
 _FRAMED = (20.0, 340.0)
 
 
 def law_charts(
     structure: Structure | Shell, stretch: tuple[float, float] = (0.8, 1.2)
 ) -> list[Chart]:
-    """Curves of the laws of a structure, a chart for each kind of element that it has.
+    """Curves of a structure's laws, a chart for each kind of element.
 
-    Hinges of equal stiffness and rest angle share a curve; of each kind at most four different
-    curves are shown, those of the most hinges. Moments (N m) are those of whole creases, dihedrals
-    in degrees, stresses in Pa. The last curve of a chart are the states at rest.
+    Hinges of equal stiffness and rest angle share a curve; each chart shows at most four curves,
+    for the largest groups of hinges. Moments (N m) are of whole creases, dihedrals in degrees,
+    stresses in Pa. The last curve of a chart marks the states at rest.
     """
     charts = [_hinges(kind) for kind in structure.hinge_kinds if len(kind.nodes)]
     if structure.bar_law is not None:
@@ -75,7 +75,7 @@ def _hinges(hinges: HingeKind) -> Chart:
 
 
 def _distinct(stiffness: NDArray, rest: NDArray) -> list[tuple[int, int]]:
-    """Return (first index, count) of hinges with equal stiffness and rest, most frequent first."""
+    """First index and count of hinges with equal stiffness and rest angle, most frequent first."""
     looks = [f"{k:.6e} {theta0:.6f}" for k, theta0 in zip(stiffness, rest, strict=True)]
     first = {look: k for k, look in reversed(list(enumerate(looks)))}
     return [(first[look], count) for look, count in Counter(looks).most_common()]

@@ -23,16 +23,15 @@ def plot_laws(
     *,
     title: str = "",
 ) -> Figure:
-    """Draw moment against dihedral of folds and bends, and stress against stretch of bars.
+    """Draw moment over dihedral of folds and bends, and stress over stretch of bars.
 
-    A shell has folds alone. Hinges of equal stiffness and rest angle share a curve; of each kind
-    at most four different curves are shown, those of the most hinges. A dot and a dotted line mark
-    the rest angle.
+    A shell has only folds. Hinges of equal stiffness and rest angle share a curve; each kind has at
+    most four curves, for the largest groups of hinges. A dot and a dotted line mark the rest angle.
 
     Parameters
     ----------
     structure : Structure or Shell, or a Case or result with one
-        Its laws, stiffnesses and rest angles are drawn as they are used, those of whole creases.
+        Its laws, stiffnesses and rest angles are drawn as used, for whole creases.
     stretch : tuple of float
         Range of the bars' stretch.
     title : str
@@ -46,7 +45,7 @@ def plot_laws(
     Raises
     ------
     InputError
-        Where the stretches are not positive and increasing, or there is nothing with laws.
+        The stretches are not positive and increasing, or there are no laws.
     """
     low, high = stretch
     if not (0.0 < low < high < np.inf):
@@ -74,7 +73,7 @@ def plot_laws(
 
 
 def _legend_below(axes: Axes, count: int, note: str) -> None:
-    """Write what the first curves are."""
+    """Write a legend for the first curves."""
     axes.legend(
         handles=axes.get_lines()[:count],
         loc="upper left",

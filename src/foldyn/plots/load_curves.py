@@ -1,4 +1,4 @@
-"""Loads of a case and the motions it imposes as curves over time, and in words."""
+"""Loads and imposed motions of a case as curves over time, and in words."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _MOST_CURVES = 4
 
 
 def load_charts(case: Case, start: float, duration: float) -> list[Chart]:
-    """Curves of all loads and imposed motions over time (s), a chart for each of their kinds.
+    """Curves of all loads and imposed motions over time (s), a chart for each kind.
 
-    Forces are the largest at a node, pressures, temperatures and moments the largest of their
-    panels or creases.
+    A curve shows the largest force at a node, or the largest pressure, temperature or moment among
+    the panels or creases.
     """
     time = np.linspace(start, start + duration, POINTS)
 
@@ -111,7 +111,7 @@ def _rest_angles(case: Case) -> list[tuple[float, str, Any, float]]:
 
 
 def _some(groups: dict[K, list[int]]) -> Iterator[tuple[K, list[int], str]]:
-    """The first groups; the last of them says how many are left out."""
+    """The first groups; the last one says how many are left out."""
     hidden = len(groups) - _MOST_CURVES
     for k, (key, numbers) in enumerate(list(groups.items())[:_MOST_CURVES], 1):
         last = hidden > 0 and k == _MOST_CURVES
@@ -119,7 +119,7 @@ def _some(groups: dict[K, list[int]]) -> Iterator[tuple[K, list[int], str]]:
 
 
 def base_vectors(case: Case, vectors: np.ndarray) -> np.ndarray:
-    """Displacements of a base (n, 3) at the nodes held along axes, if there are such."""
+    """Displacements of a base (n, 3) at held nodes and axes; at all nodes if none is held."""
     alone = np.where(case.fixed, vectors, 0.0)
     return alone if alone.any() else vectors
 
@@ -130,19 +130,19 @@ def signed_peak(vectors: np.ndarray) -> np.ndarray:
 
 
 def describe_pressure(share: Share) -> str:
-    """Say in words how large a pressure is, and on which panels it acts."""
+    """Describe a pressure in words: its size and its panels."""
     return f"pressure {_most(share.value):.4g} Pa on {_listed('panel', share.numbers.tolist())}"
 
 
 def describe_temperature(share: Share) -> str:
-    """Say in words how much warmer panels are, and which."""
+    """Describe a change of temperature in words: its size and its panels."""
     value = _most(share.value)
     way = "colder" if value < 0.0 else "warmer"
     return f"{abs(value):.4g} K {way} on {_listed('panel', share.numbers.tolist())}"
 
 
 def describe_moment(share: Share) -> str:
-    """Say in words how large moments of creases are, and of which."""
+    """Describe crease moments in words: their size and their creases."""
     creases, low = _listed("crease", share.numbers.tolist()), float(share.value.min())
     if np.ptp(share.value):
         return f"moments {low:.4g} to {share.value.max():.4g} N m of {creases}"
@@ -155,12 +155,12 @@ def _most(values: np.ndarray) -> float:
 
 
 def describe_base(vector: np.ndarray) -> str:
-    """Say in words how far the base moves (3,) and where to."""
+    """Describe a base motion (3,) in words: its distance and direction."""
     return _toward("base moved", vector, "m")
 
 
 def describe_gravity(acceleration: np.ndarray) -> str:
-    """Say in words how large an acceleration of gravity (3,) is and where it points."""
+    """Describe an acceleration of gravity (3,) in words: its size and direction."""
     return _toward("gravity", acceleration, "m/s2")
 
 
@@ -171,7 +171,7 @@ def _toward(text: str, vector: np.ndarray, unit: str) -> str:
 
 
 def describe(vectors: np.ndarray, unit_name: str) -> str:
-    """Say in words where vectors act, in which direction, and how large they are at a node."""
+    """Describe vectors in words: where they act, their direction, and their size at a node."""
     size = np.linalg.norm(vectors, axis=1)
     nodes = np.flatnonzero(size > 0.0)
     unit = vectors[nodes] / size[nodes, None]
@@ -184,7 +184,7 @@ def describe(vectors: np.ndarray, unit_name: str) -> str:
 
 
 def _listed(what: str, numbers: list[int]) -> str:
-    """Name the first of some nodes or creases, "nodes 1, 2, 5 and 4 more"."""
+    """List the first of some nodes or creases, "nodes 1, 2, 5 and 4 more"."""
     listed = ", ".join(str(number) for number in numbers[:_LISTED])
     if len(numbers) > _LISTED:
         listed += f" and {len(numbers) - _LISTED} more"
@@ -200,8 +200,8 @@ def _direction(unit: np.ndarray) -> str:
 
 
 def history_name(history: Any) -> str:
-    """Name a history by its class and numbers, "half sine (duration 0.5)"."""
-    history = getattr(history, "function", history)  # a user's function is known by its own name
+    """Name a history by its class and parameters, "half sine (duration 0.5)"."""
+    history = getattr(history, "function", history)  # a user's function goes by its own name
     kind = type(history)
     if not is_dataclass(history):
         return str(getattr(history, "__name__", kind.__name__)).strip("<>")

@@ -1,4 +1,4 @@
-"""Histories of a case: its loads and the motions that it imposes."""
+"""Histories of a case's loads and imposed motions."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def plot_load_history(
     - imposed displacements and displacements of the base, one curve per value and axis;
     - rest angles of actuated creases, one curve per pair of first and last angle.
 
-    Of the last two, at most four curves per history are drawn.
+    The last two kinds have at most four curves per history.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def plot_load_history(
     Raises
     ------
     InputError
-        Where the duration is not positive, or there is no case.
+        The duration is not positive, or there is no case.
     """
     own = Sheet3D.of(case).case
     if own is None:

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from foldyn.plots import scene
 from foldyn.plots.scene import Points, View
 
-CROWD = 20  # arrows between the vertices of a pattern, beyond which they keep a distance,
-MANY = 100  # and arrows in all, beyond which they keep a larger one
+CROWD = 20  # number of arrows between the vertices of a pattern, above which they are thinned,
+MANY = 100  # and number of all arrows, above which they are thinned more
 _DIRECTIONS = np.radians(np.arange(90.0, 450.0, 30.0))
 
 
 class Mark(NamedTuple):
-    """What a picture shows of something that acts on a sheet or is attached to it.
+    """A mark of something that acts on a sheet or is attached to it.
 
     Attributes
     ----------
@@ -28,15 +28,15 @@ class Mark(NamedTuple):
     keys : list
         Legend entries.
     lines : sequence of ndarray, each of shape (k, p, 3)
-        Straight from each of p points to the next.
+        Polylines through p points each.
     triangles : ndarray, shape (m, 3, 3)
     dots : ndarray, shape (d, 3)
     zorder : float
     width : float
-        Of lines, points.
+        Width of lines, points.
     dashes : str
     look : mapping
-        Of dots: their marker and size.
+        Marker and size of dots.
     """
 
     color: str
@@ -51,7 +51,7 @@ class Mark(NamedTuple):
 
     @property
     def points(self) -> Points:
-        """All points that the picture must have room for (k, 3)."""
+        """All points (k, 3) that must fit in the picture."""
         parts = [*self.lines, self.triangles, self.dots]
         return np.concatenate([part.reshape(-1, 3) for part in parts])
 
@@ -70,7 +70,7 @@ def billboard(tip: Points, along: Points, length: float, half: float, view: View
     """Return a triangle (3, 3) that points along a unit vector and faces the viewer."""
     across = np.cross(view.basis[2], along)
     size = np.linalg.norm(across)
-    # Seen end-on there is no sideways direction left: any in the screen will do.
+    # Seen end-on, any sideways direction in the screen will do.
     across = across / size if size > 1e-6 else view.basis[0]
     base = tip - length * along
     return np.array([tip, base + half * across, base - half * across])
@@ -90,7 +90,7 @@ def support_triangles(
         Length of a triangle (m).
     view : View
     moves : ndarray, shape (n, 3)
-        Displacements (m) that the supports impose: their triangles push the nodes.
+        Displacements (m) imposed by the supports: their triangles push the nodes.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def support_triangles(
         held.append((int(node), "".join("xyz"[k] for k in np.flatnonzero(fixed[node]))))
         for k in np.flatnonzero(fixed[node]):
             along = np.zeros(3)
-            # The triangle stands outside the sheet; on the middle plane, below or before it.
+            # The triangle stands outside the sheet; for middle nodes, below or in front of it.
             outside = -1.0 if points[node, k] > middle[k] + 0.05 * size and k != 2 else 1.0
             along[k] = np.sign(moves[node, k]) or outside
             triangles.append(billboard(points[node], along, size, 0.38 * size, view))
@@ -143,9 +143,10 @@ def load_arrows(
 
 
 def thinned(points: Points, vectors: Points, length: float, always: int | None) -> Points:
-    """Vectors (n, 3), zero at points (n, 3) that are too near to others for arrows of a length.
+    """Set vectors (n, 3) to zero at points (n, 3) too close for arrows of a given length.
 
-    The first `always` points keep theirs; so do all where few others have one, or for None.
+    The first `always` points keep theirs. All points do if few others have a vector, or if `always`
+    is None.
     """
     where = np.flatnonzero(vectors.any(axis=1))
     if always is None or np.count_nonzero(where >= always) <= CROWD:
@@ -182,7 +183,7 @@ def add_triangles(axes: Axes3D, triangles: Points, color: str, zorder: float) ->
 
 
 class Labels:
-    """Places short texts beside points, each where the picture is emptiest.
+    """Places short texts beside points, each in the emptiest direction.
 
     Parameters
     ----------
@@ -191,7 +192,7 @@ class Labels:
     distance : float
         From the point to the middle of its text (m).
     obstacles : ndarray, shape (p, 3)
-        Points to keep away from: samples of lines and marks.
+        Points to avoid: samples of lines and marks.
     """
 
     def __init__(self, axes: Axes3D, view: View, distance: float, obstacles: Points) -> None:
@@ -210,7 +211,7 @@ class Labels:
         if near.any():
             between = (spots[:, None] - self._taken[near][None]) / stretch
             gaps = np.linalg.norm(between, axis=2).min(axis=1)
-        # Equal gaps count as equal, so that like nodes get their texts on the like side.
+        # Nearly equal gaps count as equal, so that similar nodes get their texts on the same side.
         best = int(np.argmax(np.round(gaps / self._distance, 1)))
         shift = spots[best] - anchor
         place = point + shift[0] * self._view.basis[0] + shift[1] * self._view.basis[1]

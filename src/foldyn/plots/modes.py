@@ -1,4 +1,4 @@
-"""Mode shapes side by side, over the state about which the structure vibrates, and their MAC."""
+"""Mode shapes side by side, over the state about which the structure vibrates; MAC."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from foldyn.structures import Structure
 from foldyn.values import length, numbers
 
 """Modes that one figure shows at most."""
-_AMPLITUDE = 0.12  # largest displacement, as a part of the sheet's size
-_STRETCH = 0.4  # largest displacement of a bar's ends against each other, as a part of its length
+_AMPLITUDE = 0.12  # largest displacement, relative to the sheet's size
+_STRETCH = 0.4  # largest relative displacement of a bar's ends, relative to its length
 _SHADES = LinearSegmentedColormap.from_list("mac", ["#FFFFFF", "#9CC7E4", style.BLUE, "#00304A"])
-_MOST_NUMBERS = 16  # rows or columns with which the numbers can be read
+_MOST_NUMBERS = 16  # most rows or columns with legible numbers
 _CELL, _MARGIN, _BAR = 0.42, 1.1, 0.9  # inches
 
 
@@ -42,25 +42,25 @@ def draw_modes(
     view: tuple[float, float] = (28.0, -60.0),
     title: str = "",
 ) -> Figure:
-    """Draw mode shapes, each over the state about which it swings in gray.
+    """Draw mode shapes, each over the state of the oscillation in gray.
 
-    All are drawn at the same scale; below each stand its number, its frequency, its damping ratio
-    and what it does.
+    All are drawn at the same scale; below each stand its number, frequency, damping ratio and
+    character.
 
     Parameters
     ----------
     case_or_structure : Case or Structure
-        What vibrates; left out, it is the case of the modes: ``draw_modes(modes)``.
+        What vibrates; by default the case of the modes: ``draw_modes(modes)``.
     modes : xarray.Dataset
         Modes of `foldyn.modes`.
     which : sequence of int, optional
-        Their numbers, from 1 on; by default all that are not rigid, at most 12.
+        Mode numbers, from 1; by default all that are not rigid, at most 12.
     amplitude : float, optional
-        Largest displacement (m) in each picture; by default such that the shape can be read: 12 %
-        of the sheet's size, or less where neighbors would part too far.
+        Largest displacement (m) in each picture; by default 12 % of the sheet's size, or less if
+        neighboring nodes would part too far for a legible shape.
     names : xarray.Dataset or mapping of int to str, optional
-        What modes do: a result of `foldyn.linear.character`, or words by the modes' numbers; by
-        default the character along the axis that leads away from the supports, or the longest.
+        Character of the modes: a result of `foldyn.linear.character`, or words by mode number; by
+        default the character along the axis that leads away from the supports, or the longest axis.
     view : tuple of float
         Elevation above the xy plane and azimuth around z (degrees).
     title : str
@@ -88,9 +88,9 @@ class ShownModes:
     Attributes
     ----------
     sheet : Sheet3D
-        The sheet in the state about which it swings.
+        The sheet in the state of the oscillation.
     swings : ndarray, shape (k, n, 3)
-        Displacements from there (m) at the largest swing.
+        Displacements from that state (m) at full amplitude.
     captions : list of str
     notes : list of Line2D
         Legend entries.
@@ -110,7 +110,7 @@ class ShownModes:
         amplitude: float | None,
         names: Mapping[int, str] | xr.Dataset | None,
     ) -> ShownModes:
-        """Choose modes and scale them."""
+        """Choose and scale modes."""
         sheet = Sheet3D.of(case_or_structure)
         numbers = chosen_modes(modes, which)
         if amplitude is not None:
@@ -129,13 +129,13 @@ class ShownModes:
 def mode_names(
     sheet: Sheet3D, modes: xr.Dataset, names: Mapping[int, str] | xr.Dataset | None
 ) -> Mapping[int, str]:
-    """What modes that are not rigid do, with its share of the motion, by their numbers."""
+    """Character of modes that are not rigid, with its share of the motion, by mode number."""
     if names is None:
         from foldyn.linear import character
 
         try:
             names = character(modes, case=sheet.case)
-        except InputError:  # of a structure alone, with laws that the result does not hold
+        except InputError:  # a bare structure whose laws the result does not hold
             return {}
     if not hasattr(names, "data_vars"):
         return cast("Mapping[int, str]", names)
@@ -146,7 +146,7 @@ def mode_names(
 
 
 def describe_mode(modes: xr.Dataset, number: int, name: str = "") -> str:
-    """Text for a mode: number, frequency and damping, and below them what it does."""
+    """Text for a mode: number, frequency and damping, with its character below."""
     mode = modes.sel(mode=number)
     eigenvalue = float(mode["eigenvalue"])
     if bool(mode["rigid"]):
@@ -171,7 +171,7 @@ def hertz(frequency: float) -> str:
 
 
 def _readable(sheet: Sheet3D, shape: Points, amplitude: float | None) -> Points:
-    """Scale a shape to an amplitude (m), or to one at which it can be read."""
+    """Scale a shape to an amplitude (m), or to a legible one."""
     largest = float(np.linalg.norm(shape, axis=1).max())
     if largest == 0.0:
         return shape
@@ -200,7 +200,7 @@ def plot_mac(
     mac : array_like, shape (a, b)
         Values from 0 to 1 of `foldyn.mac`: the rows are the modes of the first set.
     rows, columns : sequence of str, optional
-        What is written at the rows and the columns; by default the numbers from 1 on.
+        Labels of the rows and columns; by default the numbers from 1.
     row_title, column_title : str
         Names of the two sets.
     title : str
@@ -209,13 +209,13 @@ def plot_mac(
     Returns
     -------
     matplotlib.figure.Figure
-        The matrix, first mode at the top left, and the scale of its colors. Up to 16 rows and
-        columns have the values in their cells.
+        The matrix, first mode at the top left, with a color bar. With up to 16 rows and columns the
+        cells show their values.
 
     Raises
     ------
     InputError
-        No matrix, values out of range, or labels that do not fit it.
+        Not a matrix, values out of range, or labels that do not match it.
     """
     values = numbers("mac", mac)
     if values.ndim != 2 or not values.size:
@@ -229,7 +229,7 @@ def plot_mac(
             raise InputError(f"{name}: {len(labels[-1])} labels for {count} modes; give one each")
     down, across = values.shape
     cell = min(_CELL, 6.0 / max(down, across))
-    long = 0.07 * max(len(label) for label in labels[1]) > cell  # labels that would touch
+    long = 0.07 * max(len(label) for label in labels[1]) > cell  # labels that would overlap
     width, height = max(_MARGIN + _BAR + cell * across, 3.2), max(_MARGIN + cell * down, 2.2)
     figure = style.new_figure(width, height, title)
     axes = figure.subplots()

@@ -1,4 +1,4 @@
-"""Nyquist plots: the circles that modes make in the plane of the mobility."""
+"""Nyquist plots: circles of modes in the plane of the mobility."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ _RESONANT = style.ring(style.BLACK, 6.0)
 
 
 class Circle(NamedTuple):
-    """A mode's circle: diameter / (1 + i x) + residual, x its detuning, in the plane of mobility.
+    """Circle of a mode in the plane of mobility: diameter / (1 + i x) + residual, x the detuning.
 
-    `natural` (Hz) and `ratio` are those of the curve, with the damping of a window if it has one.
+    `natural` (Hz) and `ratio` describe the curve, including the damping of a window, if any.
     """
 
     peak: Peak
@@ -38,7 +38,7 @@ class Circle(NamedTuple):
     residual: complex
     natural: float
     ratio: float
-    band: NDArray[np.bool_]  # of the frequencies that it was laid through
+    band: NDArray[np.bool_]  # which frequencies were fitted
 
     def __call__(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Mobility at frequencies (Hz) above 0."""
@@ -59,7 +59,7 @@ def plot_nyquist(
     peaks: Sequence[Peak] | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw the mobility of a node around its resonances in the complex plane, with their circles.
+    """Draw the mobility of a node around its resonances in the complex plane, with circles.
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ def plot_nyquist(
     axis : {"x", "y", "z", "-x", "-y", "-z"}, optional
         By default the axis along which the node responds most, in the direction of the drive.
     peaks : sequence of Peak, optional
-        Its peaks, of `foldyn.linear.peaks_of`, by default all of them: natural frequency and
-        damping ratio of the circles are theirs. The first 6 that have a circle are drawn.
+        Peaks of the response, from `foldyn.linear.peaks_of`, by default all; they set the natural
+        frequency and damping ratio of the circles. The first 6 with a circle are drawn.
     title : str
         Title of the figure.
 
@@ -78,8 +78,8 @@ def plot_nyquist(
     -------
     matplotlib.figure.Figure
         Axes for each circle, at equal scale in both directions: the points within 1.5 half-power
-        widths of the resonance, the circle, and the resonance on it. One of the whole curve where
-        no circle fits.
+        widths of the resonance, the circle, and the resonance on it. If no circle fits, axes of the
+        whole curve.
 
     Raises
     ------
@@ -122,12 +122,13 @@ def circles_of(
     frequency: NDArray[np.float64], mobility: NDArray[np.complex128], peaks: Sequence[Peak],
     rate: float = 0.0,
 ) -> list[Circle]:  # fmt: skip
-    """Circles of peaks, laid through the mobility around them by least squares.
+    """Circles of peaks, fitted to the mobility around them by least squares.
 
     Parameters
     ----------
     rate : float
-        Decay rate (1/s) of an exponential window: the curve has its damping, the peaks have not.
+        Decay rate (1/s) of an exponential window, whose damping the curve includes but the peaks do
+        not.
     """
     modes = [_windowed(peak.natural_frequency, peak.damping_ratio, rate) for peak in peaks]
     between = [0.5 * (a[0] + b[0]) for a, b in pairwise(modes)]
@@ -146,7 +147,7 @@ def circles_of(
 
 
 def _windowed(natural: float, ratio: float, rate: float) -> tuple[float, float]:
-    """Natural frequency (Hz) and damping ratio with the damping of an exponential window."""
+    """Natural frequency (Hz) and damping ratio, including the damping of an exponential window."""
     omega = 2.0 * np.pi * natural
     decay, damped = ratio * omega + rate, omega * np.sqrt(1.0 - min(ratio, 1.0) ** 2)
     size = float(np.hypot(decay, damped))
@@ -178,7 +179,7 @@ def _frames(count: int, curve: Curve, title: str) -> tuple[Figure, list[Axes]]:
 
 
 def _draw(frame: Axes, Y: NDArray, circle: Circle) -> str:
-    """Draw a circle and the points near it, and return its title."""
+    """Draw a circle and the points near it; return its title."""
     outline = circle.outline()
     frame.plot(outline.real, outline.imag, color=style.VERMILLION, linewidth=1.2, zorder=2.0,
                label="fitted circle")  # fmt: skip

@@ -1,4 +1,4 @@
-"""Paths: load against displacement with its stability, and the deformed shapes along them."""
+"""Paths: load over displacement with stability, and deformed shapes along them."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ def plot_load_displacement(
 ) -> Figure:
     """Draw the load factor over the displacement of chosen nodes.
 
-    Solid lines are stable, dashed ones unstable (the tangent has negative eigenvalues, the supports
-    as they are); limit points are dots, bifurcations diamonds. Where one could not be located, a
-    bar spans the load factors between which it lies.
+    Solid lines are stable, dashed ones unstable (the tangent has negative eigenvalues with the
+    supports held in place); limit points are dots, bifurcations diamonds. A point that could not be
+    located is a bar over its interval of load factors.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def plot_load_displacement(
     nodes : int, sequence of int, or str
         Nodes to show, a curve each; a selection ("xmax") means vertices of the pattern.
     direction : {"x", "y", "z", "-x", "-y", "-z"}, optional
-        Direction of the displacement; by default that in which the nodes move farthest.
+        Direction of the displacement; by default the one in which the nodes move farthest.
     title : str
         Title of the figure.
 
@@ -94,8 +94,8 @@ def plot_reaction(
 ) -> Figure:
     """Draw the total force of supports over the displacement that they impose.
 
-    Solid lines are stable, dashed ones unstable, as long as the supports are where they are; limit
-    points are dots, bifurcations diamonds.
+    Solid lines are stable, dashed ones unstable, with the supports held in place; limit points are
+    dots, bifurcations diamonds.
 
     Parameters
     ----------
@@ -137,17 +137,17 @@ def plot_reaction(
 
 
 class _Curve(NamedTuple):
-    """What is drawn of a path, and its name."""
+    """A path to draw, and its name."""
 
     label: str
     x: NDArray[np.float64]
     y: NDArray[np.float64]
     path: xr.Dataset
-    loose: NDArray[np.bool_] | bool = False  # points whose interval of load factors is drawn
+    loose: NDArray[np.bool_] | bool = False  # points drawn with their interval of load factors
 
 
 def _draw(curves: list[_Curve], title: str, xlabel: str, ylabel: str) -> Figure:
-    """Draw curves, with a legend of what occurs in them."""
+    """Draw curves, with a legend of the marks that occur."""
     figure = style.new_figure(6.5, 4.4, title)
     axes = figure.subplots()
     style.frame(axes, xlabel, ylabel)
@@ -215,12 +215,12 @@ def draw_shapes(
     Parameters
     ----------
     case_or_structure : Case or Structure
-        What moves; left out, it is the case of the path: ``draw_shapes(path)``.
+        What moves; by default the case of the path: ``draw_shapes(path)``.
     path : xarray.Dataset
         A path of `foldyn.trace`.
     points : int or sequence of int
-        How many points, spread evenly over the way of the nodes with the first and the last among
-        them; or their numbers, negative ones from the end.
+        How many points, evenly spread over the distance that the nodes travel, including the first
+        and the last; or their numbers, negative ones from the end.
     scale : float
         Factor on the displacement in the picture.
     view : tuple of float
@@ -231,8 +231,7 @@ def draw_shapes(
     Returns
     -------
     matplotlib.figure.Figure
-        One orthographic view for each point; below it the number of the point, its load factor
-        and what kind of point it is.
+        One orthographic view for each point; below it the point's number, load factor and kind.
 
     Raises
     ------
@@ -250,7 +249,7 @@ def draw_shapes(
 
 
 def describe_point(path: xr.Dataset, number: int) -> str:
-    """Text for a point: its number, load factor, and what is special about it."""
+    """Text for a point: its number, load factor, and kind if critical."""
     point = path.isel(step=number)
     remark = critical_word(path, number)
     if not remark and int(point["negative_eigenvalues"]) > 0:

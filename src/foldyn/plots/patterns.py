@@ -1,4 +1,4 @@
-"""Pictures of patterns beside each other: crease patterns from above, folded ones in space."""
+"""Pictures of patterns side by side: flat ones from above, folded ones in space."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from foldyn.plots import scene, style
 from foldyn.plots.scene import Seen, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, edge_keys
 
-FLAT = 1e-6  # of the size: a pattern of less height is drawn from above
+FLAT = 1e-6  # of the size: a pattern of smaller height is drawn from above
 _ABOVE, _ASLANT = (90.0, -90.0), (28.0, -60.0)
 _MARGIN, _CAPTION, _LEGEND = 0.15, 0.3, 0.35  # inches
 
@@ -27,16 +27,16 @@ def draw_patterns(
     width: float = 7.0,
     title: str = "",
 ) -> Figure:
-    """Draw patterns side by side, each as large as its place allows.
+    """Draw patterns side by side, each as large as its space allows.
 
     Parameters
     ----------
     patterns : Pattern or sequence of Pattern
     captions : sequence of str
-        What stands below each.
+        Text below each.
     views : sequence of tuple of float, or None
-        Elevation above the xy plane and azimuth around z (degrees) of each; None and by default
-        from above for a flat pattern, and from the front for a folded one.
+        Elevation above the xy plane and azimuth around z (degrees) of each; None, the default, is
+        from above for a flat pattern and from the front for a folded one.
     tallest : float
         Height of the largest picture (inches).
     width : float

@@ -1,4 +1,4 @@
-"""What figures and pages read from results of each kind, without drawing it."""
+"""Shared readings of results for figures and pages, without drawing."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ STRAIN: Mapping[str, str] = {
 MOST_MODES = 12
 NEEDED = ("frequency", "eigenvalue", "shape", "rigid", "displacement")
 """What figures need of modes."""
-_NONE = 1e-9  # of the largest energy: below it there is nothing to share
+_NONE = 1e-9  # of the largest energy: smaller energies have no shares
 
 
 def moved_supports(case: Case) -> tuple[list[int], str] | None:
-    """Nodes that supports move together and farthest, and the direction; None where none moves."""
+    """Nodes that supports move farthest and equally, and the direction; None if none moves."""
     motion = sum((vector for vector, _ in case.prescribed_terms), np.zeros(case.imposed.shape))
     if not motion.any():
         return None
@@ -77,11 +77,11 @@ def total_reaction(
     loose = sorted(set(nodes) - set(held.tolist()))
     if loose:
         raise InputError(f"nodes: no support holds node {loose[0]} along {axis}")
-    return sign * path["reaction"].values[:, chosen.values].sum(axis=1) + 0.0  # no -0
+    return sign * path["reaction"].values[:, chosen.values].sum(axis=1) + 0.0  # avoid -0
 
 
 def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:
-    """Numbers of points from 0 on, of a wanted count or of numbers, negative ones from the end."""
+    """Numbers of points from 0: a count of them, or given numbers, negative ones from the end."""
     check_path(path, "path")
     return chosen("points", points, path.sizes["step"], partial(evenly, path))
 
@@ -89,7 +89,7 @@ def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:
 def chosen(
     field: str, wanted: int | Sequence[int], count: int, spread: Callable[[int], list[int]]
 ) -> list[int]:
-    """Numbers of states: so many, as they are spread, or those that are named."""
+    """Numbers of states: a count of them, evenly spread, or given numbers."""
     if isinstance(wanted, int | np.integer):
         if wanted < 1:
             raise InputError(f"{field}: {wanted}; give at least one")
@@ -103,26 +103,26 @@ def chosen(
 
 
 def parts_of(result: xr.Dataset) -> tuple[str, ...]:
-    """Parts of the strain energy of a result, in the order of its structure."""
+    """Names of the strain energies of a result, in the order of its structure."""
     own = OF_SHELLS if set(OF_SHELLS) <= set(result.data_vars) else OF_BARS_AND_HINGES
     others = (str(name) for name in result.data_vars if name not in own)
     return (*own, *(name for name in others if name.startswith("strain_") or name == CONTACT))
 
 
 def strain_name(part: str) -> str:
-    """Name of a part of the strain energy."""
+    """Name of a strain energy in words."""
     return STRAIN.get(part, part.removeprefix("strain_").replace("_", " "))
 
 
 def stacked(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
-    """Return the parts of the strain energy (J) in the order of a stack."""
+    """Return the strain energies (J) in stacking order."""
     parts = parts_of(path)
     order = [*(part for part in STRAIN if part in parts), *(p for p in parts if p not in STRAIN)]
     return {part: path[part].values for part in order}
 
 
 def energy_shares(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
-    """Shares of the parts of the strain energy at each point; NaN where there is none.
+    """Share of each strain energy at each point; NaN where the total vanishes.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def energy_shares(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
 
 
 def chosen_modes(modes: xr.Dataset, which: Sequence[int] | None) -> list[int]:
-    """Numbers of the modes to show: those asked for, else the first that are not rigid."""
+    """Numbers of the modes to show: those asked for, or the first that are not rigid."""
     missing = [key for key in NEEDED if key not in modes]
     if missing:
         raise InputError(f"modes: has no {missing[0]}; give a result of fd.modes")
@@ -164,13 +164,13 @@ def chosen_modes(modes: xr.Dataset, which: Sequence[int] | None) -> list[int]:
 
 
 def along_drive(response: xr.Dataset) -> list[str]:
-    """Each axis in the direction in which forces drive along it; as it is where none does."""
+    """Each axis with the sign of the driving forces along it, positive without any."""
     forces = response["drive"].transpose("node", "axis").values.sum(axis=0)
     backward = (forces < 0.0) & (quantity_of(response) in PER_FORCE)
     return ["-" + axis if back else axis for axis, back in zip(AXES, backward, strict=True)]
 
 
 def unit_of(quantity: str) -> str:
-    """What stands behind a quantity at an axis: its unit in parentheses, or nothing."""
+    """Unit of a quantity in parentheses, for an axis title; empty if dimensionless."""
     unit = RESPONSES[quantity].units.replace("s2", "s²")
     return "" if unit == "1" else f" ({unit})"

@@ -33,20 +33,20 @@ def plot_response_curve(
     curves : xarray.Dataset, or mapping of str to xarray.Dataset
         A result of `foldyn.response_curve`, or several by their labels.
     backbone : xarray.Dataset, optional
-        A result of `foldyn.backbone` to be drawn behind them, by the amplitude of curves without a
-        measure: half the distance between the extremes of the largest displacement along an axis.
+        A result of `foldyn.backbone`, drawn behind curves without a measure. The amplitude is then
+        half the range of the largest displacement along an axis.
     title : str
         Title of the figure.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Amplitude over what varies: the frequency, or the factor on the drive.
+        Amplitude over the frequency or the factor on the drive, whichever varies.
 
     Raises
     ------
     InputError
-        Something else than response curves of one kind; a backbone beside curves of a measure.
+        Not response curves of one kind; a backbone with curves of a measure.
     """
     labeled = by_label("curves", curves)
     kinds = {_kind("curves", one, "response_curve", "by") for one in labeled.values()}
@@ -79,7 +79,7 @@ def plot_response_curve(
 
 
 def plot_backbone(backbones: xr.Dataset | Mapping[str, xr.Dataset], title: str = "") -> Figure:
-    """Draw backbones: frequency over amplitude and, of undamped ones, over energy.
+    """Draw backbones: frequency over amplitude and, if undamped, over energy.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def plot_backbone(backbones: xr.Dataset | Mapping[str, xr.Dataset], title: str =
     Raises
     ------
     InputError
-        Something else than backbones.
+        Not backbones.
     """
     labeled = by_label("backbones", backbones)
     for one in labeled.values():
@@ -120,7 +120,7 @@ def plot_backbone(backbones: xr.Dataset | Mapping[str, xr.Dataset], title: str =
 
 
 def _size_along(backbone: xr.Dataset, curves: Mapping[str, xr.Dataset]) -> NDArray:
-    """Amplitudes of the motions of a backbone, as those of curves without a measure."""
+    """Amplitudes of a backbone's motions, defined as for curves without a measure."""
     from foldyn.periodic.orbit import amplitudes_of
     from foldyn.periodic.response import LARGEST
 
@@ -136,7 +136,7 @@ def _size_along(backbone: xr.Dataset, curves: Mapping[str, xr.Dataset]) -> NDArr
 
 
 def _kind(field: str, result: xr.Dataset, kind: str, attribute: str) -> str:
-    """An attribute of a result, which must be of a kind."""
+    """Return an attribute of a result; refuse results of other kinds."""
     if alone(field, result).attrs.get("foldyn_result") != kind or attribute not in result.attrs:
         raise InputError(f": must be a result of foldyn.{kind}", field)
     return str(result.attrs[attribute])
@@ -152,7 +152,7 @@ def _mark(color: str, name: str) -> dict:
 
 
 def _draw(axes: Axes, curve: xr.Dataset, along: str, color: str) -> set[str]:
-    """Draw a curve with its branches; the names of its bifurcations."""
+    """Draw a curve with its branches; return the names of its bifurcations."""
     x, y = curve[along].values, curve["amplitude"].values
     names, branch = curve["bifurcation"].values, curve["branch"].values
     for number in np.unique(branch):
@@ -168,11 +168,11 @@ def _draw(axes: Axes, curve: xr.Dataset, along: str, color: str) -> set[str]:
 
 
 def _pieces(stable: NDArray[np.bool_], marked: NDArray[np.bool_]) -> list[tuple[NDArray, bool]]:
-    """Numbers of the points of each stretch of one stability, which ends at bifurcations."""
+    """Point numbers of each stretch of equal stability, which ends at bifurcations."""
     count = len(stable)
     if count == 1:
         return [(np.array([0]), bool(stable[0]))]
-    # a motion at a bifurcation is neither: the other end of a segment says what it is
+    # a bifurcation is neither: the other end of the segment decides
     segment = np.where(marked[:-1], stable[1:], stable[:-1])
     ends = np.flatnonzero(np.diff(segment)) + 1
     edges = [0, *ends.tolist(), count - 1]

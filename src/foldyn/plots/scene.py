@@ -32,17 +32,17 @@ PAPERS = ("#CFB387", "#B9CBB0", "#C9B4C6", "#A9BFCC")
 """Colors of panels that differ from the rest of the sheet, by turns."""
 WIDTH = 7.0
 """Width of a figure, in inches."""
-# Margins around the seen box, and its largest height, in inches.
+# Margins around the box seen, and its largest height, in inches.
 _LEFT, _RIGHT, _TICKS, _TALLEST = 0.8, 0.8, 0.5, 5.0
-_LABEL_PADS = 6.0, 6.0, 4.0  # points; that of z would leave the margin with more
-_CLOSE = 0.4  # inches between two ticks whose numbers would touch
-_MOST_PIECES, _MOST_DIVISIONS = 2000, 12  # of all panels in a picture, and of a triangle's edge
+_LABEL_PADS = 6.0, 6.0, 4.0  # points; the label of z would leave the margin with more
+_CLOSE = 0.4  # inches between two ticks with overlapping numbers
+_MOST_PIECES, _MOST_DIVISIONS = 2000, 12  # of all panels in a picture, and along a triangle's edge
 _LIGHT = np.array([0.35, -0.5, 0.8]) / np.linalg.norm([0.35, -0.5, 0.8])
 
 
 @dataclass(frozen=True)
 class Sheet3D:
-    """What is drawn of a case, a structure or a pattern.
+    """What to draw of a case, a structure or a pattern.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Sheet3D:
 
     @cached_property
     def edges(self) -> Indices:
-        """Nodes along each edge of the pattern but for welds, creases first, shape (ne, p).
+        """Nodes along each edge of the pattern except welds, creases first, shape (ne, p).
 
         p is 2, or for a shell the number of nodes along an edge, which bends.
         """
@@ -100,17 +100,17 @@ class Sheet3D:
 
     @cached_property
     def boundary(self) -> Indices:
-        """Edges of one panel only, shape (nb, p)."""
+        """Edges of a single panel, shape (nb, p)."""
         return self.edges[len(self._creases) :]
 
     @cached_property
     def pieces(self) -> Indices:
-        """Neighbors along all edges of the pattern, shape (ne (p - 1), 2)."""
+        """Neighboring nodes along all edges of the pattern, shape (ne (p - 1), 2)."""
         return np.stack([self.edges[:, :-1], self.edges[:, 1:]], axis=2).reshape(-1, 2)
 
     @cached_property
     def inner_bars(self) -> Indices:
-        """Bars, or sides of a shell's triangles, that are on no edge of the pattern, (k, 2)."""
+        """Bars, or sides of a shell's triangles, on no edge of the pattern, (k, 2)."""
         if self.structure is None:
             return np.zeros((0, 2), dtype=np.int64)
         edges = {tuple(edge) for edge in np.sort(self.pieces, axis=1).tolist()}
@@ -120,24 +120,24 @@ class Sheet3D:
 
     @cached_property
     def actuated(self) -> Indices:
-        """Creases that the case actuates, shape (k, p)."""
+        """Actuated creases, shape (k, p)."""
         if self.case is None:
             return np.zeros((0, 2), dtype=np.int64)
         return self.edges[self.case.actuated_creases]
 
     @property
     def highlights(self) -> bool:
-        """Whether to highlight actuated creases: all of them would say nothing and hide panels."""
+        """Whether to highlight actuated creases; not if all are, which would only hide panels."""
         return len(self.actuated) < len(self.pattern.creases)
 
     @property
     def parts(self) -> tuple[Any, ...]:
-        """Kinds of panels that differ from the rest of the sheet."""
+        """Kinds of panels that differ from the sheet."""
         return getattr(getattr(self.structure, "sheet", None), "panels", ())
 
     @cached_property
     def paper(self) -> NDArray[np.float64]:
-        """Color of each triangle (nt, 3): panels that differ from the sheet have their own."""
+        """Color of each triangle (nt, 3); panels that differ from the sheet have their own."""
         color = np.tile(to_rgb(PAPER), (len(self.triangles), 1))
         for number, part in enumerate(self.parts):
             own = np.isin(self.structure.triangle_panel, part.panels)
@@ -145,7 +145,7 @@ class Sheet3D:
         return color
 
     def check_nodes(self, result: str, moved: Points, done: str = "computed") -> None:
-        """Refuse displacements (..., n, 3) of another number of nodes."""
+        """Refuse displacements (..., n, 3) with another number of nodes."""
         if moved.shape[-2:] != self.nodes.shape:
             raise InputError(
                 f"{result} {moved.shape[-2]} nodes, the structure {len(self.nodes)}; give the case "
@@ -153,7 +153,7 @@ class Sheet3D:
             )
 
     def creases(self) -> dict[str, Indices]:
-        """Return the creases (k, p) of each assignment that occurs."""
+        """Creases (k, p) of each assignment that occurs."""
         creases = self.edges[: len(self._creases)]
         kinds = np.array(self.pattern.assignments, dtype=str)
         return {kind: creases[kinds == kind] for kind in style.CREASES if (kinds == kind).any()}
@@ -179,18 +179,18 @@ class View:
         return np.array([right, np.cross(toward, right), toward])
 
     def flat(self, points: Points) -> Points:
-        """Return the points as seen on the screen, shape (..., 2)."""
+        """Project points to the screen, shape (..., 2)."""
         return points @ self.basis[:2].T
 
     def across(self, line: Points) -> Points:
-        """Return the unit vector (3,) on the screen across a line (3,)."""
+        """Unit vector (3,) in the screen perpendicular to a line (3,)."""
         across = np.cross(self.basis[2], line)
         length = np.linalg.norm(across)
         return across / length if length > 1e-6 * np.linalg.norm(line) else self.basis[0]
 
 
 class Seen(NamedTuple):
-    """The box around all that a view shows, and its size on the screen."""
+    """Bounding box of all that a view shows, and its size on the screen."""
 
     view: View
     middle: Points
@@ -200,9 +200,9 @@ class Seen(NamedTuple):
 
     @classmethod
     def of(cls, points: Points, view: View) -> Seen:
-        """Take the box of all points (p, 3)."""
+        """Bounding box of points (p, 3)."""
         low, high = points.min(axis=0), points.max(axis=0)
-        # A flat sheet still gets a box of some height, or its ticks would fall on each other.
+        # A flat sheet still gets a box with some height, or its ticks would overlap.
         box = np.maximum(high - low, 0.15 * (high - low).max()) * 1.04
         middle = 0.5 * (low + high)
         corners = middle + 0.5 * box * np.array(list(product((-1, 1), repeat=3)))
@@ -212,10 +212,10 @@ class Seen(NamedTuple):
 def view_figure(
     points: Points, view: View, title: str = "", legend_rows: int = 0, width: float = WIDTH
 ) -> tuple[Figure, Axes3D]:
-    """Return a figure with orthographic axes of equal scale that hold all the points (p, 3).
+    """Return a figure with orthographic axes at equal scale that hold all the points (p, 3).
 
-    Three-dimensional axes are square and mostly empty around a flat sheet, so the figure is cut to
-    the box as it is seen: its height follows from the points, at most 5 inches and the margins.
+    Three-dimensional axes are square and mostly empty around a flat sheet, so the figure is cropped
+    to the projected box: its height follows from the points, at most 5 inches plus the margins.
     """
     seen = Seen.of(points, view)
     scale = min((width - _LEFT - _RIGHT) / seen.size[0], _TALLEST / seen.size[1])
@@ -231,9 +231,9 @@ def view_figure(
 
 
 def add_view(figure: Figure, seen: Seen, center: tuple[float, float], scale: float) -> Axes3D:
-    """Put axes for what is seen into a figure: the center in inches, the scale in inches per m."""
+    """Add axes for a view to a figure: the center in inches, the scale in inches per m."""
     width, height = figure.get_size_inches()
-    side = 1.1 * seen.size.max() * scale  # of the square axes, which clip what they draw
+    side = 1.1 * seen.size.max() * scale  # of the square axes, which clip their content
     left, bottom = center[0] - 0.5 * side, center[1] - 0.5 * side
     place = left / width, bottom / height, side / width, side / height
     axes = Axes3D(figure, place, proj_type="ortho", computed_zorder=False)
@@ -242,7 +242,7 @@ def add_view(figure: Figure, seen: Seen, center: tuple[float, float], scale: flo
     low, high = seen.middle - 0.5 * seen.box, seen.middle + 0.5 * seen.box
     for axis, name in enumerate("xyz"):
         getattr(axes, f"set_{name}lim")(low[axis], high[axis], view_margin=0)
-    # copies: matplotlib scales what it is given
+    # copies, because matplotlib scales its arguments
     axes.set_box_aspect(seen.box.copy(), zoom=1.0)
     flat = np.array(proj_transform(*seen.corners.T, axes.get_proj())[:2])
     zoom = seen.size[0] * scale / (side * np.ptp(flat[0]) / _span(axes))
@@ -252,20 +252,20 @@ def add_view(figure: Figure, seen: Seen, center: tuple[float, float], scale: flo
 
 
 def _span(axes: Axes3D) -> float:
-    """Return the width of the axes in the units of the projection."""
+    """Width of the axes in units of the projection."""
     pixels = axes.get_window_extent().width
     return pixels / (axes.transData.transform((1.0, 0.0)) - axes.transData.transform((0.0, 0.0)))[0]
 
 
 def _frame(axes: Axes3D, middle: Points, box: Points, basis: Points) -> None:
-    """Set ticks, grid, panes and labels; the basis is that of the view, in inches per meter."""
+    """Set ticks, grid, panes and labels; the basis is the view's, in inches per meter."""
     ticks = _ticks(middle, box, basis)
     for axis, places in zip((axes.xaxis, axes.yaxis, axes.zaxis), ticks, strict=True):
         axis.set_major_locator(FixedLocator(places.tolist()))
         axis.set_pane_color((0.975, 0.975, 0.975, 1.0))
         axis.line.set_color(style.LIGHT)
-        # The grid of three-dimensional axes has no public setting of its own; without this one it
-        # would only be darker.
+        # The grid of three-dimensional axes has no public color; without this it would only be
+        # darker.
         getattr(axis, "_axinfo", {}).get("grid", {}).update(color="#E2E2E2", linewidth=0.5)
     axes.tick_params(labelsize=style.NOTE, color=style.LIGHT, labelcolor=style.BLACK, pad=0)
     for name, pad in zip("xyz", _LABEL_PADS, strict=True):
@@ -274,13 +274,13 @@ def _frame(axes: Axes3D, middle: Points, box: Points, basis: Points) -> None:
 
 
 def _ticks(middle: Points, box: Points, basis: Points) -> list[NDArray]:
-    """Return the ticks of each axis, those of x and y apart where the two axes meet."""
+    """Return the ticks of each axis; x and y drop overlapping ones where their axes meet."""
     ticks = []
     for center, length in zip(middle, box, strict=True):
         wanted = MaxNLocator(max(2, round(5 * length / box.max())), steps=[1, 2, 2.5, 5, 10])
         places = np.array(wanted.tick_values(center - 0.5 * length, center + 0.5 * length))
         ticks.append(places[np.abs(places - center) <= 0.5 * length * (1.0 + 1e-9)])
-    # They meet in the corner next to the viewer.
+    # The axes meet in the corner nearest the viewer.
     corner = middle + 0.5 * box * np.where(basis[2] > 0.0, 1.0, -1.0)
     nearest = [int(np.abs(ticks[k] - corner[k]).argmin()) for k in (0, 1)]
     apart = sum(
@@ -296,22 +296,22 @@ def _ticks(middle: Points, box: Points, basis: Points) -> list[NDArray]:
 def shades(
     vertices: Points, triangles: Indices, color: str | NDArray[np.float64] = PAPER
 ) -> NDArray[np.float64]:
-    """Return a color per triangle, darker where it faces away from the light, shape (nt, 3).
+    """Color per triangle, darker where it faces away from the light, shape (nt, 3).
 
-    color : of all triangles, or of each (nt, 3).
+    color : of all triangles, or one for each (nt, 3).
     """
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     length = np.linalg.norm(normals, axis=1)
     normals /= np.where(length > 0.0, length, 1.0)[:, None]
-    # Both faces of paper reflect, so the sign of the normal must not matter.
+    # Both faces of paper reflect, so the sign of the normal does not matter.
     bright = 0.62 + 0.38 * np.abs(normals @ _LIGHT)
     paper = np.array(to_rgb(color)) if isinstance(color, str) else color
     return np.clip(bright[:, None] * paper, 0.0, 1.0)
 
 
 def pieces(vertices: Points, triangles: Indices) -> Points:
-    """Cut triangles into smaller ones (np, 3, 3), as many of each."""
+    """Cut each triangle into the same number of smaller ones (np, 3, 3)."""
     count = _divisions(len(triangles))
     corners = []
     for i in range(count):
@@ -333,7 +333,7 @@ def piece_colors(
 
 
 def _divisions(count: int) -> int:
-    """Pieces of a triangle's edge."""
+    """Number of pieces along a triangle's edge."""
     return int(np.clip(np.sqrt(_MOST_PIECES / max(count, 1)), 1, _MOST_DIVISIONS))
 
 
@@ -344,10 +344,10 @@ def add_panels(
     alpha: float = 1.0,
     zorder: float = 1.0,
 ) -> Poly3DCollection:
-    """Fill triangles, corners (k, 3, 3), each in its color (k, 3).
+    """Fill triangles with corners (k, 3, 3), each in its own color (k, 3).
 
-    An `alpha` below 1 mixes the color with white. The panels are never translucent, and not
-    antialiased: neighbors that overlap or part by a pixel would leave seams inside every panel.
+    An `alpha` below 1 mixes the color with white. Panels are neither translucent nor antialiased:
+    neighboring triangles that overlap or part by a pixel would leave seams inside every panel.
     """
     panels = Poly3DCollection(
         corners,
@@ -371,7 +371,7 @@ def add_segments(
     zorder: float = 2.0,
     alpha: float = 1.0,
 ) -> Line3DCollection:
-    """Draw segments (k, p, 3), straight from each of their points to the next."""
+    """Draw polylines (k, p, 3)."""
     lines = Line3DCollection(
         segments,
         colors=color,

@@ -16,9 +16,9 @@ from foldyn.plots import scene, style
 from foldyn.plots.scene import Indices, Points, Sheet3D, View
 from foldyn.plots.visibility import hidden_points, split_edges
 
-_HIDDEN = 0.3  # opacity of what lies behind a panel
+_HIDDEN = 0.3  # opacity of edges behind a panel
 _MARGIN = 0.15  # inches
-_CAPTION, _LINE = 0.42, 0.16  # inches; the caption stands below its sheet, more lines take more
+_CAPTION, _LINE = 0.42, 0.16  # inches; of a caption, and each further line
 _TALLEST = 3.2  # inches
 
 
@@ -30,7 +30,7 @@ def add_undeformed(axes: Axes3D, sheet: Sheet3D) -> None:
 
 
 def rest_keys(scale: float = 1.0, state: str = "undeformed") -> list[Line2D]:
-    """Legend entries of the sheet at rest, and of the factor on displacements if it is not 1."""
+    """Legend entries of the sheet at rest, and of the displacement factor if it is not 1."""
     keys = [style.key(state, color=style.LIGHT, linewidth=1.2)]
     if scale != 1.0:
         keys.append(style.key(f"displacement times {scale:g}", linestyle="none"))
@@ -38,7 +38,7 @@ def rest_keys(scale: float = 1.0, state: str = "undeformed") -> list[Line2D]:
 
 
 def panel_keys(sheet: Sheet3D) -> list[Patch]:
-    """Legend entries of the panels that differ from the rest of the sheet."""
+    """Legend entries of panels that differ from the sheet."""
     return [
         Patch(facecolor=scene.PAPERS[k % len(scene.PAPERS)], label=_differs(part.own))
         for k, part in enumerate(sheet.parts)
@@ -54,7 +54,7 @@ def _differs(own: Mapping[str, float]) -> str:
 
 
 class EdgeKind(NamedTuple):
-    """Edges that look alike: the nodes along them (k, p), look and name."""
+    """Edges of equal look: the nodes along them (k, p), look and name."""
 
     name: str
     edges: Indices
@@ -64,10 +64,10 @@ class EdgeKind(NamedTuple):
 
 
 def edge_kinds(sheet: Sheet3D, elements: bool, actuated: bool = True) -> list[EdgeKind]:
-    """Return the kinds of edges that a sheet has, from the lowest to the topmost.
+    """Kinds of edges of a sheet, from the lowest to the topmost.
 
-    Its inner bars, or the sides of a shell's triangles, are among them where `elements`, highlights
-    of actuated creases where `actuated`.
+    They include inner bars, or the sides of a shell's triangles, with `elements`, and highlights of
+    actuated creases with `actuated`.
     """
     kinds = []
     if actuated and len(sheet.actuated):
@@ -84,7 +84,7 @@ def edge_kinds(sheet: Sheet3D, elements: bool, actuated: bool = True) -> list[Ed
 
 
 def edge_keys(sheet: Sheet3D, elements: bool = False, actuated: bool = True) -> list[Line2D]:
-    """Return legend entries of a sheet's edges."""
+    """Legend entries of a sheet's edges."""
     return [
         style.key(kind.name, color=kind.color, linewidth=kind.width, linestyle=kind.dashes)
         for kind in edge_kinds(sheet, elements, actuated)
@@ -94,9 +94,9 @@ def edge_keys(sheet: Sheet3D, elements: bool = False, actuated: bool = True) -> 
 class DrawnSheet:
     """Panels, creases and boundary of a sheet in one position.
 
-    Panels are painted from the farthest to the nearest by their middles, which goes wrong where
-    large ones lie close to each other, as in a sheet that is almost closed. So they are cut into
-    pieces, and those whose middle is hidden are painted before all others.
+    Panels are painted from the farthest to the nearest by their centers, which fails if large ones
+    lie close to each other, as in a nearly closed sheet. So they are cut into pieces, and pieces
+    with hidden centers are painted before all others.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ class DrawnSheet:
             self._lines.append((front, behind, kind.edges))
 
     def move(self, points: Points) -> None:
-        """Put the nodes in other positions (n, 3)."""
+        """Move the nodes to other positions (n, 3)."""
         for panels, (corners, colors) in zip(
             (self._behind, self._panels), self._pieces(points), strict=True
         ):
@@ -146,7 +146,7 @@ class DrawnSheet:
             behind.set_segments(hidden)
 
     def _pieces(self, points: Points) -> list[tuple[NDArray, NDArray]]:
-        """Return corners and colors of the hidden pieces of panels, and of the others."""
+        """Corners and colors of the hidden pieces of panels, and of the others."""
         triangles = self._sheet.triangles
         corners = scene.pieces(points, triangles)
         colors = scene.piece_colors(points, triangles, self._sheet.paper)
@@ -170,7 +170,7 @@ def side_by_side(
     width: float = 9.0,
     most_columns: int = 3,
 ) -> tuple[Figure, list[DrawnSheet]]:
-    """Draw a sheet in several positions, over where its nodes are in gray.
+    """Draw a sheet in several positions, over its nodes' positions in gray.
 
     Parameters
     ----------
@@ -179,25 +179,26 @@ def side_by_side(
     shapes : ndarray, shape (k, n, 3)
         Positions of its nodes (m).
     captions : sequence of str
-        What stands below each shape, all of as many lines as the longest.
+        Text below each shape; all get as many lines as the longest.
     view : View
     notes : sequence of Line2D
         Legend entries that come before those of the edges.
     title : str
         Title of the figure.
     extent : ndarray, shape (p, 3), optional
-        Points (m) that every view has room for, beside the gray nodes; by default the shapes.
+        Points (m) that every view has room for, in addition to the gray nodes; by default the
+        shapes.
     width : float
         Width of the figure (inches).
     most_columns : int
-        Shapes in a row at most.
+        Most shapes in a row.
 
     Returns
     -------
     figure : Figure
         One orthographic view for each sheet, in the order of the shapes.
     sheets : list of DrawnSheet
-        They can be moved within the extent that the figure was made for.
+        They can be moved within `extent`.
     """
     count = len(shapes)
     room = np.vstack([sheet.nodes, shapes.reshape(-1, 3) if extent is None else extent])
@@ -205,13 +206,13 @@ def side_by_side(
     keys = [*notes, *edge_keys(sheet, actuated=sheet.highlights)]
 
     columns = min(count, most_columns)
-    columns = -(-count // -(-count // columns))  # rows as full as can be
+    columns = -(-count // -(-count // columns))  # fill the rows as evenly as possible
     rows = -(-count // columns)
     cell = width / columns
     flat = view.flat(room)
     low, size = flat.min(axis=0), np.ptp(flat, axis=0)
-    inches = min((cell - 2 * _MARGIN) / size[0], _TALLEST / size[1])  # per meter
-    aside = inches * (view.flat(seen.middle) - low - 0.5 * size)  # of the box from its contents
+    inches = min((cell - 2 * _MARGIN) / size[0], _TALLEST / size[1])  # inches per meter
+    aside = inches * (view.flat(seen.middle) - low - 0.5 * size)  # from the box to its content
     below = _CAPTION + _LINE * max(caption.count("\n") for caption in captions)
     top = 0.42 if title else 0.1
     entries = style.columns_that_fit(keys, width, 4)
@@ -222,7 +223,7 @@ def side_by_side(
     sheets = []
     for place, (caption, shape) in enumerate(zip(captions, shapes, strict=True)):
         row, column = divmod(place, columns)
-        here = min(columns, count - row * columns)  # the last row stands in the middle
+        here = min(columns, count - row * columns)  # the last row is centered
         middle = width / 2 + (column - 0.5 * (here - 1)) * cell
         floor = height - top - (row + 1) * step + below
         center = middle + aside[0], floor + 0.5 * size[1] * inches + aside[1]

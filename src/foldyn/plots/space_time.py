@@ -1,4 +1,4 @@
-"""Waves in chains of cells: over cells and time, over phase and frequency, and from end to end."""
+"""Waves in chains of cells: over cells and time, over phase and frequency, and transmission."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ STRENGTH = LinearSegmentedColormap.from_list(
     "strength", ["#FFFFFF", "#C9DDEC", style.SKY, style.BLUE, "#00304A"]
 )
 QUANTITIES = ("displacement", "velocity", "strain")
-DECADES = 3.0  # of amplitudes that a spectrum shows
+DECADES = 3.0  # decades of amplitude that a spectrum shows
 
 
 def plot_space_time(
@@ -38,22 +38,22 @@ def plot_space_time(
     limit: float | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw a motion of a chain: cells to the right, time upward, what they do as color.
+    """Draw a motion of a chain: cells to the right, time upward, the motion as color.
 
     Parameters
     ----------
     trajectory : xarray.Dataset
-        A motion of a chain or sheet of such cells.
+        A motion of a chain or sheet of these cells.
     cell : UnitCell
     component : {"x", "y", "z", "rotation"}
-        Of displacement and velocity; see `foldyn.linear.space_time`.
+        Component of displacement and velocity; see `foldyn.linear.space_time`.
     quantity : {"displacement", "velocity", "strain"}
         Displacement or velocity of each cell, or the strain between neighbors along the chain.
     along : int
-        Which motion of the cell leads along the chain.
+        Which period of the cell runs along the chain.
     limit : float, optional
-        Value at the ends of the colors; by default the largest, of strains that of all but the
-        first quarter of the gaps, which an impact strains most.
+        Value at the ends of the color scale; by default the largest. For strains the first quarter
+        of the gaps, which an impact strains most, does not count.
     title : str
         Title of the figure.
 
@@ -65,7 +65,7 @@ def plot_space_time(
     Raises
     ------
     InputError
-        As of `foldyn.linear.space_time`; strains of cells that do not advance.
+        As in `foldyn.linear.space_time`; strains of cells without a translation.
     """
     choice("quantity", quantity, QUANTITIES)
     found = space_time(trajectory, cell, component=component, along=along)
@@ -77,7 +77,7 @@ def plot_space_time(
 
 
 def drawn_cells(found: xr.Dataset, quantity: str, limit: float | None, title: str = "") -> Figure:
-    """Figure of what `space_time` returns; see `plot_space_time`."""
+    """Figure of the result of `space_time`; see `plot_space_time`."""
     shown = found[quantity]
     places = found["between" if quantity == "strain" else "cell"].values
     if limit is None:
@@ -103,15 +103,15 @@ def plot_wave_spectrum(
     max_frequency: float | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw the two-dimensional spectrum of a motion, with the bands on which small motions lie.
+    """Draw the two-dimensional spectrum of a motion, with the bands of small motions.
 
     Parameters
     ----------
     spectrum : xarray.Dataset
         From `foldyn.linear.wave_spectrum`.
     bands : xarray.Dataset, optional
-        From `foldyn.bands`, at phases of the one period along the chain; those below zero may be
-        left out, as bands are the same there.
+        From `foldyn.bands`, at phases of the one period along the chain; negative phases may be
+        left out, as bands are symmetric.
     max_frequency : float, optional
         Upper end of the frequency axis (Hz); by default all of the spectrum.
     title : str
@@ -165,7 +165,7 @@ def plot_transmission(
     *,
     title: str = "",
 ) -> Figure:
-    """Draw what reaches the end of a chain, and its decay from cell to cell beside the bands'.
+    """Draw the transmission to the end of a chain, and its decay per cell with the bands' decay.
 
     Parameters
     ----------
@@ -180,13 +180,13 @@ def plot_transmission(
     -------
     matplotlib.figure.Figure
         Response of the last cell over that of the first, and below it the decay (Np per cell) as
-        dots, with the attenuation of the waves of the repeated chain as lines, of which a drive
-        excites some.
+        dots, with the attenuation of all waves of the periodic chain as lines; a drive excites some
+        of them.
 
     Raises
     ------
     InputError
-        Not what these functions return.
+        Not results of these functions.
     """
     shown = by_label("transmissions", transmissions)
     for label, one in shown.items():

@@ -38,16 +38,16 @@ def draw_structure(
     view: tuple[float, float] = (28.0, -60.0),
     title: str = "",
 ) -> Figure:
-    """Draw a sheet in three dimensions with all that acts on it.
+    """Draw a sheet in three dimensions with its supports and loads.
 
     Parameters
     ----------
     case_or_structure : Case, Structure or Pattern, or a result with its case
-        Supports and loads are those of a case.
+        Only a case has supports and loads.
     displacement : array_like, shape (n, 3), or None
         Node displacements (m): the deformed sheet is drawn over the undeformed one in gray.
     numbers : bool or "all"
-        Write the numbers of the pattern's vertices; "all" also those of all other nodes.
+        Write the numbers of the pattern's vertices; "all" adds all other nodes.
     supports : bool
         Mark held and moved nodes: one triangle per direction, and the names of the directions that
         are axes. An arrow from each node with an imposed displacement, and one from the middle of
@@ -85,7 +85,7 @@ def draw_structure(
     if sheet.case is None:
         supports = loads = False
     size = sheet.size
-    # Marks suit the sheet's size, but not so that they cover the panels of a large sheet.
+    # Marks scale with the sheet, but must not cover the panels of a large one.
     edge = float(np.median(np.linalg.norm(np.ptp(sheet.nodes[sheet.edges], axis=1), axis=1)))
     marked = min(0.055 * size, 0.25 * edge)
     length = min(0.17 * size, 0.8 * edge)
@@ -98,7 +98,7 @@ def draw_structure(
     others += ties.links(sheet.case, points) if supports and sheet.case else []
     shown = [*(group.mark for group in groups), *attached, *arrows, *others]
     triangles = np.concatenate([np.zeros((0, 3, 3)), *(group.mark.triangles for group in groups)])
-    # The names of the held directions stand beyond the triangles' feet.
+    # The names of held directions stand beyond the feet of the triangles.
     feet = triangles[:, :1] + 1.6 * (triangles - triangles[:, :1])
     everything = [points, feet.reshape(-1, 3), *(mark.points for mark in shown)]
     if numbers:  # room for the labels above the highest nodes
@@ -141,7 +141,7 @@ def checked_displacement(sheet: Sheet3D, displacement: ArrayLike | None) -> Poin
 
 
 class _Supports(NamedTuple):
-    """Marks of one kind of support, and the axes of each node with the color of their names."""
+    """Marks of one kind of support, and the axes of each node with the color of the labels."""
 
     mark: Mark
     axes: list[tuple[int, str]]
@@ -149,7 +149,7 @@ class _Supports(NamedTuple):
 
 
 def _supports(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[_Supports]:
-    """Return the marks of the nodes that are held, and of those that are moved."""
+    """Marks of held nodes and of moved nodes."""
     fixed, imposed = np.asarray(sheet.case.fixed), np.asarray(sheet.case.imposed)
     moves = sum((vectors for vectors, _ in sheet.case.prescribed_terms), np.zeros(points.shape))
     kinds = [
@@ -170,7 +170,7 @@ def _supports(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[
 
 
 def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[Mark]:
-    """Return arrows of imposed displacements, and of the base at the middle of its nodes."""
+    """Arrows of imposed displacements, and of the base at the mean of its nodes."""
     imposed = [
         (points, vectors, f"moved {histories.describe(vectors, 'm')}")
         for vectors, _ in sheet.case.prescribed_terms
@@ -188,7 +188,7 @@ def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list
 
 
 def _dashpots(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[Mark]:
-    """Return the lines of the dashpots."""
+    """Lines of the dashpots."""
     lines = dashpots.dashpot_lines(sheet.case, points, size, sight)
     if not len(lines):
         return []
@@ -198,7 +198,7 @@ def _dashpots(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[
 
 
 def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[Mark]:
-    """Return arrows of forces, pressure and moments, and of gravity at the center of mass."""
+    """Arrows of forces, pressure and moments, and of gravity at the center of mass."""
     case, vertices = sheet.case, len(sheet.pattern.vertices)
     forces = [(points, f, histories.describe(f, "N")) for f, _ in case.force_terms]
     pressure = [
@@ -206,7 +206,7 @@ def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[M
         for share in following.on_panels(case, Pressure)
     ]
     gravity = []
-    for vector, _ in case.gravity_terms:  # which needs masses, as no other load does
+    for vector, _ in case.gravity_terms:  # only gravity needs masses
         center = case.nodal_mass @ points / case.nodal_mass.sum()
         gravity.append((center[None], vector[None], histories.describe_gravity(vector)))
     return [
@@ -218,7 +218,7 @@ def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[M
 
 
 def _turns(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[Mark]:
-    """Return curved arrows of moments of creases."""
+    """Curved arrows of crease moments."""
     shares = following.moments(sheet.case)
     if not shares:
         return []
@@ -235,7 +235,7 @@ def _turns(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[M
 
 
 def _warm(sheet: Sheet3D, points: Points) -> list[Mark]:
-    """Return stars on panels that are warmed."""
+    """Stars on warmed panels."""
     look, found = {"marker": "*", "markersize": 9.0, "markeredgecolor": "white"}, []
     for share in following.on_panels(sheet.case, Temperature):
         key = style.key(
@@ -254,9 +254,9 @@ def _arrows(
     color: str,
     vertices: int | None = None,
 ) -> list[Mark]:
-    """Return arrows from points along vectors, both (k, 3) in each term, with the term's text.
+    """Arrows from points along vectors, both (k, 3) in each term, with the term's text.
 
-    vertices : of crowds of nodes beyond this number, those that stand too close have no arrow.
+    vertices : nodes from this number on get no arrow if they are many and stand too close.
     """
     terms = [term for term in terms if term[1].any()]
     if not terms:
@@ -284,10 +284,10 @@ def _write_labels(
     obstacles: Points,
     sight: View,
 ) -> None:
-    """Write node numbers and the directions of supports where they hide least."""
+    """Write node numbers and support directions where they hide least."""
     count = len(sheet.pattern.vertices)
     shown = len(points) if numbers == "all" else count if numbers else 0
-    # Large sheets get smaller numbers, closer to their nodes.
+    # Large sheets get smaller numbers, closer to the nodes.
     crowd = float(np.clip(np.sqrt(20.0 / max(shown, 1)), 0.6, 1.0))
     labels = marks.Labels(axes, sight, 0.036 * crowd * sheet.size, obstacles)
     for node in range(shown):

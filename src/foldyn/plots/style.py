@@ -1,7 +1,7 @@
-"""Look of all figures: colors, fonts and frames, set on each figure and nowhere else.
+"""Look of all figures: colors, fonts and frames, set on each figure only.
 
-Nothing here changes matplotlib's global settings, so the caller's own figures are left alone; and
-fonts, colors and widths are set one by one, so the caller's usual settings do not leak in here.
+Nothing here changes matplotlib's global settings, so the caller's own figures are unaffected.
+Fonts, colors and widths are set explicitly, so the caller's settings do not affect our figures.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from foldyn.patterns.palette import (  # noqa: F401  figures take all colors fro
 from foldyn.values import of_kind
 
 CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, BLACK, ORANGE, SKY, GRAY)
-# Line kinds change with the color, so curves are told apart in gray print too.
+# Line styles change with the color, so that curves differ in gray print too.
 DASHES = ("solid", (0, (6, 2)), (0, (2, 1.4)), (0, (7, 2, 1.5, 2)), (0, (4, 1.5)))
 
 CREASE_DASHES = {"M": "solid", "V": (0, (5, 2)), "F": (0, (1, 1.5)), "U": (0, (5, 2, 1, 2))}
@@ -67,9 +67,9 @@ def new_figure(width: float, height: float, title: str = "", constrained: bool =
     width, height : float
         Size in inches.
     title : str
-        Title of the figure, if it has one.
+        Title of the figure; empty for none.
     constrained : bool
-        Let matplotlib make room for labels and legends; False leaves axes where they are put.
+        Let matplotlib make room for labels and legends; False keeps axes in place.
     """
     figure = Figure(
         figsize=(width, height),
@@ -79,7 +79,7 @@ def new_figure(width: float, height: float, title: str = "", constrained: bool =
         edgecolor="white",
     )
     if not constrained:
-        figure.set_layout_engine("none")  # against the caller's own setting of a layout
+        figure.set_layout_engine("none")  # overrides the caller's layout setting
     FigureCanvasAgg(figure)
     title_above(figure, title)
     return figure
@@ -90,7 +90,7 @@ def frame(axes: Axes, xlabel: str = "", ylabel: str = "", title: str = "") -> No
     axes.set_xlabel(xlabel, **TEXT)
     axes.set_ylabel(ylabel, **TEXT)
     if title:
-        # A fixed height: left to itself, a title moves above the exponent of the axis.
+        # A fixed height: otherwise a title moves above the exponent of the axis.
         axes.set_title(title, **TEXT, y=1.0, pad=4.0)
     axes.set_facecolor("white")
     axes.grid(True, color="#E4E4E4", linewidth=0.6, linestyle="solid")
@@ -109,7 +109,7 @@ def rows(
     ylabels: Sequence[str],
     heights: Sequence[float] | None = None,
 ) -> tuple[Figure, NDArray]:
-    """Return a figure of axes in rows that share the horizontal axis, named below the last one.
+    """Return a figure with rows of axes that share the horizontal axis, labeled below the last.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def line_style(index: int) -> dict:
 
 
 def ring(color: str, size: float = 4.5) -> dict[str, Any]:
-    """Return the look of a white dot with an outline of a color."""
+    """Return the look of a white dot with a colored outline."""
     return {
         "linestyle": "none",
         "marker": "o",
@@ -156,7 +156,7 @@ def key(label: str, **look: Any) -> Line2D:
 
 
 def exponents(axes: Axes, ticks: int = 6, which: Literal["x", "y"] = "y") -> None:
-    """Write small and large values of an axis with one common exponent."""
+    """Write small and large values along an axis with one common exponent."""
     small = -2 if which == "y" else -3
     axes.ticklabel_format(axis=which, scilimits=(small, 4), useMathText=True)
     side = axes.yaxis if which == "y" else axes.xaxis
@@ -165,9 +165,9 @@ def exponents(axes: Axes, ticks: int = 6, which: Literal["x", "y"] = "y") -> Non
 
 
 def columns_that_fit(handles: Sequence, width: float, most: int) -> int:
-    """Columns of a legend, at most `most`, that fit a width (inches) by the length of its texts."""
+    """Columns of a legend, at most `most`, that fit a width (inches) given its longest text."""
     labels = [str(handle.get_label()) for handle in handles]
-    letter, handle, gap = 0.065, 0.38, 0.22  # inches, at the size of the legend's font
+    letter, handle, gap = 0.065, 0.38, 0.22  # inches, in the legend's font
     for columns in range(most, 1, -1):
         rows = -(-len(labels) // columns)
         filled = [labels[k : k + rows] for k in range(0, len(labels), rows)]
@@ -178,7 +178,7 @@ def columns_that_fit(handles: Sequence, width: float, most: int) -> int:
 
 
 def title_above(figure: Figure, title: str) -> None:
-    """Set the figure's title, if there is one; InputError where it is no text."""
+    """Set the figure's title, if any; raise InputError if it is not text."""
     place = {} if _constrained(figure) else {"y": 1.0 - 0.1 / figure.get_figheight(), "va": "top"}
     if of_kind("title", title, str):
         figure.suptitle(title, fontsize=TITLE, color=BLACK, **place)
@@ -193,13 +193,13 @@ def legend_below(
 ) -> None:
     """Put one legend for the whole figure below its axes, where it hides no data.
 
-    With a width (inches) it has as many columns, at most so many, as `columns_that_fit`.
+    With a width (inches) the number of columns follows from `columns_that_fit`.
     """
     if width is not None:
         columns = columns_that_fit(handles, width, columns)
     figure.legend(
         handles=list(handles),
-        # "outside" makes room, which only the layout engine can do.
+        # only the layout engine can make room "outside"
         loc="outside lower center" if _constrained(figure) else "lower center",
         ncols=_even_columns(len(handles), columns),
         fontsize=TICK,
@@ -213,7 +213,7 @@ def legend_below(
 def finish(
     figure: Figure, handles: Sequence = (), columns: int = 3, width: float | None = None
 ) -> Figure:
-    """Add the legend, if it has entries, as `legend_below`; set all fonts; return the figure."""
+    """Add the legend, if it has entries, set all fonts, and return the figure."""
     if handles:
         legend_below(figure, handles, columns, width)
     for text in figure.findobj(Text):
@@ -224,6 +224,6 @@ def finish(
 
 
 def _even_columns(count: int, most: int) -> int:
-    """Columns, at most `most`, that fill the rows of a legend evenly."""
+    """Number of columns, at most `most`, that fills the rows of a legend evenly."""
     rows = max(1, -(-count // most))
     return max(1, -(-count // rows))

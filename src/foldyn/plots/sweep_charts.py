@@ -70,7 +70,7 @@ def line_chart(
 def effect_charts(
     sweep: xr.Dataset, measure: str, at: Mapping[str, Any] | None, points: bool = False
 ) -> list[Chart]:
-    """Main effects on a measure, a chart for each parameter, with the points if asked."""
+    """Main effects on a measure, a chart for each parameter, optionally with the points."""
     found, charts = measured(sweep, measure, at), []
     check_some(found.values, measure)
     for effect in main_effects(sweep, measure, at=at):
@@ -86,7 +86,7 @@ def effect_charts(
 
 
 def places(values: NDArray) -> tuple[NDArray[np.float64], list[str]]:
-    """Where values stand along an axis, and the words that stand at 0, 1, 2, ... there, if any."""
+    """Coordinates of values along an axis, and the labels of 0, 1, 2, ... if they are words."""
     if values.dtype.kind in "iuf":
         return values.astype(float), []
     words = [str(value) for value in dict.fromkeys(values.tolist())]
@@ -94,13 +94,13 @@ def places(values: NDArray) -> tuple[NDArray[np.float64], list[str]]:
 
 
 def by_ratio(values: NDArray, words: Sequence[str] = ()) -> bool:
-    """Whether values go by ratios."""
+    """Whether values are spaced by ratios."""
     steps = np.unique(values)
     return not words and bool(steps.size > 2 and steps[0] > 0.0 and steps[-1] > RATIO * steps[0])
 
 
 def check_left(found: xr.DataArray, shown: Sequence[str]) -> None:
-    """Refuse a further parameter without a value."""
+    """Refuse a further parameter whose value is not given."""
     left = [str(dim) for dim in found.dims if dim not in shown]
     if left:
         raise InputError(
@@ -111,13 +111,13 @@ def check_left(found: xr.DataArray, shown: Sequence[str]) -> None:
 
 
 def check_some(values: NDArray, measure: str) -> None:
-    """Refuse a measure without a value."""
+    """Refuse a measure without any value."""
     if not np.isfinite(values).any():
         raise InputError(f" = {measure}: has no value at any point", "measure")
 
 
 def named(found: xr.DataArray, by: str | None = None) -> str:
-    """Label of a measure, with where it is along its own dimensions."""
+    """Label of a measure, with the coordinates along its own dimensions."""
     at = [
         f"{one.attrs.get('long_name', name)} {short(one.item())}"
         for name, one in found.coords.items()

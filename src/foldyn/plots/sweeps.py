@@ -1,4 +1,4 @@
-"""Sweeps: maps, lines, main effects and Sobol indices of what was measured."""
+"""Sweeps: maps, lines, main effects and Sobol indices of measures."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def plot_sweep_map(
     at: Mapping[str, Any] | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw a measure over two parameters of a sweep in shades, with lines of equal values.
+    """Draw a measure over two parameters of a sweep in shades, with contour lines.
 
     Parameters
     ----------
@@ -56,18 +56,18 @@ def plot_sweep_map(
     measure : str
         One of its variables.
     x, y : str, optional
-        Parameters along the axes, by default the first two that `at` leaves.
+        Parameters along the axes, by default the first two that `at` does not fix.
     at : mapping, optional
-        Where along the measure's own dimensions, {"mode": 2}, the first by default; and the value
-        of each further parameter of a grid.
+        Coordinates along the measure's own dimensions, {"mode": 2}, by default the first; and the
+        value of each further parameter of a grid.
     title : str
         Title of the figure.
 
     Returns
     -------
     matplotlib.figure.Figure
-        One axes and the scale of its shades. Points that failed, or have no such value, are
-        crosses. Samples are dots in their shades, without lines.
+        One axes and a color bar. Points that failed, or lack the value, are crosses. Samples are
+        shaded dots, without contour lines.
 
     Raises
     ------
@@ -128,12 +128,12 @@ def plot_sweep_lines(
     measure : str
         One of its variables.
     x : str, optional
-        Parameter along the axis, by default the first that `at` leaves.
+        Parameter along the axis, by default the first that `at` does not fix.
     by : str, optional
-        Parameter, or dimension of the measure such as "mode", that has a curve for each value; by
-        default the next parameter of a grid, if there is one.
+        Parameter, or dimension of the measure such as "mode", with a curve for each value; by
+        default the next parameter of a grid, if any.
     at : mapping, optional
-        As of `plot_sweep_map`.
+        As in `plot_sweep_map`.
     title : str
         Title of the figure.
 
@@ -160,18 +160,18 @@ def plot_main_effects(
     Parameters
     ----------
     sweep, measure, at, title
-        As of `plot_sweep_map`.
+        As in `plot_sweep_map`.
 
     Returns
     -------
     matplotlib.figure.Figure
-        An axes for each parameter, all with one vertical axis: the mean over everything else, and
-        a band of one standard deviation to either side. Samples are averaged over 8 ranges.
+        Axes for each parameter, with a common vertical axis: the mean over all other parameters,
+        with a band of one standard deviation to either side. Samples are averaged over 8 ranges.
 
     Raises
     ------
     InputError
-        As of `plot_sweep_map`.
+        As in `plot_sweep_map`.
     """
     charts = effect_charts(sweep, measure, at)
     columns = min(COLUMNS, len(charts))
@@ -185,25 +185,24 @@ def plot_main_effects(
 
 
 def plot_sobol_indices(indices: SobolIndices, title: str = "") -> Figure:
-    """Draw the shares of the variance of a measure that parameters explain.
+    """Draw the shares of a measure's variance due to each parameter.
 
     Parameters
     ----------
     indices : SobolIndices
-        Of `foldyn.results.sobol_indices`.
+        From `foldyn.results.sobol_indices`.
     title : str
         Title of the figure.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Two bars for each parameter, its share alone and with its interactions, with their
-        intervals.
+        Two bars for each parameter, its share alone and with interactions, with intervals.
 
     Raises
     ------
     InputError
-        Not such indices.
+        Not Sobol indices.
     """
     if not isinstance(indices, SobolIndices):
         raise InputError("indices: give what foldyn.results.sobol_indices returns")
@@ -249,7 +248,7 @@ def _two(
 
 
 def _places(axes: Axes, one: xr.DataArray, which: Literal["x", "y"]) -> NDArray:
-    """Where the values of a parameter stand along an axis, which gets its ticks or its scale."""
+    """Coordinates of a parameter's values along an axis, whose ticks or scale it sets."""
     values, words = places(one.values)
     if words:
         getattr(axes, f"set_{which}ticks")(range(len(words)), words)

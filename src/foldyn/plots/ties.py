@@ -1,4 +1,4 @@
-"""Marks of what ties displacements together: supports along directions, and links."""
+"""Marks of ties between displacements: supports along directions, and links."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from foldyn.plots.scene import Points, View
 
 
 def direction_triangles(case: Case, kind: type, points: Points, size: float, sight: View) -> Points:
-    """Triangles (k, 3, 3) of the nodes that `Fix` or `Impose`, the kind, holds along directions."""
+    """Triangles (k, 3, 3) at nodes that `Fix` or `Impose`, the kind, holds along directions."""
     middle, found = points.mean(axis=0), []
     for support in case.supports:
         if not isinstance(support, Fix | Impose) or type(support) is not kind:
@@ -21,7 +21,7 @@ def direction_triangles(case: Case, kind: type, points: Points, size: float, sig
             continue
         nodes, unit = resolve_nodes(case.structure, support.nodes), unit_vector(support.direction)
         for node, value in zip(nodes, _values(support, len(nodes)), strict=True):
-            # it pushes where it moves; else it stands below the sheet, or outside
+            # it pushes a moving node; else it stands below the sheet, or outside
             outward = unit[2] if abs(unit[2]) > 1e-9 else unit @ (middle - points[node])
             along = unit * (np.sign(value) or np.sign(outward) or 1.0)
             found.append(marks.billboard(points[node], along, size, 0.38 * size, sight))
@@ -33,7 +33,7 @@ def _values(support: Fix | Impose, count: int) -> Points:
 
 
 def links(case: Case, points: Points) -> list[Mark]:
-    """Lines from the first of some linked nodes to the others, or from riders to their carriers."""
+    """Lines from the first of some linked nodes to the others, or from riders to carriers."""
     segments, tied = [], []
     for support in case.supports:
         if isinstance(support, Link):

@@ -19,9 +19,9 @@ def track_charts(
     axes: Sequence[str],
     truth: Mapping[int, ArrayLike] | None = None,
 ) -> list[Chart]:
-    """Displacements (m) of nodes over time, photograph or load, a chart for each.
+    """Displacements (m) of nodes over time, photograph or load, a chart for each node.
 
-    Several axes are a curve each, in dots. The truth is that along a single one.
+    Each axis is a curve, in dots. The truth is along a single axis.
     """
     along = dimension(tracks)
     shown = "load" if along == "photo" and "load" in tracks.coords else along
@@ -47,7 +47,7 @@ def dimension(tracks: xr.Dataset) -> str:
 
 
 def _name(tracks: xr.Dataset, node: int) -> str:
-    """Title of a node's history: how well it was measured."""
+    """Title of a node's history, with the quality of its measurement."""
     name = f"node {node}: measured in {float(tracks['tracked'].sel(node=node)):.1%}"
     if "error" in tracks and np.isfinite(tracks["error"].sel(node=node)):
         name += f", standard error {1e6 * float(tracks['error'].sel(node=node)):.2g} µm"

@@ -1,4 +1,4 @@
-"""Tracked nodes: their histories, and the model over the picture in which it was recognized."""
+"""Tracked nodes: their histories, and the model over the picture that it was matched to."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from foldyn.plots.given import alone
 from foldyn.plots.track_charts import dimension, track_charts
 from foldyn.values import choice
 
-_MARGIN = 0.08  # of the model's size, around it in an overlay
+_MARGIN = 0.08  # margin around the model in an overlay, relative to its size
 _WIDTH = 8.0  # inches
 
 
@@ -31,15 +31,15 @@ def plot_tracks(
     truth: Mapping[int, ArrayLike] | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw the measured displacements of nodes, one row each; gaps are where a node was lost.
+    """Draw the measured displacements of nodes, one row each; gaps mark lost nodes.
 
     Parameters
     ----------
     tracks : xarray.Dataset
-        Of `foldyn.experiment`, with a model.
+        From `foldyn.experiment`, with a model.
     nodes : int or sequence of int
     axis : str or None
-        "x", "y" or "z"; None: the one in which most is measured to move.
+        "x", "y" or "z"; None means the one with the largest measured motion.
     truth : mapping of int to array_like, optional
         True displacements (m) of nodes at the same times, drawn behind.
     title : str
@@ -51,7 +51,7 @@ def plot_tracks(
     Raises
     ------
     InputError
-        Tracks without a model, a node or an axis that they do not have, or one never measured.
+        Tracks without a model, a node or an axis that they lack, or a node never measured.
     """
     if "displacement" not in alone("tracks", tracks):
         raise InputError("tracks: without a model there are pixels only; track with a model")
@@ -68,12 +68,12 @@ def plot_tracks(
 def plot_steps(
     steps: Mapping[str, tuple[ArrayLike, ArrayLike]], unit: str = "m", *, title: str = ""
 ) -> Figure:
-    """Draw a history after each step of its preparation, one row each.
+    """Draw a history after each step of its processing, one row each.
 
     Parameters
     ----------
     steps : mapping of str to (time, values)
-        What was done, and the record (s, `unit`) after it; the first one is the record as measured.
+        The step, and the record (s, `unit`) after it; the first is the measured record.
     unit : str
     title : str
 
@@ -84,7 +84,7 @@ def plot_steps(
     Raises
     ------
     InputError
-        There is none, or times and values differ in number.
+        No steps, or times and values differ in number.
     """
     if not isinstance(steps, Mapping) or not steps:
         raise InputError(": give a mapping with at least {'as measured': (time, values)}", "steps")
@@ -104,11 +104,11 @@ def draw_overlay(
     Parameters
     ----------
     picture : ndarray of uint8, shape (height, width)
-        The frame or photograph, whole.
+        The whole frame or photograph.
     tracks : xarray.Dataset
-        Of `foldyn.experiment`; with a model, whose edges are then drawn as it was recognized.
+        From `foldyn.experiment`; with a model, its edges are drawn in the recognized pose.
     at : int or None
-        Index of the frame or photograph; None: the frame in which the model was recognized.
+        Index of the frame or photograph; None means the frame in which the model was recognized.
     title : str
 
     Returns
@@ -170,7 +170,7 @@ def draw_overlay(
 def _extent(
     points: NDArray[np.float64], shape: tuple[int, ...]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Part of the picture around all points."""
+    """Part of the picture that surrounds all points."""
     whole = np.array([shape[1], shape[0]], dtype=np.float64) - 0.5
     known = points[np.isfinite(points[:, 0])]
     if not len(known):

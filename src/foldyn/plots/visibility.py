@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from foldyn.plots.scene import Indices, Points, View
 
-SAMPLES = 24  # pieces per edge: the ends of a hidden part are found to 1/24 of the edge, about
-_CHUNK = 10_000  # points tested at a time
+SAMPLES = 24  # pieces per edge: the ends of hidden parts are found to about 1/24 of the edge
+_CHUNK = 10_000  # points tested at once
 
 
 def hidden_points(
     points: Points, vertices: Points, triangles: Indices, view: View, size: float
 ) -> NDArray[np.bool_]:
-    """Tell which points (p, 3) lie behind a triangle as seen along the view.
+    """Which points (p, 3) lie behind a triangle as seen along the view.
 
-    A point within a thousandth of `size` (m) of a triangle does not count as behind it: edges lie
-    in their own panels.
+    A point within a thousandth of `size` (m) of a triangle is not behind it, as edges lie in their
+    own panels.
     """
     seen = vertices @ view.basis.T
     a, b, c = (seen[triangles[:, k]] for k in range(3))
@@ -43,7 +43,7 @@ def hidden_points(
 
 
 def _near_pairs(points: Points, corners: Points) -> Iterator[tuple[Indices, Indices]]:
-    """Give all pairs of points (p, 2) and triangles (3, t, 2) that may overlap, some at a time."""
+    """Yield all pairs of points (p, 2) and triangles (3, t, 2) that may overlap, in batches."""
     tree = shapely.STRtree(shapely.box(*corners.min(axis=0).T, *corners.max(axis=0).T))
     for start in range(0, len(points), _CHUNK):
         point, triangle = tree.query(shapely.points(points[start : start + _CHUNK]))
@@ -53,7 +53,7 @@ def _near_pairs(points: Points, corners: Points) -> Iterator[tuple[Indices, Indi
 def split_edges(
     edges: Indices, vertices: Points, triangles: Indices, view: View, size: float
 ) -> tuple[Points, Points]:
-    """Cut edges (k, p), each straight from node to node, into parts in sight and hidden ones.
+    """Split edges (k, p), which are polylines through nodes, into visible and hidden parts.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def split_edges(
     if len(edges) == 0:
         return np.zeros((0, 2, 3)), np.zeros((0, 2, 3))
     lines = vertices[edges]
-    each = max(2, SAMPLES // (edges.shape[1] - 1))  # samples from node to node
+    each = max(2, SAMPLES // (edges.shape[1] - 1))  # samples between nodes
     middle = (np.arange(each) + 0.5)[:, None] / each
     points = lines[:, :-1, None] * (1.0 - middle) + lines[:, 1:, None] * middle
     behind = hidden_points(points.reshape(-1, 3), vertices, triangles, view, size)
@@ -80,13 +80,13 @@ def split_edges(
 
 
 def _point(line: Points, place: float) -> Points:
-    """Point at a place from 0 to p - 1 of a line (p, 3)."""
+    """Point at a coordinate from 0 to p - 1 along a polyline (p, 3)."""
     k = min(int(place), len(line) - 2)
     return line[k] + (line[k + 1] - line[k]) * (place - k)
 
 
 def _together(parts: list[Points]) -> Points:
-    """Lines of different numbers of points in one array."""
+    """Stack lines with different numbers of points in one array."""
     longest = max((len(part) for part in parts), default=2)
     same = [np.concatenate([part, part[-1:].repeat(longest - len(part), 0)]) for part in parts]
     return np.array(same).reshape(-1, longest, 3)

@@ -1,4 +1,4 @@
-"""Files of an animation: GIF through Pillow, MP4 through an ffmpeg that is looked for."""
+"""Files of an animation: GIF through Pillow, MP4 through ffmpeg."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from foldyn.writing import whole
 
 DPI = {".gif": 100, ".mp4": 200}
 """Dots per inch of an animation by the end of the file's name."""
-_FASTEST = {".gif": 50, ".mp4": 60}  # viewers slow down GIFs of shorter frames
-_COLORS = 128  # of a GIF, for all its pictures: 256 for each would take three times the space
-_SAMPLES = 8  # pictures from which these colors are taken
+_FASTEST = {".gif": 50, ".mp4": 60}  # viewers slow down GIFs with shorter frames
+_COLORS = 128  # for all pictures of a GIF: 256 per picture would take three times the space
+_SAMPLES = 8  # number of pictures that these colors are taken from
 
 
 class GifWriter(PillowWriter):
-    """A GIF that loops forever, all its pictures in the same few colors.
+    """A GIF that loops forever, all its pictures with one small palette.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class GifWriter(PillowWriter):
         if not self._pictures:
             return
         palette = _common_palette(self._pictures)
-        # Dithered paper would flicker and could not be compressed.
+        # Dithered paper would flicker and compress badly.
         first, *others = (
             picture.quantize(palette=palette, dither=Image.Dither.NONE)
             for picture in self._pictures
@@ -65,7 +65,7 @@ class GifWriter(PillowWriter):
 
 
 def _common_palette(pictures: list[Image.Image]) -> Image.Image:
-    """Return the colors that suit some of the pictures, first and last among them, best."""
+    """Colors that best suit a sample of the pictures, including the first and the last."""
     count = min(len(pictures), _SAMPLES)
     width, height = pictures[0].size
     strip = Image.new("RGB", (width, height * count))
@@ -73,13 +73,13 @@ def _common_palette(pictures: list[Image.Image]) -> Image.Image:
         strip.paste(pictures[k], (0, row * height))
     chosen = strip.quantize(_COLORS)
     palette = np.array(chosen.getpalette()).reshape(-1, 3)
-    palette[palette.min(axis=1) > 249] = 255  # white is white, not almost
+    palette[palette.min(axis=1) > 249] = 255  # make white exactly white
     chosen.putpalette(palette.ravel().tolist())
     return chosen
 
 
 class Mp4Writer(FFMpegWriter):
-    """An MP4 in H.264 that browsers and slides play.
+    """An MP4 in H.264 that browsers and presentations play.
 
     Attributes
     ----------
@@ -88,8 +88,8 @@ class Mp4Writer(FFMpegWriter):
     """
 
     def __init__(self, fps: int) -> None:
-        # Everything named, so that the caller's settings of matplotlib do not matter; the index
-        # comes first in the file, so that it plays before it is loaded.
+        # Everything is set explicitly, so that the caller's matplotlib settings do not matter. The
+        # index comes first in the file, so that it plays before it is fully loaded.
         quality = ["-crf", "20", "-movflags", "+faststart"]
         super().__init__(fps=fps, codec="h264", bitrate=-1, extra_args=quality)
         self.rate = float(fps)
@@ -105,7 +105,7 @@ WRITERS = dict(zip((f".{kind}" for kind in ANIMATIONS), (GifWriter, Mp4Writer), 
 
 
 def checked_file(path: str | PathLike[str], frames: int, fps: int) -> Path:
-    """Return the file to write when all that an animation needs is there."""
+    """Check that an animation can be written, and return its file."""
     path = Path(path)
     kind = path.suffix.lower()
     if kind not in WRITERS:
@@ -121,7 +121,7 @@ def checked_file(path: str | PathLike[str], frames: int, fps: int) -> Path:
 
 @contextmanager
 def filmed(figure: Figure, path: Path, fps: int) -> Iterator[GifWriter | Mp4Writer]:
-    """Make a file of the pictures that the writer grabs meanwhile; it appears when complete.
+    """Write a file from the pictures that the writer grabs in the block; it appears once complete.
 
     Raises
     ------
@@ -142,12 +142,12 @@ def filmed(figure: Figure, path: Path, fps: int) -> Iterator[GifWriter | Mp4Writ
 
 
 def find_ffmpeg() -> str:
-    """Path of the ffmpeg on the PATH, or else of that of the package imageio-ffmpeg.
+    """Path of ffmpeg, on the PATH or else in the package imageio-ffmpeg.
 
     Raises
     ------
     InputError
-        There is neither.
+        Neither is found.
     """
     program = shutil.which("ffmpeg")
     if program is not None:
@@ -156,7 +156,7 @@ def find_ffmpeg() -> str:
         from imageio_ffmpeg import get_ffmpeg_exe  # pyright: ignore[reportMissingImports]
 
         return get_ffmpeg_exe()
-    except (ImportError, RuntimeError):  # the package, or the program for this machine
+    except (ImportError, RuntimeError):  # the package, or its program for this machine, is missing
         raise InputError(
             "MP4 needs ffmpeg, which is not on the PATH: install it, or the package that brings "
             "it (pip install imageio-ffmpeg), or write a GIF"
