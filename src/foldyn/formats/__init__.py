@@ -1,4 +1,4 @@
-"""Pattern files: one module for each format, chosen by extension from a registry."""
+"""Pattern files: one module per format, selected from a registry by extension."""
 
 from __future__ import annotations
 

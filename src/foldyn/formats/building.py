@@ -1,4 +1,4 @@
-"""From a `Drawing` to a `Pattern`, repaired, with a diagnosis of what was done."""
+"""From a `Drawing` to a repaired `Pattern`, with a diagnosis."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from foldyn.patterns.topology import Edge, Faces, edge_lookup, edge_of
 from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.values import LONGEST, SHORTEST, number
 
-_FARTHEST = 1e8  # from the origin, over the size: coordinates keep eight digits within the drawing
+_FARTHEST = 1e8  # from the origin, relative to the size: keeps eight digits
 _COARSEST = 0.05  # of the size: tolerance
 _SHUT = 179.0  # degrees: fold angles of closed creases
-_TURNED = 1e-3  # rad from pi: what counts as folded
+_TURNED = 1e-3  # rad from pi: larger angles count as folded
 
 
 class Built(NamedTuple):
-    """A pattern and what is to be said of it."""
+    """A pattern and its diagnosis."""
 
     pattern: Pattern
     diagnosis: Diagnosis
@@ -40,34 +40,34 @@ def built(
     drawing: Drawing, *, meters: float | None = None, scale: float = 1.0,
     tolerance: float | None = None,
 ) -> Built:  # fmt: skip
-    """Build the pattern of a drawing: repaired where that can be done, refused where not.
+    """Build the pattern of a drawing; repair what can be repaired, refuse the rest.
 
-    Lines without faces, in the plane: ends that lie together are joined, lines are split where
-    they meet, the panels are the regions that they enclose; open ends are left out. With faces, in
-    the plane or in space: points that panels should share are merged. Cuts inside become two edges
-    of the boundary; joins ("J", FOLD 1.2: the panels are one) become flat creases.
+    Lines without faces lie in the plane: coincident ends are joined, lines are split where they
+    meet, panels are the enclosed regions, and open ends are left out. With faces, in the plane or
+    in space, points that panels should share are merged. Cuts inside become two edges of the
+    boundary; joins ("J", FOLD 1.2: the panels are one) become flat creases.
 
     Parameters
     ----------
     drawing : Drawing
-        What a reader gives, with or without faces.
+        Result of a reader, with or without faces.
     meters : float, optional
-        Length of the drawing's unit (m), in place of the one that the file says or that is
-        assumed (`drawing.assumed`).
+        Length of the drawing's unit (m), instead of the file's or the assumed one
+        (`drawing.assumed`).
     scale : float
-        Factor on all lengths, beside the unit.
+        Factor on all lengths, in addition to the unit.
     tolerance : float, optional
-        Distance (m) within which points are one; by default one that suits the drawing.
+        Distance (m) within which points are merged; by default it suits the drawing.
 
     Returns
     -------
     Built
-        The pattern (m), and the diagnosis: assumptions, repairs, doubts. Nothing is warned.
+        The pattern (m), and the diagnosis: assumptions, repairs, doubts. There are no warnings.
 
     Raises
     ------
     InputError
-        What cannot be repaired; the message names the place and the reason.
+        The drawing cannot be repaired; the message names the place and the reason.
     """
     unit, assumptions = drawing.meters or drawing.assumed, list(drawing.assumptions)
     if meters is not None:
@@ -112,16 +112,16 @@ def built(
 
 
 def _facets(pattern: Pattern, panels: Panels) -> tuple[Edge, ...]:
-    """Creases that are drawn as flat, and to stay so."""
+    """Creases drawn as flat that are to stay flat."""
     folded = edge_lookup(pattern.creases[np.nan_to_num(pattern.fold_angles) != 0.0])
     drawn = [(a, b) for a, b in pattern.creases.tolist() if panels.letters.get((a, b)) == "F"]
     return tuple(edge for edge in drawn if edge not in folded)
 
 
 def _lines(drawing: Drawing, unit: float, notes: Notes) -> Lines:
-    """Lines of a drawing in meters, checked, fold angles with the signs of their letters."""
+    """Lines of a drawing in meters, checked; fold angles get the signs of their letters."""
     given = np.asarray(drawing.vertices, dtype=np.float64)
-    for k in np.flatnonzero(~(np.abs(given) * unit <= LONGEST).all(axis=1))[:1]:  # NaN too
+    for k in np.flatnonzero(~(np.abs(given) * unit <= LONGEST).all(axis=1))[:1]:  # NaN included
         raise InputError(
             f" = {given[k].tolist()}: coordinates must be finite, and at most {LONGEST:g} m",
             f"vertices[{k}]",
@@ -149,7 +149,7 @@ def _lines(drawing: Drawing, unit: float, notes: Notes) -> Lines:
             "to 180",
             notes.line(k),
         )
-    angles[(letters == "U") & (angles == 0.0)] = np.nan  # 0 of all but mountains and valleys: none
+    angles[(letters == "U") & (angles == 0.0)] = np.nan  # 0 means not given
     against = np.where(letters == "M", angles > 0, (letters == "V") & (angles < 0))
     along = np.where(letters == "M", angles < 0, (letters == "V") & (angles > 0))
     if against.any() and not along.any():
@@ -165,7 +165,7 @@ def _lines(drawing: Drawing, unit: float, notes: Notes) -> Lines:
 
 
 def _pattern(panels: Panels, drawing: Drawing, notes: Notes) -> Pattern:
-    """Pattern of panels whose cuts are open."""
+    """Pattern of panels with open cuts."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
         bare = Pattern(panels.points, panels.faces)
@@ -201,11 +201,11 @@ def _pattern(panels: Panels, drawing: Drawing, notes: Notes) -> Pattern:
 
 
 def _turned(bare: Pattern, letters: NDArray[np.str_], notes: Notes) -> Faces:
-    """Faces, turned over where every folded crease has the other letter."""
+    """Faces, turned over if every folded crease contradicts its letter."""
     turn = bare.dihedrals - np.pi
     right = ((letters == "M") & (turn > _TURNED)) | ((letters == "V") & (turn < -_TURNED))
     wrong = ((letters == "M") & (turn < -_TURNED)) | ((letters == "V") & (turn > _TURNED))
-    wrong &= np.abs(turn) < np.pi - _TURNED  # panels that lie upon each other fit either letter
+    wrong &= np.abs(turn) < np.pi - _TURNED  # coincident panels fit either letter
     if right.any() or not wrong.any():
         return bare.faces
     notes.repairs.append("turned all panels over: seen from their front, every letter was wrong")
@@ -216,9 +216,10 @@ def _with_sides(
     bare: Pattern, given: NDArray[np.str_], faces: Faces, panels: Panels, drawing: Drawing,
     notes: Notes,
 ) -> NDArray[np.str_]:  # fmt: skip
-    """Letters of creases, of closed ones by their fold angle or by the order of their layers.
+    """Letters of creases; for closed ones from the fold angle or from the order of layers.
 
-    Panels that lie upon each other face each other at a valley, and look away at a mountain.
+    Coincident panels have their fronts together at a valley, and their backs together at a
+    mountain.
     """
     orders = drawing.custom.get(FACE_ORDERS, ())
     if len(faces) != len(drawing.faces or ()):
@@ -250,9 +251,9 @@ def _with_sides(
 
 
 def _with_fronts(pattern: Pattern, faces: Faces, drawing: Drawing, notes: Notes) -> Pattern:
-    """The pattern with the order of its layers, if its panels, from `faces`, are those of the file.
+    """Keep the pattern's order of layers if its panels, from `faces`, are those of the file.
 
-    It is said of fronts, which are the other sides of panels that were turned over.
+    The order refers to fronts, so it is reversed for panels that were turned over.
     """
     given = pattern.custom.get(FACE_ORDERS)
     if given is None:

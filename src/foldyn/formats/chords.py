@@ -1,4 +1,4 @@
-"""What readers make of the shapes of a drawing: lines with letters and places, curves as chords."""
+"""Lines that readers collect from shapes: with letters and places; curves become chords."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from foldyn.formats.notes import count, without_length
 
 
 class Chords:
-    """Gathers the lines of shapes.
+    """Collects the lines of shapes.
 
     Parameters
     ----------
     boxes : sequence of ndarray, shape (k, d)
-        Points that tell how large each shape is.
+        Points that bound each shape.
 
     Attributes
     ----------
     tolerance : float
-        Distance of a curve from its chords.
+        Largest distance of a curve from its chords.
     """
 
     def __init__(self, boxes: Sequence[NDArray[np.float64]]) -> None:
@@ -37,7 +37,7 @@ class Chords:
         self._has_length: dict[str, bool] = {}
 
     def add(self, along: NDArray[np.float64], letter: str, place: str) -> int:
-        """Add the lines from each point of a shape to the next; returns how many have a length."""
+        """Add the lines between successive points of a shape; return how many have a length."""
         pairs = np.stack((along[:-1], along[1:]), axis=1)
         pairs = pairs[(pairs[:, 0] != pairs[:, 1]).any(axis=1)]
         self._has_length[place] = self._has_length.get(place, False) or len(pairs) > 0
@@ -51,7 +51,7 @@ class Chords:
     def drawing(
         self, curved: int, fold_angles: ArrayLike, repairs: Sequence[str], **more: Any
     ) -> Drawing:
-        """All lines, of which some were curves, with further repairs and fields."""
+        """Drawing of all lines, of which some were curves, with further repairs and fields."""
         told = [f"{count(curved, 'curve')} drawn as chords, within {self.tolerance:.3g} units"]
         repairs = (*told[:curved], *without_length(self._has_length), *repairs)
         if not self.letters:

@@ -26,7 +26,7 @@ def read(text: str) -> Drawing:
     Parameters
     ----------
     text : str
-        The file's content. Empty lines, and what follows "#", do not count.
+        The file's content. Empty lines, and text after "#", are ignored.
 
     Returns
     -------
@@ -36,7 +36,7 @@ def read(text: str) -> Drawing:
     Raises
     ------
     InputError
-        A line that is no line of a crease pattern; the message names it.
+        A line that does not describe a crease pattern's line; the message names it.
     """
     kinds: list[str] = []
     points: list[tuple[float, float]] = []
@@ -62,13 +62,13 @@ def read(text: str) -> Drawing:
 
 
 def write(pattern: Pattern) -> str:
-    """Text of a CP file: kind, x1, y1, x2, y2, with the y of the screen, which runs down.
+    """Text of a CP file: kind, x1, y1, x2, y2, with y downwards as on the screen.
 
     Parameters
     ----------
     pattern : Pattern
-        A flat one; the format knows boundary, mountain, valley and auxiliary lines alone, so that
-        facets and unassigned creases become the last.
+        A flat pattern. The format has only boundary, mountain, valley and auxiliary lines; facets
+        and unassigned creases become auxiliary.
 
     Returns
     -------

@@ -16,7 +16,7 @@ MOST = 1000
 
 
 def bezier(control: ArrayLike, tolerance: float) -> NDArray[np.float64]:
-    """Points (k, 2) on a Bezier curve of degree 2 or 3, the first and last among them.
+    """Points (k, 2) on a Bezier curve of degree 2 or 3, including the first and last.
 
     Chords of equal steps of the parameter depart from the curve by at most max|B''| h^2 / 8.
     """
@@ -32,12 +32,12 @@ def bezier(control: ArrayLike, tolerance: float) -> NDArray[np.float64]:
 
 
 def arc_chords(radius: float, sweep: float, tolerance: float) -> int:
-    """Chords of an arc (angle in rad): each departs by radius (1 - cos of half its angle)."""
+    """Number of chords of an arc (rad), each departing by radius (1 - cos of half its angle)."""
     if tolerance >= radius:
         return max(1, math.ceil(abs(sweep) / (0.5 * math.pi) - 1e-9))
     return chords(abs(sweep) / (2 * math.acos(1 - tolerance / radius)))
 
 
 def chords(count: float) -> int:
-    """Whole number of chords, at most `MOST`."""
+    """Round up to a number of chords, at most `MOST`."""
     return max(1, min(MOST, math.ceil(count - 1e-9))) if math.isfinite(count) else MOST

@@ -1,4 +1,4 @@
-"""Cuts in a sheet: the panels on both sides get points of their own where the cut opens."""
+"""Cuts in a sheet: panels on both sides get their own points where the cut opens."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from foldyn.patterns.topology import Edge, Faces, around, edge_of
 
 
 def opened(panels: Panels) -> tuple[Panels, int]:
-    """Panels whose cut edges (letter "C", of two panels) are two edges of the boundary.
+    """Split cut edges (letter "C", of two panels) into two boundary edges each.
 
-    Around each end of a cut, panels that folds join keep a point in common; so a cut's end inside
-    the sheet stays one point, and a cut that reaches the outline or another cut opens there. A
-    cut of one edge with both ends inside gets a point in its middle, on each side.
+    Around each end of a cut, panels joined by folds keep a common point. So a cut that ends inside
+    the sheet stays closed there, and one that reaches the outline or another cut opens. A cut of
+    one edge with both ends inside gets a midpoint on each side.
 
     Parameters
     ----------
     panels : Panels
-        Each edge of at most two.
+        Each edge belongs to at most two.
 
     Returns
     -------
     panels : Panels
-        The first panel at a point keeps its number; new ones follow all others.
+        The first panel at a point keeps the point's number; new points follow all others.
     count : int
         Number of edges cut.
     """
@@ -72,7 +72,7 @@ def opened(panels: Panels) -> tuple[Panels, int]:
 def _parted(
     panels: Panels, sides: dict[Edge, list[int]], cuts: set[Edge]
 ) -> dict[tuple[int, int], int]:
-    """For each corner (face, point) at a cut, the group of corners that folds join around it."""
+    """Group of each corner (face, point) at a cut; folds around the point join corners."""
     ends = {end for edge in cuts for end in edge}
     corners = [(f, point) for f, face in enumerate(panels.faces) for point in face if point in ends]
     row = {corner: k for k, corner in enumerate(corners)}
@@ -88,7 +88,7 @@ def _parted(
 
 
 def _halved(panels: Panels, edges: list[Edge]) -> Panels:
-    """Panels with a point in the middle of some edges."""
+    """Panels with a midpoint added to some edges."""
     middle = {edge: len(panels.points) + k for k, edge in enumerate(edges)}
     places = [0.5 * (panels.points[a] + panels.points[b]) for a, b in edges]
     faces: Faces = tuple(

@@ -1,4 +1,4 @@
-"""`Diagnosis`: what was assumed, repaired and doubted when a pattern was read."""
+"""`Diagnosis`: assumptions, repairs and doubts from reading a pattern."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ LISTED = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What a reader says of a pattern; `str` is the text of ``foldyn convert --check``.
+    """Diagnosis of a read pattern; `str` is the text of ``foldyn convert --check``.
 
     Attributes
     ----------
     size : tuple of float
         Extent of the sheet along x, y and z (m).
     assumptions : tuple of str
-        What the file does not say: its unit, what its colors mean.
+        Facts missing in the file: its unit, the meaning of its colors.
     repairs : tuple of str
-        What was put right.
+        What was repaired.
     doubts : tuple of str
-        What may not be as intended.
+        What may not be intended.
     vertices : FlatFoldability
-        Maekawa's and Kawasaki's conditions at the vertices inside.
+        Maekawa's and Kawasaki's conditions at interior vertices.
     facets : tuple of pairs of int
-        Flat creases that the file itself assigns "F", and that are not to be folded.
+        Flat creases that the file itself assigns "F", which are not meant to fold.
     moves : ndarray, shape (n,)
-        How far (m) each vertex was moved, or would be by ``flat_foldable=True``, to fold flat;
-        empty where none needs to.
+        Distance (m) that each vertex was moved, or would be moved by ``flat_foldable=True``, to
+        fold flat; empty if none needs to move.
     """
 
     size: tuple[float, float, float]
@@ -58,7 +58,7 @@ class Diagnosis:
         return "\n".join(lines + self._move_lines() + self._vertex_lines())
 
     def _move_lines(self) -> list[str]:
-        """How many vertices move to fold flat, and how far those do that move most."""
+        """How many vertices move to fold flat, and the largest moves."""
         number = int((self.moves > LISTED).sum())
         if not number:
             return []
@@ -68,7 +68,7 @@ class Diagnosis:
         return [f"vertices moved, or to be moved, to fold flat: {number}{least} (um): {shown}"]
 
     def _vertex_lines(self) -> list[str]:
-        """Table of the vertices inside, those first that cannot fold flat."""
+        """Table of interior vertices, starting with those that cannot fold flat."""
         v = self.vertices
         maekawa, kawasaki = v.maekawa, v.kawasaki(ROUNDING)
         developable = v.developable(ROUNDING)
@@ -91,7 +91,7 @@ class Diagnosis:
                 )
                 if not holds
             ]
-            deficit = round(float(np.degrees(v.deficits[k])), 3) + 0.0  # no -0
+            deficit = round(float(np.degrees(v.deficits[k])), 3) + 0.0  # avoid -0
             alternating = "odd" if v.degrees[k] % 2 else f"{np.degrees(v.alternating[k]):.3f}"
             lines.append(
                 f"{v.vertices[k]:8d}{v.degrees[k]:8d}{v.mountains[k]:6d}{v.valleys[k]:6d}"

@@ -1,4 +1,4 @@
-"""`Drawing`: a crease pattern as a file gives it, before it is repaired and has panels."""
+"""`Drawing`: a crease pattern as read from a file, before repair and without derived panels."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ METERS = {
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """Lines with letters; what readers of all formats give.
+    """Lines with letters, as readers of all formats return them.
 
     Parameters
     ----------
@@ -39,31 +39,31 @@ class Drawing:
     edges : ndarray of int, shape (m, 2)
         Vertex numbers of each line.
     letters : tuple of str
-        For each line "B", "M", "V", "F", "U", "C" (cut) or "J" (join), as FOLD has them.
+        For each line "B", "M", "V", "F", "U", "C" (cut) or "J" (join), as in FOLD.
     fold_angles : ndarray, shape (m,)
-        Angle (degrees, positive on valleys) to fold each line to; NaN where none is given.
+        Angle (degrees, positive on valleys) to fold each line to; NaN if not given.
     faces : tuple of tuple of int, optional
-        Panels; None where the file has lines alone and the panels are to be found from them.
+        Panels; None if the file has only lines, from which panels are to be found.
     meters : float, optional
-        Length of the file's unit (m); None where the file does not say it.
+        Length of the file's unit (m); None if the file does not give it.
     assumed : float
-        Length (m) to take the unit for where neither the file nor the user says it.
+        Length (m) assumed for the unit if neither the file nor the user gives it.
     unit : str
-        What the format calls its unit, for messages: "px".
+        Name of the format's unit, for messages: "px".
     name : str
         Title.
     places : tuple of str
-        Where each line is in the file ("line 12", "path 3"), for messages; () where its number
-        says it.
+        Where each line is in the file ("line 12", "path 3"), for messages; () if its number says
+        so.
     repairs, assumptions, doubts : tuple of str
-        What the reader put right, took for granted, and is not sure of, in words.
+        What the reader repaired, assumed, and doubts, in words.
     families : mapping
         Names for groups of lines, each with pairs of vertex numbers.
     welds : sequence, optional
-        Pairs of vertex numbers of the lines across which the sheet runs on, of a file that says
-        it of each of its flat lines.
+        Pairs of vertex numbers of lines across which the sheet is continuous, if the file states
+        this for each of its flat lines.
     custom : mapping
-        Further data, kept.
+        Further data, preserved.
     """
 
     vertices: NDArray[np.float64]
@@ -87,7 +87,7 @@ class Drawing:
     def of_lines(
         cls, points: ArrayLike, letters: Sequence[str], fold_angles: ArrayLike = np.nan, **more: Any
     ) -> Self:
-        """Drawing of lines with ends of their own.
+        """Drawing of lines that share no ends.
 
         Parameters
         ----------
@@ -95,7 +95,7 @@ class Drawing:
             Both ends of each line in turn.
         letters : sequence of str, length m
         fold_angles : array_like, shape (m,), optional
-            Degrees; without it none is given.
+            Degrees; by default none.
         **more
             Further fields.
         """
@@ -106,12 +106,12 @@ class Drawing:
 
 
 def coordinate(text: str, place: str, given: str = "") -> float:
-    """Coordinate that a text is.
+    """Parse a coordinate.
 
     Raises
     ------
     InputError
-        It is no finite number; the message names the place, and shows what is given there.
+        It is not a finite number; the message names the place and shows the text.
     """
     try:
         value = parsed(text)

@@ -1,8 +1,8 @@
-"""DXF crease patterns: lines whose layers say what they are, or else their colors.
+"""DXF crease patterns: layers, or else colors, tell the kinds of lines.
 
-A layer counts by what its name contains: mountain, valley, cut, border (boundary, outline,
-contour), facet (flat, aux), fold (crease, hinge; without a letter); or by being M, V, C, B, F or U.
-The library ezdxf reads the format.
+The kind follows from a word in the layer's name: mountain, valley, cut, border (boundary, outline,
+contour), facet (flat, aux), fold (crease, hinge; without a letter); or from the name M, V, C, B, F
+or U. The library ezdxf reads the format.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def read(text: str) -> Drawing:
     Raises
     ------
     InputError
-        No DXF, one without lines, or ezdxf is not installed.
+        Not DXF, no lines, or ezdxf is not installed.
     """
     document = _document(ezdxf(), text)
     with _reading("entities"):
@@ -98,7 +98,7 @@ def read(text: str) -> Drawing:
 def _document(library: Any, text: str) -> Any:
     _check_numbers(text)
     logger, handler = logging.getLogger("ezdxf"), logging.NullHandler()
-    logger.addHandler(handler)  # else what it logs goes to standard error
+    logger.addHandler(handler)  # otherwise its log goes to standard error
     try:
         with _reading("is not a DXF file"):
             return library.read(io.StringIO(text))
@@ -107,7 +107,7 @@ def _document(library: Any, text: str) -> Any:
 
 
 def _check_numbers(text: str) -> None:
-    """Refuse coordinates that are numbers to Python alone."""
+    """Refuse coordinates that only Python reads as numbers, such as 1_000."""
     if text.isascii() and "_" not in text:
         return
     lines = text.splitlines()
@@ -123,7 +123,7 @@ def _check_numbers(text: str) -> None:
 
 @contextmanager
 def _reading(place: str) -> Iterator[None]:
-    """Refuse what the library cannot read: what it raises of damaged files is not known."""
+    """Refuse what the library cannot read; damaged files can raise any kind of error."""
     try:
         yield
     except InputError:
@@ -134,7 +134,7 @@ def _reading(place: str) -> Iterator[None]:
 
 
 def _entities(document: Any) -> tuple[list[Any], list[str]]:
-    """Entities that are lines, those of blocks included, and what is told of the others."""
+    """Line entities, including those in blocks, and remarks on the others."""
     from ezdxf.disassemble import recursive_decompose
 
     layers = [layer for layer in document.layers if layer.is_off() or layer.is_frozen()]
@@ -160,7 +160,7 @@ def _entities(document: Any) -> tuple[list[Any], list[str]]:
 
 
 def _inserted(layout: Any, document: Any, known: dict[str, int], depth: int) -> int:
-    """How many entities the blocks of a layout make, in all."""
+    """Number of entities that the blocks of a layout expand to."""
     total = 0
     for insert in layout.query("INSERT"):
         name = str(insert.dxf.get("name", "")).lower()
@@ -187,7 +187,7 @@ def _place(entity: Any) -> str:
 
 
 def _along(entity: Any, path: Any, tolerance: float) -> NDArray[np.float64]:
-    """Points (k, 3) along a path; those of circles and arcs lie on them."""
+    """Points (k, 3) along a path; for circles and arcs they lie on the curve."""
     if path.has_curves and tolerance:
         exact = entity.dxftype() in ("ARC", "CIRCLE") and entity.dxf.radius > tolerance
         found = islice((entity if exact else path).flattening(tolerance), MOST_LINES + 2)
@@ -200,7 +200,7 @@ def _along(entity: Any, path: Any, tolerance: float) -> NDArray[np.float64]:
 
 
 def _letter(entity: Any, document: Any, colors: Counter[tuple[RGB, RGB | None]]) -> str | None:
-    """Letter of a line by its layer, else by its color; None where it is white."""
+    """Letter of a line by its layer, else by its color; None if it is white."""
     name = str(entity.dxf.get("layer", "0"))
     for letter, pattern in _LAYERS:
         if pattern.search(name.lower()):
@@ -212,7 +212,7 @@ def _letter(entity: Any, document: Any, colors: Counter[tuple[RGB, RGB | None]])
 
 
 def _color(entity: Any, document: Any, layer: str) -> RGB:
-    """Color of a line: its own, or that of its layer; the index 7 is black on white paper."""
+    """Color of a line, its own or its layer's; index 7 is black on white paper."""
     from ezdxf.colors import aci2rgb
 
     holders = [entity]
@@ -232,7 +232,7 @@ def _color(entity: Any, document: Any, layer: str) -> RGB:
 
 
 def _meters(document: Any) -> float | None:
-    """Length of the unit (m) that the header names; None for none."""
+    """Length of the unit (m) that the header names; None if it names none."""
     unit = _UNITS.get(document.header.get("$INSUNITS", 0))
     return None if unit is None else METERS[unit]
 
@@ -243,7 +243,7 @@ def write(pattern: Pattern) -> str:
     Parameters
     ----------
     pattern : Pattern
-        A flat one.
+        A flat pattern.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Facets of pattern files: lines assigned "F", along which a sheet is not creased."""
+"""Facets of pattern files: lines assigned "F" along which a sheet is not creased."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 
 def with_facets(made: Built, drawing: Drawing, facets: str | None) -> Built:
-    """Take facets out of a pattern, or leave them in as creases.
+    """Weld the facets of a pattern, or keep them as creases.
 
-    facets : one of `FACETS`; None for "weld" where all facets lie in one plane with their panels,
+    facets : one of `FACETS`; None means "weld" if all facets are coplanar with their panels,
         or the file says which of its flat creases are facets, else "hinge".
     """
     drawn = _drawn(made, drawing)
@@ -62,7 +62,7 @@ def with_convex_panels(made: Built) -> Built:
 
 
 def _drawn(made: Built, drawing: Drawing) -> tuple[Edge, ...]:
-    """Facets that the file names, where its vertices are still those of the pattern."""
+    """Facets that the file names, if the pattern still has the file's vertices."""
     creases = edge_lookup(made.pattern.creases)
     same = len(made.pattern.vertices) == len(drawing.vertices)
     pairs = [(min(pair), max(pair)) for pair in drawing.welds or ()]
@@ -70,7 +70,7 @@ def _drawn(made: Built, drawing: Drawing) -> tuple[Edge, ...]:
 
 
 def _bent(pattern: Pattern, facets: tuple[Edge, ...]) -> str:
-    """Facets between panels that do not lie in one plane, in words."""
+    """Describe facets between panels that are not coplanar."""
     row = edge_lookup(pattern.creases)
     turn = np.degrees(np.abs(pattern.dihedrals[[row[edge] for edge in facets]] - np.pi))
     worst = int(turn.argmax())
@@ -81,7 +81,7 @@ def _bent(pattern: Pattern, facets: tuple[Edge, ...]) -> str:
 
 
 def _acted(before: Pattern, after: Pattern) -> str:
-    """What welding did, in words."""
+    """Describe the effect of welding."""
     lost = len(before.creases) - len(after.creases)
     new = len(set(after.faces) - set(before.faces))
     parts = []

@@ -35,8 +35,8 @@ SAME = 1e-4
 class Format:
     """A text format for patterns.
 
-    Reading and writing work on text: opening, decoding and saving files, and naming the file
-    in messages, is done once for all formats; so is all that makes a pattern of lines (`built`).
+    Reading and writing work on text. Opening, decoding and saving files, naming the file in
+    messages, and building the pattern from lines (`built`) are shared by all formats.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Format:
 
     @property
     def named(self) -> str:
-        """A file of this format, with its article: "an SVG file", as it is spelled out."""
+        """Name a file of this format with its spoken article: "an SVG file"."""
         return f"{'an' if self.name[0] in 'OS' else 'a'} {self.name} file"
 
 
@@ -99,22 +99,22 @@ def read_pattern(
     scale : float, optional
         Factor on all lengths.
     unit : str, optional
-        Unit of the file's coordinates, "mm" say, instead of what the file says of it. One that
-        says nothing is taken to be in meters.
+        Unit of the file's coordinates, such as "mm", instead of the one in the file. A file without
+        a unit is taken to be in meters.
     frame : int or str, optional
-        Number or title of a frame, of a file that has several.
+        Number or title of a frame, if the file has several.
     facets : {"weld", "line", "hinge"}, optional
-        What lines assigned "F" are. "weld": facets of a sheet that runs on across them; panels are
-        joined, as `welded` does. "line": facets, which stay as the `welds` of the pattern. "hinge":
-        creases that are flat. Without it facets, as with "weld", where all of them lie in one plane
-        with their panels, which a warning says; else hinges. Files by Foldyn say which are facets.
-        Unless it is "line", panels that are not convex are cut along welds, as `convex` does.
+        Meaning of lines assigned "F". "weld": facets across which the sheet is continuous; panels
+        are joined, as `welded` does. "line": facets, kept as the pattern's `welds`. "hinge": flat
+        creases. By default they are facets, as with "weld", if all are coplanar with their panels,
+        which a warning says; else hinges. Files by Foldyn say which are facets. Unless it is
+        "line", panels that are not convex are cut along welds, as `convex` does.
     tolerance : float, optional
-        Distance (m) within which ends of lines, or points that panels should share, are one; by
-        default what suits the file.
+        Distance (m) within which ends of lines, or points that panels should share, are merged; by
+        default it suits the file.
     flat_foldable : bool
         Whether to move vertices of a flat drawing that nearly folds flat to the nearest places
-        where it does, as `fd.flat_foldable`; `diagnose` tells how far each is, or would be, moved.
+        where it does, as `fd.flat_foldable`; `diagnose` gives the distance of each move.
 
     Returns
     -------
@@ -124,13 +124,13 @@ def read_pattern(
     Raises
     ------
     InputError
-        No such file, an unknown extension, or content that is no pattern and cannot be repaired;
+        No such file, an unknown extension, or content that is not a pattern and cannot be repaired;
         the message names the file and the place.
 
     Warns
     -----
     FoldynWarning
-        What was assumed, with the pattern's size, what was repaired, and what may not be meant.
+        Assumptions, with the pattern's size, repairs, and doubts.
     """
     pattern, diagnosis = diagnose(
         path,
@@ -162,13 +162,13 @@ def diagnose(
     tolerance: float | None = None,
     flat_foldable: bool = False,
 ) -> Built:
-    """Read a pattern as `read_pattern` does, and return what it says of it instead of warning.
+    """Read a pattern as `read_pattern` does, and return the diagnosis instead of warning.
 
     Returns
     -------
     Built
-        The `pattern`, and the `diagnosis`: what was assumed, repaired and doubted. Its text is
-        that of ``foldyn convert --check``.
+        The `pattern`, and the `diagnosis`: assumptions, repairs and doubts. Its text is the output
+        of ``foldyn convert --check``.
 
     Raises
     ------
@@ -195,7 +195,7 @@ def diagnose(
 
 
 def _without_repetition(made: Built) -> Built:
-    """Leave out fold angles that only repeat how the vertices lie: they are no state to fold to."""
+    """Drop fold angles that equal the current ones: they are no state to fold to."""
     wanted, there = made.pattern.fold_angles, fold_angles(made.pattern)
     given = ~np.isnan(wanted)
     if given.any() and np.abs(wanted - there)[given].max() < SAME:
@@ -204,7 +204,7 @@ def _without_repetition(made: Built) -> Built:
 
 
 def _with_families(made: Built, drawing: Drawing) -> Built:
-    """Put families of creases into a pattern, where its vertices are still those of the drawing."""
+    """Add families of creases to a pattern that still has the drawing's vertices."""
     if not drawing.families:
         return made
     creases = {(a, b) for a, b in made.pattern.creases.tolist()}
@@ -220,8 +220,8 @@ def write_pattern(
 ) -> None:
     """Write a pattern to a file; its extension determines the format.
 
-    The whole text is made first and the file put in place in one step, so that a failure
-    leaves what was there before.
+    The file is replaced in one step once its text is complete, so that a failure leaves the old
+    file.
 
     Parameters
     ----------
@@ -230,7 +230,7 @@ def write_pattern(
     path : path-like
         The file to make or to replace; its directory must exist.
     frames : sequence of Frame, optional
-        States of the pattern, for formats that hold several; `fd.results.frames_of` makes them of
+        States of the pattern, for formats that hold several; `fd.results.frames_of` makes them from
         a result.
 
     Raises

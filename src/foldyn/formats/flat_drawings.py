@@ -1,4 +1,4 @@
-"""Panels of a drawing that has lines alone: its planar graph, with what is told of its repair."""
+"""Panels of a drawing with only lines: its planar graph, with notes on repairs."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from foldyn.formats.panels import Panels, compact, with_inner_borders
 from foldyn.formats.planar import check_crowding, joined, on_lines, points_on, split, tolerance_of
 from foldyn.formats.regions import areas, enclosed, sheet, straightened
 
-_SAME = 1e-9  # of the size: ends that are farther apart are told of
+_SAME = 1e-9  # of the size: larger distances between ends are reported
 _PLANE = 1e-9  # of the size
 
 
 def flat_panels(lines: Lines, notes: Notes, tolerance: float | None = None) -> Panels:
-    """Panels that lines in the plane enclose.
+    """Panels enclosed by lines in the plane.
 
     Parameters
     ----------
     lines : Lines
-        As drawn (m), with two coordinates, or three of which one is the same everywhere.
+        As drawn (m), with two coordinates, or three of which one is constant.
     notes : Notes
-        Gets what is repaired and doubted.
+        Collects repairs and doubts.
     tolerance : float, optional
-        Distance (m) within which ends are one; by default one that suits the lines.
+        Distance (m) within which ends are merged; by default it suits the lines.
 
     Raises
     ------
@@ -90,12 +90,12 @@ def flat_panels(lines: Lines, notes: Notes, tolerance: float | None = None) -> P
 
 
 def _uncut(drawn: Panels, kept: Panels, openings: NDArray, cuts: int) -> int:
-    """Openings that there are without lines of the outline that are taken for cuts.
+    """Number of openings if inner lines of the outline do not count as cuts.
 
     Raises
     ------
     InputError
-        These lines cut pieces off the sheet.
+        As cuts, these lines would cut pieces off the sheet.
     """
     whole, meant, _ = sheet(drawn)
     before, after = areas(whole).sum(), areas(kept).sum()
@@ -111,7 +111,7 @@ def _uncut(drawn: Panels, kept: Panels, openings: NDArray, cuts: int) -> int:
 
 
 def _in_plane(lines: Lines, notes: Notes) -> Lines:
-    """Lines in the plane of x and y, of a coordinate plane as seen from its positive side."""
+    """Lines in the xy plane, turned from another plane as seen from its positive side."""
     points = lines.points
     if not len(lines.ends):
         raise InputError(": there are none; give a file with a crease pattern", "lines")
@@ -133,7 +133,7 @@ def _in_plane(lines: Lines, notes: Notes) -> Lines:
 
 
 def _joined(lines: Lines, tolerance: float, notes: Notes) -> Lines:
-    """Lines with joined ends, none of no length."""
+    """Lines with joined ends, without those of zero length."""
     whole = joined(lines, tolerance)
     moves = np.linalg.norm(whole.points[whole.ends] - lines.points[lines.ends], axis=2)
     moved = int(np.count_nonzero(moves > _SAME * lines.size))
@@ -155,7 +155,7 @@ def _joined(lines: Lines, tolerance: float, notes: Notes) -> Lines:
 
 
 def _on_lines(lines: Lines, tolerance: float, notes: Notes) -> Lines:
-    """Lines whose ends lie on the lines that they nearly reach."""
+    """Move line ends onto lines that they nearly reach."""
     placed = on_lines(lines, tolerance)
     moves = np.linalg.norm(placed.points - lines.points, axis=1)
     if moves.any():
@@ -167,7 +167,7 @@ def _on_lines(lines: Lines, tolerance: float, notes: Notes) -> Lines:
 
 
 def _tell_loose(loose: Lines, lines: Lines, notes: Notes) -> None:
-    """Tell of lines that bound no panel; long pieces of creases were to part two panels."""
+    """Report lines that bound no panel; long pieces of creases were meant to divide panels."""
     folds = np.isin(loose.letters, ("M", "V", "U")) & (loose.lengths > 2 * gaps.GAP * lines.size)
     slits = loose.letters == "C"
     for which, told, noun, what in (

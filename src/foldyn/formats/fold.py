@@ -1,8 +1,8 @@
 """FOLD (Flexible Origami List Datastructure), specifications 1.0 to 1.2.
 
-Source of the format: https://github.com/edemaine/fold (doc/spec.md). Read are, of one frame, the
-coordinates, edges with their assignments and fold angles, faces where they are given, the unit and
-what other programs have put in (keys with a colon).
+Source of the format: https://github.com/edemaine/fold (doc/spec.md). The reader takes from one
+frame the coordinates, edges with their assignments and fold angles, faces if given, the unit, and
+data of other programs (keys with a colon).
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ def read(text: str, frame: int | str | None = None) -> Drawing:
     Returns
     -------
     Drawing
-        With faces where the file has them. Edges of faces without an assignment are left out:
-        they get the letter of their dihedral.
+        With faces if the file has them. Unassigned edges of faces are left out: they get the letter
+        of their dihedral.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def read(text: str, frame: int | str | None = None) -> Drawing:
 
 
 def _document(text: str) -> tuple[dict[str, Any], list[str]]:
-    """Top level of the file, and what had to be repaired to read it."""
+    """Top level of the file, and repairs needed to read it."""
     repairs: list[str] = []
     repeated: list[str] = []
     try:
@@ -101,7 +101,7 @@ def _document(text: str) -> tuple[dict[str, Any], list[str]]:
 
 
 def _frame(document: dict[str, Any], chosen: int | str | None) -> dict[str, Any]:
-    """Fields of a frame, with those that it inherits."""
+    """Fields of a frame, including inherited ones."""
     others = document.get("file_frames", [])
     if not isinstance(others, list) or not all(isinstance(each, dict) for each in others):
         raise InputError("file_frames must be a list of JSON objects, one for each frame.")
@@ -133,7 +133,7 @@ def _frame(document: dict[str, Any], chosen: int | str | None) -> dict[str, Any]
 
 
 def _number(frames: Sequence[dict[str, Any]], chosen: int | str | None) -> int:
-    """Number of the frame that is asked for."""
+    """Number of the requested frame."""
     if chosen is None:
         return 0
     titles = [each.get("frame_title", "") for each in frames]
@@ -158,7 +158,7 @@ def _number(frames: Sequence[dict[str, Any]], chosen: int | str | None) -> int:
 
 
 def _with_field(document: dict[str, Any], field: str, what: str) -> str:
-    """Say which frames have a field, or how to get it."""
+    """Say which frames have a field, or how to add it."""
     frames = document.get("file_frames") or []
     having = [str(k) for k, each in enumerate(frames, 1) if field in each]
     if not having:
@@ -175,19 +175,19 @@ def _list(fields: dict[str, Any], name: str) -> list[Any]:
 
 
 def _check(name: str, rows: list[Any], sound: Callable[[Any], bool], give: str) -> None:
-    """Refuse the first row that is not sound, and say what to give."""
+    """Refuse the first invalid row, and say what to give."""
     for k, row in enumerate(rows):
         if not sound(row):
             raise InputError(f"{name}[{k}] = {show(row)}: give {give}.")
 
 
 def _is_number(value: Any) -> bool:
-    """Whether a value is a finite number of a size that Python can make a float of."""
+    """Whether a value is a finite number that fits a Python float."""
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
 
 
 def _are_below(row: Any, count: int) -> bool:
-    """Whether a row is a list of whole numbers from 0 on, below a count."""
+    """Whether a row is a list of whole numbers from 0 to below a count."""
     return isinstance(row, list) and all(type(n) is int and 0 <= n < count for n in row)
 
 
@@ -209,7 +209,7 @@ def _faces(fields: dict[str, Any], count: int) -> tuple[tuple[int, ...], ...] | 
 
 
 def _mend_letters(fields: dict[str, Any]) -> list[str]:
-    """Write small letters large and "U" for null; returns what was done."""
+    """Capitalize small letters and replace null by "U"; return what was repaired."""
     given = fields.get("edges_assignment")
     if not isinstance(given, list):
         return []
@@ -229,7 +229,7 @@ def _mend_letters(fields: dict[str, Any]) -> list[str]:
 
 
 def _angle_doubts(angles: NDArray[np.float64]) -> tuple[str, ...]:
-    """What to say of fold angles that look like radians."""
+    """Doubts about fold angles that look like radians."""
     largest = float(np.abs(np.nan_to_num(angles)).max(initial=0.0))
     if abs(largest - np.pi) > 1e-3:
         return ()
@@ -265,7 +265,7 @@ def _edges(
     give = "degrees from -180 (a closed mountain) to 180 (a closed valley), or null"
     _check("edges_foldAngle", given, _is_angle, give)
     angles = np.array([np.nan if angle is None else angle for angle in given], np.float64)
-    if "edges_assignment" not in fields:  # of faces: the letter of the dihedral
+    if "edges_assignment" not in fields:  # of faces: they get the letter of the dihedral
         letters = ["V" if a > 0 else "M" if a < 0 else "" if with_faces else "U" for a in angles]
     told = [e for e, letter in enumerate(letters) if letter]
     ends = np.array(pairs, dtype=np.int64).reshape(-1, 2)
@@ -287,7 +287,7 @@ def _is_angle(angle: Any) -> bool:
 
 
 def _custom(fields: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    """Data of other programs, and the keys of those that would not fit a repaired pattern."""
+    """Data of other programs, and the keys of data that would not fit a repaired pattern."""
     keys = [key for key in fields if ":" in key and key not in (FAMILIES, WELDS)]
     dropped = [key for key in keys if _OF_ELEMENTS.match(key)]
     custom = {key: fields[key] for key in keys if key not in dropped}
@@ -319,7 +319,7 @@ def _families(given: Any, count: int) -> dict[str, list[tuple[int, int]]]:
 
 
 def _welds(fields: dict[str, Any], count: int) -> list[tuple[int, int]] | None:
-    """Vertex pairs of the welds; None in a file that says nothing of them."""
+    """Vertex pairs of the welds; None if the file has no field for them."""
     if WELDS not in fields:
         return None
     return _pairs(WELDS, _list(fields, WELDS), count)

@@ -1,4 +1,4 @@
-"""FOLD as it is written: version 1.2, in meters, with frames for the states of a result."""
+"""FOLD writer: version 1.2, in meters, with frames for the states of a result."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from foldyn.patterns.topology import edge_lookup
 
 
 def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:
-    """Text of a FOLD file (1.2); reading it gives the same pattern to the last digit.
+    """Text of a FOLD file (1.2), from which the same pattern can be read to the last digit.
 
     Parameters
     ----------
     pattern : Pattern
-        What to write: the key frame. Its fold angles are those to fold to, where they are given,
-        or else those at which a folded pattern is; a flat one without angles has none.
+        The key frame. Its fold angles are the ones to fold to, if given, or else the current angles
+        of a folded pattern; a flat pattern without angles has none.
     frames : sequence of Frame, optional
         Further states, which inherit all but coordinates and fold angles from the key frame.
 
@@ -79,7 +79,7 @@ def _state(pattern: Pattern, frame: Frame, rows: Sequence[int | None]) -> dict[s
 
 
 def _degrees(angles: NDArray, rows: Sequence[int | None]) -> list[float | None]:
-    """Angles of all edges, given those of the creases; 0 on the boundary, None where unknown."""
+    """Angles of all edges from those of the creases; 0 on the boundary, None if unknown."""
     found = [0.0 if k is None else float(np.degrees(angles[k])) for k in rows]
     return [None if np.isnan(angle) else angle for angle in found]
 

@@ -1,4 +1,4 @@
-"""Lines that nearly meet: open ends are drawn on to the point or line that they miss."""
+"""Small gaps between lines: open ends are extended to the point or line that they miss."""
 
 from __future__ import annotations
 
@@ -16,25 +16,26 @@ GAP = 5e-3
 
 
 def closed(lines: Lines, tolerance: float) -> tuple[Lines, int, float]:
-    """Lines whose open ends reach the next point or line, where one is near.
+    """Extend open ends to the next point or line, if near.
 
-    A line shorter than two gaps that sticks out is left: it went too far rather than fell short.
+    A line shorter than two gaps that sticks out is left as drawn: it overshot rather than fell
+    short.
 
     Parameters
     ----------
     lines : Lines
-        That meet only at their ends.
+        Lines that meet only at their ends.
     tolerance : float
-        As of `split`.
+        As in `split`.
 
     Returns
     -------
     lines : Lines
         Split again.
     count : int
-        Ends that were moved.
+        Number of moved ends.
     farthest : float
-        Largest distance that one was moved.
+        Largest distance of a move.
     """
     gap = GAP * lines.size
     degree = np.bincount(lines.ends.ravel(), minlength=len(lines.points))
@@ -73,7 +74,7 @@ def closed(lines: Lines, tolerance: float) -> tuple[Lines, int, float]:
 
 
 def _reached(points: NDArray, root: int, end: int, target: NDArray, gap: float) -> NDArray:
-    """Where a line meets another when drawn on; the nearest point where that is far away."""
+    """Where an extended line meets another; the nearest point if that is far away."""
     a, b = points[target]
     along, onward = b - a, points[end] - points[root]
     turn = onward[0] * along[1] - onward[1] * along[0]

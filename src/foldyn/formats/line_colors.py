@@ -1,4 +1,4 @@
-"""Letters of lines by their colors: Origami Simulator's, and the nearest of these for others.
+"""Letters of lines by color: Origami Simulator's colors, and the nearest of them for others.
 
 Source: A. Ghassaei, E. Demaine, N. Gershenfeld, Fast, interactive origami simulation using GPU
 computation, Origami 7 (2018), and the notes on SVG of origamisimulator.org.
@@ -22,7 +22,7 @@ COLORS: dict[RGB, tuple[str, str]] = {
     (255, 0, 255): ("U", "magenta, hinge"),
 }
 """Letter and name of each color."""
-_HUES = (  # degrees up to which a hue is taken for a color
+_HUES = (  # degrees within which a hue counts as a color
     (30, (255, 0, 0)),
     (90, (255, 255, 0)),
     (165, (0, 255, 0)),
@@ -33,13 +33,13 @@ _HUES = (  # degrees up to which a hue is taken for a color
 )
 _GRAY = 0.15  # range of the components below which a color has no hue
 _DARK, _WHITE = 0.4, 0.95
-_MOST_COLORS = 10  # told one by one
+_MOST_COLORS = 10  # colors reported individually
 
 
 def nearest(rgb: RGB) -> RGB | None:
-    """Color of `COLORS` that another is taken for, by its hue; None for white, which is no line.
+    """Color of `COLORS` nearest to another by hue; None for white, which is not drawn.
 
-    Dark gray is black, light gray yellow (flat), and so is cyan.
+    Dark gray counts as black, light gray and cyan as yellow (flat).
     """
     if rgb in COLORS:
         return rgb
@@ -52,7 +52,7 @@ def nearest(rgb: RGB) -> RGB | None:
 
 
 def color_doubts(taken: Mapping[tuple[RGB, RGB | None], int]) -> list[str]:
-    """Sentences about colors not of `COLORS`, from how many lines each was taken for what."""
+    """Doubts about colors not in `COLORS`, from the number of lines matched to each."""
     doubts = []
     for (color, to), number in taken.items():
         if color != to:

@@ -1,4 +1,4 @@
-"""Lines between numbered points: one in each place, none of no length, not too many."""
+"""Lines between numbered points: one per place, none of zero length, not too many."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class Lines:
     ends : ndarray of int, shape (m, 2)
         Point numbers of each line.
     letters : ndarray of str, shape (m,)
-        As of a `Drawing`.
+        As in a `Drawing`.
     angles : ndarray, shape (m,)
-        Fold angles (degrees), NaN where none is given.
+        Fold angles (degrees), NaN if not given.
     source : ndarray of int, shape (m,)
-        Number of the drawn line that each is a piece of.
+        Number of the drawn line that each came from.
     """
 
     points: NDArray[np.float64]
@@ -41,7 +41,7 @@ class Lines:
     source: NDArray[np.int64]
 
     def taken(self, rows: NDArray) -> Lines:
-        """Some of the lines, by number or mask."""
+        """Select lines by number or mask."""
         return Lines(
             self.points, self.ends[rows], self.letters[rows], self.angles[rows], self.source[rows]
         )
@@ -58,23 +58,23 @@ class Lines:
 
 
 def without_points(lines: Lines) -> Lines:
-    """Lines without those of no length."""
+    """Remove lines of zero length."""
     return lines.taken(lines.ends[:, 0] != lines.ends[:, 1])
 
 
 def single(lines: Lines) -> tuple[Lines, list[tuple[int, int]]]:
-    """One line in each place; cuts go before folds, these before the outline.
+    """One line per place; cuts take precedence over folds, folds over the outline.
 
     Returns
     -------
     lines : Lines
-        Each between its own pair of points.
+        No two between the same points.
     contradictions : list of (int, int)
-        Pairs of drawn lines, of which one is a mountain and the other a valley in one place; the
-        first drawn is kept.
+        Pairs of drawn lines in one place, one a mountain, the other a valley; the first drawn is
+        kept.
     """
     ranks = np.array([_RANKS[letter] for letter in lines.letters.tolist()], int)
-    ranks = np.where(ranks == _RANKS["V"], _RANKS["M"], ranks)  # the first drawn of them
+    ranks = np.where(ranks == _RANKS["V"], _RANKS["M"], ranks)  # the first drawn line of each place
     low, high = lines.ends.min(axis=1), lines.ends.max(axis=1)
     order = np.lexsort((lines.source, ranks, high, low))
     pairs = np.column_stack((low, high))[order]
@@ -89,7 +89,7 @@ def single(lines: Lines) -> tuple[Lines, list[tuple[int, int]]]:
 
 
 def too_many(what: str) -> InputError:
-    """Error about a drawing that is too large to be split."""
+    """Error for a drawing that is too large to split."""
     return InputError(
         f": {what} are too many (at most {MOST_LINES} lines and pieces of lines, and "
         f"{MOST_PAIRS} pairs of lines near each other); read a part of the pattern",

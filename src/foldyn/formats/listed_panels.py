@@ -1,4 +1,4 @@
-"""Panels that a file lists: joined where they meet, without those listed twice or collapsed."""
+"""Panels listed in a file: joined along shared edges, without repeated or collapsed ones."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ _ROUNDS = 8
 def listed_panels(
     lines: Lines, faces: Faces, notes: Notes, tolerance: float | None = None
 ) -> Panels:
-    """Panels of a file, joined where they meet, with the letters of its lines.
+    """Join a file's panels along shared edges, with the letters of its lines.
 
-    Boundary edges that lie in the same place, and whose letters do not say that they are boundary
-    or cut, get the same points. Panels that lie upon each other there (layers) stay apart.
+    Coincident boundary edges get the same points unless their letters mark a boundary or a cut.
+    Coincident panels (layers) stay apart.
 
     Parameters
     ----------
     lines : Lines
-        As the file has them (m).
+        As in the file (m).
     faces : tuple of tuple of int
-        Corners of the panels, as numbers of the points.
+        Corners of the panels, as point numbers.
     notes : Notes
-        Gets what is repaired and doubted.
+        Collects repairs and doubts.
     tolerance : float, optional
-        Distance (m) within which points that panels should share are one.
+        Distance (m) within which points that panels should share are merged.
 
     Raises
     ------
     InputError
-        A corner that does not exist, or panels that make no surface.
+        A corner that does not exist, or panels that form no surface.
     """
     lines, contradictions = single(without_points(lines))
     notes.contradict(contradictions)
@@ -94,7 +94,7 @@ def listed_panels(
 
 
 def _numbered(faces: Faces, n_vertices: int) -> Faces:
-    """Faces whose corners exist; what else may be wrong with them is repaired or found later."""
+    """Faces whose corners exist; other errors are repaired or found later."""
     for f, face in enumerate(faces):
         bad = [v for v in face if not 0 <= v < n_vertices]
         if bad:
@@ -107,13 +107,13 @@ def _numbered(faces: Faces, n_vertices: int) -> Faces:
 
 
 def _once(panels: Panels) -> tuple[Panels, int]:
-    """Panels without repeated corners, each listed once."""
+    """Panels without repeated corners, and without repeated panels."""
     faces: dict[tuple[int, ...], tuple[int, ...]] = {}
     for face in panels.faces:
         corners = tuple(a for a, b in around(face) if a != b)
         if len(set(corners)) > 2:
             faces.setdefault(tuple(sorted(corners)), corners)
-    if not faces:  # the pattern says what is wrong
+    if not faces:  # the pattern reports what is wrong
         return panels, 0
     left = len(panels.faces) - len(faces)
     return Panels(panels.points, tuple(faces.values()), panels.letters, panels.angles), left
@@ -122,10 +122,10 @@ def _once(panels: Panels) -> tuple[Panels, int]:
 def _seam_points(
     panels: Panels, near: float
 ) -> tuple[NDArray[np.int64] | None, Faces, NDArray[np.float64], NDArray[np.float64]]:
-    """Number of the point that each is merged into, or None where panels meet as they should.
+    """Point that each point is merged into, or None if panels are already joined.
 
-    With it the panels, wound alike, their points in space, and their normals. `near` is how far
-    apart points are that are one, over the size.
+    Also return the panels with consistent winding, their points in space, and their normals. `near`
+    is the merging distance, relative to the size.
     """
     points = np.zeros((len(panels.points), 3))
     points[:, : panels.points.shape[1]] = panels.points
@@ -143,7 +143,7 @@ def _seam_points(
     if all(a == b for a, b in same):
         return None, topology.faces, points, normals
     part = components(same, len(points))
-    into = np.unique(part, return_index=True)[1][part]  # the first of those that are one
+    into = np.unique(part, return_index=True)[1][part]  # the first of the merged points
     return into, topology.faces, points, normals
 
 

@@ -1,4 +1,4 @@
-"""What is said while a drawing is built: repairs and doubts, with places in the file."""
+"""Notes on building a drawing: repairs and doubts, with places in the file."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ _SHOWN = 3
 
 
 def count(number: int, noun: str, plural: str = "") -> str:
-    """Number and noun, "1 line" or "2 lines"."""
+    """Number with its noun, "1 line" or "2 lines"."""
     return f"{number} {noun if number == 1 else plural or noun + 's'}"
 
 
 def without_length(has_length: Mapping[str, bool]) -> list[str]:
-    """What is said of elements that are points, as a scale of 0 makes them, by their place."""
+    """Sentence on elements that shrink to points, as by a scale of 0, with their places."""
     places = [place for place, has in has_length.items() if not has]
     if not places:
         return []
@@ -31,9 +31,9 @@ class Notes:
     Parameters
     ----------
     drawing : Drawing
-        What is built; its own sentences come first.
+        The drawing being built; its own notes come first.
     unit : float
-        Length (m) of its unit: places are told in the file's coordinates.
+        Length (m) of its unit; places are given in the file's coordinates.
     """
 
     def __init__(self, drawing: Drawing, unit: float) -> None:
@@ -45,11 +45,11 @@ class Notes:
         return self._places[source] if self._places else f"line {source}"
 
     def point(self, point: NDArray) -> str:
-        """Place of a point (m) in the file."""
+        """Place of a point (m) in the file's coordinates."""
         return "(" + ", ".join(f"{x:.6g}" for x in (point / self._unit).tolist()) + ")"
 
     def lines(self, sources: Sequence[int], points: Sequence[NDArray] = ()) -> str:
-        """Names of some lines, and where they are."""
+        """Names and places of some lines."""
         names: dict[str, None] = {}
         for k, source in enumerate(sources):
             where = f" near {self.point(points[k])}" if len(points) else ""
@@ -59,7 +59,7 @@ class Notes:
         return ", ".join(shown) + more
 
     def contradict(self, pairs: Sequence[tuple[int, int]]) -> None:
-        """Tell of lines in one place, of which one is a mountain and the other a valley."""
+        """Report coincident lines of which one is a mountain and the other a valley."""
         if pairs:
             one, other = pairs[0]
             more = f" (and {len(pairs) - 1} more such pairs)" if len(pairs) > 1 else ""

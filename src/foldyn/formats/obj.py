@@ -5,8 +5,8 @@ a fold angle in degrees. They come from Freeform Origami (T. Tachi), and other p
 share them; its kinds, as Origami Simulator writes them for it (js/saveSTL.js), are 0 boundary, 1
 flat, 2 valley, 3 mountain. ORIPA (doc/exporter/ExporterOBJ.java) has numbers of its
 own (1 cut, 2 mountain, 3 valley) and coordinates of the screen, whose y runs down. Lines without
-faces (``l a b c``) are creases that are unassigned, or what their group, object or material is
-called: "mountain", "valley", "boundary", "facet", "cut".
+faces (``l a b c``) are unassigned creases, or of the kind named by their group, object or material:
+"mountain", "valley", "boundary", "facet", "cut".
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class _Crease(NamedTuple):
 
 
 def read(text: str) -> Drawing:
-    """Drawing of an OBJ file; groups, textures, normals and materials are left out.
+    """Drawing of an OBJ file; groups, textures, normals and materials are ignored.
 
     Parameters
     ----------
@@ -53,8 +53,8 @@ def read(text: str) -> Drawing:
     Returns
     -------
     Drawing
-        With the faces of the file. Edges of faces that the file does not list are left out: they
-        get the letter of their dihedral.
+        With the faces of the file. Unlisted edges of faces are left out: they get the letter of
+        their dihedral.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def read(text: str) -> Drawing:
             meters = meters or _meters(" ".join([word, *rest]))
     if not vertices:
         raise InputError("not an OBJ file of a pattern: it has no vertices (lines v x y z).")
-    if faces:  # lines that say no more than that there is an edge would undo its dihedral's letter
+    if faces:  # lines without further information would override the letter of the dihedral
         lines = [each for each in lines if each.letter != "U"]
     marked = {tuple(sorted(each.edge)) for each in creases}
     every = [*creases, *(each for each in lines if tuple(sorted(each.edge)) not in marked)]
@@ -110,9 +110,9 @@ def read(text: str) -> Drawing:
 
 
 def _lines(text: str) -> list[str]:
-    """Lines without comments after data; one that ends in a backslash goes on in the next.
+    """Lines without trailing comments; a trailing backslash joins a line with the next.
 
-    The next is then empty, so that the numbers of lines stay.
+    The next line becomes empty, so that line numbers do not change.
     """
     lines, begun = [], ""
     for line in text.splitlines():
@@ -123,21 +123,21 @@ def _lines(text: str) -> list[str]:
 
 
 def _coordinates(words: list[str], place: str) -> list[float]:
-    """Coordinates (3,) of a vertex; a weight or a color after them is left out."""
+    """Coordinates (3,) of a vertex; a weight or color after them is ignored."""
     if len(words) < 2:
         raise InputError(f": v {show(' '.join(words))}: give x y z, three numbers", place)
     return [coordinate(word, place, " ".join(["v", *words])) for word in [*words[:3], "0"][:3]]
 
 
 def _corners(words: list[str], known: tuple[int, int], place: str) -> tuple[int, ...]:
-    """Vertex numbers from 0 of a face or line, of which each may have a texture and a normal."""
+    """Vertex numbers from 0 of a face or line; each may carry a texture and a normal."""
     return tuple(_vertex(word.partition("/")[0], known, place) for word in words)
 
 
 def _vertex(word: str, known: tuple[int, int], place: str) -> int:
-    """Vertex number from 0; negative ones count back from the last vertex so far.
+    """Vertex number from 0; negative numbers count back from the latest vertex.
 
-    known : how many vertices there were so far, and in the whole file
+    known : number of vertices so far, and in the whole file
     """
     before, count = known
     try:
@@ -159,7 +159,7 @@ def _area(corners: NDArray) -> float:
 def _crease(
     words: list[str], known: tuple[int, int], place: str, kinds: tuple[str, ...]
 ) -> _Crease:
-    """Crease of a line #e a b kind angle; kind and angle may be missing."""
+    """Crease of a line #e a b kind angle; kind and angle are optional."""
     if len(words) < 2:
         raise InputError(": #e needs two vertices, then a kind and an angle", place)
     a, b = (_vertex(word, known, place) for word in words[:2])
@@ -178,12 +178,12 @@ def _crease(
         angle = np.inf
     if not np.isnan(angle) and abs(angle) > 180.0 + 1e-9:
         raise InputError(f": {show(words[3])}: give an angle from -180 to 180 degrees", place)
-    angle = -abs(angle) if known_kinds[kind] == "M" else angle  # some write its size alone
+    angle = -abs(angle) if known_kinds[kind] == "M" else angle  # some programs write only its size
     return _Crease((a, b), known_kinds[kind], float(np.clip(angle, -180.0, 180.0)), place)
 
 
 def _angles(creases: list[_Crease]) -> NDArray[np.float64]:
-    """Fold angles (degrees); where all are 0, the program has only filled the column."""
+    """Fold angles (degrees); if all are 0, the program only filled the column."""
     angles = np.array([each.angle for each in creases])
     return np.full(len(angles), np.nan) if not np.nan_to_num(angles).any() else angles
 
@@ -201,12 +201,12 @@ def _meters(comment: str) -> float | None:
 
 
 def write(pattern: Pattern) -> str:
-    """Text of an OBJ file, in meters: vertices, faces, and all edges as lines #e.
+    """Text of an OBJ file, in meters: vertices, faces, and all edges as #e lines.
 
     Parameters
     ----------
     pattern : Pattern
-        What to write. The angle of an edge is `Pattern.fold_angles`; it is left out where none is
+        The pattern to write. The angle of an edge is `Pattern.fold_angles`; it is omitted if not
         given.
 
     Returns

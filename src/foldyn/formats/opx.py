@@ -1,8 +1,8 @@
-"""OPX, ORIPA's own crease patterns: what Java's XMLEncoder writes of its lines.
+"""OPX, ORIPA's own crease patterns, as Java's XMLEncoder writes them.
 
-Each is an object of the class ``oripa.OriLineProxy`` with x0, y0, x1, y1 and a type (1 the outline,
-2 a mountain, 3 a valley, 4 and 0 flat); values of 0 are left out. y points down, as in CP files.
-Source of the format: fold's src/oripa.coffee (https://github.com/edemaine/fold).
+Each line is an object of the class ``oripa.OriLineProxy`` with x0, y0, x1, y1 and a type (1 the
+outline, 2 a mountain, 3 a valley, 4 and 0 flat); values of 0 are left out. y points down, as in CP
+files. Source of the format: fold's src/oripa.coffee (https://github.com/edemaine/fold).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def read(text: str) -> Drawing:
     Raises
     ------
     InputError
-        No OPX, or a line that is none; the message names it.
+        Not OPX, or an invalid line; the message names it.
     """
     root = from_xml(text, "an OPX file")
     objects = [

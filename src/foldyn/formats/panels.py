@@ -1,4 +1,4 @@
-"""`Panels`, what is known of their edges, and what joins them."""
+"""`Panels` with data on their edges, and connected components."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class Panels:
-    """Panels, and what is known of their edges.
+    """Panels with data on their edges.
 
     Parameters
     ----------
     points : ndarray, shape (n, 2) or (n, 3)
         Coordinates.
     faces : tuple of tuple of int
-        Panels, in flat drawings counter-clockwise.
+        Panels, counter-clockwise in flat drawings.
     letters : dict
         Letter of each edge that has one, by its (low, high) pair of points.
     angles : dict
@@ -37,7 +37,7 @@ class Panels:
     angles: dict[Edge, float]
 
     def sides(self) -> dict[Edge, list[int]]:
-        """Numbers of the faces of each edge."""
+        """Numbers of the faces at each edge."""
         sides: dict[Edge, list[int]] = {}
         for number, face in enumerate(self.faces):
             for a, b in around(face):
@@ -46,10 +46,10 @@ class Panels:
 
 
 def with_inner_borders(panels: Panels) -> tuple[Panels, int, int]:
-    """Panels whose inner lines of the outline ("B") are cuts, or creases, and how many of each.
+    """Turn inner lines of the outline ("B") into cuts or creases; also return the number of each.
 
-    They are creases ("U") in a drawing that has no other letters, where they are connected with the
-    outline; a closed line that floats inside is a cut. Joins ("J") are flat creases.
+    In a drawing without other letters, lines connected to the outline are creases ("U") and closed
+    lines inside are cuts; otherwise all are cuts. Joins ("J") become flat creases.
     """
     sides = panels.sides()
     letters = {edge: "F" if letter == "J" else letter for edge, letter in panels.letters.items()}
@@ -57,7 +57,7 @@ def with_inner_borders(panels: Panels) -> tuple[Panels, int, int]:
     if not inner:
         return Panels(panels.points, panels.faces, letters, panels.angles), 0, 0
     plain = set(letters.values()) == {"B"}
-    part = components(list(letters), len(panels.points))  # as drawn, without what was divided
+    part = components(list(letters), len(panels.points))  # as drawn, before panels were divided
     rim = {part[edge[0]] for edge, at in sides.items() if len(at) == 1}
     folds = [edge for edge in inner if plain and part[edge[0]] in rim]
     letters |= dict.fromkeys(inner, "C") | dict.fromkeys(folds, "U")
@@ -66,14 +66,14 @@ def with_inner_borders(panels: Panels) -> tuple[Panels, int, int]:
 
 
 def components(pairs: list[tuple[int, int]], size: int) -> NDArray[np.int64]:
-    """Number of the component of each of the nodes that pairs connect (size,)."""
+    """Component number of each of the nodes (size,) connected by pairs."""
     rows = np.array(pairs, dtype=np.int64).reshape(-1, 2)
     graph = coo_array((np.ones(len(rows)), (rows[:, 0], rows[:, 1])), shape=(size, size))
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def compact(panels: Panels) -> Panels:
-    """Panels with the points that they use, in their order."""
+    """Panels with only the points that they use, in order."""
     used = sorted({point for face in panels.faces for point in face})
     number = {point: k for k, point in enumerate(used)}
     faces = tuple(tuple(number[point] for point in face) for face in panels.faces)

@@ -1,4 +1,4 @@
-"""Planar graph of drawn lines: ends joined, lines split where they meet, one line in each place.
+"""Planar graph of drawn lines: ends joined, lines split where they meet, one line per place.
 
 Lines are split as a snapping noder does: at every vertex that lies within the tolerance of a line,
 and at crossings, which become vertices; repeated until nothing is left to split (J. Hobby,
@@ -18,15 +18,15 @@ from foldyn.formats.lines import MOST_LINES, MOST_PAIRS, Lines, single, too_many
 
 FINEST, COARSEST = 1e-6, 5e-4
 """Tolerance within which two points are one, over the drawing's size (its diagonal)."""
-_SHARE = 0.1  # of the length of the shortest twentieth of the lines
+_SHARE = 0.1  # of the lengths: a tenth of the shortest twentieth
 _ROUNDS = 12
 _SOME = 500
 
 
 def tolerance_of(lines: Lines) -> float:
-    """Distance within which points of a drawing are one vertex.
+    """Distance within which points of a drawing are merged.
 
-    A tenth of the shortest lines (of their first twentieth), from 1e-6 to 5e-4 of the size.
+    A tenth of the 5th percentile of line lengths, within 1e-6 to 5e-4 of the size.
     """
     size, lengths = lines.size, lines.lengths
     lengths = lengths[lengths > FINEST * size]
@@ -35,9 +35,9 @@ def tolerance_of(lines: Lines) -> float:
 
 
 def merged(points: NDArray, tolerance: float, kept: int = 0) -> NDArray[np.int64]:
-    """Number of the point that each is merged into: the first within the tolerance.
+    """Point that each point is merged into: the first within the tolerance.
 
-    Points that remain are farther than the tolerance from each other; the first `kept` remain.
+    Remaining points are farther apart than the tolerance; the first `kept` always remain.
     """
     cells = np.round(points / (0.5 * tolerance))
     _, first, cell = np.unique(cells, axis=0, return_index=True, return_inverse=True)
@@ -46,28 +46,28 @@ def merged(points: NDArray, tolerance: float, kept: int = 0) -> NDArray[np.int64
     rest = np.flatnonzero(into == np.arange(len(points)))
     pairs = rest[cKDTree(points[rest]).query_pairs(tolerance, output_type="ndarray")]
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))] if len(pairs) else pairs
-    for low, high in pairs.tolist():  # low < high, by low: what is before low is settled
+    for low, high in pairs.tolist():  # low < high, sorted by low: earlier points are settled
         if into[low] == low and into[high] == high and high >= kept:
             into[high] = low
     return into[into]
 
 
 def joined(lines: Lines, tolerance: float) -> Lines:
-    """Lines whose ends within the tolerance are one point."""
+    """Join line ends that are within the tolerance."""
     return renumbered(lines, merged(lines.points, tolerance))
 
 
 def renumbered(lines: Lines, into: NDArray) -> Lines:
-    """Lines with other ends, and the points that they use."""
+    """Lines with renumbered ends, and only the points that they use."""
     used, ends = np.unique(into[lines.ends], return_inverse=True)
     ends = ends.reshape(lines.ends.shape)
     return Lines(lines.points[used], ends, lines.letters, lines.angles, lines.source)
 
 
 def on_lines(lines: Lines, tolerance: float) -> Lines:
-    """Lines whose ends lie on the line that they nearly reach, which stays straight.
+    """Move line ends onto lines that they nearly reach, which stay straight.
 
-    Ends within rounding of it stay as they are, and those near several lines.
+    Ends within rounding of the line, and ends near several lines, do not move.
     """
     hits = points_on(lines, 0.5 * tolerance)
     point, first, count = np.unique(hits[:, 1], return_index=True, return_counts=True)
@@ -84,12 +84,12 @@ def on_lines(lines: Lines, tolerance: float) -> Lines:
 
 
 def split(lines: Lines, tolerance: float) -> Lines:
-    """Lines that meet only at their ends.
+    """Split lines so that they meet only at their ends.
 
     Parameters
     ----------
     lines : Lines
-        With joined ends, none of no length.
+        With joined ends, none of zero length.
     tolerance : float
         Distance within which a point lies on a line.
 
@@ -99,7 +99,7 @@ def split(lines: Lines, tolerance: float) -> Lines:
         Too many lines are near each other or cross, or tangle within the tolerance.
     """
     lines, _ = single(lines)
-    # With points a tolerance apart, no triangle has two corners that lie on the side across.
+    # With points a tolerance apart, no triangle has two corners on their opposite sides.
     near_by = 0.5 * tolerance
     for _ in range(_ROUNDS):
         if len(lines.ends) > MOST_LINES:
@@ -116,12 +116,12 @@ def split(lines: Lines, tolerance: float) -> Lines:
 
 
 def check_crowding(lines: Lines) -> None:
-    """Refuse lines of which too many are near each other, judged by some of them.
+    """Refuse lines of which too many are close together, judged from a sample.
 
     Raises
     ------
     InputError
-        So many that `split` would work long before it refuses them.
+        There are so many that `split` would take long before it refuses them.
     """
     geometries = segments(lines)
     some = geometries[:: -(-len(geometries) // _SOME)]
@@ -136,7 +136,7 @@ def segments(lines: Lines) -> NDArray:
 
 
 def _with_crossings(lines: Lines, near_by: float, tolerance: float) -> tuple[Lines, NDArray]:
-    """Lines with a point at each crossing, and (k, 2) the lines and points of these."""
+    """Add a point to both lines at each crossing; also return lines and points (k, 2)."""
     points, ends = lines.points, lines.ends
     geometries = segments(lines)
     one, other = STRtree(geometries).query(geometries, predicate="intersects")
@@ -158,14 +158,15 @@ def _with_crossings(lines: Lines, near_by: float, tolerance: float) -> tuple[Lin
 def _crossings(
     points: NDArray, ends: NDArray, pairs: NDArray, tolerance: float
 ) -> tuple[NDArray, NDArray]:
-    """Pairs (k, 2) of lines that cross away from their ends, and the places (k, 2)."""
+    """Pairs (k, 2) of lines that cross away from their ends, and the crossings (k, 2)."""
     pairs = pairs[(ends[pairs[:, 0]][:, :, None] != ends[pairs[:, 1]][:, None, :]).all(axis=(1, 2))]
     p, q = points[ends[pairs[:, 0], 0]], points[ends[pairs[:, 1], 0]]
     r, s = points[ends[pairs[:, 0], 1]] - p, points[ends[pairs[:, 1], 1]] - q
     turn = _cross(r, s)
     apart = q - p
     length_r, length_s = np.linalg.norm(r, axis=1), np.linalg.norm(s, axis=1)
-    # Heights of the ends of each line over the other: of both signs, and beyond the tolerance.
+    # Signed distances of each line's ends from the other line: opposite signs, and beyond the
+    # tolerance.
     over_s = -_cross(apart, s) / length_s, (_cross(r, s) - _cross(apart, s)) / length_s
     over_r = _cross(r, apart) / length_r, (_cross(r, apart) + _cross(r, s)) / length_r
     cross = np.ones(len(pairs), dtype=bool)
@@ -180,7 +181,7 @@ def _cross(a: NDArray, b: NDArray) -> NDArray:
 
 
 def points_on(lines: Lines, tolerance: float) -> NDArray:
-    """Lines and points (k, 2) where a point lies on a line that does not end there."""
+    """Lines and points (k, 2) for points on lines that do not end there."""
     used = np.unique(lines.ends)
     tree = STRtree(segments(lines))
     number, line = tree.query(
@@ -191,7 +192,7 @@ def points_on(lines: Lines, tolerance: float) -> NDArray:
 
 
 def _pieces(lines: Lines, hits: NDArray) -> Lines:
-    """Lines split at points: rows (line, point)."""
+    """Pieces of lines split at points, from rows (line, point)."""
     every = np.arange(len(lines.ends))
     line = np.concatenate((every, every, hits[:, 0]))
     point = np.concatenate((lines.ends[:, 0], lines.ends[:, 1], hits[:, 1]))

@@ -1,4 +1,4 @@
-"""Regions that lines in the plane enclose, and the sheet that they are panels of."""
+"""Regions enclosed by lines in the plane, and the sheet that they form as panels."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from foldyn.patterns.topology import Faces, around, edge_of
 
 
 def enclosed(lines: Lines, tolerance: float) -> tuple[Panels, Lines, int]:
-    """Panels of lines that meet only at their ends.
+    """Panels enclosed by lines that meet only at their ends.
 
     Parameters
     ----------
     lines : Lines
-        As `split` gives them.
+        As returned by `split`.
     tolerance : float
         Distance within which a point lies on a line.
 
@@ -29,9 +29,9 @@ def enclosed(lines: Lines, tolerance: float) -> tuple[Panels, Lines, int]:
     -------
     panels : Panels
     loose : Lines
-        Those that bound no panel: open ends, and links between separate parts.
+        Lines that bound no panel: open ends, and links between separate parts.
     divided : int
-        Panels with others inside, divided into triangles.
+        Number of panels with others inside, which are divided into triangles.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def enclosed(lines: Lines, tolerance: float) -> tuple[Panels, Lines, int]:
 
 
 def _faces(lines: Lines) -> tuple[Faces, int]:
-    """Faces, counter-clockwise and sorted, and how many had to be divided."""
+    """Faces, counter-clockwise and sorted, and the number of divided ones."""
     polygons = shapely.get_parts(shapely.polygonize(list(segments(lines))))
     hollow = shapely.get_num_interior_rings(polygons) > 0
     if hollow.any():
@@ -68,21 +68,21 @@ def _faces(lines: Lines) -> tuple[Faces, int]:
     corners, polygon = shapely.get_coordinates(
         shapely.get_exterior_ring(polygons), return_index=True
     )
-    used = np.unique(lines.ends)  # others may lie in the same places
+    used = np.unique(lines.ends)  # others may coincide
     places = lines.points[used].tolist()
     number = {(x, y): k for k, (x, y) in zip(used.tolist(), places, strict=True)}
     numbers = [number[x, y] for x, y in corners.tolist()]
     bounds = np.searchsorted(polygon, np.arange(len(polygons) + 1)).tolist()
     faces = []
     for start, end in pairwise(bounds):
-        face = numbers[start : end - 1]  # the last corner is the first
+        face = numbers[start : end - 1]  # the last corner repeats the first
         first = face.index(min(face))
         faces.append(tuple(face[first:] + face[:first]))
     return tuple(sorted(faces)), int(np.count_nonzero(hollow))
 
 
 def straightened(lines: Lines, suspects: NDArray, tolerance: float) -> Lines:
-    """Lines without those of the suspected points that lie within a line of one kind."""
+    """Remove those suspected points that lie within a straight line of one kind."""
     at: dict[int, set[int]] = {}
     drawn = {edge_of(a, b) for a, b in lines.ends.tolist()}
     for row, (a, b) in enumerate(lines.ends.tolist()):
@@ -120,7 +120,7 @@ def areas(panels: Panels) -> NDArray[np.float64]:
 
 
 def parts(panels: Panels) -> NDArray[np.int64]:
-    """Number of the part that each panel belongs to: panels joined by edges that are no cuts."""
+    """Part number of each panel; edges that are not cuts join panels to a part."""
     pairs = [
         (at[0], at[1])
         for edge, at in panels.sides().items()
@@ -130,14 +130,14 @@ def parts(panels: Panels) -> NDArray[np.int64]:
 
 
 def sheet(panels: Panels) -> tuple[Panels, NDArray, list[tuple[float, NDArray]]]:
-    """Largest sheet of a flat drawing, without what falls out of it.
+    """Largest sheet of a flat drawing, without pieces that fall out of it.
 
     Returns
     -------
     panels : Panels
-        Those joined to the outline of the largest part.
+        Panels of the largest part that reaches the outline.
     openings : ndarray of float
-        Areas of the regions that cuts and outlines alone bound, inside: they fall out.
+        Areas of inner regions bounded only by cuts and outlines, which fall out.
     others : list of (float, ndarray)
         Area and a corner of each other sheet, which is left out.
     """

@@ -1,4 +1,4 @@
-"""Slips of drawing, by which a pattern that is to fold flat just fails to: told of, or mended."""
+"""Slips of drawing that keep a pattern from folding flat: reported or repaired."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from foldyn.patterns.flat_foldable import flat_foldable, slips
 if TYPE_CHECKING:
     from foldyn.formats.building import Built
 
-# rad, least sum of Kawasaki's that is doubted: lengths with five digits, as drawing programs write
+# rad, smallest Kawasaki sum that is doubted: lengths with five digits, as drawing programs write
 # them, leave sums of that size, and panels bend by about as much when the pattern folds
 _DOUBTED = 1e-4
 
 
 def without_slips(made: Built, mend: bool, is_state: bool) -> Built:
-    """Move vertices to where they fold flat, if that is asked for, else offer it.
+    """Move vertices to where they fold flat, if asked for; otherwise offer to.
 
-    is_state : whether the pattern is one of several states, which strains may distort.
+    is_state : whether the pattern is one of several states, which may be strained.
     """
     told, pattern = made.diagnosis, made.pattern
     rows = slips(told.vertices)
-    if rows.size < (1 if mend else 2):  # panels about one vertex stay plane
+    if rows.size < (1 if mend else 2):  # panels around a single vertex stay planar
         return made
     off = told.vertices.alternating[rows].max()
     if off < _DOUBTED and not mend:

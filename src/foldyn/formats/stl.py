@@ -1,7 +1,7 @@
-"""STL: the triangles of a pattern, flat or folded, as printers and viewers take them; written only.
+"""STL: the triangles of a flat or folded pattern, for printers and viewers; written only.
 
-The text form, in millimeters, which these programs presume since the format has no unit. Panels of
-more corners are cut into triangles between their corners; what they are creased by is lost.
+The text form, in millimeters, which these programs assume as the format has no unit. Panels with
+more corners are cut into triangles between their corners; creases are lost.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def write(pattern: Pattern) -> str:
     Parameters
     ----------
     pattern : Pattern
-        What to write; panels wound counter-clockwise seen from the front keep their front.
+        The pattern; panels are written counter-clockwise seen from the front.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def write(pattern: Pattern) -> str:
 
 
 def triangles(pattern: Pattern) -> NDArray[np.int64]:
-    """Vertex numbers (k, 3) of triangles that cover the panels, wound as these are."""
+    """Vertex numbers (k, 3) of triangles that cover the panels, with the same winding."""
     found: list[tuple[int, ...]] = []
     for face, normal in zip(pattern.faces, pattern.face_normals, strict=True):
         found += (

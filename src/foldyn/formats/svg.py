@@ -1,8 +1,8 @@
-"""SVG crease patterns: lines whose colors say what they are, as Origami Simulator draws them.
+"""SVG crease patterns in the colors of Origami Simulator.
 
 Red is a mountain, blue a valley, black the outline, yellow a flat crease, green a cut, magenta a
 hinge without a letter; the opacity of a mountain or valley is its fold angle over 180 degrees. The
-attributes data-assignment and data-foldAngle (letters and degrees) go before these. y points down
+attributes data-assignment and data-foldAngle (letters and degrees) take precedence. y points down
 in an SVG and up in a pattern, which shows the sheet as it is drawn, from its front.
 """
 
@@ -44,23 +44,23 @@ _GROUPS = ("svg", "g", "a", "switch")
 _NOT_DRAWN = ("text", "image", "foreignObject")
 _STATED = ("mm", "cm", "in", "pt", "pc")
 FAINT = "opacities are fold angles over 180 degrees"
-# what programs write that write an opacity everywhere, such as Inkscape
+# value of programs that write an opacity everywhere, such as Inkscape
 OPAQUE = "all lines have opacity 1: creases fold to 180 degrees unless --to says otherwise"
 
 
 @dataclass(frozen=True)
 class _Frame:
-    """How large the drawing is: its view in user units, and what these are."""
+    """Extent of the drawing: its view in user units, and the size of these."""
 
     view: tuple[float, float]
     pixels: float = 1.0  # of a user unit
     physical: bool = False
-    stretch: float = 1.0  # of y against x
+    stretch: float = 1.0  # ratio of y to x
 
 
 @dataclass
 class _Lines:
-    """What is gathered from the elements."""
+    """Lines collected from the elements."""
 
     rules: Rules
     names: dict[str, Element]
@@ -81,13 +81,13 @@ def read(text: str) -> Drawing:
     Returns
     -------
     Drawing
-        In user units of the file, y up. Curves are chords within 1e-3 of the drawing's size. What
-        is not displayed, and text, is left out.
+        In user units of the file, y up. Curves are chords within 1e-3 of the drawing's size. Hidden
+        elements and text are left out.
 
     Raises
     ------
     InputError
-        No SVG, one that is unsafe to read, or one without lines; the message names the place.
+        Not SVG, unsafe to read, or without lines; the message names the place.
     """
     root = from_xml(text, "an SVG file")
     if local(root) != "svg":
@@ -96,7 +96,7 @@ def read(text: str) -> Drawing:
     rules, left = rules_of("".join(e.text or "" for e in root.iter() if local(e) == "style"))
     lines = _Lines(rules, {e.get("id", ""): e for e in root.iter()}, frame.view)
     upward = np.array([[1.0, 0.0, 0.0], [0.0, -frame.stretch, 0.0]])
-    with np.errstate(over="ignore", invalid="ignore"):  # where everything is, is checked at the end
+    with np.errstate(over="ignore", invalid="ignore"):  # all positions are checked at the end
         _walk(root, upward, Style(), lines, 0)
         boxes = [placed(curve.frame, here) for curve, here, _, _ in lines.curves]
     doubts = []
@@ -127,7 +127,7 @@ def _frame(root: Element) -> _Frame:
 
 
 def _walk(element: Element, outer: Placing, inherited: Style, lines: _Lines, depth: int) -> None:
-    """Gather the lines of an element and of what is in it."""
+    """Collect the lines of an element and its children."""
     lines.visited += 1
     if lines.visited > MOST_LINES:
         raise too_many("the elements of the drawing")
@@ -235,9 +235,9 @@ def placed(points: NDArray[np.float64], here: Placing) -> NDArray[np.float64]:
 
 
 def _fold_angles(letters: NDArray, opacities: NDArray) -> tuple[NDArray, tuple[str, ...]]:
-    """Fold angles (degrees) of opacities, and what was assumed about them.
+    """Fold angles (degrees) from opacities, and the assumptions made.
 
-    Where a mountain or valley is not opaque, those without a given opacity fold entirely.
+    If any mountain or valley is not opaque, those without an opacity fold completely.
     """
     folds = np.isin(letters, ("M", "V"))
     stated = folds & np.isfinite(opacities)

@@ -1,4 +1,4 @@
-"""Shapes of SVG as polylines: lines as they are, curves as chords."""
+"""Shapes of SVG as polylines; curves become chords."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ Placing = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Curve:
-    """A piece of a shape: its ends and, between them, where it bends.
+    """A piece of a shape: its ends and any bends between them.
 
     Attributes
     ----------
     frame : ndarray, shape (k, 2)
-        Points that tell how large the piece is, the first and last being its ends.
+        Points that bound the piece; the first and last are its ends.
     points : callable
-        From a tolerance to points (k, 2) along the piece, ends included.
+        Maps a tolerance to points (k, 2) along the piece, ends included.
     straight : bool
         Whether it is a line.
     """
@@ -57,7 +57,7 @@ class Curve:
 
 
 def length(text: str | None, whole: float, place: str, default: float = 0.0) -> float:
-    """Length in pixels; `whole` is what percentages refer to."""
+    """Length in pixels; percentages refer to `whole`."""
     if text is None or text.strip() in ("", "auto"):
         return default
     match = _LENGTH.fullmatch(text.strip()[:_LONGEST])
@@ -69,17 +69,17 @@ def length(text: str | None, whole: float, place: str, default: float = 0.0) -> 
 
 
 def numbers(text: str) -> list[float]:
-    """Numbers of a list, whatever is between them."""
+    """Numbers of a list, with any separators."""
     return [float(word) for word in _NUMBER.findall(text)]
 
 
 def _is_plain(text: str) -> bool:
-    """Whether all numbers of a text are such that others than Python read them alike."""
+    """Whether all numbers of a text read alike outside Python."""
     return text.isascii() and "_" not in text
 
 
 def placing(text: str, place: str) -> Placing:
-    """Affine map of a `transform`, as an attribute or in CSS."""
+    """Affine map of a `transform`, given as an attribute or in CSS."""
     from svgelements import Matrix
 
     text, plain, end = text.strip(), [], 0
@@ -105,7 +105,7 @@ def placing(text: str, place: str) -> Placing:
 
 
 def _without_units(name: str, arguments: str) -> str:
-    """A function of a transform in degrees and pixels, with the names that attributes have."""
+    """Convert a transform function to degrees and pixels, and to attribute names."""
     if _LENGTH.sub("", arguments).strip(" \t\r\n,"):
         raise ValueError(arguments)
     kind, axis, values = name.rstrip("XY"), name[-1], []
@@ -142,7 +142,7 @@ def placed_by(given: Mapping[str, str], place: str) -> Placing:
 
 
 def after(outer: Placing, inner: Placing) -> Placing:
-    """Map that applies `inner` first."""
+    """Compose maps, `inner` first."""
     return outer @ np.vstack((inner, (0.0, 0.0, 1.0)))
 
 
@@ -152,7 +152,7 @@ def curves(element: Element, whole: tuple[float, float], place: str) -> list[Cur
     Raises
     ------
     InputError
-        Attributes that make no shape; the message names the place.
+        Attributes that describe no shape; the message names the place.
     """
     from svgelements import Ellipse, Path, Rect
 
@@ -212,7 +212,7 @@ def _segments(path: Any) -> Iterator[Curve]:
     Raises
     ------
     ValueError
-        One that does not begin or end anywhere.
+        A path without a start or an end.
     """
     from svgelements import Arc, Close, CubicBezier, Move, QuadraticBezier
 

@@ -1,4 +1,4 @@
-"""What an SVG element looks like: attributes, style sheets and inheritance, as far as lines go."""
+"""Styles of SVG elements: attributes, style sheets and inheritance, as far as lines need them."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ _LONGEST = 200  # letters of a value
 
 @dataclass(frozen=True)
 class Style:
-    """How lines of an element are drawn.
+    """Drawing style of an element's lines.
 
     Attributes
     ----------
     color : (int, int, int) or None
-        Red, green and blue of the stroke, 0 to 255; None where lines are not drawn.
+        Red, green and blue of the stroke, 0 to 255; None if lines are not drawn.
     opacity : float
-        Of the stroke, with that of the groups that the element is in.
+        Opacity of the stroke, times that of enclosing groups.
     stated : bool
-        Whether an opacity is given anywhere.
+        Whether any opacity is given.
     visible : bool
-        Of the element itself; parts of a group may be visible again.
+        Whether the element itself is visible; parts of a hidden group may be visible.
     current : (int, int, int)
-        What "currentColor" is.
+        Value of "currentColor".
     """
 
     color: RGB | None = None
@@ -55,13 +55,13 @@ class Style:
     stated: bool = False
     visible: bool = True
     current: RGB = (0, 0, 0)
-    own: float = 1.0  # stroke-opacity, which is inherited; opacity of groups multiplies
-    letter: str = ""  # of the line, where an attribute says it
-    angle: float = math.nan  # degrees, to which an attribute says that it folds
+    own: float = 1.0  # stroke-opacity, which is inherited; opacities of groups multiply
+    letter: str = ""  # letter of the line, if an attribute gives it
+    angle: float = math.nan  # fold angle in degrees, if an attribute gives it
 
     @property
     def shown(self) -> bool:
-        """Whether there are lines to see."""
+        """Whether the element has visible lines."""
         drawn = self.color is not None or bool(self.letter)
         return self.visible and drawn and self.opacity * self.own > 0.0
 
@@ -71,7 +71,7 @@ Rules = list[tuple[tuple[int, int], str, str, frozenset[str], dict[str, str]]]
 
 
 def declarations(text: str) -> dict[str, str]:
-    """Values of the properties that count, from "stroke:#f00; opacity: 0.5"."""
+    """Values of relevant properties, from "stroke:#f00; opacity: 0.5"."""
     found = {}
     for declaration in text.split(";"):
         name, _, value = declaration.partition(":")
@@ -81,7 +81,7 @@ def declarations(text: str) -> dict[str, str]:
 
 
 def rules_of(text: str) -> tuple[Rules, int]:
-    """Rules of a style sheet, weakest first, and the number of those too intricate to follow."""
+    """Rules of a style sheet, weakest first, and the number of unsupported ones."""
     rules: Rules = []
     left = 0
     for order, block in enumerate(_without_comments(text).split("}")):
@@ -115,14 +115,14 @@ def _without_comments(text: str) -> str:
 
 
 def styled(given: Mapping[str, str], inherited: Style, place: str) -> Style | None:
-    """Style of an element, from what is `declared`, in one of another style.
+    """Style of an element from its declarations, within the parent's style.
 
-    None where nothing in it is displayed.
+    None if nothing in it is displayed.
 
     Raises
     ------
     InputError
-        A value that is none; the message names the place.
+        An invalid value; the message names the place.
     """
     if given.get("display") == "none":
         return None
@@ -154,12 +154,12 @@ def styled(given: Mapping[str, str], inherited: Style, place: str) -> Style | No
 
 
 def declared(element: Element, rules: Rules, place: str) -> Mapping[str, str]:
-    """What attributes, rules and the style of an element say of its looks and place.
+    """Declarations on looks and place from attributes, rules and the style of an element.
 
     Raises
     ------
     InputError
-        CSS moves or shapes it by a property that is read as an attribute alone.
+        CSS moves or shapes it by a property that is only supported as an attribute.
     """
     given = {name: element.get(name, "").strip() for name in PROPERTIES if element.get(name)}
     css: dict[str, str] = {}
@@ -187,7 +187,7 @@ def declared(element: Element, rules: Rules, place: str) -> Mapping[str, str]:
 
 
 def _rgba(value: str, style: Style, place: str) -> tuple[RGB | None, float]:
-    """Color and opacity of a paint; the first color of a gradient is not known: black."""
+    """Color and opacity of a paint; gradients count as black."""
     from svgelements import Color
 
     word = value.lower()
@@ -209,7 +209,7 @@ def _rgba(value: str, style: Style, place: str) -> tuple[RGB | None, float]:
 
 
 def _is_black(word: str) -> bool:
-    """Whether a color is black by what it says; svgelements takes what it does not know for it."""
+    """Whether a color is explicitly black; svgelements returns black for unknown colors too."""
     return word == "black" or word.startswith(("#", "rgb", "hsl"))
 
 

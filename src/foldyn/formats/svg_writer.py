@@ -1,9 +1,9 @@
-"""SVG crease patterns as they are written: true size, in the colors of Origami Simulator.
+"""SVG writer: crease patterns at true size, in the colors of Origami Simulator.
 
 Source of the colors: Origami Simulator (A. Ghassaei), "Design tips": mountains red, valleys blue,
 boundary black, facets yellow, cuts green, undriven creases magenta; the opacity of a mountain or
 valley is its fold angle, 180 degrees where it is opaque. The legend is text, which neither cutters
-nor readers of crease patterns take for lines.
+nor readers of crease patterns mistake for lines.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def write(pattern: Pattern) -> str:
     Parameters
     ----------
     pattern : Pattern
-        A flat one.
+        A flat pattern.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def write(pattern: Pattern) -> str:
     size = max(width, height)
     margin, pen = 0.03 * size, size / 500.0
     page = width + 2.0 * margin
-    type_size = min(0.03 * size, page / 35.0)  # the longest line of the legend has 33 em
+    type_size = min(0.03 * size, page / 35.0)  # the longest line of the legend takes 33 em
     edges = letters(pattern)
     words = _legend(pattern, edges)
     line_height = 1.4 * type_size
@@ -85,7 +85,7 @@ def write(pattern: Pattern) -> str:
 
 
 def _legend(pattern: Pattern, edges: list) -> list[str]:
-    """Lines of the legend: kinds of lines in their colors; what opacity means; the size."""
+    """Lines of the legend: line kinds in their colors, the meaning of opacity, the size."""
     used = [letter for letter in "BMVFUC" if any(edge[1] == letter for edge in edges)]
     kinds = "  ".join(
         f'<tspan fill="{_DARKER.get(letter, PAINT[letter])}">{NAMES[letter]}</tspan>'

@@ -1,6 +1,6 @@
-"""Vertices of panels that lie inside an edge of a panel beside them: the edge gets them as corners.
+"""T-junctions: panel vertices inside an edge of a neighboring panel become its corners.
 
-Programs that list polygons leave such edges whole; the panels on both sides then share no edge.
+Programs that list polygons leave such edges undivided, so the panels on both sides share no edge.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ def with_corners_on_edges(
     normals: NDArray[np.float64],
     share: float = ON_EDGE,
 ) -> tuple[Panels, int]:
-    """Panels with the vertices of those beside them as corners, and how many were put in.
+    """Add neighbors' vertices on panel edges as corners; also return how many were added.
 
-    An edge of one panel is divided where such an edge of another panel that runs along it, on its
-    other side, ends. What the file calls boundary or cut stays whole, and so does an edge that more
-    than two panels would then meet at. Nothing is done where too many vertices are near the edges.
+    A boundary edge is divided at the ends of another panel's boundary edge that runs along its
+    other side. Edges that the file calls boundary or cut are not divided, nor edges at which more
+    than two panels would then meet. Nothing is done if too many vertices are near the edges.
 
     Parameters
     ----------
     panels : Panels
-        Wound as their normals are.
+        With winding consistent with their normals.
     points : ndarray, shape (n, 3)
-        Coordinates, of flat panels too.
+        Coordinates, also for flat panels.
     normals : ndarray, shape (m, 3)
         Unit normals of the panels.
     share : float
-        Distance of a vertex from an edge that it lies in, over the size.
+        Largest distance of a vertex from an edge that it lies on, relative to the size.
     """
     sides = panels.sides()
     rim = [
@@ -79,7 +79,7 @@ def with_corners_on_edges(
 def _divided(
     rim: list[tuple[int, int, int]], points: NDArray, normals: NDArray, share: float
 ) -> Iterator[tuple[int, int, int, list[int]]]:
-    """Edges of a rim (start, end, panel) with the points that divide them, in order."""
+    """Boundary edges (start, end, panel) with the points that divide them, in order."""
     rows = np.array(rim, dtype=np.int64).reshape(-1, 3)
     tolerance = share * float(np.linalg.norm(np.ptp(points, axis=0)))
     lengths = np.linalg.norm(points[rows[:, 1]] - points[rows[:, 0]], axis=1)
@@ -98,13 +98,13 @@ def _divided(
         return
 
     def place(k: int, point: NDArray) -> tuple[NDArray, NDArray]:
-        """How far along an edge points are, and how far off its line."""
+        """Coordinates of points along an edge, and their distances from its line."""
         to = point - points[ends[k, 0]]
         far = to @ along[k]
         return far, np.linalg.norm(to - far[..., None] * along[k], axis=-1)
 
     def beside(k: int, other: int) -> bool:
-        """Whether an edge runs along another, its panel not upon the other's."""
+        """Whether an edge runs along another, with its panel on the other side."""
         apart = np.linalg.norm(inward[k] - inward[other]) > UPON
         return panel[k] != panel[other] and bool(
             apart and (place(k, points[ends[other]])[1] < tolerance).all()

@@ -1,4 +1,4 @@
-"""What writers of several formats need: letters of all edges, and whether a pattern is flat."""
+"""Helpers shared by writers: letters of all edges, and flatness of a pattern."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.geometry import seams
 from foldyn.patterns.topology import Edge, edge_lookup
 
-PLANE = 1e-9  # of the pattern's size: heights that count as none
+PLANE = 1e-9  # of the pattern's size: smaller heights count as zero
 
 
 def is_plane(pattern: Pattern) -> bool:
-    """Whether all vertices have z = 0, as a file of two coordinates needs it."""
+    """Whether all vertices have z = 0, as files with two coordinates need."""
     return not np.any(pattern.vertices[:, 2])
 
 
@@ -40,11 +40,11 @@ def flat_points(pattern: Pattern, kind: str) -> NDArray[np.float64]:
 
 
 def letters(pattern: Pattern) -> list[tuple[Edge, str, float]]:
-    """Every edge with its letter ("B" on the boundary, "C" on a cut) and the angle to fold it to.
+    """Each edge with its letter ("B" on the boundary, "C" on a cut) and its angle to fold to.
 
-    Welds are "F", as facets are in all formats.
+    Welds are "F", like facets in all formats.
 
-    The angle (rad) is NaN where none is given, and on the boundary.
+    The angle (rad) is NaN if not given, and on the boundary.
     """
     row, welds = edge_lookup(pattern.creases), edge_lookup(pattern.welds)
     pairs = seams(pattern.vertices, pattern.faces, pattern.face_normals, pattern.boundary)
@@ -62,7 +62,7 @@ def letters(pattern: Pattern) -> list[tuple[Edge, str, float]]:
 
 
 def warn_of_angles(pattern: Pattern, kind: str) -> None:
-    """Say that a file has no place for the angles to fold to."""
+    """Warn that a file cannot hold angles to fold to."""
     if not np.isnan(pattern.fold_angles).all():
         warn(
             f"pattern: {kind} files have no place for fold angles, which are left out; write .fold "
@@ -72,7 +72,7 @@ def warn_of_angles(pattern: Pattern, kind: str) -> None:
 
 
 def warn_of_boards(pattern: Pattern) -> None:
-    """Say that a file cannot hold the thickness of a pattern's panels; `write_pattern` calls it."""
+    """Warn that a file cannot hold panel thickness; called by `write_pattern`."""
     if pattern.boards is not None:
         warn(
             "pattern: the file has no place for the thickness of its panels and holds the planes "

@@ -1,4 +1,4 @@
-"""The one door for XML: no entities, no external parts, no depth."""
+"""The only entry for XML: no custom entities, no external parts, limited depth."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ def from_xml(text: str, what: str) -> Element:
     text : str
         The file's content; a DOCTYPE may name a DTD, which is not read.
     what : str
-        What it should be, for messages: "an SVG file".
+        What the file should be, for messages: "an SVG file".
 
     Raises
     ------
     InputError
-        No XML, with entities or parts in other files, or nested too deep.
+        Not XML, with entities or external parts, or nested too deep.
     """
     from xml.etree.ElementTree import ParseError
 
@@ -57,9 +57,9 @@ def from_xml(text: str, what: str) -> Element:
 
 
 def _without_abbreviations(text: str) -> str:
-    """Text with entities written out that stand for short words, as Illustrator's do.
+    """Expand entities that abbreviate short words, as in Illustrator's files.
 
-    Where there are others, the text stays as it is, and is refused.
+    If there are other entities, the text stays unchanged and is refused later.
     """
     subset = _SUBSET.search(text[:_FIRST])
     if not subset:
