@@ -1,4 +1,4 @@
-"""`Boards`: the panels of a pattern as boards of some thickness, hinged beside their middles."""
+"""`Boards`: the panels of a pattern as boards with thickness, hinged off their midplanes."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from foldyn.errors import InputError
 
 @dataclass(frozen=True, eq=False)
 class Boards:
-    """Boards that a pattern's panels stand for; usually made by `thicken`.
+    """Boards that represent a pattern's thick panels; usually made by `thicken`.
 
     Parameters
     ----------
     offsets : array_like, shape (np + 1,)
-        Board p has the corners offsets[p] to offsets[p + 1], one for each of its panel's.
+        Board p has the corners offsets[p] to offsets[p + 1], one for each corner of its panel.
     corners : array_like, shape (m, 3)
-        Corners of the boards' middle surfaces at rest (m), around each panel as its face is.
+        Corners of the boards' middle surfaces at rest (m), in the order of the panel's face.
     thickness : array_like, shape (np,)
         Thickness (m) of each board.
 
@@ -69,7 +69,7 @@ class Boards:
 
     @cached_property
     def _vectors(self) -> NDArray[np.float64]:
-        """Newell's normals (np, 3), as long as the areas."""
+        """Newell's normals (np, 3), with the areas as lengths."""
         vectors = np.empty((len(self.thickness), 3))
         for panel in range(len(vectors)):
             x = self.of(panel)
@@ -78,7 +78,7 @@ class Boards:
         return vectors
 
     def check(self, faces: tuple[tuple[int, ...], ...]) -> None:
-        """Refuse boards that are not those of the faces of a pattern."""
+        """Check that the boards match the faces of a pattern."""
         sizes = np.array([len(face) for face in faces])
         if not np.array_equal(np.diff(self.offsets), sizes) or len(self.thickness) != len(sizes):
             raise InputError("boards: give one for each face, with as many corners")

@@ -1,7 +1,7 @@
-"""Panels that are not convex, cut into convex ones: models mesh a panel about its center.
+"""Convex decomposition of panels: models mesh a panel about its center.
 
-The cuts are welds, so the sheet runs on across them. Of the triangles of a panel those are joined
-again that make a convex polygon, as Hertel and Mehlhorn do (see `facets`).
+The cuts are welds, so the sheet is continuous across them. A panel is triangulated, and triangles
+are merged while they form a convex polygon, after Hertel and Mehlhorn (see `facets`).
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ Face = tuple[int, ...]
 
 
 def convex(pattern: Pattern) -> Pattern:
-    """Pattern whose panels are convex, with a corner at each of their vertices.
+    """Pattern with convex panels that have a corner at each of their vertices.
 
-    Other panels are cut between their vertices, by `welds`. Vertices and creases keep their
-    numbers. So do panels: one that is cut gives its number to the part at its first edge, the
-    other parts follow after all panels.
+    Other panels are cut between their vertices, by `welds`. Vertices, creases and panels keep their
+    numbers: the part at a panel's first edge keeps its number, the other parts follow after all
+    panels.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def convex(pattern: Pattern) -> Pattern:
 
 
 def what_was_cut(before: Pattern, after: Pattern) -> str:
-    """What `convex` did, in words."""
+    """Describe in words how `convex` cut panels."""
     new = range(len(before.faces), len(after.faces))
     cut = sum(one != other for one, other in zip(before.faces, after.faces, strict=False))
     which = f"{cut} panels" if cut > 1 else "a panel"
@@ -78,7 +78,7 @@ def what_was_cut(before: Pattern, after: Pattern) -> str:
 
 
 def triangles_of(face: Face, corners: NDArray, normal: NDArray) -> list[Face]:
-    """Triangles of a polygon with corners (k, 3), cut in the plane across `normal`, wound alike."""
+    """Triangles of a polygon with corners (k, 3), cut in the plane across `normal`."""
     import shapely
 
     first = corners[1] - corners[0]
@@ -92,7 +92,7 @@ def triangles_of(face: Face, corners: NDArray, normal: NDArray) -> list[Face]:
 
 
 def _parts(face: Face, vertices: NDArray, normal: NDArray) -> list[Face]:
-    """Convex parts of a panel, the one at its first edge first."""
+    """Convex parts of a panel, starting with the one at its first edge."""
     rank = {vertex: k for k, vertex in enumerate(face)}
     pieces = triangles_of(face, vertices[list(face)], normal)
     pieces = [min((p[k:] + p[:k] for k in range(3)), key=lambda q: rank[q[0]]) for p in pieces]

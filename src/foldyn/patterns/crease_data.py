@@ -1,4 +1,4 @@
-"""What a pattern may say beside the letters of creases: angles to fold to, families, periods."""
+"""Optional crease data of a pattern: letters, angles to fold to, families, periods."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ ASSIGNED: Mapping[str, str] = {
 
 
 class Named(NamedTuple):
-    """Letters and families of creases, by which words choose some of them."""
+    """Letters and families of creases, by which words select creases."""
 
     assignments: Sequence[str]
     families: Mapping[str, NDArray[np.int64]]
 
 
 def letters_by_pair(given: Any, named: Mapping[str, Any], creases: NDArray[np.int64]) -> Any:
-    """Letters by pairs of vertices, those of families in a mapping put before their pairs."""
+    """Letters by pairs of vertices; letters of families are expanded, and pairs override them."""
     words = [key for key in given if isinstance(key, str)] if isinstance(given, Mapping) else []
     if not words:
         return given
@@ -51,7 +51,7 @@ def letters_by_pair(given: Any, named: Mapping[str, Any], creases: NDArray[np.in
 
 
 def fold_angles(given: Any, creases: NDArray[np.int64], named: Named) -> NDArray[np.float64]:
-    """Angles (nc,), rad, valleys positive, NaN where none is given; `given` as `Pattern` takes."""
+    """Angles (nc,), rad, valleys positive, NaN if not given; `given` as in `Pattern`."""
     angles = np.full(len(creases), np.nan)
     if given is None:
         return angles
@@ -62,7 +62,7 @@ def fold_angles(given: Any, creases: NDArray[np.int64], named: Named) -> NDArray
             angles[rows] = _own_way(word, _angle(given[word]), np.array(named.assignments)[rows])
         for key, angle in given.items():
             if isinstance(key, str):
-                continue  # pairs after words, which they refine
+                continue  # pairs last, since they refine words
             pair = vertex_pair("fold_angles", key)
             if pair not in row:
                 raise InputError(f": {pair} is not a crease; name its two vertices", "fold_angles")
@@ -87,7 +87,7 @@ def fold_angles(given: Any, creases: NDArray[np.int64], named: Named) -> NDArray
 
 
 def _own_way(word: str, size: float, letters: NDArray[np.str_]) -> NDArray[np.float64]:
-    """Angles (rad) of creases that a word chooses, each its own way, from a size."""
+    """Angles (rad) of selected creases from a size, with the sign of each crease's letter."""
     signs = np.select([letters == "V", letters == "M"], [1.0, -1.0], 0.0)
     if size < 0.0 or (size > 0.0 and not signs.all()):
         why = "is a size, as each crease folds its own way; give at least 0"
@@ -114,7 +114,7 @@ def _angle(value: Any) -> float:
 def families(
     given: Any, creases: NDArray[np.int64], field: str = "families", what: str = "a crease"
 ) -> Mapping[str, NDArray[np.int64]]:
-    """Rows of the creases (or other edges) of each family; `given` as `Pattern` takes it."""
+    """Rows of the creases (or other edges) of each family; `given` as in `Pattern`."""
     if given is None:
         return {}
     if not isinstance(given, Mapping):
@@ -141,7 +141,7 @@ def families(
 
 
 def crease_rows(field: str, word: str, pattern: Any, is_key: bool = False) -> NDArray[np.int64]:
-    """Rows of the creases that a word stands for: an assignment, "all", or a family.
+    """Rows of the creases that a word selects: an assignment, "all", or a family.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def crease_rows(field: str, word: str, pattern: Any, is_key: bool = False) -> ND
     word : str
     pattern : Pattern
     is_key : bool
-        Whether the word is the last part of the field, and not its value.
+        Whether the word is the last part of the field rather than its value.
 
     Returns
     -------
@@ -187,7 +187,7 @@ def crease_rows(field: str, word: str, pattern: Any, is_key: bool = False) -> ND
 
 
 def folded_rows(field: str, word: str, pattern: Any) -> NDArray[np.int64]:
-    """Rows as of `crease_rows`, `word` a key; "all" leaves unassigned creases free, if it can."""
+    """Rows as in `crease_rows`, with `word` a key; "all" skips unassigned creases, if it can."""
     rows = crease_rows(field, word, pattern, is_key=True)
     known = rows[[pattern.assignments[k] in "MV" for k in rows.tolist()]]
     return known if word == "all" and len(known) else rows
@@ -201,7 +201,7 @@ def crease_values(
     Raises
     ------
     InputError
-        A word stands for no crease, or two of them for the same.
+        A word selects no crease, or two words select the same one.
     """
     count = len(pattern.creases)
     values, chosen = np.zeros(count), np.zeros(count, bool)
@@ -219,9 +219,9 @@ def crease_values(
 
 
 def periods(given: Any, count: int) -> tuple[NDArray[np.int64], ...]:
-    """Pairs (m, 2) of vertices and their images under each period; `given` as `Pattern` takes it.
+    """Pairs (m, 2) of vertices and their images under each period; `given` as in `Pattern`.
 
-    count : of the vertices.
+    count : number of vertices.
     """
     found = []
     for k, pairs in enumerate(listed("periods", given, "pairs of vertices for each motion")):

@@ -1,4 +1,4 @@
-"""Short expressions in case files: read by Python's parser, never evaluated."""
+"""Short expressions in case files: parsed by Python's parser, never evaluated."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ DEEPEST = 50
 
 
 def parse(text: str) -> ast.expr:
-    """Tree of an expression, shallow enough for functions that call themselves.
+    """Syntax tree of an expression, shallow enough for recursive functions.
 
     Raises
     ------
     InputError
-        The text cannot be read, or is too long or too deep; the message says that alone.
+        The text cannot be read, or is too long or too deep; the message names no field.
     """
-    if _UNDERSCORED.search(text):  # a number to Python alone
+    if _UNDERSCORED.search(text):  # only Python reads this as a number
         raise InputError("cannot be read")
     if len(text) > LONGEST:
         raise InputError(f"is longer than {LONGEST} characters")
     try:
-        with warnings.catch_warnings():  # Python's own opinions on how to write
+        with warnings.catch_warnings():  # Python's syntax warnings
             warnings.simplefilter("ignore")
             tree = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -43,8 +43,8 @@ def parse(text: str) -> ast.expr:
 
 
 def written(node: ast.expr) -> str:
-    """Part of an expression as text for a message."""
+    """Source text of a subexpression, for a message."""
     try:
         return shortened(ast.unparse(node))
-    except ValueError:  # a whole number of too many digits
+    except ValueError:  # an integer with too many digits
         return "a number"

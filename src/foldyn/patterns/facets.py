@@ -1,9 +1,9 @@
-"""Facets: lines that divide a panel in a drawing, but along which the sheet is not creased.
+"""Facets: lines drawn inside a panel along which the sheet is not creased.
 
-Programs that fold patterns cut panels into triangles by such lines, assigned "F". `welded` takes
-them out: two panels become one polygon where this is convex, with every vertex at a corner of it,
-as Hertel and Mehlhorn (Proc. FCT 1983) merge the triangles of a polygon; other facets stay as
-welds, lines across which the sheet runs on.
+Folding programs cut panels into triangles along such lines, assigned "F". `welded` removes them: it
+merges two panels if the result is convex with every vertex at a corner, as Hertel and Mehlhorn
+(Proc. FCT 1983) merge triangles of a polygon. Other facets become welds, lines across which the
+sheet is continuous.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from foldyn.values import flag, listed
 
 WELD, LINE, HINGE = FACETS = ("weld", "line", "hinge")
 """What facets become: nothing, where panels can be joined, or welds; welds; creases."""
-COPLANAR = 1e-3  # rad: panels that turn by less lie in one plane, as coordinates in a file do
-STRAIGHT = np.radians(15.0)  # corners that turn by less divide an edge
+COPLANAR = 1e-3  # rad: panels within this angle are coplanar, as coordinates in a file allow
+STRAIGHT = np.radians(15.0)  # smaller turns do not count as corners
 
 
 def welded(
     pattern: Pattern, facets: Iterable[tuple[int, int]] | str | None = None, *, join: bool = True
 ) -> Pattern:
-    """Pattern whose facets are no creases.
+    """Pattern with its facets removed from the creases.
 
-    Panels in one plane (within 1e-3 rad) are joined across a facet where that makes a convex
-    polygon with a corner at each of their vertices, across the longest facets first. Other facets
-    become `welds`. Vertices keep their numbers; panels and creases are counted anew, in their
-    order, a joined panel as the first of its parts.
+    Coplanar panels (within 1e-3 rad) are joined across a facet if that makes a convex polygon with
+    a corner at each vertex, across the longest facets first. Other facets become `welds`. Vertices
+    keep their numbers; panels and creases are renumbered in order, a joined panel in place of its
+    first part.
 
     Parameters
     ----------
     pattern : Pattern
     facets : iterable of (vertex, vertex) or str, optional
-        Creases that are facets, or the name of their family; without it all that are assigned "F".
-        Welds that are there already are facets too.
+        Creases that are facets, or the name of their family; by default all creases assigned "F".
+        Existing welds are facets too.
     join : bool
         Whether to join panels; otherwise all facets become welds.
 
@@ -52,13 +52,12 @@ def welded(
     Warns
     -----
     FoldynWarning
-        No facets are named, and some creases are welded that lie flat but have no letter.
+        No facets are named, and some of the welded creases are flat without a letter.
 
     Raises
     ------
     InputError
-        A facet is no crease or is assigned "M" or "V"; panels of boards; panels that lie upon each
-        other.
+        A facet is not a crease or is assigned "M" or "V"; thick panels; coincident panels.
 
     Examples
     --------
@@ -109,7 +108,7 @@ def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
     if facets is None:
         rows = np.flatnonzero(letters == "F")
         guessed = rows[pattern.unlettered[rows]]
-        if 0 < guessed.size < len(letters):  # of a sheet that is flat all over, all are facets
+        if 0 < guessed.size < len(letters):  # in a completely flat sheet all creases are facets
             which = (
                 f"{guessed.size} of {len(letters)} creases, as {_pair(pattern.creases[guessed[0]])}"
             )
@@ -137,7 +136,7 @@ def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
 
 
 def longest_first(vertices: NDArray, edges: NDArray) -> NDArray[np.int64]:
-    """Order of edges (m, 2) by their length; those of one length by their vertices."""
+    """Order of edges (m, 2) by decreasing length; equal lengths by vertex numbers."""
     length = np.linalg.norm(np.diff(vertices[edges], axis=1)[:, 0], axis=1)
     return np.lexsort((edges[:, 1], edges[:, 0], -length.round(12)))
 
@@ -149,9 +148,9 @@ def joined(
     edges: Sequence[Sequence[int]],
     beside: Sequence[Sequence[int]],
 ) -> list[tuple[int, ...]]:
-    """Faces, joined across edges in their order, given the normals and the two faces beside each.
+    """Join faces across edges in order, given the normals and the two faces at each edge.
 
-    A joined face has the place, the first corner and the plane of the first of its parts.
+    A joined face takes the place, the first corner and the plane of its first part.
     """
     faces, part_of = list(faces), list(range(len(faces)))
 
@@ -171,17 +170,17 @@ def joined(
 
 
 def _union(one: Sequence[int], two: Sequence[int], edge: Edge) -> tuple[int, ...] | None:
-    """Corners of two faces without the edge that they share; None if they share more."""
+    """Corners of the union of two faces without their shared edge; None if they share more."""
     if len(set(one) & set(two)) > 2:
         return None
-    a = edge[0] if edge in set(around(one)) else edge[1]  # from which `one` runs along it
+    a = edge[0] if edge in set(around(one)) else edge[1]  # where the shared edge starts along `one`
     at, back = one.index(a), two.index(a)
-    beyond = [*two[back:], *two[:back]][1:-1]  # between the two ends of the edge
+    beyond = [*two[back:], *two[:back]][1:-1]  # vertices between the ends of the shared edge
     return (*one[: at + 1], *beyond, *one[at + 1 :])
 
 
 def _convex(vertices: NDArray, face: Sequence[int], normal: NDArray) -> bool:
-    """Whether a face lies in the plane across `normal` and turns to the left at every corner."""
+    """Whether a face lies in the plane normal to `normal` and turns left at every corner."""
     x = vertices[list(face)]
     if np.abs((x - x[0]) @ normal).max() > COPLANAR * np.linalg.norm(x - x[0], axis=1).max():
         return False
@@ -189,7 +188,7 @@ def _convex(vertices: NDArray, face: Sequence[int], normal: NDArray) -> bool:
 
 
 def corner_turns(x: NDArray, normal: NDArray) -> NDArray[np.float64]:
-    """Angles (rad) by which an outline x (k, 3) turns to the left at its corners."""
+    """Angles (rad) by which an outline x (k, 3) turns left at its corners."""
     along = np.roll(x, -1, axis=0) - x
     before = np.roll(along, 1, axis=0)
     left = np.einsum("ij,j->i", np.cross(before, along), normal)

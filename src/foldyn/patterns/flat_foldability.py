@@ -1,6 +1,6 @@
-"""Whether the vertices of a pattern can fold flat: the conditions of Maekawa and Kawasaki.
+"""Local flat-foldability of a pattern's vertices: the conditions of Maekawa and Kawasaki.
 
-They are necessary at each vertex inside the sheet, not sufficient for the whole (layers may
+They are necessary at each interior vertex, but not sufficient for the whole pattern (layers may
 collide). Source: T. Hull, On the mathematics of flat origamis, Congressus Numerantium 100 (1994):
 Maekawa, mountains less valleys are 2 or -2; Kawasaki, the angles between neighboring creases, taken
 with alternating signs, add up to zero.
@@ -18,19 +18,19 @@ from foldyn.patterns.pattern import Pattern
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FlatFoldability:
-    """What the vertices inside a pattern say of folding flat, one row each.
+    """Flat-foldability of the interior vertices of a pattern, one row each.
 
     Attributes
     ----------
     vertices : ndarray of int, shape (k,)
-        Numbers of the vertices inside: panels go all the way round.
+        Numbers of the interior vertices, which panels surround completely.
     mountains, valleys, unassigned : ndarray of int, shape (k,)
         Creases of each kind there; flat ones ("F") do not count.
     deficits : ndarray, shape (k,)
-        What the angles of the panels lack of a full turn (rad): 0 where developable.
+        Angle deficit (rad): a full turn minus the sum of panel angles, 0 where developable.
     alternating : ndarray, shape (k,)
-        Kawasaki's sum (rad, not negative), of the angles between folded creases; NaN where
-        their number is odd. It is 0 where no crease folds.
+        Kawasaki's alternating sum (rad, not negative) of the angles between folded creases; NaN if
+        their number is odd, 0 if no crease folds.
     """
 
     vertices: NDArray[np.int64]
@@ -46,12 +46,12 @@ class FlatFoldability:
 
     @property
     def degrees(self) -> NDArray[np.int64]:
-        """Folded creases of each vertex (k,)."""
+        """Number of folded creases at each vertex (k,)."""
         return self.mountains + self.valleys + self.unassigned
 
     @property
     def maekawa(self) -> NDArray[np.bool_]:
-        """Whether mountains less valleys are 2 or -2, or can be with letters for all (k,)."""
+        """Whether mountains minus valleys are 2 or -2, or can be with all letters (k,)."""
         least = self.mountains - self.valleys - self.unassigned
         most = self.mountains - self.valleys + self.unassigned
         even = self.degrees % 2 == 0
@@ -63,22 +63,22 @@ class FlatFoldability:
         return self.alternating <= tolerance  # False for NaN
 
     def developable(self, tolerance: float) -> NDArray[np.bool_]:
-        """Whether the angles make a full turn within a tolerance (rad) (k,)."""
+        """Whether the angles add up to a full turn within a tolerance (rad) (k,)."""
         return np.abs(self.deficits) <= tolerance
 
 
 def flat_foldability(pattern: Pattern) -> FlatFoldability:
-    """Conditions of Maekawa and Kawasaki, and developability, at the vertices inside a pattern.
+    """Conditions of Maekawa and Kawasaki, and developability, at interior vertices.
 
     Parameters
     ----------
     pattern : Pattern
-        Flat or folded: the angles of its panels count, which folding does not change.
+        Flat or folded; only the angles of its panels matter, which folding preserves.
 
     Returns
     -------
     FlatFoldability
-        One row for each vertex inside.
+        One row for each interior vertex.
     """
     letter = dict(zip(map(tuple, pattern.creases.tolist()), pattern.assignments, strict=True))
     letter |= dict.fromkeys(map(tuple, pattern.welds.tolist()), "F")  # nothing folds there
@@ -89,7 +89,7 @@ def flat_foldability(pattern: Pattern) -> FlatFoldability:
             continue
         around = _around(corners)
         if len(around) < len(corners):
-            continue  # panels that meet here in the point alone
+            continue  # panels that meet here only at this point
         angles = np.array([corners[after][1] for after in around])
         kinds = [letter[min(vertex, after), max(vertex, after)] for after in around]
         folds = np.array([kind != "F" for kind in kinds])
@@ -108,7 +108,7 @@ def flat_foldability(pattern: Pattern) -> FlatFoldability:
 
 
 def _corners(pattern: Pattern) -> dict[int, dict[int, tuple[int, float]]]:
-    """For each vertex, by the vertex after it in a face: the vertex before it, and the angle."""
+    """For each vertex, the corners of faces there: next vertex to (previous vertex, angle)."""
     faces = pattern.faces
     vertex = np.array([v for face in faces for v in face])
     following = np.array([v for face in faces for v in (*face[1:], face[0])])
@@ -138,11 +138,11 @@ def _around(corners: dict[int, tuple[int, float]]) -> list[int]:
 
 
 def _alternating(angles: NDArray[np.float64], folds: NDArray[np.bool_]) -> float:
-    """Kawasaki's sum of the angles after each crease, those across flat creases put together."""
+    """Kawasaki's sum of the angles after each crease, merged across flat creases."""
     count = int(folds.sum())
     if count == 0:
         return 0.0
     if count % 2:
         return np.nan
-    sector = (np.cumsum(folds) - 1) % count  # angles before the first fold belong to the last one
+    sector = (np.cumsum(folds) - 1) % count  # before the first fold: the last sector
     return abs(float(np.sum(np.where(sector % 2 == 0, angles, -angles))))

@@ -1,13 +1,13 @@
-"""The nearest flat-foldable pattern: mends what slips of drawing leave of Kawasaki's conditions.
+"""The nearest flat-foldable pattern: repairs slips of drawing that violate Kawasaki's condition.
 
-At a vertex inside a flat sheet the alternating sum of the angles between neighboring creases is
-zero if it folds flat: twice the alternating sum of the directions f of its creases. Where four
-creases meet, neighbors then turn by angles g whose tan(g/2) have a fixed ratio, and panels between
-such vertices stay plane if the product of the ratios around them is 1 (T. Tachi, Generalization of
-rigid-foldable quadrilateral-mesh origami, J. IASS 50, 2009). Both are conditions on directions,
-which change with the ends a and b of a crease by df = (e x d(b - a)) / l, e and l its direction and
-length. The vertices x that satisfy them and are nearest to those drawn, x0, are found by Newton's
-method: each step solves the conditions, linear at x, for the least x - x0.
+At an interior vertex of a flat sheet the alternating sum of the angles between neighboring creases
+is zero if it folds flat; it is twice the alternating sum of the directions f of its creases. Where
+four creases meet, neighbors then turn by angles g whose tan(g/2) have a fixed ratio, and panels
+between such vertices stay plane if the product of the ratios around them is 1 (T. Tachi,
+Generalization of rigid-foldable quadrilateral-mesh origami, J. IASS 50, 2009). Both are conditions
+on directions, which change with the ends a and b of a crease by df = (e x d(b - a)) / l, e and l
+its direction and length. The vertices x that satisfy them and are nearest to those drawn, x0, are
+found by Newton's method: each step solves the conditions, linear at x, for the least x - x0.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ FARTHEST = 0.01
 """Most that a vertex is moved, over its shortest edge."""
 _STEPS = 20
 _CONVERGED = 1e-12  # rad
-_LEAST = 1e-13  # over the diagonal: conditions that repeat others are left to rounding
+_LEAST = 1e-13  # relative to the diagonal: smaller ones are redundant conditions
 _PLANE = 1e-9  # of the size
 
 
 def slips(vertices: FlatFoldability) -> NDArray[np.int64]:
-    """Rows of the vertices inside that nearly fold flat, if most do and some are off by a slip."""
+    """Rows of interior vertices that nearly fold flat, if most do and some are slightly off."""
     known = (vertices.degrees > 2) & ~np.isnan(vertices.alternating)
     near = np.flatnonzero(known & (vertices.alternating <= NEARLY))
     meant = 2 * len(near) > known.sum() and (vertices.alternating[near] > EXACT).any()
@@ -49,20 +49,20 @@ def slips(vertices: FlatFoldability) -> NDArray[np.int64]:
 def flat_foldable(pattern: Pattern) -> Pattern:
     """Pattern with vertices moved to the nearest ones that fold flat.
 
-    Vertices inside that fail Kawasaki's condition by at most 2 degrees are taken for slips of
-    drawing, and satisfy it to rounding then; others keep failing it. Panels between vertices of
-    four creases, with letters, that nearly stay plane while they fold do so then. All vertices may
-    move, those of the outline too, by as little as the sum of squares allows.
+    Interior vertices that violate Kawasaki's condition by at most 2 degrees count as slips of
+    drawing and satisfy it to rounding afterwards; larger violations remain. Panels between assigned
+    degree-four vertices that nearly stay planar while folding then do so exactly. All vertices may
+    move, including the outline, with the least sum of squared moves.
 
     Parameters
     ----------
     pattern : Pattern
-        A flat one.
+        A flat pattern.
 
     Returns
     -------
     Pattern
-        The same one if there is nothing to mend (1e-6 rad).
+        The same pattern if there is nothing to repair (1e-6 rad).
 
     Raises
     ------
@@ -109,7 +109,7 @@ def flat_foldable(pattern: Pattern) -> Pattern:
 
 
 def _check(pattern: Pattern, moved: NDArray, left: float) -> None:
-    """Refuse moves that are no slips, and sums (rad) that are left."""
+    """Refuse moves too large for slips, and remaining sums (rad)."""
     ends = pattern.edges
     length = np.linalg.norm(np.diff(pattern.vertices[ends], axis=1)[:, 0], axis=1)
     shortest = np.full(len(pattern.vertices), np.inf)
@@ -125,7 +125,7 @@ def _check(pattern: Pattern, moved: NDArray, left: float) -> None:
 class _Conditions:
     """Kawasaki's sums at vertices, and sums of log ratios around the panels between them.
 
-    drawn : places (k, 2) of the vertices of a flat pattern; place : which each vertex has.
+    drawn : positions (k, 2) of the vertices of a flat pattern; place : row of each vertex.
     """
 
     def __init__(self, pattern: Pattern, vertices: NDArray, drawn: NDArray, place: NDArray) -> None:
@@ -135,7 +135,7 @@ class _Conditions:
             for one, other in ((a, b), (b, a)):
                 if kind != "F" and one in beside:
                     beside[one].append(other)
-        spokes: dict[Edge, int] = {}  # number of each direction, by the vertices from and to
+        spokes: dict[Edge, int] = {}  # row of each direction, by its start and end vertex
         entries = []
         for k, (vertex, others) in enumerate(beside.items()):
             x, y = (drawn[place[others]] - drawn[place[vertex]]).T
@@ -158,7 +158,7 @@ class _Conditions:
         self.turns = [column[kept] for column in self.turns]
 
     def at(self, x: NDArray) -> tuple[NDArray, sparse.csr_array]:
-        """Sums (m,), and how they change with the places x (k, 2), as (m, 2 k) per m."""
+        """Sums (m,) and their derivatives with respect to positions x (k, 2), as (m, 2 k) per m."""
         along = x[self.ends[:, 1]] - x[self.ends[:, 0]]
         across = np.column_stack([-along[:, 1], along[:, 0]]) / (along**2).sum(axis=1)[:, None]
         directions = np.arctan2(along[:, 1], along[:, 0])
@@ -166,16 +166,16 @@ class _Conditions:
         entries = np.column_stack([across, -across]).ravel(), columns.ravel()
         rows = np.repeat(np.arange(len(across)), 4)
         turned = sparse.csr_array((entries[0], (rows, entries[1])), (len(across), 2 * self.count))
-        sums = (self.kawasaki @ directions + np.pi) % (2.0 * np.pi) - np.pi  # less full turns
+        sums = (self.kawasaki @ directions + np.pi) % (2.0 * np.pi) - np.pi  # remove full turns
         ratios, slopes = self._ratios(directions)
         return np.concatenate([sums, ratios]), sparse.vstack([self.kawasaki, slopes]) @ turned
 
     def _ratios(self, directions: NDArray) -> tuple[NDArray, sparse.csr_array]:
-        """Sums (p,) of log |tan(g2/2) / tan(g1/2)| around panels, and how directions change them.
+        """Sums (p,) of log |tan(g2/2) / tan(g1/2)| around panels, and derivatives by directions.
 
-        Of three neighbors with directions f1, f2, f3, f2 - f1 the corner of the panel, the ratio is
-        h((f3 - f1) / 2) / h(f2 - (f1 + f3) / 2), h the sine where 1 and 3 fold opposite ways, else
-        the cosine.
+        For three neighboring creases with directions f1, f2, f3, where f2 - f1 is the panel's
+        corner, the ratio is h((f3 - f1) / 2) / h(f2 - (f1 + f3) / 2); h is the sine if 1 and 3 fold
+        opposite ways, else the cosine.
         """
         one, two, three, opposite = self.turns
         half = 0.5 * (directions[three] - directions[one])

@@ -1,4 +1,4 @@
-"""`Frame`: one state of a pattern among several, and how far its creases are folded there."""
+"""`Frame`: one state of a pattern, and the fold angles in a state."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Frame:
     Parameters
     ----------
     title : str
-        What to call it: "t = 0.1 s".
+        Title of the state: "t = 0.1 s".
     vertices : ndarray, shape (n, 3)
         Coordinates (m) of the pattern's vertices.
     """
@@ -28,7 +28,7 @@ class Frame:
 
 
 def fold_angles(pattern: Pattern, vertices: NDArray | None = None) -> NDArray[np.float64]:
-    """Angles (nc,) to which the creases are folded: pi less the dihedral (rad), valleys positive.
+    """Fold angles (nc,) of the creases: pi minus the dihedral (rad), valleys positive.
 
     Parameters
     ----------

@@ -1,10 +1,9 @@
 """Geometry of faces: areas, normals and planarity, dihedrals, and seams between faces.
 
-A seam is two boundary edges in one place that are not joined, where a crease was probably meant. A
-crease is an edge of two panels, named by the same two vertices; two vertices in the same place are
-still two, so panels that meet there only look joined. A cut is such a place on purpose, marked by
-a letter. Panels that lie upon each other at the edges, as in a flat-folded state, are layers and
-no seam.
+A seam is two coincident boundary edges that are not joined, where a crease was probably intended. A
+crease is an edge of two panels with the same two vertex numbers; panels that meet at coincident but
+different vertices only look joined. A cut is an intentional seam, marked by a letter. Panels that
+coincide at the edges, as in a flat-folded state, are layers and not a seam.
 """
 
 from __future__ import annotations
@@ -19,23 +18,23 @@ from scipy.sparse.csgraph import connected_components
 from foldyn.errors import InputError
 from foldyn.patterns.topology import Edge, Faces, around, edge_lookup, edge_of
 
-# Area over squared diameter (and edge length over diameter) below which a face has collapsed:
-# far above rounding (1e-16), far below any panel that can be made.
+# Area over squared diameter (and edge length over diameter) below which a face is degenerate: far
+# above rounding (1e-16), far below any panel that can be made.
 _DEGENERATE = 1e-10
 SAME_PLACE = 1e-9  # of the pattern's size
-ASKEW = np.array([0.5377, 0.8339, 0.1244])  # shorter than 1
-LAYERS = 1e-6  # rad: panels that leave their edges at less than that lie upon each other
-_ASKANCE = 10.0  # the same where points count as one that are apart, over that distance
-CLOSED = 1e-3  # rad from closed: a crease's letter, not rounding, says to which side it has turned
+ASKEW = np.array([0.5377, 0.8339, 0.1244])  # shorter than a unit vector
+LAYERS = 1e-6  # rad: panels that leave their edges within this angle are coincident
+_ASKANCE = 10.0  # the same for a merging distance, relative to that distance
+CLOSED = 1e-3  # rad from closed: nearer, the letter decides the side, not rounding
 
 
 class FaceGeometry(NamedTuple):
-    """Shape of each face.
+    """Shape data of each face.
 
     Attributes
     ----------
     face_areas : ndarray, shape (m,)
-        Area (m2): of a face that is not flat, of its projection along the normal.
+        Area (m2); for a face that is not flat, of its projection along the normal.
     face_normals : ndarray, shape (m, 3)
         Unit normals towards the front (Newell's, so any polygon has one).
     face_planarity : ndarray, shape (m,)
@@ -60,12 +59,12 @@ def face_geometry(vertices: NDArray, faces: Faces) -> FaceGeometry:
     Returns
     -------
     FaceGeometry
-        One row a face.
+        One row per face.
 
     Raises
     ------
     InputError
-        A face without area, with two corners in one place, or whose outline crosses itself.
+        A face without area, with coincident corners, or with an outline that crosses itself.
     """
     count = len(faces)
     areas, planarity, shortest = np.empty(count), np.empty(count), np.empty(count)
@@ -75,11 +74,11 @@ def face_geometry(vertices: NDArray, faces: Faces) -> FaceGeometry:
     for size in np.unique(sizes):
         which = np.flatnonzero(sizes == size)
         corners = vertices[np.array([faces[f] for f in which])]
-        # About the mean corner, so that a pattern far from the origin loses nothing.
+        # Relative to the mean corner, so that a pattern far from the origin loses no accuracy.
         corners = corners - corners.mean(axis=1, keepdims=True)
         newell = 0.5 * np.cross(corners, np.roll(corners, -1, axis=1)).sum(axis=1)
         areas[which] = np.linalg.norm(newell, axis=1)
-        # sqrt of the smallest normal number: an area of zero must not divide by zero here.
+        # sqrt of the smallest normal number, to avoid division by a zero area
         normals[which] = newell / np.maximum(areas[which], 1e-154)[:, None]
         diameter[which] = 0.0
         shortest[which] = np.inf
@@ -147,7 +146,7 @@ def crease_dihedrals(
     creases, crease_faces : ndarray of int, shape (nc, 2)
         As in `Topology`.
     letters : ndarray of str, shape (nc,)
-        Of which "M" and "V" decide the side of closed creases.
+        "M" and "V" decide the side of closed creases.
 
     Returns
     -------
@@ -160,7 +159,7 @@ def crease_dihedrals(
     axis = vertices[creases[:, 1]] - vertices[creases[:, 0]]
     axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
     front, back = normals[crease_faces[:, 0]], normals[crease_faces[:, 1]]
-    # Normals of faces that are not flat may lean along the crease: only their parts across count.
+    # Normals of non-planar faces may lean along the crease: use only the components across it.
     front = front - np.einsum("ij,ij->i", front, axis)[:, None] * axis
     back = back - np.einsum("ij,ij->i", back, axis)[:, None] * axis
     sine = np.einsum("ij,ij->i", np.cross(front, back), axis)
@@ -176,7 +175,7 @@ def crease_dihedrals(
 def seams(
     vertices: NDArray, faces: Faces, normals: NDArray, boundary: NDArray, near: float = SAME_PLACE
 ) -> list[tuple[Edge, Edge]]:
-    """Pairs of boundary edges whose ends lie in the same places and whose panels do not.
+    """Pairs of boundary edges with coincident ends whose panels do not coincide.
 
     Parameters
     ----------
@@ -189,7 +188,7 @@ def seams(
     boundary : ndarray of int, shape (nb, 2)
         Edges of one face.
     near : float
-        Distance of points that lie in the same place, over the size of the pattern.
+        Distance within which points coincide, relative to the size of the pattern.
     """
     place = _places(vertices, boundary, near)
     ends = np.sort(place[boundary], axis=1)
@@ -208,7 +207,7 @@ def seams(
 
 
 def _places(vertices: NDArray, boundary: NDArray, near: float) -> NDArray:
-    """Number of the place of each vertex (n,), the same for those of the boundary that coincide."""
+    """Place number of each vertex (n,); coincident boundary vertices share one."""
     rim = np.unique(boundary)
     points, where = np.unique(vertices[rim], axis=0, return_inverse=True)
     pairs = _pairs_nearer(points, near * float(np.linalg.norm(np.ptp(vertices, axis=0))))
@@ -220,7 +219,7 @@ def _places(vertices: NDArray, boundary: NDArray, near: float) -> NDArray:
 
 def _pairs_nearer(points: NDArray, distance: float) -> NDArray:
     """Pairs (k, 2) of points (n, 3) within a distance."""
-    # in most patterns none are: no two are as near in a direction that runs along no edge
+    # usually there are none: along a direction parallel to no edge, no two points are that close
     along = np.sort((points - points[:1]) @ ASKEW)
     if not (np.diff(along) <= 2.0 * distance).any():
         return np.zeros((0, 2), np.int64)
@@ -232,7 +231,7 @@ def _pairs_nearer(points: NDArray, distance: float) -> NDArray:
 def _inward(
     vertices: NDArray, faces: Faces, normals: NDArray, boundary: NDArray, chosen: NDArray
 ) -> dict[int, NDArray]:
-    """Unit vectors from the chosen boundary edges into their panels, across the edge."""
+    """Unit vectors from the chosen boundary edges into their panels, perpendicular to the edge."""
     row = edge_lookup(boundary[chosen])
     unit = {}
     for number, face in enumerate(faces):

@@ -1,8 +1,8 @@
-"""Colors of all pictures, and of creases among them; they need no Matplotlib."""
+"""Colors of all pictures and of creases in them; independent of Matplotlib."""
 
 from __future__ import annotations
 
-# Okabe and Ito's palette: told apart with every common kind of color blindness.
+# Okabe and Ito's palette, distinguishable with every common kind of color blindness.
 BLUE = "#0072B2"
 VERMILLION = "#D55E00"
 GREEN = "#009E73"

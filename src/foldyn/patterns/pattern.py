@@ -26,8 +26,8 @@ from foldyn.patterns.topology import (
 from foldyn.patterns.transforms import Transforms
 from foldyn.values import LONGEST, SHORTEST, single
 
-_FLAT = 1e-6  # rad from pi: a crease without a letter counts as flat
-_CONTRADICTION = 1e-3  # rad from pi on the wrong side: a letter given is doubted
+_FLAT = 1e-6  # rad from pi: an unassigned crease within this angle counts as flat
+_CONTRADICTION = 1e-3  # rad from pi on the wrong side: beyond this a given letter is doubted
 _LETTERS = ("M", "V", "F", "U")
 
 
@@ -44,60 +44,60 @@ class Pattern(Transforms):
         counter-clockwise seen from the front. The winding is made consistent: in each
         connected part the lowest-numbered face decides where the front is.
     assignments : mapping, sequence or None
-        "M" (mountain), "V" (valley), "F" (flat) or "U" (unassigned), either for each crease in
-        the order of `creases` or as a mapping from vertex pairs and families, {(a, b): "M",
-        "zigzag": "V"}, pairs before families. A mapping may also hold "B" for boundary edges;
-        creases that it leaves out, and all of them for None, get the letter of their dihedral.
+        "M" (mountain), "V" (valley), "F" (flat) or "U" (unassigned), either for each crease in the
+        order of `creases` or as a mapping from vertex pairs and families, {(a, b): "M", "zigzag":
+        "V"}, where pairs override families. A mapping may also hold "B" for boundary edges. Creases
+        without an entry, and all creases for None, get the letter of their dihedral.
     name : str
-        What to call the pattern.
+        Name of the pattern.
     boards : Boards, optional
-        The boards that thick panels stand for; see `thicken`.
+        The boards of thick panels; see `thicken`.
     fold_angles : mapping, sequence or None
         The state to fold to: an angle (rad) from -pi to pi for each crease in the order of
-        `creases`, positive on valleys, 0 where flat, NaN or None where none is wanted, or a
-        mapping from vertex pairs, and from "mountain", "valley", "all" and families, of which the
-        angle is a size, as each crease folds its own way; pairs refine these.
+        `creases`, positive on valleys, 0 where flat, NaN or None where free; or a mapping from
+        vertex pairs, and from "mountain", "valley", "all" and families. Angles of these words are
+        magnitudes, and each crease folds by its letter; pairs override words.
     families : mapping, optional
         Names for groups of creases, each with vertex pairs: {"zigzag": [(0, 1), (1, 2)]}.
     custom : mapping, optional
-        Further data of a file that Foldyn does not read, kept to be written again.
+        Further data of a file that Foldyn does not use, kept for writing.
     welds : sequence of (vertex, vertex)
-        Edges of two panels across which the sheet runs on: they are no creases but lines in it,
-        as along the facets of a curved panel; see `welded`.
+        Edges of two panels across which the sheet is continuous: not creases but lines in it, as
+        along the facets of a curved panel; see `welded`.
     rim_families : mapping, optional
-        Boundary edges by the family that they belong to where another panel is put beside them,
-        each with vertex pairs.
+        Boundary edges by the family that they join once another panel is attached, each with vertex
+        pairs.
     periods : sequence of sequences of (vertex, vertex)
-        One or two motions that bring the pattern beside itself, each as the pairs of a vertex and
-        the one where it comes to lie; they hold in every folded state. See `foldyn.UnitCell`.
+        One or two motions that map the pattern to its neighbor, each given by pairs of a vertex and
+        the vertex onto which it moves; they hold in every folded state. See `foldyn.UnitCell`.
 
     Attributes
     ----------
     assignments : tuple of str
         The letter of each crease.
     unlettered : ndarray of bool, shape (nc,)
-        Creases that were given no letter and have that of their dihedral.
+        Creases without a given letter, which have the letter of their dihedral.
     fold_angles : ndarray, shape (nc,)
-        Angle to fold each crease to (rad, pi less the dihedral), NaN where none is given.
+        Angle to fold each crease to (rad, pi minus the dihedral), NaN if not given.
     families, rim_families : mapping
         Rows of `creases` and of `boundary`, by the name of their family.
     flipped : tuple of bool
         For each face, whether its winding was reversed. A reversed face keeps its first
         vertex: (v1, v2, v3, v4) becomes (v1, v4, v3, v2).
     edges, creases, boundary : ndarray of int, shape (m, 2)
-        All edges, those shared by two faces but for welds, and those of one face, as (low, high)
+        All edges, edges shared by two faces except welds, and edges of one face, as (low, high)
         vertex pairs in lexicographic order.
     crease_faces : ndarray of int, shape (nc, 2)
         The face that runs along the crease from low to high, and the one from high to low.
     welds, weld_faces, weld_dihedrals
-        The same as `creases`, `crease_faces` and `dihedrals` of welds.
+        Like `creases`, `crease_faces` and `dihedrals`, for welds.
     dihedrals : ndarray, shape (nc,)
         Angle between the two panels across each crease (rad, 0 to 2 pi) seen from the front:
         pi when flat, below pi on a valley, above on a mountain. Where panels coincide within
-        1e-3 rad the letter decides the side, 0 or 2 pi; to rounding it is 0 without one.
+        1e-3 rad the letter decides the side, 0 or 2 pi; exactly closed creases without one have 0.
     flat_dihedrals : ndarray, shape (nc,)
-        Dihedral (rad) at which the two panels lie flat: pi, but of thick panels, whose boards lie
-        askew to the planes through their hinge lines.
+        Dihedral (rad) at which the two panels lie flat: pi, except for thick panels, whose boards
+        are tilted relative to the planes through their hinge lines.
     face_areas : ndarray, shape (m,)
         Areas (m2).
     face_normals : ndarray, shape (m, 3)
@@ -230,7 +230,7 @@ class Pattern(Transforms):
 
     @property
     def lines(self) -> NDArray[np.int64]:
-        """All edges by what they are, shape (m, 2): creases, then boundary edges, then welds."""
+        """All edges by kind, shape (m, 2): creases, then boundary edges, then welds."""
         return np.concatenate([self.creases, self.boundary, self.welds]).reshape(-1, 2)
 
     @cached_property
@@ -257,16 +257,16 @@ class Pattern(Transforms):
 
 
 class Patterned(Protocol):
-    """What has a pattern: a folding, a structure, what a file was diagnosed as."""
+    """An object with a pattern: a folding, a structure, a diagnosed file."""
 
     @property
     def pattern(self) -> Pattern | None:
-        """Its pattern."""
+        """The object's pattern."""
         ...
 
 
 def pattern_of(given: Any, name: str = "pattern") -> Pattern:
-    """Return a pattern as it is, or that of what has one."""
+    """Return a pattern, or the pattern of an object that has one."""
     found = getattr(given, "pattern", given)
     if isinstance(found, Pattern):
         return found
@@ -306,12 +306,12 @@ def _checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
 
 
 def _letters(dihedrals: NDArray[np.float64]) -> NDArray[np.str_]:
-    """Return the letter that the geometry gives each crease."""
+    """Letter of each crease according to its dihedral."""
     return np.select([dihedrals < np.pi - _FLAT, dihedrals > np.pi + _FLAT], ["V", "M"], "F")
 
 
 def _given_letters(assignments: Any, topology: Topology) -> tuple[NDArray[np.str_], set[Edge]]:
-    """Letter given for each crease, "" where there is none, and the edges given as "B"."""
+    """Letter given for each crease, "" if none, and the edges given as "B"."""
     creases = topology.creases
     given = np.full(len(creases), "", dtype="<U1")
     boundary_edges: set[Edge] = set()

@@ -1,4 +1,4 @@
-"""A picture of a sheet as SVG: what a pattern shows of itself in a notebook."""
+"""SVG picture of a pattern, which represents it in a notebook."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ LINES = {
 
 
 def picture(pattern: Any, words: str = "") -> str | None:
-    """Picture of a `Pattern` as HTML with words below; None where it has too many panels.
+    """Picture of a `Pattern` as HTML with a caption; None if it has too many panels.
 
-    Panels are drawn from back to front, each with the edges that no nearer panel has.
+    Panels are drawn from back to front; an edge is drawn with the nearest of its panels.
     """
     if len(pattern.faces) > MOST_PANELS:
         return None
@@ -66,7 +66,7 @@ def _panels(pattern: Any, places: NDArray, depth: NDArray, toward: NDArray) -> l
         [(min(pair), max(pair)) for pair in zip(face, (*face[1:], face[0]), strict=True)]
         for face in pattern.faces
     ]
-    last = {edge: face for face in order.tolist() for edge in edges_of[face]}  # the nearest panel
+    last = {edge: face for face in order.tolist() for edge in edges_of[face]}  # nearest face
     facing = (pattern.face_normals @ toward).tolist()
     out = []
     for face in order.tolist():

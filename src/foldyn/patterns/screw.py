@@ -1,8 +1,8 @@
-"""Rigid motions that bring a pattern beside itself: translations and screws.
+"""Rigid motions that map a pattern to its neighbor: translations and screws.
 
 By Chasles' theorem every proper motion is a screw, a rotation about an axis and a shift along it;
-without the rotation it is a translation. Its powers have their axis in common, so that copies of a
-pattern are as far apart as they should be, however many there are.
+without rotation it is a translation. All powers of a screw share its axis, so any number of copies
+of a pattern stay correctly spaced.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from foldyn.arguments import Check, Checked
 from foldyn.errors import InputError, UnitsWarning
 from foldyn.values import number, show, vector
 
-SPREAD = 1e-6  # of their size: how far points must reach across a line to tell how they turn
-STILL = 1e-9  # rad: turns that count as none
+SPREAD = 1e-6  # of their size: how far points must extend across a line to determine a rotation
+STILL = 1e-9  # rad: smaller rotations count as none
 
 
 def _direction(name: str, value: ArrayLike) -> tuple[float, float, float]:
-    """Return a direction, one of the axes by its name or a vector that is not zero."""
+    """Return a direction: an axis by its name, or a nonzero vector."""
     if isinstance(value, str):
         if value not in ("x", "y", "z"):
             raise InputError(f' = {show(value)}: give "x", "y", "z" or three numbers', name)
@@ -42,7 +42,7 @@ class Screw(Checked):
     axis : {"x", "y", "z"} or sequence of float, shape (3,)
         Direction of the axis, of any length.
     angle : float
-        Turn (degrees); 0 makes it a translation.
+        Rotation (degrees); 0 makes it a translation.
     shift : float
         Shift (m) along the axis.
     point : sequence of float, shape (3,)
@@ -51,7 +51,7 @@ class Screw(Checked):
     Raises
     ------
     InputError
-        An argument of the wrong kind, or neither a turn nor a shift.
+        An argument of the wrong kind, or neither a rotation nor a shift.
 
     Examples
     --------
@@ -66,7 +66,7 @@ class Screw(Checked):
     point: Annotated[Sequence[float], Check(vector, unit="m")] = (0.0, 0.0, 0.0)
 
     def agree(self) -> None:
-        """Ask for a motion."""
+        """Require a motion."""
         if self.angle % 360.0 == 0.0 and self.shift == 0.0:
             raise InputError(
                 f" = 0, angle = {self.angle:g}: leave all in its place; give a turn or a shift",
@@ -80,22 +80,22 @@ class Screw(Checked):
 
     @property
     def vector(self) -> NDArray[np.float64]:
-        """Its shift (3,), m."""
+        """Shift vector (3,), m."""
         return self.shift * self.unit
 
     @property
     def turns(self) -> bool:
-        """Whether it is more than a translation."""
+        """Whether it has a rotation."""
         return self.angle != 0.0
 
     @property
     def twist(self) -> NDArray[np.float64]:
-        """Rotation vector (rad) and displacement rate of the origin (m), (6,): its logarithm."""
+        """Logarithm (6,): rotation vector (rad) and displacement rate of the origin (m)."""
         turn = np.radians(self.angle) * self.unit
         return np.concatenate([turn, self.vector - np.cross(turn, self.point)])
 
     def rotation(self, power: int = 1) -> NDArray[np.float64]:
-        """Rotation (3, 3) of so many of these motions."""
+        """Rotation (3, 3) of a power of the motion."""
         if not self.turns or power == 0:
             return np.eye(3)
         from scipy.spatial.transform import Rotation
@@ -103,7 +103,7 @@ class Screw(Checked):
         return Rotation.from_rotvec(power * np.radians(self.angle) * self.unit).as_matrix()
 
     def images(self, points: ArrayLike, power: int = 1) -> NDArray[np.float64]:
-        """Where so many of these motions bring points (n, 3), m."""
+        """Images of points (n, 3), m, under a power of the motion."""
         points, center = np.asarray(points, float), np.array(self.point)
         if not self.turns:
             return points + power * self.vector
@@ -111,13 +111,13 @@ class Screw(Checked):
 
 
 def translation(vector: ArrayLike) -> Screw:
-    """The screw without a turn that is a translation (3,), m."""
+    """The screw without rotation for a translation (3,), m."""
     step = np.asarray(vector, float)
     return Screw(tuple(step.tolist()), 0.0, float(np.linalg.norm(step)))
 
 
 def of_twist(twist: NDArray) -> Screw:
-    """The motion of a twist (6,); see `Screw.twist`."""
+    """The motion with a given logarithm (6,); see `Screw.twist`."""
     turn, move = twist[:3], twist[3:]
     angle = float(np.linalg.norm(turn))
     if angle < STILL:
@@ -128,18 +128,18 @@ def of_twist(twist: NDArray) -> Screw:
 
 
 def _screw(axis: NDArray, angle: float, shift: float, point: NDArray) -> Screw:
-    """A screw of a computed angle (rad), which is not doubted."""
+    """A screw with a computed angle (rad), which is not checked."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnitsWarning)
         return Screw(tuple(axis.tolist()), math.degrees(angle), shift, tuple(point.tolist()))
 
 
 def motion_between(points: NDArray, images: NDArray, tolerance: float) -> tuple[Screw, NDArray]:
-    """Motion that brings points (m, 3) to their images (m, 3), and what each is off (m,), m.
+    """Motion from points (m, 3) to their images (m, 3), and the error of each (m,), m.
 
-    A translation where one does within the tolerance, m, or where the points are too few or too
-    nearly on a line to tell a turn; else the screw of least squares (Kabsch, Acta Cryst. A 32,
-    1976).
+    It is a translation if that fits within the tolerance, m, or if the points are too few or too
+    nearly collinear to determine a rotation; else the least-squares screw (Kabsch, Acta Cryst. A
+    32, 1976).
     """
     step = (images - points).mean(axis=0)
     off = np.linalg.norm(points + step - images, axis=1)
@@ -160,7 +160,7 @@ def motion_between(points: NDArray, images: NDArray, tolerance: float) -> tuple[
     point = np.linalg.lstsq(np.eye(3) - rotation, move - shift * axis, rcond=None)[0]
     found = _screw(axis, angle, shift, point)
     left = np.linalg.norm(found.images(points) - images, axis=1)
-    if left.max() > tolerance:  # of no motion: most of them may still say which are wrong
+    if left.max() > tolerance:  # no motion fits: a majority may still show which points are wrong
         usual = np.median(images - points, axis=0)
         off = np.linalg.norm(points + usual - images, axis=1)
         if 2 * (off <= tolerance).sum() > len(off):

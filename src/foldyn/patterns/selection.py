@@ -1,4 +1,4 @@
-"""Expressions that select vertices by place, as "zmax and y>0".
+"""Expressions that select vertices by position, as "zmax and y>0".
 
 An expression is made of
 
@@ -6,9 +6,9 @@ An expression is made of
 - comparisons of ``x``, ``y`` or ``z`` (m) with numbers: ``y > 0``, ``0 <= x < 1.5``, ``z == 0``;
 - ``and``, ``or``, ``not`` and parentheses.
 
-All of them use a tolerance of 1e-9 of the pattern's size, so that rounding in the coordinates does
-not matter: ``y > 0`` leaves out a vertex at y = 1e-17. Expressions select among the vertices of
-the pattern (at rest), never panel centers. They are read by a small parser, never evaluated.
+All comparisons use a tolerance of 1e-9 of the pattern's size, so that rounding in the coordinates
+does not matter: ``y > 0`` leaves out a vertex at y = 1e-17. Expressions select among the vertices
+of the pattern (at rest), never panel centers. They are read by a small parser, never evaluated.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def select(points: Any, expression: str) -> NDArray[np.int64]:
     points : Pattern or array_like, shape (n, 3)
         A pattern, or points (m).
     expression : str
-        See the module's text.
+        See the module's docstring.
 
     Returns
     -------
@@ -81,7 +81,7 @@ def select(points: Any, expression: str) -> NDArray[np.int64]:
 
 @contextmanager
 def given_as(field: str) -> Iterator[None]:
-    """Name the field of an expression that cannot be used."""
+    """Name the field in errors about an expression."""
     try:
         yield
     except InputError as error:
@@ -89,7 +89,7 @@ def given_as(field: str) -> Iterator[None]:
 
 
 def check_expression(expression: str) -> str:
-    """Return an expression that can be read, whatever it selects."""
+    """Return an expression if it can be parsed, whatever it selects."""
     if not expression.strip():
         raise InputError(f'"{expression}": selects nothing; {_REMEDY}')
     _Selector(expression, np.zeros((1, 3)), 0.0).mask()
@@ -97,7 +97,7 @@ def check_expression(expression: str) -> str:
 
 
 class _Selector:
-    """One expression applied to points with an absolute tolerance (m)."""
+    """Evaluates one expression on points with an absolute tolerance (m)."""
 
     def __init__(self, expression: str, points: NDArray, tolerance: float) -> None:
         self.expression = expression

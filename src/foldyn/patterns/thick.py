@@ -1,9 +1,9 @@
-"""Thick panels: boards whose hinges lie on their faces, as thick origami is built.
+"""Thick panels: boards hinged on their faces, as in thick origami.
 
-A crease is a line at some height along the front normal of the boards beside it: by default in the
+A crease is a line at some height along the front normal of the adjacent boards: by default in the
 front face at a valley, where the two front faces meet when it closes, and in the back face at a
 mountain. Each panel of the thick pattern is the plane through its hinge lines; a board moves with
-its panel. Angles at which boards lie flat, their areas and pictures follow from `Pattern.boards`.
+its panel. The dihedrals of flat boards, their areas and pictures follow from `Pattern.boards`.
 
 A board with one hinge line, or with two parallel ones at opposite heights, is a plane through
 opposite edges of its section: the mass on this plane has the center of mass of the board and its
@@ -30,7 +30,7 @@ from foldyn.patterns.pattern import Pattern, pattern_of
 from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.values import SHORTEST, number, number_or_list, show
 
-SAME = 1e-9  # of the pattern's size: places and heights that count as one
+SAME = 1e-9  # of the pattern's size: positions and heights within this are equal
 SIDES = {"V": 0.5, "M": -0.5, "F": 0.0}
 """Height of a hinge line in thicknesses, by assignment."""
 CONDITIONS = (
@@ -46,26 +46,25 @@ def thicken(
     *,
     offsets: float | Sequence[float] | Mapping[str, float] | None = None,
 ) -> Pattern:
-    """Give the panels of a pattern a thickness, and put each crease at its own height in it.
+    """Give panels a thickness, and place each crease at its own height within it.
 
     Parameters
     ----------
     pattern : Pattern
         Flat or folded, with flat panels; its panels are the middle surfaces of the boards.
     thickness : float or sequence of float
-        Thickness (m) of all panels, or of each.
+        Thickness (m), common to all panels or one for each.
     offsets : float, sequence of float or mapping, optional
         Height (m) of the hinge line of all creases, or of each, above the middle surfaces along
-        their front normals, at most half a thickness in size; or of those that have a name
-        ("mountain", "valley", "flat", or a family of the pattern), as {"flat": 0.01}. By default
-        valleys are hinged in the front face, mountains in the back face, flat creases in the
-        middle.
+        their front normals, at most half a thickness in magnitude; or heights by name ("mountain",
+        "valley", "flat", or a family of the pattern), as {"flat": 0.01}. By default valleys are
+        hinged in the front face, mountains in the back face, flat creases in the middle.
 
     Returns
     -------
     Pattern
-        With the same numbers of vertices, panels and creases; its `boards` are the panels in
-        their thickness, and its `flat_dihedrals` the angles at which they lie flat.
+        With the same numbering of vertices, panels and creases; its `boards` are the thick panels,
+        and its `flat_dihedrals` the angles at which they lie flat.
 
     Raises
     ------
@@ -157,7 +156,7 @@ def _heights(offsets: Any, sizes: NDArray, pattern: Pattern) -> NDArray[np.float
 
 
 def _given_heights(offsets: Any, pattern: Pattern) -> tuple[NDArray[np.float64], NDArray]:
-    """Height of each crease (nc,), and for which one is given (nc,)."""
+    """Height of each crease (nc,), and whether it is given (nc,)."""
     count = len(pattern.creases)
     if isinstance(offsets, Mapping):
         each = {word: number(f"offsets.{word}", value) for word, value in offsets.items()}
@@ -173,7 +172,7 @@ def _given_heights(offsets: Any, pattern: Pattern) -> tuple[NDArray[np.float64],
 
 
 def _corner_heights(height: NDArray, pattern: Pattern) -> list[NDArray[np.float64]]:
-    """Height of each panel's corners (k,) above its middle: those of the plane of hinge lines."""
+    """Height of each panel's corners (k,) above its middle, on the plane of the hinge lines."""
     row = edge_lookup(pattern.creases)
     out = []
     for panel, face in enumerate(pattern.faces):
@@ -198,9 +197,9 @@ def _corner_heights(height: NDArray, pattern: Pattern) -> list[NDArray[np.float6
 def _plane(
     panel: int, face: tuple[int, ...], known: dict[int, float], pattern: Pattern
 ) -> NDArray[np.float64]:
-    """Heights (k,) of a panel's corners, some of which are `known`, on one plane.
+    """Heights (k,) of a panel's corners on one plane through the `known` ones.
 
-    Where the known ones lie on a line, the plane goes through the panel's centroid: the mass on it
+    If the known corners are collinear, the plane goes through the panel's centroid: the mass on it
     then has the board's center of mass.
     """
     if not known:
@@ -214,7 +213,7 @@ def _plane(
     points = np.array([flat[face.index(v)] for v in known])
     heights = np.array([*known.values()])
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if spread[-1] < SAME * span:  # on a line
+    if spread[-1] < SAME * span:  # collinear
         points = np.vstack([points, _centroid(flat)])
         heights = np.append(heights, 0.0)
     system = np.column_stack([np.ones(len(points)), points / span])
@@ -229,7 +228,7 @@ def _plane(
 
 
 def _centroid(x: NDArray) -> NDArray[np.float64]:
-    """Centroid (2,) of the area of a polygon x (k, 2)."""
+    """Area centroid (2,) of a polygon x (k, 2)."""
     y = np.roll(x, -1, axis=0)
     cross = x[:, 0] * y[:, 1] - y[:, 0] * x[:, 1]
     return ((x + y) * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())
@@ -238,7 +237,7 @@ def _centroid(x: NDArray) -> NDArray[np.float64]:
 def _shifts(height: NDArray, pattern: Pattern) -> NDArray[np.float64]:
     """Displacement (np, 3) of each board from its thin panel, so that the hinge lines coincide.
 
-    The first panel of each connected part stays.
+    The first panel of each connected part stays fixed.
     """
     normal = pattern.face_normals
     step = height[:, :1] * normal[pattern.crease_faces[:, 0]]

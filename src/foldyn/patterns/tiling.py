@@ -1,4 +1,4 @@
-"""Copies of patterns side by side: the periods of a pattern, and edges that are glued."""
+"""Tiling: the periods of a pattern, and gluing of copies edge to edge."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from scipy.sparse.csgraph import connected_components
 from foldyn.errors import InputError
 from foldyn.patterns.topology import Faces, around, edge_lookup, edge_of
 
-PARALLEL = 1e-3  # rad: periods closer than that count as one direction
+PARALLEL = 1e-3  # rad: periods within this angle count as one direction
 MOST_EDGES = 600
 """Boundary edges among which periods are looked for."""
 
 
 class Glued(NamedTuple):
-    """Several sheets as one.
+    """Several sheets glued into one.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Glued(NamedTuple):
     numbers : list of ndarray of int
         For each sheet the new number of each of its vertices.
     joined : int
-        How many pairs of edges were glued.
+        Number of glued pairs of edges.
     """
 
     vertices: NDArray[np.float64]
@@ -38,16 +38,16 @@ class Glued(NamedTuple):
 
 
 def half_edges(faces: Faces, boundary: NDArray) -> NDArray[np.int64]:
-    """Boundary edges (m, 2) in the direction in which their face runs along them."""
+    """Boundary edges (m, 2) in the direction of their face's winding."""
     rim = edge_lookup(boundary)
     found = [(a, b) for face in faces for a, b in around(face) if edge_of(a, b) in rim]
     return np.array(found, dtype=np.int64).reshape(-1, 2)
 
 
 def glue(vertices: Sequence[NDArray], edges: Sequence[NDArray], tolerance: float) -> Glued:
-    """Join sheets along boundary edges that lie in the same place.
+    """Join sheets along coincident boundary edges.
 
-    Only ends of such edges become one, so that cuts within a sheet stay open.
+    Only the ends of such edges are merged, so that cuts within a sheet stay open.
 
     Parameters
     ----------
@@ -61,7 +61,8 @@ def glue(vertices: Sequence[NDArray], edges: Sequence[NDArray], tolerance: float
     Returns
     -------
     Glued
-        With the vertices of the first sheet first, each where the first sheet has it.
+        With the vertices of the first sheet first; merged vertices keep the position in the
+        earliest sheet.
     """
     from scipy.spatial import cKDTree
 
@@ -94,34 +95,34 @@ def glue(vertices: Sequence[NDArray], edges: Sequence[NDArray], tolerance: float
 
 
 def periods(vertices: NDArray, edges: NDArray, tolerance: float) -> NDArray[np.float64]:
-    """Two translations (2, 3), m, that put a sheet beside itself, edge to edge.
+    """Two translations (2, 3), m, that place copies of a sheet edge to edge.
 
-    They are those that bring the longest parts of the boundary together with others that run the
-    other way, as two panels do on both sides of a crease.
+    They map the longest parts of the boundary onto other parts that run the opposite way, as two
+    panels do on both sides of a crease.
 
     Parameters
     ----------
     vertices : ndarray, shape (n, 3)
         Coordinates (m).
     edges : ndarray of int, shape (m, 2)
-        Boundary edges in the direction in which their face runs along them.
+        Boundary edges in the direction of their face's winding.
     tolerance : float
         Distance (m) that counts as none.
 
     Returns
     -------
     ndarray, shape (2, 3)
-        First the one that is nearer to the x axis; each towards positive coordinates.
+        The one closer to the x axis first; each towards positive coordinates.
 
     Raises
     ------
     InputError
-        There are no two.
+        Fewer than two are found.
     """
     found: list[NDArray] = []
     if len(edges) <= MOST_EDGES:
         lengths = np.linalg.norm(np.diff(vertices[edges], axis=1)[:, 0], axis=1)
-        left = lengths.copy()  # of boundary that no period has brought together with other
+        left = lengths.copy()  # boundary edges that no period has matched yet
         steps = _translations(vertices, edges, tolerance)
         while steps and len(found) < 2:
             step, brought = max(steps, key=lambda each: (_rounded(left[each[1]].sum(), lengths),
@@ -142,14 +143,14 @@ def periods(vertices: NDArray, edges: NDArray, tolerance: float) -> NDArray[np.f
 
 
 def _rounded(length: float, lengths: NDArray) -> float:
-    """Share of a boundary, in which rounding does not tell equal ones apart."""
+    """Share of the boundary, rounded so that equal shares compare equal."""
     return round(float(length / lengths.sum()), 6)
 
 
 def _translations(
     vertices: NDArray, edges: NDArray, tolerance: float
 ) -> list[tuple[NDArray, NDArray]]:
-    """Translations that bring boundary edges together, with the edges that they do so with."""
+    """Translations that match boundary edges, with the edges that they match."""
     from scipy.spatial import cKDTree
 
     a, b = vertices[edges[:, 0]], vertices[edges[:, 1]]

@@ -28,12 +28,12 @@ class Topology(NamedTuple):
     flipped : tuple of bool
         For each face, whether the winding given was reversed.
     edges, creases, boundary : ndarray of int, shape (m, 2)
-        Vertex pairs (low, high) in lexicographic order: all edges, those of two faces but for
-        welds, of one.
+        Vertex pairs (low, high) in lexicographic order: all edges, edges of two faces except welds,
+        and edges of one face.
     crease_faces : ndarray of int, shape (nc, 2)
         For each crease the face that runs low to high and the face that runs high to low.
     welds, weld_faces : ndarray of int, shape (nw, 2)
-        The same of edges of two faces across which the sheet runs on.
+        The same for edges of two faces across which the sheet is continuous.
     """
 
     faces: Faces
@@ -47,7 +47,7 @@ class Topology(NamedTuple):
 
 
 def checked_faces(faces: Any, n_vertices: int) -> Faces:
-    """Faces as tuples of Python integers, each face checked on its own and against the others.
+    """Faces as tuples of Python integers, each checked by itself and against the others.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def build_topology(faces: Faces, n_vertices: int, welds: Any = ()) -> Topology:
     n_vertices : int
         Number of vertices.
     welds : sequence of (vertex, vertex)
-        Edges of two faces across which the sheet runs on.
+        Edges of two faces across which the sheet is continuous.
 
     Returns
     -------
@@ -141,8 +141,8 @@ def build_topology(faces: Faces, n_vertices: int, welds: Any = ()) -> Topology:
     Raises
     ------
     InputError
-        An edge of more than two faces, a surface with only one side, or a weld that is no edge of
-        two faces.
+        An edge of more than two faces, a one-sided surface, or a weld that is not an edge of two
+        faces.
     """
     sizes = np.array([len(face) for face in faces])
     owner = np.repeat(np.arange(len(faces)), sizes)
@@ -183,7 +183,7 @@ def build_topology(faces: Faces, n_vertices: int, welds: Any = ()) -> Topology:
 
 
 def _welded(welds: Any, shared: NDArray) -> NDArray[np.bool_]:
-    """Which of the edges of two faces (k, 2) are `welds`, pairs of vertices."""
+    """Which edges of two faces (k, 2) are `welds`, pairs of vertices."""
     row, chosen = edge_lookup(shared), np.zeros(len(shared), bool)
     for pair in listed("welds", welds, "pairs of vertices, as [(0, 1)]"):
         edge = vertex_pair("welds", pair)
@@ -237,7 +237,7 @@ def edge_of(a: int, b: int) -> Edge:
 
 
 def vertex_pair(field: str, key: Any) -> Edge:
-    """Edge (low, high) that a pair of vertex numbers names."""
+    """Edge (low, high) of a pair of vertex numbers."""
     try:
         if isinstance(key, str):
             raise TypeError
@@ -250,5 +250,5 @@ def vertex_pair(field: str, key: Any) -> Edge:
 
 
 def around(face: Sequence[int]) -> Iterator[Edge]:
-    """Pairs of neighboring corners around a face, in its order."""
+    """Pairs of neighboring corners around a face, in order."""
     return zip(face, (*face[1:], face[0]), strict=True)

@@ -1,4 +1,4 @@
-"""Patterns made from others: scaled, moved, rotated, mirrored, repeated, joined."""
+"""Patterns derived from others: scaled, moved, rotated, mirrored, repeated, joined."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from foldyn.patterns.tiling import periods as periods_of
 from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.values import number, numbers, show, vector, whole
 
-FLAT = 1e-6  # rad from pi: a crease between copies that is given no letter by its dihedral
+FLAT = 1e-6  # rad from pi: a crease between copies that gets no letter from its dihedral
 TURNED = {"M": "V", "V": "M"}
 FACE_ORDERS = "faceOrders"
 """Key of a pattern's custom data that holds the order of its layers, as FOLD has it."""
@@ -26,7 +26,7 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 class Transforms:
-    """What `Pattern` can make of itself; every method returns a new pattern."""
+    """Transformations of a `Pattern`; every method returns a new pattern."""
 
     if TYPE_CHECKING:
         vertices: NDArray[np.float64]
@@ -49,7 +49,7 @@ class Transforms:
         size: float
 
     def scaled(self, factor: float) -> Self:
-        """Return the pattern with all lengths multiplied, those of boards too.
+        """Return the pattern with all lengths scaled, including its boards.
 
         Parameters
         ----------
@@ -65,7 +65,7 @@ class Transforms:
         Parameters
         ----------
         shift : array_like, shape (3,)
-            By how much (m).
+            Displacement (m).
         """
         step = np.array(vector("shift", shift))
         return self._placed(lambda x: x + step)
@@ -98,16 +98,16 @@ class Transforms:
     def mirrored(self, normal: str | ArrayLike = "x", about: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
         """Return the mirror image of the pattern.
 
-        The front is mirrored too: panels are listed the other way around, so that what is a
-        valley seen from the front stays one, with its dihedral and its fold angle. In a plane
-        that stands on a flat sheet the mirror image shows the same side, with the same letters.
+        The front is mirrored too: the winding of panels is reversed, so that a valley seen from the
+        front stays a valley, with its dihedral and fold angle. Mirrored in a plane perpendicular to
+        it, a flat sheet shows the same side with the same letters.
 
         Parameters
         ----------
         normal : {"x", "y", "z"} or array_like, shape (3,)
-            Direction across the mirror.
+            Normal of the mirror plane.
         about : array_like, shape (3,)
-            A point on the mirror (m).
+            A point on the mirror plane (m).
         """
         unit = _direction("normal", normal)
         center = np.array(vector("about", about))
@@ -125,18 +125,18 @@ class Transforms:
         Parameters
         ----------
         counts : sequence of two int
-            How many copies along the first and the second period, at least 1.
+            Number of copies along the first and the second period, at least 1.
         periods : array_like, shape (2, 3), optional
-            Translations (m) from a copy to the next. By default they are found: those that bring
-            the longest parts of the boundary together, first the one nearer to the x axis.
+            Translations (m) from a copy to the next. By default they match the longest parts of the
+            boundary, the one closer to the x axis first.
         tolerance : float
-            Distance, as a fraction of the pattern's size, at which edges lie in the same place.
+            Distance, as a fraction of the pattern's size, within which edges coincide.
 
         Returns
         -------
         Pattern
-            The copies run along the second period first. Creases keep letters, fold angles and
-            families; those between copies get the letter of their dihedral, "U" where it is flat.
+            Copies are ordered along the second period first. Creases keep letters, fold angles and
+            families; creases between copies get the letter of their dihedral, "U" if flat.
 
         Raises
         ------
@@ -160,22 +160,22 @@ class Transforms:
         return made
 
     def joined(self, other: Self, tolerance: float = 1e-6) -> Self:
-        """Return two patterns as one, glued where boundary edges lie in the same place.
+        """Return two patterns as one, glued along coincident boundary edges.
 
-        The front is that of this pattern; where it glues the back of the other to it, mountains
-        and valleys of the other change places, as seen from there.
+        The front is this pattern's; if the other pattern is glued with its back to that side, its
+        mountains and valleys swap.
 
         Parameters
         ----------
         other : Pattern
         tolerance : float
-            Distance, as a fraction of the larger size, at which edges lie in the same place.
+            Distance, as a fraction of the larger size, within which edges coincide.
 
         Returns
         -------
         Pattern
             With the vertices and panels of this pattern first. Creases between the two get the
-            letter of their dihedral, "U" where it is flat.
+            letter of their dihedral, "U" if flat.
 
         Raises
         ------
@@ -203,15 +203,15 @@ class Transforms:
         return made
 
     def changed(self, **values: Any) -> Self:
-        """Return the pattern with other arguments; see `Pattern`.
+        """Return the pattern with some arguments changed; see `Pattern`.
 
-        Warnings that it has given when it was first made are not given again. Other faces have no
-        order of layers until one is given.
+        Warnings from its construction are not repeated. With other faces the order of layers is
+        dropped unless given.
 
         Parameters
         ----------
         **values
-            Arguments of `Pattern`, instead of its own.
+            New arguments of `Pattern`.
         """
         own = {
             "vertices": self.vertices,
@@ -230,7 +230,7 @@ class Transforms:
             own["custom"] = {k: v for k, v in self.custom.items() if k != FACE_ORDERS}
             own["rim_families"] = _still_at_the_rim(self._rim(), values["faces"])
         if len(values.get("vertices", self.vertices)) != len(self.vertices):
-            own["periods"] = ()  # which are said of the vertices by number
+            own["periods"] = ()  # which refer to vertex numbers
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
             changed = type(self)(**{**own, **values})
@@ -243,7 +243,7 @@ class Transforms:
         return {name: self.boundary[rows] for name, rows in self.rim_families.items()}
 
     def _placed(self, place: Any, factor: float = 1.0, turned: bool = False) -> Self:
-        """The pattern with its points put elsewhere; with panels listed the other way around."""
+        """The pattern with its points mapped by `place`; with reversed winding if `turned`."""
         boards = self.boards
         order = [
             np.array([0, *range(len(face) - 1, 0, -1)]) if turned else np.arange(len(face))
@@ -267,12 +267,12 @@ class Transforms:
 def _still_at_the_rim(
     families: Mapping[str, NDArray], faces: Any
 ) -> dict[str, list[list[int]]] | None:
-    """Families of boundary edges without those that are none of other faces."""
+    """Families of boundary edges, without edges that are not on the boundary of the new faces."""
     if not families:
         return None
     try:
         count = Counter(edge_of(a, b) for face in faces for a, b in around(list(face)))
-    except (TypeError, IndexError):  # which `Pattern` refuses by name
+    except (TypeError, IndexError):  # `Pattern` refuses these by name
         return None
     return {
         name: [pair for pair in pairs.tolist() if count[pair[0], pair[1]] == 1]
@@ -283,7 +283,7 @@ def _still_at_the_rim(
 def _joined(
     first: Transforms, sheets: Sequence[tuple[Transforms, NDArray]], near: float
 ) -> tuple[Any, int]:
-    """Sheets, each moved, as one pattern; and how many edges were glued."""
+    """Join sheets, each shifted, into one pattern; also return the number of glued edges."""
     points = [sheet.vertices + shift for sheet, shift in sheets]
     rims = [half_edges(sheet.faces, sheet.boundary) for sheet, _ in sheets]
     glued = glue(points, rims, near)
@@ -329,7 +329,7 @@ def _joined(
 
 
 def _given(steps: Any) -> NDArray[np.float64]:
-    """Translations (2, 3) as they are given."""
+    """Check given translations (2, 3)."""
     array = numbers("periods", steps)
     if array.shape != (2, 3):
         raise InputError(
@@ -355,7 +355,7 @@ def _thin(pattern: Transforms) -> None:
 
 
 def _direction(name: str, given: Any) -> NDArray[np.float64]:
-    """Unit vector (3,) of an axis that is named or given by its coordinates."""
+    """Unit vector (3,) of an axis given by name or coordinates."""
     if isinstance(given, str) and given in AXES:
         return np.array(AXES[given])
     if isinstance(given, str):

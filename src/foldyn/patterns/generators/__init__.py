@@ -1,1 +1,1 @@
-"""Generators of common patterns, each in a file of its own."""
+"""Generators of common patterns, one per file."""

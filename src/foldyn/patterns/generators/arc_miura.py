@@ -29,7 +29,7 @@ def arc_miura(
     second_angle: float = 75.0,
     dihedral: float = 90.0,
 ) -> Pattern:
-    """Arc-Miura sheet: a Miura-ori whose zigzags have two angles by turns, which folds to an arc.
+    """Arc-Miura sheet: a Miura-ori with two alternating zigzag angles, which folds to an arc.
 
     Vertex (i, j), i along x and j along y, is number i (2 cells[1] + 1) + j, as in `miura`. The
     zigzag with j even has the angle g1 and edges of length b, the one with j odd g2 and edges of
@@ -38,7 +38,7 @@ def arc_miura(
     along the bisectors of their corners, by v1 and v2. With the tilt f = (180 - dihedral)/2:
     s = b sin g1/sqrt(1 + cos^2 g1 tan^2 f) is the distance of the planes, k = s cos g1 tan f,
     tan(d1/2) = k/(b cos g1), tan(d2/2) = k/(b sin g1 cot g2),
-    v = sqrt(k^2 + (b cos g1)^2) at j even, alike at j odd. The panels are trapezoids.
+    v = sqrt(k^2 + (b cos g1)^2) at j even, and likewise at j odd. The panels are trapezoids.
 
     Parameters
     ----------
@@ -70,8 +70,8 @@ def arc_miura(
     Notes
     -----
     J. M. Gattas, W. Wu, Z. You, Miura-base rigid origami: parameterizations of first-level
-    derivative and piecewise geometries, J. Mech. Des. 135, 2013. Each vertex is that of a
-    flat-foldable Miura-ori, so the sheet folds rigidly, with one degree of freedom.
+    derivative and piecewise geometries, J. Mech. Des. 135, 2013. Each vertex is a flat-foldable
+    Miura-ori vertex, so the sheet folds rigidly, with one degree of freedom.
     """
     with within("arc_miura: "):
         nx, ny = cell_counts(cells, 4)
@@ -79,7 +79,7 @@ def arc_miura(
         g1, g2 = acute("panel_angle", panel_angle), acute("second_angle", second_angle)
         dihedral = fold_dihedral(dihedral)
         along = b * math.cos(g1), b * math.sin(g1) / math.tan(g2)
-        change = along[1] - along[0]  # of the straight edges from one row of creases to the next
+        change = along[1] - along[0]  # in length of the straight edges, row to row
         if abs(change) >= 2.0 * a:
             raise InputError(
                 f" = {a:g}: panels with these angles have no length; must be above "
@@ -95,7 +95,7 @@ def arc_miura(
     j = np.arange(2 * ny + 1)
     odd = j % 2
     turn = np.where(odd, -turns[1], turns[0])
-    # direction (rad) of the straight edge that leaves each corner, and of the bisector there
+    # direction (rad) of the straight edge after each corner, and of the bisector there
     leaving = np.cumsum(turn) - 0.5 * turns[0]
     bisector = leaving - 0.5 * turn
     lengths = np.where(odd, a + 0.5 * change, a - 0.5 * change)[:-1]

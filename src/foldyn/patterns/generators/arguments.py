@@ -30,10 +30,10 @@ def fold_dihedral(
     least: float = 0.0,
     otherwise: str = "at both of which the sheet closes to a line",
 ) -> float:
-    """Return the smaller angle of a fold (degrees), between 0 and 180, 180 only if allowed.
+    """Return the smaller angle of a fold (degrees), between 0 and 180; 180 only if allowed.
 
-    least : angle (degrees) at which the pattern is closed already.
-    otherwise : what happens at the ends where flat is not allowed.
+    least : angle (degrees) at which the pattern is already closed.
+    otherwise : what happens at the limits if flat is not allowed.
     """
     if flat_allowed and isinstance(value, Real) and value == 180:
         return 180.0
@@ -50,7 +50,7 @@ def acute(name: str, value: Any) -> float:
 
 
 def check_size(fields: str, vertices: int) -> None:
-    """Refuse a pattern that memory cannot hold, before it is made.
+    """Refuse a pattern too large for the memory, before it is generated.
 
     fields : names and values of the arguments that make it large.
     """
@@ -59,7 +59,7 @@ def check_size(fields: str, vertices: int) -> None:
 
 
 def cell_counts(cells: Any, per_cell: int) -> tuple[int, int]:
-    """Return the numbers of cells along x and y of a sheet with some vertices in each."""
+    """Return the numbers of cells along x and y of a sheet, given the vertices per cell."""
     try:
         if isinstance(cells, (str, bytes)):
             raise TypeError
@@ -81,7 +81,8 @@ def sizes(a: Any, b: Any) -> tuple[float, float]:
 def check_turn(name: str, count: int, turn: float, what: str) -> None:
     """Refuse a sheet that rolls up by more than a full turn.
 
-    turn : degrees by which each of `count` rows, or whatever `what` says, turns against the last.
+    turn : degrees by which each of `count` rows, or of the parts named by `what`, turns relative to
+    the last.
     """
     if abs(turn) * count > ROUND:
         most = math.floor(ROUND / abs(turn))

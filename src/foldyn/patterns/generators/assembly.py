@@ -1,4 +1,4 @@
-"""A pattern from its panels, the families of its creases and their letters."""
+"""A pattern assembled from its panels, crease families and letters."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def assembled(
     custom: Mapping[str, Any] | None = None,
     periods: Sequence[Sequence[Edge]] = (),
 ) -> Pattern:
-    """Pattern of which each family may name edges of one panel too, which are left out.
+    """Assemble a pattern; edges in families that belong to a single panel are left out.
 
-    An edge may be named twice.
+    An edge may be listed twice.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def assembled(
         Angle (rad) to fold each family to, valleys positive.
     custom : mapping, optional
     periods : sequence of sequences of vertex pairs
-        Both as `Pattern` takes them.
+        Both as in `Pattern`.
 
     Returns
     -------

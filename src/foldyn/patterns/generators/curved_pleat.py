@@ -22,7 +22,7 @@ def curved_pleat(
     arc: float = 90.0,
     dihedral: float = 110.0,
 ) -> Pattern:
-    """Sheet that is pleated along arcs of circles, each a polygon, with straight rulings.
+    """Sheet pleated along circular arcs, each a polygon, with straight rulings.
 
     The creases are copies of one polygon with its corners on an arc, each shifted by `a` along y
     from the last; rulings join their corners. Vertex (i, j), i along the arc and j along y, is
@@ -41,10 +41,11 @@ def curved_pleat(
     radius : float
         Radius of the arc (m) when the sheet is flat.
     arc : float
-        Its angle (degrees, between 0 and 180).
+        Angle of the arc (degrees, between 0 and 180).
     dihedral : float
         180 degrees less twice the tilt of the rulings: the angle across a crease where it is at
-        right angles to them (degrees; 180 is flat). At the angle of the outermost chords, closed.
+        right angles to them (degrees; 180 is flat). At the angle of the outermost chords it is
+        closed.
 
     Returns
     -------

@@ -38,7 +38,7 @@ def eggbox(
     dihedral : float
         Angle between the panels across the creases along x (degrees, between 0 and 180, at
         both of which the sheet closes to a line): valleys where j is even, mountains where it
-        is odd; so too along y with i.
+        is odd; likewise along y with i.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def eggbox(
         half = math.radians(fold_dihedral(dihedral, flat_allowed=False)) / 2
     cos_y = math.hypot(math.cos(gamma), math.sin(gamma) * math.cos(half))
     h1, h2 = a * cos_y, b * math.cos(gamma) / cos_y
-    # the roots of the docstring's formulas, taken by hand so that nothing cancels
+    # the roots of the docstring's formulas, rewritten so that nothing cancels
     along_y = a * math.sin(gamma) * math.sin(half)
     s = b * math.sin(gamma) * math.cos(half) / cos_y
     i, j = indices(2 * nx, 2 * ny)

@@ -17,7 +17,7 @@ LETTERS = {"hub": "V", "ray": "V", "ridge": "M", "inner_bend": "V", "outer_bend"
 
 
 def flasher(sides: int = 6, a: float = 1.0, *, rings: int = 3, folded: bool = False) -> Pattern:
-    """Flasher: a flat sheet that wraps around a polygonal hub, of zero thickness.
+    """Flasher: a flat sheet that wraps around a polygonal hub; zero thickness.
 
     Each side of the hub is prolonged by a ray; the wedge of 360/sides degrees between two rays is
     halved by a ridge. Folded, the two halves of each wedge lie upon each other in the walls of a
@@ -37,7 +37,7 @@ def flasher(sides: int = 6, a: float = 1.0, *, rings: int = 3, folded: bool = Fa
     rings : int
         Bends across each half wedge, at least 1.
     folded : bool
-        Whether to give the folded state, wrapped up.
+        Whether to return the folded state, wrapped around the hub.
 
     Returns
     -------

@@ -26,7 +26,7 @@ def lines(columns: int, rows: int) -> tuple[list[Edge], list[Edge]]:
 
 
 def opposite(columns: int, rows: int) -> tuple[list[Edge], list[Edge]]:
-    """Vertices at the lower end of each row, and of each column, with those at the other end."""
+    """Vertices at the lower end of each row, and of each column, paired with the opposite ends."""
     step = rows + 1
     along_x = [(j, columns * step + j) for j in range(step)]
     along_y = [(i * step, i * step + rows) for i in range(columns + 1)]
@@ -48,10 +48,10 @@ def sheet(
     places : three arrays, each broadcast to shape (columns + 1, rows + 1)
         Coordinates of vertex (i, j), which is number i (rows + 1) + j.
     families : tuple of two str
-        What to call the creases along x and those along y.
+        Names of the creases along x and along y.
     assignments : mapping or sequence of str, optional
     periods : sequence of sequences of vertex pairs
-        Both as `Pattern` takes them.
+        Both as in `Pattern`.
 
     Returns
     -------

@@ -70,7 +70,7 @@ def kresling(
     -------
     Pattern
         (storeys + 1) sides vertices and 2 storeys sides faces. Families: "diagonal" and "side"
-        are the slanted edges, "ring" those between storeys.
+        are the slanted edges, "ring" the edges between storeys.
 
     Raises
     ------

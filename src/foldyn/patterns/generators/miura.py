@@ -66,7 +66,7 @@ def miura(
         gamma = acute("panel_angle", panel_angle)
         dihedral = fold_dihedral(dihedral)
     tilt = math.radians(180.0 - dihedral) / 2
-    # cos of the tilt as sin of half the dihedral keeps its digits when nearly closed.
+    # cos of the tilt as sin of half the dihedral stays accurate when nearly closed
     t = math.sin(math.radians(dihedral) / 2) * math.tan(gamma)
     s = b * t / math.hypot(1.0, t)
     v = b / math.hypot(1.0, t)

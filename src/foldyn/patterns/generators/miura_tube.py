@@ -24,7 +24,7 @@ def miura_tube(
     panel_angle: float = 60.0,
     dihedral: float = 90.0,
 ) -> Pattern:
-    """Tube along x of two Miura-ori strips, one the mirror image of the other, open at its ends.
+    """Tube along x of two mirrored Miura-ori strips, open at its ends.
 
     Station i along x has four corners, number 4 i to 4 i + 3: those of one cell of `miura` at
     (i, 0), (i, 1) and (i, 2), and the image of (i, 1) in the plane z = 0. Cross-sections are
@@ -39,7 +39,7 @@ def miura_tube(
         `miura`.
     dihedral : float
         Angle inside the tube across the upper and lower zigzag creases (degrees, between 0 and
-        180, at both of which the tube is flat). The other two have 180 less it.
+        180, at both of which the tube is flat). The other two angles are 180 minus this.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def miura_tube(
 
 
 def tube(cells: int, a: float, b: float, panel_angle: float, dihedral: float) -> NDArray:
-    """Vertices (4 stations, 3), m, of a tube whose arguments are checked here."""
+    """Vertices (4 stations, 3), m, of a tube, with checks of its arguments."""
     cells = whole("cells", cells, least=1)
     check_size(f"cells = {cells}", 8 * cells + 4)
     sizes(a, b)
@@ -80,7 +80,7 @@ def tube(cells: int, a: float, b: float, panel_angle: float, dihedral: float) ->
 
 
 def tube_panels(stations: int, first: int = 0) -> tuple[list[tuple[int, ...]], dict]:
-    """Faces of a tube of four corners a station, front outside, and its families of edges."""
+    """Faces of a tube with four corners per station, front outside, and its families of edges."""
     faces: list[tuple[int, ...]] = []
     families: dict[str, list[Edge]] = {"zigzag": [], "ring": []}
     for i in range(stations):

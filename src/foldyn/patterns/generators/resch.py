@@ -19,7 +19,7 @@ from foldyn.values import length
 
 MIDDLE, TIP = 1.0 / math.sqrt(3.0), 2.0 / math.sqrt(3.0)
 """Distances of the middles of a star's sides and of its corners from its center, in sides a."""
-STEP = math.radians(10.0)  # from one solution to the next
+STEP = math.radians(10.0)  # step from one solution to the next
 LETTERS = {"tile": "M", "tuck": "V", "star": "M"}
 CLOSED = {"tile": -math.pi / 2, "tuck": math.pi, "star": -math.pi / 3}
 """Fold angles (rad) of the closed state."""
@@ -34,17 +34,17 @@ def resch(cells: Sequence[int] = (3, 3), a: float = 1.0, *, dihedral: float = 12
     plane: the middles of a star's sides meet in one point, its center hangs a/sqrt(3) below it,
     the tucks are closed, and the tiles stand at right angles to them.
 
-    Between these two the sheet rolls up, to a cylinder about an axis along y, and flattens again:
-    with all tiles in one plane only the two ends have all lengths right. All stars fold alike, as
-    mirror images of themselves in planes through the axis. With the dihedral d of the tuck along y,
-    seen from the center of a star, the middle of a side beside it lies at a/2 sin(d/2) from that
-    plane; three lengths then say how the tuck is inclined, and how far columns of stars are apart
-    and turned, which is solved from the closed state on.
+    Between these two states the sheet rolls up to a cylinder about an axis along y, and flattens
+    again: only at the two ends can all tiles be coplanar with correct lengths. All stars fold
+    alike, as mirror images of themselves in planes through the axis. With the dihedral d of the
+    tuck along y, seen from the center of a star, the middle of a side beside it lies at a/2
+    sin(d/2) from that plane; three lengths then say how the tuck is inclined, and how far columns
+    of stars are apart and turned, which is solved from the closed state on.
 
     Parameters
     ----------
     cells : sequence of two int
-        Columns of stars along x, and stars along y in each; every star brings two tiles with it.
+        Columns of stars along x, and stars along y in each; every star comes with two tiles.
     a : float
         Side of a tile (m).
     dihedral : float
@@ -77,7 +77,7 @@ def resch(cells: Sequence[int] = (3, 3), a: float = 1.0, *, dihedral: float = 12
     vertices: list[tuple[float, ...]] = []
 
     def corner(m: int, n: int, k: int) -> int:
-        """Number of the middle of side k of star (m, n), or of its center for k = 3."""
+        """Vertex number of the middle of side k of star (m, n), or of its center for k = 3."""
         if (m, n, k) not in found:
             found[m, n, k] = len(vertices)
             vertices.append(tuple((a * star.place(m - (counts[0] - 1) / 2, n, k)).tolist()))
@@ -86,7 +86,7 @@ def resch(cells: Sequence[int] = (3, 3), a: float = 1.0, *, dihedral: float = 12
     faces: list[tuple[int, ...]] = []
     families: dict[str, list[Edge]] = {"tile": [], "tuck": [], "star": []}
     for m in range(counts[0]):
-        for n in range(-(m // 2), counts[1] - m // 2):  # so that columns stand side by side
+        for n in range(-(m // 2), counts[1] - m // 2):  # keeps columns side by side
             center = corner(m, n, 3)
             middle = [corner(m, n, k) for k in range(3)]
             tips = [corner(m, n + 1, 2), corner(m - 1, n, 0), corner(m + 1, n - 1, 1)]
@@ -115,7 +115,7 @@ def resch(cells: Sequence[int] = (3, 3), a: float = 1.0, *, dihedral: float = 12
 
 @dataclass(frozen=True)
 class Star:
-    """One star of tiles with sides of 1, and how the next ones are placed.
+    """A star of tiles with sides 1, and the placement of its neighbors.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class Star:
 
     @classmethod
     def of(cls, dihedral: float, incline: float, apart: float, turn: float) -> Star:
-        """Make the star whose tuck along y, of some dihedral (rad), rises by an angle (rad)."""
+        """Make the star whose tuck along y has a dihedral (rad) and rises by an angle (rad)."""
         along = np.array([0.0, math.cos(incline), math.sin(incline)])
         front = np.array([0.0, -math.sin(incline), math.cos(incline)])
         side = MIDDLE / 2 * along + math.sin((math.pi - dihedral) / 2) / 2 * front
@@ -153,7 +153,7 @@ class Star:
 
     @classmethod
     def at(cls, dihedral: float) -> Star:
-        """Star whose tuck along y has a dihedral (rad)."""
+        """Star whose tuck along y has the given dihedral (rad)."""
         from scipy.optimize import root
 
         if dihedral == math.pi:
@@ -167,19 +167,19 @@ class Star:
 
     @property
     def gaps(self) -> NDArray[np.float64]:
-        """What the squares of the lengths from a tip in the next column are off by (3,)."""
+        """Errors (3,) in the squared lengths from a tip in the next column."""
         side, _, last, center = self.middles
         tip = self.place(1, -1, 1)
         squares = [((tip - point) ** 2).sum() for point in (center, side, last)]
         return np.array(squares) - [TIP**2, 1.0, 1.0]
 
     def place(self, m: float, n: int, k: int) -> NDArray[np.float64]:
-        """Place (3,) of middle k of star n in column m, or of its center for k = 3."""
+        """Position (3,) of middle k of star n in column m, or of its center for k = 3."""
         x, y, z = self.middles[k]
         c, s, half = math.cos(m * self.turn), math.sin(m * self.turn), self.turn / 2
         if half == 0.0:
             right, up = m * self.apart, 0.0
-        else:  # of the column, about an axis at the depth apart/2 cot(half) below the centers
+        else:  # angle of the column, about an axis at the depth apart/2 cot(half) below the centers
             radius = self.apart * math.cos(half) / (2.0 * math.sin(half))
             right, up = radius * s, -2.0 * radius * math.sin(m * half) ** 2
         return np.array([x * c + z * s + right, y + (m / 2 + n) * self.period, z * c - x * s + up])

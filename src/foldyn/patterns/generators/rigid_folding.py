@@ -14,10 +14,10 @@ from foldyn.patterns.topology import Edge, around, edge_of
 def folded(
     flat: NDArray[np.float64], faces: Sequence[Sequence[int]], angles: Mapping[Edge, float]
 ) -> NDArray[np.float64]:
-    """Places of the vertices when each crease is folded by its angle.
+    """Positions of the vertices when each crease is folded by its angle.
 
-    The first panel stays; each other one is carried by a neighbor nearest to it. The angles must
-    be such that the panels around every vertex close.
+    The first panel stays fixed; each other panel follows the neighbor nearest to the first. The
+    angles must close the panels around every vertex.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ def square_twist(
     dihedral: float = 100.0,
     symmetric: bool = False,
 ) -> Pattern:
-    """Square twist: a square with a pleat from each of its sides.
+    """Square twist: a square with a pleat from each side.
 
     Corners 0 to 3 are those of the square, counter-clockwise from the origin. From the ends of side
     i two parallel creases of length b run outwards, at the acute angle g = panel_angle to the side
@@ -96,7 +96,7 @@ def square_twist(
 
 
 def _flat(a: float, b: float, gamma: float) -> tuple[np.ndarray, list[tuple[int, ...]]]:
-    """Vertices (16, 2), m, and panels: the square, the pleats, the corners between them."""
+    """Vertices (16, 2), m, and panels: the square, the pleats, the outer corners between them."""
     square = a * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     way = np.arange(4) * math.pi / 2 - gamma
     pleat = b * np.column_stack([np.cos(way), np.sin(way)])
@@ -111,10 +111,10 @@ def _flat(a: float, b: float, gamma: float) -> tuple[np.ndarray, list[tuple[int,
 def _angles(
     p: float, gamma: float, center: list[Edge], first: list[Edge], second: list[Edge]
 ) -> dict[Edge, float]:
-    """Fold angles (rad) where sides 0 and 2 fold by p.
+    """Fold angles (rad) if sides 0 and 2 fold by p.
 
-    At a corner the creases that continue each other across it fold by the same angle, the pair
-    that folds further the same way, the other pair in opposite ways.
+    At a corner, opposite creases fold by the same angle: the pair that folds further with equal
+    signs, the other pair with opposite signs.
     """
     q = 2.0 * math.atan(math.tan(math.pi / 4 - gamma / 2) * math.tan(p / 2))
     sides = [p, -q, -p, q]

@@ -22,7 +22,7 @@ def waterbomb(
     b: float = 1.0,
     dihedral: float = 120.0,
 ) -> Pattern:
-    """Waterbomb tessellation: rows of waterbomb bases, each shifted by half a base to the last.
+    """Waterbomb tessellation: rows of waterbomb bases, each row shifted by half a base.
 
     A base is a rectangle with creases from its center to its corners (valleys) and to the middles
     of its lower and upper edge (mountains). The grid points on the edges of the rows, `2 cells[0] +
@@ -78,7 +78,7 @@ def waterbomb(
         check_turn("cells[0]", nx, 2.0 * math.degrees(bent), "bases")
 
     def place(column: int, y: float, inside: float) -> tuple[float, float, float]:
-        """Place of a point in its column, at some depth inside the cylinder of the grid points."""
+        """Position of a point in its column, at some depth inside the grid points' cylinder."""
         if bent == 0.0:
             return b / 2 * (column - nx), y, 0.0
         angle = bent * (column - nx)
@@ -128,7 +128,7 @@ def waterbomb(
 
 
 def _height(dihedral: float, h: float, w: float) -> float:
-    """Height (m) of a middle above the center along the axis, from the dihedral (rad) of sides."""
+    """Height (m) of a midpoint above the center along the axis, from sides' dihedral (rad)."""
     from scipy.optimize import brentq
 
     def short(z: float) -> float:

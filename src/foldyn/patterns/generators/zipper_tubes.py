@@ -23,12 +23,12 @@ def zipper_tubes(
     panel_angle: float = 60.0,
     dihedral: float = 90.0,
 ) -> Pattern:
-    """Two tubes of `miura_tube` whose zigzag walls fit together, as the two rows of a zipper.
+    """Two tubes as in `miura_tube` whose zigzag walls fit together, like the rows of a zipper.
 
     The second tube is the first one turned by 180 degrees about an axis at right angles to the wall
     between its corners 2 and 3 of each station, and shifted so that one of its own walls lies in
     that wall. The panels of the two walls lie in the same planes and lean opposite ways, so they
-    overlap only in part, and stay so as both tubes fold: their corners lie on common lines, at
+    overlap only in part, and do so throughout the folding: their corners lie on common lines, at
     constant distances. Vertex k of the second tube has the number of the first one's plus
     4 (2 cells + 1).
 
@@ -41,7 +41,7 @@ def zipper_tubes(
     Parameters
     ----------
     cells, a, b, panel_angle, dihedral
-        Those of each tube, as in `miura_tube`; b cos(panel_angle) must be less than a for the
+        Arguments of each tube, as in `miura_tube`; b cos(panel_angle) must be less than a for the
         walls to overlap.
 
     Returns
@@ -84,7 +84,7 @@ def zipper_tubes(
     ]
     vertices, custom = np.concatenate([one, other]), {TIES: ties}
     along = [(c, first - 4 + c) for c in range(4)]
-    along += [(2 * first - 4 + c, first + c) for c in range(4)]  # the second tube runs back
+    along += [(2 * first - 4 + c, first + c) for c in range(4)]  # the second tube runs backwards
     return assembled(
         "zipper tubes", vertices, [*faces, *more], {**both, **named}, custom=custom,
         periods=[along],
@@ -92,7 +92,7 @@ def zipper_tubes(
 
 
 def _turned(one: NDArray, lean: float) -> NDArray[np.float64]:
-    """The second tube: its wall of corners 0 and 1 in the wall of the first one's 3 and 2.
+    """The second tube, with its wall of corners 0 and 1 placed in the first one's wall of 3 and 2.
 
     Along the walls' edges, the corners of even stations lie at 0 and 1 of their length in the first
     tube, those of odd ones at `lean` and 1 + lean; in the second one both the other way round.
