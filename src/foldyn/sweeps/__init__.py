@@ -1,4 +1,4 @@
-"""Many analyses: a case file at many values of its numbers, and what all that computes shares."""
+"""Many analyses: a case file at many values of its keys, with the shared pool and evaluations."""
 
 from __future__ import annotations
 

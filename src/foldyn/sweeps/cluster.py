@@ -1,4 +1,4 @@
-"""A Dask cluster as a pool: its scheduler's address is all that is needed of it."""
+"""A Dask cluster as a pool, given the address of its scheduler."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ AT_LEAST = 16
 
 
 class Cluster(Generic[Item, Result]):
-    """Workers of a Dask cluster, to which work is given; a context manager.
+    """Workers of a Dask cluster as a pool; a context manager.
 
-    An item whose worker is gone is computed by another one; Dask gives up one that has ended
-    several workers.
+    If a worker dies, another one computes its item; Dask gives up an item that has ended several
+    workers.
 
     Parameters
     ----------
     do : callable
-        What is computed for an item.
+        Computes an item.
     address : str
-        Of the scheduler, "tcp://10.0.0.1:8786".
+        Address of the scheduler, "tcp://10.0.0.1:8786".
 
     Raises
     ------
     InputError
-        Dask is not installed, nothing answers there, or a worker computes on several threads.
+        Dask is not installed, no scheduler answers, or a worker has several threads.
     """
 
     def __init__(self, do: Callable[[Item], Result], address: str) -> None:
@@ -50,7 +50,7 @@ class Cluster(Generic[Item, Result]):
                 "scheduler",
             ) from None
         several = [one for one, threads in self._client.nthreads().items() if threads > 1]
-        if several:  # warnings and libraries of one process would mix
+        if several:  # warnings and library settings of a process are shared by its threads
             self._client.close()
             raise InputError(
                 f" = {address}: its worker {several[0]} computes on several threads; start workers "
@@ -65,9 +65,9 @@ class Cluster(Generic[Item, Result]):
         lost: Callable[[Item, str], Result] | None = None,
         first: bool = False,
     ) -> None:
-        """Compute something for each item; see `foldyn.workers.Workers.each`.
+        """Compute each item; see `foldyn.workers.Workers.each`.
 
-        first : whether one is computed by one worker before the others.
+        first : compute one item on one worker before the others.
         """
         left = iter(items)
         if first:
@@ -101,7 +101,7 @@ class Cluster(Generic[Item, Result]):
             self._client.cancel(list(waiting))
 
     def _hand_out(self, left: Any, waiting: dict[Any, Item], finished: Any) -> None:
-        """Hand out so many items that no worker is idle."""
+        """Submit enough items that no worker is idle."""
         room = max(AHEAD * len(self._client.nthreads()), AT_LEAST)
         for item in islice(left, max(room - len(waiting), 0)):
             future = self._client.submit(self.do, item, pure=False)
@@ -109,7 +109,7 @@ class Cluster(Generic[Item, Result]):
             finished.add(future)
 
     def stop(self) -> None:
-        """Leave the cluster; what it computes for this process is dropped."""
+        """Leave the cluster; its computations for this process are dropped."""
         self._client.close()
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""Evaluations of a model: each is computed once, and kept in a file of its own."""
+"""Evaluations of a model: each is computed once, and kept in its own file."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from foldyn.sweeps.pool import Pool
 from foldyn.writing import made_folder, whole
 
 Point = TypeVar("Point")
-_VALUE = "value "  # before the names of values, in files
+_VALUE = "value "  # prefix of the names of values, in files
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """What a model gives at a point.
+    """Values of a model at a point.
 
     Attributes
     ----------
     values : dict of str to ndarray
     failure : str
-        Why there are none, or fewer than were asked for, or "".
+        Why values are missing, or "".
     warnings : str
-        What was warned of, or "".
+        Warnings, or "".
     seconds : float
         Computing time.
     lasting : bool
-        Whether it would be the same again; otherwise it is not kept, as a lack of memory.
+        Whether a repetition would give the same; if not, as for a lack of memory, it is not kept.
     """
 
     values: Mapping[str, NDArray] = field(default_factory=dict)
@@ -46,16 +46,16 @@ class Evaluation:
 
 
 class Evaluations(Generic[Point]):
-    """Evaluations at points, each computed once. Several threads may ask at a time.
+    """Evaluations at points, each computed once. Several threads may use it at the same time.
 
     Parameters
     ----------
     pool : Pool
         Computes an `Evaluation` for a point.
     stamp : callable
-        All that an evaluation depends on, of a point, as JSON holds it.
+        Returns everything that a point's evaluation depends on, as JSON types.
     folder : path, optional
-        Keeps every evaluation; those that are there are not computed again.
+        Keeps every evaluation; stored ones are not recomputed.
     tell : callable, optional
         Called with each point, its evaluation, and whether it was found in the folder.
     """
@@ -79,15 +79,15 @@ class Evaluations(Generic[Point]):
         lost: Callable[[Point, str], Evaluation] | None = None,
         first: bool = False,
     ) -> list[Evaluation]:
-        """Evaluations at several points, at the same time as far as the pool can.
+        """Evaluations at several points, in parallel as far as the pool allows.
 
         Parameters
         ----------
         points : sequence
         lost : callable, optional
-            As of `Pool.each`.
+            As in `Pool.each`.
         first : bool
-            Whether one is computed before the others, which then find its kernels compiled.
+            Compute one point before the others, which then find its kernels compiled.
         """
         new = [point for point in dict.fromkeys(points) if not self._look(point)]
         if new:
@@ -95,7 +95,7 @@ class Evaluations(Generic[Point]):
         return [self._known[point] for point in points]
 
     def _look(self, point: Point) -> bool:
-        """Whether a point is known, or kept in the folder."""
+        """Whether a point is known, or stored in the folder."""
         if point not in self._known and self.folder is not None:
             name = name_of(self.stamp(point))
             found = KEPT.find(self.folder / f"{name}.npz", name)

@@ -1,4 +1,4 @@
-"""What a sweep computes at a point: the case file with other values, its result, its measures."""
+"""One point of a sweep: the case file with changed values, its result, its measures."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ class Job:
     document : dict
         Its content.
     keys : tuple of str
-        What is varied.
+        Varied keys.
     ties : tuple of Tie
     measures : tuple of Asked
     program : str
-        Digest of the program that asks.
+        Digest of the program that started the sweep.
     """
 
     path: Path
@@ -58,7 +58,7 @@ class Job:
     program: str
 
     def changes(self, point: Point) -> dict[str, Any]:
-        """Values of all keys at a point, ties among them."""
+        """Values of all keys at a point, including ties."""
         own: dict[str, Any] = dict(zip(self.keys, point, strict=True))
         numbers = {
             key: float(value)
@@ -77,9 +77,9 @@ class Job:
         return case_of_document(self.path, self.changed(point))
 
     def stamp(self, point: Point) -> list[Any]:
-        """All that the evaluation of a point depends on."""
+        """Everything that a point's evaluation depends on."""
         document = self.changed(point)
-        if "device" in document.get("analysis", {}):  # which changes no more than rounding does
+        if "device" in document.get("analysis", {}):  # the device changes only rounding
             del document["analysis"]["device"]
         there = [self.path.parent / file for file in sorted(files_of(document))]
         files = {str(file): _digest(str(file)) for file in there}
@@ -87,11 +87,11 @@ class Job:
         return [self.program, document, files, measures]
 
     def __call__(self, point: Point) -> Evaluation:
-        """Evaluate a point: what goes wrong is what is found there."""
+        """Evaluate a point; errors become part of the evaluation."""
         return self.begun(point).finished()
 
     def begun(self, point: Point) -> BegunPoint:
-        """A point whose computation is checked, but not begun."""
+        """A point whose computation has been checked but not started."""
         return BegunPoint(self, point)
 
 
@@ -101,7 +101,7 @@ class BegunPoint:
     Attributes
     ----------
     compute : callable or None
-        The computation; None where there can be none.
+        The computation; None if it could not be set up.
     """
 
     def __init__(self, job: Job, point: Point) -> None:
@@ -116,14 +116,14 @@ class BegunPoint:
             self.compute = self._computation.compute
 
     def finished(self) -> Evaluation:
-        """The evaluation of the point."""
+        """Finish the evaluation of the point."""
         values = {}
         with self._timed(), self._noted():
             if self.compute is not None:
                 if isinstance(self.compute, Moving) and self.compute.integrated:
                     self._seconds += self.compute.motion.seconds
                 result, case, shared = self._result(), self._case_file.case(), {}
-                for variable in result.variables.values():  # a measure changes it for no other
+                for variable in result.variables.values():  # no measure may change it
                     variable.values.setflags(write=False)
                 for each in self._job.measures:
                     with self._noted():
@@ -132,7 +132,7 @@ class BegunPoint:
         return Evaluation(values, failure, self._told.kept(), self._seconds, self._lasting)
 
     def _result(self) -> xarray.Dataset:
-        """The result; of a path that stops, what there is of it, which is noted."""
+        """The result; for a path that stops, the part computed so far, with a note."""
         try:
             return self._computation.result()
         except ComputationError as error:
@@ -146,7 +146,7 @@ class BegunPoint:
 
     @contextmanager
     def _timed(self) -> Iterator[None]:
-        """Count the time of the block, and note what it warns of."""
+        """Time the block and record its warnings."""
         began = time.perf_counter()
         with self._told.noting():
             yield
@@ -154,12 +154,12 @@ class BegunPoint:
 
     @contextmanager
     def _noted(self) -> Iterator[None]:
-        """Note what goes wrong in the block; what else is found is kept."""
+        """Record errors of the block, and keep other values."""
         try:
             yield
         except (InputError, ComputationError) as error:
             self._failures.append(self._said(error))
-        except Exception as error:  # of one point; the others are computed all the same
+        except Exception as error:  # an error at one point must not stop the others
             self._failures.append(f"{type(error).__name__}: {error}")
             self._lasting = False
 
@@ -171,7 +171,7 @@ def this_program() -> str:
 
 @cache
 def _digest(file: str) -> str:
-    """Digest of a file that a case file names; "" where there is none."""
+    """Digest of a file named in a case file; "" if there is none."""
     try:
         return hashlib.sha256(Path(file).read_bytes()).hexdigest()
     except OSError:
@@ -179,7 +179,7 @@ def _digest(file: str) -> str:
 
 
 def code_of(function: Callable[..., Any]) -> str:
-    """Digest of the sources of a user's function; "" for one of the registry."""
+    """Digest of the source of a user's function; "" for registered ones."""
     found = function.load() if isinstance(function, Loaded) else function
     if getattr(found, "__module__", "").startswith("foldyn."):
         return ""

@@ -1,4 +1,4 @@
-"""A measure: a named function of a result, and how it is asked for."""
+"""Measures: named functions of a result, and their arguments."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ class Measure:
     ----------
     name : str
     kinds : tuple of str
-        Kinds of analysis whose results it can be taken of; empty: all.
+        Kinds of analysis that it applies to; empty means all.
     function : callable
         ``function(result, case)``, with the values of `takes` as named arguments; a number or an
         array.
     units : str
-        "1" where it has none, "" where it is not known.
+        "1" if dimensionless, "" if unknown.
     doc : str
-        What it is, as labels of figures say it.
+        Meaning, as labels of figures show it.
     dims : tuple of str
         Dimensions of an array; their lengths may differ from point to point.
     takes : tuple of str
@@ -54,10 +54,11 @@ class Measure:
     needs : int
         How many of them must be given.
     through : callable, optional
-        ``through(result, case)`` comes first, once for all measures that share it; what it gives
-        takes the place of the result.
+        ``through(result, case)`` runs first, once for all measures that share it; its return value
+        replaces the result.
     whole : bool
-        Whether a path that stopped on the way has none: it is of the end, or an extreme.
+        Whether a path that stopped early has no value: true for measures of the end and for
+        extremes.
     """
 
     name: str
@@ -73,7 +74,7 @@ class Measure:
 
     @property
     def asked(self) -> str:
-        """How it is asked for: "peak_frequency[node,axis]"."""
+        """Notation with its arguments: "peak_frequency[node,axis]"."""
         shown = [*self.takes[: self.needs], *(f"{word}?" for word in self.takes[self.needs :])]
         return f"{self.name}[{','.join(shown)}]" if shown else self.name
 
@@ -89,7 +90,7 @@ class Asked:
     measure : Measure
     arguments : dict
     text : str
-        What was asked for.
+        Text of the request.
     """
 
     name: str
@@ -98,19 +99,19 @@ class Asked:
     text: str
 
     def of(self, result: xr.Dataset, case: Case, shared: dict[Any, Any]) -> NDArray:
-        """Its value.
+        """Value of the measure.
 
         Parameters
         ----------
         result : xarray.Dataset
         case : Case
         shared : dict
-            What measures of this result have come through, by the function; it is added to.
+            Return values of `through` for this result, by function; it is extended.
 
         Raises
         ------
         FoldynError
-            It cannot be taken of this result.
+            It does not apply to this result.
         """
         if self.measure.whole and result.attrs.get("status") == "stopped":
             raise InputError(f"{self.text}: is of whole paths, and this one stopped on the way")
@@ -123,9 +124,9 @@ class Asked:
             found = self.measure.function(subject, case, **self.arguments)
         except FoldynError as error:
             raise type(error)(f"{self.text}: {error}") from None
-        except MemoryError:  # there may be more the next time
+        except MemoryError:  # more memory may be free next time
             raise
-        except Exception as error:  # of a user's function, of any kind
+        except Exception as error:  # a user's function may raise anything
             raise InputError(f"{self.text}: {type(error).__name__}: {error}") from error
         if found is None:
             raise InputError(f"{self.text}: gave nothing; let it return a number or an array")
@@ -143,7 +144,7 @@ class Asked:
         return value
 
     def check(self, case_file: CaseFile) -> None:
-        """Refuse what cannot be taken of the results of a case file."""
+        """Refuse a measure that does not apply to results of a case file."""
         kind, kinds = case_file.analysis.kind, self.measure.kinds
         if kinds and kind not in kinds:
             raise InputError(
@@ -161,7 +162,7 @@ def asked(text: str, known: Mapping[str, Measure]) -> Asked:
     Raises
     ------
     InputError
-        There is none of this name, or its arguments are others.
+        No measure of this name, or wrong arguments.
     """
     found = _ASKED.match(text.strip()) if isinstance(text, str) else None
     if found is None:
@@ -201,7 +202,7 @@ def _argument(text: str, what: str, word: str) -> Any:
 
 
 def own_measure(text: str, folder: Path) -> Asked | None:
-    """A user's function, from "module:function" or "file.py:function"; None if it is not such."""
+    """A user's function, from "module:function" or "file.py:function"; None for other text."""
     found = _OWN.match(text.strip())
     if found is None:
         return None
@@ -224,13 +225,13 @@ def of_callable(name: str, function: Callable[..., Any]) -> Asked:
 
 @dataclass(frozen=True)
 class Loaded:
-    """A function by the place where it is found, so that it can be sent to other processes."""
+    """A function by its location, so that it can be sent to other processes."""
 
     place: str
     function: str
 
     def load(self) -> Callable[..., Any]:
-        """The function.
+        """Import the function.
 
         Raises
         ------
@@ -239,7 +240,7 @@ class Loaded:
         """
         try:
             module = _module(self.place)
-        except Exception as error:  # whatever a user's module raises
+        except Exception as error:  # a user's module may raise anything
             raise InputError(
                 f" = {show(f'{self.place}:{self.function}')}: cannot be imported "
                 f"({type(error).__name__}: {error}); write module:function or file.py:function"
@@ -257,7 +258,7 @@ class Loaded:
         return self.load()(result, case)
 
 
-_modules: dict[str, Any] = {}  # what was loaded from files, once in a process
+_modules: dict[str, Any] = {}  # functions loaded from files, once per process
 
 
 def _module(place: str) -> Any:

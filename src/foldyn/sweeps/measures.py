@@ -1,4 +1,4 @@
-"""The measures that a sweep can take, by name."""
+"""Registry of measures that a sweep can take."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ MEASURES: dict[str, Measure] = {}
 
 
 def _measure(*kinds: str, **about: Any) -> Callable[[F], F]:
-    """Register a function as the measure of its name: of some kinds of analysis, see `Measure`."""
+    """Register a function as a measure under its name, for kinds of analysis; see `Measure`."""
 
     def registered(function: F) -> F:
         name = function.__name__.removeprefix("_")
@@ -112,7 +112,7 @@ def _rigid_modes(result: xr.Dataset, case: Case) -> int:
 def curve_of(
     result: xr.Dataset, node: int, axis: str | None
 ) -> tuple[NDArray, NDArray, Peaks, str]:
-    """Frequencies, magnitudes at a node (of the vector where no axis is named), and their peaks."""
+    """Frequencies, magnitudes at a node (of the vector if no axis is named), and their peaks."""
     along = list(AXES) if axis is None else [axis]
     if "time" in result:
         motion = result["displacement"].transpose("time", ...).sel(node=node, axis=along).values
@@ -137,7 +137,7 @@ def highest(peaks: Peaks) -> int | None:
 
 
 def frequency_of(result: xr.Dataset, frequency: float) -> int:
-    """Number of the nearest frequency (Hz) of a response, half their distance off at most."""
+    """Number of the nearest frequency (Hz) of a response, at most half the spacing away."""
     known = result["frequency"].values
     k = int(np.abs(known - frequency).argmin())
     if abs(known[k] - frequency) > 0.5 * np.diff(known).max(initial=0.0):
@@ -204,7 +204,7 @@ def _displacement_at(
 
 
 def time_of(result: xr.Dataset, time: float) -> int:
-    """Number of the sample at a time (s), half a sampling interval off at most."""
+    """Number of the sample at a time (s), at most half a sampling interval away."""
     times = result["time"].values
     k = int(np.abs(times - time).argmin())
     if abs(times[k] - time) > 0.5 * np.diff(times).max():
@@ -260,7 +260,7 @@ def _strain_energy(result: xr.Dataset, case: Case) -> float:
 @_measure(*MOVED, units="J", doc="energy dissipated", whole=True)
 def _dissipated(result: xr.Dataset, case: Case) -> float:
     if "dissipated" not in result:
-        return 0.0  # a path without creases that yield
+        return 0.0  # a path without yielding creases
     return float(sampled(result, "dissipated")[-1])
 
 
@@ -283,7 +283,7 @@ def _clearance(result: xr.Dataset, case: Case) -> float:
 
 
 def closest_panels(result: xr.Dataset, case: Case) -> list[Clearance]:
-    """How close panels are in each sample (one of modes, whose panels are at rest), and where."""
+    """Smallest distance of panels in each sample (modes: at rest, a single one), and its place."""
     made, shapes = case.structure, np.zeros((1, 1, 3))
     if "time" in result.dims or "step" in result.dims:
         shapes = sampled(result, "displacement").transpose(..., "node", "axis").values
@@ -303,7 +303,7 @@ def _largest_load(result: xr.Dataset, case: Case) -> float:
 
 
 def intervals(result: xr.Dataset, kind: str) -> NDArray:
-    """Load factors (k, 2) between which critical points lie, alike where they are located."""
+    """Load factors (k, 2) between which critical points lie; both are equal for located ones."""
     counts, factor = result["negative_eigenvalues"].values, result["load_factor"].values
     changes = np.flatnonzero((np.diff(counts) != 0) & (np.minimum(counts[1:], counts[:-1]) >= 0))
     if len(changes) and (result.attrs["method"] == "newton" or not result.attrs["locate"]):
@@ -468,7 +468,7 @@ def _unstable_bands(result: xr.Dataset, case: Case) -> int:
 
 
 def _gap_ends(result: xr.Dataset, band: int, leg: str) -> tuple[float, float]:
-    """Where a band ends and the next one begins (Hz), along a leg of the path or in all."""
+    """Top of a band and bottom of the next one (Hz), along a leg of the path or overall."""
     values, known = _in_order(result), legs(result)
     if leg not in known:
         raise InputError(f"the path has the legs {', '.join(known)}")

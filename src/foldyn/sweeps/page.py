@@ -1,4 +1,4 @@
-"""The page of a sweep: what was measured over what was varied, the points, what they lack."""
+"""The page of a sweep: measures over parameters, the points, and failures."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def write_sweep(
     sweep: xr.Dataset, folder: str | Path, case_file: CaseFile, call: Call | None = None,
     figures: str | None = None,
 ) -> Path:  # fmt: skip
-    """Write the page of a sweep into a folder that exists; returns its path.
+    """Write the page of a sweep into an existing folder; return its path.
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ def write_sweep(
         A result of `foldyn.sweep`.
     folder : path
     case_file : CaseFile
-        What was varied.
+        The case file that was varied.
     call : Call, optional
-        How it was asked for.
+        The command or call, for the page.
     figures : {"png", "svg", "pdf"}, optional
-        What figures are written as; none are drawn by default.
+        File format of figures; by default none are drawn.
     """
     album = Album(folder, figures)
     sections: list[Section] = []
@@ -160,7 +160,7 @@ def _points(sweep: xr.Dataset) -> Iterator[Section]:
 
 
 def _flat(sweep: xr.Dataset) -> xr.Dataset:
-    """The sweep with its points in a row."""
+    """The sweep with its points along a single dimension."""
     kept = sweep[[*measures_of(sweep), "failure", "seconds"]]
     if not is_grid(sweep):
         return kept
@@ -183,7 +183,7 @@ def _failures(sweep: xr.Dataset) -> Table:
 def _rows(
     sweep: xr.Dataset, case_file: CaseFile, call: Call | None
 ) -> Iterator[tuple[str, str]]:  # fmt: skip
-    """How it was computed."""
+    """Facts about the computation."""
     facts = sweep.attrs
     yield "case file", str(case_file.path.name)
     yield "analysis", str(facts["kind"])

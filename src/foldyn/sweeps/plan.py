@@ -1,4 +1,4 @@
-"""What a sweep is to compute, checked whole before anything runs."""
+"""The plan of a sweep, completely checked before anything runs."""
 
 from __future__ import annotations
 
@@ -30,23 +30,23 @@ MASS = "model.mass"
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A sweep that was checked.
+    """A checked sweep.
 
     Attributes
     ----------
     case_file : CaseFile
-        The file as it is.
+        The unchanged file.
     varied : tuple of Varied
     method : str
-        "grid", or how points are drawn.
+        "grid", or the sampling method.
     count : int
-        How many are drawn, or of the base of their design; 0 of a grid.
+        Number of samples, or of the base samples of a design; 0 for a grid.
     seed : int
     points : list of tuple
         Values of the keys, as `varied`.
     job : Job
     compute : callable
-        The computation of the file as it is.
+        The computation of the unchanged file.
     device : str
         Where motions are computed: "cpu", "gpu", or "auto".
     """
@@ -63,7 +63,7 @@ class Plan:
 
     @property
     def section(self) -> dict[str, Any]:
-        """Table [sweep] that asks for the same."""
+        """The equivalent [sweep] table."""
         table: dict[str, Any] = {}
         if self.method != GRID:
             table = {"samples": self.count, "method": self.method, "seed": self.seed}
@@ -118,7 +118,7 @@ def plan_of(
         with faults.collected():
             one.check(case_file)
     faults.raise_all()
-    compute = case_file.computation().compute  # refuses what cannot be computed as it is
+    compute = case_file.computation().compute  # refuses a file that cannot be computed unchanged
     number, drawn, start = how
     return Plan(
         case_file, keys, drawn if sampled else GRID, number, start, points, job, compute, device
@@ -126,7 +126,7 @@ def plan_of(
 
 
 def _with_device(document: dict[str, Any], device: str | None) -> tuple[dict[str, Any], str]:
-    """A case file of motions with the device that is asked for, and this."""
+    """A case file of motions with the requested device, and that device."""
     if device is not None:
         choice("device", device, DEVICES)
     section = document.get("analysis")
@@ -143,7 +143,7 @@ def _chosen(
     vary: Mapping[str, Any], count: int | None, method: str | None, seed: int | None,
     ties: Mapping[str, str] | None,
 ) -> SweepSection:  # fmt: skip
-    """A table [sweep] of arguments."""
+    """Build a [sweep] table from arguments."""
     if count is None and (method is not None or seed is not None):
         raise InputError(
             ": is of samples; give samples too, or leave it out for a grid",
@@ -165,7 +165,7 @@ def _chosen(
 def _with_masses(
     keys: tuple[Varied, ...], case_file: CaseFile, sampled: bool
 ) -> tuple[Varied, ...]:
-    """The keys, and the mass rules of the file where it lists several."""
+    """Add the file's mass rules to the keys, if it lists several."""
     masses = case_file.masses
     if len(masses) == 1 or any(one.key == MASS for one in keys):
         return keys
@@ -216,7 +216,7 @@ def _function(one: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _check_keys(job: Job, keys: Sequence[Varied], first: Point) -> None:
-    """Refuse keys and values that no case file of this kind has, before anything is computed."""
+    """Refuse keys and values that this kind of case file cannot have, before any computation."""
     names = [*job.keys, *(tie.key for tie in job.ties)]
     for name in names:
         if names.count(name) > 1:

@@ -23,22 +23,22 @@ Point = tuple[Value, ...]
 
 
 def grid(varied: Sequence[Varied]) -> list[Point]:
-    """All combinations of values, those of the last key changing first."""
+    """All combinations of values; the last key varies fastest."""
     count = math.prod(len(one.values) for one in varied)
     _check_count(count)
     return list(product(*(one.values for one in varied)))
 
 
 def samples(varied: Sequence[Varied], count: int, method: str, seed: int) -> list[Point]:
-    """Points that are drawn.
+    """Draw sample points.
 
     Parameters
     ----------
     varied : sequence of Varied
-        Those with one value have that at all points, and count for nothing.
+        Keys with one value keep it at all points and add no dimension.
     count : int
-        How many. With "saltelli" the base of a design for Sobol indices, which has as many points
-        for each of two independent samples, and for the first one with each key from the second
+        Number of points. With "saltelli" it is the size of the base samples of a design for Sobol
+        indices: two independent samples, and for each key the first with that key from the second
         (Saltelli et al., Comput. Phys. Commun. 181, 2010).
     method : {"latin_hypercube", "sobol", "saltelli"}
     seed : int
@@ -46,7 +46,7 @@ def samples(varied: Sequence[Varied], count: int, method: str, seed: int) -> lis
     Raises
     ------
     InputError
-        The count is no power of 2 where a Sobol sequence needs it, or too large.
+        The count is not a power of 2 although a Sobol sequence needs it, or too large.
     """
     free = [one.key for one in varied if len(one.values) != 1]
     d = max(len(free), 1)

@@ -1,4 +1,4 @@
-"""Where many computations run: in this process, in processes of this machine, on a cluster."""
+"""Pools for many computations: this process, processes of this machine, or a cluster."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Result = TypeVar("Result")
 
 
 class Pool(Protocol[Item, Result]):
-    """What computes something for each of many items; a context manager."""
+    """Computes many items; a context manager."""
 
     def each(
         self,
@@ -24,27 +24,27 @@ class Pool(Protocol[Item, Result]):
     ) -> None:
         """Compute items; each result is kept, in this process, as soon as it is ready.
 
-        lost : result for an item whose process is gone, from the item and the reason; without it
-        that is an error.
-        first : whether one is computed before the others, which then find its kernels compiled.
+        lost : returns a result for an item whose process died, given the item and the reason;
+        without it that is an error. first : compute one item before the others, which then find its
+        kernels compiled.
         """
         ...
 
     def stop(self) -> None:
-        """Give up at once."""
+        """Abort at once."""
         ...
 
     def __enter__(self) -> Self:
-        """Begin."""
+        """Enter the context."""
         ...
 
     def __exit__(self, *_: Any) -> None:
-        """End, at once if something was raised."""
+        """Leave the context, at once if something was raised."""
         ...
 
 
 class Here(Generic[Item, Result]):
-    """A pool that is this process alone."""
+    """A pool that runs in this process only."""
 
     def __init__(self, do: Callable[[Item], Result]) -> None:
         self.do = do
@@ -58,7 +58,7 @@ class Here(Generic[Item, Result]):
             keep(item, self.do(item))
 
     def stop(self) -> None:
-        """Nothing runs beside this."""
+        """Do nothing, as nothing runs in the background."""
 
     def __enter__(self) -> Self:
         return self
@@ -70,14 +70,14 @@ class Here(Generic[Item, Result]):
 def pool_of(
     do: Callable[[Item], Result], processes: int, scheduler: str | None = None
 ) -> Pool[Item, Result]:
-    """Pool that computes something for items.
+    """Create the pool that computes items.
 
     Parameters
     ----------
     do : callable
-        What is computed; for other processes it must be one that can be sent there.
+        Computes an item; for other processes it must be picklable.
     processes : int
-        How many items at a time on this machine; 1: in this process.
+        Number of parallel processes on this machine; 1 means this process.
     scheduler : str, optional
         Address of a Dask scheduler, whose workers compute instead.
     """

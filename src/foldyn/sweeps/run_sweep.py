@@ -36,17 +36,16 @@ Measures = Sequence[str | Measure | Callable[..., Any]] | Mapping[str, Callable[
 
 @dataclass(frozen=True)
 class Course:
-    """How far a sweep is.
+    """Progress of a sweep.
 
     Attributes
     ----------
     done, found, failed, total : int
-        Points that are there, those of them that were kept from before, those that failed, and
-        all there are.
+        Number of finished points, of stored ones among them, of failed ones, and of all.
     seconds : float
-        Time since the beginning.
+        Time (s) since the start.
     left : float
-        Time (s) that the others will take, at the pace so far; nan while it is not known.
+        Remaining time (s) at the pace so far; nan while unknown.
     """
 
     done: int
@@ -77,62 +76,63 @@ def sweep(
     Parameters
     ----------
     case : path
-        A case file of any kind. What is not given here is that of its table [sweep].
+        A case file of any kind. Arguments that are not given come from its [sweep] table.
     vary : mapping, optional
         Keys of the case file, each with values, or with a text: ``"1:5:9"`` (9 values from 1 to 5),
-        ``"1e-3:1:7:log"``, and with `samples` ``"1:5"`` or ``"1e-3:1:log"``. Takes the place of all
-        of [sweep] but its measures.
+        ``"1e-3:1:7:log"``, and with `samples` ``"1:5"`` or ``"1e-3:1:log"``. Replaces the whole
+        [sweep] table except its measures.
     measures : sequence or mapping, optional
         Names of `foldyn.sweeps.MEASURES` with their arguments, ``"peak_frequency[8]"``; functions
         of a result and its case, which give a number or an array; `Measure` objects. A mapping
         names its functions.
     samples : int, optional
-        Draw so many points instead of all combinations; with "saltelli" (2 + keys) times as many.
+        Draw this many points instead of all combinations; with "saltelli" (2 + keys) times as many.
     method : {"latin_hypercube", "sobol", "saltelli"}, optional
-        How: a Latin hypercube by default, a Sobol sequence, or a design for Sobol indices.
+        Sampling method: a Latin hypercube by default, a Sobol sequence, or a design for Sobol
+        indices.
     seed : int, optional
-        Of the samples, 0 by default.
+        Random seed of the samples, 0 by default.
     ties : mapping of str to str, optional
         Keys that follow others, ``{"model.fold_law.theta2": "360 - model.fold_law.theta1"}``.
     processes : int, optional
-        How many points are computed at a time; by default one per processor. 1: in this process.
+        Number of parallel processes, by default one per processor; 1 means this process.
     scheduler : str, optional
         Address of a Dask scheduler, whose workers compute instead.
     folder : path, optional
-        Keeps every point: a sweep that was cut off goes on where it stopped.
+        Keeps every point, so that an interrupted sweep resumes.
     progress : callable, optional
         Called with a `Course` after every point.
     device : {"auto", "cpu", "gpu"}, optional
-        Where motions are computed, by default as the file says, else "auto": side by side on a GPU
-        where there is one, it has kernels for them, and they should be done sooner.
+        Device for motions, by default the file's, else "auto": batched on a GPU if there is one, it
+        has the kernels, and it should be faster.
 
     Returns
     -------
     xarray.Dataset
-        A variable for each measure. Of a grid over dimensions that have the last words of the keys
-        as names, of samples over ``point``; values of the keys are coordinates. `failure` says why
-        a point lacks values (they are nan), `warnings` what was warned of, and `seconds` how long
-        it took. The attribute `device` says where motions were computed, of "auto" with the reason
-        (`device_reason`).
+        A variable for each measure. For a grid the dimensions are named by the last words of the
+        keys, for samples the dimension is ``point``; values of the keys are coordinates. `failure`
+        says why a point lacks values (they are nan), `warnings` holds its warnings, and `seconds`
+        its computing time. The attribute `device` names the device of the motions; for "auto"
+        `device_reason` explains it.
 
     Warns
     -----
     FoldynWarning
-        Of each kind once, at the end, with the points.
+        Each kind of warning once, at the end, with the points concerned.
 
     Raises
     ------
     InputError
-        A key, range or measure cannot be used, the case file is not sound as it is, or it cannot
+        A key, range or measure cannot be used, the unchanged case file is invalid, or it cannot
         hold one of the values. Nothing was computed then.
     ComputationError
-        The cluster is gone. Points that were kept are.
+        The cluster was lost. Stored points remain.
 
     Notes
     -----
-    Values that a case file can hold may still not make a case, or not compute: such points fail one
-    by one, with their reasons, and the others are computed all the same. A measure that cannot be
-    taken of a result leaves the others of its point.
+    Valid values may still give an invalid case or a failing computation: such points fail
+    individually, with their reasons, and the others are still computed. A measure that fails does
+    not affect other measures of its point.
     """
     plan = plan_of(case, vary, measures, samples, method, seed, ties, device)
     return swept(plan, processes, scheduler, folder, progress)
@@ -145,7 +145,7 @@ def swept(
     folder: str | os.PathLike[str] | None = None,
     progress: Callable[[Course], None] | None = None,
 ) -> xr.Dataset:
-    """Compute what was planned; arguments as of `sweep`."""
+    """Run a plan; arguments as in `sweep`."""
     job, points = plan.job, plan.points
     if processes is not None:
         whole("processes", processes, least=1, most=MOST_PROCESSES)
@@ -168,7 +168,7 @@ def swept(
 
 
 def _tell(plan: Plan, found: Sequence[Evaluation]) -> None:
-    """Warn of what points were warned of, of each kind once, with the points."""
+    """Issue each kind of warning once, with the points concerned."""
     told, names = Told(), [one.key.rpartition(".")[2] for one in plan.varied]
     for point, one in zip(plan.points, found, strict=True):
         values = (f"{name} = {show(value)}" for name, value in zip(names, point, strict=True))
@@ -177,7 +177,7 @@ def _tell(plan: Plan, found: Sequence[Evaluation]) -> None:
 
 
 def _device(plan: Plan, cores: int, scheduler: str | None) -> tuple[str, dict[str, str]]:
-    """Where points are computed, "cpu" or "gpu", and attributes that say so."""
+    """Device for the points, "cpu" or "gpu", and attributes that record it."""
     if not isinstance(plan.compute, Moving):
         return "cpu", {}
     device, motion, why = plan.device, plan.compute.motion, ""
@@ -203,7 +203,7 @@ def _lost(point: Point, reason: str) -> Evaluation:
 
 
 class _Follow:
-    """Counts points as they come."""
+    """Counts points as they finish."""
 
     def __init__(self, total: int, progress: Callable[[Course], None] | None) -> None:
         self.total, self.progress = total, progress
@@ -217,7 +217,7 @@ class _Follow:
         self.failed += bool(one.failure)
         computed = self.done - self.found
         if computed == 1:
-            self.first = now  # it compiles kernels, and others wait for it
+            self.first = now  # it compiles kernels while others wait
         pace = (now - self.first) / (computed - 1) if computed > 1 else float("nan")
         if self.progress is not None:
             left = pace * (self.total - self.done)
@@ -226,11 +226,11 @@ class _Follow:
 
 
 def _check_sendable(job: Job) -> None:
-    """Refuse functions that other processes cannot have."""
+    """Refuse functions that cannot be sent to other processes."""
     for one in job.measures:
         try:
             pickle.dumps(one.measure.function)
-        except Exception as error:  # pickle raises what it likes
+        except Exception as error:  # pickle may raise anything
             raise InputError(
                 f": {one.text} cannot be sent to other processes ({error}); define the function at "
                 "the top of a module, or compute with processes=1",

@@ -1,4 +1,4 @@
-"""A pool that is this process, and integrates the motions of many points at once on a GPU."""
+"""A pool in this process that integrates the motions of many points in batches on a GPU."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ ROOM = 2.0**31
 
 
 class SideBySide(Here[Point, Evaluation]):
-    """A pool whose points are motions.
+    """A pool for points that are motions.
 
     Parameters
     ----------
     job : Job
-        Of motions. What of them has no GPU kernel, and what goes wrong on the GPU, is computed by
-        a processor.
+        Job whose points are motions. Points without a GPU kernel, or that fail on the GPU, run on
+        the CPU.
     like : Motion
-        One of them, from which the room for their samples is estimated.
+        One of the motions, used to estimate the memory for samples.
     """
 
     def __init__(self, job: Job, like: Motion) -> None:
@@ -40,7 +40,7 @@ class SideBySide(Here[Point, Evaluation]):
         self, items: Iterable[Point], keep: Callable[[Point, Evaluation], None],
         lost: object = None, first: bool = False,
     ) -> None:  # fmt: skip
-        """Compute items, many at a time."""
+        """Compute items in batches."""
         from foldyn.dynamics.gpu.many import integrate_prepared
 
         left = iter(items)
@@ -49,6 +49,6 @@ class SideBySide(Here[Point, Evaluation]):
             moving = [one.compute for _, one in begun if isinstance(one.compute, Moving)]
             for k in integrate_prepared([compute.motion for compute in moving]):
                 moving[k].integrated = True
-            while begun:  # which gives its samples' memory back
+            while begun:  # frees the memory of its samples
                 point, one = begun.pop(0)
                 keep(point, one.finished())

@@ -31,7 +31,7 @@ ABOUT: Mapping[str, str] = {
 
 
 def names_of(keys: Sequence[str], taken: Sequence[str]) -> list[str]:
-    """Names for keys: their last words, or all words where these are not unique."""
+    """Short names of keys: their last words, or all words if these are not unique."""
     short = [_last(key) for key in keys]
     counts = Counter([*short, *taken, *ABOUT, *DOCUMENT, POINT, "case_file"])
     return [
@@ -41,7 +41,7 @@ def names_of(keys: Sequence[str], taken: Sequence[str]) -> list[str]:
 
 
 def _last(key: str) -> str:
-    """Last word of a key, with the indices that follow it: "force_2" of "loads[0].force[2]"."""
+    """Last word of a key, with the following indices: "force_2" for "loads[0].force[2]"."""
     words = parts(key)
     start = max(k for k, word in enumerate(words) if isinstance(word, str))
     return "_".join(map(str, words[start:]))
@@ -54,7 +54,7 @@ def dataset(plan: Plan, found: Sequence[Evaluation], facts: Mapping[str, Any]) -
     ----------
     plan : Plan
     found : sequence of Evaluation
-        Of its points.
+        Evaluations of the plan's points.
     facts : mapping
         Attributes.
     """
@@ -104,7 +104,7 @@ def dataset(plan: Plan, found: Sequence[Evaluation], facts: Mapping[str, Any]) -
 
 
 def _stacked(one: Asked, found: list[Evaluation]) -> tuple[NDArray[np.float64], list[Evaluation]]:
-    """Values at all points, nan where there are none or fewer; and what then failed."""
+    """Values at all points, padded with nan, and failures due to missing values."""
     there = [point.values[one.name] for point in found if one.name in point.values]
     depth = len(one.measure.dims) or (there[0].ndim if there else 0)
     fitting = [value for value in there if value.ndim == depth]
@@ -124,7 +124,7 @@ def _stacked(one: Asked, found: list[Evaluation]) -> tuple[NDArray[np.float64], 
 
 
 def _even(data: Mapping[str, Any], coordinates: Mapping[str, Any]) -> dict[str, Any]:
-    """Variables with nan at their ends where another one is longer along the same dimension."""
+    """Pad variables with nan to a common length along each dimension."""
     even = {}
     for name, (dims, array, about) in data.items():
         lengths = [
