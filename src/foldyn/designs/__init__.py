@@ -1,4 +1,4 @@
-"""Inverse design: parameters of a case that make the most of what is measured, within limits."""
+"""Inverse design: parameters of a case that optimize a measure under constraints."""
 
 from __future__ import annotations
 

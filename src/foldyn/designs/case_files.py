@@ -1,4 +1,4 @@
-"""A search for a design as the table [design] of a case file asks for it."""
+"""A design search as specified by the [design] table of a case file."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from foldyn.writing import write_text
 
 
 def planned(path: Path, changes: Mapping[str, Any]) -> tuple[CaseFile, Plan]:
-    """A case file, and the search that its table [design] asks for.
+    """Read a case file and the search that its [design] table specifies.
 
-    changes : keys of the table that are given instead.
+    changes : values that override keys of the table.
 
     Raises
     ------
     InputError
-        It has no such table, or something in it cannot be used.
+        The table is missing, or something in it cannot be used.
     """
     document = read_document(path)
     case_file = case_of_document(path, document)
@@ -43,20 +43,20 @@ def planned(path: Path, changes: Mapping[str, Any]) -> tuple[CaseFile, Plan]:
     try:
         return case_file, plan_of(path, analysis=None, **asked)
     except InputError as error:
-        if error.file is not None:  # of the case that the first design has
+        if error.file is not None:  # an error in the case of the first design
             raise
         raise error.within("design.", path) from None
 
 
 def _starts(document: Mapping[str, Any], bounds: Mapping[str, Any]) -> dict[str, Any]:
-    """Values that the file has, where they are within their bounds."""
+    """Values from the file, if they are within their bounds."""
     found = {}
     for key, pair in bounds.items():
         value = value_at(document, key)
         try:
             lower, upper = (np.asarray(end, float) for end in pair)
             inside = np.all((lower <= np.asarray(value, float)) & (np.asarray(value) <= upper))
-        except (TypeError, ValueError):  # plan_of says what is wrong
+        except (TypeError, ValueError):  # plan_of reports the error
             continue
         if inside and value is not None:
             found[key] = value
@@ -64,7 +64,7 @@ def _starts(document: Mapping[str, Any], bounds: Mapping[str, Any]) -> dict[str,
 
 
 def write_case(case_file: CaseFile, parameters: Mapping[str, Any], path: Path) -> None:
-    """Write a case file with the values found; paths in it are relative to the new place."""
+    """Write a case file with the values found; paths in it become relative to the new location."""
     plain = {key: np.asarray(value).tolist() for key, value in parameters.items()}
     document = replaced(read_document(case_file.path), plain)
     way = os.path.relpath(case_file.path.parent.resolve(), path.parent.resolve())

@@ -1,4 +1,4 @@
-"""What is measured of one design, and how that changes with its entries."""
+"""Measures of one design, and their derivatives with respect to its entries."""
 
 from __future__ import annotations
 
@@ -36,27 +36,27 @@ Source = Callable[..., Case] | str | os.PathLike[str]
 
 
 class Evaluator(Protocol):
-    """Measures of designs."""
+    """Evaluates measures of designs."""
 
     @property
     def stamp(self) -> list[Any]:
-        """All that they depend on, as JSON holds it."""
+        """Everything that the measures depend on, as JSON types."""
         ...
 
     def __call__(self, values: Mapping[str, Any], gradient: bool) -> tuple[NDArray, NDArray | None]:
-        """Measures (m,) of a design, and if asked their derivatives (m, n) by its entries."""
+        """Measures (m,) of a design, and on request their derivatives (m, n) by its entries."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Measures of a case that a function builds, or a case file, with exact derivatives.
+    """Measures of a case from a function or a case file, with exact derivatives.
 
     Attributes
     ----------
     build : callable or Path
     analysis : dict or None
-        What is computed of built cases.
+        Analysis of built cases.
     measures : tuple of Asked
     space : Space
     """
@@ -69,12 +69,12 @@ class Measured:
 
     @property
     def stamp(self) -> list[Any]:
-        """See `Evaluator`."""
+        """Everything that the measures depend on, as JSON types."""
         texts = [one.text for one in self.measures]
         return [program(*COMPUTING), self._source(), repr(self.analysis), texts]
 
     def __call__(self, values: Mapping[str, Any], gradient: bool) -> tuple[NDArray, NDArray | None]:
-        """See `Evaluator`."""
+        """Measures (m,) of a design, and on request their derivatives (m, n) by its entries."""
         if not gradient:
             result, case, shared = *self._computed(values), dict[Any, Any]()
             return np.array([_single(one, result, case, shared) for one in self.measures]), None
@@ -107,7 +107,7 @@ class Measured:
         return case_file_at(self.build, self.document, values)
 
     def _source(self) -> Any:
-        """What a case is built from."""
+        """Source of the case: a function or a file."""
         if not self.document:
             return code_of(self.build)
         return Job(self.build, self.document, (), (), (), "").stamp(())[1:3]
@@ -117,15 +117,15 @@ def measured(
     build: Source, analysis: Mapping[str, Any] | None, places: Mapping[str, str], space: Space,
     gradient: bool,
 ) -> Measured:  # fmt: skip
-    """Check what is to be computed of each design.
+    """Check the analysis and the measures of designs.
 
-    places : measures, each with the argument that asks for it.
-    gradient : whether derivatives will be.
+    places : measures, each with the argument that requests it.
+    gradient : whether derivatives are needed.
 
     Raises
     ------
     InputError
-        There is no such analysis, or no such measure of it.
+        No such analysis, or no such measure of it.
     """
     document: dict[str, Any] = {}
     if isinstance(build, str | os.PathLike):
@@ -155,7 +155,7 @@ def measured(
 
 
 def _check_keys(path: Path, document: Mapping[str, Any], space: Space) -> None:
-    """Refuse keys that no case file of this kind has, and bounds that it cannot hold."""
+    """Refuse keys that this kind of case file cannot have, and bounds that it cannot hold."""
     for ends in (space.lower, space.upper):
         for name, part in space.parts(ends).items():
             if parts(name)[0] in ASIDE:
@@ -175,14 +175,14 @@ def _single(one: Asked, result: xr.Dataset, case: Case, shared: dict[Any, Any]) 
 
 @dataclass(frozen=True, eq=False)
 class Evaluate:
-    """Evaluates points of a space: what goes wrong is what is found there."""
+    """Evaluates points of a space; errors become part of the evaluation."""
 
     evaluator: Evaluator
     space: Space
     gradient: bool
 
     def stamp(self, point: Point) -> list[Any]:
-        """All that the evaluation of a point depends on."""
+        """Everything that a point's evaluation depends on."""
         shapes = {name: list(shape) for name, shape in self.space.shapes.items()}
         return [self.evaluator.stamp, shapes, list(point), self.gradient]
 
@@ -196,7 +196,7 @@ class Evaluate:
                 values = {VALUES: value} | ({} if jacobian is None else {JACOBIAN: jacobian})
             except FoldynError as error:
                 failure = str(error)
-            except Exception as error:  # of a user's function, at this point alone
+            except Exception as error:  # an error in a user's function affects only this point
                 failure, lasting = f"{type(error).__name__}: {error}", False
         bad = [name for name, array in values.items() if not np.isfinite(array).all()]
         if bad:

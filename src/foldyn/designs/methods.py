@@ -1,4 +1,4 @@
-"""Methods that search for the best design, from 0 to 1 in all its entries."""
+"""Optimization methods for designs, with all entries scaled to 0 to 1."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ SPREAD = 0.25
 
 @dataclass(frozen=True)
 class Settings:
-    """What methods are told.
+    """Settings of methods.
 
     Attributes
     ----------
     tolerance : float
-        Change of the objective, over its size, at which a search ends.
+        Relative change of the objective at which a search ends.
     slack : float
-        Violations of constraints over their sizes that count as none.
+        Relative violation of constraints that counts as none.
     most : int
         Evaluations.
     seed : int
-        Of methods that draw designs.
+        Random seed of stochastic methods.
     """
 
     tolerance: float
@@ -42,12 +42,12 @@ class Settings:
 
 @dataclass(frozen=True)
 class Method:
-    """A method.
+    """An optimization method.
 
     Attributes
     ----------
     run : callable
-        Searches from a start; returns why it ended, and whether that is an optimum.
+        Searches from a start; returns why it ended, and whether it is an optimum.
     gradient : bool
         Whether it needs derivatives.
     doc : str
@@ -61,7 +61,7 @@ class Method:
     needs: str = ""
 
     def check(self) -> None:
-        """Refuse a method that is not installed."""
+        """Refuse a method whose module is not installed."""
         if self.needs:
             optional(self.needs, f"this method needs {self.needs}", "foldyn[design]")
 
@@ -96,7 +96,7 @@ def _trust_constr(search: Search, x: NDArray, settings: Settings) -> tuple[str, 
                 hess=BFGS(),
             )
         )  # fmt: skip
-    with warnings.catch_warnings():  # where a design fails, slopes stay as they were
+    with warnings.catch_warnings():  # if a design fails, its slopes keep the last values
         warnings.filterwarnings("ignore", "delta_grad == 0.0", UserWarning)
         found = minimize(
             lambda x: search.at(x).objective, np.clip(x, 1e-3, 1.0 - 1e-3),
@@ -112,7 +112,7 @@ def _trust_constr(search: Search, x: NDArray, settings: Settings) -> tuple[str, 
 
 
 def _mma(search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
-    """NLopt's method of moving asymptotes; equalities are left to an augmented Lagrangian."""
+    """Run NLopt's method of moving asymptotes; an augmented Lagrangian handles equalities."""
     nlopt = optional("nlopt", "MMA needs nlopt", "foldyn[design]")
     last: list[Trial] = []
 
@@ -121,7 +121,7 @@ def _mma(search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
         if not last or found is not last[0]:
             search.step()
         last[:] = [found]
-        slope[:] = found.slope[: slope.size]  # empty where it wants the value alone
+        slope[:] = found.slope[: slope.size]  # empty if only the value is wanted
         return found.objective
 
     def excess(k: int) -> Callable[[NDArray, NDArray], float]:
@@ -162,7 +162,7 @@ def _mma(search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
 
 
 def _cma(search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
-    """CMA-ES, with constraints in an augmented Lagrangian (Atamna et al. 2017)."""
+    """Run CMA-ES, with constraints in an augmented Lagrangian (Atamna et al. 2017)."""
     cma = optional("cma", "CMA-ES needs cma", "foldyn[design]")
     handler = optional("cma.constraints_handler", "CMA-ES needs cma", "foldyn[design]")
     drawn = np.random.RandomState(settings.seed + search.start)
@@ -171,7 +171,7 @@ def _cma(search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
         "verb_log": 0, "tolfun": settings.tolerance, "tolx": 1e-2 * settings.tolerance,
     }  # fmt: skip
     n = len(x)
-    first = x if n > 1 else np.append(x, 0.5)  # it cannot do with one number
+    first = x if n > 1 else np.append(x, 0.5)  # it does not support a single variable
     strategy = cma.CMAEvolutionStrategy(first, SPREAD, options)
     count = len(search.problem.constraints)
     lagrangian = handler.AugmentedLagrangian(len(first), search.problem.equal)
@@ -203,7 +203,7 @@ METHODS: Mapping[str, Method] = {
 
 
 def searched(method: str, search: Search, x: NDArray, settings: Settings) -> tuple[str, bool]:
-    """Search from a start; returns why it ended, and whether that is an optimum."""
+    """Search from a start; return why it ended, and whether it is an optimum."""
     try:
         search.at(x)
         return METHODS[method].run(search, x, settings)

@@ -1,4 +1,4 @@
-"""The page of a design: before and after, the parameters and constraints, how the search went."""
+"""The page of a design: before and after, parameters and constraints, the course of the search."""
 
 from __future__ import annotations
 
@@ -35,20 +35,20 @@ def write_design(
     found: Design, plan: Plan, folder: str | Path, case_file: CaseFile, call: Call | None = None,
     figures: str | None = None,
 ) -> Path:  # fmt: skip
-    """Write the page of a design into a folder that exists; returns its path.
+    """Write the page of a design into an existing folder; return its path.
 
     Parameters
     ----------
     found : Design
     plan : Plan
-        What was searched.
+        Plan of the search.
     folder : path
     case_file : CaseFile
-        What was designed.
+        The case file of the design.
     call : Call, optional
-        How it was asked for.
+        The command or call, for the page.
     figures : {"png", "svg", "pdf"}, optional
-        What figures are written as; none are drawn by default.
+        File format of figures; by default none are drawn.
     """
     album, evaluator = Album(folder, figures), plan.evaluator
     first = plan.space.values(tuple(plan.first.tolist()))
@@ -57,7 +57,7 @@ def write_design(
     for name, values in designs.items():
         try:
             cases[name] = evaluator.case(values)  # type: ignore[attr-defined]
-        except FoldynError:  # a start that is no case
+        except FoldynError:  # the start may not give a case
             continue
     sections: list[Section | Stage] = [*_stages(plan, cases, designs, case_file)]
     sections += [Heading("The best design"), Text(_verdict(found, plan)), _parameters(found, plan)]
@@ -103,7 +103,7 @@ def _verdict(found: Design, plan: Plan) -> str:
 
 
 def _parameters(found: Design, plan: Plan) -> Table:
-    """All entries with their bounds, before and after."""
+    """Table of all entries with their bounds, before and after."""
     space = plan.space
     after = np.concatenate([np.ravel(value) for value in found.parameters.values()])
     x = space.x(after)
@@ -140,7 +140,7 @@ def _ends(found: Design) -> Table:
 
 
 def _failures(found: Design) -> Iterator[Section]:
-    """Designs that could not be computed, by their reasons."""
+    """Designs that could not be computed, grouped by reason."""
     reasons = dict[str, int]()
     for reason in filter(None, found.history["failure"].values.tolist()):
         reasons[reason] = reasons.get(reason, 0) + 1
@@ -153,7 +153,7 @@ def _failures(found: Design) -> Iterator[Section]:
 def _slopes(
     found: Design, plan: Plan, case: Case, folder: Path, figures: str | None
 ) -> Iterator[Section]:
-    """What each parameter matters, and each entry of arrays on the sheet."""
+    """Sensitivity to each parameter, and to each array entry on the sheet."""
     text = plan.problem.objective.text
     width = plan.space.parts(plan.space.upper - plan.space.lower)
     over = {name: np.asarray(found.gradient[name]) * width[name] for name in found.gradient}
@@ -182,7 +182,7 @@ def _slopes(
 def _rows(
     found: Design, plan: Plan, case_file: CaseFile, call: Call | None
 ) -> Iterator[tuple[str, str]]:
-    """How it was computed."""
+    """Facts about the computation."""
     facts = found.history.attrs
     yield "case file", case_file.path.name
     yield "analysis", case_file.analysis.kind

@@ -1,4 +1,4 @@
-"""What a design is to be: the least or the most of an expression, under constraints."""
+"""The optimization problem: minimize or maximize an expression under constraints."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Problem:
 
     @property
     def places(self) -> dict[str, str]:
-        """All that is measured, each with the argument that first asks for it."""
+        """All measures, each with the argument that first requests it."""
         goal = "minimize" if self.sign > 0.0 else "maximize"
         found = dict.fromkeys(self.objective.measures, goal)
         for k, one in enumerate(self.constraints):
@@ -41,17 +41,17 @@ class Problem:
 
     @property
     def measures(self) -> tuple[str, ...]:
-        """All that is measured."""
+        """All measures."""
         return tuple(self.places)
 
     @property
     def equal(self) -> NDArray:
-        """Which constraints are equalities."""
+        """Whether each constraint is an equality."""
         return np.array([one.sense == "==" for one in self.constraints], bool)
 
     @property
     def signs(self) -> NDArray:
-        """Of each constraint -1 where its difference must not be below 0, else 1."""
+        """For each constraint -1 if its difference must be at least 0, else 1."""
         return np.array([-1.0 if one.sense == ">=" else 1.0 for one in self.constraints])
 
     def numbers(self, values: Mapping[str, float]) -> NDArray:
@@ -61,7 +61,7 @@ class Problem:
     def with_slopes(
         self, values: Mapping[str, float], jacobian: Mapping[str, NDArray]
     ) -> tuple[NDArray, NDArray]:
-        """The same, and their derivatives by the entries of a design, by those of the measures."""
+        """The same, and derivatives by the entries of a design, from the measures' jacobian."""
         width = len(next(iter(jacobian.values())))
         found, rows = [], []
         for one in (self.objective, *self.constraints):
@@ -71,7 +71,7 @@ class Problem:
         return np.array(found), np.array(rows)
 
     def sizes(self, values: Mapping[str, float]) -> NDArray:
-        """What the objective and the violations are compared with, from one design."""
+        """Scales of the objective and the violations, from one design."""
         return np.array(
             [
                 abs(self.objective.value(values)) or 1.0,
@@ -81,12 +81,12 @@ class Problem:
 
 
 def problem_of(minimize: Any, maximize: Any, subject_to: Any) -> Problem:
-    """Check what a design is to be.
+    """Check the objective and constraints of a design.
 
     Raises
     ------
     InputError
-        An expression cannot be read, or there is not one objective.
+        An expression cannot be read, or there is not exactly one objective.
     """
     if (minimize is None) == (maximize is None):
         raise InputError(

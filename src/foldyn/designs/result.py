@@ -1,4 +1,4 @@
-"""What a search for a design has found."""
+"""Results of a design search."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ PARAMETER, GRADIENT = "parameter_", "gradient_"
 
 @dataclass(frozen=True)
 class End:
-    """How the search from one start ended.
+    """End of the search from one start.
 
     Attributes
     ----------
     start : int
     objective, violation : float
-        Of the best design of this start; nan where none could be computed. The violation is the
-        largest of all constraints, over their sizes.
+        Values of the best design from this start; nan if none could be computed. The violation is
+        the largest of all constraints, relative to their scales.
     feasible : bool
-        Whether it is small enough to count as none.
+        Whether the violation is small enough to count as none.
     evaluations : int
     message : str
         Why it ended.
@@ -57,7 +57,7 @@ class End:
 @brief
 @dataclass(frozen=True, eq=False)
 class Design:
-    """The best design that was found, and how. ``design["parameters"]`` is `design.parameters`.
+    """The best design found, and the search. ``design["parameters"]`` is `design.parameters`.
 
     Attributes
     ----------
@@ -68,11 +68,11 @@ class Design:
     feasible : bool
         Whether all constraints hold, up to the slack.
     constraints : dict of str to float
-        By how much each constraint is violated, in the unit of its sides; 0 up to the slack.
+        Violation of each constraint, in the unit of its sides; 0 up to the slack.
     measures : dict of str to float
-        All that was measured of this design.
+        All measures of this design.
     gradient : dict
-        Derivatives of the objective by the parameters, per unit; empty without derivatives.
+        Derivatives of the objective with respect to the parameters; empty if not computed.
     ends : tuple of End
         How the search from each start ended.
     history : xarray.Dataset
@@ -102,7 +102,7 @@ class Design:
         return getattr(self, name)
 
     def summary(self) -> dict[str, Any]:
-        """All numbers but the history, as JSON has them (nan is null)."""
+        """All numbers except the history, as JSON types (nan is null)."""
         own = {name: value for name, value in vars(self).items() if name not in ("ends", "history")}
         return plain(
             {"foldyn_version": foldyn.__version__, **own, "ends": [vars(one) for one in self.ends]}
@@ -137,7 +137,7 @@ class Design:
 
 
 def _columns(history: xr.Dataset) -> Iterator[tuple[str, list[Any]]]:
-    """Columns of a table: a number of each evaluation each."""
+    """Table columns with a number for each evaluation."""
     for name, one in history.items():
         if one.dims[:1] != ("evaluation",):
             continue

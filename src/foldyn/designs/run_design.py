@@ -1,4 +1,4 @@
-"""`design`: parameters that make the most of what is measured, within bounds and constraints."""
+"""`design`: optimize parameters under bounds and constraints."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ MOST_DRAWN = 20
 
 @dataclass(frozen=True)
 class Course:
-    """How far a search is.
+    """Progress of a search.
 
     Attributes
     ----------
     done, found : int
-        Evaluations, and those of them that were kept from before.
+        Number of evaluations, and of stored ones among them.
     start : int
-        Which of the starts.
+        Number of the start.
     objective, violation : float
         Of the best design so far; nan without one.
     """
@@ -51,7 +51,7 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A search for a design that was checked.
+    """A checked design search.
 
     Attributes
     ----------
@@ -103,46 +103,47 @@ def design(
         Parameters by name, each with its lower and upper bound: numbers, or for an array lists of
         one for each entry; numbers hold for all entries of an array that `start` gives.
     minimize, maximize : str
-        One of both: an expression of measures of a sweep, "-frequency[2] / frequency[1]", with
-        ``+ - * / **``, parentheses, min, max, abs, sqrt, log and exp.
+        Exactly one of the two: an expression of sweep measures, "-frequency[2] / frequency[1]",
+        with ``+ - * / **``, parentheses, min, max, abs, sqrt, log and exp.
     subject_to : sequence of str
         Constraints: expressions with "==", "<=" or ">=", as "mass <= 0.1".
     analysis : mapping
-        What is computed of a case that is built: its kind, "modes", "dynamics", "statics" or "frf",
-        and arguments of `modes`, `simulate`, `trace` or `frf`. A case file has its own.
+        Analysis of a built case: its kind, "modes", "dynamics", "statics" or "frf", and arguments
+        of `modes`, `simulate`, `trace` or `frf`. A case file has its own.
     start : mapping, optional
-        Values to start from; where none is given, the middle between the bounds.
+        Values to start from, by default the middle between the bounds.
     method : {"slsqp", "trust-constr", "mma", "cma"}
         The first three use exact derivatives, see `sensitivity`; "mma" needs NLopt. "cma" (CMA-ES)
-        needs none, and some hundred times as many evaluations.
+        needs no derivatives, but some hundred times as many evaluations.
     starts : int
-        How many searches: the first from `start`, the others from designs drawn within the bounds.
+        Number of searches: the first from `start`, the others from random designs within the
+        bounds.
     seed : int
-        Of the drawn designs, and of CMA-ES.
+        Random seed of the starts and of CMA-ES.
     tolerance : float
-        Change of the objective, over its size at the first design, at which a search ends.
+        Change of the objective, relative to its size at the first design, at which a search ends.
     slack : float
-        Violation of a constraint that counts as none, over the size of the constraint: that of the
-        side that is a number, or else of the larger one at the first design.
+        Violation of a constraint that counts as none, relative to the constraint's size: its
+        numeric side, or else the larger side at the first design.
     max_evaluations : int
-        At most from each start.
+        Most evaluations from each start.
     folder : path, optional
-        Keeps every evaluation: a search that was cut off goes on where it stopped.
+        Keeps every evaluation, so that an interrupted search resumes.
     progress : callable, optional
         Called with a `Course` after every evaluation.
 
     Returns
     -------
     Design
-        The best of all feasible designs that were evaluated, with the history of all starts:
+        The best of all evaluated feasible designs, with the history of all starts:
         ``best["parameters"]``, ``best["history"]``.
 
     Raises
     ------
     InputError
-        An argument cannot be used, or the first design is no case or has no such measure.
+        An argument cannot be used, or the first design gives no case or lacks a measure.
     ComputationError
-        No start can be computed.
+        None of the starts can be computed.
 
     Warns
     -----
@@ -152,7 +153,7 @@ def design(
     Notes
     -----
     A design that cannot be computed does not end a search: the method takes a shorter step, and the
-    history says why. CMA-ES holds constraints by an augmented Lagrangian, MMA equalities.
+    history says why. CMA-ES enforces constraints, and MMA equalities, by an augmented Lagrangian.
     """
     plan = plan_of(
         build, bounds, minimize, maximize, subject_to, analysis, start, method, starts, seed,
@@ -186,7 +187,7 @@ def designed(
     folder: str | os.PathLike[str] | None = None,
     progress: Callable[[Course], None] | None = None,
 ) -> Design:
-    """Search as planned; arguments as of `design`."""
+    """Run a plan; arguments as in `design`."""
     began = time.perf_counter()
     gradient = METHODS[plan.method].gradient
     evaluate = Evaluate(plan.evaluator, plan.space, gradient)
@@ -210,7 +211,7 @@ def designed(
 
 
 def _first(plan: Plan, search: Search, start: int) -> NDArray:
-    """Where a search starts: as given, or drawn, again where a design cannot be computed."""
+    """Start of a search: given, or drawn until a design can be computed."""
     if start == 0:
         return plan.space.x(plan.first)
     drawn = np.random.default_rng([plan.settings.seed, start])
@@ -246,7 +247,7 @@ def _end(start: int, search: Search, message: str, converged: bool) -> End:
 
 
 def _insensitive(search: Search, row: Row) -> bool:
-    """Whether the derivatives of the objective are all 0, so that no method knows where to go."""
+    """Whether all derivatives of the objective are 0, so that no method has a direction."""
     if row.slopes is None or search.sizes is None:
         return False
     change = np.abs(row.slopes[0] * (search.space.upper - search.space.lower)).max()
@@ -256,7 +257,7 @@ def _insensitive(search: Search, row: Row) -> bool:
 def _found(
     plan: Plan, search: Search, best: Row, ends: Sequence[End], seconds: float
 ) -> Design:  # fmt: skip
-    """The result of a search, with a warning where no design is feasible."""
+    """Result of a search, with a warning if no design is feasible."""
     problem, space = plan.problem, plan.space
     violations = {}
     slacks = (plan.settings.slack * np.asarray(search.sizes)[1:]).tolist()

@@ -1,4 +1,4 @@
-"""A search: designs are evaluated once each, noted, and given to a method in numbers near 1."""
+"""A search: evaluates designs once each, records them, and scales them for the method."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ NEAR, STILL = 1e-7, 20
 
 
 class Ended(Exception):  # noqa: N818
-    """A search ends, whatever the method thinks."""
+    """Ends a search, whatever the method."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A design that was tried; numbers are over their sizes, slopes by numbers from 0 to 1.
+    """An evaluated design, with scaled values and slopes with respect to entries from 0 to 1.
 
     Attributes
     ----------
     x : ndarray, shape (n,)
     objective : float
-        To be made small.
+        Value to minimize.
     excess : ndarray, shape (c,)
-        Of the constraints: at most 0, or 0 of an equality, where they hold.
+        Excess of each constraint: at most 0 if it holds, or exactly 0 for an equality.
     slope, slopes : ndarray, shapes (n,) and (c, n)
-        Their derivatives; empty where no method asks for them.
+        Derivatives of both; empty if no method asks for them.
     violation : float
         The largest of all violations.
     """
@@ -54,9 +54,9 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A line of the history.
+    """A row of the history.
 
-    numbers : the objective, and left minus right sides of the constraints; nan where it failed.
+    numbers : the objective, and left minus right sides of the constraints; nan if it failed.
     """
 
     start: int
@@ -69,7 +69,7 @@ class Row:
     failure: str
     warnings: str
     values: dict[str, float] = field(default_factory=dict)
-    slopes: NDArray | None = None  # of the numbers, per unit of the entries
+    slopes: NDArray | None = None  # of the numbers, with respect to the entries in their units
 
 
 class Search:
@@ -80,11 +80,11 @@ class Search:
     problem, space
     evaluations : Evaluations
     gradient : bool
-        Whether they have derivatives.
+        Whether evaluations include derivatives.
     slack : float
-        Violations of constraints over their sizes that count as none.
+        Relative violation of constraints that counts as none.
     most : int
-        Evaluations from one start.
+        Most evaluations from one start.
     tell : callable, optional
         Called after each new row.
     """
@@ -96,7 +96,7 @@ class Search:
         self.problem, self.space, self.evaluations = problem, space, evaluations
         self.gradient, self.slack, self.most, self.tell = gradient, slack, most, tell
         self.rows: list[Row] = []
-        self.sizes: NDArray | None = None  # by the first design that can be computed
+        self.sizes: NDArray | None = None  # from the first design that can be computed
         self.start = 0
         self.best: Row | None = None
         self._known: dict[Point, Trial | None] = {}
@@ -114,7 +114,7 @@ class Search:
         self.iteration += 1
 
     def can(self, x: NDArray) -> bool:
-        """Whether a design to start from can be computed."""
+        """Whether a starting design can be computed."""
         try:
             self.at(x)
         except Ended:
@@ -122,16 +122,16 @@ class Search:
         return True
 
     def at(self, x: NDArray) -> Trial:
-        """What is found at a design.
+        """Evaluate a design.
 
-        Where it cannot be computed the objective is very large and everything else that of the
-        last design that could: methods take a shorter step.
+        If it fails, the objective is very large and all other values are those of the last
+        successful design, so that methods take a shorter step.
 
         Raises
         ------
         Ended
-            The first design of a search cannot be computed, or too many in a row, or too many
-            have been tried.
+            The first design of a search or too many in a row cannot be computed, or the limit of
+            evaluations is reached.
         """
         point = self.space.point(np.asarray(x, float))
         if point not in self._known:
@@ -154,7 +154,7 @@ class Search:
         return Trial(np.asarray(x), BAD, last.excess, last.slope, last.slopes, np.inf)
 
     def _count_still(self, found: Trial) -> None:
-        """End a search by derivatives that goes on about one design, as where none is feasible."""
+        """End a gradient-based search that stays at one design, as when none is feasible."""
         last = self._last
         if not self.gradient or last is None or found is last:
             return
@@ -198,7 +198,7 @@ class Search:
         return trial
 
     def _trial(self, point: Point, numbers: NDArray, slopes: NDArray | None) -> Trial:
-        """Numbers of a design over their sizes."""
+        """Scaled values of a design."""
         signs = np.array([self.problem.sign, *self.problem.signs])
         scale = signs / self.sizes
         scaled = numbers * scale
@@ -214,6 +214,6 @@ class Search:
         )  # fmt: skip
 
     def key(self, row: Row) -> tuple[bool, float]:
-        """By which the best of several comes first: feasible, the least objective or violation."""
+        """Sort key for the best design: feasible first, then least objective or violation."""
         least = self.problem.sign * row.numbers[0] if row.feasible else row.violation
         return not row.feasible, float(least)

@@ -1,4 +1,4 @@
-"""The space of designs: parameters between their bounds, and as numbers from 0 to 1."""
+"""The design space: parameters within their bounds, scaled to 0 to 1."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Values = Mapping[str, float | NDArray]
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Parameters between their bounds.
+    """Parameters within their bounds.
 
     Attributes
     ----------
     shapes : dict of str to tuple
-        () of a number, (count,) of an array.
+        () for a number, (count,) for an array.
     lower, upper : ndarray, shape (n,)
         Bounds of all entries, one parameter after the other.
     """
@@ -33,16 +33,16 @@ class Space:
     upper: NDArray
 
     def point(self, x: NDArray) -> tuple[float, ...]:
-        """Entries of a design from numbers from 0 to 1."""
+        """Entries of a design from scaled values (0 to 1)."""
         inside = np.clip(x, 0.0, 1.0)
         return tuple((self.lower * (1.0 - inside) + self.upper * inside).tolist())
 
     def x(self, point: NDArray) -> NDArray:
-        """Numbers from 0 to 1 of the entries of a design."""
+        """Scaled values (0 to 1) of the entries of a design."""
         return (np.asarray(point) - self.lower) / (self.upper - self.lower)
 
     def parts(self, entries: NDArray) -> dict[str, NDArray]:
-        """Entries along the last axis, by parameter."""
+        """Split entries along the last axis by parameter."""
         counts = [int(np.prod(shape)) for shape in self.shapes.values()]
         split = np.split(np.asarray(entries), np.cumsum(counts)[:-1], axis=-1)
         return dict(zip(self.shapes, split, strict=True))
@@ -65,12 +65,12 @@ class Space:
 
 
 def space_of(bounds: Any, start: Any) -> tuple[Space, NDArray]:
-    """Space of designs and the entries of the first one; in the middle where none is given.
+    """Design space and the entries of the first design, by default in the middle.
 
     Raises
     ------
     InputError
-        Bounds are none, or do not fit each other or the start.
+        Bounds are missing, or inconsistent with each other or the start.
     """
     if not isinstance(bounds, Mapping) or not bounds:
         raise InputError(
@@ -94,7 +94,7 @@ def space_of(bounds: Any, start: Any) -> tuple[Space, NDArray]:
 
 
 def _ends(name: str, pair: Any, start: Any) -> tuple[tuple[int, ...], NDArray]:
-    """Shape of a parameter, and its lower and upper bounds and its start (3, count)."""
+    """Shape of a parameter, and its lower bound, upper bound and start (3, count)."""
     place = f"bounds.{name}"
     if isinstance(pair, str) or not hasattr(pair, "__len__") or len(pair) != 2:
         raise InputError(f" = {show(pair)}: must be a lower and an upper bound", place)
