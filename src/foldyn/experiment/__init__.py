@@ -1,6 +1,6 @@
-"""The experiment: camera tracking, synthetic films to plan and to test it, and calibration.
+"""The experiment: camera tracking, synthetic films for planning and tests, and calibration.
 
-OpenCV is an optional dependency (``pip install foldyn[experiment]``), imported when it is used.
+OpenCV is an optional dependency (``pip install foldyn[experiment]``), imported on first use.
 """
 
 from __future__ import annotations

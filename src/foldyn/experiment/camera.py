@@ -16,9 +16,9 @@ from foldyn.arguments import brief
 from foldyn.errors import InputError, optional
 from foldyn.values import choice, number
 
-_TERMS = 6  # of the polynomial in r^2 that inverts the distortion
-_REACH = 1.08  # part of the half diagonal, up to which it is fitted
-_LARGEST_SPREAD = 0.02  # of the lengths that give a scale
+_TERMS = 6  # degree in r^2 of the polynomial that inverts the distortion
+_REACH = 1.08  # part of the half diagonal up to which it is fitted
+_LARGEST_SPREAD = 0.02  # allowed spread of the lengths that define a scale
 
 DIRECTIONS = {
     f"{sign}{axis}": (1.0 if sign != "-" else -1.0) * np.eye(3)[k]
@@ -41,7 +41,7 @@ def opencv() -> Any:
 
 
 def axes_of_view(up: str = "-x", facing: str = "z") -> NDArray[np.float64]:
-    """Rotation from the model's axes to those of an image: to the right, down and forward.
+    """Rotation from the model's axes to image axes: right, down and forward.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ class Camera:
 
     @property
     def center(self) -> NDArray[np.float64]:
-        """Where the axis of the camera meets the image (pixels)."""
+        """Pixel at which the camera's axis meets the image."""
         return 0.5 * (np.array(self.size, dtype=np.float64) - 1.0)
 
     def depth(self, points: ArrayLike) -> NDArray[np.float64]:
@@ -159,7 +159,7 @@ class Camera:
         seen = (np.asarray(uv, dtype=np.float64) - self.center) / self.focal
         r2 = np.sum(seen**2, axis=-1, keepdims=True)
         slope = seen * np.polynomial.polynomial.polyval(r2, self.inverse)
-        for _ in range(4):  # Newton on the radius, from a polynomial that is close already
+        for _ in range(4):  # Newton's method for the radius, started from a close polynomial
             s2 = np.sum(slope**2, axis=-1, keepdims=True)
             factor = 1.0 + self.k1 * s2 + self.k2 * s2**2
             stretch = 1.0 + 3.0 * self.k1 * s2 + 5.0 * self.k2 * s2**2
@@ -174,12 +174,12 @@ class Camera:
 
     @property
     def _outermost(self) -> float:
-        """Slope of the ray to a corner, without distortion."""
+        """Slope of the ray to a corner, ignoring distortion."""
         return _REACH * 0.5 * float(np.hypot(*self.size)) / self.focal
 
     @cached_property
     def inverse(self) -> NDArray[np.float64]:
-        """Coefficients, by powers of r^2, of the factor from distorted to straight slopes."""
+        """Coefficients, by powers of r^2, of the factor from distorted to undistorted slopes."""
         r = self._outermost * np.linspace(0.01, 1.0, 200)
         seen = r * (1.0 + self.k1 * r**2 + self.k2 * r**4)
         top = seen.max() ** 2
@@ -188,18 +188,18 @@ class Camera:
 
 
 class Sight(NamedTuple):
-    """A camera, as a model sees it.
+    """A camera in the model's axes.
 
-    Tracks tell where the line of sight of a node meets the plane in which it was when the model was
-    recognized: the motion along the line of sight is unknown to one camera. The model knows it, so
-    it is compared as it would look.
+    A track is where a node's line of sight meets the plane that contained the node when the model
+    was recognized: one camera cannot measure motion along the line of sight. The model has this
+    motion, so it is compared as the camera would see it.
 
     Attributes
     ----------
     position, direction : ndarray, shape (3,)
-        Of the camera (m), and the way in which it looks (a unit vector), in the model's axes.
+        Position of the camera (m), and its viewing direction (a unit vector), in the model's axes.
     depth : ndarray, shape (n,)
-        Distance (m) along it of the planes to which displacements of nodes 0..n-1 belong.
+        Distance (m) along this direction of the planes of nodes 0..n-1.
     """
 
     position: NDArray[np.float64]
@@ -208,7 +208,7 @@ class Sight(NamedTuple):
 
     @classmethod
     def of(cls, tracks: xr.Dataset) -> Sight | None:
-        """The camera of a film; None where its tracks do not tell."""
+        """The camera of a film; None if its tracks do not describe it."""
         if "camera_depth" not in tracks:
             return None
         there, way = (
@@ -217,7 +217,7 @@ class Sight(NamedTuple):
         return cls(there, way, tracks["camera_depth"].values)
 
     def seen(self, nodes: NDArray[np.int64], rest: NDArray, moved: NDArray) -> NDArray[np.float64]:
-        """Displacements (t, m, 3), m, that tracks tell of nodes (m,) which move by `moved`.
+        """Apparent displacements (t, m, 3), m, of nodes (m,) which move by `moved`.
 
         rest : (m, 3) positions at rest, m.
         """
@@ -228,14 +228,14 @@ class Sight(NamedTuple):
 
 @dataclass(frozen=True)
 class Scale:
-    """Scale of the image in one plane before the camera.
+    """Image scale in one plane in front of the camera.
 
     Attributes
     ----------
     metres_per_pixel : float
     spread : float
-        Largest relative deviation of the lengths that it was found from: if they differ, the camera
-        was tilted, or they lie at different depths. NaN for a single length.
+        Largest relative deviation among the lengths that define it: large if the camera was tilted,
+        or the lengths lie at different depths. NaN for a single length.
     """
 
     metres_per_pixel: float
@@ -245,9 +245,9 @@ class Scale:
         number("--scale", self.metres_per_pixel, above=0.0, unit="m per pixel")
 
     def at_depth(self, behind: ArrayLike, distance: float) -> NDArray[np.float64]:
-        """Metres per pixel `behind` the plane (m), `distance` (m) being the plane's own.
+        """Metres per pixel `behind` the plane (m), whose own distance is `distance` (m).
 
-        A pinhole shows what is farther away smaller, in proportion to its distance.
+        A pinhole image shrinks in inverse proportion to distance.
         """
         number("--distance", distance, above=0.0, unit="m")
         return self.metres_per_pixel * (1.0 + np.asarray(behind, dtype=np.float64) / distance)
@@ -264,7 +264,7 @@ def scale_of_lengths(references: Sequence[Sequence[float]]) -> Scale:
     Raises
     ------
     InputError
-        None, a length of zero, or lengths whose scales differ by more than 2 %.
+        No lengths, a length of zero, or lengths whose scales differ by more than 2 %.
     """
     if not len(references):
         raise InputError("--reference: give at least one PX1,PY1,PX2,PY2,METRES")
@@ -301,12 +301,12 @@ def scale_of_target(
     square : float
         Side of its squares (m).
     place : str
-        What the photo is called in messages.
+        Name of the photo in messages.
 
     Returns
     -------
     Scale
-        Its spread is that of the sides of all squares: it grows as the board tilts.
+        With the spread over the sides of all squares, which grows as the board tilts.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""Calibration: numbers of a case file found from measurements."""
+"""Calibration: parameters of a case fitted to measurements."""

@@ -60,14 +60,14 @@ Outcome = NDArray[np.float64] | str
 
 @dataclass(frozen=True)
 class Course:
-    """How far a fit is.
+    """Progress of a fit.
 
     Attributes
     ----------
     computed, found : int
-        Evaluations of the model that were computed, and that were kept from before.
+        Number of computed evaluations of the model, and of stored ones.
     cost : float
-        The smallest so far.
+        Smallest cost so far.
     """
 
     computed: int
@@ -90,11 +90,11 @@ def fit(
 ) -> Fit:
     """Fit parameters of a case to measurements by least squares.
 
-    Every key of the case file that holds a number can be a parameter: for other values of it the
-    file is read anew. Searches are by the trust region method of `scipy.optimize.least_squares`
-    with bounds, in the parameters over their scales. Derivatives of paths, modes, frequency
-    responses and implicit motions are found beside the result, without running the model again;
-    those of explicit motions are difference quotients of whole motions.
+    Every numeric key of the case file can be a parameter; the file is reread for each new value.
+    Searches use the trust-region method of `scipy.optimize.least_squares` with bounds, in scaled
+    parameters. Derivatives of paths, modes, frequency responses and implicit motions are computed
+    along with the result, without rerunning the model; explicit motions use difference quotients of
+    whole motions.
 
     Parameters
     ----------
@@ -107,16 +107,16 @@ def fit(
     ties : mapping of str to str, optional
         Keys that follow parameters, ``{"model.fold_law.theta2": "360 - model.fold_law.theta1"}``.
     starts : int
-        How many searches: the first from the given values, the others from random ones within the
+        Number of searches: the first from the given values, the others from random ones within the
         bounds.
     seed : int
-        Of the random starts.
+        Random seed of the starts.
     processes : int
-        How many evaluations run at a time.
+        Number of evaluations that run in parallel.
     confidence : float
-        Of the intervals, by Student's t; 0.95 by default.
+        Confidence level of the intervals, by Student's t; 0.95 by default.
     folder : path, optional
-        Keeps every evaluation: a fit that was cut off goes on where it stopped.
+        Keeps every evaluation, so that an interrupted fit resumes.
     progress : callable, optional
         Called with a `Course` after every evaluation.
 
@@ -134,15 +134,15 @@ def fit(
     Warns
     -----
     FoldynWarning
-        The time step of a motion, or the mesh of a shell, moves a parameter by more than its
-        standard error; it is not clear which mode of the model a measured one is; the search was
-        given up.
+        The time step of a motion, or the mesh of a shell, shifts a parameter by more than its
+        standard error; a measured mode matches no single mode of the model; the search was given
+        up.
 
     Notes
     -----
     A motion is computed with fixed steps, `analysis.dt`, or for an implicit method without it the
-    interval of its output: steps chosen by their error would make the misfit jump. At the end it is
-    computed once more with half the step, and intervals are widened by what that changes.
+    interval of its output: adaptive steps would make the misfit jump. At the end the motion is
+    recomputed with half the step, and intervals are widened by the change.
     """
     confidence = number("confidence", confidence, above=0.0, below=1.0)
     whole("processes", processes, least=1, most=MOST_PROCESSES)
@@ -182,18 +182,18 @@ def fit(
 def _at_a_time(
     count: int, pool: Pool, search: _Search, points: NDArray[np.float64]
 ) -> list[Descent]:
-    """Search from several starts in threads, which end where this one is interrupted."""
+    """Search from several starts in threads, which end if this one is interrupted."""
     with ThreadPoolExecutor(count) as threads:
         try:
             return list(threads.map(search.descend, points))
         except BaseException:
-            pool.stop()  # threads that wait for it go on with an error
+            pool.stop()  # fail in threads that wait for an evaluation
             threads.shutdown(cancel_futures=True)
             raise
 
 
 class _Search:
-    """A search for the smallest misfit, in parameters over their scales."""
+    """A search for the smallest misfit, in scaled parameters."""
 
     def __init__(
         self, made: Problem, pool: Pool, folder: str | os.PathLike[str] | None,
@@ -222,7 +222,7 @@ class _Search:
 
     @property
     def count(self) -> int:
-        """Evaluations of the model."""
+        """Number of evaluations of the model."""
         return sum(one.computed + one.found for one in self.all)
 
     def _tell(self, *_: object) -> None:
@@ -231,7 +231,7 @@ class _Search:
             self.progress(Course(computed, found, self.cost))
 
     def at(self, points: Sequence[NDArray], runs: tuple[int, ...] | None = None) -> list[Outcome]:
-        """Predictions at several points, at the same time where there are processes for it."""
+        """Predictions at several points, in parallel if there are several processes."""
         found = self.evaluations.at([Point(tuple(map(float, point)), runs) for point in points])
         return [one.failure or one.values[PREDICTED] for one in found]
 
@@ -256,7 +256,7 @@ class _Search:
         return Descent(begin, values, float(end.cost), int(end.nfev), why, end.status > 0)
 
     def uncertainty(self, values: NDArray[np.float64], confidence: float) -> Uncertainty:
-        """How well the parameters are known at the end of a search."""
+        """Uncertainty of the parameters at the end of a search."""
         jacobian = self._jacobian(values, both_sides=True)
         near = STEP * self.scale
         at_bound = (values - self.lower < near) | (self.upper - values < near)
@@ -264,11 +264,11 @@ class _Search:
         return Uncertainty.of(jacobian, residual, self.scale, at_bound, confidence, self.absorbed)
 
     def shifts(self, values: NDArray[np.float64], known: Uncertainty) -> list[NDArray[np.float64]]:
-        """How far ever smaller time steps, and elements, would move the estimates.
+        """Shifts of the estimates in the limit of small time steps and elements.
 
-        The misfit at the optimum is computed anew with half of each. What that changes moves the
-        optimum by its `influence`, and Richardson's extrapolation goes the rest of the way. Doubts
-        about that are shifts to both sides.
+        The misfit at the optimum is recomputed with each halved. Its change moves the optimum by
+        `influence`, and Richardson's extrapolation gives the limit. Doubts about the extrapolation
+        are added as shifts to both sides.
         """
         found = []
         coarse = np.asarray(self.at([values])[0])
@@ -302,13 +302,14 @@ class _Search:
         self, finer: Finer, values: NDArray[np.float64], shift: NDArray[np.float64],
         known: Uncertainty,
     ) -> NDArray[np.float64]:  # fmt: skip
-        """By how much the estimates of a much finer model are not where a shift leads them.
+        """Distance of a much finer model's estimates from the extrapolated shift.
 
-        Where it leads, the model must fit but for the error that it still has itself.
+        At the shifted values, the finer model must fit up to its own remaining discretization
+        error.
         """
         there = np.clip(values + shift, self.lower, self.upper)
         predicted = self._outcome(finer.proof, there)
-        if isinstance(predicted, str):  # where it leads there is no model
+        if isinstance(predicted, str):  # the model fails at the shifted values
             return np.abs(shift)
         left = known.influence @ ((predicted - self.observed) * self.weight)[self.chosen]
         expected = values + shift * (1.0 - float(finer.times) ** -finer.order) - there
@@ -324,7 +325,7 @@ class _Search:
     def _residual(
         self, points: list[NDArray[np.float64]], runs: tuple[int, ...] | None = None
     ) -> list[NDArray[np.float64]]:
-        """Weighted residuals; infinite where the model fails, so that a search steps back."""
+        """Weighted residuals; infinite if the model fails, so that a search steps back."""
         residuals = []
         for predicted in self.at(points, runs):
             if isinstance(predicted, str):
@@ -336,7 +337,7 @@ class _Search:
         return residuals
 
     def _jacobian(self, values: NDArray[np.float64], both_sides: bool) -> NDArray[np.float64]:
-        """Residuals by the parameters over their scales."""
+        """Derivatives of the residuals with respect to scaled parameters."""
         of = self.run[self.chosen]
         slopes, runs = self._slopes(values, False)
         if both_sides and not np.isin(of, runs).all():
@@ -350,14 +351,14 @@ class _Search:
     def _slopes(
         self, values: NDArray[np.float64], second: bool
     ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-        """Derivatives of all predictions, and runs that have none."""
+        """Derivatives of all predictions, and the runs that have none."""
         (found,) = self.evaluations.at([Point(tuple(map(float, values)), None, second)])
         slopes = found.values[SLOPES]
         lost = self.chosen & np.isnan(slopes).any(axis=1)
         return slopes, tuple(np.unique(self.run[lost]).tolist())
 
     def quotients(self, values: NDArray[np.float64]) -> list[str]:
-        """Names of the fitted measurements whose derivatives are those of whole runs."""
+        """Names of fitted measurements whose derivatives are difference quotients of whole runs."""
         runs, every = self._slopes(values, False)[1], self.made.measurements
         members = {i for k in runs for i in self.made.runs[k].members}
         return [every[i].name for i in sorted(members) if not every[i].held_out]
@@ -365,7 +366,7 @@ class _Search:
     def _quotients(
         self, values: NDArray[np.float64], runs: tuple[int, ...], rows: NDArray, both_sides: bool
     ) -> NDArray[np.float64]:
-        """Some rows of them: difference quotients of whole runs within the bounds."""
+        """Some rows of the Jacobian: difference quotients of whole runs within the bounds."""
         points: list[NDArray[np.float64]] = []
         pairs: list[tuple[int, int, float]] = []  # points of each quotient, and their distance
         for k, scale in enumerate(self.scale):
@@ -385,7 +386,7 @@ class _Search:
         residuals = [
             one[rows] for one in (*self._residual(points, runs), *self._residual([values]))
         ]
-        with np.errstate(invalid="ignore"):  # where the model fails
+        with np.errstate(invalid="ignore"):  # inf - inf where the model fails
             columns = [(residuals[i] - residuals[j]) / step for i, j, step in pairs]
         if not np.isfinite(columns).all():
             place = next(k for k, one in enumerate(columns) if not np.isfinite(one).all())
@@ -397,7 +398,7 @@ class _Search:
 
 
 def _width(finer: Finer, doubt: float) -> str:
-    """What an interval of a coarse model is worth."""
+    """Describe how far the interval of a coarse model can be trusted."""
     if not doubt:
         where = (
             "" if finer.proof is not finer.problem else f", if its error has order {finer.order}"
@@ -410,7 +411,7 @@ def _width(finer: Finer, doubt: float) -> str:
 
 
 def _warn_of_pairing(made: Problem, values: NDArray[np.float64]) -> None:
-    """Say where it has become open, on the way, which mode is which."""
+    """Warn if the pairing of modes has become ambiguous during the fit."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)

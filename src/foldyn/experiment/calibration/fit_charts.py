@@ -1,4 +1,4 @@
-"""Charts of a fit: what was measured beside what the fitted model says."""
+"""Charts of a fit: measurements and the fitted model."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FLOOR = 1e-300
 
 
 def charts_of(one: Measurement, result: Any, case: Case) -> list[Chart]:
-    """What was measured beside a result of the fitted model; empty where there is none to show."""
+    """Charts of a measurement and the fitted model's result; empty if there is nothing to show."""
     if isinstance(one, ForceDisplacement):
         curve = dense_curve(one)
         model = Curve("model", curve.displacement, curve.predicted(result, case))
@@ -53,7 +53,7 @@ def _beside(
     one: TimeHistory | Spectrum, along: NDArray, xlabel: str, ylabel: str,
     said: NDArray, seen: NDArray, case: Case,
 ) -> list[Chart]:  # fmt: skip
-    """A chart for each node, of histories with what the model is off by."""
+    """A chart of histories for each node, with the misfit."""
     charts = []
     for k, node in enumerate(one.where(case)[:MOST].tolist()):
         curves = [Curve("model", along, said[:, k]), Curve(one.label, along, seen[:, k], True)]
@@ -80,7 +80,7 @@ def _shapes(one: Shapes, result: Any, case: Case) -> list[Chart]:
 
 
 def _mode_shapes(one: ModeShapes, result: Any, case: Case) -> list[Chart]:
-    """Components of measured shapes over those of the model, a chart for each mode."""
+    """Measured over predicted components of mode shapes, a chart for each mode."""
     model = one.shapes(result, case)
     charts = []
     for mode, seen, said in zip(one.mode[:MOST].tolist(), one.values, model, strict=False):
@@ -93,13 +93,13 @@ def _mode_shapes(one: ModeShapes, result: Any, case: Case) -> list[Chart]:
 
 
 def _responses(one: FrequencyResponse, result: Any, case: Case) -> list[Chart]:
-    """Magnitude and, where it was measured, phase of responses, for each node."""
+    """Magnitude of responses for each node and, if measured, phase."""
     model = one.curves(result, case)
     labels = [f"{one.axis} (dB{f' re 1 {one.unit}' if one.unit else ''})", "phase (degrees)"]
     parts = [(_decibels(model), _decibels(one.values))]
     if not one.magnitude:
         phase = np.degrees(np.angle(model))
-        near = phase + np.degrees(np.angle(one.values * model.conj()))  # no jumps by a turn
+        near = phase + np.degrees(np.angle(one.values * model.conj()))  # no jumps by 360 degrees
         parts.append((phase, near))
     return [
         Chart(

@@ -1,4 +1,4 @@
-"""What a fit evaluates at values of its parameters: predictions, and their derivatives."""
+"""One evaluation in a fit: predictions at values of the parameters, and derivatives."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ SLOPES = "slopes"
 
 
 class Point(NamedTuple):
-    """What an evaluation is of.
+    """A point to evaluate.
 
     Attributes
     ----------
     values : tuple of float
-        Of the parameters.
+        Values of the parameters.
     runs : tuple of int, optional
-        Those to be computed, without derivatives; all, with derivatives, if not given.
+        Runs to compute, without derivatives; by default all runs, with derivatives.
     second : bool
-        Whether derivatives are right to the second order, as intervals need them.
+        Whether derivatives have second-order accuracy, as intervals need.
     """
 
     values: tuple[float, ...]
@@ -36,12 +36,12 @@ class Point(NamedTuple):
 
 
 def stamp(digest: str, point: Point) -> list[Any]:
-    """All that an evaluation depends on."""
+    """Everything that an evaluation depends on."""
     return [digest, *point]
 
 
 def evaluate(problem: Problem, point: Point) -> Evaluation:
-    """Predictions at a point, and their derivatives if it asks for them."""
+    """Predictions at a point, with derivatives if requested."""
     began, values = time.perf_counter(), np.array(point.values)
     try:
         if point.runs is None:

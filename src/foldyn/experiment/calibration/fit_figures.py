@@ -1,4 +1,4 @@
-"""Figures of a fit: the charts of what was measured, and how parameters hang together."""
+"""Figures of a fit: charts of measurements, and the correlation of parameters."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WIDTH = 9.0  # inches
 
 
 def plot_measured(one: Measurement, result: Any, case: Case, note: str = "") -> Figure:
-    """Draw what was measured beside a result of the fitted model.
+    """Draw measurements and a result of the fitted model.
 
     Shapes stand in the plane of the two measured axes along which the nodes lie farthest apart,
     with the bars between measured nodes.
@@ -44,7 +44,7 @@ def plot_measured(one: Measurement, result: Any, case: Case, note: str = "") -> 
         frame.add_collection(LineCollection(list(points[bars]), colors=style.SKY, linewidths=0.8))
         frame.set_aspect("equal", adjustable="datalim")
         if chart.ylabel.startswith("x"):
-            frame.invert_yaxis()  # pressed along x: as it stands in a test
+            frame.invert_yaxis()  # pressed along x: drawn upright as in a test
     return figure
 
 

@@ -46,16 +46,16 @@ NAMED = (TimeHistory.kind, Spectrum.kind, FrequencyResponse.kind)
 
 
 def _case(name: str, value: Any, folder: Path, find: Callable[[str], Path] | None) -> Path:
-    """Case file beside the fit file, or one that is found by its name."""
+    """Case file relative to the fit file, or found by its name."""
     case = text(name, value)
-    if os.path.isfile(folder / case) or find is None:  # false where a name is too long
+    if os.path.isfile(folder / case) or find is None:  # false if the name is too long
         return folder / case
     with within(f"{name}: "):
         return find(case)
 
 
 class DataSection(Section):
-    """One of the [[data]]; its other keys depend on its kind."""
+    """A [[data]] table; its other keys depend on its kind."""
 
     kind: Annotated[str, one_of(READERS)]
     file: Text
@@ -87,7 +87,7 @@ def _measurement(name: str, value: Any, folder: Path, find: Any) -> Measurement:
 
 
 def _known(kind: str) -> list[str]:
-    """Keys of a fit file that are for measurements of one kind."""
+    """Keys of a fit file for measurements of one kind."""
     reader = signature(READERS[kind]).parameters.values()
     keys = [one.name for one in reader if one.kind is not one.VAR_KEYWORD and one.name != "file"]
     if kind == Spectrum.kind:
@@ -150,20 +150,20 @@ class FitFile:
 
 
 def is_fit_file(path: str | os.PathLike[str]) -> bool:
-    """Whether a TOML file names parameters, as a case file never does."""
+    """Whether a TOML file has fit parameters, which a case file never has."""
     return "parameters" in read_document(Path(path))
 
 
 def read_fit(
     path: str | os.PathLike[str], find: Callable[[str], Path] | None = None
 ) -> FitFile:  # fmt: skip
-    """Read a fit file, its measurements too.
+    """Read a fit file and its measurements.
 
     Parameters
     ----------
     path : path
     find : callable, optional
-        Finds a case by a name that is no file beside the fit file.
+        Finds a case by name if no such file exists next to the fit file.
 
     Raises
     ------

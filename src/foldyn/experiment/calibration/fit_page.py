@@ -1,4 +1,4 @@
-"""The page of `foldyn fit`: the fitted model in motion, measured beside model, the parameters."""
+"""The page of `foldyn fit`: the fitted model in motion, data against model, the parameters."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from foldyn.viewer import Stage, stage
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """A run of the fitted model, for some measurements."""
+    """A run of the fitted model for some of the measurements."""
 
     members: tuple[int, ...]
     case_file: CaseFile
@@ -46,7 +46,7 @@ def write_fit(
     fit: Fit, folder: str | Path, title: str = "", note: str = "", call: Call | None = None,
     figures: str | None = None,
 ) -> Path:  # fmt: skip
-    """Write the page of a fit into a folder that exists; returns its path.
+    """Write the page of a fit into an existing folder; return its path.
 
     Parameters
     ----------
@@ -56,9 +56,9 @@ def write_fit(
     note : str
         Written on every figure.
     call : Call, optional
-        How it was asked for.
+        The command or call, for the page.
     figures : {"png", "svg", "pdf"}, optional
-        What figures are written as; none are drawn by default.
+        File format of figures; by default none are drawn.
     """
     folder = Path(folder)
     album, runs = Album(folder, figures), _runs(fit)
@@ -93,7 +93,7 @@ def write_fit(
 
 
 def _runs(fit: Fit) -> list[_Run]:
-    """All that the fitted model was computed for."""
+    """All runs of the fitted model."""
     values, runs = [*fit.values.values()], []
     for run in fit.problem.runs:
         members = [fit.problem.measurements[i] for i in run.members]
@@ -105,7 +105,7 @@ def _runs(fit: Fit) -> list[_Run]:
 
 
 def _stages(fit: Fit, runs: Sequence[_Run], title: str) -> Iterator[Stage]:
-    """The fitted model, its paths in step and its motions in step."""
+    """Stages of the fitted model: its paths in step, and its motions in step."""
     for kind in dict.fromkeys(run.case_file.analysis.kind for run in runs):
         own = {run.name: run for run in runs if run.case_file.analysis.kind == kind}
         nodes = _nodes(fit, own.values())
@@ -115,7 +115,7 @@ def _stages(fit: Fit, runs: Sequence[_Run], title: str) -> Iterator[Stage]:
 
 
 def _nodes(fit: Fit, runs: Iterable[_Run]) -> list[int]:
-    """Measured nodes of the first run that has some, otherwise those of the case file's output."""
+    """Measured nodes of the first run with any; otherwise the case file's output nodes."""
     for run in runs:
         for one in (fit.problem.measurements[i] for i in run.members):
             if isinstance(one, AtNodes):
@@ -124,7 +124,7 @@ def _nodes(fit: Fit, runs: Iterable[_Run]) -> list[int]:
 
 
 def _provenance(fit: Fit, runs: Sequence[_Run], call: Call) -> list[Section]:
-    """How it was computed, each run at the fitted values."""
+    """How each run was computed at the fitted values."""
     sections: list[Section] = [Heading("How it was computed")]
     for run in runs:
         if len(runs) > 1:
@@ -223,7 +223,7 @@ def _caption(one: Measurement) -> str:
 
 
 def _draw(name: str, *arguments: Any) -> Any:
-    """A figure; pages without figures do without matplotlib."""
+    """Draw a figure; pages without figures do not import matplotlib."""
     from foldyn.experiment.calibration import fit_figures
 
     return getattr(fit_figures, name)(*arguments)

@@ -1,4 +1,4 @@
-"""The model of a fit: from values of the parameters to predictions of every measurement."""
+"""The model of a fit: maps parameter values to predictions of every measurement."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Problem:
     def predict(
         self, values: Sequence[float] | NDArray, runs: Sequence[int] | None = None
     ) -> list[NDArray[np.float64]]:
-        """Values that the model gives for each measurement; nan for those of runs left out.
+        """Predictions for each measurement; nan for runs that are left out.
 
         Raises
         ------
@@ -90,11 +90,12 @@ class Problem:
     def differentiate(
         self, values: NDArray, second: bool = True
     ) -> tuple[list[NDArray], list[NDArray]]:
-        """Values that the model gives, and their derivatives (n, p) by the parameters.
+        """Predictions, and their derivatives (n, p) with respect to the parameters.
 
-        second : whether these are right to the second order in the changes of the parameters.
+        second : whether derivatives have second-order accuracy in the parameter steps.
 
-        Derivatives are nan where a run has no neighbors, and 0 of what is not fitted.
+        Derivatives are nan for runs without neighboring solutions, and 0 for measurements not
+        fitted.
         """
         predicted: dict[int, NDArray[np.float64]] = {}
         slopes: dict[int, NDArray[np.float64]] = {}
@@ -115,7 +116,7 @@ class Problem:
         return [predicted[i] for i in every], [slopes[i] for i in every]
 
     def _computed(self, run: PredictedRun, values: Sequence[float] | NDArray) -> Predicted:
-        """What a run predicts at given values."""
+        """Predictions of a run at given values."""
         case_file, members = self.case_file(run, values), run.those_of(self.measurements)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
@@ -128,12 +129,12 @@ class Problem:
     def _beside(
         self, run: PredictedRun, values: NDArray, second: bool, fitted: Sequence[int]
     ) -> tuple[Predicted, list[tuple[Beside, Predicted]]]:
-        """What a run predicts at given values, and of `fitted` at those around for derivatives.
+        """Predictions of a run at given values, and of `fitted` ones at points for differences.
 
         Raises
         ------
         FoldynError
-            Those are not found without whole runs.
+            The differences need whole runs.
         """
         if not fitted:
             return self._computed(run, values), []
@@ -162,9 +163,9 @@ class Problem:
     def case_file(
         self, run: PredictedRun, values: Sequence[float] | NDArray, like: Like | None = None
     ) -> CaseFile:
-        """Case file at given values; its warnings were given when it was checked.
+        """Case file at given values, without warnings, which were given when it was checked.
 
-        like : one at other values, whose structure it takes where that is the same.
+        like : case file at other values, whose structure is reused if it is the same.
         """
         changes = self.space.changes(values)
         fixed = HINGES not in run.document["pattern"] and not any(
@@ -219,9 +220,9 @@ class Problem:
         return digest.hexdigest()
 
     def examine(self, values: Sequence[float] | NDArray) -> None:
-        """Refuse values at which vibrations leave open what the measured ones are.
+        """Refuse values at which the measured modes cannot be identified in the model.
 
-        What an analysis warns of is told, as of a motion or path it is not.
+        Warnings of the analysis are shown here, unlike those from motions or paths.
         """
         for run in self.runs:
             if run.kind in VIBRATIONS:
@@ -232,7 +233,7 @@ class Problem:
                     one.examine(result, case_file.case())
 
     def finer(self, values: Sequence[float] | NDArray) -> list[Finer]:
-        """The same model with half the time step, and with half the size of a shell's elements."""
+        """The same model with half the time step, and with half the element size of a shell."""
         steps: dict[int, dict[str, float]] = {}
         meshes: dict[int, dict[str, float]] = {}
         orders = []
@@ -268,19 +269,19 @@ class Problem:
 
 
 class Like(NamedTuple):
-    """A case file, and the values of the parameters that it is at."""
+    """A case file, and the parameter values that it was made with."""
 
     values: NDArray[np.float64]
     case_file: CaseFile
 
 
 class Finer(NamedTuple):
-    """A problem that is discretized twice as finely as another.
+    """A problem discretized twice as finely as another.
 
     what : "time step" or "mesh".
-    remedy : what a case file would say for it.
-    order : with which the error falls.
-    proof : one as many times finer as `times`, to prove what the two tell of still finer ones.
+    remedy : the corresponding setting in a case file.
+    order : order of convergence.
+    proof : a problem `times` times finer, which checks the extrapolation from the other two.
     """
 
     what: str
@@ -297,15 +298,15 @@ def problem(
     parameters: Sequence[Parameter],
     ties: Mapping[str, str],
 ) -> Problem:
-    """Check the arguments of a fit, and make its model.
+    """Check the arguments of a fit, and create its model.
 
     Raises
     ------
     InputError
-        One cannot be used: a case file at the values to start from, a measurement that its case
-        cannot predict, a parameter that the case file does not have.
+        An argument cannot be used: an invalid case file at the starting values, a measurement that
+        its case cannot predict, a parameter that the case file lacks.
     ComputationError
-        Modes or a frequency response cannot be computed at the values to start from.
+        Modes or a frequency response cannot be computed at the starting values.
     """
     path = path_of(case, "case")
     document = read_document(path)
@@ -339,7 +340,7 @@ def problem(
 def _check_keys(
     path: Path, document: dict[str, Any], parameters: Sequence[Parameter], ties: Mapping[str, str]
 ) -> None:
-    """Refuse keys that no case file has, before it is asked what the file says of them."""
+    """Refuse keys that case files cannot have, before looking up their values."""
     starts = {one.key: one.start for one in parameters if isinstance(one, Parameter)}
     for key, start in (starts | dict.fromkeys(ties)).items():
         if value_at(document, key) is None:
@@ -359,7 +360,7 @@ def _check_sigmas(measurements: Sequence[Measurement]) -> None:
 def _runs(
     path: Path, document: dict[str, Any], measurements: Sequence[Measurement]
 ) -> list[PredictedRun]:  # fmt: skip
-    """Measurements with the same case and the same changes, together."""
+    """Group measurements with the same case and the same changes."""
     groups: dict[str, tuple[Path, dict[str, Any], list[int]]] = {}
     for i, one in enumerate(measurements):
         own = path if one.case is None else Path(one.case)
@@ -373,7 +374,7 @@ def _runs(
 
 
 def _mass_rule(document: Mapping[str, Any]) -> dict[str, Any]:
-    """The mass rule that counts, where a file compares several: cases of others are not made."""
+    """The first mass rule of a file that lists several; cases with the others are not built."""
     rules = value_at(document, "model.mass")
     return {"model.mass": rules[0]} if isinstance(rules, list) and rules else {}
 
@@ -391,7 +392,7 @@ def _check(one: Measurement, case_file: CaseFile) -> None:
 
 
 def _parts(one: Measurement) -> Iterator[Any]:
-    """What predictions of a measurement depend on, but for the model."""
+    """Everything that predictions of a measurement depend on, except the model."""
     for item in fields(one):
         value = getattr(one, item.name)
         if item.name in ASIDE:

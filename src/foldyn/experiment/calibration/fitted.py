@@ -1,4 +1,4 @@
-"""What a fit has found, and how well the parameters are known."""
+"""Results of a fit, with the uncertainty of the parameters."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ class Descent:
     Attributes
     ----------
     start, values : tuple of float
-        Where it began and ended.
+        Parameters at its start and end.
     cost : float
-        Half the sum of squares of the weighted residuals at its end; inf where it failed.
+        Half the sum of squares of the weighted residuals at its end; inf if it failed.
     evaluations : int
-        Steps of the search that were tried.
+        Number of attempted steps.
     message : str
         Why it ended.
     converged : bool
@@ -62,7 +62,7 @@ class Score:
     name : str
     held_out : bool
     count : int
-        Values compared.
+        Number of values compared.
     rms : float
         Root mean square of the misfit, in `unit`.
     unit : str
@@ -90,27 +90,28 @@ class Fit:
     ----------
     estimates : tuple of Estimate
     correlation : ndarray, shape (p, p)
-        Of the estimates; nan with one that is not determined or at a bound.
+        Correlation of the estimates; nan for estimates that are undetermined or at a bound.
     singular_values : ndarray, shape (p,)
-        Of the weighted Jacobian by the parameters over their scales: a small one belongs to a
-        change of the parameters, the same row of `directions`, that the data hardly see.
+        Singular values of the weighted Jacobian with respect to scaled parameters. A small one
+        means that the data barely determine the change of parameters in the same row of
+        `directions`.
     directions : ndarray, shape (p, p)
     confidence : float
         Of the intervals.
     freedom : int
-        Fitted values minus free parameters, and minus the scales, shifts and trends of the data.
+        Number of fitted values minus free parameters, minus scales, shifts and trends of the data.
     misfit : float
         Root mean square of the weighted residuals per degree of freedom, the root of the reduced
-        chi-square: about 1 where every `sigma` is given and both they and the model are right.
+        chi-square: about 1 if every `sigma` is given and both these and the model are right.
     scores : tuple of Score
-        One a measurement.
+        One per measurement.
     descents : tuple of Descent
-        One a start, in the order of the starts.
+        One per start, in order.
     problem : Problem
     predicted : tuple of ndarray
         The model's prediction of each measurement.
     evaluations : int
-        Of the model, in all.
+        Number of evaluations of the model.
     seconds : float
     quotients : tuple of str
         Names of the measurements whose derivatives are difference quotients of whole runs.
@@ -145,19 +146,19 @@ class Fit:
 
     @property
     def agreeing(self) -> int:
-        """How many searches ended at the same smallest cost (within 1 %)."""
+        """Number of searches that ended at the same smallest cost (within 1 %)."""
         costs = np.array([one.cost for one in self.descents])
         slack = 0.01 * costs.min() + 1e-9
         return int((costs <= costs.min() + slack).sum())
 
     @property
     def weighed(self) -> bool:
-        """Whether the misfit is in standard errors, as the data all have one."""
+        """Whether the misfit is in standard errors, because all data have one."""
         return all(one.sigma is not None for one in self.problem.measurements if not one.held_out)
 
     @property
     def unlikely(self) -> str:
-        """What a misfit says that the noise of the data would hardly ever leave; "" of others."""
+        """Remark on a misfit that noise in the data can hardly explain; "" for others."""
         if not self.weighed or not np.isfinite(self.misfit):
             return ""
         square = self.freedom * self.misfit**2
@@ -169,7 +170,7 @@ class Fit:
 
     @property
     def quality(self) -> str:
-        """The misfit in words, and what it says of model and data."""
+        """Describe the misfit in words, with conclusions on model and data."""
         if not np.isfinite(self.misfit):
             return "No degree of freedom is left to tell the misfit."
         freedom = f"{self.freedom} degree{'s' if self.freedom != 1 else ''} of freedom"
@@ -182,18 +183,18 @@ class Fit:
         return text + f"{freedom})" + (f", {self.unlikely}." if self.unlikely else ".")
 
     def document(self) -> dict[str, Any]:
-        """The case file with the values found."""
+        """The case file with the fitted values."""
         return replaced(self.problem.document, self.problem.space.changes([*self.values.values()]))
 
     def write_case(self, path: str | os.PathLike[str]) -> None:
-        """Write the case file with the values found; paths in it are relative to the new place."""
+        """Write the case file with the fitted values; paths become relative to the new location."""
         path = Path(path)
         moved = os.path.relpath(self.problem.path.parent.resolve(), path.parent.resolve())
         text = f"# Fitted by Foldyn {foldyn.__version__} from {self.problem.path.name}.\n"
         write_text(path, text + tomli_w.dumps(files_moved(self.document(), moved)))
 
     def summary(self) -> dict[str, Any]:
-        """All numbers but the measured and predicted values, as JSON has them (nan is null)."""
+        """All numbers except measured and predicted values, as JSON types (nan is null)."""
         return {
             "foldyn_version": foldyn.__version__,
             "case": self.problem.path.name,
@@ -214,7 +215,7 @@ class Fit:
         }
 
     def dataset(self) -> xr.Dataset:
-        """Estimates, correlation, and measured beside predicted values, as a labelled dataset."""
+        """Estimates, correlation, and measured and predicted values, as a labeled dataset."""
         keys = list(self.values)
         data: dict[str, Any] = {
             name: ("parameter", np.array([getattr(one, name) for one in self.estimates]))
@@ -257,7 +258,7 @@ class Fit:
 
 
 def score(one: Measurement, predicted: NDArray) -> Score:
-    """Compare measured with predicted values."""
+    """Compare measured and predicted values."""
     observed = one.observed()
     misfit = predicted - observed
     rms = float(np.sqrt(np.mean(misfit**2)))

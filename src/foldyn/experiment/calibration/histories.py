@@ -1,4 +1,4 @@
-"""What a fit compares of a motion: histories of nodes, and their spectra."""
+"""Motions in a fit: histories of nodes, and their spectra."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ class TimeHistory(NodeValues):
     time : array_like, shape (t,)
         Times (s), increasing.
     values : array_like, shape (t, m)
-        Displacement of each node (m); NaN where it was lost.
+        Displacement of each node (m); NaN while it was lost.
     axis : {"x", "y", "z"}
     delay : float
         Time of the model minus that of the measurement (s).
     align : float
-        How far (s) the model may be moved beyond `delay`, to where the misfit is least: the instant
-        of a release is rarely known to a part of a frame. Not moved by default.
+        Largest further shift in time (s) of the model, in addition to `delay`, to minimize the
+        misfit: the instant of a release is rarely known to a fraction of a frame. 0 by default.
     detrend : {None, "constant", "linear"}
-        What is subtracted from the misfit: nothing, its mean, or the straight line of best fit. The
-        mean where the zero of the measured displacements is arbitrary.
+        Trend subtracted from the misfit: none, its mean, or the best-fit line. Use the mean if the
+        zero of the measured displacements is arbitrary.
     sight : Sight, optional
-        Where a camera was whose displacements these are: then the model is compared as it would
-        look from there; `Sight.of` finds it in tracks.
+        Camera that measured the displacements: the model is then compared as this camera would see
+        it; `Sight.of` takes it from tracks.
     """
 
     time: Any = ()
@@ -77,7 +77,7 @@ class TimeHistory(NodeValues):
             self._refuse_constant(node)
 
     def _refuse_constant(self, node: int) -> None:
-        """Refuse a history without any motion."""
+        """Refuse a history without motion."""
         seen = self.values[:, node][np.isfinite(self.values[:, node])]
         named = np.ravel(self.nodes)
         one = f"node {named[node]}" if len(named) == self.values.shape[1] else f"column {node}"
@@ -92,31 +92,31 @@ class TimeHistory(NodeValues):
 
     @property
     def adapts(self) -> bool:
-        """See `Measurement`."""
+        """Whether predictions depend on the measured values."""
         return self.align > 0.0
 
     @property
     def absorbed(self) -> int:
-        """See `Measurement`."""
+        """Degrees of freedom that predictions take from the data."""
         return (self.align > 0.0) + DETRENDS.index(self.detrend) * self.values.shape[1]
 
     def observed(self) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Measured values, flattened."""
         return self._reduced(self.values)
 
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
-        """See `Measurement`."""
+        """Refuse a case that cannot predict these values."""
         super().check(case, arguments)
         early, late = self.time[0] + self.delay, self.time[-1] + self.delay
         _within(self._of("time"), np.array([early - self.align, late + self.align]), arguments)
 
     def curves(self, result: Any, case: Case) -> NDArray[np.float64]:
-        """Displacements in a motion at the measured times, shape (t, m), no trend removed."""
+        """Displacements in a motion at the measured times, shape (t, m), trend included."""
         along = _spline(result, self.where(case), self.axis, self.sight)
         return along(self.time + self.delay + self.shift(result, case))
 
     def shift(self, result: Any, case: Case) -> float:
-        """How far (s) the model is moved, beyond `delay` and at most by `align`, to fit best."""
+        """Best-fitting time shift (s) of the model in addition to `delay`, at most `align`."""
         if self.align == 0.0:
             return 0.0
         along = _spline(result, self.where(case), self.axis, self.sight)
@@ -128,17 +128,17 @@ class TimeHistory(NodeValues):
         step = 0.25 * float(np.diff(self.time).min())
         tried = np.linspace(-self.align, self.align, 2 * math.ceil(self.align / step) + 1)
         by = float(tried[np.argmin([float(r @ r) for r in map(misfit, tried)])])
-        for _ in range(REFINED):  # Gauss and Newton's steps, from a place that is close
+        for _ in range(REFINED):  # Gauss-Newton steps from a close start
             slope = self._reduced(speed(there + by))
             by = float(np.clip(by - slope @ misfit(by) / (slope @ slope), *tried[[0, -1]]))
         return by
 
     def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Predictions of the measured values, in the order of `observed`."""
         return self._reduced(self.curves(result, case))
 
     def trend(self, curves: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What `detrend` subtracts from curves (t, m), fitted where the nodes were seen."""
+        """Trend of curves (t, m) that `detrend` subtracts, fitted where nodes were seen."""
         if self.detrend is None:
             return np.zeros(curves.shape)
         degree = DETRENDS.index(self.detrend) - 1
@@ -150,7 +150,7 @@ class TimeHistory(NodeValues):
         return np.stack(lines, axis=1)
 
     def _reduced(self, curves: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Curves where the nodes were seen, without their trend, flat: node after node."""
+        """Curves where the nodes were seen, without their trend, flattened node by node."""
         return (curves - self.trend(curves)).T[np.isfinite(self.values).T]
 
 
@@ -163,17 +163,17 @@ class Spectrum(NodeValues):
     frequency : array_like, shape (f,)
         Frequencies (Hz).
     values : array_like, shape (f, m)
-        Amplitude of each node (m), as `foldyn.signals.spectrum` has it.
+        Amplitude of each node (m), as defined by `foldyn.signals.spectrum`.
     time : array_like, shape (t,)
-        Times (s) of the model's motion of which the spectrum is compared: those of the record
-        whose spectrum this is, so that both resolve and leak the same.
+        Times (s) at which the model's motion is sampled for its spectrum: the times of the measured
+        record, so that resolution and leakage agree.
     axis : {"x", "y", "z"}
     detrend : {None, "constant", "linear"}
-        What is subtracted from the model's motion first; as it was for the record.
+        Trend first subtracted from the model's motion, as for the record.
     taper : str, optional
-        Window function of both, as `foldyn.signals.spectrum` takes it.
+        Window function of both, as in `foldyn.signals.spectrum`.
     sight : Sight, optional
-        As of a history.
+        As in `TimeHistory`.
     """
 
     frequency: Any = ()
@@ -232,11 +232,11 @@ class Spectrum(NodeValues):
         )  # fmt: skip
 
     def observed(self) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Measured values, flattened."""
         return self.values.T.ravel()
 
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
-        """See `Measurement`."""
+        """Refuse a case that cannot predict these values."""
         super().check(case, arguments)
         _within(self._of("time"), self.time, arguments)
 
@@ -248,12 +248,12 @@ class Spectrum(NodeValues):
         return np.stack([np.interp(self.frequency, frequency, one) for one in amplitude.T], axis=1)
 
     def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Predictions of the measured values, in the order of `observed`."""
         return self.spectra(result, case).T.ravel()
 
 
 def _spline(result: Any, nodes: NDArray[np.int64], axis: str, sight: Sight | None) -> CubicSpline:
-    """Displacement of nodes along an axis between a motion's samples, as it is seen."""
+    """Interpolate the seen displacement of nodes along an axis between a motion's samples."""
     moved = result["displacement"].values[:, nodes]
     if sight is not None:
         moved = sight.seen(nodes, result["rest_position"].values[nodes], moved)
@@ -261,7 +261,7 @@ def _spline(result: Any, nodes: NDArray[np.int64], axis: str, sight: Sight | Non
 
 
 def _within(name: str, times: NDArray[np.float64], arguments: Mapping[str, Any]) -> None:
-    """Refuse times that the motion of a case does not have."""
+    """Refuse times outside the motion of a case."""
     first = float(arguments.get("start", 0.0))
     last = first + arguments["duration"]
     slack = 1e-9 * (last - first)

@@ -1,4 +1,4 @@
-"""What a fit compares of a quasi-static test: forces and shapes."""
+"""Quasi-static tests in a fit: forces and shapes."""
 
 from __future__ import annotations
 
@@ -26,16 +26,18 @@ POINTS = 25
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ForceDisplacement(AtNodes):
-    """Forces at displacements that supports of the case impose.
+    """Forces at displacements imposed by supports of the case.
 
     Parameters
     ----------
     nodes : sequence of int, or str
-        As of every measurement; "imposed", the default, for all that supports move along the axis.
+        As in every measurement; "imposed", the default, means all nodes that supports move along
+        the axis.
     displacement : array_like, shape (n,)
-        Mean displacement of the nodes along the axis (m); creases that yield follow their order.
+        Mean displacement of the nodes along the axis (m); with yielding creases their order
+        matters.
     force : array_like, shape (n,)
-        Force on all of them together along the axis (N), positive along the axis.
+        Total force on the nodes along the axis (N), positive along the axis.
     axis : {"x", "y", "z"}
     """
 
@@ -56,21 +58,21 @@ class ForceDisplacement(AtNodes):
 
     @property
     def unit(self) -> str:
-        """See `Measurement`."""
+        """Unit of the values."""
         return "N"
 
     def observed(self) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Measured values, flattened."""
         return self.force
 
     def where(self, case: Case) -> NDArray[np.int64]:
-        """See `Measurement`."""
+        """Numbers of the nodes."""
         if self.nodes == IMPOSED:
             return np.flatnonzero(case.imposed[:, AXES.index(self.axis)])
         return super().where(case)
 
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
-        """See `Measurement`."""
+        """Refuse a case that cannot predict these values."""
         if not len(self.where(case)):
             raise InputError(f"{self._of('nodes')}: no support moves any node along {self.axis}")
         held = case.imposed[self.where(case), AXES.index(self.axis)]
@@ -85,11 +87,11 @@ class ForceDisplacement(AtNodes):
             raise InputError(f"{self._of('nodes')}: the supports move these nodes by 0")
 
     def factors(self, case: Case) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Load factors at which the path is needed."""
         return self.displacement / self._full(case)
 
     def at(self, displacement: NDArray[np.float64]) -> ForceDisplacement:
-        """The same test at other displacements, where no force is known."""
+        """The same test at other displacements, without known forces."""
         return replace(self, displacement=displacement, force=np.zeros(len(displacement)))
 
     def _full(self, case: Case) -> float:
@@ -98,7 +100,7 @@ class ForceDisplacement(AtNodes):
         return float(sum(np.mean(term[nodes, axis]) for term, _ in case.imposed_terms))
 
     def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Predictions of the measured values, in the order of `observed`."""
         nodes = np.isin(result["support_node"].values, self.where(case))
         chosen = nodes & (result["support_axis"].values == self.axis)
         total = result["reaction"].values[:, chosen].sum(axis=1)
@@ -113,7 +115,7 @@ class Shapes(NodeValues):
     ----------
     load_factor : array_like, shape (s,)
     values : array_like, shape (s, m, a)
-        Of each node along each axis (m); NaN where one was not seen.
+        Values of each node along each axis (m); NaN if not seen.
     axes : str
         The axes measured, "xz" for a picture from the side.
     quantity : {"displacement", "position"}
@@ -142,15 +144,15 @@ class Shapes(NodeValues):
         self._set(load_factor=factors, values=values)
 
     def observed(self) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Measured values, flattened."""
         return self.values[np.isfinite(self.values)]
 
     def factors(self, case: Case) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Load factors at which the path is needed."""
         return self.load_factor
 
     def shapes(self, result: Any, case: Case) -> NDArray[np.float64]:
-        """Values of a result, whether they were seen or not, shape (s, m, a)."""
+        """Values of a result at all nodes, seen or not, shape (s, m, a)."""
         nodes, axes = self.where(case), [AXES.index(axis) for axis in self.axes]
         moved = result["displacement"].values[_steps(result, self.load_factor)][:, nodes][..., axes]
         if self.quantity == "displacement":
@@ -158,28 +160,28 @@ class Shapes(NodeValues):
         return moved + case.structure.nodes[nodes][:, axes]
 
     def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Predictions of the measured values, in the order of `observed`."""
         return self.shapes(result, case)[np.isfinite(self.values)]
 
 
 def _steps(result: Any, factors: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Steps of a path at load factors that it has been asked for: in order, or at the nearest."""
+    """Steps of a path at requested load factors: in order, or the nearest ones."""
     place, found = np.cumsum(np.append(0, np.diff(factors) != 0.0)), result["load_factor"].values
     if len(found) > place[-1] and np.array_equal(found[place], factors):
-        return place  # also of a path that passes some of them several times
+        return place  # works for paths that pass a load factor several times
     return np.abs(found[None] - factors[:, None]).argmin(axis=1)
 
 
 def dense_curve(one: ForceDisplacement) -> ForceDisplacement:
-    """The same test at more displacements, from 0 to beyond the measured ones, for a curve."""
+    """The same test at more displacements, from 0 to beyond the measured ones, to draw a curve."""
     ends = min(0.0, one.displacement.min()), max(0.0, one.displacement.max())
     return one.at(np.union1d(np.linspace(*ends, POINTS), one.displacement))
 
 
 def picture_plane(one: Shapes, case: Case) -> tuple[int, int]:
-    """Indices in `axes` of the directions that pictures have across and upwards.
+    """Indices in `axes` of the horizontal and vertical directions of pictures.
 
-    They are those along which the nodes lie farthest apart.
+    They are the axes along which the nodes extend farthest.
     """
     rest = case.structure.nodes[one.where(case)]
     spans = [np.ptp(rest[:, AXES.index(axis)]) for axis in one.axes]

@@ -35,13 +35,13 @@ from foldyn.values import choice, show
 def force_displacement(
     file: Path, columns: Mapping[str, str] | None = None, **known: Any
 ) -> ForceDisplacement:
-    """Points of a CSV file with the columns displacement and force.
+    """Force-displacement points from a CSV file with the columns displacement and force.
 
     Parameters
     ----------
     file : Path
     columns : mapping, optional
-        Headings, if they are not "displacement" and "force".
+        Column headings, if not "displacement" and "force".
     **known
         Other arguments of `ForceDisplacement`.
     """
@@ -65,12 +65,12 @@ def shapes(
     Parameters
     ----------
     file : Path
-        CSV with the columns load_factor, node, and x, y, z as far as they were measured, empty
-        where a node was lost; or tracks of photographs (``*.nc`` or ``*.csv``).
+        CSV with the columns load_factor, node, and the measured ones of x, y, z, empty where a node
+        was lost; or tracks of photographs (``*.nc`` or ``*.csv``).
     nodes : sequence of int, optional
         Nodes to take; all in the file by default.
     load_factor : sequence of float, optional
-        Of the photographs in tracks.
+        Load factor of each photograph in tracks.
     **known
         Other arguments of `Shapes`.
     """
@@ -92,7 +92,7 @@ def history(
     window: Sequence[float] | None = None,
     **known: Any,
 ) -> TimeHistory:
-    """Histories from a CSV file with a column of times and one for each node, or from tracks.
+    """Histories from a CSV file with columns of time and nodes, or from tracks.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def history(
     nodes : sequence of int
     axis : {"x", "y", "z"}
     columns : sequence of str, optional
-        Headings of the nodes' columns, in their order.
+        Headings of the nodes' columns, in order.
     window : (float, float), optional
         First and last time (s) to take.
     **known
@@ -128,19 +128,19 @@ def history(
 def spectrum(
     file: Path, band: Sequence[float] | None = None, taper: str | None = None, **known: Any
 ) -> Spectrum:
-    """Spectra of histories within a band (Hz), which must be given; the rest as for `history`."""
+    """Spectra of histories within a required band (Hz); other arguments as in `history`."""
     chosen = limits("band", band, "frequencies (Hz)")
     detrend = known.pop("detrend", "constant")
     return Spectrum.of(history(file, **known), chosen, detrend, taper)
 
 
 def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
-    """Measurement in a file; its columns tell the kind.
+    """Recognize a measurement in a file from its columns.
 
     Columns displacement and force: forces on all nodes that supports move along the axis. A column
     load_factor: shapes. A first column of times and others such as "node 8 x": histories of the
     nodes along the axis. Tracks of a film: histories of all nodes that were seen; one that was seen
-    only once shows no motion and is left out. A column mode: mode shapes where there is a column
+    only once shows no motion and is left out. A column mode: mode shapes if there is also a column
     node, else natural frequencies. A column frequency and others such as "node 8 x real": frequency
     responses of the nodes along the axis. Results of Foldyn: natural frequencies, or frequency
     responses.
@@ -183,7 +183,7 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
 
 
 def _opened(file: Path) -> tuple[xr.Dataset | None, list[str]]:
-    """Tracks and their dimensions, or None and the names of the columns of a CSV file."""
+    """Tracks and their dimensions, or None and the column names of a CSV file."""
     if file.suffix.lower() == ".nc":
         tracks = load_tracks(file)
         return tracks, [str(name) for name in tracks.sizes]
@@ -255,7 +255,7 @@ def _shapes_of_tracks(
 
 
 def _table(file: Path, names: Sequence[str]) -> xr.DataArray:
-    """Displacements in a CSV file with a line for each photograph, as tracks have them."""
+    """Displacements from a CSV file with a line for each photograph, in the layout of tracks."""
     columns = _columns(names)
     if not columns:
         raise InputError(f'{file}: has no columns "node 8 x", ... of displacements')
@@ -278,7 +278,7 @@ def _of_nodes(file: Path, moved: xr.DataArray, nodes: Sequence[int]) -> xr.DataA
 
 
 def _texts(given: Any) -> bool:
-    """Whether this is a list of texts."""
+    """Whether this is a list of strings."""
     return isinstance(given, list | tuple) and all(isinstance(one, str) for one in given)
 
 

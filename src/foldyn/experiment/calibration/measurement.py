@@ -1,4 +1,4 @@
-"""What all measurements to which a case is fitted have in common."""
+"""Common base of all measurements to which a case is fitted."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ class Measurement(ABC):
     name : str
         Its name in messages and figures; the kind by default.
     label : str
-        What figures call the data: "measured"; "synthetic" where a model made them.
+        Label of the data in figures: "measured", or "synthetic" if a model made them.
     sigma : float, optional
         Standard error of one value, in the unit of the values. A fit to several measurements needs
-        it for each, to weight them. Some kinds take a list, one for each value.
+        it for each, as weights. Some kinds take a list with one for each value.
     held_out : bool
-        Not fitted, only compared with the result of the fit to the others.
+        Whether to compare the data only with the fit to the others, without fitting them.
     case : path, optional
-        Case file of this measurement, where it differs from that of the whole fit.
+        Case file of this measurement, if it differs from the fit's.
     changes : mapping of str to object
         Keys of the case file that have other values in this measurement, such as
         ``{"supports[3].displacement": 0.04}``.
@@ -52,7 +52,7 @@ class Measurement(ABC):
     each: ClassVar[bool] = False  # whether sigma may be a list
 
     def __post_init__(self) -> None:
-        """Check what all have."""
+        """Check the common fields."""
         self._set(name=self.name or self.kind)
         listed = self.each and isinstance(self.sigma, Sequence | np.ndarray)
         if self.sigma is not None and not listed:
@@ -70,7 +70,7 @@ class Measurement(ABC):
 
     @property
     def unit(self) -> str:
-        """Unit of the values; empty where they have none."""
+        """Unit of the values; empty if none."""
         return "m"
 
     @property
@@ -88,23 +88,23 @@ class Measurement(ABC):
         """Measured values, flat."""
 
     def errors(self) -> NDArray[np.float64]:
-        """Standard error of each measured value; the spread of all where none is known."""
+        """Standard error of each measured value; the spread of all values if unknown."""
         observed = self.observed()
         return np.full(len(observed), self.sigma or spread(observed))
 
     @abstractmethod
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
-        """Refuse a case, or arguments of its analysis, that cannot give these values."""
+        """Refuse a case, or arguments of its analysis, that cannot predict these values."""
 
     @abstractmethod
     def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
-        """Values that a result gives for the measured ones, flat and in their order."""
+        """Predictions of the measured values by a result, flattened in the same order."""
 
     def examine(self, result: Any, case: Case) -> None:  # noqa: B027
-        """Refuse a result that leaves open which of its values are the measured ones."""
+        """Refuse a result in which the measured modes cannot be identified."""
 
     def factors(self, case: Case) -> NDArray[np.float64]:
-        """Load factors at which a path is needed; none for what is no path."""
+        """Load factors at which a path is needed; none for other analyses."""
         return np.zeros(0)
 
 
@@ -119,7 +119,7 @@ class AtNodes(Measurement):
     """
 
     nodes: int | str | Sequence[int] = ()
-    word: ClassVar[str] = ""  # for `nodes`, which only this kind understands
+    word: ClassVar[str] = ""  # for `nodes`, which only this kind accepts
 
     def __post_init__(self) -> None:
         """Check the nodes."""
@@ -134,18 +134,18 @@ class AtNodes(Measurement):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NodeValues(AtNodes):
-    """Values of each of the nodes: `values`, its second axis along the nodes."""
+    """Values of each node: `values`, with nodes along its second axis."""
 
     values: Any = ()
 
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
-        """See `Measurement`."""
+        """Refuse a case that cannot predict these values."""
         named, known = len(self.where(case)), self.values.shape[1]
         if named != known:
             raise InputError(f"{self._of('values')}: are of {known} nodes, {named} are named")
 
     def _per_node(self, values: NDArray, rows: int, what: str, field: str = "values") -> NDArray:
-        """The values of as many rows, a column for each node."""
+        """Values for a number of rows, a column for each node."""
         values = values[:, None] if values.ndim == 1 else values
         if values.ndim != 2 or len(values) != rows:
             raise InputError(
@@ -155,7 +155,7 @@ class NodeValues(AtNodes):
 
 
 def column(name: str, values: Any, length: int | None = None) -> NDArray[np.float64]:
-    """Finite numbers in a row, of a given length where one is given."""
+    """Finite numbers in one dimension, of a given length if specified."""
     array = numbers(name, values)
     if array.ndim != 1 or not array.size or (length is not None and len(array) != length):
         wanted = "a list of numbers" if length is None else f"a list of {length} numbers"
@@ -164,7 +164,7 @@ def column(name: str, values: Any, length: int | None = None) -> NDArray[np.floa
 
 
 def plain_array(name: str, values: Any) -> NDArray:
-    """Array of values of any kind, NaN among them."""
+    """Numeric array, with NaN allowed."""
     try:
         return np.array(values)
     except ValueError:
@@ -172,12 +172,12 @@ def plain_array(name: str, values: Any) -> NDArray:
 
 
 def spread(observed: NDArray) -> float:
-    """Size of measured values, by which they are weighted where their error is not known."""
+    """Spread of measured values, which weights them if their error is unknown."""
     return float(np.std(observed)) or float(np.abs(observed).max()) or 1.0
 
 
 def check_axes(name: str, axes: Any) -> None:
-    """Refuse what is not letters of "xyz", each once."""
+    """Refuse anything but letters of "xyz" without repetition."""
     sound = isinstance(axes, str) and axes and len(set(axes)) == len(axes) and {*axes} <= {*AXES}
     if not sound:
         raise InputError(f'{name} = {show(axes)}: must be letters of "xyz"')

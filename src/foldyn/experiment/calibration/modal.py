@@ -1,4 +1,4 @@
-"""What a fit compares of modes: natural frequencies, damping ratios and mode shapes."""
+"""Modes in a fit: natural frequencies, damping ratios and mode shapes."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ FEWEST = 2
 
 
 class Pairing(NamedTuple):
-    """Which mode of the model each measured one is.
+    """Pairing of measured modes with modes of the model.
 
-    place : places (k,) of the partners among the modes of the model that something resists.
-    mac : (k, K), of the measured modes with all of these.
+    place : index (k,) of each partner among the model's modes with stiffness.
+    mac : (k, K), between measured modes and all of these.
     """
 
     place: NDArray[np.int64]
@@ -44,17 +44,17 @@ class Pairing(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ModeShapes(NodeValues):
-    """Mode shapes at nodes: what counts is their form, not their sign or size.
+    """Mode shapes at nodes; only their form matters, not their sign or size.
 
-    Each measured shape is compared with that mode of the model, among those that its case asks for,
-    whose shape is most like it (MAC), scaled so that it fits best. The sum of the squared
-    differences is then 1 - MAC for a shape of length 1.
+    Each measured shape is compared with the mode of the model, among those that its case computes,
+    with the highest MAC, scaled for the best fit. The sum of squared differences is then 1 - MAC
+    for a shape of length 1.
 
     Parameters
     ----------
     values : array_like, shape (k, m, a)
-        Of each mode, the component of each node along each axis, in any unit; NaN where it was not
-        measured. They are kept divided by the largest of each mode.
+        Component of each mode at each node along each axis, in any unit; NaN where not measured.
+        They are stored divided by the largest of each mode.
     axes : str
         The axes measured, "z" for a sensor that looks along z.
     mode : sequence of int, optional
@@ -94,30 +94,30 @@ class ModeShapes(NodeValues):
 
     @property
     def unit(self) -> str:
-        """See `Measurement`."""
+        """Unit of the values."""
         return ""
 
     @property
     def adapts(self) -> bool:
-        """See `Measurement`: they are paired, and scaled."""
+        """Predictions depend on the measured values: shapes are paired and scaled."""
         return True
 
     @property
     def absorbed(self) -> int:
-        """See `Measurement`: the scale of each shape."""
+        """One degree of freedom for the scale of each shape."""
         return len(self.values)
 
     @property
     def count(self) -> int:
-        """How many modes of the model are needed, those without stiffness not counted."""
+        """Number of modes of the model needed, without modes of zero stiffness."""
         return len(self.values)
 
     def observed(self) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Measured values, flattened."""
         return self.values[np.isfinite(self.values)]
 
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
-        """See `Measurement`."""
+        """Refuse a case that cannot predict these values."""
         super().check(case, arguments)
         nodes, axes = self.where(case), [AXES.index(axis) for axis in self.axes]
         if case.fixed[nodes][:, axes].all():
@@ -127,7 +127,7 @@ class ModeShapes(NodeValues):
             )
 
     def pairing(self, result: Any, case: Case) -> Pairing:
-        """Which modes of a result are the measured ones, so that the sum of their MAC is largest.
+        """Pair measured modes with modes of a result so that the sum of their MAC is largest.
 
         Raises
         ------
@@ -143,7 +143,7 @@ class ModeShapes(NodeValues):
         return Pairing(pair_modes(alike).second, alike)
 
     def examine(self, result: Any, case: Case) -> None:
-        """See `Measurement`: each measured mode must be like one of the model, and one alone."""
+        """Refuse a result unless each measured mode resembles exactly one mode of the model."""
         place, alike = self.pairing(result, case)
         kept = resisted(result)
         names, hertz = result["mode"].values[kept], result["frequency"].values[kept]
@@ -176,33 +176,33 @@ class ModeShapes(NodeValues):
         return shapes * scale[:, None, None]
 
     def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Predictions of the measured values, in the order of `observed`."""
         return self.shapes(result, case)[np.isfinite(self.values)]
 
     def places(self, result: Any, case: Case) -> NDArray[np.int64]:
-        """Places (k,) in a result of the modes that were measured."""
+        """Indices (k,) of the measured modes in a result."""
         return resisted(result)[self.pairing(result, case).place]
 
     def _of_model(self, result: Any, case: Case) -> NDArray[np.float64]:
-        """Shapes (K, m, a) of the model where it was measured, of modes that something resists."""
+        """Shapes (K, m, a) of the model's modes with stiffness, where measured."""
         shapes = result["shape"].transpose("mode", "node", "axis").values[resisted(result)]
         return shapes[:, self.where(case)][..., [AXES.index(axis) for axis in self.axes]]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ModalParameters(Measurement):
-    """A number of each of several modes.
+    """A number for each of several modes.
 
     Parameters
     ----------
     mode : sequence of int, optional
-        Which mode of the model each is, counted from 1 by frequency, those that nothing resists
-        left out; the lowest ones by default. With `shapes`, numbers for messages and figures.
+        Number of each mode in the model, counted from 1 by frequency without modes of zero
+        stiffness; by default the lowest ones. With `shapes`, numbers for messages and figures.
     shapes : ModeShapes, optional
-        The shapes of the same modes, in the same order: then each is the mode of the model whose
-        shape is most like it, whatever its place among the others. They are not fitted.
+        The shapes of the same modes, in the same order: each is then paired with the model's mode
+        of the most similar shape, whatever its number. They are not fitted.
     sigma : float or array_like, shape (k,), optional
-        Standard error of each.
+        Standard error of each number.
     """
 
     mode: Any = None
@@ -239,46 +239,46 @@ class ModalParameters(Measurement):
 
     @abstractmethod
     def _check_values(self, values: NDArray[np.float64]) -> None:
-        """Refuse values that no mode has."""
+        """Refuse values that are impossible for modes."""
 
     @property
     @abstractmethod
     def quantity(self) -> str:
-        """Variable of modes that is compared, and the field that holds what was measured."""
+        """Variable of modes to compare, and the field with its measured values."""
 
     @property
     def adapts(self) -> bool:
-        """See `Measurement`."""
+        """Whether predictions depend on the measured values."""
         return self.shapes is not None
 
     @property
     def count(self) -> int:
-        """How many modes of the model are needed, those without stiffness not counted."""
+        """Number of modes of the model needed, without modes of zero stiffness."""
         return int(self.mode.max()) if self.shapes is None else self.shapes.count
 
     def observed(self) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Measured values, flattened."""
         return getattr(self, self.quantity)
 
     def errors(self) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Standard error of each measured value."""
         if isinstance(self.sigma, np.ndarray):
             return self.sigma
         return super().errors()
 
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
-        """See `Measurement`."""
+        """Refuse a case that cannot predict these values."""
         if self.shapes is not None:
             self.shapes.check(case, arguments)
 
     def examine(self, result: Any, case: Case) -> None:
-        """See `Measurement`."""
+        """Refuse a result in which the measured modes cannot be identified."""
         if self.shapes is not None:
             self.shapes.examine(result, case)
         self.predicted(result, case)
 
     def places(self, result: Any, case: Case) -> NDArray[np.int64]:
-        """Places (k,) in a result of the modes that were measured."""
+        """Indices (k,) of the measured modes in a result."""
         if self.shapes is not None:
             return self.shapes.places(result, case)
         kept = resisted(result)
@@ -286,7 +286,7 @@ class ModalParameters(Measurement):
         return kept[self.mode - 1]
 
     def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Predictions of the measured values, in the order of `observed`."""
         return result[self.quantity].values[self.places(result, case)]
 
 
@@ -305,12 +305,12 @@ class NaturalFrequencies(ModalParameters):
 
     @property
     def quantity(self) -> str:
-        """See `ModalParameters`."""
+        """Variable of modes to compare, and the field with its measured values."""
         return "frequency"
 
     @property
     def unit(self) -> str:
-        """See `Measurement`."""
+        """Unit of the values."""
         return "Hz"
 
     def _check_values(self, values: NDArray[np.float64]) -> None:
@@ -342,12 +342,12 @@ class DampingRatios(ModalParameters):
 
     @property
     def quantity(self) -> str:
-        """See `ModalParameters`."""
+        """Variable of modes to compare, and the field with its measured values."""
         return "damping_ratio"
 
     @property
     def unit(self) -> str:
-        """See `Measurement`."""
+        """Unit of the values."""
         return ""
 
     def _check_values(self, values: NDArray[np.float64]) -> None:
@@ -360,7 +360,7 @@ class DampingRatios(ModalParameters):
 
 
 def resisted(result: Any) -> NDArray[np.int64]:
-    """Places of the modes that something resists: neither rigid nor mechanisms, nor unstable."""
+    """Indices of modes with stiffness: not rigid, mechanisms, or unstable."""
     return np.flatnonzero(result["eigenvalue"].values > 0.0)
 
 
@@ -376,7 +376,7 @@ def _enough(name: str, found: int, needed: int, result: Any) -> None:
 
 
 def _numbered(name: str, given: Any, count: int) -> NDArray[np.int64]:
-    """Numbers of modes from 1, increasing; 1, 2, ... where none are given."""
+    """Mode numbers from 1, increasing; 1, 2, ... by default."""
     if given is None:
         return np.arange(1, count + 1)
     array = numbers(name, given)

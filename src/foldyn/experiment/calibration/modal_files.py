@@ -49,11 +49,11 @@ def frequencies(
     Parameters
     ----------
     file : Path
-        CSV, where a column frequency_sigma holds standard errors; or a result of `fd.modes`.
+        CSV, with standard errors in an optional column frequency_sigma; or a result of `fd.modes`.
     modes : sequence of int, optional
         Numbers of the modes to take; all in the file by default.
     shapes : Path, optional
-        File of the shapes of these modes, by which they are paired with the model's.
+        File with the shapes of these modes, which pair them with the model's.
     **known
         Other arguments of `NaturalFrequencies`.
     """
@@ -63,7 +63,7 @@ def frequencies(
 def damping_ratios(
     file: Path, modes: Any = None, shapes: Path | None = None, **known: Any
 ) -> DampingRatios:
-    """Damping ratios, as `frequencies`: columns mode, damping_ratio and damping_ratio_sigma."""
+    """Damping ratios like `frequencies`: columns mode, damping_ratio, damping_ratio_sigma."""
     return _of_modes(DampingRatios, file, known, _numbers(file, "damping_ratio", modes, shapes))
 
 
@@ -74,14 +74,14 @@ def _of_modes(kind: Any, file: Path, known: dict[str, Any], given: dict[str, Any
 
 
 def _with_sigma(file: Path, known: dict[str, Any], errors: NDArray) -> dict[str, Any]:
-    """Other arguments with the standard errors that a file holds, which must be the only ones."""
+    """Add the standard errors of a file to the arguments; refuse a second source of them."""
     if known.get("sigma") is not None:
         raise InputError(f"{file}: sigma: leave it out, the file has a column of it")
     return {**known, "sigma": errors}
 
 
 def _numbers(file: Path, name: str, modes: Any, shapes: Path | None) -> dict[str, Any]:
-    """Arguments that a file gives for numbers of modes."""
+    """Arguments from a file of numbers per mode."""
     if _is_result(file):
         found = _result(file, "modes")
         values = found[name].values[resisted(found)]
@@ -107,8 +107,8 @@ def mode_shapes(
     Parameters
     ----------
     file : Path
-        CSV with the columns mode, node, and x, y, z as far as they were measured, empty where a
-        node was not; or a result of `fd.modes`.
+        CSV with the columns mode, node, and the measured ones of x, y, z, empty where not measured;
+        or a result of `fd.modes`.
     nodes : sequence of int, optional
         Nodes to take; all in the file by default.
     axes : str, optional
@@ -149,13 +149,13 @@ def frf(
     file : Path
         CSV with the columns frequency and, for each node, "node 8 x real" and "node 8 x imag" or
         "node 8 x magnitude", empty where nothing was measured; "node 8 x sigma" holds standard
-        errors. The unit says which quantity it is. Or a result.
+        errors. The unit determines the quantity. Or a result.
     nodes : sequence of int
     axis : {"x", "y", "z"}
     quantity : str, optional
-        What a result is turned into.
+        Quantity to convert a result to.
     magnitude : bool, optional
-        Whether magnitudes are compared, where the file has complex values.
+        Whether to compare magnitudes if the file has complex values.
     band : (float, float), optional
         First and last frequency (Hz) to take.
     **known
@@ -199,7 +199,7 @@ def frf(
 
 
 def recognized(file: Path, axis: str, **known: Any) -> Measurement | None:
-    """Modes or frequency responses in a file; None where it holds none."""
+    """Modes or frequency responses in a file; None if there are none."""
     if _is_result(file):
         kind = read(file, "cannot be read as NetCDF").attrs.get("foldyn_result")
         if kind == "modes":
@@ -220,7 +220,7 @@ def recognized(file: Path, axis: str, **known: Any) -> Measurement | None:
 def _columns(
     file: Path, nodes: Sequence[int], axis: str, quantity: str | None
 ) -> tuple[str, NDArray, NDArray, NDArray | None]:
-    """Quantity, frequencies (f,), values (f, m) and their standard errors, where there are any."""
+    """Quantity, frequencies (f,), values (f, m) and their standard errors, if any."""
     units = dict(read_headings(file))
     there = {part for node, along, part in _parts(units) if along == axis and node in nodes}
     parts = ("magnitude",) if "magnitude" in there else ("real", "imag")
@@ -263,7 +263,7 @@ def _parts(names: Any) -> list[tuple[int, str, str]]:
 
 
 def _chosen(file: Path, numbers: NDArray, modes: Any) -> NDArray[np.int64]:
-    """Places of the modes to take among those of a file, in the order of their numbers."""
+    """Indices of the requested modes in a file, in the order of their numbers."""
     broken = numbers[numbers != numbers.astype(int)]
     if broken.size:
         raise InputError(f"{file}: mode = {broken[0]:g}: must be a whole number")

@@ -1,4 +1,4 @@
-"""Tables of measured modes beside those of the fitted model."""
+"""Tables of measured modes and the fitted model's modes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from foldyn.report.sections import Table, cell
 
 
 def modes_table(one: ModalParameters, result: Any, case: Case) -> Table:
-    """Measured numbers of modes beside those of the model."""
+    """Table of measured values per mode and the model's values."""
     places, measured = one.places(result, case), one.observed()
     model = result[one.quantity].values[places]
     errors = one.errors() if one.sigma is not None else np.full(len(measured), np.nan)
@@ -36,7 +36,7 @@ def modes_table(one: ModalParameters, result: Any, case: Case) -> Table:
 
 
 def shapes_table(one: ModeShapes, result: Any, case: Case) -> Table:
-    """How alike measured shapes and those of the model are."""
+    """Table of the similarity of measured shapes and the model's shapes."""
     place, alike = one.pairing(result, case)
     kept = resisted(result)[place]
     names, hertz = result["mode"].values[kept].tolist(), result["frequency"].values[kept].tolist()

@@ -31,19 +31,19 @@ MOST_STARTS = 100_000
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number in a case file that a fit is to find.
+    """A number in a case file to be fitted.
 
     Parameters
     ----------
     key : str
-        Where it stands in the case file: "sheet.length_scale_ratio", "damping.alpha",
+        Key in the case file: "sheet.length_scale_ratio", "damping.alpha",
         "model.fold_law.theta1" (degrees, as there), "loads[0].force[2]".
     start : float, optional
-        Value to start from; that of the case file by default.
+        Value to start from; by default the case file's.
     lower, upper : float
         Bounds; none by default. Several starts need both.
     scale : float, optional
-        A change of the value that matters; by default the size of the start or, where that is 0,
+        A significant change of the value; by default the magnitude of the start or, if that is 0,
         the distance of the bounds.
     """
 
@@ -74,11 +74,11 @@ class Parameter:
 
 
 class Beside(NamedTuple):
-    """Values with one parameter changed.
+    """Parameter values with one parameter changed, for differences.
 
-    point : values of all.
-    place : the parameter's.
-    weight : of a prediction there, in the derivative.
+    point : values of all parameters.
+    place : index of the changed parameter.
+    weight : weight of the prediction at this point in the derivative.
     """
 
     point: NDArray[np.float64]
@@ -107,7 +107,7 @@ class Space:
         return tuple(p.key for p in self.parameters)
 
     def column(self, name: str) -> NDArray[np.float64]:
-        """One of "start", "lower", "upper", "scale" of all parameters."""
+        """One field, "start", "lower", "upper" or "scale", of all parameters."""
         return np.array([getattr(p, name) for p in self.parameters], dtype=np.float64)
 
     def changes(self, values: Sequence[float] | NDArray) -> dict[str, float]:
@@ -116,14 +116,14 @@ class Space:
         return own | {tie.key: tie.value(own) for tie in self.ties}
 
     def differences(self, values: NDArray, second: bool) -> list[Beside]:
-        """Points beside given values, within the bounds.
+        """Neighboring points within the bounds for difference quotients.
 
-        Weighted sums of predictions are derivatives, right to the first or the second order.
+        Weighted sums of predictions are derivatives, accurate to first or second order.
 
         Raises
         ------
         InputError
-            Bounds leave no room.
+            The bounds leave no room.
         """
         found = []
         for k, one in enumerate(self.parameters):
@@ -166,13 +166,13 @@ class Space:
 def space(
     document: Mapping[str, Any], parameters: Sequence[Parameter], ties: Mapping[str, str]
 ) -> Space:
-    """Parameters with the starts and scales that the case file gives them, and their ties.
+    """Parameters with starts and scales filled in from the case file, and their ties.
 
     Raises
     ------
     InputError
-        No parameter, or one given twice, without a start or no number; a tie to something that is
-        no parameter.
+        No parameter; a parameter given twice, without a start or not a number; a tie to something
+        that is not a parameter.
     """
     if not parameters:
         raise InputError("parameters: none; name at least one key of the case file")

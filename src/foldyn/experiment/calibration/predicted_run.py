@@ -1,4 +1,4 @@
-"""What the case of a fit computes for its measurements."""
+"""Runs of a fit: computations that predict measurements."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ class PredictedRun:
     members : tuple of int
         Numbers of the measurements.
     patterns : list of Pattern
-        Its pattern once it is made, for all values of parameters that leave it alone.
+        Its pattern once generated, for all parameter values that do not change it.
     starts : list of State or None
-        The stored state that it starts from, once it is read.
+        The stored initial state, once read.
     """
 
     path: Path
@@ -65,11 +65,11 @@ class PredictedRun:
         return self.document["analysis"]["kind"]
 
     def those_of(self, measurements: Sequence[Measurement]) -> list[Measurement]:
-        """Its measurements, of all."""
+        """Select its measurements from all."""
         return [measurements[i] for i in self.members]
 
     def start(self, case_file: CaseFile) -> State | None:
-        """What its case starts from."""
+        """Initial state of its case."""
         if "file" not in self.document.get("initial", ()):
             return case_file.initial()
         if not self.starts:
@@ -78,19 +78,19 @@ class PredictedRun:
 
 
 def result_of(run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]) -> Any:
-    """What a case file asks for, without its warnings."""
+    """Result of a case file, without warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
         return computed(run, case_file, members)
 
 
 def computed(run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]) -> Any:
-    """What a case file asks for, at the load factors, modes or frequencies that are measured."""
+    """Result of a case file at the measured load factors, modes or frequencies."""
     return _computation(run, case_file, members).result()
 
 
 def seen(run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]) -> Any:
-    """What measurements compare of that."""
+    """The part of the result that measurements compare."""
     computation = _computation(run, case_file, members)
     if run.kind != "dynamics":
         return computation.result()
@@ -101,12 +101,12 @@ def seen(run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement])
 
 
 def motion_of(run: PredictedRun, case_file: CaseFile) -> Motion:
-    """The motion that a case file asks for, before it begins."""
+    """The motion of a case file, before it begins."""
     return _computation(run, case_file, ()).compute.motion  # type: ignore[attr-defined]
 
 
 def _moved(motion: Motion) -> dict[str, Variable]:
-    """What measurements compare of a motion that was computed."""
+    """The part of a computed motion that measurements compare."""
     out, _ = motion.output.first(motion.stored)
     return {
         "time": Variable("time", out.time),
@@ -124,7 +124,7 @@ def _computation(
 def _changes(
     run: PredictedRun, case_file: CaseFile, members: Sequence[Measurement]
 ) -> dict[str, Any]:  # fmt: skip
-    """Arguments of an analysis that are not those of the case file."""
+    """Arguments of the analysis that override the case file's."""
     case, given = case_file.case(), case_file.analysis.arguments
     if run.kind == "dynamics":
         return {**steady(case_file), "initial": run.start(case_file)}
@@ -144,14 +144,14 @@ def with_neighbors(
     run: PredictedRun, case_file: CaseFile, others: Sequence[CaseFile],
     members: Sequence[Measurement], second: bool,
 ) -> tuple[Any, list[Any]]:  # fmt: skip
-    """What measurements compare, and the same of other cases a little beside.
+    """Compared results of a case, and of other cases close to it.
 
-    second : whether differences have to be right to the second order.
+    second : whether differences need second-order accuracy.
 
     Raises
     ------
     FoldynError
-        There is none without computing the others on their own.
+        The others would need computations of their own.
     """
     if run.kind != "dynamics" and run.start(case_file) is not None:
         raise InputError("what starts from a state has no neighbors")
@@ -180,7 +180,7 @@ def with_neighbors(
 
 
 def _path(case: Case, members: Sequence[Measurement]) -> list[float]:
-    """Load factors at which a case is measured; in the order of a test in which creases yield."""
+    """Load factors at which a case is measured; with yielding creases, in the order of the test."""
     given = [one.factors(case) for one in members]
     if all(part.law.relaxes for part in case.remembering):
         factors = np.unique(np.concatenate(given))
@@ -194,9 +194,9 @@ def _path(case: Case, members: Sequence[Measurement]) -> list[float]:
 
 
 def steady(case_file: CaseFile) -> dict[str, Any]:
-    """Arguments of `simulate` for steps that do not depend on the parameters.
+    """Arguments of `simulate` for time steps that do not depend on the parameters.
 
-    Steps chosen by their error would make the misfit jump between neighboring values.
+    Adaptive steps would make the misfit jump between neighboring values.
     """
     given = dict(case_file.analysis.arguments)
     if given["method"] == "auto":

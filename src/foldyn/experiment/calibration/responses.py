@@ -1,4 +1,4 @@
-"""What a fit compares of a frequency response: complex values or magnitudes at nodes."""
+"""Frequency responses in a fit: complex values or magnitudes at nodes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOTION = "transmissibility"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FrequencyResponse(NodeValues):
-    """Frequency responses of nodes along an axis, to what drives the case.
+    """Frequency responses of nodes along an axis to the case's drive.
 
     Complex values are compared by their real and imaginary parts.
 
@@ -34,7 +34,7 @@ class FrequencyResponse(NodeValues):
         Frequencies (Hz), increasing.
     values : array_like, shape (f, m)
         Response of each node, as `fd.frf` defines it: complex, for the time dependence exp(+i w t);
-        or its magnitude. NaN where it was not measured.
+        or its magnitude. NaN where not measured.
     axis : {"x", "y", "z"}
     quantity : {"receptance", "mobility", "accelerance", "transmissibility"}
         Displacement (m/N), velocity (m/(N s)) or acceleration (m/(N s2)) per newton of the driving
@@ -92,22 +92,22 @@ class FrequencyResponse(NodeValues):
 
     @property
     def unit(self) -> str:
-        """See `Measurement`."""
+        """Unit of the values."""
         unit = RESPONSES[self.quantity].units
         return "" if unit == "1" else unit
 
     def observed(self) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Measured values, flattened."""
         return self._flat(self.values)
 
     def errors(self) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Standard error of each measured value."""
         if not isinstance(self.sigma, np.ndarray):
             return super().errors()
         return self._flat(self.sigma if self.magnitude else self.sigma * (1.0 + 1.0j))
 
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
-        """See `Measurement`."""
+        """Refuse a case that cannot predict these values."""
         super().check(case, arguments)
         if not METHODS[arguments["method"]].linear:
             linear = ", ".join(name for name, one in METHODS.items() if one.linear)
@@ -131,7 +131,7 @@ class FrequencyResponse(NodeValues):
             )
 
     def examine(self, result: Any, case: Case) -> None:
-        """See `Measurement`."""
+        """Refuse a result without finite predictions."""
         self.predicted(result, case)
 
     def curves(self, result: Any, case: Case) -> NDArray[np.complex128]:
@@ -142,7 +142,7 @@ class FrequencyResponse(NodeValues):
         return whole[lines][:, self.where(case), AXES.index(self.axis)]
 
     def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
-        """See `Measurement`."""
+        """Predictions of the measured values, in the order of `observed`."""
         curves = self.curves(result, case)
         lost = ~np.isfinite(curves).all(axis=1)
         if lost.any():
@@ -154,6 +154,6 @@ class FrequencyResponse(NodeValues):
         return self._flat(np.abs(curves) if self.magnitude else curves)
 
     def _flat(self, curves: NDArray) -> NDArray[np.float64]:
-        """Values where measured, node after node: all real parts, then all imaginary parts."""
+        """Measured entries, node by node: all real parts, then all imaginary parts."""
         seen: NDArray[Any] = curves.T[np.isfinite(self.values).T]
         return np.concatenate([np.real(seen), np.imag(seen)]) if np.iscomplexobj(seen) else seen

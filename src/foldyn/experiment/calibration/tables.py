@@ -1,4 +1,4 @@
-"""What readers of measurements share: nodes and ranges from a fit file, and tables by node."""
+"""Shared readers of measurements: nodes and ranges of a fit file, and tables by node."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from foldyn.values import numbers, show
 
 
 def made(kind: Any, file: Path, **known: Any) -> Any:
-    """A measurement; messages on what is wrong with it name the file."""
+    """Create a measurement; error messages name the file."""
     with within("", file):
         return kind(**known)
 
 
 def listed_nodes(file: Path, nodes: Any) -> list[int]:
-    """Numbers of nodes: expressions over a pattern mean nothing to a file."""
+    """Node numbers; a file cannot use expressions over a pattern."""
     empty = isinstance(nodes, Sized) and not len(nodes)
     chosen = "" if empty else check_nodes("nodes", nodes)
     if isinstance(chosen, str):
@@ -42,23 +42,22 @@ def limits(name: str, given: Any, what: str) -> tuple[float, float]:
 def by_node(
     file: Path, key: str, nodes: Any, unit: str | None
 ) -> tuple[NDArray[np.float64], list[int], str, NDArray[np.float64]]:
-    """What a CSV file holds that has a line for each node and value of a key.
+    """Contents of a CSV file with a line for each node and value of a key.
 
     Parameters
     ----------
     file : Path
-        With the columns `key`, node, and x, y, z as far as they were measured.
+        With the columns `key`, node, and the measured ones of x, y, z.
     key : str
     nodes : sequence of int or None
         Nodes to take; all in the file by default.
     unit : str, optional
-        What the components become; by default that of the file's first, whatever it is.
+        Unit to convert the components to; by default the unit of the file's first one.
 
     Returns
     -------
     (ndarray, list, str, ndarray)
-        Values (s,) of the key, nodes, axes, and components (s, nodes, axes); NaN where there are
-        none.
+        Values (s,) of the key, nodes, axes, and components (s, nodes, axes); NaN where missing.
     """
     units = dict(read_headings(file))
     axes = "".join(axis for axis in AXES if axis in units)

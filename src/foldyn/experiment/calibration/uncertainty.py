@@ -1,4 +1,4 @@
-"""How well the parameters of a fit are known: standard errors, intervals, correlation."""
+"""Uncertainty of fitted parameters: standard errors, intervals, correlation."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ class Estimate:
     key : str
     value : float
     standard_error : float
-        inf where the data do not determine the parameter, nan where a bound holds it.
+        inf if the data do not determine the parameter, nan if it is at a bound.
     lower, upper : float
         Confidence interval, widened by the discretization.
     determined : bool
         Whether the data determine it.
     at_bound : bool
-        Whether it ended at one of its bounds, which then decides its value.
+        Whether it ended at one of its bounds, which then determines its value.
     discretization : float
-        How far the value would move with ever smaller time steps and, of a shell, elements: by
-        Richardson's extrapolation of the misfit at the optimum with half of them. The interval is
-        longer by as much, on that side. nan where that could not be computed.
+        Shift of the value in the limit of small time steps and, for a shell, elements, by
+        Richardson's extrapolation of the misfit at the optimum with these halved. The interval is
+        extended by it on that side. nan if it could not be computed.
     """
 
     key: str
@@ -50,7 +50,7 @@ class Estimate:
 
     @property
     def note(self) -> str:
-        """Remark beside its numbers, if any."""
+        """Remark on its numbers, if any."""
         if self.at_bound:
             return "at its bound: the data pull it further"
         return "" if self.determined else "the data do not determine it"
@@ -64,25 +64,25 @@ class Uncertainty:
     Attributes
     ----------
     standard_error : ndarray, shape (p,)
-        inf of what is not determined, nan of what lies at a bound.
+        inf if not determined, nan if at a bound.
     half_width : ndarray, shape (p,)
         Of the confidence intervals.
     correlation : ndarray, shape (p, p)
-        nan with what is not determined or at a bound.
+        nan for parameters not determined or at a bound.
     singular_values : ndarray, shape (p,)
-        Of the weighted Jacobian by the parameters over their scales, decreasing; 0 for parameters
-        at a bound.
+        Singular values of the weighted Jacobian with respect to scaled parameters, decreasing; 0
+        for parameters at a bound.
     directions : ndarray, shape (p, p)
-        Row k: the change of the parameters (in their scales) that belongs to singular value k.
+        Row k: the change of scaled parameters that belongs to singular value k.
     determined : ndarray of bool, shape (p,)
     freedom : int
-        Values minus parameters that are free.
+        Number of values minus free parameters.
     misfit : float
-        Root mean square of the weighted residuals per degree of freedom: 1 where the model is
-        right and the standard errors of the data are.
+        Root mean square of the weighted residuals per degree of freedom: about 1 if both the model
+        and the standard errors of the data are right.
     influence : ndarray, shape (p, n)
-        How far each estimate moves with each weighted residual of the model; 0 of what is not
-        seen or lies at a bound.
+        Derivative of each estimate with respect to each weighted residual; 0 for parameters not
+        determined or at a bound.
     """
 
     standard_error: NDArray[np.float64]
@@ -111,23 +111,23 @@ class Uncertainty:
         v_k^T / s_k^2, and the half width of an interval is the standard error times the quantile of
         Student's t of the degrees of freedom.
 
-        The data do not see a direction whose singular value is below `WEAK` of the largest, and
-        hardly see one whose standard error exceeds the scales of the parameters. Both are left out
-        of the covariance, and parameters that take part in them are not determined.
+        The data do not determine a direction whose singular value is below `WEAK` of the largest,
+        and barely determine one whose standard error exceeds the parameter scales. Both are left
+        out of the covariance, and parameters with a part in them count as not determined.
 
         Parameters
         ----------
         jacobian : ndarray, shape (n, p)
-            Weighted residuals by the parameters over their scales.
+            Derivatives of weighted residuals with respect to scaled parameters.
         residual : ndarray, shape (n,)
             Weighted residuals.
         scale : ndarray, shape (p,)
         at_bound : ndarray of bool, shape (p,)
-            Parameters that a bound holds: they count as known.
+            Parameters at a bound, which count as known.
         confidence : float
             Of the intervals, 0.95 for 95 %.
         absorbed : int
-            Degrees of freedom that the predictions have taken from the data.
+            Degrees of freedom that predictions take from the data.
         """
         n, p = jacobian.shape
         free = np.flatnonzero(~at_bound)
@@ -164,7 +164,7 @@ class Uncertainty:
     def estimates(
         self, keys: Sequence[str], values: NDArray[np.float64], shifts: Sequence[NDArray]
     ) -> tuple[Estimate, ...]:
-        """Estimates of the parameters, with the shifts (p,) of each kind of discretization."""
+        """Estimates of the parameters, given shifts (p,) for each kind of discretization."""
         error, half = self.standard_error, self.half_width
         moved = np.reshape(shifts, (-1, len(values)))
         known = np.nan_to_num(moved)

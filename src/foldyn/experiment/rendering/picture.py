@@ -1,4 +1,4 @@
-"""One picture of a moving structure: its paper, the light, rays over each pixel and exposure."""
+"""Picture of a moving structure: paper, light, rays over each pixel and exposure."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from numpy.typing import NDArray
 from foldyn.experiment.camera import Camera, opencv
 from foldyn.values import number, whole
 
-_TILE = 512  # texels of the grain, repeated over the paper
-_MARGIN = 6  # pixels around the structure that are drawn anew in each picture
+_TILE = 512  # side of the grain tile in texels, repeated over the paper
+_MARGIN = 6  # pixels around the structure that are redrawn in each picture
 
 
 @dataclass(frozen=True)
 class Look:
-    """What the specimen, the light and the background look like; reflectances from 0 to 1.
+    """Appearance of specimen, light and background; reflectances from 0 to 1.
 
     Attributes
     ----------
     paper, ink, background : float
-        Reflectance of the paper, of the markers and of what lies behind.
+        Reflectance of the paper, of the markers and of the background.
     marker : float
-        Radius (m) of the markers: around each vertex every other panel is inked, so that the
-        vertex is where lines cross. 0 leaves the paper as it is.
+        Radius (m) of the markers: around each vertex every other panel is inked, so that lines
+        cross at the vertex. 0 means no markers.
     grain : float
         Standard deviation of the paper's reflectance, relative to it.
     grain_size : float
-        Distance of the texels of the grain (m).
+        Spacing of the grain's texels (m).
     light : tuple of float
         Direction towards the lamp in the camera's axes (right, down, forward).
     ambient : float
@@ -60,13 +60,13 @@ class Look:
 
 @dataclass(frozen=True, eq=False)
 class Paper:
-    """Triangles of a structure with what is printed on them.
+    """Triangles of a structure with their print.
 
     Attributes
     ----------
     triangles : ndarray, shape (m, 3)
     flat : ndarray, shape (m, 3, 2)
-        Corners of each triangle in the plane of its panel (m), panels apart from each other.
+        Corners of each triangle in the plane of its panel (m); panels do not overlap.
     marked : ndarray of bool, shape (m, 3)
         Corners that are vertices of the pattern.
     dark : ndarray of bool, shape (m,)
@@ -96,7 +96,7 @@ class Paper:
 
 
 def two_colors(pattern: Any) -> NDArray[np.bool_]:
-    """Color of each panel, so that neighbors differ wherever the pattern allows it."""
+    """Color of each panel; neighbors differ wherever the pattern allows."""
     neighbors: list[list[int]] = [[] for _ in pattern.faces]
     for a, b in np.asarray(pattern.crease_faces).tolist():
         neighbors[a].append(b)
@@ -116,10 +116,10 @@ def two_colors(pattern: Any) -> NDArray[np.bool_]:
 
 
 def grain_tile(look: Look, rng: np.random.Generator) -> NDArray[np.float32]:
-    """Reflectance of the paper on a square of texels that can be repeated."""
+    """Reflectance of the paper on a square of texels that tiles seamlessly."""
     frequency = np.hypot(np.fft.fftfreq(_TILE)[:, np.newaxis], np.fft.rfftfreq(_TILE))
     frequency[0, 0] = np.inf
-    # fibers of all lengths: more of the long ones, as in real paper
+    # fibers of all lengths, with more long ones, as in real paper
     noise = np.fft.irfft2(np.fft.rfft2(rng.standard_normal((_TILE, _TILE))) / frequency**0.7)
     tile = look.paper * (1.0 + look.grain * noise / noise.std())
     return np.clip(tile, 0.0, 1.0).astype(np.float32)
@@ -131,7 +131,7 @@ def shading(
     light: NDArray[np.float64],
     ambient: float,
 ) -> NDArray[np.float64]:
-    """Light on each triangle, on both faces: ambient, and by the angle to the lamp."""
+    """Light on each triangle, on either face: ambient, plus by the angle to the lamp."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=1)
@@ -141,7 +141,7 @@ def shading(
 
 @dataclass(frozen=True)
 class Sensor:
-    """What the lens and the sensor add.
+    """Effects of lens and sensor.
 
     Attributes
     ----------
@@ -152,9 +152,10 @@ class Sensor:
     read_noise : float
         Standard deviation of the noise in the dark, in gray values of 0 to 255.
     shot_noise : float
-        That of the noise at full brightness; it grows with the root of the brightness.
+        Standard deviation of the noise at full brightness; it grows with the square root of
+        brightness.
     samples : int
-        Rays in each pixel, each at its own place and time.
+        Rays per pixel, each with its own place and time.
     """
 
     exposure: float = 0.0
@@ -182,7 +183,7 @@ class Sensor:
 
 
 def _halton(k: NDArray[np.int64], base: int) -> NDArray[np.float64]:
-    """Van der Corput's sequence: the digits of k behind the point, centered on average."""
+    """Van der Corput sequence: digits of k reversed behind the point, centered on average."""
     value, scale, rest = np.zeros(len(k)), 1.0, k.copy()
     while rest.any():
         scale /= base
@@ -203,7 +204,7 @@ class Studio:
 
     @classmethod
     def of(cls, structure, camera: Camera, look: Look, sensor: Sensor, seed: int) -> Studio:
-        """Draw paper and grain at random: the same seed, the same paper."""
+        """Draw paper and grain at random; equal seeds give equal paper."""
         rng = np.random.default_rng([seed, 0])
         paper = Paper.of(structure, rng)
         return cls(camera, look, sensor, paper, grain_tile(look, rng))
@@ -248,7 +249,7 @@ class Studio:
     def _expose(
         self, image: NDArray[np.float32], positions: NDArray[np.float64]
     ) -> NDArray[np.bool_]:
-        """Draw the mean of all rays where the structure may be seen; returns the visible nodes."""
+        """Accumulate the mean of all rays around the structure; return the visible nodes."""
         from foldyn.experiment.rendering.raster import draw
 
         camera, look, paper = self.camera, self.look, self.paper
@@ -289,7 +290,7 @@ class Studio:
 def _unhidden(
     pixels: NDArray[np.float64], near: NDArray[np.float64], depth: NDArray[np.float32]
 ) -> NDArray[np.bool_]:
-    """Nodes in the image that are not behind a panel by more than a hundredth of the distance."""
+    """Nodes in the image that no panel hides by more than a hundredth of the distance."""
     height, width = depth.shape
     at = np.rint(pixels).astype(np.int64)
     inside = ((at >= 1) & (at < [width - 1, height - 1])).all(axis=1)
@@ -297,6 +298,6 @@ def _unhidden(
     for node in np.flatnonzero(inside):
         u, v = at[node]
         around = depth[v - 1 : v + 2, u - 1 : u + 2]
-        # of the nine pixels around it some show what is next to the node, not before it
+        # some of the nine pixels around it show a neighboring panel, not one in front
         seen[node] = around.min() <= near[node] * 1.01
     return seen

@@ -1,4 +1,4 @@
-"""Triangles into pixels: one ray through each pixel, the nearest triangle, its paper and light."""
+"""Rasterize triangles: one ray through each pixel, the nearest triangle, its paper and light."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from foldyn.jit.compiled import strict, strict_inlined
 
-_MARGIN = 3  # pixels around a triangle's box: with distortion its edges are slightly curved
+_MARGIN = 3  # pixels around a triangle's box, as distortion curves its edges slightly
 
 
 @strict
@@ -29,7 +29,7 @@ def draw(
     depth: Any,
     bright: Any,
 ) -> None:
-    """Draw triangles over what is in `bright`, the nearest in front.
+    """Draw triangles over the content of `bright`, the nearest in front.
 
     Parameters
     ----------
@@ -38,14 +38,14 @@ def draw(
     nearness : ndarray, shape (n,)
         1/z of the nodes (1/m).
     pixels : ndarray, shape (n, 2)
-        Where they are seen, for the boxes of the triangles.
+        Pixels of the nodes, for the boxes of the triangles.
     triangles : ndarray, shape (m, 3)
     flat : ndarray, shape (m, 3, 2)
         Corners of each triangle in the plane of its paper (m).
     marked : ndarray of bool, shape (m, 3)
         Corners around which the marker is painted,
     dark : ndarray of bool, shape (m,)
-        and which triangles it makes dark.
+        and the triangles that it inks.
     shade : ndarray, shape (m,)
         Light on each triangle.
     grain : ndarray, shape (k, k)
@@ -60,7 +60,7 @@ def draw(
     box : ndarray of int, shape (2,)
         First column and row of the part of the image that is drawn.
     depth, bright : ndarray, shape (height, width), float32
-        Nearness of what is drawn (0: nothing) and its brightness.
+        Nearness (1/z, 0 for nothing) and brightness of the picture.
     """
     height, width = bright.shape
     focal, cu, cv = lens[0], lens[1], lens[2]
@@ -75,7 +75,7 @@ def draw(
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if area == 0.0:
             continue
-        # what is linear over the image: the shares of the corners, 1/z, and (s, q)/z of the paper
+        # functions linear over the image: barycentric shares, 1/z, and (s, q)/z of the paper
         share_a = _plane(bx * cy - by * cx, by - cy, cx - bx, area)
         share_b = _plane(cx * ay - cy * ax, cy - ay, ax - cx, area)
         share_c = (
@@ -137,7 +137,7 @@ def _plane(c0: float, c1: float, c2: float, area: float) -> tuple[float, float, 
 
 @strict_inlined
 def _mix(a: Any, b: Any, c: Any, va: float, vb: float, vc: float) -> tuple[float, float, float]:
-    """Coefficients of the linear function with these values at the three corners."""
+    """Coefficients of the linear function with given values at the three corners."""
     return (
         a[0] * va + b[0] * vb + c[0] * vc,
         a[1] * va + b[1] * vb + c[1] * vc,
@@ -147,7 +147,7 @@ def _mix(a: Any, b: Any, c: Any, va: float, vb: float, vc: float) -> tuple[float
 
 @strict
 def _span(pu: Any, pv: Any, row: int, before: int, after: int) -> tuple[int, int]:
-    """Columns of a row that a triangle may cover, a margin around it."""
+    """Columns of a row that a triangle may cover, with a margin."""
     low, high = 1e30, -1e30
     for k in range(3):
         m = (k + 1) % 3
@@ -169,7 +169,7 @@ def _span(pu: Any, pv: Any, row: int, before: int, after: int) -> tuple[int, int
 
 @strict_inlined
 def _grain(grain: Any, mask: int, s: float, q: float) -> float:
-    """Reflectance of the paper between four texels."""
+    """Reflectance of the paper, interpolated between four texels."""
     i, j = int(np.floor(s)), int(np.floor(q))
     fs, fq = s - i, q - j
     i0, j0, i1, j1 = i & mask, j & mask, (i + 1) & mask, (j + 1) & mask

@@ -1,4 +1,4 @@
-"""Synthetic films and photographs of a simulated motion, with the true motion beside them."""
+"""Synthetic films and photographs of a simulated motion, with the true motion."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CODECS = {".mkv": "FFV1", ".avi": "FFV1", ".mp4": "mp4v"}
 @brief
 @dataclass(frozen=True, eq=False)
 class SyntheticFilm:
-    """A film whose pictures are rendered one by one, when they are asked for.
+    """A film whose pictures are rendered on demand.
 
     Attributes
     ----------
@@ -39,9 +39,9 @@ class SyntheticFilm:
     rate : float
         Frames per second.
     dropped : tuple of int
-        Frames in which the camera repeats the one before.
+        Frames in which the camera repeats the previous one.
     seed : int
-        Of paper, noise and everything else that is random: the same seed, the same film.
+        Random seed of paper and noise; equal seeds give equal films.
     """
 
     studio: Studio
@@ -61,7 +61,7 @@ class SyntheticFilm:
             yield last
 
     def frame(self, k: int) -> NDArray[np.uint8]:
-        """Picture number k, as if it were not dropped."""
+        """Picture number k, ignoring drops."""
         sensor = self.studio.sensor
         times = self.time[k] + sensor.exposure * sensor.moments
         positions = self.motion(times if sensor.exposure else self.time[[k]])
@@ -76,8 +76,8 @@ class SyntheticFilm:
         -------
         xarray.Dataset
             `position` (time, node, axis) in m, `position_px` (time, node, uv), and `seen` (node,
-            False where a panel hides it or it is outside of the image) for frames that have been
-            made, `dropped` (time).
+            False if a panel hides it or it is outside the image) for rendered frames, `dropped`
+            (time).
         """
         positions = self.motion(self.time)
         count = positions.shape[1]
@@ -126,9 +126,9 @@ def film_of(
         Part of the motion (s) that is filmed; by default to its end. The film's time is 0 at
         `start`.
     look, sensor : Look, Sensor
-        What the specimen looks like, and what lens and sensor add.
+        Appearance of the specimen, and effects of lens and sensor.
     dropped : sequence of int
-        Frames that repeat the one before.
+        Frames that repeat the previous one.
     seed : int
 
     Returns
@@ -138,7 +138,7 @@ def film_of(
     Raises
     ------
     InputError
-        Not a motion, a part that it does not have, or nodes behind the camera.
+        Not a motion, a time span outside it, or nodes behind the camera.
     """
     structure = case_of(motion).structure
     if "time" not in motion.dims or motion.sizes["time"] < 4:
@@ -171,14 +171,14 @@ def photos_of(
     sensor: Sensor | None = None,
     seed: int = 0,
 ) -> tuple[list[NDArray[np.uint8]], xr.Dataset]:
-    """Photographs of equilibria, each with other noise, and the truth as a film has it.
+    """Photographs of equilibria, each with its own noise, and the truth in the layout of a film's.
 
     Parameters
     ----------
     path : xarray.Dataset
         Result of `trace`.
     steps : sequence of int
-        Which of its states.
+        Numbers of its states.
     camera, look, sensor, seed
         As for `film_of`; nothing moves during the exposure.
 
@@ -202,7 +202,7 @@ def photos_of(
 
 
 def write_film(film: SyntheticFilm, path: str | os.PathLike[str]) -> None:
-    """Write a film to a file: .mkv or .avi without loss, .mp4 with.
+    """Write a film to a file: lossless as .mkv or .avi, lossy as .mp4.
 
     Raises
     ------

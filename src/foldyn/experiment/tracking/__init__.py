@@ -1,1 +1,1 @@
-"""Camera tracking: corners in films and photographs, and which node of a model each of them is."""
+"""Camera tracking: corners in films and photographs, and their assignment to a model's nodes."""

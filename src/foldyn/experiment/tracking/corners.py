@@ -1,4 +1,4 @@
-"""Corners in a picture: Harris's measure, then where straight edges meet, to a fraction of a pixel.
+"""Corner detection: Harris's measure, then intersection of straight edges, to subpixel accuracy.
 
 Corners of folded paper are where creases and boundaries cross. Each of these edges is located by
 its own profiles, some pixels away from the corner, and the lines through them are intersected. The
@@ -22,35 +22,35 @@ from foldyn.experiment.camera import opencv
 from foldyn.jit.compiled import strict
 from foldyn.values import number
 
-_CANDIDATES = 5  # of Harris's measure for each corner that is asked for
-_DIRECTIONS = 120  # around a point, in which edges are looked for
+_CANDIDATES = 5  # candidates of Harris's measure per requested corner
+_DIRECTIONS = 120  # circle of samples around a point, in which edges are looked for
 _APART = 4  # directions, at least, between two edges of a corner (12 degrees)
 _EDGES = 6  # of a corner, at most
-_FAINTEST = 4.0  # gray values between the two sides of an edge
+_FAINTEST = 4.0  # least contrast (gray values) between the sides of an edge
 _RELATIVE = 0.12  # the same, relative to the strongest edge of the corner
 _PROFILES = 12  # across an edge, at least
 _STEP = 0.5  # pixels between samples across an edge
 _ROUNDS = 3
 _NARROWEST = 1.6  # pixels of room on each side of an edge
-_STRAIGHT = 0.35  # pixels, rms, by which an edge may leave its line
-_FLATTEST = 0.02  # of the smaller to the larger eigenvalue: edges that are nearly parallel
+_STRAIGHT = 0.35  # pixels, rms, by which an edge may deviate from a line
+_FLATTEST = 0.02  # smallest ratio of eigenvalues: below it edges are nearly parallel
 
 
 @dataclass(frozen=True)
 class CornerSettings:
-    """How corners are found and refined.
+    """Settings for finding and refining corners.
 
     Attributes
     ----------
     spacing : float or None
-        Least distance of two corners (pixels); None: 1.5 `reach`.
+        Least distance of two corners (pixels); None means 1.5 `reach`.
     quality : float
         Harris's measure of the weakest corner, relative to the strongest one.
     most : int
-        Most corners, the strongest first.
+        Largest number of corners, the strongest first.
     reach : float or None
         Length of the edges from which a corner is refined (pixels): about a quarter of the distance
-        between corners. None: 0.012 of the picture's diagonal, from 7 to 24 pixels.
+        between corners. None means 0.012 of the picture's diagonal, from 7 to 24 pixels.
     """
 
     spacing: float | None = None
@@ -65,7 +65,7 @@ class CornerSettings:
                 number(name, value, above=0.0)
 
     def reach_in(self, shape: tuple[int, ...]) -> float:
-        """Length of the edges in a picture of this shape."""
+        """Length of the edges in a picture of this shape (pixels)."""
         return self.reach or float(np.clip(0.012 * np.hypot(shape[0], shape[1]), 7.0, 24.0))
 
 
@@ -79,12 +79,12 @@ def find_corners(
     image : ndarray of uint8, shape (height, width)
     settings : CornerSettings
     place : str
-        What the picture is called in messages.
+        Name of the picture in messages.
 
     Returns
     -------
     ndarray, shape (p, 2)
-        Pixels (u, v), the strongest corner first; those at which edges meet are refined, others
+        Pixels (u, v), the strongest corner first. Corners where edges meet are refined; others
         (ends of stains, texture) are left out.
 
     Raises
@@ -111,7 +111,7 @@ def find_corners(
             f"{place}: no corners found in it; take a sharp, well lit one, or another --roi"
         )
     junctions = refine(image, candidates.reshape(-1, 2), reach=reach, moved=0.6 * reach)
-    # where more edges meet it is more likely a corner of the pattern than the end of a stain
+    # with more edges it is more likely a corner of the pattern than the end of a stain
     order = np.lexsort([junctions.error, -np.minimum(junctions.edges, 4)])
     order = order[np.isfinite(junctions.position[order, 0])]
     points = junctions.position[order]
@@ -125,7 +125,7 @@ def find_corners(
 
 
 def _first_of_each(points: NDArray[np.float64], apart: float) -> NDArray[np.bool_]:
-    """Points with no earlier one within a distance."""
+    """Points without an earlier one within a distance."""
     kept = np.zeros(len(points), dtype=bool)
     for k, point in enumerate(points):
         distance = np.hypot(*(points[kept] - point).T)
@@ -165,7 +165,7 @@ def refine(image: NDArray[np.uint8], points: ArrayLike, *, reach: float, moved: 
     reach : float
         Length of the edges that is used (pixels): no other corner may lie closer.
     moved : float
-        Farther than this from its point a corner is not accepted (pixels).
+        Largest accepted distance of a corner from its point (pixels).
 
     Returns
     -------
@@ -209,7 +209,7 @@ def _inside(image: Any, u: float, v: float, margin: float) -> bool:
 
 @strict
 def _gray(image: Any, u: float, v: float) -> float:
-    """Gray value between four pixels; the border goes on outside."""
+    """Gray value interpolated between four pixels; extended beyond the border."""
     height, width = image.shape
     u, v = min(max(u, 0.0), width - 1.001), min(max(v, 0.0), height - 1.001)
     i, j = int(u), int(v)
@@ -221,7 +221,7 @@ def _gray(image: Any, u: float, v: float) -> float:
 
 @strict
 def _directions(image: Any, u: float, v: float, inner: float, reach: float, found: Any) -> int:
-    """Directions of the edges around a point (rad) and their signs, into `found`; their number."""
+    """Find directions of the edges around a point (rad) and their signs; return the count."""
     n = _DIRECTIONS
     count = max(6, int(0.6 * (reach - inner)))
     around = np.zeros(n)
@@ -244,7 +244,7 @@ def _directions(image: Any, u: float, v: float, inner: float, reach: float, foun
         edges += 1
         for m in range(-_APART + 1, _APART):
             size[(k + m) % n] = 0.0
-        # what falls on from there belongs to the same edge
+        # a further decrease belongs to the same edge
         for side in (-1, 1):
             m = side * _APART
             while abs(m) < n // 2 and 0.0 < size[(k + m) % n] < abs(change[(k + m - side) % n]):
@@ -257,7 +257,7 @@ def _directions(image: Any, u: float, v: float, inner: float, reach: float, foun
 def _meet(
     image: Any, u: float, v: float, inner: float, reach: float, width: float
 ) -> tuple[float, float, float, int]:
-    """Shift to where the edges around a point meet, its standard error, the number of edges."""
+    """Shift to the intersection of edges around a point, its standard error, number of edges."""
     found = np.empty((_EDGES, 2))
     edges = _directions(image, u, v, inner, reach, found)
     lines = np.zeros((_EDGES, 4))  # normal, offset, standard error of the offset
@@ -280,7 +280,7 @@ def _meet(
 
 @strict
 def _intersection(lines: Any) -> tuple[float, float, float, int]:
-    """Point nearest to the lines; one that misses the others does not count."""
+    """Point nearest to the lines; a line that misses the others is dropped."""
     weight = 1.0 / np.maximum(lines[:, 3], 0.02) ** 2
     x, y, error, count = np.nan, np.nan, np.nan, 0
     for attempt in range(len(lines)):
@@ -289,7 +289,7 @@ def _intersection(lines: Any) -> tuple[float, float, float, int]:
         d = np.sum(weight * lines[:, 1] ** 2)
         half, turn = 0.5 * (a + d), np.hypot(0.5 * (a - d), b)
         count = int(np.sum(weight > 0.0))
-        # two lines always meet: no proof that they are the right two, where others missed
+        # two lines always meet, which does not prove them right if others missed
         if count < (2 if attempt == 0 else 3) or not half - turn > _FLATTEST * (half + turn):
             return np.nan, np.nan, np.nan, 0
         p = np.sum(weight * lines[:, 0] * lines[:, 2])
@@ -329,7 +329,7 @@ def _line(
     radius, place, used = np.empty(most), np.empty(most), 0
     for m in range(most):
         r = inner + m * step
-        # next to another edge a profile sees both: only up to half way between them counts
+        # near another edge a profile shows both: use it only up to half way between them
         side = min(width, room * r)
         if side < _NARROWEST:
             continue
@@ -363,7 +363,7 @@ def _line(
 def _edge_place(
     image: Any, u: float, v: float, nu: float, nv: float, sign: float, side: float
 ) -> float:
-    """Place of an edge along the normal (nu, nv), within `side` pixels; NaN without one."""
+    """Position of an edge along the normal (nu, nv), within `side` pixels; NaN without one."""
     n = int(side / _STEP)
     rise = np.zeros(2 * n + 1)
     before = _gray(image, u - (n + 1) * _STEP * nu, v - (n + 1) * _STEP * nv)
@@ -375,7 +375,7 @@ def _edge_place(
         before, here = here, after
     if 0.5 * rise.sum() < _FAINTEST:
         return np.nan
-    # first with all there is, then about what was found, so that the window is even on both sides
+    # first over the whole profile, then around the edge found, so that the window is symmetric
     middle, reach = 0.0, 1e9
     for _ in range(3):
         top, total = 0.0, 0.0

@@ -1,4 +1,4 @@
-"""Films and photographs from files, picture by picture: only one at a time is in memory."""
+"""Films and photographs from files, one picture in memory at a time."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ class Film:
     size : tuple of int
         Width and height (pixels).
     rate : float
-        Frames per second, as the file says or as given.
+        Frames per second, from the file or as given.
     box : tuple of int
         Region of interest: column and row of its first pixel, width and height.
     timed : bool
-        Times come from the file; otherwise from the rate alone.
+        Whether times come from the file; otherwise they follow from the rate.
     declared : int
         Frames that the file claims to have, often the rate times the duration: an estimate. 0 where
-        it claims nothing.
+        unknown.
     """
 
     path: Path
@@ -53,7 +53,7 @@ class Film:
     declared: int = 0
 
     def frames(self) -> Iterator[tuple[float, NDArray[np.uint8]]]:
-        """Give the time (s) and the gray region of interest of each frame."""
+        """Yield the time (s) and the gray region of interest of each frame."""
         with _capture(self.path) as film:
             for index in count():
                 read, picture = film.read()
@@ -72,7 +72,7 @@ class Film:
         raise InputError(f"{self.path}: frame {index} cannot be read")
 
     def _time(self, index: int, stamp: float) -> float:
-        """Time by count, unless the file's is off by more than its rounding to milliseconds."""
+        """Time from the frame count, unless the file's time differs by more than rounding to ms."""
         counted = index / self.rate
         if not self.timed or not np.isfinite(stamp) or (index > 0 and stamp <= 0.0):
             return counted
@@ -81,7 +81,7 @@ class Film:
 
 @contextmanager
 def _capture(path: Path) -> Iterator[Any]:
-    """OpenCV's reader of a film, which is closed in the end."""
+    """OpenCV's reader of a film, closed at the end of the block."""
     film = opencv().VideoCapture(str(path))
     try:
         yield film
@@ -92,16 +92,15 @@ def _capture(path: Path) -> Iterator[Any]:
 def open_film(
     path: str | os.PathLike[str], roi: Box | None = None, *, rate: float | None = None
 ) -> Film:
-    """Open a film, and read its first frame to be sure that it can be.
+    """Open a film, and read its first frame as a check.
 
     Parameters
     ----------
     path : path
     roi : tuple of int, optional
-        Region of interest: column, row, width, height (pixels); None takes all.
+        Region of interest: column, row, width, height (pixels); None means the whole picture.
     rate : float, optional
-        Frames per second at which it was taken, where the file says another: films in slow motion
-        often say 30.
+        True frames per second, if the file states another rate: slow-motion films often state 30.
 
     Raises
     ------
@@ -111,7 +110,7 @@ def open_film(
     cv2 = opencv()
     path = check_file(path, "a film")
     with _capture(path) as film:
-        read, picture = film.read()  # false where it cannot be opened
+        read, picture = film.read()  # false if it cannot be opened
         own_rate, frames = film.get(cv2.CAP_PROP_FPS), film.get(cv2.CAP_PROP_FRAME_COUNT)
     if not read or picture is None:
         raise InputError(
@@ -134,7 +133,7 @@ def read_photo(path: str | os.PathLike[str], roi: Box | None = None) -> NDArray[
     Raises
     ------
     InputError
-        There is no such file, it is no picture, or the region lies outside.
+        There is no such file, it is not a picture, or the region lies outside.
     """
     cv2 = opencv()
     path = check_file(path, "a photograph")
@@ -145,7 +144,7 @@ def read_photo(path: str | os.PathLike[str], roi: Box | None = None) -> NDArray[
 
 
 def checked_box(roi: Box | None, width: int, height: int) -> Box:
-    """Return a region of interest that lies in the image; all of it for None."""
+    """Return a region of interest within the image; the whole image for None."""
     if roi is None:
         return 0, 0, width, height
     x, y, w, h = (int(value) for value in roi)

@@ -1,7 +1,7 @@
-"""Corners from frame to frame: pyramidal Lucas-Kanade, there and back, then the junction.
+"""Track corners from frame to frame: pyramidal Lucas-Kanade, forward-backward, then the junction.
 
-The flow tells to a few pixels where a corner went; the junction of edges in the frame itself tells
-exactly where it is. So errors do not add up over a film, and panels may turn and change their
+The flow predicts a corner's position to a few pixels; the junction of edges in the frame itself
+locates it exactly. So errors do not accumulate over a film, and panels may rotate and change
 brightness.
 """
 
@@ -23,11 +23,11 @@ from foldyn.values import number, whole
 LOST, FOUND_AGAIN, TRACKED = 0, 1, 2
 
 _MARGIN = 220  # pixels around all points that are searched
-_NEIGHBORS, _FIRMNESS = 8, 0.05  # whose motion tells where a point should be: `by_neighbors`
-_STRAY = 0.4  # of the reach, by which a point may miss the place where a guide puts it
-_SURE = 0.3  # the same of its neighbors, for a guide to be believed about a lost point
-_CLEAR = 0.55  # of the allowed error, for a corner of few edges to be found again
-_MOST_MISSES = 3  # frames after which a corner of two edges is not found again without a guide
+_NEIGHBORS, _FIRMNESS = 8, 0.05  # neighbors whose motion predicts a point: `by_neighbors`
+_STRAY = 0.4  # share of the reach by which a point may miss a guide's prediction
+_SURE = 0.3  # the same for its neighbors, so that a guide is trusted for a lost point
+_CLEAR = 0.55  # share of the allowed error for a corner of few edges to be found again
+_MOST_MISSES = 3  # frames after which a lost corner of two edges is found again only with a guide
 
 Guide = Callable[[Array], Array]
 """From the places of points (p, 2), NaN where lost, to where each of them should be.
@@ -38,21 +38,21 @@ NaN where that is not known, infinite where the point cannot be seen.
 
 @dataclass(frozen=True)
 class FollowSettings:
-    """How corners are followed.
+    """Settings for tracking corners.
 
     Attributes
     ----------
     window : int
-        Side of the square that is compared (pixels).
+        Side of the compared window (pixels).
     levels : int
-        Of the pyramid: each doubles the largest motion that is found.
+        Levels of the pyramid; each doubles the largest detectable motion.
     back : float
-        Largest distance (pixels) between a point and where the flow there and back takes it.
+        Largest forward-backward error of the flow (pixels).
     error : float
         Largest standard error of a junction (pixels).
     stray : float
-        Largest distance from where its neighbors' motion puts a point, relative to the distance of
-        the neighbors.
+        Largest deviation of a point from its neighbors' motion, relative to the distance of the
+        neighbors.
     """
 
     window: int = 31
@@ -82,9 +82,9 @@ class Step:
     error : ndarray, shape (p,)
         Standard error (pixels).
     status : ndarray of int8, shape (p,)
-        0 lost, 1 found again, 2 tracked from the frame before.
+        0 lost, 1 found again, 2 tracked from the previous frame.
     repeated : bool
-        The frame repeats the one before it: nothing is measured in it.
+        The frame repeats the previous one, so nothing is measured in it.
     """
 
     time: Annotated[float, Unit("s")]
@@ -103,21 +103,21 @@ def follow(
     unseen: NDArray[np.bool_] | None = None,
     guide: Guide | None = None,
 ) -> Iterator[Step]:
-    """Follow corners through the frames of a film.
+    """Track corners through the frames of a film.
 
     Parameters
     ----------
     frames : iterable of (float, ndarray of uint8)
-        Times (s) and gray pictures; the first is the one in which the points were found.
+        Times (s) and gray pictures, beginning with the one in which the points were found.
     points : ndarray, shape (p, 2)
         Corners in the first frame (pixels).
     reach : float
         Length of the edges that make a corner (pixels).
     settings : FollowSettings
     unseen : ndarray of bool, shape (p,), optional
-        Points that are not there yet: they are looked for as lost ones are.
+        Points not yet visible, which are searched for like lost ones.
     guide : callable, optional
-        Where points should be, given the others; None: where their neighbors moved them.
+        Predicts points from the others; None uses the motion of their neighbors.
 
     Yields
     ------
@@ -147,26 +147,27 @@ def follow(
             status = (TRACKED * kept).astype(np.int8)
         else:
             state, error, status = _advance(last, frame, state, reach, settings, guide)
-        # a junction that was not seen in this very frame is not measured
+        # a junction not seen in this frame is not measured
         yield Step(time, _only(state.misses == 0, state.here), error, status, False)
         last = frame
 
 
 @dataclass(frozen=True)
 class _State:
-    """Where the corners are, and where they may be.
+    """Current and predicted positions of the corners.
 
     Attributes
     ----------
     here : ndarray, shape (p, 2)
-        Last known place, or for a lost corner the one that its neighbors suggest.
+        Last known position, or for a lost corner the one predicted by its neighbors.
     step : ndarray, shape (p, 2)
-        Motion since the frame before.
+        Motion since the previous frame.
     misses : ndarray of int, shape (p,)
         Frames since the corner was last measured.
     anchor : ndarray, shape (p, p, 2)
-        For each corner the places of all when it was last seen, NaN where these were not: from
-        there its neighbors' motion is counted, so that errors do not add up while it is lost.
+        For each corner the positions of all when it was last seen, NaN where unknown. The
+        neighbors' motion is measured from these, so that errors do not accumulate while a corner is
+        lost.
     """
 
     here: Array
@@ -200,7 +201,7 @@ def _advance(
 ) -> tuple[_State, Array, NDArray[np.int8]]:
     led = state.misses == 0
     flown, there = _flow(last, frame, state.here, state.here + state.step, led, reach, settings)
-    # a junction near the place to which the flow leads
+    # a junction near the flow's prediction
     junction = refine(frame, _only(there, flown), reach=reach, moved=0.5 * reach)
     good = there & np.isfinite(junction.position[:, 0]) & (junction.error < settings.error)
     place = np.where(good[:, np.newaxis], junction.position, flown)
@@ -212,21 +213,21 @@ def _advance(
         good &= ~(stray > _STRAY * reach + 4.0 * usual)
     good &= ~_crowded(place, good, junction.error, 0.4 * reach)
 
-    # the others: where they should be by these, if a junction is there
+    # the others: at their prediction, if a junction is there
     expected, _ = _by_neighbors(state, place, good)
     barred = np.zeros(len(place), bool)
     if guide is not None:
         guided = guide(_only(good, place))
         _, usual = _strays(_only(good, place), guided)
-        # where the guide itself has lost its way, neighbors do no better
+        # if the guide itself is lost, neighbors do no better
         barred = ~(np.isfinite(guided[:, 0]) & (usual < _SURE * reach))
         expected = np.where(barred[:, np.newaxis], expected, guided)
     guess = np.where(np.isfinite(expected), expected, state.here)
     again = refine(frame, _only(~(good | barred), guess), reach=reach, moved=0.35 * reach)
-    # where fewer edges meet, the end of a stain on an edge may be taken for the corner
+    # with few edges, the end of a stain on an edge may be mistaken for the corner
     allowed = settings.error * np.where(again.edges >= 4, 1.0, _CLEAR)
     found = ~good & np.isfinite(again.position[:, 0]) & (again.error < allowed)
-    if guide is None:  # after some frames there must be no doubt about which corner it is
+    if guide is None:  # after some frames the corner's identity must be certain
         found &= (again.edges >= 3) | (state.misses < _MOST_MISSES)
     place = np.where(good[:, np.newaxis], place, guess)
     place = np.where(found[:, np.newaxis], again.position, place)
@@ -238,7 +239,7 @@ def _advance(
 
 
 def _flow(last, frame, start, guess, led, reach, settings: FollowSettings):
-    """Where the flow leads points, and which of them come back to where they were."""
+    """Positions predicted by the flow, and whether the backward flow returns to the start."""
     cv2 = opencv()
     flown, there = guess.copy(), np.zeros(len(start), bool)
     some = np.flatnonzero(led & _within(start, frame.shape, 2.0))
@@ -272,13 +273,13 @@ def _within(points, shape, margin):
 
 
 def _by_neighbors(state: _State, place: Array, good: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Places by the motion of good neighbors since each corner was last seen; their distance."""
+    """Positions predicted by neighbors' motion since each corner was last seen; their distance."""
     asked = range(len(place)) if good.sum() > 4 else ()
     return by_neighbors(state.anchor, _only(good, place), asked, _NEIGHBORS, _FIRMNESS)
 
 
 def _strays(place: Array, guided: Array) -> tuple[Array, Array]:
-    """Distance of points from where a guide puts them, and that of their nearest neighbors."""
+    """Distance of points from a guide's prediction, and their neighbors' distance."""
     stray = np.hypot(*(place - guided).T)
     known = np.flatnonzero(np.isfinite(stray))
     usual = np.full(len(place), np.inf)
@@ -290,7 +291,7 @@ def _strays(place: Array, guided: Array) -> tuple[Array, Array]:
 
 
 def _crowded(place: Array, good: NDArray, error: Array, apart: float) -> NDArray[np.bool_]:
-    """Points that have come to the place of another one: all but the best measured of them."""
+    """Points that coincide with another one, except the best measured of them."""
     out, known = np.zeros(len(place), bool), np.flatnonzero(good)
     better = error[known] <= error[known][:, np.newaxis]
     out[known] = ((distances(place[known]) < apart) & better).any(axis=1)
@@ -298,19 +299,19 @@ def _crowded(place: Array, good: NDArray, error: Array, apart: float) -> NDArray
 
 
 def _taken(place: Array, good: NDArray, found: NDArray, apart: float) -> NDArray[np.bool_]:
-    """Points found again where another corner is already."""
+    """Points found again at the position of another corner."""
     out, held = np.zeros(len(place), bool), np.flatnonzero(good | found)
     out[held] = (distances(place[held]) < apart).any(axis=1)
     return out & found
 
 
 def _only(these: NDArray[np.bool_], places: Array) -> Array:
-    """Places of these points, NaN for all others."""
+    """Positions of these points, NaN for all others."""
     return np.where(these[:, np.newaxis], places, np.nan)
 
 
 def _repeats(frame: NDArray[np.uint8], last: NDArray[np.uint8]) -> bool:
-    """Tell whether a frame is the same picture as the last one."""
+    """Whether a frame is the same picture as the last one."""
     if (frame[::16, ::16] != last[::16, ::16]).any():
         return False
     return bool((frame == last).all())

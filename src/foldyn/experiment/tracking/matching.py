@@ -1,7 +1,7 @@
-"""Which corner is which node: project the model, assign corners to nodes, look up all nodes.
+"""Match corners to nodes: project the model, assign corners to nodes, look up all nodes.
 
-A folded sheet looks much the same one cell further on. So placements are ranked by the nodes that
-are really there: edges must meet at each one's place in the picture.
+A folded sheet looks much the same when shifted by one cell. So placements are ranked by the nodes
+confirmed in the picture: edges must meet at a node's predicted position.
 """
 
 from __future__ import annotations
@@ -21,30 +21,30 @@ from foldyn.experiment.tracking.neighbors import Array, by_neighbors, distances
 from foldyn.experiment.tracking.view import View, fit_view, hidden_nodes
 from foldyn.values import number
 
-_TURNS = np.radians(np.arange(-12.0, 12.1, 4.0))  # of the image about the line of sight
-_SCALES = np.exp(np.linspace(-0.35, 0.35, 15))  # about the scale by size, where it is not known
-_STATES = 9  # of a path, that are tried before the best is refined
-_BEST = 6  # placements that are refined
-_FEWEST = 6  # matched nodes, without which a placement is chance
-_LEAST_SHARE = 0.5  # of the nodes that no panel hides
-_NEIGHBORS, _FIRMNESS = 6, 0.1  # whose places correct that of a node: `by_neighbors`
-_STRAY = 0.2  # of the nodes' spacing, by which a node may miss where its neighbors put it
+_TURNS = np.radians(np.arange(-12.0, 12.1, 4.0))  # rotations of the image about the line of sight
+_SCALES = np.exp(np.linspace(-0.35, 0.35, 15))  # range of scales about the one by size, if unknown
+_STATES = 9  # states of a path that are tried before the best is refined
+_BEST = 6  # number of placements that are refined
+_FEWEST = 6  # matched nodes, below which a placement is chance
+_LEAST_SHARE = 0.5  # share of the nodes that no panel hides
+_NEIGHBORS, _FIRMNESS = 6, 0.1  # neighbors whose positions correct a node: `by_neighbors`
+_STRAY = 0.2  # of the nodes' spacing, by which a node may deviate from its neighbors' prediction
 
 
 @dataclass(frozen=True)
 class Placing:
-    """How the camera sees the model, as far as the user says.
+    """What the user knows of the camera's view of the model.
 
     Attributes
     ----------
     up, facing : str
         Directions of the model that point up in the image and towards the camera.
     metres_per_pixel : float or None
-        In the plane of the model that is nearest to the camera; None: fitted.
+        Scale in the plane of the model nearest to the camera; None means fitted.
     distance : float or None
-        Of that plane from the camera (m); None: fitted.
+        Distance of that plane from the camera (m); None means fitted.
     axis : tuple of float or None
-        Pixel on the camera's axis; None: the middle of the whole image.
+        Pixel on the camera's axis; None means the middle of the whole image.
     """
 
     up: str = "-x"
@@ -67,21 +67,21 @@ class Match:
     Attributes
     ----------
     node : ndarray of int, shape (m,)
-        Nodes, rising, and
+        Nodes, increasing, and
     uv : ndarray, shape (m, 2)
-        where they are seen (pixels).
+        their pixels.
     view : View
     positions : ndarray, shape (n, 3)
         Positions of all nodes (m) in the state that fits best.
     state : float
-        Its place among the states: 2.5 is halfway between states 2 and 3.
+        Position of that state among the states: 2.5 is halfway between states 2 and 3.
     rms : float
         Root mean square distance between seen and projected nodes (pixels): how far the specimen
         differs from the model.
     seen : ndarray of bool, shape (n,)
         Nodes that no panel hides.
     expected : ndarray, shape (n, 2)
-        Where each node should be by its neighbors (pixels), measured or not.
+        Pixel of each node predicted by its neighbors, measured or not.
     """
 
     node: NDArray[np.int64]
@@ -107,27 +107,27 @@ def match_nodes(
 ) -> Match:
     """Recognize the nodes of a model in a picture.
 
-    The model is laid over the corners in every way that `placing` leaves open. The placements in
-    which most nodes fall on corners are refined by turns: assignment of nodes to corners (the
-    shortest total distance), then a fit of the view and the state. Nodes without a corner are
-    looked for where their neighbors put them. The placement with most nodes wins.
+    The model is tried over the corners in every way that `placing` leaves open. The placements with
+    most nodes on corners are refined by alternating the assignment of nodes to corners (shortest
+    total distance) and a fit of the view and the state. Nodes without a corner are searched for at
+    their neighbors' prediction. The placement with most nodes wins.
 
     Parameters
     ----------
     image : ndarray of uint8, shape (height, width)
     corners : ndarray, shape (p, 2)
-        Found in it (pixels).
+        Corners found in the image (pixels).
     states : ndarray, shape (k, n, 3)
-        Positions of all nodes (m) in the states in which the model may be, a path in order.
+        Positions of all nodes (m) in the possible states of the model, in the order of a path.
     triangles : ndarray, shape (m, 3)
-        Panels, to tell which nodes they hide.
+        Panels, which may hide nodes.
     nodes : ndarray of int
         Nodes that may be seen: the vertices of the pattern.
     placing : Placing
     reach : float
         Length of the edges that make a corner (pixels).
     place : str
-        What the picture is called in messages.
+        Name of the picture in messages.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def match_nodes(
     Raises
     ------
     InputError
-        Too few corners, or no placement in which enough nodes are there.
+        Too few corners, or no placement with enough nodes confirmed.
     """
     if len(corners) < _FEWEST:
         raise InputError(
@@ -160,7 +160,7 @@ def match_nodes(
 
 
 def _placements(uv: Array, states: Array, placing: Placing) -> list[tuple[View, int]]:
-    """The best ways to lay the model over the points, by how many nodes fall on a point."""
+    """Best placements of the model over the points, ranked by nodes that fall on a point."""
     tree = cKDTree(uv)
     axes = axes_of_view(placing.up, placing.facing)
     chosen = np.unique(np.linspace(0, len(states) - 1, _STATES).round().astype(int))
@@ -187,7 +187,7 @@ def _placements(uv: Array, states: Array, placing: Placing) -> list[tuple[View, 
 
 
 def _scales(uv: Array, seen: Array, placing: Placing) -> Array:
-    """Metres per pixel that are tried, in the middle plane of the model."""
+    """Scales to try (metres per pixel), in the middle plane of the model."""
     if placing.metres_per_pixel is not None:
         near = -seen[:, 2].min()
         deeper = 1.0 if placing.distance is None else 1.0 + near / placing.distance
@@ -197,7 +197,7 @@ def _scales(uv: Array, seen: Array, placing: Placing) -> Array:
 
 
 def _most_votes(uv: Array, flat: Array, tolerance: float) -> Array:
-    """Shift for which most nodes fall on points: every pair votes for its own."""
+    """Shift with most nodes on points; every pair votes for its own."""
     votes = (uv[:, np.newaxis] - flat).reshape(-1, 2)
     low = votes.min(axis=0)
     cell = np.floor((votes - low) / tolerance).astype(np.int64)
@@ -218,7 +218,7 @@ def _spacing(flat: Array) -> float:
 def _view_of(
     points: Array, axes: Array, scale: float, turn: float, shift: Array, placing: Placing
 ) -> View:
-    """The view of a placement, with the nearest plane of the model as that of the scale."""
+    """View of a placement, with the scale in the model's nearest plane."""
     middle = points.mean(axis=0)
     nearest = ((points - middle) @ axes[2]).min()
     distance = placing.distance or 1e3 * float(np.ptp(points, axis=0).max())
@@ -243,7 +243,7 @@ def _refined(
     placing: Placing,
     reach: float,
 ) -> Match | None:
-    """Assignment and fit by turns, then a look at the places of all nodes."""
+    """Alternate assignment and fit, then look up all nodes."""
     state, positions = float(index), states[index]
     known = placing.metres_per_pixel is not None, placing.distance is not None
     for part in (0.45, 0.35, 0.3, 0.25):
@@ -276,7 +276,7 @@ def _fitted(
     uv: Array,
     known: tuple[bool, bool],
 ) -> tuple[View, float, Array, float]:
-    """View, state, positions of all nodes in it, and what is left (pixels, rms)."""
+    """View, state, positions of all nodes in it, and the residual (pixels, rms)."""
     last = len(states) - 1
     ends = max(state - 3.0, 0.0), min(state + 3.0, float(last))
     around = np.stack([_between(states, end)[node] for end in ends]) if last else None
@@ -288,7 +288,7 @@ def _fitted(
 def _looked_up(
     image: NDArray[np.uint8], place: Array, flat: Array, asked: NDArray[np.int64], reach: float
 ) -> Array:
-    """Places of the nodes asked for: where their neighbors put them, if edges meet there."""
+    """Positions of requested nodes: at their neighbors' prediction, if edges meet there."""
     kept = _without_strays(place, flat, asked)
     expected = by_model(kept, flat, asked)
     missing = np.where(np.isfinite(kept), np.nan, expected)
@@ -296,15 +296,15 @@ def _looked_up(
     sure = np.isfinite(junctions.position[:, 0]) & (junctions.error < 0.5)
     for node in np.flatnonzero(sure):
         apart = np.hypot(*(kept - junctions.position[node]).T)
-        if not (apart < 0.5 * reach).any():  # or it is another node's
+        if not (apart < 0.5 * reach).any():  # otherwise it belongs to another node
             kept[node] = junctions.position[node]
     return kept
 
 
 def _without_strays(place: Array, flat: Array, asked: NDArray[np.int64]) -> Array:
-    """Places of the nodes but those that their neighbors contradict, the worst one first.
+    """Positions of nodes without those that contradict their neighbors, worst first.
 
-    One by one: a wrong place throws its neighbors out of line, too.
+    They are removed one by one, as a wrong position also disturbs its neighbors' prediction.
     """
     kept = np.full(place.shape, np.nan)
     kept[asked] = place[asked]
@@ -322,16 +322,16 @@ def _without_strays(place: Array, flat: Array, asked: NDArray[np.int64]) -> Arra
 
 
 def by_model(place: Array, flat: Array, asked: NDArray[np.int64]) -> Array:
-    """Places (n, 2) of the nodes asked for, by their neighbors' distance from the model's `flat`.
+    """Predict requested nodes (n, 2) from their neighbors' deviation from the model's `flat`.
 
-    NaN for all others, and where fewer than four others are known.
+    NaN for all others, and where fewer than four neighbors are known.
     """
     reference = np.broadcast_to(flat, (len(flat), *flat.shape))
     return by_neighbors(reference, place, asked, _NEIGHBORS, _FIRMNESS, robust=True)[0]
 
 
 def _between(states: Array, state: float) -> Array:
-    """State between two of a path."""
+    """Interpolated state between two of a path."""
     if len(states) == 1:
         return states[0]
     low = min(int(state), len(states) - 2)
@@ -341,7 +341,7 @@ def _between(states: Array, state: float) -> Array:
 def assign(nodes: Array, points: Array, limit: float) -> tuple[NDArray, NDArray]:
     """Pairs of nodes and points (pixels) with the shortest total distance, none above a limit."""
     distance = np.hypot(*(nodes[:, np.newaxis] - points).transpose(2, 0, 1))
-    # a node without a partner costs the limit: it takes none that is farther away
+    # leaving a node unpaired costs the limit, so no pair is farther apart
     padded = np.concatenate([np.minimum(distance, 1e6), np.full((len(nodes),) * 2, limit)], axis=1)
     rows, columns = linear_sum_assignment(padded)
     paired = columns < len(points)

@@ -1,4 +1,4 @@
-"""Where points should be in a picture: by the motion of their nearest neighbors."""
+"""Prediction of points in a picture from the motion of their nearest neighbors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def distances(points: Array) -> Array:
 
 
 def nearest(points: Array, index: int, others: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Those of the other points that are nearest to one, at most so many."""
+    """Nearest points to a given one, at most `count`."""
     return others[np.argsort(np.hypot(*(points[others] - points[index]).T))[:count]]
 
 
@@ -30,27 +30,27 @@ def by_neighbors(
     firmness: float,
     robust: bool = False,
 ) -> tuple[Array, Array]:
-    """Places of points by the affine motion of their neighbors since a reference picture.
+    """Predict points from the affine motion of their neighbors since a reference picture.
 
     Parameters
     ----------
     reference : ndarray, shape (n, n, 2)
-        For each point the places of all in its reference picture (pixels), NaN where not known.
+        For each point the positions of all in its reference picture (pixels), NaN if unknown.
     place : ndarray, shape (n, 2)
-        Places now, NaN where not known.
+        Current positions, NaN if unknown.
     asked : iterable of int
-        Points to place.
+        Points to predict.
     count : int
-        How many neighbors count.
+        Number of neighbors used.
     firmness : float
-        How firmly the gradient is held at zero: a row of neighbors leaves it open.
+        Regularization of the gradient towards zero: a row of neighbors does not determine it.
     robust : bool
-        Start from the median, so that one wrong neighbor does not carry all others away.
+        Start from the median, so that one wrong neighbor does not spoil the fit.
 
     Returns
     -------
     expected : ndarray, shape (n, 2)
-        NaN for points not asked for, and where fewer than four neighbors are known.
+        NaN for points not requested, and where fewer than four neighbors are known.
     distance : ndarray, shape (n,)
         Median distance of the neighbors in the reference picture.
     """

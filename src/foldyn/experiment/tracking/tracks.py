@@ -1,4 +1,4 @@
-"""From a film or photographs to the places of corners, and of the nodes of a model."""
+"""Tracks of corners, and of a model's nodes, from a film or photographs."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from foldyn.experiment.tracking.matching import Match, Placing, by_model, match_
 from foldyn.experiment.tracking.tracks_dataset import add_displacements, tracks_of
 from foldyn.experiment.tracking.view import TrackedModel, hidden_nodes
 
-_GUIDING = 6  # tracked nodes, without which the states of the model are no guide
-_WHOLE = 0.95  # share of the declared frames that a whole film has at least
+_GUIDING = 6  # tracked nodes, below which the model's states do not guide the search
+_WHOLE = 0.95  # least share of the declared frames in a complete film
 
 
 @dataclass(frozen=True)
 class Tracking:
-    """How a film or photographs are tracked.
+    """Settings for tracking a film or photographs.
 
     Attributes
     ----------
@@ -33,10 +33,10 @@ class Tracking:
     placing : Placing
         How the camera sees the model.
     match : {"first", "last"}
-        The frame in which the model's nodes are recognized: the one in which the specimen is in
-        one of the model's states.
+        Frame in which to recognize the model's nodes; the specimen must be in one of the model's
+        states there.
     nodes : tuple of int or None
-        Nodes that must be found; None: as many as there are.
+        Nodes that must be found; None means as many as possible.
     """
 
     corners: CornerSettings = field(default_factory=CornerSettings)
@@ -50,14 +50,14 @@ class Tracking:
             raise InputError(f'--match {self.match!r}: use "first" or "last"')
 
     def centered(self, size: tuple[int, ...], box: tuple[int, ...]) -> Tracking:
-        """The same, with the camera's axis in the middle of the image where none is given."""
+        """Copy with the camera's axis in the middle of the image if none is given."""
         if self.placing.axis is not None:
             return self
         u, v = (0.5 * (np.array(size) - 1.0) - np.array(box[:2])).tolist()
         return replace(self, placing=replace(self.placing, axis=(u, v)))
 
     def reach(self, shape: tuple[int, ...]) -> float:
-        """Length of the edges that make a corner (pixels); a given one must fit the picture."""
+        """Length of the edges that make a corner (pixels); refused if it does not fit."""
         reach, most = self.corners.reach_in(shape), 0.25 * min(shape)
         if self.corners.reach is not None and reach > most:
             raise InputError(
@@ -80,17 +80,17 @@ def track_film(
     ----------
     film : Film or path
     model : TrackedModel, optional
-        Recognized in the film: its nodes' displacements are given, too.
+        Model to recognize in the film; the result then includes its nodes' displacements.
     tracking : Tracking
     tell : callable, optional
-        Called with the number of each frame that is done.
+        Called with the number of each finished frame.
 
     Returns
     -------
     xarray.Dataset
         `position_px` (time, point, uv), pixels of the whole image, NaN where a point is lost;
         `error_px` (time, point), its standard error; `status` (time, point): 0 lost, 1 found
-        again, 2 tracked; `repeated` (time): the frame repeats the one before. With a model,
+        again, 2 tracked; `repeated` (time): the frame repeats the previous one. With a model,
         `displacement` (time, node, axis) in m from rest, NaN where lost and along the line of
         sight, `node_of_point` (point), -1 for none, and figures of quality of each node.
 
@@ -155,8 +155,8 @@ def track_photos(
 ) -> xr.Dataset:
     """Find the nodes of a model in photographs, one for each load.
 
-    In each photograph the model is recognized anew, in one of its states: nodes may have moved
-    farther than their distance from one photograph to the next.
+    The model is recognized separately in each photograph, in one of its states, since nodes may
+    move farther than their spacing between photographs.
 
     Parameters
     ----------
@@ -169,13 +169,13 @@ def track_photos(
     roi : tuple of int, optional
         Region of interest: column, row, width, height.
     tell : callable, optional
-        Called with the number of each photograph that is done.
+        Called with the number of each finished photograph.
 
     Returns
     -------
     xarray.Dataset
-        As `track_film` gives it, along the dimension `photo` instead of `time`, with the
-        coordinate `load` where loads are given.
+        As in `track_film`, along the dimension `photo` instead of `time`, with the coordinate
+        `load` if loads are given.
 
     Raises
     ------
@@ -221,11 +221,11 @@ def track_photos(
 
 
 def _guide_of(match: Match, model: TrackedModel) -> Guide:
-    """Guide for points of which the first ones are the vertices of the model, in order.
+    """Guide for points whose first ones are the model's vertices, in order.
 
-    In each frame the state whose projection lies nearest to the tracked nodes is taken, and what it
-    misses them by is carried over to each node from its neighbors. Lost nodes that a panel hides in
-    that state are not looked for.
+    In each frame it takes the state whose projection is nearest to the tracked nodes, and corrects
+    each node by its neighbors' residuals. Lost nodes that a panel hides in that state are not
+    searched for.
     """
     count, view = model.vertices, match.view
     flat = np.array([view.project(state[:count]) for state in model.states])
@@ -247,7 +247,7 @@ def _guide_of(match: Match, model: TrackedModel) -> Guide:
 
 
 def _check_length(film: Film, frames: int) -> None:
-    """Refuse a film of one frame, and warn of one that breaks off."""
+    """Refuse a film of one frame, and warn if a film ends early."""
     if frames < 2:
         raise InputError(f"{film.path}: one frame alone shows no motion; give a longer film")
     if frames < _WHOLE * film.declared:
@@ -282,7 +282,7 @@ def _matched(
 
 
 def _linked(steps: list[Step], match: Match, apart: float) -> NDArray[np.int64]:
-    """Node of each tracked point, by where both are in the last frame."""
+    """Node of each tracked point, by their positions in the last frame."""
     last = next(step for step in reversed(steps) if not step.repeated)
     nodes = np.full(len(last.position), -1)
     for node, uv in zip(match.node, match.uv, strict=True):
@@ -295,7 +295,7 @@ def _linked(steps: list[Step], match: Match, apart: float) -> NDArray[np.int64]:
 def _in_metres(
     ds: xr.Dataset, model: TrackedModel | None, matches: Sequence[Match], tracking: Tracking
 ) -> xr.Dataset:
-    """Add the displacements of the nodes, and what is known of the scale."""
+    """Add the displacements of the nodes, and the scale."""
     known = tracking.placing.metres_per_pixel
     if model is None:
         return ds.assign_attrs({} if known is None else {"metres_per_pixel": known})

@@ -1,4 +1,4 @@
-"""Tracks as a dataset: made from the steps of a film or of photographs, in metres, in files."""
+"""Datasets of tracks: made from the steps of a film or photographs, in metres, in files."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def tracks_of(
     size : tuple of int
         Width and height of the pictures (pixels).
     box : tuple of int
-        Region of interest, from which the steps' pixels are counted.
+        Region of interest, which is the origin of the steps' pixels.
     along : {"time", "photo"}
     """
     place, units = (along, "point"), {"units": "pixel"}
@@ -62,9 +62,9 @@ def tracks_of(
 def add_displacements(
     ds: xr.Dataset, model: TrackedModel, matches: Sequence[Match], placing: Placing
 ) -> xr.Dataset:
-    """Displacements from rest of the nodes that were tracked.
+    """Add displacements from rest of the tracked nodes.
 
-    Each node is taken to stay as far from the camera as it was where the model was recognized, at
+    Each node is assumed to keep its distance from the camera when the model was recognized,
     `camera_depth` along `camera_direction` from `camera_position`; the component along the line of
     sight is unknown (NaN). The camera must stand still.
 
@@ -74,7 +74,7 @@ def add_displacements(
         Of `tracks_of`.
     model : TrackedModel
     matches : sequence of Match
-        The one of the film, or one for each photograph.
+        One for the film, or one for each photograph.
     placing : Placing
 
     Returns
@@ -132,7 +132,7 @@ def add_displacements(
 
 
 def _longest_gaps(measured: np.ndarray) -> np.ndarray:
-    """Most frames in a row in which a node was not measured, shape (n,)."""
+    """Longest run of frames in which a node was not measured, shape (n,)."""
     frame = np.arange(1, len(measured) + 1)[:, np.newaxis]
     last = np.maximum.accumulate(np.where(measured, frame, 0), axis=0)
     return (frame - last).max(axis=0)
@@ -178,7 +178,7 @@ def write_csv(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """Write histories to a CSV file: one row for each frame or photograph.
 
     With a model the columns are the measured displacements of the nodes in m ("node 8 x [m]"),
-    else the pixels of the points ("point 3 u [px]"). What is lost is left empty.
+    else the pixels of the points ("point 3 u [px]"). Lost values are left empty.
     """
     columns = {"photo": ds["photo"]} if "photo" in ds.dims else {"time [s]": ds["time"]}
     if "load" in ds.coords:

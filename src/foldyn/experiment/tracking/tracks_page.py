@@ -41,17 +41,17 @@ FILLED = (
 
 @dataclass(frozen=True)
 class Footage:
-    """What tracks were found in.
+    """Film or photographs that were tracked.
 
     Parameters
     ----------
     files : sequence of str
     pictures : mapping of int to bytes
-        What the camera saw (JPEG or PNG), by the number of the frame or photograph.
+        Pictures (JPEG or PNG), by the number of the frame or photograph.
     figures : sequence of Picture
-        Figures of the model over it.
+        Figures of the model over the pictures.
     case : Case, optional
-        The model that was recognized.
+        The recognized model.
     settings : mapping of str to str
         Scale, region and others, in words.
     """
@@ -66,7 +66,7 @@ class Footage:
 def write_tracks_page(
     tracks: xr.Dataset, path: Path, footage: Footage, call: Call | None = None
 ) -> Path:
-    """Write the page of tracks; returns its path, that of the file with the suffix .html."""
+    """Write the page of tracks to the file with the suffix .html; return its path."""
     sections: list[Section | Stage] = []
     title = f"Tracks of {', '.join(Path(name).name for name in footage.files)}"
     if footage.case is not None and "displacement" in tracks:
@@ -86,9 +86,9 @@ def write_tracks_page(
 
 
 def spread(count: int, encoded: Callable[[int], bytes]) -> dict[int, bytes]:
-    """Pictures of a film evenly over it, as many as a page has room for, by their numbers.
+    """Pictures spread evenly over a film, as many as a page has room for, by number.
 
-    encoded : gives the file of a frame by its number.
+    encoded : returns the encoded picture of a frame, given its number.
     """
     first = encoded(0)
     kept = min(count, max(2, ROOM // max(len(first), 1)))
@@ -97,7 +97,7 @@ def spread(count: int, encoded: Callable[[int], bytes]) -> dict[int, bytes]:
 
 
 def most_moved(tracks: xr.Dataset) -> list[int]:
-    """Nodes that move most among those that were measured most of the time."""
+    """Nodes that move most among those measured most of the time."""
     moved = tracks["displacement"].values
     known = np.isfinite(moved)
     high = np.where(known, moved, -np.inf).max(axis=0)
@@ -108,10 +108,10 @@ def most_moved(tracks: xr.Dataset) -> list[int]:
 
 
 def filled(tracks: xr.Dataset) -> NDArray[np.float64]:
-    """Displacements (m) of all nodes at all samples, without gaps, shape (samples, n, 3).
+    """Displacements (m) of all nodes at all samples, gaps filled, shape (samples, n, 3).
 
-    Between samples by straight lines, between nodes by the mean of neighbors, 0 along the line of
-    sight.
+    Gaps are filled linearly in time, then by the mean of neighboring nodes, and by 0 along the line
+    of sight.
     """
     moved = np.array(tracks["displacement"].transpose(..., "node", "axis").values)
     samples = np.arange(len(moved))
@@ -128,7 +128,7 @@ def filled(tracks: xr.Dataset) -> NDArray[np.float64]:
     ones, shape = np.ones(len(i)), (len(seen), len(seen))
     near = sparse.coo_array((ones, (i, j)), shape=shape).tocsr()
     near = near + near.T
-    far = sparse.diags_array(near.sum(axis=1) + 1e-9) - near  # nodes without neighbors stay
+    far = sparse.diags_array(near.sum(axis=1) + 1e-9) - near  # nodes without neighbors stay at rest
     lost = np.flatnonzero(~seen)
     flat = out.transpose(1, 0, 2).reshape(len(seen), -1)
     pull = near[lost] @ flat
@@ -139,9 +139,9 @@ def filled(tracks: xr.Dataset) -> NDArray[np.float64]:
 def _stage(
     tracks: xr.Dataset, case: Case, nodes: list[int], title: str, pictures: Mapping[int, bytes]
 ) -> Stage:
-    """The sheet of the pattern's vertices as it was tracked, a path where there are photographs.
+    """Stage of the tracked sheet of the pattern's vertices; a path for photographs.
 
-    The camera is the one that sees the model where it was recognized.
+    Its camera is the one fitted when the model was recognized.
     """
     pattern, sheet = case.structure.pattern, case.structure.sheet
     vertices = Case(shell(pattern, sheet, divisions=1))
@@ -162,7 +162,7 @@ def _stage(
     seen, at = tracks["projected_px"].values, int(tracks.attrs.get("match_frame", 0))
     whole = places if along == "step" else places[at]
     backdrop = None
-    with suppress(InputError):  # a flat sheet does not show where the camera stands
+    with suppress(InputError):  # a flat sheet does not determine the camera
         width, height = (int(size) for size in tracks.attrs["size"])
         taken = {float(moments[number]): content for number, content in pictures.items()}
         camera = projection(whole.reshape(-1, 3), seen.reshape(-1, 2))
@@ -177,7 +177,7 @@ def _hidden(tracks: xr.Dataset) -> str:
 
 
 def _nodes(tracks: xr.Dataset) -> Table:
-    """How well each node was seen."""
+    """Table of the quality of each node's track."""
     error = tracks["error"].values if "error" in tracks else np.full(tracks.sizes["node"], np.nan)
     rows = [
         [node, 100.0 * share, gap, cell(1e3 * off)]
@@ -193,7 +193,7 @@ def _nodes(tracks: xr.Dataset) -> Table:
 
 
 def _found(tracks: xr.Dataset) -> list[tuple[str, str]]:
-    """What tracking says of the camera and of how the model was recognized."""
+    """Facts on the camera and on the recognition of the model."""
     a, along = tracks.attrs, "photo" if "photo" in tracks.dims else "time"
     count, what = tracks.sizes[along], "photographs" if along == "photo" else "frames"
     width, height = (int(size) for size in a["size"])

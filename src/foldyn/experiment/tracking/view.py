@@ -1,4 +1,4 @@
-"""A model and how a camera sees it: the pose that is fitted to corners, and the way back."""
+"""A camera's view of a model: the pose fitted to corners, and back-projection."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from foldyn.results.contents import check_variable
 Array = NDArray[np.float64]
 
 _MOST_STATES = 200
-FARTHEST = 1e4  # m: a camera from which lines of sight are parallel
+FARTHEST = 1e4  # m: a camera this far away has parallel lines of sight
 
 
 @brief
 @dataclass(frozen=True, eq=False)
 class TrackedModel:
-    """What tracking needs to know of a model: its nodes, its panels and its possible states.
+    """The model for tracking: its nodes, panels and possible states.
 
     Attributes
     ----------
     rest : ndarray, shape (n, 3)
         Positions of all nodes at rest (m), the vertices of the pattern first.
     states : ndarray, shape (k, n, 3)
-        Positions (m) in the states that the specimen may take, in the order of a path.
+        Positions (m) in the possible states of the specimen, in the order of a path.
     triangles : ndarray, shape (m, 3)
     vertices : int
         Number of the pattern's vertices: only they can be seen as corners.
@@ -48,7 +48,7 @@ class TrackedModel:
 
     @classmethod
     def of(cls, thing: Any) -> TrackedModel:
-        """Model of a case or structure, at rest, or of a result of `trace`, with all its states."""
+        """Model of a case or structure at rest, or of a result of `trace` with all its states."""
         if not isinstance(thing, xr.Dataset):
             structure = getattr(thing, "structure", thing)
             rest = np.asarray(structure.nodes, dtype=np.float64)
@@ -74,7 +74,7 @@ class TrackedModel:
 @brief
 @dataclass(frozen=True)
 class View:
-    """A camera so far away that the scale of one plane describes it.
+    """A distant camera, described by the scale in one plane.
 
     Points are seen at center + (right, down) / (metres_per_pixel (1 + depth / distance)), all
     relative to `origin`, whose plane has the scale; right, down and depth are along the rows of
@@ -91,9 +91,10 @@ class View:
     metres_per_pixel : float
         In the plane through `origin`.
     distance : float
-        Of that plane from the camera (m); infinite: depth does not change an object's size.
+        Distance of that plane from the camera (m); if infinite, depth does not change an object's
+        size.
     axis : ndarray, shape (2,)
-        Pixel at which the camera's axis meets the image: what is farther away appears closer to it.
+        Pixel at which the camera's axis meets the image; points farther away appear closer to it.
     """
 
     rotation: Array
@@ -123,7 +124,7 @@ class View:
         return self.origin + np.concatenate([seen, z], axis=-1) @ self.rotation
 
     def camera(self) -> Array:
-        """Position (3,), m, of the camera: at most `FARTHEST` away."""
+        """Position (3,), m, of the camera, at most `FARTHEST` away."""
         distance = min(self.distance, FARTHEST)
         aside = (self.axis - self.center) * self.metres_per_pixel
         return self.origin + np.append(aside, -distance) @ self.rotation
@@ -142,7 +143,7 @@ def fit_view(
     placed: bool,
     shapes: Array | None = None,
 ) -> tuple[View, float, float]:
-    """Fit a view to points and the pixels at which they are seen.
+    """Fit a view to points and their pixels.
 
     Parameters
     ----------
@@ -152,17 +153,17 @@ def fit_view(
         Positions in the model (m).
     uv : ndarray, shape (m, 2)
     scaled : bool
-        The scale is known, and kept,
+        Whether the scale is known and kept,
     placed : bool
         and so is the distance.
     shapes : ndarray, shape (2, m, 3), optional
-        Positions in the states before and after: then the state is fitted, too.
+        Positions in the previous and next states; the state is then fitted too.
 
     Returns
     -------
     view : View
     state : float
-        0 for `points`, to -1 for the state before and to 1 for that after.
+        0 for `points`, down to -1 for the previous state and up to 1 for the next.
     rms : float
         Root mean square of the distances between seen and projected (pixels).
     """
